@@ -1,0 +1,85 @@
+# Every target sets up what it needs: a virtual environment in .venv, then the project in it.
+# `make PYTHON=python3.12 test` chooses the interpreter.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+# No window is opened and no display is needed.
+export MPLBACKEND ?= Agg
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help venv demo test lint format types layers docs docs-live bench-smoke bench clean
+
+help:  ## Show this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+# ---------------------------------------------------------------- set-up
+
+$(BIN)/python:
+	@command -v "$(PYTHON)" >/dev/null 2>&1 || { \
+	  echo "make: no '$(PYTHON)' found: install Python 3.11 or later, or name one: make PYTHON=/path/to/python3.12" >&2; exit 1; }
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "make: piezoest needs Python 3.11 or later, '$(PYTHON)' is $$("$(PYTHON)" -V 2>&1): name another: make PYTHON=python3.12" >&2; exit 1; }
+	"$(PYTHON)" -m venv $(VENV)
+
+# One stamp for each set of extras; all are renewed when pyproject.toml changes.
+$(VENV)/.installed: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable .
+	@touch $@
+
+$(VENV)/.installed-%: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable ".[$*]"
+	@touch $@
+
+.PRECIOUS: $(VENV)/.installed-%
+
+venv: $(VENV)/.installed-dev  ## Set up .venv with everything a contributor needs
+
+# ---------------------------------------------------------------- use
+
+demo: $(VENV)/.installed  ## Run the demonstration: linear against adaptive compensation
+	$(BIN)/piezoest demo
+
+# ---------------------------------------------------------------- checks
+
+test: $(VENV)/.installed-test  ## Run the tests (ARGS="-k name" passes options to pytest)
+	$(BIN)/python -m pytest $(ARGS)
+
+lint: $(VENV)/.installed-lint  ## Check style and formatting
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(VENV)/.installed-lint  ## Mend what lint can mend by itself
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+types: $(VENV)/.installed-lint  ## Check the types of package and tests
+	$(BIN)/mypy
+
+layers: $(VENV)/.installed-test  ## Check that modules import only from the floors below them
+	$(BIN)/lint-imports --no-cache
+
+# ---------------------------------------------------------------- documentation
+
+docs: $(VENV)/.installed-docs  ## Build the documentation into docs/_build/html; a warning is an error
+	rm -rf docs/generated
+	$(BIN)/sphinx-build -W --keep-going -n -q -b html docs docs/_build/html
+	@echo "open docs/_build/html/index.html"
+
+docs-live: $(VENV)/.installed-docs-live  ## Serve the documentation and rebuild it on every change
+	$(BIN)/sphinx-autobuild --watch piezoest --ignore "docs/gallery/*" --ignore "docs/generated/*" docs docs/_build/live
+
+# ---------------------------------------------------------------- benchmarks
+
+bench-smoke: $(VENV)/.installed  ## Time the kernels against a NumPy loop, in under a minute
+	$(BIN)/python benchmarks/smoke.py
+
+bench: $(VENV)/.installed  ## The same on a longer signal, written to benchmarks/results/smoke.local.json
+	$(BIN)/python benchmarks/smoke.py --samples 200000 --repeats 7 --json benchmarks/results/smoke.local.json
+
+clean:  ## Remove builds, caches and generated pages, keep .venv
+	rm -rf build dist docs/_build docs/gallery docs/generated docs/sg_execution_times.rst
+	rm -rf .numba_cache .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find piezoest tests benchmarks -type d -name __pycache__ -prune -exec rm -rf {} +
