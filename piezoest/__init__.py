@@ -1,0 +1,5 @@
+"""Learn a piezo stage's hysteresis while it runs, and cancel it."""
+
+import lazy_loader as _lazy
+
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

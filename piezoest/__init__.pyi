@@ -1,0 +1,56 @@
+from . import models, policies, signals
+from ._version import __version__
+from .compensators import (
+    CompensatorStatus,
+    IntegralFeedback,
+    InverseCompensator,
+    LinearCompensator,
+    VoltageLimits,
+)
+from .estimators.base import Estimator, Status, Trace
+from .estimators.ekf import HysteresisEKF
+from .estimators.filterpy_baselines import FilterPyEKF, FilterPyUKF
+from .estimators.recursive_least_squares import RecursiveLeastSquares
+from .estimators.rls import HysteresisRLS
+from .identification import Identification, identify
+from .models import ColemanHodgdon, Creep, LinearGain, MassSpringDamper, PrandtlIshlinskii
+from .records import Record, read_record
+from .signals import Signal
+from .stage import Amplifier, Gauge, PaperStage, SimulatedStage
+from .tracking import TrackingRecord, track
+
+__all__ = [
+    "Amplifier",
+    "ColemanHodgdon",
+    "CompensatorStatus",
+    "Creep",
+    "Estimator",
+    "FilterPyEKF",
+    "FilterPyUKF",
+    "Gauge",
+    "HysteresisEKF",
+    "HysteresisRLS",
+    "Identification",
+    "IntegralFeedback",
+    "InverseCompensator",
+    "LinearCompensator",
+    "LinearGain",
+    "MassSpringDamper",
+    "PaperStage",
+    "PrandtlIshlinskii",
+    "Record",
+    "RecursiveLeastSquares",
+    "Signal",
+    "SimulatedStage",
+    "Status",
+    "Trace",
+    "TrackingRecord",
+    "VoltageLimits",
+    "__version__",
+    "identify",
+    "models",
+    "policies",
+    "read_record",
+    "signals",
+    "track",
+]

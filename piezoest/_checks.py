@@ -1,0 +1,100 @@
+"""Checks of arguments: every message names the argument, what came, and what to do."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# Beyond this, in V or µm, no stage goes: a sample that does is taken for missing.
+WILDEST = 1e9
+
+
+def finite(name: str, value: Any) -> float:
+    """Return `value` as a finite float.
+
+    Raises
+    ------
+    ValueError
+        If it is not one real, finite number.
+    """
+    if isinstance(value, (str, bytes)) or np.ndim(value) != 0:
+        raise ValueError(f"{name} must be one number, got {value!r}: pass a plain float")
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be one number, got {value!r}: pass a plain float") from None
+    if not math.isfinite(number):
+        raise ValueError(f"{name} must be finite, got {number}: check where it was computed")
+    return number
+
+
+def positive(name: str, value: Any) -> float:
+    """Return `value` as a float above zero."""
+    number = finite(name, value)
+    if number <= 0.0:
+        raise ValueError(f"{name} must be above zero, got {number:g}")
+    return number
+
+
+def non_negative(name: str, value: Any) -> float:
+    """Return `value` as a float of zero or more."""
+    number = finite(name, value)
+    if number < 0.0:
+        raise ValueError(f"{name} must be zero or more, got {number:g}")
+    return number
+
+
+def fraction(name: str, value: Any, low: float = 0.0, high: float = 1.0) -> float:
+    """Return `value` as a float within [low, high]."""
+    number = finite(name, value)
+    if not low <= number <= high:
+        raise ValueError(f"{name} must lie within [{low:g}, {high:g}], got {number:g}")
+    return number
+
+
+def integer(name: str, value: Any, minimum: int = 0) -> int:
+    """Return `value` as an int of at least `minimum`; 3.0 passes, 3.5 does not."""
+    number = finite(name, value)
+    if number != int(number) or number < minimum:
+        raise ValueError(f"{name} must be a whole number of at least {minimum}, got {value!r}")
+    return int(number)
+
+
+def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: int = 0) -> FloatArray:
+    """Return `value` as a contiguous float64 array of shape (N,).
+
+    Raises
+    ------
+    ValueError
+        If it has another number of dimensions, is not numeric, is shorter than
+        `minimum_length`, or holds NaN or infinity while `allow_nan` is false.
+    """
+    try:
+        array = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be numbers in shape (N,), got {type(value).__name__}") from None
+    if np.ndim(value) == 0 or array.ndim != 1:
+        shape = np.shape(value)
+        hint = ""
+        if len(shape) == 2 and shape[1] == 1:
+            hint = f": pass {name}[:, 0]"
+        elif len(shape) == 2 and shape[0] == 1:
+            hint = f": pass {name}[0]"
+        elif len(shape) == 0:
+            hint = ": use step() for single samples, or pass an array"
+        raise ValueError(f"{name} must have shape (N,), got {shape}{hint}")
+    if array.size < minimum_length:
+        raise ValueError(f"{name} needs at least {minimum_length} samples, got {array.size}")
+    if not allow_nan:
+        bad = np.flatnonzero(~np.isfinite(array))
+        if bad.size:
+            raise ValueError(
+                f"{name} holds {bad.size} values that are NaN or infinite (first at index {bad[0]}): "
+                "remove or interpolate them first"
+            )
+    return array

@@ -1,0 +1,4 @@
+"""The mathematics: each equation once, plain functions on numbers and flat arrays.
+
+Every function here runs as ordinary Python, inside a Numba loop and on CasADi symbols.
+"""

@@ -1,0 +1,81 @@
+"""Nearest admissible Coleman-Hodgdon parameters.
+
+The set below (1) of Eielsen et al. (2012): alpha > 0, beta > 0, alpha beta < gamma <= 2 alpha beta.
+Projection onto a linearised constraint in the metric of a covariance: D. Simon, Kalman
+filtering with state constraints, IET Control Theory Appl. 4 (2010) 1303-1318, sec. 2.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba.extending import register_jitable
+
+# Enough for the curved faces from anywhere within a factor of ten; the final clamp makes
+# the result admissible however far it came.
+_ITERATIONS = 8
+
+
+@register_jitable
+def is_admissible(alpha, beta, gamma, alpha_least, beta_least, margin):
+    """1.0 if (alpha, beta, gamma) lies inside the set by the margins, else 0.0."""
+    area = alpha * beta
+    return (
+        (alpha >= alpha_least)
+        * (beta >= beta_least)
+        * (gamma >= (1.0 + margin) * area)
+        * (gamma <= (2.0 - margin) * area)
+        * 1.0
+    )
+
+
+@register_jitable
+def _onto_least(theta, P, n, i, least):
+    """Move theta along P's column i until theta[i] >= least, the nearest point in P's metric."""
+    variance = P[i * n + i]
+    lack = np.fmax(least - theta[i], 0.0) / (variance + (variance == 0.0))
+    for j in range(n):
+        theta[j] = theta[j] + P[j * n + i] * lack
+
+
+@register_jitable
+def _onto_surface(theta, P, n, factor, side):
+    """Move theta to the nearest point with gamma = factor alpha beta, if it lies beyond by `side`."""
+    beyond = (side * (theta[2] - factor * theta[0] * theta[1]) > 0.0) * 1.0
+    alpha_0 = theta[0]
+    beta_0 = theta[1]
+    gamma_0 = theta[2]
+    alpha = alpha_0
+    beta = beta_0
+    multiplier = 0.0
+    for _ in range(_ITERATIONS):
+        g_alpha = -factor * beta
+        g_beta = -factor * alpha
+        value = gamma_0 + g_alpha * alpha_0 + g_beta * beta_0 + factor * alpha * beta
+        p_alpha = P[0] * g_alpha + P[1] * g_beta + P[2]
+        p_beta = P[n] * g_alpha + P[n + 1] * g_beta + P[n + 2]
+        p_gamma = P[2 * n] * g_alpha + P[2 * n + 1] * g_beta + P[2 * n + 2]
+        norm = g_alpha * p_alpha + g_beta * p_beta + p_gamma
+        multiplier = beyond * value / (norm + (norm == 0.0))
+        alpha = alpha_0 - p_alpha * multiplier
+        beta = beta_0 - p_beta * multiplier
+    for j in range(n):
+        theta[j] = theta[j] - multiplier * (
+            P[j * n] * -factor * beta + P[j * n + 1] * -factor * alpha + P[j * n + 2]
+        )
+
+
+@register_jitable
+def project_admissible(theta, P, n, alpha_least, beta_least, margin):
+    """Move theta (n,) in place to the nearest admissible point in the metric of P.
+
+    theta[:3] = (alpha, beta, gamma); further entries (an offset) move with them as P's
+    correlations say. P is flat (n*n,) and is not changed.
+    """
+    _onto_least(theta, P, n, 0, alpha_least)
+    _onto_least(theta, P, n, 1, beta_least)
+    _onto_surface(theta, P, n, 1.0 + margin, -1.0)
+    _onto_surface(theta, P, n, 2.0 - margin, 1.0)
+    theta[0] = np.fmax(theta[0], alpha_least)
+    theta[1] = np.fmax(theta[1], beta_least)
+    area = theta[0] * theta[1]
+    theta[2] = np.fmin(np.fmax(theta[2], (1.0 + margin) * area), (2.0 - margin) * area)

@@ -1,0 +1,24 @@
+"""Creep: slow first-order terms that add up to the logarithmic drift after a step.
+
+Source: K. Kuhnen, P. Krejci, Compensation of complex hysteresis and creep effects in
+piezoelectrically actuated systems, IEEE Trans. Autom. Control 54 (2009) 537-550; time
+constants a decade apart give x proportional to log t between the shortest and the longest.
+"""
+
+from __future__ import annotations
+
+from numba.extending import register_jitable
+
+
+@register_jitable
+def creep_step(z, w, gains, decays):
+    """x_creep = sum_i z[i] after one sample of tau_i z_i' = gains[i] w - z_i.
+
+    Exact for w held over the sample, decays[i] = exp(-dt/tau_i); `z` (n,) [µm] is updated
+    in place.
+    """
+    x = 0.0
+    for i in range(z.shape[0]):
+        z[i] = z[i] + (1.0 - decays[i]) * (gains[i] * w - z[i])
+        x = x + z[i]
+    return x

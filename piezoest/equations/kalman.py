@@ -1,0 +1,97 @@
+"""The extended Kalman filter's steps for a joint state of one hysteresis and its parameters.
+
+D. Simon, Optimal State Estimation (2006), sec. 13.2 and 5.3. The state is s = (w_h, a, b, c) or
+(w_h, a, b, c, offset): parameters are constant but for process noise, so that only the
+first row of the transition's Jacobian differs from the identity. A covariance P of n states
+is a flat array of n*n numbers in row order, updated in place and kept exactly symmetric.
+"""
+
+from __future__ import annotations
+
+from numba.extending import register_jitable
+
+
+@register_jitable
+def predict_covariance(P, row, q, n, work):
+    """P = F P F' + diag(q), F the identity but for its first `row` (n,); `work` has n numbers."""
+    corner = 0.0
+    for j in range(n):
+        total = 0.0
+        for i in range(n):
+            total = total + row[i] * P[i * n + j]
+        work[j] = total
+    for j in range(n):
+        corner = corner + work[j] * row[j]
+    for j in range(1, n):
+        P[j] = work[j]
+        P[j * n] = work[j]
+    P[0] = corner
+    for i in range(n):
+        P[i * n + i] = P[i * n + i] + q[i]
+
+
+@register_jitable
+def measure(s, h, n):
+    """h . s: the predicted measurement of a linear measurement."""
+    x = 0.0
+    for i in range(n):
+        x = x + h[i] * s[i]
+    return x
+
+
+@register_jitable
+def update(s, P, h, y, R, n, gain, work):
+    """Measurement update for one measurement; returns the innovation's variance S.
+
+    S = h P h' + R, K = P h'/S, s += K y, and Joseph's form of the covariance,
+    (I - K h) P (I - K h)' + K R K', row by row so that P stays symmetric. `gain` (n,)
+    receives K; `work` has n*n numbers.
+    """
+    S = R + 0.0
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total = total + P[i * n + j] * h[j]
+        gain[i] = total
+        S = S + h[i] * total
+    for i in range(n):
+        gain[i] = gain[i] / S
+    for i in range(n):
+        s[i] = s[i] + gain[i] * y
+    # work = (I - K h) P
+    for j in range(n):
+        total = 0.0
+        for i in range(n):
+            total = total + h[i] * P[i * n + j]
+        for i in range(n):
+            work[i * n + j] = P[i * n + j] - gain[i] * total
+    # P = work (I - K h)' + K R K'
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total = total + work[i * n + j] * h[j]
+        for j in range(i, n):
+            entry = work[i * n + j] - total * gain[j] + R * gain[i] * gain[j]
+            P[i * n + j] = entry
+            P[j * n + i] = entry
+    return S
+
+
+@register_jitable
+def project(s, P, g, least, n, work):
+    """Move s to the nearest point with g . s >= least in the metric of P; P is not changed.
+
+    D. Simon, IET Control Theory Appl. 4 (2010) 1303-1318, sec. 2.3. Returns 1.0 if it moved.
+    """
+    lack = least - measure(s, g, n)
+    outside = (lack > 0.0) * 1.0
+    norm = 0.0
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total = total + P[i * n + j] * g[j]
+        work[i] = total
+        norm = norm + g[i] * total
+    for i in range(n):
+        s[i] = s[i] + outside * work[i] * lack / (norm + (norm == 0.0))
+    return outside

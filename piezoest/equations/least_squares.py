@@ -1,0 +1,157 @@
+"""Recursive least squares: Appendix A of the paper in its two time bases.
+
+Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), (A1)-(A7), after
+Ioannou and Sun, Robust Adaptive Control, ch. 4. A covariance P of n parameters is a flat
+array of n*n numbers in row order, updated in place and kept exactly symmetric.
+
+Symbols: theta parameters, phi regressor, z output, R variance of its noise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest.equations.integrators import NODES, WEIGHTS
+
+
+@register_jitable
+def predicted_output(theta, phi, n):
+    """theta . phi (A2)."""
+    z = 0.0
+    for i in range(n):
+        z = z + theta[i] * phi[i]
+    return z
+
+
+@register_jitable
+def covariance_times(P, phi, n, out):
+    """Write P phi into `out` (n,) and return phi' P phi, the n_s² of (A7)."""
+    quadratic = 0.0
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total = total + P[i * n + j] * phi[j]
+        out[i] = total
+        quadratic = quadratic + phi[i] * total
+    return quadratic
+
+
+@register_jitable
+def trace(P, n):
+    """Trace of P: the norm ||P|| of (A6) here (for P > 0 at least the spectral norm)."""
+    total = 0.0
+    for i in range(n):
+        total = total + P[i * n + i]
+    return total
+
+
+@register_jitable
+def discrete_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
+    """One sample of recursive least squares; returns the innovation y and its variance S.
+
+    With mu = `forgetting` (mu = exp(-dt/memory) forgets as (A4) does):
+    S = phi' P phi / mu + R, K = P phi / (mu S), theta += K y, P = (P - K phi' P) / mu.
+    P keeps its value where the update would take its trace above `bound` (R0 of A6; unlike
+    (A6) to the letter this cannot freeze P for good). With `enable` 0.0 nothing changes.
+    `work` (n,) holds P phi.
+    """
+    y = z - predicted_output(theta, phi, n)
+    quadratic = covariance_times(P, phi, n, work)
+    gain = enable / (quadratic + forgetting * R)
+    size = 0.0
+    removed = 0.0
+    for i in range(n):
+        theta[i] = theta[i] + work[i] * gain * y
+        size = size + P[i * n + i]
+        removed = removed + work[i] * work[i]
+    within = ((size - removed * gain) <= bound * forgetting) * enable
+    shrink = within * gain
+    grow = 1.0 + within * (1.0 / forgetting - 1.0)
+    for i in range(n):
+        for j in range(i, n):
+            entry = (P[i * n + j] - shrink * work[i] * work[j]) * grow
+            P[i * n + j] = entry
+            P[j * n + i] = entry
+    return y, quadratic / forgetting + R
+
+
+@register_jitable
+def continuous_rates(theta, P, phi, z, n, forgetting_rate, normalised, theta_rate, P_rate, work):
+    """d theta/dt (A5) and dP/dt (A6, inside the bound) with m² of (A7), or m² = 1 if not normalised."""
+    m_squared = 1.0 + normalised * covariance_times(P, phi, n, work)
+    epsilon = (z - predicted_output(theta, phi, n)) / m_squared
+    for i in range(n):
+        theta_rate[i] = work[i] * epsilon
+        for j in range(i, n):
+            entry = forgetting_rate * P[i * n + j] - work[i] * work[j] / m_squared
+            P_rate[i * n + j] = entry
+            P_rate[j * n + i] = entry
+
+
+@register_jitable
+def continuous_update(theta, P, phi, z, n, h, forgetting_rate, normalised, bound, enable, work):
+    """A step h of (A5)-(A7) by Bogacki and Shampine, phi and z held over it; returns (y, S).
+
+    y = z - theta . phi and S = 1 + phi' P phi, both before the step. As in (A6), P moves only
+    while ||P|| <= `bound`, or where the step makes it smaller. `work` has n + 4 (n + n*n)
+    numbers.
+    """
+    m = n + n * n
+    product = work[:n]
+    slope = work[n : n + m]
+    total = work[n + m : n + 2 * m]
+    stage = work[n + 2 * m : n + 3 * m]
+    y = z - predicted_output(theta, phi, n)
+    S = 1.0 + covariance_times(P, phi, n, product)
+    for i in range(m):
+        slope[i] = 0.0
+        total[i] = 0.0
+    for k in range(3):
+        for i in range(n):
+            stage[i] = theta[i] + NODES[k] * h * slope[i]
+        for i in range(n * n):
+            stage[n + i] = P[i] + NODES[k] * h * slope[n + i]
+        continuous_rates(
+            stage[:n], stage[n:m], phi, z, n, forgetting_rate, normalised, slope[:n], slope[n:m], product
+        )
+        for i in range(m):
+            total[i] = total[i] + WEIGHTS[k] * slope[i]
+    size = trace(P, n)
+    growth = h * trace(total[n:m], n)
+    within = np.fmin((size + growth <= bound) * 1.0 + (growth <= 0.0) * 1.0, 1.0) * enable
+    for i in range(n):
+        theta[i] = theta[i] + enable * h * total[i]
+    for i in range(n * n):
+        P[i] = P[i] + within * h * total[n + i]
+    return y, S
+
+
+@register_jitable
+def above_floor(P, n, floor, work):
+    """1.0 if every eigenvalue of P exceeds `floor`, else 0.0: Cholesky on P - floor I.
+
+    Exact for the price of n³/6 products; `work` has n*n numbers.
+    """
+    positive = 1.0
+    for j in range(n):
+        pivot = P[j * n + j] - floor
+        for k in range(j):
+            pivot = pivot - work[j * n + k] * work[j * n + k]
+        positive = positive * (pivot > 0.0)
+        # A pivot that failed still needs a finite root for the columns after it.
+        root = np.sqrt(np.fmax(pivot, 1e-300))
+        work[j * n + j] = root
+        for i in range(j + 1, n):
+            entry = P[i * n + j]
+            for k in range(j):
+                entry = entry - work[i * n + k] * work[j * n + k]
+            work[i * n + j] = entry / root
+    return positive
+
+
+@register_jitable
+def restore_covariance(P, P_0, n, reset):
+    """Covariance resetting: P = P_0 where `reset` is 1.0 (Ioannou and Sun, sec. 4.3.6)."""
+    for i in range(n * n):
+        P[i] = P[i] + reset * (P_0[i] - P[i])

@@ -1,0 +1,58 @@
+"""The play operator, the Prandtl-Ishlinskii operator and its exact inverse.
+
+Sources: M. A. Krasnosel'skii, A. V. Pokrovskii, *Systems with Hysteresis*, Springer 1989
+(play); P. Krejci, K. Kuhnen, Inverse control of systems with hysteresis and creep, IEE
+Proc. Control Theory Appl. 148 (2001) 185-192 (the operator and its inverse).
+Symbols: voltage u [V], play states y [V], thresholds r [V], displacement w [µm].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba.extending import register_jitable
+
+
+@register_jitable
+def play(y, u, r):
+    """Next state of the play of threshold r: max(u - r, min(u + r, y))."""
+    return np.fmax(u - r, np.fmin(u + r, y))
+
+
+# Inlined, because a call counts references to each array: 50 ns per sample otherwise.
+@register_jitable(inline="always")
+def prandtl_ishlinskii_step(y, u, gain, thresholds, weights):
+    """w = gain u + sum_i weights[i] play_i[u]; the states `y` (n,) are updated in place."""
+    # Two loops: the first has no dependence between its turns and runs on vector
+    # instructions, which a sum in the same loop would forbid (276 ns become 122 for n = 70).
+    for i in range(y.shape[0]):
+        y[i] = play(y[i], u, thresholds[i])
+    w = gain * u
+    for i in range(y.shape[0]):
+        w = w + weights[i] * y[i]
+    return w
+
+
+@register_jitable(inline="always")
+def prandtl_ishlinskii_inverse_step(y, w, gain, thresholds, weights):
+    """The u for which `prandtl_ishlinskii_step` gives w; `y` (n,) is updated in place.
+
+    Seen from the states y, w is a piecewise linear function of u: between the breakpoints
+    y[0] - r[0] and y[0] + r[0] no play moves and its slope is the gain; each breakpoint
+    y[i] ± r[i] passed on the way out adds weights[i]. For sorted thresholds the breakpoints
+    come in the order of i, so one walk finds u: go on along the slope before breakpoint i,
+    then shorten what lies beyond it by the ratio of the slopes. Needs sorted thresholds,
+    states that an input can have left behind (|y[i] - y[j]| <= |r[i] - r[j]|), and
+    gain + weights[0] + … + weights[i] > 0 for every i.
+    """
+    held = 0.0
+    for i in range(y.shape[0]):
+        held = held + weights[i] * y[i]
+    u = (w - held) / gain
+    slope = gain
+    for i in range(y.shape[0]):
+        slope = slope + weights[i]
+        beyond = np.fmax(u - (y[i] + thresholds[i]), 0.0) + np.fmin(u - (y[i] - thresholds[i]), 0.0)
+        u = u - beyond * (weights[i] / slope)
+    for i in range(y.shape[0]):
+        y[i] = play(y[i], u, thresholds[i])
+    return u

@@ -1,0 +1,90 @@
+"""What every model has: named parameters with units, a vector form and a dictionary form."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from piezoest._checks import FloatArray, array_1d, finite
+
+
+class Model(ABC):
+    """Base of the models of a stage: voltage u [V] to displacement x [µm].
+
+    A model is a frozen dataclass; the fields named in `parameter_names` make up `theta`.
+    """
+
+    __slots__ = ()
+
+    parameter_names: ClassVar[tuple[str, ...]] = ()
+    parameter_units: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    @abstractmethod
+    def is_admissible(self) -> bool:
+        """Whether displacement rises with voltage and the inverse exists."""
+
+    @property
+    def theta(self) -> FloatArray:
+        """Parameters in the order of `parameter_names`, shape (n,)."""
+        return np.array([getattr(self, name) for name in self.parameter_names], dtype=np.float64)
+
+    @classmethod
+    def from_theta(cls, theta: Any, offset: float = 0.0) -> Self:
+        """Make the model from its parameter vector.
+
+        Parameters
+        ----------
+        theta : array_like, shape (n,)
+            Parameters in the order and units of `parameter_names`.
+        offset : float
+            Displacement at zero voltage and no hysteresis [µm].
+
+        Raises
+        ------
+        ValueError
+            If the length is wrong or a value is not finite.
+        """
+        values = array_1d("theta", theta)
+        if values.size != len(cls.parameter_names):
+            raise ValueError(
+                f"theta must hold {len(cls.parameter_names)} parameters "
+                f"({', '.join(cls.parameter_names)}), got {values.size}"
+            )
+        return cls(*(float(value) for value in values), offset=float(offset))  # type: ignore[call-arg]
+
+    def _check_finite(self) -> None:
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            object.__setattr__(self, field.name, finite(field.name, getattr(self, field.name)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a JSON-safe dictionary with the class name under ``"model"``."""
+        return {"model": type(self).__name__, **dataclasses.asdict(self)}  # type: ignore[call-overload]
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Self:
+        """Make the model from what `to_dict` gave.
+
+        Parameters
+        ----------
+        data : dict
+            The dictionary; ``"model"``, if there, must name this class.
+
+        Raises
+        ------
+        ValueError
+            If a field is missing or unknown, or the dictionary is of another model.
+        """
+        fields = {key: value for key, value in data.items() if key != "model"}
+        if data.get("model", cls.__name__) != cls.__name__:
+            raise ValueError(f"data is of a {data['model']}, not of a {cls.__name__}")
+        known = {field.name for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
+        if unknown := sorted(set(fields) - known):
+            raise ValueError(f"data has unknown fields {unknown}: {cls.__name__} has {sorted(known)}")
+        try:
+            return cls(**fields)
+        except TypeError as error:
+            raise ValueError(f"data does not describe a {cls.__name__}: {error}") from None

@@ -1,0 +1,238 @@
+"""`Signal`, the samples of a trajectory with their sample rate and period, and the test for jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
+
+from piezoest._checks import FloatArray, array_1d, finite, integer, non_negative, positive
+
+# An increment is a jump when it is both a visible part of the range and out of proportion to what
+# happens around it (see check_continuity).
+JUMP_FRACTION_OF_RANGE = 0.05
+JUMP_RATIO = 20.0
+NEIGHBOURS_ON_EACH_SIDE = 5
+NEIGHBOURS_ALIKE = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Signal:
+    """Samples with a sample rate, and a period if there is one.
+
+    Behaves as an array where one is wanted (`np.asarray(signal)`, `signal - x`, slices, iteration in plain
+    floats). `signal.then(other)` and `signal + other` append; `2 * signal` scales; `signal.shifted(1.0)` adds
+    an offset. Signals compare by identity.
+
+    Parameters
+    ----------
+    values : array_like, shape (N,)
+        Samples, finite, in µm (a reference) or V (a voltage). Copied.
+    sample_rate : float
+        Samples per second, Hz.
+    period : float, optional
+        Samples per period, not necessarily whole. None: not periodic.
+    name : str
+        For labels and messages.
+
+    Raises
+    ------
+    ValueError
+        If `values` is empty, not of shape (N,), or holds NaN or infinity; if `sample_rate` or `period`
+        is not above zero.
+    """
+
+    values: FloatArray
+    sample_rate: float
+    period: float | None = None
+    name: str = "signal"
+
+    def __post_init__(self) -> None:
+        # The copy stays writable: Numba compiles its loops a second time for read-only arrays.
+        values = array_1d("values", self.values, minimum_length=1).copy()
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "sample_rate", positive("sample_rate", self.sample_rate))
+        if self.period is not None:
+            object.__setattr__(self, "period", positive("period", self.period))
+
+    def __len__(self) -> int:
+        return int(self.values.size)
+
+    def __iter__(self) -> Iterator[float]:
+        # Plain floats: per-sample loops run about twice as fast on them as on NumPy scalars.
+        return iter(self.values.tolist())
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.values[index]
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Any:
+        return np.array(self.values, dtype=dtype, copy=copy)
+
+    def __repr__(self) -> str:
+        period = "" if self.period is None else f", period {self.period:g} samples"
+        return (
+            f"Signal({self.name!r}, {len(self)} samples at {self.sample_rate:g} Hz{period}, "
+            f"amplitude {self.amplitude:g})"
+        )
+
+    @property
+    def time(self) -> FloatArray:
+        """Time of each sample, shape (N,), s, from zero."""
+        return np.arange(len(self)) / self.sample_rate
+
+    @property
+    def duration(self) -> float:
+        """Number of samples over the sample rate, s."""
+        return len(self) / self.sample_rate
+
+    @property
+    def amplitude(self) -> float:
+        """Largest absolute value, in the unit of the values."""
+        return float(np.max(np.abs(self.values)))
+
+    def repeat(self, n: int) -> Signal:
+        """Return the signal `n` times in a row.
+
+        The period is kept if the signal is a whole number of periods long; otherwise the phase
+        breaks at the joints and the result has no period.
+
+        Raises
+        ------
+        ValueError
+            If `n` is not a whole number of at least 1.
+        """
+        n = integer("n", n, 1)
+        period = self.period
+        if n > 1 and period is not None:
+            periods = len(self) / period
+            if abs(periods - round(periods)) > 1e-9 * periods:
+                period = None
+        return Signal(np.tile(self.values, n), self.sample_rate, period, self.name)
+
+    def then(self, other: Signal) -> Signal:
+        """Return this signal followed by `other`; the period is kept if both have the same one.
+
+        A difference between the last and the first value becomes a jump: `require_continuous` finds it.
+
+        Raises
+        ------
+        ValueError
+            If the sample rates differ.
+        """
+        if other.sample_rate != self.sample_rate:
+            raise ValueError(
+                f"other must have the same sample rate, {self.sample_rate:g} Hz, got "
+                f"{other.sample_rate:g} Hz: build both signals with one sample_rate"
+            )
+        period = self.period if self.period == other.period else None
+        name = self.name if self.name == other.name else f"{self.name} + {other.name}"
+        return Signal(np.concatenate([self.values, other.values]), self.sample_rate, period, name)
+
+    def __add__(self, other: object) -> Signal:
+        """Append another signal (`then`); an offset is added with `shifted`."""
+        if not isinstance(other, Signal):
+            return NotImplemented
+        return self.then(other)
+
+    def __mul__(self, factor: object) -> Signal:
+        """Scale by a number; `np.float64(2) * signal` is NumPy's product, a plain array."""
+        if not isinstance(factor, Real):
+            return NotImplemented
+        return Signal(finite("factor", factor) * self.values, self.sample_rate, self.period, self.name)
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> Signal:
+        return self * -1.0
+
+    def shifted(self, offset: float) -> Signal:
+        """Return the signal plus a constant.
+
+        Raises
+        ------
+        ValueError
+            If `offset` is not a finite number.
+        """
+        return Signal(self.values + finite("offset", offset), self.sample_rate, self.period, self.name)
+
+    def require_continuous(self, *, allowed_step: float = 0.0) -> Signal:
+        """Return the signal itself if it has no jumps; see `check_continuity`.
+
+        Raises
+        ------
+        ValueError
+            If the signal jumps.
+        """
+        check_continuity(self.values, self.sample_rate, self.name, allowed_step=allowed_step)
+        return self
+
+
+def check_continuity(
+    values: ArrayLike, sample_rate: float | None = None, name: str = "signal", *, allowed_step: float = 0.0
+) -> None:
+    """Refuse samples with jumps, which the Coleman-Hodgdon model cannot take.
+
+    The model is defined for continuous inputs with a bounded derivative (paper, below (1)): "not unfiltered
+    steps and square-waves". Samples are never continuous, so the test is one of proportion. The increment
+    between two samples is a jump if it is
+
+    - larger than 5 % of the peak-to-peak range, and
+    - alone: fewer than three of the five increments before it and the five after it reach a twentieth
+      of its size (at the ends of the record: fewer than all, if there are only one or two).
+
+    A rise therefore has to spread over at least four samples. Coarse sampling passes, because there
+    neighbouring increments are alike: a sine of 50 samples a period, even of 5, or white noise. So do a
+    dwell followed by a ramp and a quantised slow signal (steps below 5 % of the range). Square waves,
+    staircases of up to 20 steps, unfiltered PRBS and single-sample spikes are refused: the increments
+    around theirs are zero or small. Where the signal starts from is not judged.
+
+    Parameters
+    ----------
+    values : array_like, shape (N,)
+        Samples, in any unit.
+    sample_rate : float, optional
+        Hz, for the time in the message.
+    name : str
+        What the message calls the values.
+    allowed_step : float
+        Steps up to this size, in the unit of the values, always pass: the step of a quantiser, for a
+        recorded signal that moves by only a few of them.
+
+    Raises
+    ------
+    ValueError
+        If there is a jump; the message says where, and what to do instead. If `values` is not of shape
+        (N,) or not finite.
+    """
+    values = array_1d(name, values)
+    allowed_step = non_negative("allowed_step", allowed_step)
+    if values.size < 3:
+        return
+    increments = np.abs(np.diff(values))
+    extent = float(np.ptp(values))
+    candidates = np.flatnonzero(increments > max(JUMP_FRACTION_OF_RANGE * extent, allowed_step))
+    if candidates.size == 0:
+        return
+    padding = np.full(NEIGHBOURS_ON_EACH_SIDE, np.nan)
+    padded = np.concatenate([padding, increments, padding])
+    around = np.delete(np.arange(2 * NEIGHBOURS_ON_EACH_SIDE + 1), NEIGHBOURS_ON_EACH_SIDE)
+    neighbours = padded[candidates[:, None] + around]
+    present = np.sum(np.isfinite(neighbours), axis=1)
+    alike = np.sum(JUMP_RATIO * neighbours >= increments[candidates, None], axis=1)
+    jumps = candidates[alike < np.minimum(present, NEIGHBOURS_ALIKE)]
+    if jumps.size == 0:
+        return
+    first = int(jumps[0])
+    size = float(increments[first])
+    time = "" if sample_rate is None else f" (t = {(first + 1) / positive('sample_rate', sample_rate):g} s)"
+    others = f", and {jumps.size - 1} more like it" if jumps.size > 1 else ""
+    raise ValueError(
+        f"{name} jumps by {size:.4g} ({100.0 * size / extent:.0f} % of its range) between samples {first} "
+        f"and {first + 1}{time}{others}: the Coleman-Hodgdon model needs a "
+        "continuous input; use signals.filtered_steps(...) or signals.prbs(...), or low-pass the samples "
+        "first"
+    )

@@ -1,0 +1,73 @@
+"""The admissible set and its nearest point."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+
+from piezoest import ColemanHodgdon
+from piezoest.equations.admissible import is_admissible, project_admissible
+
+THETA = np.array([0.021, 0.147, 0.0043])
+
+
+@given(st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3), st.integers(0, 2**32 - 1))
+def test_projection_is_admissible(factors: list[float], seed: int) -> None:
+    theta = THETA * np.array(factors)
+    L = np.random.default_rng(seed).normal(size=(3, 3)) * THETA[:, None]
+    project_admissible(theta, (L @ L.T).ravel(), 3, 1e-4, 1e-3, 1e-3)
+    assert is_admissible(theta[0], theta[1], theta[2], 1e-4, 1e-3, 0.999e-3) == 1.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_projection_is_the_nearest_point(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    theta = THETA * np.exp(rng.normal(0.0, 0.25, 3))
+    theta[2] = THETA[2] * rng.choice([0.6, 2.5])
+    L = (np.eye(3) + 0.3 * rng.normal(size=(3, 3))) * THETA[:, None]
+    W = np.linalg.inv(L @ L.T)
+    projected = theta.copy()
+    project_admissible(projected, (L @ L.T).ravel(), 3, 1e-4, 1e-3, 1e-6)
+
+    def distance(parts: object) -> float:
+        difference = np.asarray(parts) * THETA - theta
+        return float(difference @ W @ difference)
+
+    best = minimize(
+        distance,
+        projected / THETA,
+        method="SLSQP",
+        constraints=[
+            {
+                "type": "ineq",
+                "fun": lambda q: (q[2] * THETA[2] - q[0] * THETA[0] * q[1] * THETA[1]) / THETA[2],
+            },
+            {
+                "type": "ineq",
+                "fun": lambda q: (2 * q[0] * THETA[0] * q[1] * THETA[1] - q[2] * THETA[2]) / THETA[2],
+            },
+        ],
+        bounds=[(1e-2, None)] * 3,
+        options={"ftol": 1e-14, "maxiter": 500},
+    )
+    assert distance(projected / THETA) <= best.fun * 1.02 + 1e-6
+
+
+def test_further_parameters_move_as_their_correlation_says() -> None:
+    theta = np.array([0.02, 0.15, 0.0075, 1.0])
+    P = np.diag([0.02, 0.15, 0.004, 1.0]) ** 2
+    P[2, 3] = P[3, 2] = 0.5 * 0.004
+    project_admissible(theta, P.ravel(), 4, 1e-4, 1e-3, 1e-3)
+    assert theta[3] < 1.0
+
+
+def test_admissible_model_is_its_own_nearest() -> None:
+    model = ColemanHodgdon(0.02, 0.12, 0.0036)
+    assert model.is_admissible
+    assert model.nearest_admissible() is model
+    assert not ColemanHodgdon(0.02, 0.12, 0.0056).is_admissible
+    assert ColemanHodgdon(0.02, 0.12, 0.0056).nearest_admissible().is_admissible
+    assert ColemanHodgdon(-0.02, 0.12, 0.0056).nearest_admissible().is_admissible

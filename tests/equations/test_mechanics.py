@@ -1,0 +1,78 @@
+"""The mass-spring-damper, discretised exactly."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numba import njit
+from scipy.integrate import solve_ivp
+from scipy.signal import cont2discrete
+
+from piezoest.equations.mechanics import mechanics_coefficients, mechanics_step
+
+
+def continuous(frequency: float, damping: float) -> tuple[Any, Any]:
+    omega = 2.0 * np.pi * frequency
+    return np.array([[0.0, 1.0], [-(omega**2), -2.0 * damping * omega]]), np.array([[0.0], [omega**2]])
+
+
+@given(st.floats(10.0, 5000.0), st.one_of(st.floats(0.0, 3.0), st.just(1.0)))
+def test_coefficients_are_the_held_discretisation(frequency: float, damping: float) -> None:
+    dt = 2e-5
+    a, b = continuous(frequency, damping)
+    a_d, b_d, *_ = cont2discrete((a, b, np.eye(2), np.zeros((2, 1))), dt)
+    a11, a12, a21, a22, b1, b2 = mechanics_coefficients(frequency, damping, dt)
+    scale = np.array([1.0, 2.0 * np.pi * frequency])  # velocities in units of omega µm/s
+    np.testing.assert_allclose(
+        np.array([[a11, a12], [a21, a22]]) * scale / scale[:, None], a_d * scale / scale[:, None], atol=1e-11
+    )
+    np.testing.assert_allclose(np.array([b1, b2]) / scale, b_d[:, 0] / scale, atol=1e-11)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.02, 1.0, 1.0 + 1e-9, 2.5])
+def test_solves_the_differential_equation(damping: float) -> None:
+    dt, frequency = 2e-4, 780.0
+    a, b = continuous(frequency, damping)
+    coefficients = mechanics_coefficients(frequency, damping, dt)
+    state, expected = np.zeros(2), np.zeros(2)
+    for f in (1.0, 1.0, -2.0, 0.5, 0.5, 3.0):
+        x = mechanics_step(state, f, coefficients)
+        solution = solve_ivp(
+            lambda t, y, f=f: a @ y + b[:, 0] * f,
+            (0.0, dt),
+            expected,
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-12,
+        )
+        expected = solution.y[:, -1]
+        assert x == pytest.approx(expected[0], abs=1e-9)
+
+
+def test_static_gain_is_one_and_rest_is_kept() -> None:
+    coefficients = mechanics_coefficients(780.0, 0.02, 2e-5)
+    state = np.array([4.0, 0.0])
+    for _ in range(1000):
+        mechanics_step(state, 4.0, coefficients)
+    assert state[0] == pytest.approx(4.0, abs=1e-12)
+
+
+def test_numpy_numba_and_casadi_agree() -> None:
+    coefficients = mechanics_coefficients(780.0, 0.02, 2e-5)
+    casadi.GlobalOptions.setNumpyMode(1)
+    s, f = casadi.SX.sym("s", 2), casadi.SX.sym("f")
+    after = casadi.SX(s)
+    symbolic = casadi.Function("g", [s, f], [mechanics_step(after, f, coefficients), after])
+    compiled = njit(mechanics_step)
+    plain, jitted, traced = np.zeros(2), np.zeros(2), np.zeros(2)
+    for value in (1.0, -3.0, 2.5):
+        expected = mechanics_step(plain, value, coefficients)
+        assert compiled(jitted, value, coefficients) == expected
+        by_casadi, state = symbolic(traced, value)
+        traced = np.array(state).ravel()
+        assert float(by_casadi) == pytest.approx(expected, rel=1e-14)

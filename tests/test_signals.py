@@ -1,0 +1,470 @@
+"""Signals: shapes, continuity, the paper's PRBS, periods, and the refusal of jumps."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from piezoest import signals
+from piezoest.signals import Signal, check_continuity
+
+FS = 50_000.0
+
+EXAMPLES: dict[str, Callable[[], Signal]] = {
+    "triangle": lambda: signals.triangle(5.0, 5.0, 3, 10_000.0),
+    "sine": lambda: signals.sine(5.0, 5.0, 3, 10_000.0),
+    "amplitude_modulated": lambda: signals.amplitude_modulated(5.0, 5.0, 0.5, 4.0, 10_000.0),
+    "multi_amplitude": lambda: signals.multi_amplitude([2.5, 7.5, 0.0, 5.0], 5.0, 2, 10_000.0),
+    "filtered_steps": lambda: signals.filtered_steps([1.0, -2.0, 3.0], 0.2, 10_000.0),
+    "chirp": lambda: signals.chirp(5.0, 1.0, 20.0, 2.0, 10_000.0),
+    "prbs": lambda: signals.prbs(periods=2, sample_rate=10_000.0, lead_in=0.1),
+    "dwell": lambda: signals.dwell(2.0, 0.5, 10_000.0),
+    "two_tone": lambda: signals.two_tone((4.0, 1.0), (5.0, 40.0), 1.0, 10_000.0),
+    "random_walk": lambda: signals.random_walk(5.0, 20.0, 2.0, 10_000.0, seed=3),
+    "from_array": lambda: signals.from_array(np.sin(np.arange(200) / 10), 200.0),
+}
+
+
+# --- every signal -----------------------------------------------------------------------------------------
+
+
+def test_every_public_signal_has_an_example() -> None:
+    public = {name for name in signals.__all__ if inspect.isfunction(getattr(signals, name))}
+    assert public - {"check_continuity", "maximal_length_sequence"} == set(EXAMPLES)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_signals_are_finite_continuous_and_deterministic(name: str) -> None:
+    signal = EXAMPLES[name]()
+    assert signal.values.dtype == np.float64
+    assert signal.values.ndim == 1
+    assert np.all(np.isfinite(signal.values))
+    assert signal.require_continuous() is signal
+    np.testing.assert_array_equal(signal.values, EXAMPLES[name]().values)
+
+
+@pytest.mark.parametrize("name", set(EXAMPLES) - {"prbs", "multi_amplitude"})
+def test_periods_are_periods(name: str) -> None:
+    signal = EXAMPLES[name]()
+    if signal.period is None or 2 * signal.period > len(signal):
+        signal = signal.repeat(2)
+    if signal.period is not None:
+        n = round(signal.period)
+        assert n == pytest.approx(signal.period)
+        np.testing.assert_allclose(signal.values[n:], signal.values[:-n], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", set(EXAMPLES) - {"dwell", "from_array", "prbs"})
+def test_signals_start_near_zero(name: str) -> None:
+    assert abs(EXAMPLES[name]().values[0]) < 1e-3
+
+
+# --- triangle ---------------------------------------------------------------------------------------------
+
+
+def test_triangle_is_linear_up_to_ninety_per_cent() -> None:
+    r = signals.triangle(5.0, 5.0, 1, FS)
+    slope = np.diff(r.values) * FS
+    straight = np.maximum(np.abs(r.values[:-1]), np.abs(r.values[1:])) <= 4.5
+    np.testing.assert_allclose(np.abs(slope[straight]), 4.0 * 5.0 * 5.0, rtol=1e-9)
+    assert np.all(np.abs(slope[~straight]) <= 100.0 * (1.0 + 1e-9))
+    assert np.mean(np.abs(slope) < 99.9) == pytest.approx(0.1, abs=0.01), "rounded beyond"
+    assert straight.mean() == pytest.approx(0.9, abs=1e-3)
+    assert r.values[0] == 0.0
+    assert r.values[1] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("continuity", "peak"), [(1, 0.95), (2, 0.9625), (3, 0.96875), (4, 1 - 0.1 * 35 / 128)]
+)
+def test_triangle_peak(continuity: int, peak: float) -> None:
+    r = signals.triangle(2.0, 5.0, 2, 20_000.0, continuity=continuity)
+    assert r.amplitude == pytest.approx(2.0 * peak, rel=1e-12)
+    assert r.values.min() == pytest.approx(-r.values.max(), rel=1e-12)
+
+
+def test_triangle_peak_against_the_ratios_in_the_papers_tables() -> None:
+    # Maximum error over relative error is max|r|; each printed figure is known to half its last digit.
+    rows = [(0.016, 0.67, 2.5), (0.055, 1.1, 5.0), (0.045, 0.92, 5.0), (0.053, 0.72, 7.5), (0.67, 9.2, 7.5)]
+    digits = [(0.0005, 0.005), (0.0005, 0.05), (0.0005, 0.005), (0.0005, 0.005), (0.005, 0.05)]
+    low = max((e - de) / (p + dp) * 100 / a for (e, p, a), (de, dp) in zip(rows, digits, strict=True))
+    high = min((e + de) / (p - dp) * 100 / a for (e, p, a), (de, dp) in zip(rows, digits, strict=True))
+    assert low == pytest.approx(0.9655, abs=1e-4)
+    assert high == pytest.approx(0.9836, abs=1e-4)
+    assert low < signals.triangle(1.0, 5.0, 1, FS, continuity=3).amplitude < high
+    assert signals.triangle(1.0, 5.0, 1, FS, continuity=2).amplitude == pytest.approx(low, abs=0.004)
+
+
+@pytest.mark.parametrize("continuity", [1, 2, 3, 4])
+def test_triangle_continuity_order(continuity: int) -> None:
+    def largest_change(order: int, n: int) -> float:
+        """Largest change between neighbours of a derivative, by differences, relative to its size."""
+        r = signals.triangle(1.0, 1.0, 2, float(n), smoothing=0.8, continuity=continuity)
+        derivative = np.diff(r.values, order)
+        return float(np.max(np.abs(np.diff(derivative))) / np.max(np.abs(derivative)))
+
+    # A continuous derivative changes less on a finer grid, a discontinuous one does not.
+    for order in range(1, continuity + 1):
+        assert largest_change(order, 800) < 0.6 * largest_change(order, 400)
+    assert largest_change(continuity + 1, 800) > 0.9 * largest_change(continuity + 1, 400)
+
+
+def test_triangle_without_smoothing_is_ideal() -> None:
+    r = signals.triangle(3.0, 1.0, 2, 400.0, smoothing=0.0)
+    corners = [0.0, 100.0, 300.0, 500.0, 700.0, 800.0]
+    ideal = np.interp(np.arange(800), corners, [0.0, 3.0, -3.0, 3.0, -3.0, 0.0])
+    np.testing.assert_allclose(r.values, ideal, atol=1e-12)
+
+
+def test_phase_is_in_periods() -> None:
+    for make in (signals.sine, signals.triangle):
+        whole = make(1.0, 2.0, 2, 1000.0)
+        np.testing.assert_allclose(
+            make(1.0, 2.0, 1, 1000.0, phase=0.25).values, whole.values[125:625], atol=1e-12
+        )
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    frequency=st.floats(0.01, 100.0),
+    smoothing=st.floats(0.0, 1.0),
+    continuity=st.integers(1, 8),
+    phase=st.floats(-2.0, 2.0),
+)
+def test_triangle_never_exceeds_its_amplitude_or_its_slope(
+    frequency: float, smoothing: float, continuity: int, phase: float
+) -> None:
+    r = signals.triangle(5.0, frequency, 2, 1000.0, smoothing, continuity, phase)
+    assert r.amplitude <= 5.0 + 1e-12
+    assert np.all(np.abs(np.diff(r.values)) <= 4.0 * 5.0 * frequency / 1000.0 * (1 + 1e-6) + 1e-12)
+
+
+# --- phase and period -------------------------------------------------------------------------------------
+
+
+def test_phase_does_not_drift_when_the_frequency_does_not_divide_the_sample_rate() -> None:
+    r = signals.sine(1.0, 7.0, 7000, 1000.0)
+    assert r.period == pytest.approx(1000 / 7)
+    assert len(r) == 1_000_000
+    np.testing.assert_array_equal(r.values[-1000:], r.values[:1000])
+
+
+def test_multi_amplitude_changes_at_zero() -> None:
+    r = signals.multi_amplitude([2.5, 7.5], 5.0, [2, 3], FS, smoothing=0.1)
+    n = 10_000
+    assert len(r) == 5 * n
+    assert r.period == n
+    assert np.max(np.abs(r.values[: 2 * n])) == pytest.approx(2.5 * 0.96875)
+    assert np.max(np.abs(r.values[2 * n :])) == pytest.approx(7.5 * 0.96875)
+    assert r.values[2 * n] == 0.0
+    np.testing.assert_allclose(r.values[:n], signals.triangle(2.5, 5.0, 1, FS).values)
+    odd = signals.multi_amplitude([1.0, 5.0, 2.0], 7.0, 3, 1000.0, shape="sine")
+    assert np.max(np.abs(np.diff(odd.values))) <= 5.0 * 2.0 * np.pi * 7.0 / 1000.0
+
+
+def test_amplitude_modulated_envelope() -> None:
+    r = signals.amplitude_modulated(4.0, 50.0, 1.0, 1.0, 10_000.0, depth=0.75)
+    assert r.period == 10_000
+    assert np.max(np.abs(r.values[:200])) == pytest.approx(4.0, rel=0.01)
+    assert np.max(np.abs(r.values[4900:5100])) == pytest.approx(1.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "period"), [((2.0, 3.0), 1000.0), ((0.01, 50.0), 100_000.0), ((1.0, np.pi), None)]
+)
+def test_two_tone_period_is_the_common_one(frequencies: tuple[float, float], period: float | None) -> None:
+    assert signals.two_tone((1.0, 1.0), frequencies, 1.0, 1000.0).period == pytest.approx(period)
+
+
+@pytest.mark.parametrize("method", ["linear", "logarithmic"])
+def test_chirp_sweeps_from_start_to_stop(method: Any) -> None:
+    r = signals.chirp(1.0, 2.0, 32.0, 10.0, 10_000.0, method=method)
+    rises = np.flatnonzero((r.values[:-1] < 0.0) & (r.values[1:] >= 0.0)) / 10_000.0
+    frequency, middle = 1.0 / np.diff(rises), 0.5 * (rises[1:] + rises[:-1])
+    expected = 2.0 + 3.0 * middle if method == "linear" else 2.0 * 16.0 ** (middle / 10.0)
+    np.testing.assert_allclose(frequency, expected, rtol=0.03)
+
+
+# --- PRBS and other filtered signals ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bits", [2, 3, 5, 8])
+def test_maximal_length_sequence_autocorrelation(bits: int) -> None:
+    sequence = signals.maximal_length_sequence(bits)
+    n = 2**bits - 1
+    correlation = [float(sequence @ np.roll(sequence, lag)) for lag in range(n)]
+    assert correlation == [float(n)] + [-1.0] * (n - 1)
+    assert sequence.sum() == 1.0
+
+
+def test_prbs_is_the_papers() -> None:
+    r = signals.prbs(periods=3, sample_rate=FS)
+    n = 38_750
+    assert len(r) == 3 * n
+    assert r.period == n
+    assert r.amplitude == pytest.approx(5.5, rel=0.02)
+    np.testing.assert_array_equal(r.values[n:], r.values[:-n])
+    assert abs(r.values[n] - r.values[n - 1]) < 0.01
+
+
+def test_prbs_is_the_steady_state_of_the_repeated_filtered_sequence() -> None:
+    from scipy.signal import butter, sosfilt
+
+    chips = np.repeat(5.0 * signals.maximal_length_sequence(5), 1250)
+    settled = sosfilt(butter(2, 10.0, fs=FS, output="sos"), np.tile(chips, 3))[-38_750:]
+    np.testing.assert_allclose(signals.prbs(sample_rate=FS).values, settled, atol=1e-8)
+
+
+@pytest.mark.parametrize("cutoff", [0.05, 10.0])
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_periodic_steady_state_joins_even_when_the_filter_outlasts_a_period(
+    cutoff: float, order: int
+) -> None:
+    r = signals.prbs(periods=2, sample_rate=1000.0, cutoff=cutoff, order=order)
+    assert r.values.mean() == pytest.approx(5.0 / 31.0, rel=1e-6)  # the filter's gain is 1 at rest
+    increments = np.abs(np.diff(r.values))
+    assert increments[774] <= np.delete(increments, 774).max()
+
+
+def test_prbs_starts_at_zero_or_leads_in_from_rest() -> None:
+    begun = signals.prbs(start="zero")
+    assert abs(begun.values[0]) < 0.01
+    assert begun.values[100] > 0.0
+    np.testing.assert_allclose(np.sort(begun.values), np.sort(signals.prbs().values))
+    led = signals.prbs(periods=2, lead_in=0.2)
+    n = 10_000
+    assert len(led) == n + 2 * 38_750
+    assert led.values[0] == 0.0
+    np.testing.assert_array_equal(led.values[n:], signals.prbs(periods=2).values)
+    np.testing.assert_allclose(led.values[n - 50 : n], begun_before := signals.prbs().values[-50:], atol=1e-5)
+    slope = np.diff(np.concatenate([begun_before, signals.prbs().values[:50]]))
+    np.testing.assert_allclose(np.diff(led.values[n - 50 : n + 50]), slope, atol=1e-6)
+
+
+def test_filtered_steps_reach_their_levels() -> None:
+    r = signals.filtered_steps([5.0, -5.0], [0.5, 1.0], FS, cutoff=10.0)
+    assert len(r) == 75_000
+    assert r.period is None
+    assert r.values[24_999] == pytest.approx(5.0, abs=1e-6)
+    assert r.values[-1] == pytest.approx(-5.0, abs=1e-6)
+    assert r.values.max() == pytest.approx(5.0 * 1.0432, rel=1e-3)
+    rest = signals.filtered_steps([2.0], 0.1, FS, start=2.0)
+    np.testing.assert_allclose(rest.values, 2.0, atol=1e-12)
+    wave = signals.filtered_steps([5.0, -5.0], 0.1, FS, periods=4)
+    assert wave.period == 10_000
+    assert len(wave) == 40_000
+    np.testing.assert_allclose(wave.values[:5000], -wave.values[5000:10_000], atol=1e-8)
+
+
+def test_random_walk_is_band_limited_and_reproducible() -> None:
+    r = signals.random_walk(5.0, 20.0, 3.0, 1000.0, seed=7)
+    assert r.amplitude == pytest.approx(5.0)
+    assert r.values[0] == 0.0
+    spectrum = np.abs(np.fft.rfft(r.values))
+    assert spectrum[61:].max() < 1e-9 * spectrum.max()
+    np.testing.assert_allclose(
+        r.values, signals.random_walk(5.0, 20.0, 3.0, 2000.0, seed=7).values[::2], rtol=2e-3
+    )
+    assert not np.allclose(r.values, signals.random_walk(5.0, 20.0, 3.0, 1000.0, seed=8).values)
+
+
+# --- Signal -----------------------------------------------------------------------------------------------
+
+
+def test_signal_is_an_array_where_one_is_wanted() -> None:
+    given_values = np.array([1.0, -3.0, 2.0])
+    r = signals.from_array(given_values, 10.0, period=3)
+    given_values[0] = 99.0
+    assert r.values[0] == 1.0, "the samples are copied"
+    assert len(r) == 3
+    assert r.amplitude == 3.0
+    assert r.duration == 0.3
+    np.testing.assert_allclose(r.time, [0.0, 0.1, 0.2])
+    np.testing.assert_array_equal(np.asarray(r), r.values)
+    assert np.asarray(r, dtype=np.float32).dtype == np.float32
+    np.testing.assert_array_equal(r - r.values, np.zeros(3))
+    assert list(r) == [1.0, -3.0, 2.0]
+    assert all(type(value) is float for value in r)
+    assert r[1] == -3.0
+    assert r[:2].shape == (2,)
+    assert repr(r) == "Signal('array', 3 samples at 10 Hz, period 3 samples, amplitude 3)"
+    with pytest.raises(AttributeError):
+        r.sample_rate = 5.0  # type: ignore[misc]
+
+
+def test_signal_arithmetic() -> None:
+    r = signals.sine(1.0, 5.0, 2, 1000.0)
+    for twice in (2 * r, r * 2, r * np.float64(2.0)):
+        np.testing.assert_array_equal(twice.values, 2.0 * r.values)
+        assert twice.period == r.period
+        assert twice.name == "sine"
+    np.testing.assert_array_equal((-r).values, -r.values)
+    np.testing.assert_array_equal(r.shifted(3.0).values, r.values + 3.0)
+    both = r + 3 * r
+    assert len(both) == 2 * len(r)
+    assert both.period == 200.0
+    assert (r + signals.dwell(0.0, 1.0, 1000.0)).period is None
+    np.testing.assert_array_equal(r.repeat(3).values, np.tile(r.values, 3))
+    assert r.repeat(3).period == 200.0
+    assert signals.sine(1.0, 7.0, 2, 1000.0).repeat(2).period is None, "the phase breaks at the joint"
+    with pytest.raises(TypeError):
+        r + 3.0
+    with pytest.raises(ValueError, match="other must have the same sample rate, 1000 Hz, got 500 Hz"):
+        r.then(signals.dwell(0.0, 1.0, 500.0))
+
+
+# --- jumps ------------------------------------------------------------------------------------------------
+
+T = np.arange(2000) / 1000.0
+SLOW = np.sin(2.0 * np.pi * T)
+STEP = np.where(T < 1.0, 0.0, 1.0)
+JUMPY = {
+    "square wave": np.sign(np.sin(2.0 * np.pi * T + 0.01)),
+    "one step": STEP,
+    "step in three samples": np.interp(T, [0.0, 1.0, 1.003, 2.0], [0.0, 0.0, 1.0, 1.0]),
+    "staircase of 10 steps": np.floor(T * 5.0),
+    "unfiltered PRBS": np.repeat(signals.maximal_length_sequence(5), 50),
+    "slow sine with a step": SLOW + STEP,
+    "slow sine with a spike": SLOW + (np.arange(2000) == 700),
+    "sawtooth": T % 0.5,
+    "joined signals": np.concatenate([SLOW[:250], SLOW]),
+    "noisy steps": STEP + 0.001 * np.random.default_rng(0).standard_normal(2000),
+    "four samples": np.array([0.0, 0.0, 5.0, 5.0]),
+    "three samples": np.array([0.0, 5.0, 5.0]),
+}
+LEGITIMATE = {
+    "1 Hz sine at 200 Hz": np.sin(2.0 * np.pi * np.arange(600) / 200.0),
+    "50 samples a period": np.sin(2.0 * np.pi * np.arange(200) / 50.0),
+    "5 samples a period": np.sin(2.0 * np.pi * np.arange(50) / 5.0),
+    "coarse triangle": signals.triangle(5.0, 1.0, 5, 12.0, smoothing=0.0).values,
+    "triangle with rests": signals.multi_amplitude([5.0, 0.0, 1.0], 1.0, 3, 40.0).values,
+    "white noise": np.random.default_rng(1).standard_normal(3000),
+    "noise after a dwell": np.concatenate([np.zeros(100), np.random.default_rng(2).standard_normal(3000)]),
+    "ramp of five samples": np.interp(np.arange(100), [0, 50, 55, 99], [0.0, 0.0, 1.0, 1.0]),
+    "quantised slow sine": np.round(SLOW * 50.0) / 50.0,
+    "held constant": np.full(100, 5.0),
+    "one sample": np.array([5.0]),
+    "two samples": np.array([0.0, 5.0]),
+    "empty": np.array([]),
+    "steps filtered near the sample rate": signals.filtered_steps(
+        [1.0, -1.0, 1.0], 1.0, 100.0, cutoff=20.0
+    ).values,
+    "coarse PRBS": signals.prbs(sample_rate=40.0).values,
+}
+
+
+@pytest.mark.parametrize("name", JUMPY)
+def test_jumps_are_refused(name: str) -> None:
+    with pytest.raises(ValueError, match=r"^r jumps by .* use signals\.filtered_steps"):
+        check_continuity(JUMPY[name], 1000.0, "r")
+
+
+@pytest.mark.parametrize("name", LEGITIMATE)
+def test_legitimate_signals_pass(name: str) -> None:
+    check_continuity(LEGITIMATE[name], 1000.0, "r")
+
+
+def test_jump_message_says_where_and_how_large() -> None:
+    where = r"u jumps by 1 \(100 % of its range\) between samples 999 and 1000 \(t = 1 s\):"
+    with pytest.raises(ValueError, match=where):
+        check_continuity(STEP, 1000.0, "u")
+    with pytest.raises(ValueError, match="and 8 more like it"):
+        check_continuity(JUMPY["staircase of 10 steps"], 1000.0)
+    with pytest.raises(ValueError, match="array jumps"):
+        signals.from_array(STEP, 1000.0).require_continuous()
+
+
+def test_allowed_step_lets_a_quantiser_flicker() -> None:
+    flicker = np.where(np.arange(500) % 50 == 0, 0.0003, 0.0)
+    with pytest.raises(ValueError, match="jumps"):
+        check_continuity(flicker, 1000.0)
+    check_continuity(flicker, 1000.0, allowed_step=0.0003)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    scale=st.floats(1e-6, 1e6),
+    offset=st.floats(-100.0, 100.0),
+    name=st.sampled_from(sorted(JUMPY) + sorted(set(LEGITIMATE) - {"empty"})),
+)
+def test_the_verdict_ignores_unit_and_direction_of_time(scale: float, offset: float, name: str) -> None:
+    values = scale * ({**JUMPY, **LEGITIMATE}[name] + offset)[::-1]
+    if name in JUMPY:
+        with pytest.raises(ValueError, match="jumps"):
+            check_continuity(values, 1000.0)
+    else:
+        check_continuity(values, 1000.0)
+
+
+# --- bad arguments ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: signals.sine(1.0, 600.0, 1, 1000.0), "frequency must be below half .* 500 Hz, got 600 Hz"),
+        (lambda: signals.triangle(-1.0, 5.0, 1, FS), "amplitude must be zero or more, got -1"),
+        (lambda: signals.triangle(float("nan"), 5.0, 1, FS), "amplitude must be finite, got nan"),
+        (lambda: signals.triangle(1.0, 5.0, 0, FS), "periods must be above zero, got 0"),
+        (lambda: signals.triangle(1.0, 5.0, 1e-9, FS), "periods must cover at least one sample"),
+        (lambda: signals.triangle(1.0, 0.0, 1, FS), "frequency must be above zero"),
+        (lambda: signals.triangle(1.0, 5.0, 1, FS, smoothing=1.5), "smoothing must lie within"),
+        (
+            lambda: signals.triangle(1.0, 5.0, 1, FS, continuity=0),
+            "continuity must be a whole number of at least 1",
+        ),
+        (lambda: signals.triangle(1.0, 5.0, 1, FS, continuity=9), "continuity must be at most 8, got 9"),
+        (lambda: signals.sine(1.0, 5.0, 1, "fast"), "sample_rate must be one number, got 'fast'"),  # type: ignore[arg-type]
+        (lambda: signals.sine([1.0, 2.0], 5.0, 1, FS), "amplitude must be one number"),  # type: ignore[arg-type]
+        (
+            lambda: signals.multi_amplitude([1.0, -2.0], 5.0, 1, FS),
+            "amplitudes must be zero or more, got -2 at index 1",
+        ),
+        (
+            lambda: signals.multi_amplitude([1.0, 2.0], 5.0, [1], FS),
+            "periods must have one entry for each of the 2",
+        ),
+        (lambda: signals.multi_amplitude([1.0], 5.0, 1.5, FS), "periods must be a whole number"),  # type: ignore[arg-type]
+        (
+            lambda: signals.multi_amplitude([1.0], 5.0, 1, FS, shape="saw"),  # type: ignore[arg-type]
+            "shape must be 'triangle' or 'sine', got 'saw'",
+        ),
+        (lambda: signals.amplitude_modulated(1.0, 5.0, 1.0, 1.0, FS, depth=2.0), "depth must lie within"),
+        (lambda: signals.two_tone([1.0], [5.0, 6.0], 1.0, FS), "amplitudes must hold two numbers"),
+        (lambda: signals.two_tone([1.0, 1.0], [5.0, 6e4], 1.0, FS), r"frequencies\[1\] must be below half"),
+        (lambda: signals.chirp(1.0, 1.0, 6e4, 1.0, FS), "stop_frequency must be below half"),
+        (lambda: signals.chirp(1.0, 1.0, 5.0, 1.0, FS, method="cubic"), "method must be"),  # type: ignore[arg-type]
+        (lambda: signals.dwell(1.0, 0.0, FS), "duration must be above zero"),
+        (
+            lambda: signals.filtered_steps([1.0, 2.0], [0.1], FS),
+            "dwell_times must have one entry for each of the 2",
+        ),
+        (
+            lambda: signals.filtered_steps([1.0, 2.0], [0.1, 0.0], FS),
+            "dwell_times must each be at least one sample",
+        ),
+        (lambda: signals.filtered_steps([], 0.1, FS), "levels needs at least 1 samples"),
+        (lambda: signals.filtered_steps([1.0], 0.1, FS, cutoff=3e4), "cutoff must be below half"),
+        (lambda: signals.prbs(chip_rate=37.0), "chip_rate must divide sample_rate, 50000 Hz, .* use 37.0096"),
+        (lambda: signals.prbs(start="middle"), "start must be"),  # type: ignore[arg-type]
+        (lambda: signals.prbs(bits=1), "bits must be a whole number of at least 2"),
+        (lambda: signals.maximal_length_sequence(40), "bits must be at most 20"),
+        (
+            lambda: signals.random_walk(1.0, 0.1, 1.0, FS),
+            "bandwidth must be at least 1/duration, 1 Hz, got 0.1 Hz",
+        ),
+        (lambda: signals.from_array([1.0, np.nan], FS), "values holds 1 values that are NaN"),
+        (lambda: signals.from_array(np.zeros((5, 1)), FS), r"pass values\[:, 0\]"),
+        (lambda: signals.from_array([1.0], FS, period=0.0), "period must be above zero"),
+        (lambda: check_continuity([0.0, np.inf], FS, "u"), "u holds 1 values"),
+    ],
+)
+def test_bad_arguments_are_named(call: Callable[[], object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        call()
