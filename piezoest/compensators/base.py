@@ -1,0 +1,235 @@
+"""What linear and inverse feed-forward share: the model's inverse, limits, bumpless change."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+from typing import Any, Literal, Self
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST, FloatArray, array_1d, integer
+from piezoest.compensators.limits import VoltageLimits
+from piezoest.equations import coleman_hodgdon as equations
+from piezoest.equations.integrators import bogacki_shampine
+from piezoest.models import ColemanHodgdon, LinearGain, Model
+
+Method = Literal["closed-form", "bogacki-shampine"]
+
+# State: last voltage, its w_h, what the last change of model still owes [µm], counters.
+VOLTAGE, W_H, OWED, SAMPLES, SATURATED, SLEWED, MISSED, LIMITED_NOW, STATE = range(9)
+# Configuration.
+A, B, C, OFFSET, MINIMUM, MAXIMUM, LARGEST_STEP, DECAY, INTEGRATED, CONFIG = range(10)
+
+
+@register_jitable
+def _voltage(state: Any, config: Any, r: Any) -> Any:
+    """Voltage for the next reference sample; the state follows the voltage really given out."""
+    state[SAMPLES] += 1.0
+    u = state[VOLTAGE]
+    if not np.abs(r) < WILDEST:
+        state[MISSED] += 1.0
+        return u
+    a, b, c = config[A], config[B], config[C]
+    w_h = state[W_H]
+    state[OWED] *= config[DECAY]
+    dr = r - state[OWED] - (c * u + w_h + config[OFFSET])
+    if config[INTEGRATED] != 0.0:
+        w_next = bogacki_shampine(equations.inverse_rate, w_h, 1.0, (dr, a, b, c))
+        wanted = u + (dr - (w_next - w_h)) / c
+    else:
+        wanted = u + equations.inverse_increment(w_h, dr, a, b, c)
+        w_next = equations.hysteresis_step(w_h, wanted - u, a, b)
+    slewed = min(max(wanted, u - config[LARGEST_STEP]), u + config[LARGEST_STEP])
+    given = min(max(slewed, config[MINIMUM]), config[MAXIMUM])
+    state[SLEWED] += slewed != wanted
+    state[SATURATED] += given != slewed
+    state[LIMITED_NOW] = np.sign(wanted - given)
+    if given != wanted:
+        w_next = equations.hysteresis_step(w_h, given - u, a, b)
+    state[W_H] = w_next
+    state[VOLTAGE] = given
+    return given
+
+
+@njit("f8(f8[::1], f8[::1], f8)", cache=True)
+def _step(state: Any, config: Any, r: float) -> Any:
+    return _voltage(state, config, r)
+
+
+@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True)
+def _run(state: Any, config: Any, r: Any, u: Any) -> None:
+    for k in range(r.size):
+        u[k] = _voltage(state, config, r[k])
+
+
+@dataclass(frozen=True, slots=True)
+class CompensatorStatus:
+    """What happened to the samples a compensator was given.
+
+    Parameters
+    ----------
+    samples : int
+        Reference samples seen.
+    saturated, slewed : int
+        Samples at which the voltage range or the slew rate was in the way.
+    missing : int
+        Samples without a usable reference: the voltage was held.
+    projected : bool
+        Whether the model set last was inadmissible and its nearest admissible one is used.
+    """
+
+    samples: int
+    saturated: int
+    slewed: int
+    missing: int
+    projected: bool
+
+
+class Compensator:
+    """Feed-forward through the inverse of a model.
+
+    See `LinearCompensator` and `InverseCompensator`.
+    """
+
+    __slots__ = ("_config", "_limits", "_model", "_projected", "_start", "_state")
+
+    def __init__(
+        self, model: Model, limits: VoltageLimits | None, method: Method, transfer_samples: int
+    ) -> None:
+        self._limits = VoltageLimits() if limits is None else limits
+        self._config = np.zeros(CONFIG)
+        self._config[MINIMUM] = self._limits.minimum
+        self._config[MAXIMUM] = self._limits.maximum
+        self._config[LARGEST_STEP] = self._limits.largest_step
+        transfer_samples = integer("transfer_samples", transfer_samples)
+        self._config[DECAY] = np.exp(-1.0 / transfer_samples) if transfer_samples else 0.0
+        if method not in ("closed-form", "bogacki-shampine"):
+            raise ValueError(f"method must be 'closed-form' or 'bogacki-shampine', got {method!r}")
+        self._config[INTEGRATED] = method == "bogacki-shampine"
+        if not self._accepts(model).is_admissible:
+            raise ValueError(f"model {model} is not admissible and has no inverse: use nearest_admissible()")
+        self._model = model
+        self._projected = False
+        self._start = model
+        self._state = np.zeros(STATE)
+        self._configure(model)
+        self._state[VOLTAGE] = self._limits.rest
+
+    def _accepts(self, model: Model) -> Model:
+        """Return the model if it is of a kind this compensator can invert."""
+        if not isinstance(model, ColemanHodgdon | LinearGain):
+            raise ValueError(f"model must be a ColemanHodgdon or a LinearGain, got {type(model).__name__}")
+        return model
+
+    def _configure(self, model: Model) -> None:
+        if isinstance(model, ColemanHodgdon):
+            self._config[[A, B, C, OFFSET]] = model.a, model.b, model.c, model.offset
+        elif isinstance(model, LinearGain):
+            # No hysteresis: b = 0, and any a.
+            self._config[[A, B, C, OFFSET]] = 1.0, 0.0, model.gain, model.offset
+
+    @property
+    def model(self) -> Model:
+        """Model whose inverse is used. Setting it is bumpless.
+
+        The place in the loop, w_h in parts of its limit b/a, is kept. What the new model makes of
+        the present voltage differs from what the old one made of it; that difference is
+        paid back exponentially over `transfer_samples`. An inadmissible model is replaced
+        by its nearest admissible one, and `status` says so: a stream must not stop.
+        """
+        return self._model
+
+    @model.setter
+    def model(self, model: Model) -> None:
+        model = self._accepts(model)
+        self._projected = not model.is_admissible
+        if self._projected:
+            if not isinstance(model, ColemanHodgdon):
+                return
+            model = model.nearest_admissible()
+        old, state = self._config, self._state
+        expected = old[C] * state[VOLTAGE] + state[W_H] + old[OFFSET] + state[OWED]
+        place = state[W_H] * old[A] / old[B] if old[B] > 0.0 else 0.0
+        self._configure(model)
+        self._model = model
+        state[W_H] = min(max(place, -1.0), 1.0) * old[B] / old[A]
+        state[OWED] = expected - (old[C] * state[VOLTAGE] + state[W_H] + old[OFFSET])
+
+    @property
+    def limits(self) -> VoltageLimits:
+        """Limits that the voltage never leaves."""
+        return self._limits
+
+    @property
+    def voltage(self) -> float:
+        """Voltage given out last [V]."""
+        return float(self._state[VOLTAGE])
+
+    @property
+    def limited(self) -> int:
+        """Sign of what the limits withheld at the last sample: +1, -1, or 0 if nothing."""
+        return int(self._state[LIMITED_NOW])
+
+    @property
+    def status(self) -> CompensatorStatus:
+        """What happened to the samples so far."""
+        state = self._state
+        return CompensatorStatus(
+            samples=int(state[SAMPLES]),
+            saturated=int(state[SATURATED]),
+            slewed=int(state[SLEWED]),
+            missing=int(state[MISSED]),
+            projected=self._projected,
+        )
+
+    def step(self, r: float) -> float:
+        """Voltage for the next sample of the reference.
+
+        Parameters
+        ----------
+        r : float
+            Reference displacement [µm]; NaN or infinity holds the last voltage.
+
+        Returns
+        -------
+        float
+            Voltage [V], within the limits.
+        """
+        return _step(self._state, self._config, r)
+
+    def run(self, r: Any) -> FloatArray:
+        """Voltages for a whole reference; continues from the current state, as a loop of `step`.
+
+        Parameters
+        ----------
+        r : array_like, shape (N,)
+            Reference displacement [µm]; NaN holds the last voltage.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Voltage [V], within the limits.
+
+        Raises
+        ------
+        ValueError
+            If r is not a 1-D array of numbers.
+        """
+        r = array_1d("r", r, allow_nan=True)
+        u = np.empty_like(r)
+        _run(self._state, self._config, r, u)
+        return u
+
+    def reset(self) -> None:
+        """Return to the state after construction, with the model given there."""
+        self._model, self._projected = self._start, False
+        self._configure(self._start)
+        self._state[:] = 0.0
+        self._state[VOLTAGE] = self._limits.rest
+
+    def copy(self) -> Self:
+        """Return an independent compensator in the same state."""
+        return copy.deepcopy(self)

@@ -1,0 +1,92 @@
+"""Integral feedback around a feed-forward (last remark of Sec. I of the paper)."""
+
+from __future__ import annotations
+
+import math
+
+from piezoest._checks import positive
+from piezoest.compensators.base import Compensator
+from piezoest.models import Model
+
+
+class IntegralFeedback:
+    """Integral action on the tracking error around a feed-forward compensator.
+
+    The reference handed to the compensator is r + i, with di/dt = gain (r - x).
+
+    Parameters
+    ----------
+    compensator : LinearCompensator or InverseCompensator
+        The feed-forward.
+    gain : float
+        Integral gain [1/s]: the bandwidth of the correction in rad/s. Keep it far below the
+        lowest resonance times its damping ratio, 2 zeta omega_0.
+    sample_rate : float
+        [Hz].
+
+    Raises
+    ------
+    ValueError
+        If the gain or the sample rate is not above zero.
+
+    Notes
+    -----
+    Anti-windup: the integral stands still while the voltage is limited in the direction in
+    which it would grow, and over samples without a measurement.
+    """
+
+    __slots__ = ("_compensator", "_gain", "_integral", "_step_gain")
+
+    #: The loop must hand each measurement back: `piezoest.track` steps sample by sample.
+    needs_measurement = True
+
+    def __init__(self, compensator: Compensator, *, gain: float, sample_rate: float) -> None:
+        self._compensator = compensator
+        self._gain = positive("gain", gain)
+        self._step_gain = self._gain / positive("sample_rate", sample_rate)
+        self._integral = 0.0
+
+    @property
+    def model(self) -> Model:
+        """Model of the feed-forward; settable, bumpless."""
+        return self._compensator.model
+
+    @model.setter
+    def model(self, model: Model) -> None:
+        self._compensator.model = model
+
+    @property
+    def integral(self) -> float:
+        """Correction of the reference [µm]."""
+        return self._integral
+
+    @property
+    def compensator(self) -> Compensator:
+        """The feed-forward inside."""
+        return self._compensator
+
+    def step(self, r: float, x: float | None) -> float:
+        """Voltage for the next sample.
+
+        Parameters
+        ----------
+        r : float
+            Reference displacement [µm].
+        x : float or None
+            Displacement measured last [µm]; None, NaN or infinity if there is none.
+
+        Returns
+        -------
+        float
+            Voltage [V], within the compensator's limits.
+        """
+        if x is not None and math.isfinite(x) and math.isfinite(r):
+            growth = self._step_gain * (r - x)
+            if growth * self._compensator.limited <= 0.0:
+                self._integral += growth
+        return self._compensator.step(r + self._integral)
+
+    def reset(self) -> None:
+        """Return to the state after construction."""
+        self._integral = 0.0
+        self._compensator.reset()

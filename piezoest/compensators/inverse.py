@@ -1,0 +1,47 @@
+"""Feed-forward through the inverse of the hysteresis, (14)-(17) and App. C."""
+
+from __future__ import annotations
+
+from piezoest.compensators.base import Compensator, Method
+from piezoest.compensators.limits import VoltageLimits
+from piezoest.models import Model
+
+
+class InverseCompensator(Compensator):
+    """Feed-forward through the inverse of a hysteresis model (14).
+
+    Parameters
+    ----------
+    model : ColemanHodgdon or LinearGain
+        Model to invert; must be admissible. A `LinearGain` is the case without hysteresis.
+    limits : VoltageLimits, optional
+        Limits of the voltage (default none).
+    method : {"closed-form", "bogacki-shampine"}
+        How w_h is found: by the closed form (C7), (C10), exact for monotone reference
+        between samples, or by integrating (17) with the paper's Runge-Kutta method.
+    transfer_samples : int
+        Time constant of a bumpless change of model, in samples (default 500); 0 for none.
+
+    Raises
+    ------
+    ValueError
+        If the model is of another kind or not admissible, or the method is unknown.
+
+    Notes
+    -----
+    The state follows the voltage that was really given out, so that limits do not wind it
+    up. Start: 0 V and w_h = 0, the equilibrium of the paper.
+    Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012).
+    """
+
+    __slots__ = ()
+
+    def __init__(
+        self,
+        model: Model,
+        limits: VoltageLimits | None = None,
+        *,
+        method: Method = "closed-form",
+        transfer_samples: int = 500,
+    ) -> None:
+        super().__init__(model, limits, method, transfer_samples)

@@ -1,0 +1,55 @@
+"""Limits of the voltage that a compensator may ask for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from piezoest._checks import finite, positive
+
+
+@dataclass(frozen=True, slots=True)
+class VoltageLimits:
+    """Limits that a compensator's voltage never leaves.
+
+    Parameters
+    ----------
+    minimum, maximum : float
+        Voltage range [V]; infinite for none.
+    slew_rate : float, optional
+        Largest |du/dt| [V/s]; needs `sample_rate`.
+    sample_rate : float, optional
+        [Hz].
+
+    Raises
+    ------
+    ValueError
+        If the range is empty, or the slew rate comes without a sample rate.
+    """
+
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    slew_rate: float | None = None
+    sample_rate: float | None = None
+
+    def __post_init__(self) -> None:
+        if math.isnan(self.minimum) or math.isnan(self.maximum) or not self.minimum < self.maximum:
+            raise ValueError(f"minimum must be below maximum, got {self.minimum} V and {self.maximum} V")
+        if self.slew_rate is not None:
+            positive("slew_rate", self.slew_rate)
+            if self.sample_rate is None:
+                raise ValueError("slew_rate needs sample_rate: pass the rate of the loop in Hz")
+        if self.sample_rate is not None:
+            positive("sample_rate", self.sample_rate)
+
+    @property
+    def largest_step(self) -> float:
+        """Largest change of voltage between two samples [V]; infinite without a slew rate."""
+        if self.slew_rate is None or self.sample_rate is None:
+            return math.inf
+        return self.slew_rate / self.sample_rate
+
+    @property
+    def rest(self) -> float:
+        """The voltage within the range that is nearest to 0 V."""
+        return finite("rest", min(max(0.0, self.minimum), self.maximum))

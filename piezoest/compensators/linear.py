@@ -1,0 +1,41 @@
+"""Linear feed-forward, u = r/K (11)."""
+
+from __future__ import annotations
+
+from piezoest.compensators.base import Compensator
+from piezoest.compensators.limits import VoltageLimits
+from piezoest.models import LinearGain, Model
+
+
+class LinearCompensator(Compensator):
+    """Linear feed-forward: u = (r - offset)/K (11).
+
+    Parameters
+    ----------
+    model : LinearGain
+        Gain K [µm/V] and offset [µm].
+    limits : VoltageLimits, optional
+        Limits of the voltage (default none).
+    transfer_samples : int
+        Time constant of a bumpless change of model, in samples (default 500); 0 for none.
+
+    Raises
+    ------
+    ValueError
+        If the model is of another kind or its gain is zero.
+    """
+
+    __slots__ = ()
+
+    def __init__(
+        self, model: LinearGain, limits: VoltageLimits | None = None, *, transfer_samples: int = 500
+    ) -> None:
+        super().__init__(model, limits, "closed-form", transfer_samples)
+
+    def _accepts(self, model: Model) -> Model:
+        if not isinstance(model, LinearGain):
+            raise ValueError(
+                f"model must be a LinearGain, got {type(model).__name__}: "
+                "use InverseCompensator for a model with hysteresis"
+            )
+        return model

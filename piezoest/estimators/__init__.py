@@ -1,0 +1,1 @@
+"""From voltage and displacement to a model."""

@@ -1,0 +1,285 @@
+"""The face that every estimator shows, and what they share behind it."""
+
+from __future__ import annotations
+
+import copy
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+
+import numpy as np
+
+from piezoest._checks import FloatArray, array_1d, integer
+from piezoest.models import Model
+
+_FORMAT = 1
+
+
+@runtime_checkable
+class Estimator(Protocol):
+    """What `piezoest.track` needs of an estimator; any class with these two will do.
+
+    An estimator may also have ``run(u, x)``, which `track` then prefers to a loop of ``step``.
+    """
+
+    @property
+    def model(self) -> Model:
+        """Model as known now."""
+
+    def step(self, u: float, x: float | None) -> None:
+        """Take one sample.
+
+        Parameters
+        ----------
+        u : float
+            Voltage [V].
+        x : float or None
+            Measured displacement [µm]; None if it is missing.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What happened to the samples an estimator was given.
+
+    Parameters
+    ----------
+    samples : int
+        Samples seen.
+    updates : int
+        Samples that moved the estimate.
+    missing : int
+        Samples without a usable voltage or displacement (None, NaN, infinite).
+    held : int
+        Samples with a measurement but too little excitation to say anything.
+    resets : int
+        Times the covariance was reset.
+    projected : bool
+        Whether `model` is the nearest admissible one and not `theta` itself.
+    last : str
+        What became of the last sample: ``"waiting"``, ``"updated"``, ``"missing"`` or ``"held"``.
+    """
+
+    samples: int
+    updates: int
+    missing: int
+    held: int
+    resets: int
+    projected: bool
+    last: str
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """History of an estimator over a `run`, every k-th sample.
+
+    Parameters
+    ----------
+    index : ndarray of int, shape (M,)
+        Positions in the record that was run.
+    theta : ndarray, shape (M, n)
+        Parameters after that sample.
+    parameter_names : tuple of str
+        Names of the columns of `theta`.
+    y, S : ndarray or None, shape (M,)
+        Innovation and its variance, if asked for.
+    P : ndarray or None, shape (M, n, n)
+        Covariance, if asked for.
+    """
+
+    index: np.ndarray[Any, np.dtype[np.int64]]
+    theta: FloatArray
+    parameter_names: tuple[str, ...]
+    y: FloatArray | None = None
+    S: FloatArray | None = None
+    P: FloatArray | None = field(default=None, repr=False)
+
+
+class EstimatorBase(ABC):
+    """Shared behaviour: one flat state array, from which all else is derived.
+
+    A subclass keeps everything that changes in ``self._state`` (flat float64) and its
+    constructor's JSON-safe arguments in ``self._arguments``; copying, saving, resetting and
+    pickling then need nothing more.
+    """
+
+    __slots__ = ("_arguments", "_pending", "_start", "_state")
+
+    #: Promises of the face this class does not keep: name of the promise to the reason.
+    conformance_exceptions: ClassVar[dict[str, str]] = {}
+
+    _arguments: dict[str, Any]
+    _pending: float | None
+    _start: FloatArray
+    _state: FloatArray
+
+    def _begin(self, arguments: dict[str, Any], state: FloatArray) -> None:
+        self._arguments = arguments
+        self._state = state
+        self._start = state.copy()
+        self._pending = None
+
+    def _load(self, state: FloatArray) -> None:
+        """Take over a state."""
+        self._state[:] = state
+
+    @abstractmethod
+    def _sample(self, u: float, x: float) -> None:
+        """Take one sample; NaN in either is a missing measurement."""
+
+    @abstractmethod
+    def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
+        """Take checked records."""
+
+    @property
+    @abstractmethod
+    def model(self) -> Model:
+        """Admissible model as known now, ready for a compensator."""
+
+    @property
+    @abstractmethod
+    def theta(self) -> FloatArray:
+        """Parameters as estimated, shape (n,), in the order of `parameter_names`."""
+
+    @property
+    @abstractmethod
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the entries of `theta`."""
+
+    @property
+    @abstractmethod
+    def status(self) -> Status:
+        """What happened to the samples so far."""
+
+    def predict(self, u: float) -> None:
+        """Take the voltage of the next sample; `update` completes it.
+
+        Parameters
+        ----------
+        u : float
+            Voltage [V]. A second `predict` without an `update` between them makes the first
+            a sample without a measurement.
+        """
+        if self._pending is not None:
+            self._sample(self._pending, np.nan)
+        self._pending = float(u)
+
+    def update(self, x: float | None) -> None:
+        """Take the measurement that belongs to the last `predict`.
+
+        Parameters
+        ----------
+        x : float or None
+            Displacement [µm]; None, NaN or infinity where there is none.
+
+        Raises
+        ------
+        ValueError
+            If there was no `predict` before.
+        """
+        if self._pending is None:
+            raise ValueError("update(x) needs the sample's voltage: call predict(u) before, or step(u, x)")
+        u, self._pending = self._pending, None
+        self._sample(u, np.nan if x is None else x)
+
+    def step(self, u: float, x: float | None) -> None:
+        """Take one sample: ``predict(u)`` and ``update(x)``.
+
+        Parameters
+        ----------
+        u : float
+            Voltage [V].
+        x : float or None
+            Measured displacement [µm]; None, NaN or infinity where there is none: the
+            sample is skipped and `status` says so. Nothing is raised: a stream must not stop.
+        """
+        if self._pending is not None:
+            self.predict(u)
+            self.update(x)
+            return
+        self._sample(u, np.nan if x is None else x)
+
+    def run(self, u: Any, x: Any, *, every: int = 1, record: tuple[str, ...] = ()) -> Trace:
+        """Take a whole record; continues from the current state, the same as a loop of `step`.
+
+        Parameters
+        ----------
+        u, x : array_like, shape (N,)
+            Voltage [V] and measured displacement [µm]; NaN where a sample is missing.
+        every : int
+            Keep every k-th sample in the trace, the last of each k.
+        record : tuple of str
+            What to keep beside theta: any of ``"y"``, ``"S"``, ``"P"``.
+
+        Returns
+        -------
+        Trace
+
+        Raises
+        ------
+        ValueError
+            If the shapes do not match or a name in `record` is unknown.
+        """
+        u = array_1d("u", u, allow_nan=True)
+        x = array_1d("x", x, allow_nan=True)
+        if u.size != x.size:
+            raise ValueError(f"u and x must have the same length, got {u.size} and {x.size}")
+        if unknown := sorted(set(record) - {"y", "S", "P"}):
+            raise ValueError(f"record holds unknown names {unknown}: choose of 'y', 'S', 'P'")
+        every = integer("every", every, 1)
+        if self._pending is not None:
+            self._sample(self._pending, np.nan)
+            self._pending = None
+        return self._run(u, x, every, frozenset(record))
+
+    def reset(self) -> None:
+        """Return to the state after construction."""
+        self._load(self._start)
+        self._pending = None
+
+    def copy(self) -> Self:
+        """Return an independent estimator in the same state."""
+        return copy.deepcopy(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return arguments and state as a JSON-safe dictionary; `from_dict` resumes bit for bit."""
+        return {
+            "estimator": type(self).__name__,
+            "format": _FORMAT,
+            "arguments": copy.deepcopy(self._arguments),
+            "state": self._state.tolist(),
+            "pending": self._pending,
+        }
+
+    @classmethod
+    def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
+        """Constructor's arguments from their JSON-safe form."""
+        return arguments
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Self:
+        """Make an estimator that continues where `to_dict` was called.
+
+        Parameters
+        ----------
+        data : dict
+            What `to_dict` returned, also after a round trip through JSON.
+
+        Raises
+        ------
+        ValueError
+            If the dictionary is of another class or format, or its state does not fit.
+        """
+        if data.get("estimator") != cls.__name__:
+            raise ValueError(f"data is of a {data.get('estimator')!r}, not of a {cls.__name__}")
+        if data.get("format") != _FORMAT:
+            raise ValueError(f"data has format {data.get('format')!r}, this version reads {_FORMAT}")
+        estimator = cls(**cls._revive(data["arguments"]))
+        state = array_1d("state", data["state"])
+        if state.size != estimator._state.size:
+            raise ValueError(
+                f"state holds {state.size} numbers, {cls.__name__} needs {estimator._state.size}"
+            )
+        estimator._load(state)
+        estimator._pending = data.get("pending")
+        return estimator

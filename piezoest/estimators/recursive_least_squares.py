@@ -1,0 +1,248 @@
+"""The paper's recursive least squares (App. A) for any regression z = theta . phi."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+
+from piezoest._checks import FloatArray, array_1d, finite, integer, positive
+from piezoest.equations import least_squares as equations
+from piezoest.policies import (
+    CovarianceResetting,
+    DeadZone,
+    Forgetting,
+    Normalisation,
+    NormBound,
+    Policy,
+    select,
+)
+
+TimeBase = Literal["discrete", "continuous"]
+
+# Configuration of the law: positions in a flat array.
+FORGETTING, NOISE, BOUND, CONTINUOUS, STEP, RATE, NORMALISED, FLOOR, DEAD_ZONE, CONFIG_SIZE = range(10)
+
+# Head of the law's state; theta, P, P_0 and the work space follow.
+INNOVATION, INNOVATION_VARIANCE, UPDATES, HELD, RESETS, LAST, HEAD = range(7)
+
+# Values of LAST.
+WAITING, UPDATED, MISSING, HOLDING = 0.0, 1.0, 2.0, 3.0
+
+# Beyond this a number is no measurement, and its square could overflow.
+LARGEST = 1e100
+
+
+@register_jitable
+def state_size(n: int) -> int:
+    """Numbers that the state of the law needs for n parameters."""
+    return HEAD + n + 2 * n * n + n + 3 * (n + n * n)
+
+
+def configure(
+    policies: tuple[Policy, ...], step: float, time_base: str, noise: float, P_0: FloatArray
+) -> FloatArray:
+    """Flat configuration of the law from its policies."""
+    if time_base not in ("discrete", "continuous"):
+        raise ValueError(f"time_base must be 'discrete' or 'continuous', got {time_base!r}")
+    forgetting = select(policies, Forgetting) or Forgetting()
+    bound = select(policies, NormBound)
+    resetting = select(policies, CovarianceResetting)
+    dead_zone = select(policies, DeadZone)
+    assert isinstance(forgetting, Forgetting)
+    config = np.zeros(CONFIG_SIZE)
+    config[FORGETTING] = forgetting.factor(step)
+    config[NOISE] = noise
+    config[BOUND] = bound.limit * np.trace(P_0) if isinstance(bound, NormBound) else np.inf
+    config[CONTINUOUS] = time_base == "continuous"
+    config[STEP] = step
+    config[RATE] = 1.0 / forgetting.memory
+    config[NORMALISED] = select(policies, Normalisation) is not None
+    if isinstance(resetting, CovarianceResetting):
+        config[FLOOR] = resetting.floor * np.linalg.eigvalsh(P_0)[0]
+    config[DEAD_ZONE] = dead_zone.threshold if isinstance(dead_zone, DeadZone) else -1.0
+    return config
+
+
+def new_state(theta: FloatArray, P_0: FloatArray) -> FloatArray:
+    """State of the law at its start."""
+    n = theta.size
+    state = np.zeros(state_size(n))
+    state[HEAD : HEAD + n] = theta
+    state[HEAD + n : HEAD + n + n * n] = P_0.ravel()
+    state[HEAD + n + n * n : HEAD + n + 2 * n * n] = P_0.ravel()
+    return state
+
+
+@register_jitable
+def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any) -> None:
+    """One sample of the law: gate, resetting, update. State and theta change in place."""
+    theta = state[HEAD : HEAD + n]
+    P = state[HEAD + n : HEAD + n + n * n]
+    P_0 = state[HEAD + n + n * n : HEAD + n + 2 * n * n]
+    work = state[HEAD + n + 2 * n * n :]
+    information = 0.0
+    for i in range(n):
+        information += phi[i] * phi[i] * P_0[i * n + i]
+    if information <= config[DEAD_ZONE] * config[NOISE]:
+        state[LAST] = HOLDING
+        state[HELD] += 1.0
+        return
+    if config[FLOOR] > 0.0 and equations.above_floor(P, n, config[FLOOR], work) == 0.0:
+        equations.restore_covariance(P, P_0, n, 1.0)
+        state[RESETS] += 1.0
+    if config[CONTINUOUS] != 0.0:
+        y, S = equations.continuous_update(
+            theta, P, phi, z, n, config[STEP], config[RATE], config[NORMALISED], config[BOUND], 1.0, work
+        )
+    else:
+        y, S = equations.discrete_update(
+            theta, P, phi, z, n, config[FORGETTING], config[NOISE], config[BOUND], 1.0, work
+        )
+    state[INNOVATION] = y
+    state[INNOVATION_VARIANCE] = S
+    state[UPDATES] += 1.0
+    state[LAST] = UPDATED
+
+
+@njit("void(f8[::1], f8[::1], f8[::1], f8, i8)", cache=True)
+def _update(state: Any, config: Any, phi: Any, z: float, n: int) -> None:
+    adapt(state, config, phi, z, n)
+
+
+class RecursiveLeastSquares:
+    """Recursive least squares with forgetting for any regression z = theta . phi (App. A).
+
+    Parameters
+    ----------
+    n : int
+        Number of parameters.
+    theta : array_like, shape (n,), optional
+        Parameters to start from (default zeros).
+    P : array_like, shape (n, n) or (n,), or float, optional
+        Initial covariance Q0^-1: matrix, diagonal, or one variance for all (default 1e6).
+    noise_variance : float
+        Variance R of the noise in z, in its unit squared (discrete law only; the paper's
+        law has 1).
+    time_base : {"discrete", "continuous"}
+        ``"discrete"``: time in samples; one exact update a sample, the ordinary recursive
+        least squares. ``"continuous"``: the differential equations (A5)-(A7) integrated by
+        Bogacki-Shampine with `step`; with the step in seconds its normalised gain works
+        per second, as in the paper.
+    step : float
+        Time between samples, in the unit of `Forgetting.memory`: 1 for samples (default),
+        ``1 / sample_rate`` for seconds.
+    policies : tuple of policies
+        Any of `Forgetting`, `NormBound`, `Normalisation`, `CovarianceResetting`,
+        `DeadZone`, at most one of each. Default: none of them but `Normalisation`.
+
+    Raises
+    ------
+    ValueError
+        If a shape, a value or a combination of policies is wrong, or P is not symmetric
+        positive definite.
+
+    Notes
+    -----
+    Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), App. A.
+    """
+
+    __slots__ = ("_config", "_n", "_state")
+
+    def __init__(
+        self,
+        n: int,
+        *,
+        theta: Any = None,
+        P: Any = 1e6,
+        noise_variance: float = 1.0,
+        time_base: TimeBase = "discrete",
+        step: float = 1.0,
+        policies: tuple[Policy, ...] = (Normalisation(),),
+    ) -> None:
+        self._n = integer("n", n, 1)
+        start = np.zeros(self._n) if theta is None else array_1d("theta", theta)
+        if start.size != self._n:
+            raise ValueError(f"theta must have shape ({self._n},), got {start.shape}")
+        P_0 = covariance_matrix("P", P, self._n)
+        noise_variance = positive("noise_variance", noise_variance)
+        if time_base == "continuous" and noise_variance != 1.0:
+            raise ValueError("noise_variance must be 1 in the continuous law: scale z and phi instead")
+        self._config = configure(tuple(policies), positive("step", step), time_base, noise_variance, P_0)
+        self._state = new_state(start, P_0)
+
+    def update(self, z: float, phi: Any) -> None:
+        """Take one sample.
+
+        Parameters
+        ----------
+        z : float
+            Output. A sample in which z or phi is NaN, infinite or beyond 1e100 is skipped.
+        phi : array_like, shape (n,)
+            Regressor.
+
+        Raises
+        ------
+        ValueError
+            If phi has another shape.
+        """
+        phi = array_1d("phi", phi, allow_nan=True)
+        if phi.size != self._n:
+            raise ValueError(f"phi must have shape ({self._n},), got {phi.shape}")
+        if not (abs(z) < LARGEST and np.all(np.abs(phi) < LARGEST)):
+            self._state[LAST] = MISSING
+            return
+        _update(self._state, self._config, phi, float(z), self._n)
+
+    def reset_covariance(self) -> None:
+        """Put P back to its initial value (covariance resetting on call)."""
+        n = self._n
+        self._state[HEAD + n : HEAD + n + n * n] = self._state[HEAD + n + n * n : HEAD + n + 2 * n * n]
+        self._state[RESETS] += 1.0
+
+    @property
+    def theta(self) -> FloatArray:
+        """Parameters, shape (n,)."""
+        return self._state[HEAD : HEAD + self._n].copy()
+
+    @property
+    def P(self) -> FloatArray:
+        """Covariance, shape (n, n)."""
+        n = self._n
+        return self._state[HEAD + n : HEAD + n + n * n].reshape(n, n).copy()
+
+    @property
+    def y(self) -> float:
+        """Last innovation z - theta . phi, before the update."""
+        return float(self._state[INNOVATION])
+
+    @property
+    def S(self) -> float:
+        """Variance of the last innovation as the law saw it."""
+        return float(self._state[INNOVATION_VARIANCE])
+
+    @property
+    def resets(self) -> int:
+        """How often the covariance was reset."""
+        return int(self._state[RESETS])
+
+
+def covariance_matrix(name: str, value: Any, n: int) -> FloatArray:
+    """Return a covariance as a symmetric positive definite (n, n) array.
+
+    `value` may be the matrix, its diagonal or one variance for all.
+    """
+    matrix = np.asarray(value, dtype=np.float64)
+    if matrix.ndim == 0:
+        matrix = finite(name, value) * np.eye(n)
+    elif matrix.ndim == 1:
+        matrix = np.diag(array_1d(name, matrix))
+    if matrix.shape != (n, n):
+        raise ValueError(f"{name} must have shape ({n}, {n}), got {matrix.shape}")
+    if not np.all(np.isfinite(matrix)) or not np.array_equal(matrix, matrix.T):
+        raise ValueError(f"{name} must be finite and symmetric: pass (P + P.T) / 2")
+    if np.linalg.eigvalsh(matrix)[0] <= 0.0:
+        raise ValueError(f"{name} must be positive definite: its smallest eigenvalue is not above zero")
+    return np.ascontiguousarray(matrix)

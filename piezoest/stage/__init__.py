@@ -1,0 +1,7 @@
+"""Simulated stages: voltage in, measured and true displacement out."""
+
+from piezoest.stage.instruments import Amplifier, Gauge
+from piezoest.stage.paper import PaperStage
+from piezoest.stage.stage import SimulatedStage
+
+__all__ = ["Amplifier", "Gauge", "PaperStage", "SimulatedStage"]

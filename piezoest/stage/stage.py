@@ -1,0 +1,282 @@
+"""A simulated stage, put together from parts: amplifier, hysteresis, creep, mechanics, gauge."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from piezoest._checks import FloatArray, array_1d, integer, positive
+from piezoest.models.coleman_hodgdon import ColemanHodgdon
+from piezoest.models.creep import Creep
+from piezoest.models.linear_gain import LinearGain
+from piezoest.models.mechanics import MassSpringDamper
+from piezoest.models.prandtl_ishlinskii import PrandtlIshlinskii
+from piezoest.stage import kernel
+from piezoest.stage.instruments import Amplifier, Gauge
+
+Hysteresis = LinearGain | ColemanHodgdon | PrandtlIshlinskii
+GainSchedule = Callable[[FloatArray], FloatArray]
+
+_NO_MECHANICS = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+
+
+class SimulatedStage:
+    """A stage in software: voltage in, measured and true displacement out.
+
+    One sample runs through amplifier → hysteresis → creep → mechanics → gauge. The voltage
+    of `step` is held for one sample interval and the reading is taken at its end, so that
+    without filters, mechanics and delay the reading is the hysteresis of the voltage itself.
+    The stage starts at rest at 0 V; `step`, `run` and a run in pieces give the same bits,
+    noise included.
+
+    Parameters
+    ----------
+    sample_rate : float
+        [Hz].
+    hysteresis : LinearGain, ColemanHodgdon or PrandtlIshlinskii
+        Voltage [V] to displacement [µm].
+    creep : Creep, optional
+        Slow terms added to the displacement.
+    mechanics : MassSpringDamper, optional
+        Resonance of the stage (5).
+    amplifier : Amplifier, optional
+        Converter and amplifier that drive the stage; ideal if not given.
+    gauge : Gauge, optional
+        Gauge and converter that measure it; ideal if not given.
+    gain_schedule : callable or array_like, shape (M, 2), optional
+        Factor of the hysteresis (not of its offset) over time. An array holds rows of time
+        [s] and factor, joined by straight lines and constant outside. A callable gets an
+        array of times [s], shape (N,), and returns the factors.
+    seed : int
+        Start of the random numbers of the gauge's noise.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range, a part is of the wrong kind, or a filter's cut-off is
+        not below half the sample rate.
+    """
+
+    __slots__ = (
+        "_amplifier",
+        "_count",
+        "_creep",
+        "_displacement",
+        "_gauge",
+        "_generator",
+        "_hysteresis",
+        "_mechanics",
+        "_noisy",
+        "_plays",
+        "_rest",
+        "_sample_rate",
+        "_schedule",
+        "_seed",
+        "_settings",
+        "_state",
+        "_terms",
+    )
+
+    def __init__(
+        self,
+        sample_rate: float,
+        hysteresis: Hysteresis,
+        creep: Creep | None = None,
+        mechanics: MassSpringDamper | None = None,
+        amplifier: Amplifier | None = None,
+        gauge: Gauge | None = None,
+        gain_schedule: GainSchedule | ArrayLike | None = None,
+        seed: int = 0,
+    ) -> None:
+        self._sample_rate = positive("sample_rate", sample_rate)
+        self._hysteresis = _part("hysteresis", hysteresis, (LinearGain, ColemanHodgdon, PrandtlIshlinskii))
+        self._creep = creep if creep is None else _part("creep", creep, (Creep,))
+        self._mechanics = (
+            mechanics if mechanics is None else _part("mechanics", mechanics, (MassSpringDamper,))
+        )
+        self._amplifier = Amplifier() if amplifier is None else _part("amplifier", amplifier, (Amplifier,))
+        self._gauge = Gauge() if gauge is None else _part("gauge", gauge, (Gauge,))
+        self._schedule = None if gain_schedule is None else _schedule(gain_schedule)
+        self._seed = integer("seed", seed)
+        self._noisy = self._gauge.noise > 0.0
+        self._displacement: float | FloatArray
+        self._build()
+        self.reset()
+
+    def _build(self) -> None:
+        """Lay the parts out in the flat vectors of the kernel."""
+        fs = self._sample_rate
+        head, thresholds, weights = _hysteresis_settings(self._hysteresis)
+        gains = np.empty(0) if self._creep is None else self._creep.gains
+        decays = np.empty(0) if self._creep is None else self._creep.decays(fs)
+        mechanics = _NO_MECHANICS if self._mechanics is None else self._mechanics.coefficients(fs)
+        amplifier, gauge = self._amplifier.settings(fs), self._gauge.settings(fs)
+        self._plays, self._terms = thresholds.size, gains.size
+        self._settings = np.concatenate(
+            (amplifier, head, mechanics, gauge, thresholds, weights, gains, decays)
+        )
+        offset = self._hysteresis.offset
+        sample, coleman_hodgdon = np.zeros(kernel.SAMPLE), np.zeros(2)
+        gauge_filter, delay_line = self._gauge.rest_state(offset, gauge)
+        self._rest = np.concatenate(
+            (
+                sample,
+                self._amplifier.rest_state(),
+                coleman_hodgdon,
+                (offset, 0.0),
+                gauge_filter,
+                np.zeros(self._plays + self._terms),
+                delay_line,
+            )
+        )
+
+    @property
+    def sample_rate(self) -> float:
+        """Sample rate [Hz]."""
+        return self._sample_rate
+
+    @property
+    def hysteresis(self) -> Hysteresis:
+        """The hysteresis model."""
+        return self._hysteresis
+
+    @property
+    def creep(self) -> Creep | None:
+        """The creep, None if without."""
+        return self._creep
+
+    @property
+    def mechanics(self) -> MassSpringDamper | None:
+        """The mechanics, None if without."""
+        return self._mechanics
+
+    @property
+    def amplifier(self) -> Amplifier:
+        """The amplifier and its converter."""
+        return self._amplifier
+
+    @property
+    def gauge(self) -> Gauge:
+        """The gauge and its converter."""
+        return self._gauge
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self._count / self._sample_rate
+
+    @property
+    def displacement(self) -> float | FloatArray:
+        """True displacement [µm]: a float after `step`, shape (N,) after `run`."""
+        return self._displacement
+
+    def step(self, u: float) -> float:
+        """Apply a voltage for one sample.
+
+        Parameters
+        ----------
+        u : float
+            Voltage [V]. For NaN or infinity the last finite voltage is held: a program may
+            compute a NaN, an amplifier cannot put it out.
+
+        Returns
+        -------
+        float
+            Measured displacement at the end of the sample [µm].
+        """
+        factor = 1.0 if self._schedule is None else float(self._factors(1)[0])
+        noise = self._generator.standard_normal() if self._noisy else 0.0
+        measured, displacement = kernel.step(
+            self._state, self._settings, self._plays, self._terms, float(u), noise, factor
+        )
+        self._count += 1
+        self._displacement = displacement
+        return measured
+
+    def run(self, u: FloatArray) -> FloatArray:
+        """Apply a voltage record, from the current state on.
+
+        Parameters
+        ----------
+        u : array_like, shape (N,)
+            Voltage [V]; for NaN or infinity the last finite voltage is held.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Measured displacement at the end of each sample [µm].
+
+        Raises
+        ------
+        ValueError
+            If u is not a 1-D array.
+        """
+        x = array_1d("u", u, allow_nan=True).copy()  # voltage, which the kernel turns into displacement
+        measured = np.empty_like(x)
+        factor = np.ones(1) if self._schedule is None else self._factors(x.size)
+        noise = self._generator.standard_normal(x.size) if self._noisy else np.zeros(1)
+        kernel.run(self._state, self._settings, self._plays, self._terms, x, noise, factor, measured)
+        self._count += x.size
+        self._displacement = x
+        return measured
+
+    def reset(self) -> None:
+        """Go back to the start: at rest at 0 V, time zero, the same random numbers."""
+        self._state = self._rest.copy()
+        self._generator = np.random.default_rng(self._seed)
+        self._count = 0
+        self._displacement = self._hysteresis.offset
+
+    def _factors(self, n: int) -> FloatArray:
+        """Gain factors of the next n samples, shape (n,)."""
+        schedule = cast(GainSchedule, self._schedule)
+        times = (self._count + np.arange(n)) / self._sample_rate
+        factors = np.empty(n)
+        try:
+            factors[:] = schedule(times)
+        except (TypeError, ValueError) as error:
+            raise ValueError(
+                f"gain_schedule must return one factor per time, shape ({n},): {error}"
+            ) from error
+        if not np.all(np.isfinite(factors)):
+            raise ValueError(
+                f"gain_schedule returned NaN or infinity after {times[0]:g} s: return finite factors"
+            )
+        return factors
+
+
+def _part(name: str, value: Any, kinds: tuple[type, ...]) -> Any:
+    if not isinstance(value, kinds):
+        expected = " or ".join(kind.__name__ for kind in kinds)
+        raise ValueError(f"{name} must be a {expected}, got {type(value).__name__}")
+    return value
+
+
+def _hysteresis_settings(model: Hysteresis) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(gain, a, b, offset), thresholds and weights: all models are cases of one sum."""
+    none = np.empty(0)
+    if isinstance(model, ColemanHodgdon):
+        return np.array([model.c, model.a, model.b, model.offset]), none, none
+    head = np.array([model.gain, 0.0, 0.0, model.offset])
+    if isinstance(model, PrandtlIshlinskii):
+        return head, model.thresholds, model.weights
+    return head, none, none
+
+
+def _schedule(schedule: Any) -> GainSchedule:
+    """The gain schedule as a function of an array of times."""
+    if callable(schedule):
+        return cast(GainSchedule, schedule)
+    table = np.array(schedule, dtype=np.float64)
+    if table.ndim != 2 or table.shape[0] < 1 or table.shape[1] != 2:
+        raise ValueError(f"gain_schedule must have shape (M, 2), time and factor, got {table.shape}")
+    array_1d("gain_schedule", table.ravel())
+    if np.any(np.diff(table[:, 0]) <= 0.0):
+        raise ValueError(
+            "gain_schedule must have rising times: sort its rows, and ramp where the factor jumps"
+        )
+    return functools.partial(cast(Any, np.interp), xp=table[:, 0], fp=table[:, 1])

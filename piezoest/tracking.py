@@ -1,0 +1,270 @@
+"""The ring: reference, compensator, stage, estimator, and back to the compensator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piezoest._checks import FloatArray, array_1d, integer
+from piezoest.signals import check_continuity
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingRecord:
+    """What went round the ring, sample by sample.
+
+    Parameters
+    ----------
+    reference, voltage, measured, displacement : ndarray, shape (N,)
+        r [µm], u [V], measured x [µm], true x [µm] (the measured one where the stage does
+        not know better).
+    theta : ndarray, shape (N, n)
+        Parameters of the compensator's model at each sample; n = 0 without an estimator.
+    parameter_names : tuple of str
+        Names of the columns of `theta`.
+    sample_rate : float
+        [Hz].
+    period : int or None
+        Samples per period of the reference; None if it has none.
+    """
+
+    reference: FloatArray = field(repr=False)
+    voltage: FloatArray = field(repr=False)
+    measured: FloatArray = field(repr=False)
+    displacement: FloatArray = field(repr=False)
+    theta: FloatArray = field(repr=False)
+    parameter_names: tuple[str, ...]
+    sample_rate: float
+    period: int | None
+
+    @property
+    def error(self) -> FloatArray:
+        """Tracking error r - x of the true displacement [µm], shape (N,)."""
+        return self.reference - self.displacement
+
+    @property
+    def time(self) -> FloatArray:
+        """[s], shape (N,)."""
+        return np.arange(self.reference.size) / self.sample_rate
+
+    @property
+    def periods(self) -> int:
+        """Whole periods in the record.
+
+        Raises
+        ------
+        ValueError
+            If the reference has no period.
+        """
+        return self.reference.size // self._period()
+
+    def _period(self) -> int:
+        if self.period is None:
+            raise ValueError(
+                "the reference has no period: use record.error, or give track() a periodic signal"
+            )
+        return self.period
+
+    def _tail(self, last_periods: int | None) -> slice:
+        if last_periods is None:
+            return slice(None)
+        last_periods = integer("last_periods", last_periods, 1)
+        if last_periods > self.periods:
+            raise ValueError(f"last_periods is {last_periods}, the record has {self.periods} periods")
+        return slice(self.reference.size - last_periods * self._period(), None)
+
+    def max_error(self, last_periods: int | None = None) -> float:
+        """Largest |r - x| [µm], as in the paper's Table II.
+
+        Parameters
+        ----------
+        last_periods : int, optional
+            Over the last so many periods only; default the whole record.
+        """
+        return float(np.max(np.abs(self.error[self._tail(last_periods)])))
+
+    def rms_error(self, last_periods: int | None = None) -> float:
+        """Root mean square of r - x [µm].
+
+        Parameters
+        ----------
+        last_periods : int, optional
+            Over the last so many periods only; default the whole record.
+        """
+        return float(np.sqrt(np.mean(self.error[self._tail(last_periods)] ** 2)))
+
+    def max_error_per_period(self) -> FloatArray:
+        """Largest |r - x| of each whole period [µm], shape (`periods`,)."""
+        period = self._period()
+        whole = np.abs(self.error[: self.periods * period])
+        return whole.reshape(self.periods, period).max(axis=1)
+
+    def table(self) -> str:
+        """Text table of the largest and rms error, and the parameters, at the end of each period."""
+        period = self._period()
+        names = "".join(f"{name:>14}" for name in self.parameter_names)
+        lines = [f"{'period':>6}{'max error [µm]':>16}{'rms error [µm]':>16}{names}"]
+        for k in range(self.periods):
+            error = self.error[k * period : (k + 1) * period]
+            values = "".join(f"{value:14.5g}" for value in self.theta[(k + 1) * period - 1])
+            lines.append(f"{k + 1:6d}{np.max(np.abs(error)):16.4f}{np.sqrt(np.mean(error**2)):16.4f}{values}")
+        return "\n".join(lines)
+
+    def plot(self, last_periods: int | None = None) -> Figure:
+        """Draw the time series and the reference-to-displacement map, as in Fig. 4 of the paper.
+
+        Parameters
+        ----------
+        last_periods : int, optional
+            Draw only the last so many periods.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from matplotlib.figure import Figure
+
+        part = self._tail(last_periods)
+        figure = Figure(figsize=(10, 4), layout="constrained")
+        series, loop = figure.subplots(1, 2, width_ratios=[2, 1])
+        draw_series(series, self, part)
+        draw_map(loop, self, part)
+        return figure
+
+
+def draw_series(axes: Any, record: TrackingRecord, part: slice = slice(None)) -> None:
+    """Draw reference, displacement and error over time (Fig. 4a, 4b) into Matplotlib axes."""
+    axes.plot(record.time[part], record.reference[part], label="reference", color="0.6", lw=2)
+    axes.plot(record.time[part], record.displacement[part], label="displacement", color="C0", lw=1)
+    axes.set(xlabel="time [s]", ylabel="displacement [µm]")
+    right = axes.twinx()
+    right.plot(record.time[part], record.error[part], label="error", color="C3", lw=0.8)
+    right.set_ylabel("error [µm]", color="C3")
+    limit = 1.05 * float(np.max(np.abs(record.error[part]))) or 1.0
+    right.set_ylim(-limit, limit)
+    axes.legend(loc="upper right")
+
+
+def draw_map(axes: Any, record: TrackingRecord, part: slice = slice(None)) -> None:
+    """Draw displacement over reference (Fig. 4c, 4d) into Matplotlib axes."""
+    axes.plot(record.reference[part], record.displacement[part], lw=0.9)
+    axes.set(xlabel="reference [µm]", ylabel="displacement [µm]", aspect="equal")
+    axes.grid(alpha=0.3)
+
+
+def track(
+    r: Any,
+    *,
+    stage: Any,
+    compensator: Any,
+    estimator: Any = None,
+    update_interval: int = 50,
+    sample_rate: float | None = None,
+    allow_jumps: bool = False,
+) -> TrackingRecord:
+    """Let a stage follow a reference, and the compensator learn from the estimator.
+
+    Parameters
+    ----------
+    r : Signal or array_like, shape (N,)
+        Reference displacement [µm]. A `piezoest.signals.Signal` brings sample rate and period.
+    stage : object with ``step(u) -> x``
+        Such as `PaperStage`, or a driver of a real stage.
+    compensator : object with ``step(r) -> u`` and ``model``
+        Such as `InverseCompensator`; with ``needs_measurement`` true, as in `IntegralFeedback`,
+        it is called as ``step(r, x)`` with the measurement before.
+    estimator : object with ``step(u, x)`` and ``model``, optional
+        Such as `HysteresisRLS`; without one the compensator's model stays.
+    update_interval : int
+        Samples between two updates of the compensator's model (default 50: 1 ms at 50 kHz).
+    sample_rate : float, optional
+        [Hz]; needed if r is a plain array and the stage does not name its own.
+    allow_jumps : bool
+        Take a reference with unfiltered steps instead of refusing it; without a slew-rate limit
+        they reach the voltage.
+
+    Returns
+    -------
+    TrackingRecord
+
+    Raises
+    ------
+    ValueError
+        If r is not a finite 1-D array or jumps, or no sample rate is known or two of them differ.
+
+    Notes
+    -----
+    Feed-forward needs no measurement within an interval, so objects that also have ``run``
+    are run an interval at a time; the result is that of a loop of ``step``.
+    """
+    reference = array_1d("r", r, minimum_length=1)
+    rate = _sample_rate(r, stage, estimator, sample_rate)
+    if not allow_jumps:
+        check_continuity(reference, rate, "r")
+    interval = integer("update_interval", update_interval, 1)
+    N = reference.size
+    voltage, measured, displacement = np.empty(N), np.empty(N), np.empty(N)
+    history: list[FloatArray] = []
+    names: tuple[str, ...] = ()
+    for start in range(0, N, interval):
+        part = slice(start, min(start + interval, N))
+        _turn(part, stage, compensator, reference, voltage, measured, displacement)
+        if estimator is not None:
+            history.append(compensator.model.theta)
+            names = compensator.model.parameter_names
+            _feed(estimator, voltage[part], measured[part])
+            compensator.model = estimator.model
+    theta = np.repeat(history, interval, axis=0)[:N] if history else np.empty((N, 0))
+    period = getattr(r, "period", None)
+    return TrackingRecord(
+        reference, voltage, measured, displacement, theta, names, rate,
+        None if period is None else round(period),
+    )  # fmt: skip
+
+
+def _turn(
+    part: slice, stage: Any, compensator: Any, r: FloatArray, u: FloatArray, x: FloatArray, true: FloatArray
+) -> None:
+    """One interval of the reference through compensator and stage, into u, x and the true x."""
+    feeds_back = getattr(compensator, "needs_measurement", False)
+    if not feeds_back and hasattr(compensator, "run") and hasattr(stage, "run"):
+        u[part] = compensator.run(r[part])
+        x[part] = stage.run(u[part])
+        true[part] = getattr(stage, "displacement", x[part])
+        return
+    for k in range(part.start, part.stop):
+        if feeds_back:
+            u[k] = compensator.step(float(r[k]), float(x[k - 1]) if k > 0 else None)
+        else:
+            u[k] = compensator.step(float(r[k]))
+        x[k] = stage.step(float(u[k]))
+        true[k] = getattr(stage, "displacement", x[k])
+
+
+def _feed(estimator: Any, u: FloatArray, x: FloatArray) -> None:
+    if hasattr(estimator, "run"):
+        estimator.run(u, x)
+        return
+    for k in range(u.size):
+        estimator.step(float(u[k]), float(x[k]))
+
+
+def _sample_rate(r: Any, stage: Any, estimator: Any, given: float | None) -> float:
+    named = {
+        "sample_rate": given,
+        "r": getattr(r, "sample_rate", None),
+        "stage": getattr(stage, "sample_rate", None),
+        "estimator": getattr(estimator, "sample_rate", None),
+    }
+    known = {name: float(rate) for name, rate in named.items() if rate is not None}
+    if not known:
+        raise ValueError("sample_rate is unknown: pass a piezoest.signals.Signal or sample_rate= in Hz")
+    if len(set(known.values())) > 1:
+        rates = ", ".join(f"{name} {rate:g} Hz" for name, rate in known.items())
+        raise ValueError(f"sample rates differ: {rates}")
+    return next(iter(known.values()))

@@ -1,0 +1,164 @@
+"""Compensators: exactness, limits, bumpless change of model, feedback."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import piezoest as pz
+
+FS = 50_000.0
+MODEL = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
+
+
+def triangle(periods: int = 3) -> Any:
+    return pz.signals.triangle(5.0, 5.0, periods, FS)
+
+
+@pytest.mark.parametrize("method", ["closed-form", "bogacki-shampine"])
+def test_follows_its_own_model(method: Any) -> None:
+    r = triangle()
+    u = pz.InverseCompensator(MODEL, method=method).run(r)
+    np.testing.assert_allclose(MODEL.simulate(u), r.values, atol=1e-9)
+
+
+def test_linear() -> None:
+    u = pz.LinearCompensator(pz.LinearGain(0.155, offset=0.3)).run([0.0, 1.0, -2.0])
+    np.testing.assert_allclose(u, (np.array([0.0, 1.0, -2.0]) - 0.3) / 0.155)
+    inverted = pz.LinearCompensator(pz.LinearGain(-0.155)).run([0.0, 1.0, -40.0])
+    np.testing.assert_allclose(inverted, np.array([0.0, 1.0, -40.0]) / -0.155)
+
+
+@pytest.mark.parametrize("method", ["closed-form", "bogacki-shampine"])
+def test_step_run_and_split_run_are_the_same_bits(method: Any) -> None:
+    r = triangle(1).values.copy()
+    r[400] = np.nan
+    limits = pz.VoltageLimits(-25.0, 28.0, slew_rate=900.0, sample_rate=FS)
+    whole, steps, parts = (pz.InverseCompensator(MODEL, limits, method=method) for _ in range(3))
+    u = whole.run(r)
+    assert np.array_equal(u, [steps.step(float(value)) for value in r])
+    assert np.array_equal(u, np.concatenate([parts.run(r[:123]), parts.run(r[123:])]))
+    assert whole.status == steps.status == parts.status
+    assert whole.status.missing == 1
+    assert whole.status.saturated > 0
+    whole.reset()
+    assert np.array_equal(u, whole.run(r))
+
+
+@given(
+    st.lists(st.floats(allow_nan=True, allow_infinity=True, width=64), min_size=1, max_size=30),
+    st.floats(-50.0, -1.0),
+    st.floats(1.0, 50.0),
+)
+def test_voltage_never_leaves_its_limits(r: list[float], low: float, high: float) -> None:
+    limits = pz.VoltageLimits(low, high, slew_rate=1000.0, sample_rate=1000.0)
+    compensator = pz.InverseCompensator(MODEL, limits)
+    u = compensator.run(r)
+    assert np.all((u >= low) & (u <= high))
+    assert np.max(np.abs(np.diff(u, prepend=0.0))) <= 1.0 + 1e-12
+    later = compensator.run(triangle(1))
+    assert np.all(np.isfinite(later))
+
+
+def test_range_without_zero_starts_at_its_edge() -> None:
+    compensator = pz.InverseCompensator(MODEL, pz.VoltageLimits(10.0, 100.0))
+    assert compensator.voltage == 10.0
+    assert compensator.step(0.0) == 10.0
+
+
+def test_saturation_does_not_wind_up() -> None:
+    r = pz.signals.sine(5.0, 5.0, 3, FS)
+    free = pz.InverseCompensator(MODEL)
+    limited = pz.InverseCompensator(MODEL, pz.VoltageLimits(-20.0, 20.0))
+    u_free, u = free.run(r), limited.run(r)
+    x = MODEL.simulate(u)
+    reached = np.abs(u) < 20.0
+    np.testing.assert_allclose(x[reached], r.values[reached], atol=1e-9)
+    assert np.max(np.abs(u_free)) > 25.0
+
+
+@pytest.mark.parametrize("at", [700, 2500, 4100])
+def test_change_of_model_is_bumpless(at: int) -> None:
+    r = triangle(2).values
+    new = pz.ColemanHodgdon(0.033, 0.12, 0.0055, offset=0.2)
+    compensator = pz.InverseCompensator(MODEL)
+    before = compensator.run(r[:at])
+    compensator.model = new
+    after = compensator.run(r[at:])
+    usual = np.max(np.abs(np.diff(before)))
+    assert np.max(np.abs(np.diff(np.concatenate([before, after])))) < 3.0 * usual
+    # Once paid back, it is the new model's inverse: the output follows r.
+    settled = pz.InverseCompensator(new)
+    settled.run(np.linspace(0.0, 0.0, 2))
+    whole = np.concatenate([r, r, r])
+    compensator.run(whole)
+    settled.run(whole)
+    np.testing.assert_allclose(compensator.run(r), settled.run(r), atol=1e-3)
+
+
+def test_without_transfer_the_jump_is_what_the_parameters_explain() -> None:
+    r = triangle(1).values[:1800]
+    old, new = pz.ColemanHodgdon(0.021, 0.147, 0.00429), pz.ColemanHodgdon(0.021, 0.13, 0.0038)
+    compensator = pz.InverseCompensator(old, transfer_samples=0)
+    u = compensator.run(r)
+    compensator.model = new
+    jump = compensator.step(r[-1]) - u[-1]
+    w_h = r[-1] - old.c * u[-1]
+    explained = abs((new.c - old.c) * u[-1]) + abs(w_h * (new.b / old.b - 1.0))
+    assert 0.0 < abs(jump) <= explained / (new.c - 2.0 * new.b + 1e-12)
+
+
+def test_inadmissible_model() -> None:
+    wrong = pz.ColemanHodgdon(0.021, 0.147, 0.02)
+    with pytest.raises(ValueError, match="nearest_admissible"):
+        pz.InverseCompensator(wrong)
+    compensator = pz.InverseCompensator(MODEL)
+    compensator.model = wrong
+    assert compensator.status.projected
+    assert compensator.model.is_admissible
+    assert np.all(np.isfinite(compensator.run(triangle(1))))
+    compensator.model = pz.LinearGain(0.15)
+    assert not compensator.status.projected
+
+
+def test_wrong_arguments() -> None:
+    with pytest.raises(ValueError, match="minimum must be below maximum"):
+        pz.VoltageLimits(1.0, -1.0)
+    with pytest.raises(ValueError, match="slew_rate needs sample_rate"):
+        pz.VoltageLimits(slew_rate=10.0)
+    with pytest.raises(ValueError, match="use InverseCompensator"):
+        pz.LinearCompensator(MODEL)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="method must be"):
+        pz.InverseCompensator(MODEL, method="euler")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"r must have shape \(N,\), got \(3, 1\): pass r\[:, 0\]"):
+        pz.InverseCompensator(MODEL).run(np.zeros((3, 1)))
+    with pytest.raises(AttributeError):
+        pz.InverseCompensator(MODEL).modle = MODEL  # type: ignore[attr-defined]
+
+
+def test_integral_feedback_removes_a_constant_error() -> None:
+    stage = pz.SimulatedStage(sample_rate=10_000.0, hysteresis=pz.LinearGain(0.12, offset=0.5))
+    loop = pz.IntegralFeedback(pz.LinearCompensator(pz.LinearGain(0.15)), gain=200.0, sample_rate=10_000.0)
+    record = pz.track(np.full(2000, 2.0), stage=stage, compensator=loop, allow_jumps=True)
+    assert abs(record.error[-1]) < 1e-6
+    assert abs(record.error[0]) > 0.09
+
+
+def test_integral_feedback_does_not_wind_up() -> None:
+    limits = pz.VoltageLimits(-10.0, 10.0)
+    loop = pz.IntegralFeedback(
+        pz.LinearCompensator(pz.LinearGain(0.15), limits), gain=200.0, sample_rate=10_000.0
+    )
+    for _ in range(10_000):
+        assert loop.step(5.0, 1.5) <= 10.0
+    assert loop.integral < 0.1
+    loop.step(1.0, None)
+    loop.step(1.0, float("nan"))
+    loop.step(float("nan"), 1.0)
+    assert np.isfinite(loop.integral)
+    loop.reset()
+    assert loop.integral == 0.0

@@ -1,0 +1,97 @@
+"""RecursiveLeastSquares: the law of App. A for any regression."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from tests.reference import least_squares as reference
+
+
+def test_without_forgetting_is_lstsq() -> None:
+    rng = np.random.default_rng(0)
+    phi = rng.normal(size=(200, 4))
+    z = phi @ [1.0, -2.0, 0.5, 3.0] + 0.1 * rng.normal(size=200)
+    law = pz.RecursiveLeastSquares(4, P=1e8)
+    for k in range(200):
+        law.update(z[k], phi[k])
+    np.testing.assert_allclose(law.theta, np.linalg.lstsq(phi, z)[0], rtol=1e-7)
+
+
+def test_forgetting_follows_a_change() -> None:
+    rng = np.random.default_rng(0)
+    law = pz.RecursiveLeastSquares(2, policies=(pz.policies.Forgetting(memory=20.0),))
+    for k in range(400):
+        phi = rng.normal(size=2)
+        law.update(float(phi @ ([1.0, 2.0] if k < 200 else [1.0, -2.0])), phi)
+    np.testing.assert_allclose(law.theta, [1.0, -2.0], atol=1e-3)
+
+
+def test_continuous_law_is_the_papers() -> None:
+    rng = np.random.default_rng(0)
+    law = pz.RecursiveLeastSquares(
+        2,
+        P=np.array([[2.0, 0.5], [0.5, 1.0]]),
+        time_base="continuous",
+        step=0.01,
+        policies=(pz.policies.Forgetting(3.0), pz.policies.Normalisation()),
+    )
+    theta, P = np.zeros(2), np.array([[2.0, 0.5], [0.5, 1.0]])
+    for _ in range(100):
+        phi, z = rng.normal(size=2), float(rng.normal())
+        law.update(z, phi)
+        theta, P = reference.bogacki_shampine(theta, P, 0.01, phi, z, 1.0 / 3.0, True)
+    np.testing.assert_allclose(law.theta, theta, rtol=1e-10)
+    np.testing.assert_allclose(law.P, P, rtol=1e-10)
+
+
+def test_zero_regressor_for_good() -> None:
+    for policies in ((pz.policies.NormBound(10.0),), (pz.policies.DeadZone(),)):
+        law = pz.RecursiveLeastSquares(2, P=1.0, policies=(pz.policies.Forgetting(5.0), *policies))
+        for _ in range(20_000):
+            law.update(0.3, [0.0, 0.0])
+        assert np.all(np.isfinite(law.P))
+        assert np.trace(law.P) <= 20.0
+
+
+def test_covariance_resetting_below_the_floor_and_on_call() -> None:
+    law = pz.RecursiveLeastSquares(1, P=1.0, policies=(pz.policies.CovarianceResetting(0.1),))
+    for _ in range(100):
+        law.update(1.0, [1.0])
+    assert law.resets == pytest.approx(10, abs=2)
+    law.reset_covariance()
+    np.testing.assert_array_equal(law.P, [[1.0]])
+
+
+def test_wild_samples_are_skipped() -> None:
+    law = pz.RecursiveLeastSquares(2)
+    for z, phi in ((np.nan, [1.0, 1.0]), (1.0, [np.inf, 1.0]), (1e200, [1.0, 1.0])):
+        law.update(z, phi)
+    np.testing.assert_array_equal(law.theta, [0.0, 0.0])
+    law.update(1.0, [1.0, 0.0])
+    assert law.y == 1.0
+    assert pytest.approx(1e6 + 1.0) == law.S
+
+
+def test_wrong_arguments() -> None:
+    with pytest.raises(ValueError, match="n must be a whole number"):
+        pz.RecursiveLeastSquares(0)
+    with pytest.raises(ValueError, match=r"P must have shape \(2, 2\)"):
+        pz.RecursiveLeastSquares(2, P=[1.0, 2.0, 3.0])
+    with pytest.raises(ValueError, match="positive definite"):
+        pz.RecursiveLeastSquares(2, P=[1.0, -1.0])
+    with pytest.raises(ValueError, match="symmetric"):
+        pz.RecursiveLeastSquares(2, P=[[1.0, 0.5], [0.0, 1.0]])
+    with pytest.raises(ValueError, match=r"phi must have shape \(2,\)"):
+        pz.RecursiveLeastSquares(2).update(1.0, [1.0])
+    with pytest.raises(ValueError, match="noise_variance must be 1"):
+        pz.RecursiveLeastSquares(2, time_base="continuous", noise_variance=2.0)
+    with pytest.raises(ValueError, match="limit must be at least 1"):
+        pz.policies.NormBound(0.5)
+    with pytest.raises(ValueError, match="floor must be below 1"):
+        pz.policies.CovarianceResetting(1.0)
+    with pytest.raises(ValueError, match="policy 'Magic' is unknown"):
+        pz.policies.policy_from_dict({"policy": "Magic"})
+    with pytest.raises(ValueError, match="must be made of policies"):
+        pz.RecursiveLeastSquares(2, policies=("forgetting",))  # type: ignore[arg-type]

@@ -1,0 +1,223 @@
+"""The simulated stage: its parts, its streams, its seeds."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from piezoest import (
+    Amplifier,
+    ColemanHodgdon,
+    Creep,
+    Gauge,
+    LinearGain,
+    MassSpringDamper,
+    PaperStage,
+    PrandtlIshlinskii,
+    SimulatedStage,
+)
+from piezoest.equations.filters import biquad_step, butterworth_low_pass
+
+FS = 10_000.0
+COLEMAN_HODGDON = ColemanHodgdon(0.021, 0.147, 4.29e-3, offset=0.3)
+PLAYS = PrandtlIshlinskii(0.1, [1.0, 5.0, 20.0], [0.02, 0.01, 0.03], offset=-0.2)
+U = 40.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(3000) / FS)
+
+
+def full_stage(hysteresis: Any = PLAYS, seed: int = 3) -> SimulatedStage:
+    return SimulatedStage(
+        FS,
+        hysteresis,
+        creep=Creep([0.01, 0.02], [0.01, 0.1]),
+        mechanics=MassSpringDamper(780.0, 0.02),
+        amplifier=Amplifier(-60.0, 60.0, resolution=0.01, slew_rate=1e5, cutoff=3000.0),
+        gauge=Gauge(1e-3, 0.1, 3000.0, delay=2, resolution=1e-3, minimum=-10.0, maximum=10.0),
+        gain_schedule=np.array([[0.05, 1.0], [0.2, 1.2]]),
+        seed=seed,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("model", [LinearGain(0.15, offset=1.0), COLEMAN_HODGDON, PLAYS])
+def test_ideal_instruments_show_the_model_itself(model: Any) -> None:
+    stage = SimulatedStage(FS, model)
+    np.testing.assert_array_equal(stage.run(U), model.simulate(U))
+    np.testing.assert_array_equal(stage.displacement, model.simulate(U))
+
+
+def test_creep_and_mechanics_are_those_of_the_models() -> None:
+    creep, mechanics = Creep([0.01, 0.02], [0.01, 0.1]), MassSpringDamper(780.0, 0.02)
+    measured = SimulatedStage(FS, PLAYS, creep=creep, mechanics=mechanics).run(U)
+    w = PLAYS.simulate(U) - PLAYS.offset
+    slow = w + creep.simulate(w, sample_rate=FS) + PLAYS.offset
+    rest = np.array([PLAYS.offset, 0.0])
+    np.testing.assert_allclose(
+        measured, mechanics.simulate(slow, sample_rate=FS, initial_state=rest), atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("hysteresis", [LinearGain(0.15), COLEMAN_HODGDON, PLAYS])
+def test_step_run_and_split_run_give_the_same_bits(hysteresis: Any) -> None:
+    u = U.copy()
+    u[100:103] = np.nan, np.inf, -np.inf
+    whole, pieces, single = (full_stage(hysteresis) for _ in range(3))
+    measured = whole.run(u)
+    parts = [pieces.run(part) for part in np.split(u, [1, 100, 102, 1700])]
+    np.testing.assert_array_equal(np.concatenate(parts), measured)
+    np.testing.assert_array_equal(pieces.displacement, np.asarray(whole.displacement)[1700:])
+    for k, value in enumerate(u):
+        assert single.step(value) == measured[k]
+        assert single.displacement == np.asarray(whole.displacement)[k]
+    assert isinstance(single.step(1.0), float)
+    assert isinstance(single.displacement, float)
+    assert single.time == pytest.approx((u.size + 1) / FS)
+
+
+@given(st.lists(st.integers(0, 400), max_size=6))
+def test_any_split_of_a_run_gives_the_same_bits(cuts: list[int]) -> None:
+    pieces = np.split(U[:400], sorted(cuts))
+    stage = full_stage()
+    np.testing.assert_array_equal(
+        np.concatenate([stage.run(piece) for piece in pieces]), full_stage().run(U[:400])
+    )
+
+
+def test_reset_repeats_and_seeds_differ() -> None:
+    stage = full_stage()
+    first = stage.run(U)
+    stage.reset()
+    assert stage.time == 0.0
+    assert stage.displacement == PLAYS.offset
+    np.testing.assert_array_equal(stage.run(U), first)
+    other = full_stage(seed=4)
+    assert np.any(other.run(U) != first)
+    np.testing.assert_array_equal(other.displacement, stage.displacement)
+
+
+def test_copies_go_their_own_way() -> None:
+    stage = full_stage()
+    stage.run(U[:500])
+    twins = copy.deepcopy(stage), pickle.loads(pickle.dumps(stage))
+    measured = stage.run(U[500:])
+    for twin in twins:
+        np.testing.assert_array_equal(twin.run(U[500:]), measured)
+
+
+def test_last_good_voltage_is_held() -> None:
+    bad = U.copy()
+    bad[50:60] = np.nan
+    bad[70] = np.inf
+    held = U.copy()
+    held[50:60] = U[49]
+    held[70] = U[69]
+    np.testing.assert_array_equal(full_stage().run(bad), full_stage().run(held))
+    stage = full_stage()
+    assert np.isfinite(stage.step(float("nan")))
+
+
+def test_starts_at_rest() -> None:
+    """At 0 V nothing moves, whatever offset, bias, filters and delay there are."""
+    stage = SimulatedStage(
+        FS, PLAYS, Creep([0.1], [0.01]), MassSpringDamper(780.0, 0.02),
+        Amplifier(cutoff=2000.0), Gauge(bias=0.7, cutoff=2000.0, delay=3),
+    )  # fmt: skip
+    np.testing.assert_allclose(stage.run(np.zeros(200)), PLAYS.offset + 0.7, atol=1e-14)
+
+
+def test_voltage_quantisation_and_range() -> None:
+    stage = SimulatedStage(FS, LinearGain(1.0), amplifier=Amplifier(-5.0, 8.0, resolution=0.25))
+    x = stage.run(np.linspace(-20.0, 20.0, 1001))
+    np.testing.assert_array_equal(
+        x, np.clip(0.25 * np.floor(np.linspace(-20.0, 20.0, 1001) / 0.25 + 0.5), -5.0, 8.0)
+    )
+
+
+def test_slew_rate() -> None:
+    stage = SimulatedStage(FS, LinearGain(1.0), amplifier=Amplifier(slew_rate=5.0 * FS))
+    np.testing.assert_array_equal(
+        stage.run(np.array([12.0, 12.0, 12.0, 12.0, -1.0])), [5.0, 10.0, 12.0, 12.0, 7.0]
+    )
+
+
+def test_reading_quantisation_range_bias_and_delay() -> None:
+    gauge = Gauge(bias=0.5, delay=2, resolution=0.1, minimum=-1.0, maximum=1.0)
+    stage = SimulatedStage(FS, LinearGain(1.0), gauge=gauge)
+    measured = stage.run(np.array([0.03, 0.27, 3.0, -4.0, 0.0, 0.0]))
+    np.testing.assert_allclose(measured, [0.5, 0.5, 0.5, 0.8, 1.0, -1.0], atol=1e-15)
+    np.testing.assert_array_equal(stage.displacement, [0.03, 0.27, 3.0, -4.0, 0.0, 0.0])
+
+
+def test_noise_is_white_before_the_filter() -> None:
+    n = 100_000
+    plain = SimulatedStage(FS, LinearGain(1.0), gauge=Gauge(noise=2e-3), seed=1).run(np.zeros(n))
+    assert plain.std() == pytest.approx(2e-3, rel=0.02)
+    np.testing.assert_array_equal(plain, 2e-3 * np.random.default_rng(1).standard_normal(n))
+    filtered = SimulatedStage(FS, LinearGain(1.0), gauge=Gauge(noise=2e-3, cutoff=1000.0), seed=1).run(
+        np.zeros(n)
+    )
+    state, coefficients = np.zeros(2), butterworth_low_pass(1000.0, FS)
+    np.testing.assert_allclose(filtered, [biquad_step(state, x, coefficients) for x in plain], atol=1e-18)
+
+
+def test_filter_is_the_butterworth_low_pass() -> None:
+    from scipy.signal import butter, lfilter
+
+    b, a = butter(2, 1000.0, fs=FS)
+    np.testing.assert_allclose(butterworth_low_pass(1000.0, FS), [*b, *a[1:]], atol=1e-14)
+    stage = SimulatedStage(FS, LinearGain(1.0), amplifier=Amplifier(cutoff=1000.0))
+    np.testing.assert_allclose(stage.run(U), lfilter(b, a, U), atol=1e-12)
+
+
+def test_gain_schedule() -> None:
+    model = LinearGain(0.1, offset=2.0)
+    u = np.full(5, 10.0)
+    table = SimulatedStage(FS, model, gain_schedule=np.array([[1.0 / FS, 1.0], [3.0 / FS, 3.0]]))
+    np.testing.assert_allclose(table.run(u), [3.0, 3.0, 4.0, 5.0, 5.0], atol=1e-12)
+    called = SimulatedStage(FS, model, gain_schedule=lambda t: 1.0 + FS * t)
+    np.testing.assert_allclose(called.run(u), [3.0, 4.0, 5.0, 6.0, 7.0], atol=1e-12)
+    constant = SimulatedStage(FS, model, gain_schedule=lambda t: 2.0)  # type: ignore[arg-type, return-value]
+    np.testing.assert_allclose(constant.run(u), 4.0)
+    with pytest.raises(ValueError, match="one factor per time"):
+        SimulatedStage(FS, model, gain_schedule=lambda t: np.ones(3)).run(u)
+    with pytest.raises(ValueError, match="NaN or infinity"):
+        SimulatedStage(FS, model, gain_schedule=lambda t: t * np.nan).step(1.0)
+    with pytest.raises(ValueError, match="rising times"):
+        SimulatedStage(FS, model, gain_schedule=np.array([[1.0, 1.0], [0.0, 3.0]]))
+    with pytest.raises(ValueError, match="shape"):
+        SimulatedStage(FS, model, gain_schedule=np.array([1.0, 2.0]))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: SimulatedStage(0.0, PLAYS), "sample_rate must be above zero"),
+        (lambda: SimulatedStage(FS, 0.15), "hysteresis must be a LinearGain or .*, got float"),  # type: ignore[arg-type]
+        (lambda: SimulatedStage(FS, PLAYS, gauge=Amplifier()), "gauge must be a Gauge, got Amplifier"),  # type: ignore[arg-type]
+        (lambda: SimulatedStage(FS, PLAYS, gauge=Gauge(cutoff=5000.0)), "gauge.cutoff must lie below half"),
+        (lambda: SimulatedStage(FS, PLAYS, seed=-1), "seed must be a whole number"),
+        (lambda: Amplifier(minimum=1.0, maximum=5.0), "must enclose 0 V"),
+        (lambda: Amplifier(slew_rate=0.0), "slew_rate must be above zero"),
+        (lambda: Amplifier(cutoff=-1.0), "cutoff must be above zero"),
+        (lambda: Amplifier(resolution=-1.0), "resolution must be zero or more"),
+        (lambda: Gauge(delay=1.5), "delay must be a whole number"),  # type: ignore[arg-type]
+        (lambda: Gauge(noise=float("nan")), "noise must be finite"),
+        (lambda: Gauge(minimum=float("nan")), "must enclose 0 µm"),
+    ],
+)  # fmt: skip
+def test_refusals(make: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_run_refuses_columns_and_attributes_refuse_typos() -> None:
+    stage = PaperStage()
+    with pytest.raises(ValueError, match=r"pass u\[:, 0\]"):
+        stage.run(np.zeros((3, 1)))
+    with pytest.raises(AttributeError):
+        stage.gain_shedule = 1.0  # type: ignore[attr-defined]
+    assert stage.run(np.empty(0)).shape == (0,)

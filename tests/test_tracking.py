@@ -1,0 +1,128 @@
+"""The ring: what goes round it, and what it says when something does not fit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+
+FS = 50_000.0
+START = pz.ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)
+
+
+def ring(periods: int = 12, **options: Any) -> Any:
+    return pz.track(
+        pz.signals.triangle(5.0, 5.0, periods, FS),
+        stage=pz.PaperStage(sample_rate=FS, seed=0),
+        compensator=pz.InverseCompensator(START),
+        estimator=pz.HysteresisRLS(FS, memory=0.4),
+        **options,
+    )
+
+
+def test_adaptation_removes_nine_tenths_of_the_linear_error() -> None:
+    r = pz.signals.triangle(5.0, 5.0, 12, FS)
+    linear = pz.track(
+        r,
+        stage=pz.PaperStage(sample_rate=FS, seed=0),
+        compensator=pz.LinearCompensator(pz.LinearGain(0.12)),
+        estimator=pz.HysteresisRLS(FS, initial_model=pz.LinearGain(0.12)),
+    )
+    adaptive = ring()
+    assert linear.max_error(last_periods=2) == pytest.approx(0.54, rel=0.05)
+    assert adaptive.max_error(last_periods=2) < 0.1 * linear.max_error(last_periods=2)
+    assert adaptive.rms_error(last_periods=2) < adaptive.max_error(last_periods=2)
+    assert adaptive.max_error_per_period().shape == (12,)
+    assert adaptive.theta.shape == (adaptive.reference.size, 3)
+    np.testing.assert_array_equal(adaptive.theta[0], START.theta)
+
+
+def test_intervals_are_a_loop_of_steps() -> None:
+    """Objects with nothing but `step`, as on hardware, give the same bits."""
+
+    class Bare:
+        def __init__(self, inner: Any) -> None:
+            self._inner = inner
+
+        def step(self, *arguments: Any) -> Any:
+            return self._inner.step(*arguments)
+
+        model = property(
+            lambda self: self._inner.model, lambda self, model: setattr(self._inner, "model", model)
+        )
+        displacement = property(lambda self: self._inner.displacement)
+
+    r = pz.signals.triangle(5.0, 5.0, 1, FS)
+    whole = ring(1)
+    bare = pz.track(
+        r,
+        stage=Bare(pz.PaperStage(sample_rate=FS, seed=0)),
+        compensator=Bare(pz.InverseCompensator(START)),
+        estimator=Bare(pz.HysteresisRLS(FS, memory=0.4)),
+    )
+    for name in ("voltage", "measured", "displacement", "theta"):
+        assert np.array_equal(getattr(whole, name), getattr(bare, name)), name
+
+
+def test_an_estimator_of_ones_own_needs_no_registration() -> None:
+    class Constant:
+        model = pz.ColemanHodgdon(0.018, 0.148, 0.0039)
+
+        def step(self, u: float, x: float | None) -> None:
+            pass
+
+    record = pz.track(
+        pz.signals.triangle(5.0, 5.0, 3, FS),
+        stage=pz.PaperStage(sample_rate=FS),
+        compensator=pz.InverseCompensator(START),
+        estimator=Constant(),
+    )
+    np.testing.assert_array_equal(record.theta[-1], Constant.model.theta)
+
+
+def test_table_and_plot() -> None:
+    record = ring(2)
+    lines = record.table().splitlines()
+    assert len(lines) == 3
+    assert "alpha" in lines[0]
+    figure = record.plot(last_periods=1)
+    series, loop, error = figure.axes
+    assert series.get_ylabel() == "displacement [µm]"
+    assert loop.get_xlabel() == "reference [µm]"
+    assert error.get_ylabel() == "error [µm]"
+
+
+def test_plain_arrays_need_a_rate() -> None:
+    class Wire:
+        def step(self, u: float) -> float:
+            return u
+
+    compensator = pz.LinearCompensator(pz.LinearGain(1.0))
+    r = np.sin(np.linspace(0.0, 6.0, 100))
+    with pytest.raises(ValueError, match="sample_rate is unknown"):
+        pz.track(r, stage=Wire(), compensator=compensator)
+    record = pz.track(r, stage=Wire(), compensator=compensator, sample_rate=100.0)
+    np.testing.assert_allclose(record.error, 0.0, atol=1e-12)
+    assert record.time[1] == 0.01
+    assert record.theta.shape == (100, 0)
+    with pytest.raises(ValueError, match="has no period"):
+        record.max_error(last_periods=1)
+    with pytest.raises(ValueError, match="sample rates differ"):
+        pz.track(r, stage=pz.PaperStage(sample_rate=FS), compensator=compensator, sample_rate=100.0)
+
+
+def test_wrong_references() -> None:
+    def follow(r: Any) -> None:
+        pz.track(r, stage=pz.PaperStage(), compensator=pz.InverseCompensator(START))
+
+    with pytest.raises(ValueError, match="r holds 1 values that are NaN"):
+        follow([0.0, np.nan])
+    with pytest.raises(ValueError, match="r needs at least 1 samples"):
+        follow([])
+    with pytest.raises(ValueError, match=r"signals\.filtered_steps"):
+        follow(np.repeat([0.0, 1.0, 0.0], 100))
+    with pytest.raises(ValueError, match="last_periods is 5, the record has 2 periods"):
+        ring(2).max_error(last_periods=5)
