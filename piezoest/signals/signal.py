@@ -100,6 +100,11 @@ class Signal:
         The period is kept if the signal is a whole number of periods long; otherwise the phase
         breaks at the joints and the result has no period.
 
+        Parameters
+        ----------
+        n : int
+            How often, at least once.
+
         Raises
         ------
         ValueError
@@ -117,6 +122,11 @@ class Signal:
         """Return this signal followed by `other`; the period is kept if both have the same one.
 
         A difference between the last and the first value becomes a jump: `require_continuous` finds it.
+
+        Parameters
+        ----------
+        other : Signal
+            What follows, of the same sample rate.
 
         Raises
         ------
@@ -152,6 +162,11 @@ class Signal:
     def shifted(self, offset: float) -> Signal:
         """Return the signal plus a constant.
 
+        Parameters
+        ----------
+        offset : float
+            Added to every value, in its unit.
+
         Raises
         ------
         ValueError
@@ -161,6 +176,11 @@ class Signal:
 
     def require_continuous(self, *, allowed_step: float = 0.0) -> Signal:
         """Return the signal itself if it has no jumps; see `check_continuity`.
+
+        Parameters
+        ----------
+        allowed_step : float
+            Steps up to this size always pass.
 
         Raises
         ------

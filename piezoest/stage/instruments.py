@@ -113,12 +113,12 @@ class Amplifier:
         if self.cutoff is not None:
             positive("cutoff", self.cutoff)
 
-    def settings(self, sample_rate: float) -> FloatArray:
+    def _settings(self, sample_rate: float) -> FloatArray:
         """Settings (4,) and filter coefficients (5,) of `amplifier_step` at `sample_rate` [Hz]."""
         head = [self.minimum, self.maximum, self.resolution, self.slew_rate / sample_rate]
         return np.concatenate((head, _filter("amplifier", self.cutoff, sample_rate)))
 
-    def rest_state(self) -> FloatArray:
+    def _rest_state(self) -> FloatArray:
         """State and filter state (4,) of `amplifier_step` after a long time at 0 V."""
         return np.zeros(4)
 
@@ -165,12 +165,12 @@ class Gauge:
         non_negative("resolution", self.resolution)
         _check_range("µm", self.minimum, self.maximum)
 
-    def settings(self, sample_rate: float) -> FloatArray:
+    def _settings(self, sample_rate: float) -> FloatArray:
         """Settings (5,) and filter coefficients (5,) of `gauge_step` at `sample_rate` [Hz]."""
         head = [self.noise, self.bias, self.minimum, self.maximum, self.resolution]
         return np.concatenate((head, _filter("gauge", self.cutoff, sample_rate)))
 
-    def rest_state(self, x: float, settings: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _rest_state(self, x: float, settings: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Filter state (2,) and delay line of `gauge_step` after a long time at x [µm]."""
         level = x + self.bias
         _, b1, b2, a1, a2 = settings[5:]

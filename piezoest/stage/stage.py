@@ -114,18 +114,18 @@ class SimulatedStage:
         gains = np.empty(0) if self._creep is None else self._creep.gains
         decays = np.empty(0) if self._creep is None else self._creep.decays(fs)
         mechanics = _NO_MECHANICS if self._mechanics is None else self._mechanics.coefficients(fs)
-        amplifier, gauge = self._amplifier.settings(fs), self._gauge.settings(fs)
+        amplifier, gauge = self._amplifier._settings(fs), self._gauge._settings(fs)
         self._plays, self._terms = thresholds.size, gains.size
         self._settings = np.concatenate(
             (amplifier, head, mechanics, gauge, thresholds, weights, gains, decays)
         )
         offset = self._hysteresis.offset
         sample, coleman_hodgdon = np.zeros(kernel.SAMPLE), np.zeros(2)
-        gauge_filter, delay_line = self._gauge.rest_state(offset, gauge)
+        gauge_filter, delay_line = self._gauge._rest_state(offset, gauge)
         self._rest = np.concatenate(
             (
                 sample,
-                self._amplifier.rest_state(),
+                self._amplifier._rest_state(),
                 coleman_hodgdon,
                 (offset, 0.0),
                 gauge_filter,

@@ -1,0 +1,373 @@
+"""The command line: demo, identify, compensate. Heavy imports wait inside the commands."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+if TYPE_CHECKING:
+    from piezoest.demo import Demo
+    from piezoest.identification import Identification
+    from piezoest.models import Model
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Exit codes: 0 done, 1 the input cannot be used, 2 wrong usage.",
+)
+
+USER_ERROR, INTERRUPTED = 1, 130
+
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
+
+
+def main() -> None:
+    """Run the command line."""
+    try:
+        app(prog_name="piezoest")
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+
+
+@contextlib.contextmanager
+def _errors(debug: bool) -> Iterator[None]:
+    """Turn a user's mistake into one line on stderr and exit code 1."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise typer.Exit(INTERRUPTED) from None
+    except BrokenPipeError:
+        # Whoever read us has seen enough; Python must not complain about it at its end either.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise typer.Exit(0) from None
+    except (ValueError, OSError) as error:
+        if debug:
+            raise
+        text = (
+            f"{error.filename}: {error.strerror}"
+            if isinstance(error, OSError) and error.filename
+            else str(error)
+        )
+        console = Console(stderr=True)
+        console.print(f"error: {text}", style="red", markup=False, highlight=False, soft_wrap=True)
+        raise typer.Exit(USER_ERROR) from None
+
+
+@contextlib.contextmanager
+def _progress(text: str) -> Iterator[Callable[[str], None]]:
+    """A spinner on stderr, if that is a terminal; yields a function that changes its text."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda _: None
+        return
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task(text, total=None)
+        yield lambda said: progress.update(task, description=said)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from piezoest._version import __version__
+
+        typer.echo(f"piezoest {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _piezoest(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Learn the hysteresis of a piezo stage, and cancel it.
+
+    [bold]Examples[/bold]
+
+    See it work on a simulated stage:  [cyan]piezoest demo[/cyan]
+
+    Learn a model from a log:  [cyan]piezoest identify log.csv --output model.json[/cyan]
+
+    Turn a reference into a voltage:  [cyan]piezoest compensate r.csv -p model.json -o voltage.csv[/cyan]
+    """
+
+
+@app.command(epilog="Example: piezoest demo --output figure.png")
+def demo(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Figure to write (PNG, PDF, SVG).")] = Path(
+        "piezoest_demo.png"
+    ),
+    periods: Annotated[int, typer.Option(min=5, max=1000, help="Periods of the reference, 0.2 s each.")] = 15,
+    seed: Annotated[int, typer.Option(min=0, help="Start of the random numbers of the stage.")] = 0,
+    debug: Debug = False,
+) -> None:
+    """Compare linear feed-forward with adaptive compensation on a simulated stage.
+
+    A smoothed triangle of 5 µm at 5 Hz, noise and quantisation on, from wrong start parameters.
+    """
+    with _errors(debug):
+        _check_writable(output)
+        with _progress("loading (compiles once after the installation)") as say:
+            from piezoest.demo import run_demo
+
+            result = run_demo(periods, seed, say)
+            say("drawing")
+            result.plot().savefig(output, dpi=130)
+        _print_demo(result)
+        typer.echo(f"Figure: {output}")
+
+
+def _print_demo(result: Demo) -> None:
+    from rich.table import Table
+
+    from piezoest.demo import AMPLITUDE, FREQUENCY, SETTLED_PERIODS
+
+    ways = (
+        ("linear, gain estimated", result.linear),
+        ("inverse, not adapted", result.fixed),
+        ("inverse, adaptive", result.adaptive),
+    )
+    table = Table(title=f"Largest error [µm]: {AMPLITUDE:g} µm at {FREQUENCY:g} Hz, simulated stage")
+    table.add_column("compensation")
+    for period in range(1, 5):
+        table.add_column(f"period {period}", justify="right")
+    table.add_column("settled", justify="right", style="bold")
+    for name, record in ways:
+        errors = record.max_error_per_period()
+        table.add_row(name, *(f"{e:.3f}" for e in errors[:4]), f"{record.max_error(SETTLED_PERIODS):.4f}")
+    console = Console()
+    console.print(table)
+    names = result.adaptive.parameter_names
+    first, last = result.adaptive.theta[0], result.adaptive.theta[-1]
+    learnt = ", ".join(f"{name} {a:.4g} → {b:.4g}" for name, a, b in zip(names, first, last, strict=True))
+    console.print(f"Learnt: {learnt}", highlight=False, soft_wrap=True)
+    console.print(
+        f"Adaptive compensation reduces the settled error of linear feed-forward by "
+        f"[bold]{100.0 * result.reduction:.1f} %[/bold] ({result.seconds:.1f} s for the three runs).",
+        highlight=False, soft_wrap=True,
+    )  # fmt: skip
+
+
+@app.command(
+    epilog="Example: piezoest identify log.csv --columns voltage=drive_mV,displacement=3 --output model.json"
+)
+def identify(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="CSV log with time, voltage and displacement.")
+    ],
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            help="Columns by name or number, where guessing fails: time=t,voltage=u_mV,displacement=3"
+        ),
+    ] = None,
+    sample_rate: Annotated[
+        float | None, typer.Option(help="Samples per second; a column of time is then ignored.")
+    ] = None,
+    train: Annotated[float, typer.Option(help="Part to fit, from the start; the rest is held out.")] = 0.5,
+    delay: Annotated[
+        str, typer.Option(help="Samples by which the displacement lags the voltage, or auto.")
+    ] = "auto",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write the model as JSON, for compensate.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Figure to write; default <FILE>_identified.png here.")
+    ] = None,
+    no_plot: Annotated[bool, typer.Option("--no-plot", help="Write no figure.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
+    debug: Debug = False,
+) -> None:
+    """Learn a model from a recorded log, and say how far to trust it.
+
+    Columns and units are guessed from a header such as time_s,voltage_V,displacement_um.
+    """
+    with _errors(debug):
+        figure = None if no_plot else plot or Path(f"{file.stem}_identified.png")
+        for target in (figure, output):
+            if target is not None:
+                _check_writable(target)
+        with _progress("loading (compiles once after the installation)") as say:
+            from piezoest.identification import identify as run
+            from piezoest.records import read_record
+
+            say(f"reading {file.name}")
+            record = read_record(file, columns=_columns(columns), sample_rate=sample_rate)
+            say("fitting")
+            found = run(record, train=train, delay="auto" if delay == "auto" else _number("--delay", delay))
+            if figure is not None:
+                say("drawing")
+                found.plot().savefig(figure, dpi=130)
+        if output is not None:
+            output.write_text(
+                json.dumps(found.to_dict(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
+            )
+        if as_json:
+            typer.echo(json.dumps(found.to_dict(), indent=2, allow_nan=False))
+            return
+        _print_identification(found)
+        for name, path in (("Figure", figure), ("Model", output)):
+            if path is not None:
+                typer.echo(f"{name}: {path}")
+
+
+def _print_identification(found: Identification) -> None:
+    from rich.table import Table
+
+    record, console = found.record, Console()
+    console.print(
+        f"{record.source}: {len(record)} samples at {record.sample_rate:.6g} Hz, {found.trained} fitted, "
+        f"{len(record) - found.trained} held out",
+        highlight=False, markup=False, soft_wrap=True,
+    )  # fmt: skip
+    parameters = Table(title="Coleman-Hodgdon model")
+    for title in ("parameter", "value", "± standard error", "unit"):
+        parameters.add_column(title, justify="right" if title in ("value", "± standard error") else "left")
+    for name, value, error, unit in found.table():
+        parameters.add_row(name, f"{value:.6g}", f"{error:.2g}" if error > 0.0 else "not estimated", unit)
+    console.print(parameters)
+    errors = Table(title="Free-running error [µm]")
+    for title in ("", "fitted rms", "held out rms", "held out largest"):
+        errors.add_column(title, justify="right" if title else "left")
+    for name, fitted, held in (
+        ("model", found.train, found.held_out),
+        ("straight line, same lag", found.line_train, found.line_held_out),
+    ):
+        errors.add_row(name, *(f"{value:.4g}" for value in (fitted.rms, held.rms, held.max)))
+    console.print(errors)
+    white = found.whiteness
+    p_value = f"= {white.p_value:.2g}" if white.p_value > 1e-9 else "< 1e-9"
+    console.print(
+        f"Residual: {'white' if white.is_white else 'not white'} (Ljung-Box over {white.lags} lags: "
+        f"p {p_value}; autocorrelation at lag 1: {white.first_autocorrelation:.2f})",
+        highlight=False,
+        soft_wrap=True,
+    )
+    for sentence in (*(f"{note}." for note in record.notes), *found.advice):
+        console.print(f"• {sentence}", highlight=False, markup=False, soft_wrap=True)
+
+
+@app.command(
+    epilog="Examples: piezoest compensate reference.csv --parameters model.json -o voltage.csv; "
+    "piezoest compensate reference.csv --alpha 0.017 --beta 0.148 --gamma 0.0038 --maximum 150 -o voltage.csv"
+)
+def compensate(
+    reference: Annotated[Path, typer.Argument(metavar="REFERENCE", help="CSV with time_s, reference_um.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="CSV to write: time_s, voltage_V, reference_um.")
+    ],
+    parameters: Annotated[
+        Path | None,
+        typer.Option("--parameters", "-p", help="Model as JSON, such as identify --output wrote."),
+    ] = None,
+    alpha: Annotated[float | None, typer.Option(help="1/V")] = None,
+    beta: Annotated[float | None, typer.Option(help="µm/V")] = None,
+    gamma: Annotated[float | None, typer.Option(help="µm/V²")] = None,
+    offset: Annotated[float | None, typer.Option(help="µm at 0 V; replaces that of --parameters.")] = None,
+    minimum: Annotated[float | None, typer.Option(help="Least voltage [V].")] = None,
+    maximum: Annotated[float | None, typer.Option(help="Largest voltage [V].")] = None,
+    column: Annotated[str | None, typer.Option(help="Column of the reference, if not guessed.")] = None,
+    sample_rate: Annotated[float | None, typer.Option(help="Hz, if there is no column of time.")] = None,
+    debug: Debug = False,
+) -> None:
+    """Turn a reference into the voltage that makes the stage follow it.
+
+    The voltage starts from 0 V without hysteresis, or from the limit nearest to it.
+    """
+    with _errors(debug):
+        _check_writable(output)
+        with _progress("loading (compiles once after the installation)"):
+            from piezoest.compensators import InverseCompensator, VoltageLimits
+            from piezoest.records import read_reference, write_columns
+            from piezoest.signals import check_continuity
+
+            model = _model(parameters, {"alpha": alpha, "beta": beta, "gamma": gamma}, offset)
+            limits = VoltageLimits(
+                minimum=-float("inf") if minimum is None else minimum,
+                maximum=float("inf") if maximum is None else maximum,
+            )
+            compensator = InverseCompensator(model, limits)
+            signal = read_reference(reference, column=column, sample_rate=sample_rate)
+            check_continuity(signal.values, signal.sample_rate, "the reference")
+            voltage = compensator.run(signal.values)
+            columns = {"time_s": signal.time, "voltage_V": voltage, "reference_um": signal.values}
+            write_columns(output, columns)
+        typer.echo(
+            f"{output}: {voltage.size} samples at {signal.sample_rate:.6g} Hz, "
+            f"{voltage.min():.4g} to {voltage.max():.4g} V"
+        )
+        if limited := compensator.status.saturated:
+            typer.echo(
+                f"{limited} samples ({100.0 * limited / voltage.size:.1f} %) are at a limit of the voltage: "
+                "there the stage will not follow the reference",
+                err=True,
+            )
+
+
+def _model(path: Path | None, given: dict[str, float | None], offset: float | None) -> Model:
+    """Model from a JSON file, or from the three options."""
+    import dataclasses
+
+    from piezoest.models import ColemanHodgdon, LinearGain, model_from_dict
+
+    stated = {name: value for name, value in given.items() if value is not None}
+    if path is None:
+        if missing := sorted(set(given) - set(stated)):
+            raise ValueError(f"no model: pass --parameters FILE, or also --{' --'.join(missing)}")
+        return ColemanHodgdon(**stated, offset=offset or 0.0)
+    if stated:
+        raise ValueError(f"two models: leave out --parameters or --{' --'.join(stated)}")
+    try:
+        data: Any = json.loads(path.read_text(encoding="utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} is not JSON: {error}") from None
+    if isinstance(data, dict) and isinstance(data.get("model"), dict):
+        data = data["model"]
+    if not isinstance(data, dict):
+        raise ValueError(f"{path} holds no model: write it with identify --output")
+    data.setdefault("model", "ColemanHodgdon")
+    try:
+        model = model_from_dict(data)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    if not isinstance(model, ColemanHodgdon | LinearGain):
+        raise ValueError(f"{path}: a {type(model).__name__} cannot be inverted here: use a ColemanHodgdon")
+    return model if offset is None else dataclasses.replace(model, offset=offset)
+
+
+def _columns(text: str | None) -> dict[str, str] | None:
+    """``voltage=u,displacement=3`` as a dictionary."""
+    if text is None:
+        return None
+    pairs = [part.partition("=") for part in text.split(",")]
+    if any(not name.strip() or not value.strip() for name, _, value in pairs):
+        raise ValueError(f"--columns must read like voltage=u,displacement=3, got {text!r}")
+    return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{name} must be a number or auto, got {text!r}") from None
+
+
+def _check_writable(path: Path) -> None:
+    """Refuse before the work is done, not after."""
+    if path.is_dir():
+        raise ValueError(f"{path} is a folder: name a file in it")
+    if not path.resolve().parent.is_dir():
+        raise ValueError(f"{path}: there is no folder {path.resolve().parent}")

@@ -1,0 +1,85 @@
+"""The figure of an identification."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piezoest.identification.result import autocorrelation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from piezoest.identification.result import Identification
+
+# A figure is some two thousand dots wide: more samples than this only make it slow.
+MOST_POINTS = 40_000
+
+
+def draw(found: Identification) -> Figure:
+    """Draw voltage, displacement and model over time, the loop, the residual, its autocorrelation."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 8), layout="constrained")
+    grid = figure.add_gridspec(3, 2, height_ratios=[0.8, 1.4, 1.0], width_ratios=[2.2, 1.0])
+    voltage = figure.add_subplot(grid[0, 0])
+    series = figure.add_subplot(grid[1, 0], sharex=voltage)
+    residual = figure.add_subplot(grid[2, 0], sharex=voltage)
+    loop, correlation = figure.add_subplot(grid[:2, 1]), figure.add_subplot(grid[2, 1])
+
+    record, error, start = found.record, found.residual, found.left_out
+    thin = slice(None, None, max(1, len(record) // MOST_POINTS))
+    voltage.plot(record.time[thin], record.voltage[thin], lw=0.8, color="C2")
+    voltage.set_ylabel("voltage [V]")
+    series.plot(record.time[thin], record.displacement[thin], lw=1.8, color="0.7", label="measured")
+    series.plot(record.time[thin], found.prediction[thin], lw=0.8, color="C0", label="model, free-running")
+    series.set_ylabel("displacement [µm]")
+    residual.plot(record.time[thin], error[thin], lw=0.6, color="C3")
+    residual.set(xlabel="time [s]", ylabel="measured − model [µm]")
+    # What was left out at the start would hide everything else.
+    largest = 1.1 * float(np.nanmax(np.abs(error[start:])))
+    residual.set_ylim(-largest, largest)
+    for axes in (voltage, series, residual):
+        _shade(axes, found)
+    # Above the curves, where it hides none of them.
+    series.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize="small", borderaxespad=0.2)
+    for axes in (voltage, series):
+        axes.tick_params(labelbottom=False)
+
+    part = slice(start, None, thin.step)
+    loop.plot(record.voltage[part], record.displacement[part], lw=1.8, color="0.7", label="measured")
+    loop.plot(record.voltage[part], found.prediction[part], lw=0.6, color="C0", label="model")
+    loop.set(xlabel="voltage [V]", ylabel="displacement [µm]", title="loop")
+    loop.legend(loc="upper left", fontsize="small")
+
+    _draw_autocorrelation(correlation, found)
+    figure.suptitle(
+        f"{Path(record.source).name}: held out {found.held_out.rms:.3g} µm rms, "
+        f"largest {found.held_out.max:.3g} µm (straight line {found.line_held_out.rms:.3g} µm rms)"
+    )
+    return figure
+
+
+def _shade(axes: Any, found: Identification) -> None:
+    time = found.record.time
+    axes.axvspan(time[found.trained], time[-1], color="C1", alpha=0.12, lw=0, label="held out")
+    if found.left_out:
+        axes.axvspan(time[0], time[found.left_out], color="0.5", alpha=0.3, lw=0)
+    axes.margins(x=0.01)
+    axes.grid(alpha=0.3)
+
+
+def _draw_autocorrelation(axes: Any, found: Identification) -> None:
+    residual = found.residual[found.left_out : found.trained]
+    lags = min(100, residual.size // 4)
+    rho = autocorrelation(residual, lags)
+    bound = 2.58 / np.sqrt(np.sum(np.isfinite(residual)))
+    axes.vlines(np.arange(lags + 1), 0.0, rho, lw=1.0, color="C3")
+    axes.axhspan(-bound, bound, color="C0", alpha=0.25, lw=0, label="white noise, 99 %")
+    axes.set(
+        xlabel="lag [samples]", ylabel="autocorrelation", title="residual, fitted part", ylim=(-1.05, 1.05)
+    )
+    axes.axhline(0.0, color="0.3", lw=0.6)
+    axes.legend(loc="lower left", fontsize="small")

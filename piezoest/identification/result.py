@@ -1,0 +1,236 @@
+"""What an identification found, as numbers, text, dictionary and figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.models import ColemanHodgdon, LinearGain
+from piezoest.records import Record
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WHITENESS_LAGS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """Displacement that a free-running model misses.
+
+    Parameters
+    ----------
+    rms, max : float
+        Root mean square and largest absolute value [µm].
+    """
+
+    rms: float
+    max: float
+
+    @classmethod
+    def of(cls, error: FloatArray) -> Misfit:
+        """Make it of an error [µm]; NaN does not count.
+
+        Parameters
+        ----------
+        error : ndarray, shape (N,)
+            [µm].
+        """
+        known = error[np.isfinite(error)]
+        return cls(float(np.sqrt(np.mean(known**2))), float(np.max(np.abs(known))))
+
+    def to_dict(self) -> dict[str, float]:
+        """Return a JSON-safe dictionary."""
+        return {"rms_um": self.rms, "max_um": self.max}
+
+
+@dataclass(frozen=True, slots=True)
+class Whiteness:
+    """Ljung-Box test of a residual: Q = n(n+2) sum_k rho_k^2/(n-k) over the first lags.
+
+    Parameters
+    ----------
+    lags : int
+        Number of lags m.
+    statistic : float
+        Q, chi-squared with m degrees of freedom if the residual is white.
+    p_value : float
+        Probability of a Q at least as large in white noise.
+    first_autocorrelation : float
+        rho_1.
+
+    Notes
+    -----
+    Source: G. M. Ljung, G. E. P. Box, Biometrika 65 (1978) 297-303.
+    """
+
+    lags: int
+    statistic: float
+    p_value: float
+    first_autocorrelation: float
+
+    @property
+    def is_white(self) -> bool:
+        """Whether the test passes at the 1 % level."""
+        return self.p_value >= 0.01
+
+    @classmethod
+    def of(cls, residual: FloatArray, lags: int = WHITENESS_LAGS) -> Whiteness:
+        """Test a residual; NaN counts as absent.
+
+        Parameters
+        ----------
+        residual : ndarray, shape (N,)
+            In any unit.
+        lags : int
+            Number of lags.
+        """
+        from scipy.special import chdtrc
+
+        rho = autocorrelation(residual, lags)[1:]
+        n = int(np.sum(np.isfinite(residual)))
+        Q = float(n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1))))
+        return cls(lags, Q, float(chdtrc(lags, Q)), float(rho[0]))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a JSON-safe dictionary."""
+        return {
+            "test": "Ljung-Box",
+            "lags": self.lags,
+            "statistic": self.statistic,
+            "p_value": self.p_value,
+            "first_autocorrelation": self.first_autocorrelation,
+            "white": self.is_white,
+        }
+
+
+def autocorrelation(residual: FloatArray, lags: int) -> FloatArray:
+    """Autocorrelation at lags 0 to `lags`, shape (lags + 1,); NaN counts as absent."""
+    known = np.isfinite(residual)
+    e = np.where(known, residual - np.mean(residual[known]), 0.0)
+    power = float(e @ e) or 1.0
+    return np.array([float(e[: e.size - k] @ e[k:]) / power for k in range(lags + 1)])
+
+
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """A model identified from a record, and how far to trust it.
+
+    Parameters
+    ----------
+    model : ColemanHodgdon
+        Admissible, with offset.
+    standard_errors : dict of str to float
+        Of alpha, beta, gamma, offset and delay, in their units. Zero where a value was given or lies on
+        the edge of what is allowed. From the Jacobian of the free-running error, widened for coloured
+        residuals by the sum of its gradients over 25 blocks in time.
+    initial_state : float
+        w_h at the first sample [µm].
+    delay : float
+        Samples by which the displacement lags the voltage.
+    delay_estimated : bool
+        Whether the delay was estimated or given.
+    train, held_out : Misfit
+        Free-running error of the model on the part it was fitted on and on the part held out: it sees
+        only the voltage, and its state runs on from the first sample to the last.
+    line : LinearGain
+        The best straight line on the same samples, with the same delay, for comparison.
+    line_train, line_held_out : Misfit
+        Its errors.
+    whiteness : Whiteness
+        Of the residual of the fitted part.
+    drift : float
+        Slope of the residual in time, over the whole record [µm].
+    left_out : int
+        Samples at the start that the fit leaves out, because the stage had not settled.
+    trained : int
+        Number of samples in the fitted part, which comes first.
+    prediction : ndarray, shape (N,)
+        Free-running displacement [µm].
+    record : Record
+        What was identified.
+    advice : tuple of str
+        What to know before using it, in plain sentences.
+    """
+
+    model: ColemanHodgdon
+    standard_errors: dict[str, float]
+    initial_state: float
+    delay: float
+    delay_estimated: bool
+    train: Misfit
+    held_out: Misfit
+    line: LinearGain
+    line_train: Misfit
+    line_held_out: Misfit
+    whiteness: Whiteness
+    drift: float
+    left_out: int
+    trained: int
+    prediction: FloatArray = field(repr=False)
+    record: Record = field(repr=False)
+    advice: tuple[str, ...] = ()
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured displacement less prediction [µm], shape (N,); NaN where a sample is missing."""
+        return self.record.displacement - self.prediction
+
+    def table(self) -> list[tuple[str, float, float, str]]:
+        """Rows of parameter name, value, standard error and unit."""
+        names = (*self.model.parameter_names, "offset", "delay")
+        units = (*self.model.parameter_units, "µm", "samples")
+        values = (*(float(value) for value in self.model.theta), self.model.offset, self.delay)
+        return [
+            (name, value, self.standard_errors[name], unit)
+            for name, value, unit in zip(names, values, units, strict=True)
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a JSON-safe dictionary; the model under ``"model"`` is that of `ColemanHodgdon.to_dict`."""
+        return {
+            "format": "piezoest-identification-1",
+            "source": self.record.source,
+            "samples": len(self.record),
+            "skipped_rows": self.record.skipped,
+            "sample_rate_Hz": self.record.sample_rate,
+            "model": self.model.to_dict(),
+            "standard_errors": dict(self.standard_errors),
+            "units": {name: unit for name, _, _, unit in self.table()},
+            "initial_state_um": self.initial_state,
+            "delay_samples": self.delay,
+            "delay_estimated": self.delay_estimated,
+            "trained_samples": self.trained,
+            "left_out_samples": self.left_out,
+            "train": self.train.to_dict(),
+            "held_out": self.held_out.to_dict(),
+            "straight_line": {
+                "model": self.line.to_dict(),
+                "train": self.line_train.to_dict(),
+                "held_out": self.line_held_out.to_dict(),
+            },
+            "whiteness": self.whiteness.to_dict(),
+            "drift_um": self.drift,
+            "notes": list(self.record.notes),
+            "advice": list(self.advice),
+        }
+
+    def __str__(self) -> str:
+        lines = [f"{name:>8} {value:12.6g} ± {error:.2g} {unit}" for name, value, error, unit in self.table()]
+        for name, held in (("free-running error", self.held_out), ("straight line", self.line_held_out)):
+            lines.append(f"{name}, held out: {held.rms:.4g} µm rms, {held.max:.4g} µm largest")
+        return "\n".join([*lines, *self.advice])
+
+    def plot(self) -> Figure:
+        """Draw displacement and model over time, the loop, the residual and its autocorrelation.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from piezoest.identification.drawing import draw
+
+        return draw(self)

@@ -1,0 +1,227 @@
+"""The command line: what it prints, writes and refuses."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from piezoest import signals
+from piezoest.cli import app
+from piezoest.models import ColemanHodgdon
+from piezoest.records import Record, read_record, write_columns
+
+RATE = 1000.0
+TRUE = ColemanHodgdon(0.02, 0.12, 0.0036, offset=3.0)
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments], env={"COLUMNS": "120"})
+
+
+def refused(result: Result, *words: str) -> None:
+    """One sentence on stderr, exit code 1, nothing on stdout."""
+    assert result.exit_code == 1
+    assert result.stdout == ""
+    assert "Traceback" not in result.output
+    assert result.stderr.startswith("error: ")
+    assert len(result.stderr.strip().splitlines()) == 1
+    for word in words:
+        assert word in result.stderr
+
+
+@pytest.fixture
+def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    u = np.tile(np.asarray(signals.multi_amplitude([20.0, 35.0, 10.0], 5.0, 2, RATE)), 2)
+    x = TRUE.simulate(u) + 2e-3 * np.random.default_rng(0).standard_normal(u.size)
+    Record.from_arrays(u, x, RATE).write("log.csv")
+    return tmp_path / "log.csv"
+
+
+@pytest.fixture
+def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    r = signals.triangle(2.0, 5.0, 2, RATE)
+    write_columns("reference.csv", {"time_s": r.time, "reference_um": r.values})
+    return tmp_path / "reference.csv"
+
+
+THETA = ("--alpha", 0.02, "--beta", 0.12, "--gamma", 0.0036)
+
+
+def test_demo_reduces_the_error_by_ninety_percent(tmp_path: Path) -> None:
+    from piezoest.demo import run_demo
+
+    said: list[str] = []
+    result = run_demo(progress=said.append)
+    assert result.seconds < 10.0
+    assert result.reduction >= 0.9
+    assert len(said) == 4
+    errors = result.adaptive.max_error_per_period()
+    assert errors[0] > 5.0 * errors[-1]
+    # The start is wrong: without adaptation it is worse than the straight line.
+    assert result.fixed.max_error(2) > result.linear.max_error(2)
+    result.plot().savefig(tmp_path / "figure.png")
+
+
+def test_demo_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run("demo", "--periods", 5)
+    assert result.exit_code == 0
+    assert "settled" in result.stdout
+    assert "reduces" in result.stdout
+    assert Path("piezoest_demo.png").stat().st_size > 10_000
+
+
+def test_identify_prints_tables_and_writes_figure_and_model(log: Path) -> None:
+    result = run("identify", log, "--output", "model.json")
+    assert result.exit_code == 0
+    for word in (
+        "alpha",
+        "µm/V²",
+        "held out",
+        "straight line",
+        "Ljung-Box",
+        "log_identified.png",
+        "model.json",
+    ):
+        assert word in result.stdout
+    assert Path("log_identified.png").stat().st_size > 10_000
+    assert json.loads(Path("model.json").read_text(encoding="utf-8"))["model"]["model"] == "ColemanHodgdon"
+
+
+def test_identify_json_is_all_there_is_on_stdout(log: Path) -> None:
+    result = run("identify", log, "--json", "--no-plot", "--delay", 0)
+    assert result.exit_code == 0
+    data = json.loads(result.stdout)
+    assert data["model"]["alpha"] == pytest.approx(TRUE.alpha, rel=0.05)
+    assert data["held_out"]["rms_um"] < 3e-3
+    assert data["delay_samples"] == 0.0
+    assert not list(log.parent.glob("*.png"))
+
+
+def test_identify_real_recording(data_dir: Path, tmp_path: Path) -> None:
+    file = data_dir / "discrete_backlash_operator" / "test_1hz.csv"
+    result = run("identify", file, "--json", "--plot", tmp_path / "figure.png")
+    assert result.exit_code == 0
+    data = json.loads(result.stdout)
+    assert data["held_out"]["rms_um"] <= 0.45
+    assert data["straight_line"]["held_out"]["rms_um"] > 1.2
+    assert (tmp_path / "figure.png").exists()
+
+
+def test_identified_model_goes_into_compensate(log: Path, reference: Path) -> None:
+    assert run("identify", log, "--no-plot", "-o", "model.json").exit_code == 0
+    result = run("compensate", reference, "--parameters", "model.json", "--offset", 0, "-o", "voltage.csv")
+    assert result.exit_code == 0
+    model = ColemanHodgdon.from_dict(json.loads(Path("model.json").read_text(encoding="utf-8"))["model"])
+    u = read_record("voltage.csv", columns={"displacement": "reference_um"})
+    x = model.simulate(u.voltage) - model.offset
+    np.testing.assert_allclose(x, u.displacement, atol=1e-6)
+
+
+def test_compensate_keeps_within_limits_and_says_so(reference: Path) -> None:
+    result = run("compensate", reference, *THETA, "--maximum", 10, "--minimum", -8, "-o", "voltage.csv")
+    assert result.exit_code == 0
+    assert "limit" in result.stderr
+    u = read_record("voltage.csv", columns={"displacement": "reference_um"}).voltage
+    assert u.max() == 10.0
+    assert u.min() == -8.0
+
+
+def test_parameters_may_be_a_bare_model(reference: Path) -> None:
+    for text in (json.dumps(TRUE.to_dict()), '{"alpha": 0.02, "beta": 0.12, "gamma": 0.0036}'):
+        Path("model.json").write_text(text)
+        assert run("compensate", reference, "-p", "model.json", "-o", "voltage.csv").exit_code == 0
+
+
+def test_mistakes_in_logs(log: Path) -> None:
+    refused(run("identify", "none.csv"), "none.csv", "No such file")
+    refused(run("identify", "."), "Is a directory" if sys.platform != "win32" else ".")
+    Path("empty.csv").write_text("")
+    refused(run("identify", "empty.csv"), "empty")
+    Path("text.csv").write_text(log.read_text().replace("0.005,", "oops,", 1))
+    refused(run("identify", "text.csv"), "line 7", "time_s", "oops")
+    Path("columns.csv").write_text(log.read_text().replace("voltage_V", "current_A"))
+    refused(run("identify", "columns.csv"), "voltage", "current_A")
+    refused(run("identify", log, "--columns", "voltage"), "--columns must read like")
+    refused(run("identify", log, "--columns", "voltage=foo"), "foo")
+    refused(run("identify", log, "--delay", "soon"), "--delay")
+    refused(run("identify", log, "--train", 2), "train")
+    refused(run("identify", log, "--plot", "no/such/figure.png"), "no folder")
+    refused(run("identify", log, "--plot", "figure.xyz"), "xyz")
+    lines = log.read_text().splitlines()
+    Path("dwell.csv").write_text("\n".join([lines[0], *(f"{k / 100},5.0,{1 + k % 2}" for k in range(300))]))
+    refused(run("identify", "dwell.csv"), "too little excitation", "5 V")
+
+
+def test_mistakes_in_compensate(reference: Path) -> None:
+    out = ("-o", "voltage.csv")
+    refused(run("compensate", reference, *out), "no model")
+    refused(run("compensate", reference, "--alpha", 1, *out), "--beta --gamma")
+    refused(run("compensate", reference, "--alpha", 1, "--beta", 1, "--gamma", 9, *out), "not admissible")
+    refused(
+        run("compensate", reference, *THETA, "--minimum", 5, "--maximum", 1, *out), "minimum must be below"
+    )
+    refused(run("compensate", reference, "-p", "none.json", *out), "none.json")
+    contents = {"{": "not JSON", "[1]": "no model", '{"model": "Foo"}': "Foo", '{"alpha": 1}': "describe"}
+    for text, word in contents.items():
+        Path("model.json").write_text(text)
+        refused(run("compensate", reference, "-p", "model.json", *out), "model.json", word)
+    refused(run("compensate", reference, "-p", "model.json", "--alpha", 1, *out), "two models")
+    write_columns("jump.csv", {"time_s": np.arange(40.0), "r_um": np.repeat([0.0, 1.0], 20)})
+    refused(run("compensate", "jump.csv", *THETA, *out), "the reference jumps")
+    assert not Path("voltage.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments", [("identify",), ("demo", "--speed", 3), ("nonsense",), ("demo", "--periods", "x")]
+)
+def test_wrong_usage_exits_with_two(arguments: tuple[object, ...]) -> None:
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert "Traceback" not in result.output
+
+
+def test_debug_shows_the_traceback(log: Path) -> None:
+    result = run("identify", log, "--train", 2, "--debug")
+    assert isinstance(result.exception, ValueError)
+
+
+def test_interrupt_is_quiet(monkeypatch: pytest.MonkeyPatch, log: Path) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("piezoest.records.read_record", interrupt)
+    result = run("identify", log)
+    assert result.exit_code == 130
+    assert result.output == ""
+
+
+def test_help_and_version() -> None:
+    from piezoest._version import __version__
+
+    assert run("--version").stdout.strip() == f"piezoest {__version__}"
+    for arguments in ((), ("demo",), ("identify",), ("compensate",)):
+        result = run(*arguments, "--help")
+        assert result.exit_code == 0
+        assert "Example" in result.stdout
+
+
+def test_module_runs_and_help_is_light() -> None:
+    code = (
+        "import atexit, runpy, sys\n"
+        "heavy = ('numpy', 'numba', 'scipy', 'matplotlib')\n"
+        "atexit.register(lambda: print('HEAVY', [name for name in heavy if name in sys.modules]))\n"
+        "sys.argv = ['piezoest', '--help']\n"
+        "runpy.run_module('piezoest', run_name='__main__')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "identify" in done.stdout
+    assert "HEAVY []" in done.stdout

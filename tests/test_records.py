@@ -1,0 +1,216 @@
+"""Recorded logs: what is recognised, what is refused, and in which words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from piezoest.records import Record, read_record, read_reference, write_columns
+
+N = 40
+TIME = np.arange(N) / 100.0
+VOLTAGE = 10.0 * np.sin(0.5 * np.arange(N))
+DISPLACEMENT = 1.5 * VOLTAGE + 3.0
+
+
+def log(path: Path, header: str = "time_s,voltage_V,displacement_um", **changes: str) -> Path:
+    """Write a good log; `changes` replaces whole lines: line5="..."."""
+    lines = [header] if header else []
+    lines += [f"{t:.3f},{u:.6f},{x:.6f}" for t, u, x in zip(TIME, VOLTAGE, DISPLACEMENT, strict=True)]
+    for name, text in changes.items():
+        lines[int(name.removeprefix("line")) - 1] = text
+    file = path / "log.csv"
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return file
+
+
+def check(record: Record, tolerance: float = 1e-6) -> None:
+    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
+    np.testing.assert_allclose(record.voltage, VOLTAGE, atol=tolerance)
+    np.testing.assert_allclose(record.displacement, DISPLACEMENT, atol=tolerance)
+    assert record.sample_rate == pytest.approx(100.0)
+
+
+def test_plain_log(tmp_path: Path) -> None:
+    record = read_record(log(tmp_path))
+    check(record)
+    assert record.skipped == 0
+    assert record.notes == ()
+    assert len(record) == N
+    assert record.duration == pytest.approx(N / 100.0)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "t,u,x",
+        "Time (s),Voltage (V),Position (µm)",
+        "Time [s], Drive [V], Gauge [um]",
+        "# a comment\nt/s,u/V,x/µm",
+        '"time","voltage","displacement"',
+        "t_s,channel 1 (V),channel 2 (um)",
+        "\ufefftime_s,u_V,x_um",
+        "",
+    ],
+)
+def test_headers_that_are_recognised(tmp_path: Path, header: str) -> None:
+    check(read_record(log(tmp_path, header)))
+
+
+def test_assumed_units_are_said(tmp_path: Path) -> None:
+    notes = read_record(log(tmp_path, "t,u_V,x_um")).notes
+    assert notes == ("column 't': unit taken as s",)
+
+
+@pytest.mark.parametrize("separator", [";", "\t", "|", "  "])
+def test_other_delimiters_with_decimal_comma(tmp_path: Path, separator: str) -> None:
+    file = log(tmp_path)
+    text = file.read_text().replace(",", separator)
+    head, body = text.split("\n", 1)
+    file.write_text(head + "\n" + body.replace(".", ","))
+    check(read_record(file))
+
+
+def test_units_are_converted_and_said(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    columns = {"time_ms": 1e3 * TIME, "position_nm": 1e3 * DISPLACEMENT, "drive_mV": 1e3 * VOLTAGE}
+    write_columns(file, columns)
+    record = read_record(file)
+    check(record, 1e-6)
+    assert len(record.notes) == 3
+    assert "converted to µm (factor 0.001)" in " ".join(record.notes)
+
+
+def test_columns_by_name_and_number(tmp_path: Path) -> None:
+    file = log(tmp_path, "a,b_V,c")
+    check(read_record(file, columns={"time": "a", "voltage": "b", "displacement": "3"}))
+    check(read_record(file, columns={"voltage": "b_V", "displacement": "c"}, sample_rate=100.0))
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-16", "utf-8-sig"])
+def test_encodings(tmp_path: Path, encoding: str) -> None:
+    file = log(tmp_path, "Time (s),Voltage (V),Position (µm)")
+    file.write_bytes(file.read_text(encoding="utf-8").replace("\n", "\r\n").encode(encoding))
+    check(read_record(file))
+
+
+@pytest.mark.parametrize(
+    "line", ["0.080,nan,1.0", "0.080,1.0,", "0.080,,", "0.080", "0.080,inf,1.0", ",,", "", "0.08, N/A ,1"]
+)
+def test_rows_without_numbers_are_kept_as_nan_and_counted(tmp_path: Path, line: str) -> None:
+    record = read_record(log(tmp_path, line10=line))
+    assert record.skipped == 1
+    assert np.flatnonzero(~record.usable).tolist() == [8]
+    assert any("1 sample is without usable numbers" in note for note in record.notes)
+    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
+
+
+def test_rows_that_are_absent_leave_the_timing(tmp_path: Path) -> None:
+    file = log(tmp_path)
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join(lines[:20] + lines[22:]))
+    record = read_record(file)
+    assert record.skipped == 2
+    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
+    np.testing.assert_allclose(record.voltage[21:], VOLTAGE[21:], atol=1e-6)
+
+
+def test_every_second_line_blank_is_only_formatting(tmp_path: Path) -> None:
+    file = log(tmp_path)
+    file.write_text(file.read_text().replace("\n", "\n\n"))
+    record = read_record(file)
+    check(record)
+    assert record.skipped == 0
+
+
+def test_jitter_is_said(tmp_path: Path) -> None:
+    record = read_record(log(tmp_path, line20=f"{TIME[18] + 0.001:.4f},{VOLTAGE[18]},{DISPLACEMENT[18]}"))
+    check(record)
+    assert any("uneven by up to 10 %" in note for note in record.notes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"line7": "0.050,text,1.0"}, ["log.csv, line 7", "column 'voltage_V'", "'text' is not a number"]),
+        ({"line9": "0.060,1,1"}, ["line 9", "time does not increase", "0.06 s after 0.06 s"]),
+        ({"line9": "0.001,1,1"}, ["line 9", "time does not increase"]),
+        ({"line12": "0.1045,1,1"}, ["line 12", "unevenly", "0.01 s is usual"]),
+        ({"line12": "0,100,1,5,1,5"}, ["line 12", "6 fields", "3"]),
+        ({"line41": "9.0,1,1"}, ["line 41", "time jumps by", "missing in all"]),
+        ({"line1": "time_s,current_A,displacement_um"}, ["no column for voltage", "time_s, current_A"]),
+        ({"line1": "time_s,voltage_V,gauge_V"}, ["gauge_V", "unit v", "must be in µm"]),
+        ({"line1": "time_s,x_um,position_um"}, ["no column for voltage"]),
+        ({"line1": "t,u,x,position"}, ["columns x, position could all be the displacement"]),
+    ],
+)  # fmt: skip
+def test_refusals_name_place_and_reason(tmp_path: Path, changes: dict[str, str], words: list[str]) -> None:
+    with pytest.raises(ValueError, match=r".") as caught:
+        read_record(log(tmp_path, **changes))
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_empty_files(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    contents = {"": "is empty", "\n# only this\n": "is empty", "t,u,x\n": "rows", "t,u,x\n0,0,0\n": "rows"}
+    for text, words in contents.items():
+        file.write_text(text)
+        with pytest.raises(ValueError, match=words):
+            read_record(file)
+    file.write_bytes(b"PK\x03\x04\0\0\0\0")
+    with pytest.raises(ValueError, match="not a text file"):
+        read_record(file)
+    with pytest.raises(FileNotFoundError):
+        read_record(tmp_path / "none.csv")
+
+
+def test_wrong_column_arguments(tmp_path: Path) -> None:
+    file = log(tmp_path)
+    with pytest.raises(ValueError, match="no column 'foo' for voltage; there are the columns time_s"):
+        read_record(file, columns={"voltage": "foo"})
+    with pytest.raises(ValueError, match="would be"):
+        read_record(log(tmp_path, "t,u,x"), columns={"voltage": "x"})
+    with pytest.raises(ValueError, match="columns has"):
+        read_record(file, columns={"volts": "u"})
+    with pytest.raises(ValueError, match="sample_rate"):
+        read_record(file, sample_rate=-1.0)
+
+
+def test_round_trip_and_split(tmp_path: Path) -> None:
+    voltage = VOLTAGE.copy()
+    voltage[3] = np.nan
+    record = Record.from_arrays(voltage, DISPLACEMENT, 100.0)
+    record.write(tmp_path / "out.csv")
+    again = read_record(tmp_path / "out.csv")
+    np.testing.assert_allclose(again.voltage, voltage, rtol=1e-8)
+    first, second = again.split(0.25)
+    assert (len(first), len(second)) == (10, 30)
+    assert (first.skipped, second.skipped) == (1, 0)
+    assert second.time[0] == pytest.approx(0.1)
+    with pytest.raises(ValueError, match="part"):
+        record.split(1.5)
+    with pytest.raises(ValueError, match="displacement must have shape"):
+        Record.from_arrays(VOLTAGE, DISPLACEMENT[:-1], 100.0)
+
+
+def test_reference(tmp_path: Path) -> None:
+    file = tmp_path / "r.csv"
+    write_columns(file, {"time_s": TIME, "reference_um": DISPLACEMENT, "displacement_um": VOLTAGE})
+    signal = read_reference(file)
+    np.testing.assert_allclose(signal.values, DISPLACEMENT, rtol=1e-8)
+    assert signal.sample_rate == pytest.approx(100.0)
+    np.testing.assert_allclose(read_reference(file, column="displacement_um").values, VOLTAGE, atol=1e-7)
+    write_columns(file, {"time_s": np.delete(TIME, 20), "reference_um": np.delete(DISPLACEMENT, 20)})
+    with pytest.raises(ValueError, match="line 22: time jumps here"):
+        read_reference(file)
+    file.write_text("r_um\n" + "\n".join(["1"] * 20 + ["nan"] + ["1"] * 20))
+    with pytest.raises(ValueError, match="line 22: no number"):
+        read_reference(file, sample_rate=10.0)
+
+
+def test_columns_of_different_lengths_are_not_written(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="one length"):
+        write_columns(tmp_path / "out.csv", {"a": [1.0], "b": [1.0, 2.0]})
