@@ -1,0 +1,90 @@
+"""Sphinx configuration. The build needs no network, and neither do the pages it makes."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import piezoest
+
+project = "piezoest"
+author = "The piezoest developers"
+copyright = f"2026, {author}"
+version = release = piezoest.__version__
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.viewcode",
+    "numpydoc",
+    "myst_parser",
+    "sphinx_gallery.gen_gallery",
+    "sphinx-mathjax-offline",
+]
+templates_path = ["_templates"]
+exclude_patterns = ["_build", "examples", "sg_execution_times.rst", "gallery/sg_execution_times.rst"]
+source_suffix = {".rst": "restructuredtext", ".md": "markdown"}
+
+# Docstrings put symbols and code in single backticks.
+default_role = "literal"
+
+autosummary_generate = True
+autodoc_member_order = "bysource"
+# The types are in the Parameters sections, in words.
+autodoc_typehints = "none"
+numpydoc_show_class_members = False
+
+html_theme = "pydata_sphinx_theme"
+html_title = "piezoest"
+html_show_sourcelink = False
+html_theme_options = {
+    "show_toc_level": 2,
+    "navigation_with_keys": False,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+}
+html_sidebars: dict[str, list[str]] = {"start": [], "your_own_stage": [], "mathematics": [], "design": []}
+
+sphinx_gallery_conf = {
+    "examples_dirs": "examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"plot_",
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "capture_repr": (),
+    "show_memory": False,
+    "show_signature": False,
+    "plot_gallery": True,
+}
+
+
+def escape_symbols(line: str) -> str:
+    r"""Escape what docstrings mean literally, outside of literals.
+
+    `|` is an absolute value and not a substitution; `*arguments` does not begin an emphasis.
+    """
+    parts = re.split(r"(``.*?``|`.*?`)", line)
+    return "".join(
+        part if part.startswith("`") else re.sub(r"\||(?<![\w*\\])\*(?=\w)(?!.*\w\*)", r"\\\g<0>", part)
+        for part in parts
+    )
+
+
+def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Escape symbols in running text, not in the indented blocks of directives and code."""
+    block: int | None = None
+    for i, line in enumerate(lines):
+        indent = len(line) - len(line.lstrip())
+        if block is not None and line.strip() and indent <= block:
+            block = None
+        if block is None:
+            lines[i] = escape_symbols(line)
+            if line.rstrip().endswith("::"):
+                block = indent
+
+
+def setup(app: Any) -> None:
+    # After numpydoc (500), which makes sections of the docstring.
+    app.connect("autodoc-process-docstring", process_docstring, priority=600)
