@@ -1,0 +1,265 @@
+"""The baselines: filterpy's own EKF and UKF on the model of `HysteresisEKF`.
+
+Unaltered filterpy, used as its interface needs it: 1-D x and z, `predict_x` overridden, F
+set before every prediction, `predict` and `update` called apart (`predict_update` would
+evaluate the measurement before predicting).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
+
+from piezoest._checks import WILDEST, FloatArray
+from piezoest.equations import coleman_hodgdon as equations
+from piezoest.equations import kalman
+from piezoest.estimators import ekf
+from piezoest.estimators.base import Trace
+from piezoest.estimators.delay_line import delayed
+from piezoest.models import ColemanHodgdon, LinearGain
+
+
+class _HysteresisFilter(ExtendedKalmanFilter):  # type: ignore[misc]
+    """filterpy's EKF with the exact step of w_h as its prediction of x."""
+
+    hysteretic = True
+
+    def predict_x(self, u: float = 0.0) -> None:
+        """Predict x for a change of voltage u [V]."""
+        if self.hysteretic:
+            self.x[0] = equations.hysteresis_step(self.x[0], u, self.x[1], self.x[2])
+
+
+class _FilterPyBaseline(ekf.HysteresisEKF):
+    """What the two baselines share: bookkeeping around a filterpy object."""
+
+    __slots__ = ("_filter", "_flat")
+
+    _filter: Any
+    _flat: FloatArray
+
+    def __init__(
+        self,
+        sample_rate: float,
+        *,
+        initial_model: ColemanHodgdon | LinearGain | None = None,
+        uncertainty: float = 0.5,
+        noise: float = 1.5e-3,
+        drift: float = 0.3,
+        mismatch: float = 0.3,
+        offset: bool = False,
+        delay: float = 0.0,
+    ) -> None:
+        self._filter = None
+        super().__init__(
+            sample_rate,
+            initial_model=initial_model,
+            uncertainty=uncertainty,
+            noise=noise,
+            drift=drift,
+            mismatch=mismatch,
+            offset=offset,
+            delay=delay,
+            project=False,
+        )
+        del self._arguments["project"]
+        self._filter = self._make_filter()
+        self._filter.Q = np.diag(self._config[ekf.CONFIG :])
+        self._filter.R = np.array([[self._config[ekf.NOISE]]])
+        self._load(self._start)
+
+    def _make_filter(self) -> Any:
+        raise NotImplementedError
+
+    def _predict(self, du: float) -> None:
+        raise NotImplementedError
+
+    def _update(self, x: float, h: FloatArray) -> None:
+        raise NotImplementedError
+
+    @property
+    def filter(self) -> Any:
+        """The filterpy object itself, for filterpy's own tools such as `filterpy.common.Saver`."""
+        return self._filter
+
+    @property
+    def _state(self) -> FloatArray:
+        """The flat state, brought up to date from the filterpy object."""
+        if self._filter is not None:
+            n, head = self._n, ekf.HEAD
+            self._flat[head : head + n] = self._filter.x
+            self._flat[head + n : head + n + n * n] = self._filter.P.ravel()
+            self._flat[head + n + n * n : head + 2 * n + n * n] = np.ravel(self._filter.K)
+        return self._flat
+
+    @_state.setter
+    def _state(self, state: FloatArray) -> None:
+        self._flat = state
+
+    def _load(self, state: FloatArray) -> None:
+        n, head = self._n, ekf.HEAD
+        self._flat[:] = state
+        self._filter.x = state[head : head + n].copy()
+        self._filter.P = state[head + n : head + n + n * n].reshape(n, n).copy()
+        self._filter.K = state[head + n + n * n : head + 2 * n + n * n].reshape(n, 1).copy()
+
+    def _sample(self, u: float, x: float) -> None:
+        state, config, n = self._flat, self._config, self._n
+        state[ekf.SAMPLES] += 1.0
+        if abs(u) < WILDEST:
+            u = delayed(state[ekf.HEAD + 5 * n + 2 * n * n :], config[ekf.FRACTION], u)
+            if state[ekf.PRIMED] == 0.0:
+                state[ekf.PRIMED] = 1.0
+                state[ekf.U_CENTRE] = u * config[ekf.OFFSET]
+                state[ekf.U_LAST] = u - state[ekf.U_CENTRE]
+            u -= state[ekf.U_CENTRE]
+            self._predict(u - state[ekf.U_LAST])
+            state[ekf.U_LAST] = u
+        else:
+            x = np.nan
+        if not abs(x) < WILDEST:
+            state[ekf.MISSED] += 1.0
+            state[ekf.LAST] = ekf.MISSING
+            return
+        if state[ekf.CENTRED] == 0.0:
+            state[ekf.CENTRED] = 1.0
+            state[ekf.X_CENTRE] = x * config[ekf.OFFSET]
+        h = np.zeros(n)
+        ekf.measurement_row(h, u, config, n)
+        self._update(x - state[ekf.X_CENTRE], h)
+        state[ekf.INNOVATION] = np.ravel(self._filter.y)[0]
+        state[ekf.INNOVATION_VARIANCE] = np.ravel(self._filter.S)[0]
+        state[ekf.UPDATES] += 1.0
+        state[ekf.LAST] = ekf.UPDATED
+
+    def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
+        rows, n = u.size // every, self._n
+        s, y, S, P = np.empty((rows, n)), np.empty(rows), np.empty(rows), np.empty((rows, n, n))
+        for k in range(u.size):
+            self._sample(float(u[k]), float(x[k]))
+            if (k + 1) % every == 0:
+                row = k // every
+                s[row], P[row] = self._filter.x, self._filter.P
+                y[row], S[row] = self._flat[ekf.INNOVATION], self._flat[ekf.INNOVATION_VARIANCE]
+        return self._trace(s, y, S, P, every, want)
+
+
+class FilterPyEKF(_FilterPyBaseline):
+    """filterpy's `ExtendedKalmanFilter` on the model of `HysteresisEKF`: a baseline.
+
+    Parameters
+    ----------
+    sample_rate : float
+        [Hz].
+    initial_model : ColemanHodgdon or LinearGain, optional
+        Model to start from; its kind is the kind that is estimated.
+    uncertainty : float
+        Standard deviation of each initial parameter, in parts of its value.
+    noise : float
+        Standard deviation of the displacement's noise [µm].
+    drift : float
+        Random walk of each parameter, in parts of its initial value per root second.
+    mismatch : float
+        Random walk of w_h [µm per root second].
+    offset : bool
+        Estimate a constant offset of the displacement too.
+    delay : float
+        Samples by which the measured displacement lags the voltage.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+
+    Notes
+    -----
+    Equal to ``HysteresisEKF(..., project=False)`` at the cost of filterpy. The filterpy
+    object is at hand as `filter`. Source: R. Labbe, filterpy.
+    """
+
+    __slots__ = ()
+
+    def _make_filter(self) -> Any:
+        made = _HysteresisFilter(dim_x=self._n, dim_z=1)
+        made.hysteretic = bool(self._config[ekf.HYSTERETIC])
+        return made
+
+    def _predict(self, du: float) -> None:
+        F = np.eye(self._n)
+        Q = np.diag(self._config[ekf.CONFIG :])
+        if self._config[ekf.HYSTERETIC]:
+            s = self._filter.x
+            F[0, :3] = equations.hysteresis_jacobian(s[0], du, s[1], s[2])
+            Q[0, 0] += kalman.bilinear_variance(self._filter.P.ravel(), du, s[1], self._n)
+        self._filter.F, self._filter.Q = F, Q
+        self._filter.predict(du)
+
+    def _update(self, x: float, h: FloatArray) -> None:
+        row = h[None, :]
+        self._filter.update(np.array([x]), lambda s: row, lambda s: row @ s)
+
+
+class FilterPyUKF(_FilterPyBaseline):
+    """filterpy's `UnscentedKalmanFilter` on the model of `HysteresisEKF`: a baseline.
+
+    Parameters
+    ----------
+    sample_rate : float
+        [Hz].
+    initial_model : ColemanHodgdon or LinearGain, optional
+        Model to start from; its kind is the kind that is estimated.
+    uncertainty : float
+        Standard deviation of each initial parameter, in parts of its value.
+    noise : float
+        Standard deviation of the displacement's noise [µm].
+    drift : float
+        Random walk of each parameter, in parts of its initial value per root second.
+    mismatch : float
+        Random walk of w_h [µm per root second].
+    offset : bool
+        Estimate a constant offset of the displacement too.
+    delay : float
+        Samples by which the measured displacement lags the voltage.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+
+    Notes
+    -----
+    Merwe's scaled sigma points with alpha = 0.1, beta = 2, kappa = 3 - n. The filterpy object
+    is at hand as `filter`. Source: R. Labbe, filterpy; R. van der Merwe, thesis (2004).
+    """
+
+    __slots__ = ()
+
+    def _make_filter(self) -> Any:
+        n = self._n
+        points = MerweScaledSigmaPoints(n, alpha=0.1, beta=2.0, kappa=3.0 - n)
+        step = _advance if self._config[ekf.HYSTERETIC] else _stay
+        return UnscentedKalmanFilter(
+            dim_x=n, dim_z=1, dt=1.0 / self.sample_rate, hx=_read, fx=step, points=points
+        )
+
+    def _predict(self, du: float) -> None:
+        self._filter.predict(du=du)
+
+    def _update(self, x: float, h: FloatArray) -> None:
+        self._filter.update(np.array([x]), h=h)
+
+
+def _advance(s: FloatArray, dt: float, du: float) -> FloatArray:
+    s = s.copy()
+    s[0] = equations.hysteresis_step(s[0], du, s[1], s[2])
+    return s
+
+
+def _stay(s: FloatArray, dt: float, du: float) -> FloatArray:
+    return s
+
+
+def _read(s: FloatArray, h: FloatArray) -> FloatArray:
+    return np.array([h @ s])
