@@ -128,6 +128,21 @@ def continuous_update(theta, P, phi, z, n, h, forgetting_rate, normalised, bound
 
 
 @register_jitable
+def accumulate_scatter(M, psi, n, forgetting):
+    """M = forgetting² M + psi psi': the scatter of sum phi e for the sandwich P M P.
+
+    With coloured noise e the covariance of least squares is P M P and not P; psi is the
+    regressor seen through the noise's own filter (L. Ljung, System Identification, 2nd ed.,
+    1999, (9.54) for a known filter, with the weights of forgetting squared).
+    """
+    for i in range(n):
+        for j in range(i, n):
+            entry = forgetting * forgetting * M[i * n + j] + psi[i] * psi[j]
+            M[i * n + j] = entry
+            M[j * n + i] = entry
+
+
+@register_jitable
 def above_floor(P, n, floor, work):
     """1.0 if every eigenvalue of P exceeds `floor`, else 0.0: Cholesky on P - floor I.
 
@@ -155,3 +170,33 @@ def restore_covariance(P, P_0, n, reset):
     """Covariance resetting: P = P_0 where `reset` is 1.0 (Ioannou and Sun, sec. 4.3.6)."""
     for i in range(n * n):
         P[i] = P[i] + reset * (P_0[i] - P[i])
+
+
+@register_jitable
+def solve_positive(A, b, n, x, work):
+    """Solve A x = b for a symmetric positive definite A (n*n,) by Cholesky; `work` has n*n numbers.
+
+    A pivot that rounding made negative counts as a very small one: x stays finite.
+    """
+    for j in range(n):
+        pivot = A[j * n + j]
+        for k in range(j):
+            pivot = pivot - work[j * n + k] * work[j * n + k]
+        root = np.sqrt(np.fmax(pivot, 1e-300))
+        work[j * n + j] = root
+        for i in range(j + 1, n):
+            entry = A[i * n + j]
+            for k in range(j):
+                entry = entry - work[i * n + k] * work[j * n + k]
+            work[i * n + j] = entry / root
+    for i in range(n):
+        total = b[i]
+        for k in range(i):
+            total = total - work[i * n + k] * x[k]
+        x[i] = total / work[i * n + i]
+    for m in range(n):
+        i = n - 1 - m
+        total = x[i]
+        for k in range(i + 1, n):
+            total = total - work[k * n + i] * x[k]
+        x[i] = total / work[i * n + i]

@@ -9,7 +9,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST, FloatArray, positive
-from piezoest.equations import admissible, filters
+from piezoest.equations import admissible, filters, least_squares
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators.base import EstimatorBase, Status, Trace
@@ -29,12 +29,14 @@ from piezoest.policies import (
 PRIMED, U_LAST, X_LAST, TRAVEL, MOMENT, RISE, GAP, SAMPLES, MISSED = range(9)
 U_CENTRE, X_CENTRE = 9, 10
 LOW, HIGH, PHI = 11, 16, 21  # five filters each: four regressors and the output
-FRONT = 26  # the law's state begins here, the delay line follows it
+# Regressors seen through the noise's filter, the regressors before them, and their scatter.
+PSI, PHI_LAST, SCATTER = 26, 30, 34
+FRONT = 50  # the law's state begins here, the delay line follows it
 
 # The front end's configuration; the law's follows.
-N, HYSTERETIC, LOW_POLE, HIGH_POLE, HIGH_PASS, FRACTION, OFFSET, LONGEST_GAP = range(8)
-SCALE = 8  # four scales of the parameters, one of the output
-CONFIG = 13
+N, HYSTERETIC, LOW_POLE, HIGH_POLE, HIGH_PASS, FRACTION, OFFSET, LONGEST_GAP, NOISE_RATIO = range(9)
+SCALE = 9  # four scales of the parameters, one of the output
+CONFIG = 14
 
 
 @register_jitable
@@ -57,6 +59,24 @@ def _prime(state: Any, config: Any, u: Any, x: Any) -> None:
     state[U_LAST] = u - state[U_CENTRE]
     state[X_LAST] = x - state[X_CENTRE]
     state[TRAVEL] = state[MOMENT] = state[RISE] = state[GAP] = 0.0
+
+
+@register_jitable
+def _scatter(state: Any, config: Any, phi: Any, n: int, restart: bool) -> None:
+    """The sandwich's middle: sensor noise reaches the output through W_p and, in z, a difference."""
+    psi = state[PSI : PSI + n]
+    for i in range(n):
+        seen = (phi[i] - config[HYSTERETIC] * state[PHI_LAST + i]) * config[NOISE_RATIO]
+        psi[i] = filters.low_pass_step(psi[i], seen, config[LOW_POLE])
+        state[PHI_LAST + i] = phi[i]
+    M = state[SCATTER : SCATTER + n * n]
+    if restart:
+        for i in range(n * n):
+            M[i] = state[FRONT + law.HEAD + n + n * n + i]
+            # Of a diagonal P_0, the information P_0^-1.
+            if M[i] != 0.0:
+                M[i] = 1.0 / M[i]
+    least_squares.accumulate_scatter(M, psi, n, config[CONFIG + law.FORGETTING])
 
 
 @register_jitable
@@ -108,7 +128,10 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     for i in range(n):
         phi[i] = _filtered(state, config, i, phi[i] * config[SCALE + i])
     z = _filtered(state, config, 4, z * config[SCALE + 4])
+    resets, updates = law_state[law.RESETS], law_state[law.UPDATES]
     law.adapt(law_state, config[CONFIG:], phi, z, n)
+    if law_state[law.LAST] == law.UPDATED:
+        _scatter(state, config, phi, n, updates == 0.0 or law_state[law.RESETS] != resets)
 
 
 @njit("void(f8[::1], f8[::1], f8, f8)", cache=True)
@@ -235,7 +258,9 @@ class HysteresisRLS(EstimatorBase):
         # Noise of x behind W_p, and of its difference behind W_p (white noise in x).
         white = (1.0 - pole) / (1.0 + pole)
         blue = 2.0 * (1.0 - pole) ** 2 / (1.0 + pole)
-        output_noise = positive("noise", noise) * np.sqrt(blue if hysteretic else white)
+        gain = np.sqrt(blue if hysteretic else white)
+        output_noise = positive("noise", noise) * gain
+        config[NOISE_RATIO] = 1.0 / gain
         self._scale = np.append(np.abs(initial.theta), self._offset_scale(initial) if offset else [])
         config[SCALE : SCALE + n] = self._scale / output_noise
         config[SCALE + 4] = 1.0 / output_noise
@@ -338,8 +363,24 @@ class HysteresisRLS(EstimatorBase):
 
     @property
     def standard_errors(self) -> FloatArray:
-        """Square roots of the diagonal of `P`, shape (n,)."""
-        return np.sqrt(np.diag(self.P))
+        """Standard deviations of `theta`, shape (n,), for white noise in the displacement.
+
+        Differencing and W_p colour that noise, so that P is not the covariance of `theta`:
+        these are of the sandwich P M P (see `least_squares.accumulate_scatter`). The model's own
+        mismatch is not in them. With the continuous time base they are those of `P`.
+        """
+        if self._config[CONFIG + law.CONTINUOUS] or self._state[FRONT + law.UPDATES] == 0.0:
+            return np.sqrt(np.diag(self.P))
+        n, head = self._n, FRONT + law.HEAD
+        P = self._state[head + n : head + n + n * n].reshape(n, n)
+        M = self._state[SCATTER : SCATTER + n * n].reshape(n, n)
+        if self._config[HYSTERETIC]:
+            # The newest noise has not yet been taken back by its difference; its energy
+            # behind W_p is (1 - pole)/(1 + pole).
+            phi, pole = self._state[PHI_LAST : PHI_LAST + n], self._config[LOW_POLE]
+            energy = (1.0 - pole) / (1.0 + pole) * self._config[NOISE_RATIO] ** 2
+            M = M + np.outer(phi, phi) * energy
+        return np.sqrt(np.diag(P @ M @ P)) * self._scale
 
     @property
     def y(self) -> float:
