@@ -151,7 +151,7 @@ class EstimatorBase(ABC):
     def status(self) -> Status:
         """What happened to the samples so far."""
 
-    def predict(self, u: float) -> None:
+    def predict(self, u: float | None) -> None:
         """Take the voltage of the next sample; `update` completes it.
 
         Parameters
@@ -162,7 +162,7 @@ class EstimatorBase(ABC):
         """
         if self._pending is not None:
             self._sample(self._pending, np.nan)
-        self._pending = float(u)
+        self._pending = np.nan if u is None else float(u)
 
     def update(self, x: float | None) -> None:
         """Take the measurement that belongs to the last `predict`.
@@ -182,7 +182,7 @@ class EstimatorBase(ABC):
         u, self._pending = self._pending, None
         self._sample(u, np.nan if x is None else x)
 
-    def step(self, u: float, x: float | None) -> None:
+    def step(self, u: float | None, x: float | None) -> None:
         """Take one sample: ``predict(u)`` and ``update(x)``.
 
         Parameters
@@ -197,7 +197,7 @@ class EstimatorBase(ABC):
             self.predict(u)
             self.update(x)
             return
-        self._sample(u, np.nan if x is None else x)
+        self._sample(np.nan if u is None else u, np.nan if x is None else x)
 
     def run(self, u: Any, x: Any, *, every: int = 1, record: tuple[str, ...] = ()) -> Trace:
         """Take a whole record; continues from the current state, the same as a loop of `step`.
@@ -220,8 +220,9 @@ class EstimatorBase(ABC):
         ValueError
             If the shapes do not match or a name in `record` is unknown.
         """
-        u = array_1d("u", u, allow_nan=True)
-        x = array_1d("x", x, allow_nan=True)
+        # The compiled loops take writeable arrays only, though they write into none.
+        u = np.require(array_1d("u", u, allow_nan=True), requirements="W")
+        x = np.require(array_1d("x", x, allow_nan=True), requirements="W")
         if u.size != x.size:
             raise ValueError(f"u and x must have the same length, got {u.size} and {x.size}")
         if unknown := sorted(set(record) - {"y", "S", "P"}):
@@ -248,7 +249,10 @@ class EstimatorBase(ABC):
             "format": _FORMAT,
             "arguments": copy.deepcopy(self._arguments),
             "state": self._state.tolist(),
-            "pending": self._pending,
+            # JSON knows no NaN.
+            "pending": "missing"
+            if self._pending is not None and not np.isfinite(self._pending)
+            else self._pending,
         }
 
     @classmethod
@@ -281,5 +285,6 @@ class EstimatorBase(ABC):
                 f"state holds {state.size} numbers, {cls.__name__} needs {estimator._state.size}"
             )
         estimator._load(state)
-        estimator._pending = data.get("pending")
+        pending = data.get("pending")
+        estimator._pending = np.nan if pending == "missing" else pending
         return estimator

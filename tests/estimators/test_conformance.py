@@ -1,0 +1,555 @@
+"""Every estimator keeps every promise of the face.
+
+Estimators are found, not listed: each public class of `piezoest` on `EstimatorBase`. One that
+cannot keep a promise says so itself: ``conformance_exceptions`` on the class maps the name of the
+promise, which is that of its test here without ``test_``, to the reason.
+"""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+import json
+import pickle
+import sys
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import piezoest as pz
+from piezoest.estimators.base import EstimatorBase
+
+FloatArray = NDArray[np.float64]
+
+RATE = 1000.0
+TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
+FOUND = {
+    name: value
+    for name in pz.__all__
+    if inspect.isclass(value := getattr(pz, name))
+    and issubclass(value, EstimatorBase)
+    and not inspect.isabstract(value)
+}
+NO_NUMBERS = (np.nan, None, np.inf, -np.inf, 1e300)
+# A prediction without a measurement may round the parameters, as the sigma points of a UKF do.
+ROUNDING = 1e-12
+
+
+@pytest.fixture(params=sorted(FOUND), autouse=True)
+def kind(request: pytest.FixtureRequest) -> Any:
+    """Class of one estimator; skips the test if the class declares an exception to it."""
+    cls = FOUND[request.param]
+    promise = request.node.originalname.removeprefix("test_")
+    if promise in cls.conformance_exceptions:
+        pytest.skip(f"{request.param}: {cls.conformance_exceptions[promise]}")
+    return cls
+
+
+def voltage(periods: float = 1.0, rate: float = RATE) -> FloatArray:
+    return pz.signals.triangle(33.0, 5.0, periods, rate).values
+
+
+def record(
+    periods: float = 1.0, model: pz.models.Model = TRUE, rate: float = RATE
+) -> tuple[FloatArray, FloatArray]:
+    """Voltage and measured displacement of a true plant, 1 nm noise."""
+    u = voltage(periods, rate)
+    assert isinstance(model, pz.ColemanHodgdon | pz.LinearGain)
+    return u, model.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
+
+
+def steps(estimator: Any, u: FloatArray, x: FloatArray) -> None:
+    for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+        estimator.step(u_k, x_k)
+
+
+def face(estimator: Any) -> dict[str, Any]:
+    """All that an estimator shows, for comparison by bits."""
+    shown = {name: getattr(estimator, name) for name in ("theta", "P", "y", "S", "K", "standard_errors")}
+    return {name: np.asarray(value).tolist() for name, value in shown.items()} | {
+        "status": estimator.status,
+        "model": estimator.model.to_dict(),
+    }
+
+
+def assert_sound(estimator: Any) -> None:
+    """Finite numbers, a covariance that is one, and a model that can be inverted."""
+    assert np.all(np.isfinite(estimator.theta))
+    P = estimator.P
+    assert np.all(np.isfinite(P))
+    scale = np.sqrt(np.fmax(np.diag(P), 1e-300))
+    assert np.all(np.diag(P) >= 0.0)
+    assert np.linalg.eigvalsh(P / np.outer(scale, scale))[0] >= -1e-9
+    assert estimator.model.is_admissible
+
+
+# ---------------------------------------------------------------- the exceptions themselves
+
+
+def test_exceptions_name_promises_and_give_reasons(kind: Any) -> None:
+    names = vars(sys.modules[__name__])
+    promises = {name.removeprefix("test_") for name in names if name.startswith("test_")}
+    for promise, reason in kind.conformance_exceptions.items():
+        assert promise in promises, f"{kind.__name__} excepts itself from {promise!r}, which nobody promises"
+        assert reason[0].isupper(), reason
+        assert reason.endswith("."), reason
+        assert len(reason.split()) >= 4, reason
+
+
+# ---------------------------------------------------------------- construction
+
+
+def test_needs_no_more_than_a_sample_rate(kind: Any) -> None:
+    for estimator in (kind(RATE), kind(sample_rate=RATE)):
+        assert estimator.sample_rate == RATE
+        assert isinstance(cast(object, estimator), pz.Estimator)
+        assert estimator.status == pz.Status(0, 0, 0, 0, 0, False, "waiting")
+        assert_sound(estimator)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf, "fast", None])
+def test_refuses_a_wrong_sample_rate(kind: Any, rate: Any) -> None:
+    with pytest.raises(ValueError, match="sample_rate"):
+        kind(rate)
+
+
+def test_refuses_unknown_keywords(kind: Any) -> None:
+    with pytest.raises(TypeError, match="no_such_keyword"):
+        kind(RATE, no_such_keyword=1)
+
+
+def test_refuses_misspelt_attributes(kind: Any) -> None:
+    with pytest.raises(AttributeError):
+        kind(RATE).memmory = 3.0
+
+
+def test_refuses_an_initial_model_of_another_kind(kind: Any) -> None:
+    with pytest.raises(ValueError, match="initial_model"):
+        kind(RATE, initial_model="coleman-hodgdon")
+
+
+# ---------------------------------------------------------------- one sample, many samples
+
+
+def test_predict_and_update_are_step(kind: Any) -> None:
+    u, x = record()
+    stepped, parted = kind(RATE), kind(RATE)
+    steps(stepped, u, x)
+    for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+        parted.predict(u_k)
+        parted.update(x_k)
+    assert face(parted) == face(stepped)
+
+
+def test_predict_without_update_is_a_missing_measurement(kind: Any) -> None:
+    u, x = record(0.5)
+    missing, twice = kind(RATE), kind(RATE)
+    for k, (u_k, x_k) in enumerate(zip(u.tolist(), x.tolist(), strict=True)):
+        if k == 40:
+            missing.step(u_k, None)
+            twice.predict(u_k)
+        else:
+            missing.step(u_k, x_k)
+            twice.step(u_k, x_k)
+    assert face(twice) == face(missing)
+
+
+def test_update_without_predict_is_refused(kind: Any) -> None:
+    with pytest.raises(ValueError, match="predict"):
+        kind(RATE).update(1.0)
+
+
+def test_run_is_a_loop_of_steps(kind: Any) -> None:
+    u, x = record()
+    x[50] = u[77] = np.nan
+    ran, stepped = kind(RATE), kind(RATE)
+    trace = ran.run(u, x)
+    steps(stepped, u, x)
+    assert face(ran) == face(stepped)
+    np.testing.assert_array_equal(trace.theta[-1], stepped.theta)
+
+
+def test_run_in_parts_is_one_run(kind: Any) -> None:
+    u, x = record()
+    x[99:102] = np.nan
+    whole, parts = kind(RATE), kind(RATE)
+    theta = whole.run(u, x).theta
+    edges = [0, 1, 1, 100, 101, 137, u.size]
+    pieces = [parts.run(u[a:b], x[a:b]).theta for a, b in itertools.pairwise(edges)]
+    assert face(parts) == face(whole)
+    np.testing.assert_array_equal(np.concatenate(pieces), theta)
+
+
+def test_trace_holds_what_was_asked_for(kind: Any) -> None:
+    u, x = record(0.5)
+    asked, plain, sparse = kind(RATE), kind(RATE), kind(RATE)
+    full = asked.run(u, x, record=("y", "S", "P"))
+    bare = plain.run(u, x)
+    thin = sparse.run(u, x, every=7)
+    n = asked.theta.size
+    assert full.parameter_names == asked.parameter_names
+    assert full.theta.shape == (u.size, n)
+    assert full.y.shape == full.S.shape == (u.size,)
+    assert full.P.shape == (u.size, n, n)
+    assert (full.y[-1], full.S[-1]) == (asked.y, asked.S)
+    np.testing.assert_array_equal(full.P[-1], asked.P)
+    np.testing.assert_array_equal(full.index, np.arange(u.size))
+    assert bare.y is bare.S is bare.P is None
+    np.testing.assert_array_equal(thin.index, np.arange(6, u.size, 7))
+    np.testing.assert_array_equal(thin.theta, full.theta[thin.index])
+    assert face(asked) == face(plain) == face(sparse)
+
+
+def test_run_of_nothing_changes_nothing(kind: Any) -> None:
+    u, x = record(0.5)
+    estimator = kind(RATE)
+    estimator.run(u, x)
+    before = face(estimator)
+    trace = estimator.run([], [])
+    assert trace.theta.shape == (0, estimator.theta.size)
+    assert face(estimator) == before
+
+
+# ---------------------------------------------------------------- what arrays may be
+
+
+def test_leaves_its_input_alone(kind: Any) -> None:
+    u, x = record(0.5)
+    x[30] = np.nan
+    u_before, x_before = u.copy(), x.copy()
+    kind(RATE).run(u, x)
+    np.testing.assert_array_equal(u, u_before)
+    np.testing.assert_array_equal(x, x_before)
+
+
+def test_takes_lists_slices_and_signals(kind: Any) -> None:
+    signal = pz.signals.triangle(33.0, 5.0, 0.5, RATE)
+    u = signal.values
+    x = TRUE.simulate(u)
+    plain = kind(RATE)
+    plain.run(u, x)
+    wide = np.column_stack([u, x])
+    for u_given, x_given in ((u.tolist(), x.tolist()), (wide[:, 0], wide[:, 1]), (signal, x)):
+        other = kind(RATE)
+        other.run(u_given, x_given)
+        assert face(other) == face(plain)
+
+
+def test_takes_read_only_arrays(kind: Any) -> None:
+    u, x = record(0.2)
+    plain, other = kind(RATE), kind(RATE)
+    plain.run(u, x)
+    u.flags.writeable = x.flags.writeable = False
+    other.run(u, x)
+    assert face(other) == face(plain)
+
+
+def test_takes_whole_numbers_and_scalars_of_numpy(kind: Any) -> None:
+    plain, whole, scalar = kind(RATE), kind(RATE), kind(RATE)
+    for k in range(20):
+        plain.step(float(k), float(k // 6))
+        whole.step(k, k // 6)
+        scalar.step(np.float64(k), np.float32(k // 6))
+    assert face(plain) == face(whole) == face(scalar)
+
+
+def test_refuses_wrong_shapes(kind: Any) -> None:
+    u, x = record(0.2)
+    estimator = kind(RATE)
+    with pytest.raises(ValueError, match=r"u must have shape \(N,\).*pass u\[:, 0\]"):
+        estimator.run(u[:, None], x)
+    with pytest.raises(ValueError, match=r"x must have shape \(N,\)"):
+        estimator.run(u, x.reshape(2, -1))
+    with pytest.raises(ValueError, match=r"u must have shape \(N,\)"):
+        estimator.run(1.0, x)
+    with pytest.raises(ValueError, match="u and x must have the same length"):
+        estimator.run(u, x[:-1])
+    with pytest.raises(ValueError, match="every"):
+        estimator.run(u, x, every=0)
+    with pytest.raises(ValueError, match="record holds unknown names"):
+        estimator.run(u, x, record=("theta",))
+    assert face(estimator) == face(kind(RATE))
+
+
+# ---------------------------------------------------------------- what is missing
+
+
+@pytest.mark.parametrize("nothing", NO_NUMBERS)
+def test_skips_what_is_no_measurement(kind: Any, nothing: float | None) -> None:
+    u, x = record(0.5)
+    estimator = kind(RATE)
+    steps(estimator, u[:60], x[:60])
+    theta, updates = estimator.theta, estimator.status.updates
+    estimator.step(float(u[60]), nothing)
+    np.testing.assert_allclose(estimator.theta, theta, rtol=ROUNDING)
+    assert estimator.status.last == "missing"
+    assert estimator.status.missing == 1
+    assert estimator.status.samples == 61
+    assert estimator.status.updates == updates
+    assert_sound(estimator)
+    steps(estimator, u[61:], x[61:])
+    assert estimator.status.last != "missing"
+    assert_sound(estimator)
+
+
+@pytest.mark.parametrize("nothing", NO_NUMBERS)
+def test_skips_what_is_no_voltage(kind: Any, nothing: float | None) -> None:
+    u, x = record(0.5)
+    estimator = kind(RATE)
+    steps(estimator, u[:60], x[:60])
+    theta = estimator.theta
+    estimator.step(nothing, float(x[60]))
+    np.testing.assert_allclose(estimator.theta, theta, rtol=ROUNDING)
+    assert estimator.status.last == "missing"
+    assert estimator.status.missing == 1
+    assert_sound(estimator)
+    estimator.predict(nothing)
+    estimator.update(float(x[60]))
+    assert estimator.status.missing == 2
+    steps(estimator, u[61:], x[61:])
+    assert estimator.status.last != "missing"
+    assert_sound(estimator)
+
+
+def test_starts_with_nothing(kind: Any) -> None:
+    u, x = record(0.5)
+    late = kind(RATE)
+    late.run(np.full(5, np.nan), np.full(5, np.nan))
+    late.step(0.0, None)
+    assert late.status.missing == 6
+    np.testing.assert_allclose(late.theta, kind(RATE).theta, rtol=ROUNDING)
+    steps(late, u, x)
+    assert_sound(late)
+
+
+def test_a_missing_sample_changes_nothing_but_itself(kind: Any) -> None:
+    u, x = record(2.0)
+    whole, gappy = kind(RATE), kind(RATE)
+    whole.run(u, x)
+    x[300] = np.nan
+    trace = gappy.run(u, x)
+    np.testing.assert_allclose(trace.theta[300], trace.theta[299], rtol=ROUNDING)
+    np.testing.assert_allclose(gappy.theta, whole.theta, rtol=0.03)
+    assert gappy.status.missing == 1
+    assert gappy.status.samples == whole.status.samples == u.size
+
+
+# ---------------------------------------------------------------- what it shows
+
+
+def test_shapes_and_covariance(kind: Any) -> None:
+    u, x = record(2.0)
+    estimator = kind(RATE)
+    for given in (None, (u[:40], x[:40]), (u[40:], x[40:])):
+        if given is not None:
+            estimator.run(*given)
+        n = len(estimator.parameter_names)
+        P = estimator.P
+        assert all(isinstance(name, str) for name in estimator.parameter_names)
+        assert estimator.theta.shape == estimator.standard_errors.shape == (n,)
+        assert estimator.theta.dtype == np.float64
+        assert P.shape == (n, n)
+        np.testing.assert_allclose(P, P.T, rtol=1e-12, atol=0.0)
+        assert np.all(np.isfinite(estimator.standard_errors))
+        assert estimator.K.ndim == 1
+        assert np.all(np.isfinite(estimator.K))
+        assert isinstance(estimator.y, float)
+        assert isinstance(estimator.S, float)
+        assert_sound(estimator)
+    assert np.isfinite(estimator.y)
+    assert 0.0 < estimator.S < np.inf
+    assert estimator.status.samples == u.size
+    assert np.all(estimator.standard_errors > 0.0)
+
+
+def test_shows_copies(kind: Any) -> None:
+    u, x = record(0.5)
+    estimator = kind(RATE)
+    estimator.run(u, x)
+    before = face(estimator)
+    for name in ("theta", "P", "K", "standard_errors"):
+        getattr(estimator, name)[...] = 1e3
+    trace = estimator.run([], [])
+    estimator.model.theta[...] = 1e3
+    assert trace.theta.size == 0
+    assert face(estimator) == before
+
+
+# ---------------------------------------------------------------- what it learns
+
+
+def test_learns_the_parameters(kind: Any) -> None:
+    u, x = record(6.0)
+    estimator = kind(RATE)
+    start = np.abs(estimator.theta / TRUE.theta - 1.0).max()
+    estimator.run(u, x)
+    np.testing.assert_allclose(estimator.theta[:3], TRUE.theta, rtol=0.12)
+    assert np.abs(estimator.theta[:3] / TRUE.theta - 1.0).max() < start
+    model = estimator.model
+    assert isinstance(model, pz.ColemanHodgdon)
+    error = np.abs(model.simulate(u) - TRUE.simulate(u))[-200:]
+    assert error.max() < 0.1
+
+
+def test_learns_a_linear_gain(kind: Any) -> None:
+    u, x = record(4.0, model=pz.LinearGain(0.155))
+    estimator = kind(RATE, initial_model=pz.LinearGain(0.1))
+    assert estimator.parameter_names == ("gain",)
+    estimator.run(u, x)
+    np.testing.assert_allclose(estimator.model.theta, [0.155], rtol=0.05)
+    assert isinstance(estimator.model, pz.LinearGain)
+    assert estimator.P.shape == (1, 1)
+    saved = json.loads(json.dumps(estimator.to_dict(), allow_nan=False))
+    assert face(kind.from_dict(saved)) == face(estimator)
+
+
+def test_a_dwell_moves_nothing(kind: Any) -> None:
+    u, x = record(3.0)
+    estimator = kind(RATE)
+    estimator.run(u, x)
+    before = estimator.theta
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(400)
+    estimator.run(np.full(400, u[-1]), TRUE.simulate(u)[-1] + noise)
+    np.testing.assert_allclose(estimator.theta, before, rtol=0.05)
+    assert_sound(estimator)
+
+
+def hostile(name: str, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Records that no stage makes."""
+    N = 300
+    u = voltage(1.5)
+    x = TRUE.simulate(u)
+    records = {
+        "noise": (rng.normal(0.0, 50.0, N), rng.normal(0.0, 10.0, N)),
+        "backwards": (u, -x),
+        "stuck sensor": (u, np.full(N, 3.0)),
+        "stuck voltage": (np.zeros(N), 5.0 * np.sin(np.arange(N))),
+        "spikes": (u, x + 1e4 * (rng.random(N) < 0.05)),
+        "huge": (1e8 * rng.standard_normal(N), 1e8 * rng.standard_normal(N)),
+        "tiny": (1e-12 * u, 1e-12 * x),
+        "holes": (np.where(rng.random(N) < 0.5, u, np.nan), np.where(rng.random(N) < 0.5, x, np.inf)),
+        "biased": (u + 80.0, x - 100.0),
+    }
+    return records[name]
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["noise", "backwards", "stuck sensor", "stuck voltage", "spikes", "huge", "tiny", "holes", "biased"],
+)
+@pytest.mark.parametrize("model", [None, pz.LinearGain(0.1)])
+def test_model_is_admissible_after_anything(kind: Any, name: str, model: Any) -> None:
+    u, x = hostile(name, np.random.default_rng(2))
+    estimator = kind(RATE) if model is None else kind(RATE, initial_model=model)
+    compensator: Any = pz.InverseCompensator(TRUE) if model is None else pz.LinearCompensator(model)
+    for start in range(0, u.size, 25):
+        estimator.run(u[start : start + 25], x[start : start + 25])
+        assert_sound(estimator)
+        compensator.model = estimator.model
+        assert np.isfinite(compensator.step(0.1))
+    assert np.isfinite(estimator.y)
+    assert np.isfinite(estimator.S)
+    json.dumps(estimator.to_dict(), allow_nan=False)
+
+
+def test_works_in_the_ring(kind: Any) -> None:
+    reference = pz.signals.triangle(5.0, 5.0, 1.5, RATE)
+    estimator = kind(RATE)
+    record = pz.track(
+        reference,
+        stage=pz.SimulatedStage(RATE, TRUE, seed=0),
+        compensator=pz.InverseCompensator(pz.ColemanHodgdon(0.02, 0.12, 0.0036)),
+        estimator=estimator,
+        update_interval=25,
+    )
+    assert estimator.status.samples == len(reference)
+    assert record.theta.shape == (len(reference), 3)
+    assert np.all(np.isfinite(record.voltage))
+    assert record.max_error() < 2.0
+    assert_sound(estimator)
+
+
+# ---------------------------------------------------------------- copies of itself
+
+
+def test_reset_equals_new(kind: Any) -> None:
+    u, x = record()
+    new, used = kind(RATE), kind(RATE)
+    used.run(u + 10.0, 0.5 * x)
+    used.predict(3.0)
+    used.reset()
+    assert face(used) == face(new)
+    assert used.to_dict() == new.to_dict()
+    used.run(u, x)
+    new.run(u, x)
+    assert face(used) == face(new)
+
+
+def test_copies_are_independent(kind: Any) -> None:
+    u, x = record()
+    estimator = kind(RATE)
+    estimator.run(u[:100], x[:100])
+    before = face(estimator)
+    other = estimator.copy()
+    assert type(other) is kind
+    assert face(other) == before
+    other.run(u[100:], x[100:])
+    assert face(estimator) == before
+    estimator.run(u[100:], x[100:])
+    assert face(other) == face(estimator)
+    other.reset()
+    assert face(other) == face(kind(RATE))
+    assert face(estimator) != face(other)
+
+
+def test_resumes_from_json_bit_for_bit(kind: Any) -> None:
+    u, x = record()
+    x[150] = np.nan
+    estimator = kind(RATE)
+    fresh = kind.from_dict(json.loads(json.dumps(estimator.to_dict(), allow_nan=False)))
+    fresh.run(u[:100], x[:100])
+    estimator.run(u[:100], x[:100])
+    assert face(fresh) == face(estimator)
+    estimator.predict(float(u[100]))
+    saved = estimator.to_dict()
+    frozen = json.dumps(saved, allow_nan=False)
+    resumed = kind.from_dict(json.loads(frozen))
+    assert face(resumed) == face(estimator)
+    for each in (estimator, resumed):
+        each.update(float(x[100]))
+        each.run(u[101:], x[101:])
+    assert face(resumed) == face(estimator)
+    assert json.dumps(saved, allow_nan=False) == frozen
+    resumed.reset()
+    assert face(resumed) == face(kind(RATE))
+
+
+def test_saves_a_missing_voltage_that_waits_for_its_measurement(kind: Any) -> None:
+    estimator = kind(RATE)
+    estimator.predict(np.nan)
+    resumed = kind.from_dict(json.loads(json.dumps(estimator.to_dict(), allow_nan=False)))
+    resumed.update(1.0)
+    assert resumed.status.missing == 1
+
+
+def test_refuses_a_save_that_is_not_its_own(kind: Any) -> None:
+    data = kind(RATE).to_dict()
+    with pytest.raises(ValueError, match=f"not of a {kind.__name__}"):
+        kind.from_dict(data | {"estimator": "Other"})
+    with pytest.raises(ValueError, match="format"):
+        kind.from_dict(data | {"format": 99})
+    with pytest.raises(ValueError, match="state"):
+        kind.from_dict(data | {"state": [*data["state"], 0.0]})
+
+
+def test_pickles(kind: Any) -> None:
+    u, x = record()
+    estimator = kind(RATE)
+    estimator.run(u[:100], x[:100])
+    again = pickle.loads(pickle.dumps(estimator))
+    assert face(again) == face(estimator)
+    for each in (estimator, again):
+        each.run(u[100:], x[100:])
+    assert face(again) == face(estimator)

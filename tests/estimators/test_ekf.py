@@ -1,0 +1,259 @@
+"""HysteresisEKF: textbook parity, derivatives, reductions, tuning per second, the admissible set."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import piezoest as pz
+from piezoest.equations import coleman_hodgdon as equations
+from piezoest.equations import kalman
+from tests.reference import kalman as reference
+
+FloatArray = NDArray[np.float64]
+
+TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
+START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+
+
+def record(
+    seconds: float, fs: float, noise: float = 1e-3, offset: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    u = pz.signals.triangle(33.0, 5.0, 5.0 * seconds, fs).values
+    return u, TRUE.simulate(u) + offset + noise * np.random.default_rng(0).standard_normal(u.size)
+
+
+def loop(model: pz.ColemanHodgdon) -> FloatArray:
+    return np.array([model.a, model.b, model.c])
+
+
+# ---------------------------------------------------------------- the Jacobian
+
+
+@pytest.mark.parametrize("travel", [1e-2, 1e-1, 0.5, 1.0, 3.0])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_jacobian_is_casadis_derivative(travel: float, sign: float) -> None:
+    casadi.GlobalOptions.setNumpyMode(1)
+    w, du, a, b = (casadi.SX.sym(name) for name in ("w", "du", "a", "b"))
+    after = equations.hysteresis_step(w, du, a, b)
+    derivative = casadi.Function("jacobian", [w, du, a, b], [casadi.jacobian(after, casadi.vertcat(w, a, b))])
+    for w_h in (-2.0, 0.3, 2.5):
+        for a_, b_ in ((0.021, 0.057), (0.004, 0.01), (0.2, 0.1)):
+            du_ = sign * travel / a_
+            expected = derivative(w_h, du_, a_, b_).full().ravel()
+            got = np.array(equations.hysteresis_jacobian(w_h, du_, a_, b_))
+            np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12 * abs(expected).max())
+
+
+@pytest.mark.parametrize("du", [0.0, 1e-300, 1e-12, 1e-6, 1e3, 1e9])
+def test_jacobian_is_finite_everywhere(du: float) -> None:
+    for a in (0.0, 1e-12, 0.021, 10.0):
+        assert np.all(np.isfinite(equations.hysteresis_jacobian(0.3, du, a, 0.057)))
+
+
+def test_jacobian_of_short_travels_is_their_series() -> None:
+    """d/da of the exact step for a |du| -> 0: -|du| w_h + b du |du| / 2."""
+    for du in (1e-7, -1e-9):
+        kept, by_a, by_b = equations.hysteresis_jacobian(0.3, du, 0.021, 0.057)
+        assert kept == pytest.approx(1.0 - 0.021 * abs(du), rel=1e-15)
+        assert by_a == pytest.approx(-abs(du) * 0.3 + 0.057 * du * abs(du) / 2.0, rel=1e-6)
+        assert by_b == pytest.approx(-du, rel=1e-8)
+
+
+# ---------------------------------------------------------------- parity
+
+
+@pytest.mark.parametrize("missing", [False, True])
+def test_equals_the_textbook(missing: bool) -> None:
+    fs, noise, drift, mismatch, uncertainty = 2000.0, 2e-3, 0.2, 0.1, 0.4
+    u, x = record(0.3, fs)
+    if missing:
+        x[100] = x[250:260] = np.nan
+    estimator = pz.HysteresisEKF(
+        fs, uncertainty=uncertainty, noise=noise, drift=drift, mismatch=mismatch, project=False
+    )
+    trace = estimator.run(u, x, record=("y", "S"))
+    start = loop(START)
+    s = np.array([0.0, *start])
+    P = np.diag([0.5 * START.b / START.a, *(uncertainty * start)]) ** 2
+    q = np.array([mismatch, *(drift * start)]) ** 2 / fs
+    y = S = 0.0
+    for k in range(u.size):
+        du = u[k] - u[k - 1] if k else 0.0
+        Q = np.diag(q)
+        Q[0, 0] += kalman.bilinear_variance(P.ravel(), du, s[1], 4)
+        s, F = reference.transition(s, du)
+        P = reference.predict_covariance(P, F, Q)
+        if np.isfinite(x[k]):
+            h = np.array([1.0, 0.0, 0.0, u[k]])
+            y = float(x[k] - h @ s)
+            s, P, _, S = reference.update(s, P, h, y, noise**2)
+        assert trace.y is not None
+        assert trace.S is not None
+        assert trace.y[k] == pytest.approx(y, rel=1e-7, abs=1e-12)
+        assert trace.S[k] == pytest.approx(S, rel=1e-7)
+    np.testing.assert_allclose(estimator.state, s, rtol=1e-8)
+    np.testing.assert_allclose(estimator.state_covariance, P, rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(estimator.theta, [s[1], s[3] - s[2], s[1] * s[3]], rtol=1e-8)
+
+
+def test_covariance_of_theta_is_that_of_the_state() -> None:
+    """(4) of states drawn from the filter's own distribution has the covariance that P says."""
+    u, x = record(0.4, 2000.0)
+    estimator = pz.HysteresisEKF(2000.0, drift=0.0, mismatch=0.0, noise=1e-3)
+    estimator.run(u, x)
+    draws = np.random.default_rng(0).multivariate_normal(
+        estimator.state[1:], estimator.state_covariance[1:, 1:], size=200_000
+    )
+    theta = np.column_stack([draws[:, 0], draws[:, 2] - draws[:, 1], draws[:, 0] * draws[:, 2]])
+    np.testing.assert_allclose(estimator.standard_errors, theta.std(axis=0), rtol=0.02)
+    np.testing.assert_allclose(estimator.P[0, 2], np.cov(theta.T)[0, 2], rtol=0.03)
+
+
+# ---------------------------------------------------------------- reductions
+
+
+@pytest.mark.parametrize("offset", [False, True])
+def test_of_a_linear_gain_is_recursive_least_squares(offset: bool) -> None:
+    fs, gain, uncertainty, noise = 2000.0, 0.1, 0.5, 1.5e-3
+    u = pz.signals.triangle(33.0, 5.0, 5.0, fs).values
+    x = 0.155 * u + noise * np.random.default_rng(0).standard_normal(u.size) + 0.2 * offset
+    # With an offset the filter counts from its first sample.
+    u0, x0 = (u[0], x[0]) if offset else (0.0, 0.0)
+    filtered = pz.HysteresisEKF(
+        fs,
+        initial_model=pz.LinearGain(gain),
+        uncertainty=uncertainty,
+        noise=noise,
+        drift=0.0,
+        mismatch=0.0,
+        offset=offset,
+    )
+    n = 1 + offset
+    squares = pz.RecursiveLeastSquares(
+        n,
+        theta=[gain, 0.0][:n],
+        P=np.array([uncertainty * gain, 10.0 * gain][:n]) ** 2,
+        noise_variance=noise**2,
+        policies=(),
+    )
+    for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+        filtered.step(u_k, x_k)
+        squares.update(x_k - x0, [u_k - u0, 1.0][:n])
+    np.testing.assert_allclose(filtered.theta, squares.theta, rtol=1e-9)
+    scale = squares.P[0, 0]
+    np.testing.assert_allclose(filtered.P, squares.P, rtol=1e-9, atol=1e-9 * scale)
+    assert filtered.y == pytest.approx(squares.y, rel=1e-6, abs=1e-12)
+    assert pytest.approx(squares.S, rel=1e-9) == filtered.S
+
+
+# ---------------------------------------------------------------- what it learns
+
+
+@pytest.mark.parametrize("fs", [2000.0, 50_000.0])
+def test_finds_the_parameters(fs: float) -> None:
+    u, x = record(1.0, fs)
+    estimator = pz.HysteresisEKF(fs, noise=1e-3, drift=0.0, mismatch=0.0)
+    estimator.run(u, x)
+    np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=3e-3)
+    assert estimator.status.updates == u.size
+    assert not estimator.status.projected
+
+
+def test_finds_the_centre_of_the_loop() -> None:
+    fs = 5000.0
+    u, x = record(2.0, fs)
+    estimator = pz.HysteresisEKF(fs, noise=1e-3, drift=0.0, mismatch=0.0, offset=True)
+    estimator.run(u + 60.0, x - 120.0)
+    assert estimator.parameter_names == ("alpha", "beta", "gamma", "offset")
+    np.testing.assert_allclose(estimator.theta[:3], TRUE.theta, rtol=0.02)
+    model = estimator.model
+    assert isinstance(model, pz.ColemanHodgdon)
+    assert model.offset == pytest.approx(-120.0 - TRUE.c * 60.0, abs=0.15)
+    again = model.simulate(u + 60.0)
+    assert np.max(np.abs(again - (x - 120.0))[u.size // 2 :]) < 0.02
+
+
+@pytest.mark.parametrize("delay", [2.0, 2.5])
+def test_delay(delay: float) -> None:
+    fs = 2000.0
+    u, x = record(1.0, fs)
+    late = np.interp(np.arange(x.size) - delay, np.arange(x.size), x)
+    errors = []
+    for told in (delay, 0.0):
+        estimator = pz.HysteresisEKF(fs, delay=told)
+        estimator.run(u, late)
+        model = estimator.model
+        assert isinstance(model, pz.ColemanHodgdon)
+        errors.append(np.abs(model.simulate(u) - TRUE.simulate(u))[u.size // 2 :].max())
+    assert errors[0] < 0.5 * errors[1]
+
+
+@pytest.mark.parametrize("mismatch", [0.0, 0.3])
+def test_tuning_survives_a_change_of_rate(mismatch: float) -> None:
+    """Process noise is given per second: what is known after a time depends little on the rate."""
+    errors = []
+    for fs in (5000.0, 50_000.0):
+        u, x = record(1.0, fs, noise=0.0)
+        # The same information a second: ten times the samples of ten times the variance.
+        noise = 1e-3 * np.sqrt(fs / 5000.0)
+        estimator = pz.HysteresisEKF(fs, noise=noise, drift=0.1, mismatch=mismatch)
+        trace = estimator.run(u, x, every=int(fs / 50.0), record=("P",))
+        assert trace.P is not None
+        errors.append(np.sqrt(np.diagonal(trace.P, axis1=1, axis2=2)))
+    np.testing.assert_allclose(errors[0][5:], errors[1][5:], rtol=0.1)
+
+
+def test_stays_admissible_while_it_learns() -> None:
+    """From a start that drives the unbounded filter out of the set."""
+    fs = 2000.0
+    u, x = record(0.5, fs)
+    start = pz.ColemanHodgdon.from_loop(0.06, 0.2, 0.45)
+    kept, free = (
+        pz.HysteresisEKF(fs, initial_model=start, uncertainty=2.0, project=project)
+        for project in (True, False)
+    )
+    outside = projected = 0
+    for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+        kept.step(u_k, x_k)
+        free.step(u_k, x_k)
+        _, a, b, c = kept.state
+        assert a > 0.0
+        assert b > 0.0
+        assert c >= 2.0 * b
+        projected += kept.status.projected
+        _, a, b, c = free.state
+        outside += not (a > 0.0 and b > 0.0 and c >= 2.0 * b)
+        assert free.model.is_admissible
+    assert outside > 0
+    assert projected > 0
+
+
+def test_covariance_stays_definite_over_a_million_samples() -> None:
+    fs = 50_000.0
+    u, x = record(2.0, fs)
+    estimator = pz.HysteresisEKF(fs)
+    for _ in range(10):
+        estimator.run(u, x, every=u.size)
+        P = estimator.state_covariance
+        assert np.array_equal(P, P.T)
+        scale = np.sqrt(np.diag(P))
+        assert np.linalg.eigvalsh(P / np.outer(scale, scale))[0] > 0.0
+    assert estimator.status.samples == 1_000_000
+
+
+def test_wrong_arguments() -> None:
+    with pytest.raises(ValueError, match="is not admissible: use nearest_admissible"):
+        pz.HysteresisEKF(1e3, initial_model=pz.ColemanHodgdon(0.02, 0.12, 0.009))
+    for name in ("uncertainty", "noise"):
+        options: dict[str, Any] = {name: 0.0}
+        with pytest.raises(ValueError, match=f"{name} must be above zero"):
+            pz.HysteresisEKF(1e3, **options)
+    for name in ("drift", "mismatch", "delay"):
+        options = {name: -1.0}
+        with pytest.raises(ValueError, match=f"{name} must be zero or more"):
+            pz.HysteresisEKF(1e3, **options)

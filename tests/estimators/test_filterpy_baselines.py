@@ -1,0 +1,113 @@
+"""The baselines on filterpy: equal to the compiled filter, and open to filterpy's own tools."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from filterpy.common import Saver
+from filterpy.kalman import ExtendedKalmanFilter, UnscentedKalmanFilter
+from numpy.typing import NDArray
+
+import piezoest as pz
+
+FloatArray = NDArray[np.float64]
+
+TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
+
+
+def record(samples: int, fs: float, frequency: float = 5.0) -> tuple[FloatArray, FloatArray]:
+    u = pz.signals.triangle(33.0, frequency, samples / fs * frequency, fs).values
+    return u, TRUE.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"offset": True, "delay": 2.5, "drift": 0.0},
+        {"initial_model": pz.LinearGain(0.1), "mismatch": 0.0},
+    ],
+)
+def test_compiled_filter_equals_filterpy(options: dict[str, Any]) -> None:
+    """20 000 samples at 50 kHz, single and long gaps; 10 s are in benchmarks/filterpy_parity.py."""
+    fs, samples = 50_000.0, 20_000 if not options else 4000
+    u, x = record(samples, fs)
+    gaps = np.random.default_rng(1).random(samples) < 0.01
+    gaps[1000:1500] = True
+    x[gaps] = np.nan
+    compiled = pz.HysteresisEKF(fs, project=False, **options)
+    baseline = pz.FilterPyEKF(fs, **options)
+    ours = compiled.run(u, x, record=("y", "S", "P"))
+    theirs = baseline.run(u, x, record=("y", "S", "P"))
+    for name in ("theta", "y", "S", "P"):
+        mine, other = getattr(ours, name), getattr(theirs, name)
+        scale = np.abs(other).max(axis=0)
+        assert np.max(np.abs(mine - other) / scale) < 1e-9, name
+    np.testing.assert_allclose(compiled.theta, baseline.theta, rtol=1e-9)
+    np.testing.assert_allclose(compiled.standard_errors, baseline.standard_errors, rtol=1e-7)
+    np.testing.assert_allclose(compiled.K, baseline.K, rtol=1e-5, atol=1e-9)
+    assert compiled.status == baseline.status
+
+
+@pytest.mark.parametrize(
+    ("kind", "base"), [(pz.FilterPyEKF, ExtendedKalmanFilter), (pz.FilterPyUKF, UnscentedKalmanFilter)]
+)
+def test_filter_is_filterpys_own(kind: Any, base: type) -> None:
+    u, x = record(200, 2000.0)
+    estimator = kind(2000.0)
+    assert isinstance(estimator.filter, base)
+    for attribute in ("predict", "update"):
+        function = getattr(type(estimator.filter), attribute)
+        assert function.__module__.startswith("filterpy."), "its cost must be filterpy's"
+    saver = Saver(estimator.filter, skip_callable=True, ignore=("points_fn", "msqrt", "inv"))
+    for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+        estimator.step(u_k, x_k)
+        saver.save()
+    states, covariances = np.array(saver["x"]), np.array(saver["P"])
+    assert states.shape == (200, 4)
+    assert covariances.shape == (200, 4, 4)
+    assert np.all(np.isfinite(saver["log_likelihood"]))
+    np.testing.assert_array_equal(states[-1], estimator.state)
+    np.testing.assert_array_equal(covariances[-1], estimator.state_covariance)
+
+
+def test_what_filterpy_is_told_reaches_the_estimator() -> None:
+    estimator = pz.FilterPyEKF(1000.0)
+    estimator.filter.x = np.array([0.1, 0.03, 0.05, 0.2])
+    np.testing.assert_allclose(estimator.theta, [0.03, 0.15, 0.006])
+    np.testing.assert_array_equal(estimator.state, estimator.filter.x)
+
+
+def test_unscented_agrees_with_extended() -> None:
+    """On a true plant both know the same, within what they say that they do not know."""
+    fs = 2000.0
+    u, x = record(1200, fs)
+    extended, unscented = (
+        kind(fs, noise=1e-3, drift=0.0, mismatch=0.01) for kind in (pz.FilterPyEKF, pz.FilterPyUKF)
+    )
+    extended.run(u, x)
+    unscented.run(u, x)
+    apart = np.abs(extended.theta - unscented.theta)
+    assert np.all(apart < 3.0 * np.hypot(extended.standard_errors, unscented.standard_errors))
+    for each in (extended, unscented):
+        assert np.all(np.abs(each.theta - TRUE.theta) < 3.0 * each.standard_errors)
+        np.testing.assert_allclose(each.theta, TRUE.theta, rtol=0.05)
+
+
+def test_unscented_of_a_linear_gain_is_the_kalman_filter() -> None:
+    u, x = record(400, 2000.0)
+    options: dict[str, Any] = {"initial_model": pz.LinearGain(0.1), "mismatch": 0.0}
+    extended, unscented = pz.FilterPyEKF(2000.0, **options), pz.FilterPyUKF(2000.0, **options)
+    extended.run(u, x)
+    unscented.run(u, x)
+    np.testing.assert_allclose(unscented.theta, extended.theta, rtol=1e-9)
+    np.testing.assert_allclose(unscented.P, extended.P, rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", [pz.FilterPyEKF, pz.FilterPyUKF])
+def test_does_not_offer_projection(kind: Any) -> None:
+    with pytest.raises(TypeError, match="project"):
+        kind(1000.0, project=True)
+    assert "project" not in kind(1000.0).to_dict()["arguments"]
