@@ -8,19 +8,24 @@ from .compensators import (
     VoltageLimits,
 )
 from .estimators.base import Estimator, Status, Trace
+from .estimators.batch import BatchFit
+from .estimators.batch_result import BatchFitResult
 from .estimators.ekf import HysteresisEKF
 from .estimators.filterpy_baselines import FilterPyEKF, FilterPyUKF
+from .estimators.horizon import MovingHorizon
 from .estimators.recursive_least_squares import RecursiveLeastSquares
 from .estimators.rls import HysteresisRLS
 from .identification import Identification, identify
 from .models import ColemanHodgdon, Creep, LinearGain, MassSpringDamper, PrandtlIshlinskii
 from .records import Record, read_record
 from .signals import Signal
-from .stage import Amplifier, Gauge, PaperStage, SimulatedStage
+from .stage import Amplifier, Gauge, PaperStage, SimulatedStage, TemperatureLaw
 from .tracking import TrackingRecord, track
 
 __all__ = [
     "Amplifier",
+    "BatchFit",
+    "BatchFitResult",
     "ColemanHodgdon",
     "CompensatorStatus",
     "Creep",
@@ -36,6 +41,7 @@ __all__ = [
     "LinearCompensator",
     "LinearGain",
     "MassSpringDamper",
+    "MovingHorizon",
     "PaperStage",
     "PrandtlIshlinskii",
     "Record",
@@ -43,6 +49,7 @@ __all__ = [
     "Signal",
     "SimulatedStage",
     "Status",
+    "TemperatureLaw",
     "Trace",
     "TrackingRecord",
     "VoltageLimits",

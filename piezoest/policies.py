@@ -8,9 +8,17 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from piezoest._checks import fraction, non_negative
+from piezoest._checks import fraction, integer, non_negative, positive
 
-__all__ = ["CovarianceResetting", "DeadZone", "Forgetting", "NormBound", "Normalisation"]
+__all__ = [
+    "CovarianceResetting",
+    "DeadZone",
+    "Forgetting",
+    "NormBound",
+    "Normalisation",
+    "OutlierRejection",
+    "RandomWalk",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +51,66 @@ class Forgetting:
             Time between samples, in the unit of `memory`.
         """
         return float(np.exp(-step / self.memory))
+
+
+@dataclass(frozen=True, slots=True)
+class RandomWalk:
+    """Forgetting by parameters that walk: P grows by a constant, not by a factor.
+
+    A direction without excitation is forgotten linearly and not exponentially, and each
+    direction at the pace at which the data renew it. The memory is in parts of the
+    reference's own period, which the estimator takes from the voltage's turning points: the same
+    setting serves any amplitude, frequency and unit.
+
+    L. Ljung, System Identification, 2nd ed. (1999), sec. 11.2; L. Guo, L. Ljung, IEEE Trans.
+    Autom. Control 40 (1995) 1353-1385.
+
+    Parameters
+    ----------
+    memory : float
+        Memory of the best excited direction, in periods.
+    drift : float
+        Random walk of each parameter, in parts of its initial value per root second. It sets
+        how fast the start is forgotten; once settled, only `memory` matters.
+
+    Raises
+    ------
+    ValueError
+        If a value is not above zero.
+    """
+
+    memory: float = 0.15
+    drift: float = 2.0
+
+    def __post_init__(self) -> None:
+        positive("memory", self.memory)
+        positive("drift", self.drift)
+
+
+@dataclass(frozen=True, slots=True)
+class OutlierRejection:
+    """Leave out measurements that the stage cannot have made: spikes, and jumps of the sensor.
+
+    Parameters
+    ----------
+    warm_up : int
+        Samples from which the usual change between two samples is taken.
+
+    Raises
+    ------
+    ValueError
+        If warm_up is not a whole number above zero.
+
+    Notes
+    -----
+    A change is believed up to 20 times the usual one plus three times what the present slope
+    explains. Where x stays at its new level, it is taken for the new one after 2 ms.
+    """
+
+    warm_up: int = 100
+
+    def __post_init__(self) -> None:
+        integer("warm_up", self.warm_up, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +196,9 @@ class DeadZone:
         non_negative("threshold", self.threshold)
 
 
-Policy = Forgetting | NormBound | Normalisation | CovarianceResetting | DeadZone
+Policy = (
+    Forgetting | RandomWalk | NormBound | Normalisation | CovarianceResetting | DeadZone | OutlierRejection
+)
 
 
 def select(policies: tuple[Policy, ...], kind: type[Policy]) -> Policy | None:

@@ -128,18 +128,54 @@ def continuous_update(theta, P, phi, z, n, h, forgetting_rate, normalised, bound
 
 
 @register_jitable
-def accumulate_scatter(M, psi, n, forgetting):
-    """M = forgetting² M + psi psi': the scatter of sum phi e for the sandwich P M P.
+def random_walk(P, q, bound, n):
+    """P + q I, where its trace stays within `bound`: forgetting by parameters that walk.
 
-    With coloured noise e the covariance of least squares is P M P and not P; psi is the
-    regressor seen through the noise's own filter (L. Ljung, System Identification, 2nd ed.,
-    1999, (9.54) for a known filter, with the weights of forgetting squared).
+    L. Ljung, System Identification, 2nd ed. (1999), sec. 11.2, the Kalman filter's
+    interpretation of recursive least squares. Unlike division by a forgetting factor this grows
+    P by a constant: a direction without excitation is forgotten linearly and not
+    exponentially.
     """
+    within = ((trace(P, n) + n * q) <= bound) * 1.0
+    for i in range(n):
+        P[i * n + i] = P[i * n + i] + within * q
+
+
+@register_jitable
+def propagate_error(C, phi, gain, filtered, n, pole, ratio, differenced):
+    """Covariance C of the estimate's error after an update, under white noise before the filters.
+
+    The error obeys d = (I - K phi') d + K e. White noise v of standard deviation `ratio` reaches e
+    through a first-order low-pass of `pole`, which the gain K is passed through here instead
+    (`filtered`, in place), and, where `differenced` is 1.0, as v_k - v_(k-1): of two
+    successive gains only G = K_k - (I - K_k phi') K_(k-1) then counts. `gain` is used up.
+    """
+    reach = 0.0
+    for i in range(n):
+        reach = reach + phi[i] * filtered[i]
+    # (I - K phi') C (I - K phi')' in two halves, to need no further storage.
+    for j in range(n):
+        total = 0.0
+        for i in range(n):
+            total = total + phi[i] * C[i * n + j]
+        for i in range(n):
+            C[i * n + j] = C[i * n + j] - gain[i] * total
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total = total + C[i * n + j] * phi[j]
+        for j in range(n):
+            C[i * n + j] = C[i * n + j] - total * gain[j]
+    for i in range(n):
+        before = filtered[i]
+        now = gain[i] + pole * (before - gain[i])
+        filtered[i] = now
+        gain[i] = (now - differenced * (before - gain[i] * reach)) * ratio
     for i in range(n):
         for j in range(i, n):
-            entry = forgetting * forgetting * M[i * n + j] + psi[i] * psi[j]
-            M[i * n + j] = entry
-            M[j * n + i] = entry
+            entry = 0.5 * (C[i * n + j] + C[j * n + i]) + gain[i] * gain[j]
+            C[i * n + j] = entry
+            C[j * n + i] = entry
 
 
 @register_jitable

@@ -57,7 +57,10 @@ class Status:
     projected : bool
         Whether `model` is the nearest admissible one and not `theta` itself.
     last : str
-        What became of the last sample: ``"waiting"``, ``"updated"``, ``"missing"`` or ``"held"``.
+        What became of the last sample: ``"waiting"``, ``"updated"``, ``"missing"``, ``"held"``
+        or ``"rejected"``.
+    outliers : int
+        Measurements that were rejected as ones the stage cannot have made.
     """
 
     samples: int
@@ -67,6 +70,7 @@ class Status:
     resets: int
     projected: bool
     last: str
+    outliers: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,7 +29,7 @@ FORGETTING, NOISE, BOUND, CONTINUOUS, STEP, RATE, NORMALISED, FLOOR, DEAD_ZONE, 
 INNOVATION, INNOVATION_VARIANCE, UPDATES, HELD, RESETS, LAST, HEAD = range(7)
 
 # Values of LAST.
-WAITING, UPDATED, MISSING, HOLDING = 0.0, 1.0, 2.0, 3.0
+WAITING, UPDATED, MISSING, HOLDING, REJECTED = 0.0, 1.0, 2.0, 3.0, 4.0
 
 # Beyond this a number is no measurement, and its square could overflow.
 LARGEST = 1e100
@@ -77,8 +77,8 @@ def new_state(theta: FloatArray, P_0: FloatArray) -> FloatArray:
 
 
 @register_jitable
-def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any) -> None:
-    """One sample of the law: gate, resetting, update. State and theta change in place."""
+def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, walk: Any) -> None:
+    """One sample of the law: gate, resetting, growth by `walk`, update with noise variance R."""
     theta = state[HEAD : HEAD + n]
     P = state[HEAD + n : HEAD + n + n * n]
     P_0 = state[HEAD + n + n * n : HEAD + n + 2 * n * n]
@@ -98,9 +98,8 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any) -> None:
             theta, P, phi, z, n, config[STEP], config[RATE], config[NORMALISED], config[BOUND], 1.0, work
         )
     else:
-        y, S = equations.discrete_update(
-            theta, P, phi, z, n, config[FORGETTING], config[NOISE], config[BOUND], 1.0, work
-        )
+        equations.random_walk(P, walk, config[BOUND], n)
+        y, S = equations.discrete_update(theta, P, phi, z, n, config[FORGETTING], R, config[BOUND], 1.0, work)
     state[INNOVATION] = y
     state[INNOVATION_VARIANCE] = S
     state[UPDATES] += 1.0
@@ -109,7 +108,7 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any) -> None:
 
 @njit("void(f8[::1], f8[::1], f8[::1], f8, i8)", cache=True)
 def _update(state: Any, config: Any, phi: Any, z: float, n: int) -> None:
-    adapt(state, config, phi, z, n)
+    adapt(state, config, phi, z, n, config[NOISE], 0.0)
 
 
 class RecursiveLeastSquares:

@@ -52,7 +52,7 @@ def test_finds_the_parameters() -> None:
 
 def test_finds_the_gain() -> None:
     u, x = record(1.0, 1e-3, model=pz.LinearGain(0.155))
-    estimator = pz.HysteresisRLS(FS, initial_model=pz.LinearGain(0.1))
+    estimator = pz.HysteresisRLS(FS, initial_model=pz.LinearGain(0.1), memory=0.4)
     estimator.run(u, x)
     np.testing.assert_allclose(estimator.model.theta, [0.155], rtol=1e-4)
     with_offset = pz.HysteresisRLS(FS, initial_model=pz.LinearGain(0.1), offset=True, memory=None)
@@ -64,9 +64,9 @@ def test_finds_the_gain() -> None:
 def test_offset_needs_no_high_pass() -> None:
     """A unipolar voltage and a biased gauge: centre (60 V, -120 µm)."""
     u, x = record(1.0, 1e-3)
-    plain = pz.HysteresisRLS(FS)
+    plain = pz.HysteresisRLS(FS, memory=0.4)
     plain.run(u + 60.0, x - 120.0)
-    centred = pz.HysteresisRLS(FS, offset=True)
+    centred = pz.HysteresisRLS(FS, memory=0.4, offset=True)
     centred.run(u + 60.0, x - 120.0)
     assert not np.allclose(plain.theta, TRUE.theta, rtol=0.2)
     np.testing.assert_allclose(centred.theta[:3], TRUE.theta, rtol=0.03)
@@ -80,7 +80,7 @@ def test_offset_needs_no_high_pass() -> None:
 def test_high_pass_removes_a_bias_of_the_sensor() -> None:
     u = pz.signals.triangle(33.0, 5.0, 25, FS, smoothing=0.0).values
     x = TRUE.simulate(u)
-    biased, passed = pz.HysteresisRLS(FS), pz.HysteresisRLS(FS, high_pass=0.5)
+    biased, passed = pz.HysteresisRLS(FS, memory=0.4), pz.HysteresisRLS(FS, memory=0.4, high_pass=0.5)
     biased.run(u, x + 2.0)
     passed.run(u, x + 2.0)
 
@@ -94,13 +94,13 @@ def test_high_pass_removes_a_bias_of_the_sensor() -> None:
 def test_delay(delay: float) -> None:
     u, x = record(1.0)
     late = np.interp(np.arange(x.size) - delay, np.arange(x.size), x)
-    estimator = pz.HysteresisRLS(FS, delay=delay)
+    estimator = pz.HysteresisRLS(FS, memory=0.4, delay=delay)
     estimator.run(u, late)
     np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=2e-3)
     # At a tenth of the rate the same delay, left out, would show.
     slow_u, slow_x = record(1.0, fs=2000.0)
     late = np.interp(np.arange(slow_x.size) - delay, np.arange(slow_x.size), slow_x)
-    told, untold = pz.HysteresisRLS(2000.0, delay=delay), pz.HysteresisRLS(2000.0)
+    told, untold = pz.HysteresisRLS(2000.0, memory=0.4, delay=delay), pz.HysteresisRLS(2000.0, memory=0.4)
     told.run(slow_u, late)
     untold.run(slow_u, late)
     error = np.abs(told.theta / TRUE.theta - 1.0).max()
@@ -140,7 +140,7 @@ def test_step_run_and_split_run_are_the_same_bits(time_base: Any, options: dict[
 
 def test_a_missing_sample_changes_nothing_but_itself() -> None:
     u, x = record(1.0, 1e-3)
-    whole, gappy = pz.HysteresisRLS(FS), pz.HysteresisRLS(FS)
+    whole, gappy = (pz.HysteresisRLS(FS, memory=0.4) for _ in range(2))
     whole.run(u, x)
     x[20_000] = np.nan
     trace = gappy.run(u, x)
@@ -152,7 +152,7 @@ def test_a_missing_sample_changes_nothing_but_itself() -> None:
 def test_long_gap_starts_anew() -> None:
     u, x = record(2.0)
     x[30_000:52_345] = np.nan
-    estimator = pz.HysteresisRLS(FS)
+    estimator = pz.HysteresisRLS(FS, memory=0.4)
     estimator.run(u, x)
     np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=1e-3)
 
@@ -160,7 +160,7 @@ def test_long_gap_starts_anew() -> None:
 def test_dwell_of_a_minute_moves_nothing() -> None:
     u, x = record(2.0, 1e-3)
     half = u.size // 2
-    estimator = pz.HysteresisRLS(FS)
+    estimator = pz.HysteresisRLS(FS, memory=0.4)
     estimator.run(u[:half], x[:half])
     before = estimator.theta
     noise = 1e-3 * np.random.default_rng(1).standard_normal(50_000)
@@ -212,7 +212,7 @@ def test_continuous_law_in_seconds_adapts_over_seconds() -> None:
     errors = []
     bases: tuple[Any, ...] = ("discrete", "continuous")
     for base in bases:
-        estimator = pz.HysteresisRLS(FS, time_base=base)
+        estimator = pz.HysteresisRLS(FS, memory=0.4, time_base=base)
         estimator.run(u, x)
         errors.append(np.abs(estimator.theta / TRUE.theta - 1.0).max())
     assert errors[0] < 1e-3 < errors[1]
@@ -220,7 +220,7 @@ def test_continuous_law_in_seconds_adapts_over_seconds() -> None:
 
 def test_covariance_resetting() -> None:
     u, x = record(1.0)
-    estimator = pz.HysteresisRLS(FS, policies=(pz.policies.CovarianceResetting(1e-4),))
+    estimator = pz.HysteresisRLS(FS, memory=0.4, policies=(pz.policies.CovarianceResetting(1e-4),))
     estimator.run(u, x)
     assert estimator.status.resets > 0
     resets = estimator.status.resets
@@ -232,10 +232,10 @@ def test_covariance_resetting() -> None:
 def test_gain_of_the_last_sample() -> None:
     u, x = record(0.01, 1e-3)
     estimator = pz.HysteresisRLS(FS)
-    assert estimator.K.shape == (3,)
+    assert estimator.K.shape == (4,)
     estimator.run(u, x)
     assert np.all(np.isfinite(estimator.K))
-    assert estimator.standard_errors.shape == (3,)
+    assert estimator.standard_errors.shape == (4,)
 
 
 def test_wrong_arguments() -> None:

@@ -1,0 +1,204 @@
+"""The compiled inside of `HysteresisRLS`: from raw (u, x) to a regression, and into the law."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST
+from piezoest.equations import coleman_hodgdon as equations
+from piezoest.equations import filters, least_squares
+from piezoest.estimators import recursive_least_squares as law
+from piezoest.estimators import swing
+from piezoest.estimators.delay_line import delayed
+
+# State: what is known of the last good sample, and of the voltage's way since.
+PRIMED, U_LAST, X_LAST, TRAVEL, MOMENT, RISE, GAP, SAMPLES, MISSED, OUTLIERS = range(10)
+U_CENTRE, X_CENTRE, USUAL_STEP, FROZEN, SEEN = 10, 11, 12, 13, 14
+LOW, HIGH, PHI = 15, 20, 25  # five filters each: four regressors and the output
+SWING = 30
+EXCITATION = SWING + swing.STATE  # mean of phi phi' over half a period
+ERROR, GAIN = EXCITATION + 16, EXCITATION + 32  # covariance of the estimate's error, filtered gain
+FRONT = EXCITATION + 36  # the law's state begins here, the delay line follows it
+
+# Configuration of the front end; the law's follows.
+N, HYSTERETIC, LOW_POLE, HIGH_POLE, HIGH_PASS, FRACTION, OFFSET, LONGEST_GAP, NOISE_RATIO = range(9)
+OUTLIER, FIRST_HALF, WALK, WALK_MEMORY, WARM_UP = 9, 10, 11, 12, 13
+SCALE = 14  # four scales of the parameters, one of the output
+CONFIG = 19
+
+# A change of x is believed up to so many usual steps, plus what so many times the slope explains.
+BELIEVED_STEPS, BELIEVED_SLOPES = 20.0, 3.0
+
+
+@register_jitable
+def _filtered(state: Any, config: Any, i: int, value: Any) -> Any:
+    """Low-pass (W_p of App. A), then the optional high-pass."""
+    state[LOW + i] = filters.low_pass_step(state[LOW + i], value, config[LOW_POLE])
+    value = state[LOW + i]
+    if config[HIGH_PASS] != 0.0:
+        state[HIGH + i], value = filters.high_pass_step(state[HIGH + i], value, config[HIGH_POLE])
+    return value
+
+
+@register_jitable
+def _prime(state: Any, config: Any, u: Any, x: Any) -> None:
+    """Start from (u, x) as the last good sample; what is usual is learnt anew."""
+    state[SEEN] = 0.0
+    if state[PRIMED] == 0.0 and config[OFFSET] != 0.0:
+        state[U_CENTRE] = u
+        state[X_CENTRE] = x
+    state[PRIMED] = 1.0
+    state[U_LAST] = u - state[U_CENTRE]
+    state[X_LAST] = x - state[X_CENTRE]
+    state[TRAVEL] = state[MOMENT] = state[RISE] = state[GAP] = 0.0
+
+
+@register_jitable
+def _believable(state: Any, config: Any, x: Any) -> Any:
+    """Whether the change of x since the last good sample is one that the stage can make."""
+    if config[OUTLIER] == 0.0:
+        return True
+    dx = abs(x - state[X_CENTRE] - state[X_LAST])
+    slope = abs(state[FRONT + law.HEAD + 1]) * config[SCALE + 1] / config[SCALE + 4]
+    limit = BELIEVED_STEPS * state[USUAL_STEP] + BELIEVED_SLOPES * slope * state[TRAVEL]
+    if dx > limit and state[SEEN] >= config[WARM_UP]:
+        return False
+    state[SEEN] += 1.0
+    state[USUAL_STEP] += (dx - state[USUAL_STEP]) / min(state[SEEN], config[WARM_UP])
+    return True
+
+
+@register_jitable
+def _regression(state: Any, config: Any, x: Any, phi: Any, n: int) -> Any:
+    """Regressor into `phi` and output, from the last good sample to this one; starts the next."""
+    if config[HYSTERETIC] != 0.0:
+        z = x - state[X_LAST]
+        phi[0] = -0.5 * (x + state[X_LAST]) * state[TRAVEL]
+        phi[1] = state[RISE]
+        phi[2] = state[MOMENT]
+        if n == 4:
+            phi[3] = state[TRAVEL]
+    else:
+        z = x
+        phi[0] = state[U_LAST]
+        if n == 2:
+            phi[1] = 1.0
+    state[X_LAST] = x
+    state[TRAVEL] = state[MOMENT] = state[RISE] = state[GAP] = 0.0
+    for i in range(n):
+        phi[i] = _filtered(state, config, i, phi[i] * config[SCALE + i])
+    return _filtered(state, config, 4, z * config[SCALE + 4])
+
+
+@register_jitable
+def _walk(state: Any, config: Any, phi: Any, n: int) -> Any:
+    """Noise variance and growth of P that give random-walk forgetting its memory.
+
+    With P growing by q a sample, the best excited direction forgets within
+    sqrt(R / (q phi²)) samples: R follows from the memory wanted and the mean of phi².
+    """
+    half = swing.half_period(state[SWING : SWING + swing.STATE], config[FIRST_HALF])
+    share = 1.0 / min(state[FRONT + law.UPDATES] + 1.0, half)
+    power = 0.0
+    for i in range(n):
+        for j in range(n):
+            k = EXCITATION + i * n + j
+            state[k] += share * (phi[i] * phi[j] - state[k])
+        power += state[EXCITATION + i * n + i]
+    memory = 2.0 * half * config[WALK_MEMORY]
+    return 1.0 + memory * memory * config[WALK] * power
+
+
+@register_jitable
+def _propagate_error(state: Any, config: Any, phi: Any, n: int, restart: bool) -> None:
+    """Covariance of the estimate's error under the sensor's noise, coloured by W_p and difference."""
+    C = state[ERROR : ERROR + n * n]
+    start = FRONT + law.HEAD + n + n * n
+    gain = state[start + n * n : start + n * n + n]  # the law's work space: P phi
+    if restart:
+        for i in range(n * n):
+            C[i] = state[start + i]
+    scale = 1.0 / (config[CONFIG + law.FORGETTING] * state[FRONT + law.INNOVATION_VARIANCE])
+    for i in range(n):
+        gain[i] *= scale
+    least_squares.propagate_error(
+        C, phi, gain, state[GAIN : GAIN + n], n, config[LOW_POLE], config[NOISE_RATIO], config[HYSTERETIC]
+    )
+
+
+@register_jitable
+def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
+    """One raw sample: a regression for the law, or a note of why there is none."""
+    n = int(config[N])
+    law_state = state[FRONT:]
+    if np.abs(u) < WILDEST:
+        u = delayed(state[FRONT + law.state_size(n) :], config[FRACTION], u)
+    state[SAMPLES] += 1.0
+    known = np.abs(u) < WILDEST
+    measured = known and np.abs(x) < WILDEST
+    if not measured:
+        state[MISSED] += 1.0
+        law_state[law.LAST] = law.MISSING
+    if state[PRIMED] == 0.0 or state[GAP] > config[LONGEST_GAP]:
+        if measured:
+            _prime(state, config, u, x)
+            law_state[law.LAST] = law.WAITING
+        return
+    if known:
+        # A short gap is bridged: the voltage's integrals go on, the displacement's mean
+        # is taken between the good samples on its two sides.
+        u -= state[U_CENTRE]
+        rise, moment, travel = equations.sample_regressor(state[U_LAST], u)
+        state[RISE] += rise
+        state[MOMENT] += moment
+        state[TRAVEL] += travel
+        state[U_LAST] = u
+        if rise != 0.0:
+            swing.follow(state[SWING : SWING + swing.STATE], u)
+    if measured and not _believable(state, config, x):
+        state[OUTLIERS] += 1.0
+        law_state[law.LAST] = law.REJECTED
+        measured = False
+    if not measured:
+        state[GAP] += 1.0
+        return
+    phi = state[PHI : PHI + n]
+    z = _regression(state, config, x - state[X_CENTRE], phi, n)
+    if state[FROZEN] != 0.0:
+        law_state[law.LAST] = law.HOLDING
+        return
+    R = _walk(state, config, phi, n)
+    resets, updates = law_state[law.RESETS], law_state[law.UPDATES]
+    law.adapt(law_state, config[CONFIG:], phi, z, n, R, config[WALK])
+    if law_state[law.LAST] == law.UPDATED and config[CONFIG + law.CONTINUOUS] == 0.0:
+        _propagate_error(state, config, phi, n, updates == 0.0 or law_state[law.RESETS] != resets)
+
+
+@njit("void(f8[::1], f8[::1], f8, f8)", cache=True)
+def step(state: Any, config: Any, u: float, x: float) -> None:
+    """Take one sample."""
+    _sample(state, config, u, x)
+
+
+@njit("void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])", cache=True)
+def run(state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, y: Any, S: Any, P: Any) -> None:
+    """Take whole records; every `every`-th sample into the histories that have room."""
+    n = int(config[N])
+    head = FRONT + law.HEAD
+    for k in range(u.size):
+        _sample(state, config, u[k], x[k])
+        if (k + 1) % every == 0:
+            row = k // every
+            for i in range(n):
+                theta[row, i] = state[head + i]
+            if y.size > 0:
+                y[row] = state[FRONT + law.INNOVATION]
+            if S.size > 0:
+                S[row] = state[FRONT + law.INNOVATION_VARIANCE]
+            if P.size > 0:
+                for i in range(n * n):
+                    P[row, i] = state[head + n + i]

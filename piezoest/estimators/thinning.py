@@ -1,0 +1,64 @@
+"""Fewer points for a record, without losing the voltage's path or the displacement's information."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+
+# A voltage that turns more often than in one of so many points is taken at full rate.
+POINTS_PER_TURN = 3
+
+
+def thinned(
+    u: FloatArray, x: FloatArray, first: int, decimation: int, also: int
+) -> tuple[Any, FloatArray, FloatArray, FloatArray]:
+    """Points of a record that stand for all of it.
+
+    Parameters
+    ----------
+    u, x : ndarray, shape (N,)
+        Voltage without gaps, displacement with NaN where it is missing.
+    first : int
+        Number of the first sample in the stream: the points stay where they are as it slides.
+    decimation : int
+        Samples per point.
+    also : int
+        One more sample that has to be a point.
+
+    Returns
+    -------
+    points : ndarray of int, shape (M,)
+        Samples that are points: the middle of each block, turning points, first and last.
+    shift : ndarray, shape (M,)
+        Mean voltage of the samples averaged less that of the point.
+    x : ndarray, shape (M,)
+        Mean displacement of the samples averaged.
+    root_weight : ndarray, shape (M,)
+        Square root of the number of samples averaged; 0 where there is no measurement.
+    """
+    N, half = u.size, (decimation - 1) // 2
+    direction = np.sign(np.diff(u))
+    moving = np.flatnonzero(direction)
+    turns = moving[1:][direction[moving[1:]] != direction[moving[:-1]]]
+    if turns.size * POINTS_PER_TURN * decimation > N:
+        decimation, half = 1, 0
+    middles = np.arange((half - first) % decimation, N, decimation)
+    points = np.unique(np.concatenate([middles, turns, [0, min(also, N - 1), N - 1]]))
+    weight = np.isin(points, middles) * 1.0
+    shift, mean_x = np.zeros(points.size), x[points].copy()
+    if half > 0:
+        turned = np.zeros(N + 1)
+        turned[turns + 1] = 1.0
+        sums = [np.concatenate([[0.0], np.cumsum(part)]) for part in (turned[1:], np.isnan(x))]
+        whole = (points >= half) & (points + half < N) & (weight > 0.0)
+        low, high = points - half, points + half + 1
+        for part in sums:
+            whole[whole] = part[high[whole]] == part[low[whole]]
+        block = points[whole][:, None] + np.arange(-half, half + 1)
+        shift[whole] = u[block].mean(axis=1) - u[points[whole]]
+        mean_x[whole] = x[block].mean(axis=1)
+        weight[whole] = np.sqrt(2.0 * half + 1.0)
+    return points, shift, mean_x, np.where(np.isfinite(mean_x), weight, 0.0)

@@ -1,0 +1,385 @@
+"""The CasADi face of the equations: derivatives, whole-record simulation, and the solver IPOPT.
+
+The only module that imports CasADi. The functions of `piezoest.equations` are called with SX
+symbols, so nothing is written a second time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import casadi
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.equations import coleman_hodgdon as hysteresis
+from piezoest.equations.creep import creep_step
+
+# NumPy's functions on SX then give SX, which is what the equations rely on.
+casadi.GlobalOptions.setNumpyMode(1)
+
+# Samples traced into one straight-line function, and copies of it chained by mapaccum: CasADi's
+# cost of a call, as large as that of ten samples, is then paid once in so many.
+UNROLLED, CHAINED = 50, 20
+
+
+def trace(function: Callable[..., Any], *sizes: int, name: str = "traced") -> Any:
+    """CasADi Function of an equation.
+
+    Parameters
+    ----------
+    function : callable
+        Of numbers and flat arrays, returning numbers, arrays or a tuple of these.
+    *sizes : int
+        Length of each argument; 0 for a number.
+    name : str
+        Name of the Function.
+
+    Returns
+    -------
+    casadi.Function
+        Of the same arguments; one output, the results in one column.
+    """
+    arguments = [casadi.SX.sym(f"v{i}", max(size, 1)) for i, size in enumerate(sizes)]
+    # An equation may write into its arrays: it is given copies.
+    results = function(*(casadi.SX(argument) for argument in arguments))
+    results = results if isinstance(results, tuple) else (results,)
+    return casadi.Function(name, arguments, [casadi.vertcat(*results)], {"cse": True})
+
+
+def jacobian(function: Callable[..., Any], *sizes: int) -> Callable[..., FloatArray]:
+    """Exact derivative of an equation with respect to all of its arguments.
+
+    Parameters
+    ----------
+    function : callable
+        Of numbers and flat arrays, returning numbers, arrays or a tuple of these.
+    *sizes : int
+        Length of each argument; 0 for a number.
+
+    Returns
+    -------
+    callable
+        Of the same arguments; gives an ndarray of shape (results, arguments).
+    """
+    traced = trace(function, *sizes)
+    symbols = [casadi.SX.sym(f"v{i}", max(size, 1)) for i, size in enumerate(sizes)]
+    derivative = casadi.jacobian(traced(*symbols), casadi.vertcat(*symbols))
+    compiled = casadi.Function("derivative", symbols, [derivative], {"cse": True})
+    return lambda *values: compiled(*values).full()
+
+
+class Pass(NamedTuple):
+    """One simulation of a record, with its derivatives by (parameters, start state).
+
+    x (N,) [µm]; jacobian (N, n_p + n_s); end (n_s,), the state after the last sample;
+    end_jacobian (n_s, n_p + n_s). Without sensitivities the Jacobians have no columns.
+    """
+
+    x: FloatArray
+    jacobian: FloatArray
+    end: FloatArray
+    end_jacobian: FloatArray
+
+
+class Simulation:
+    """Output of a stage and its sensitivities, in one pass over a record.
+
+    x = c u + w_h + creep + offset, where creep is driven by c u + w_h. Parameters
+    p = (a, b, c, offset, gains...), state s = (w_h, z...). With a = b = w_h = 0 it is the linear
+    gain c. The forward sensitivities ds/dp and ds/ds(0) are carried along as further states.
+
+    Parameters
+    ----------
+    creep_terms : int
+        Number of creep terms.
+    """
+
+    __slots__ = ("_carried", "_plain", "_sensitive", "n_p", "n_s")
+
+    def __init__(self, creep_terms: int = 0) -> None:
+        self.n_p, self.n_s = 4 + creep_terms, 1 + creep_terms
+        self._plain = _lengthened(self._step(sensitive=False))
+        self._sensitive = _lengthened(self._step(sensitive=True))
+
+    def _equations(self, s: Any, u: Any, p: Any, decays: Any) -> tuple[Any, Any]:
+        """State and output after the voltage has gone from u[0] to u[1]."""
+        w_h = hysteresis.hysteresis_step(s[0], u[1] - u[0], p[0], p[1])
+        w = p[2] * u[1] + w_h
+        if self.n_s == 1:
+            return w_h, w + p[3]
+        z = casadi.SX(s[1:])
+        x = w + creep_step(z, w, p[4:], decays) + p[3]
+        return casadi.vertcat(w_h, z), x
+
+    def _step(self, sensitive: bool) -> Any:
+        """One sample as a Function (state, voltages, constants) -> (state, outputs)."""
+        n_p, n_s = self.n_p, self.n_s
+        s, u = casadi.SX.sym("s", n_s), casadi.SX.sym("u", 2)
+        p, decays = casadi.SX.sym("p", n_p), casadi.SX.sym("d", n_s - 1)
+        constants = casadi.vertcat(p, decays)
+        s_next, x = self._equations(s, u, p, decays)
+        if not sensitive:
+            return casadi.Function("step", [s, u, constants], [s_next, x], {"cse": True})
+        by_p = casadi.jacobian(s_next, p)
+        # Parameters that never reach the state (the offset; c without creep) carry no sensitivity.
+        pattern = np.array(by_p.sparsity().get_col())
+        reaching = np.unique(pattern) if pattern.size else np.empty(0, dtype=int)
+        self._carried = np.concatenate([reaching, n_p + np.arange(n_s)]).astype(int)
+        width = self._carried.size
+        S = casadi.SX.sym("S", n_s, width)
+        direct = casadi.horzcat(by_p[:, reaching.tolist()], casadi.SX.zeros(n_s, n_s))
+        by_s = casadi.jacobian(s_next, s)
+        S_next = casadi.densify(casadi.mtimes(by_s, S) + direct)
+        row = casadi.densify(casadi.horzcat(casadi.jacobian(x, p), casadi.SX.zeros(1, n_s)))
+        row[:, self._carried.tolist()] += casadi.mtimes(casadi.jacobian(x, s), S)
+        state = casadi.vertcat(s, casadi.vec(S))
+        following = casadi.vertcat(s_next, casadi.vec(S_next))
+        return casadi.Function(
+            "step", [state, u, constants], [following, casadi.vertcat(x, row.T)], {"cse": True}
+        )
+
+    def run(
+        self,
+        u: FloatArray,
+        p: FloatArray,
+        s: FloatArray,
+        decays: FloatArray,
+        *,
+        before: float | None = None,
+        sensitive: bool = True,
+    ) -> Pass:
+        """Simulate a record.
+
+        Parameters
+        ----------
+        u : ndarray, shape (N,)
+            Voltage [V].
+        p : ndarray, shape (n_p,)
+            (a, b, c, offset, gains...).
+        s : ndarray, shape (n_s,)
+            State (w_h, z...) [µm] before the first sample.
+        decays : ndarray, shape (creep terms,)
+            exp(-dt/tau_i).
+        before : float, optional
+            Voltage before the first sample [V]; default u[0].
+        sensitive : bool
+            Whether to carry the sensitivities along.
+        """
+        N, n_p, n_s = u.size, self.n_p, self.n_s
+        voltages = np.empty((N, 2))
+        voltages[:, 1] = u
+        voltages[1:, 0] = u[:-1]
+        voltages[:1, 0] = u[:1] if before is None else before
+        state = np.array(s, dtype=np.float64)
+        if sensitive:
+            start = np.zeros((self._carried.size, n_s))
+            start[-n_s:] = np.eye(n_s)
+            state = np.concatenate([state, start.ravel()])
+        functions = self._sensitive if sensitive else self._plain
+        outputs = np.empty((N, 1 + n_p + n_s if sensitive else 1))
+        _drive(functions, state, voltages, np.concatenate([p, decays]), outputs)
+        if not sensitive:
+            return Pass(outputs[:, 0], outputs[:, 1:], state, np.empty((n_s, 0)))
+        end_jacobian = np.zeros((n_s, n_p + n_s))
+        end_jacobian[:, self._carried] = state[n_s:].reshape(-1, n_s).T
+        return Pass(outputs[:, 0], outputs[:, 1:], state[:n_s], end_jacobian)
+
+
+def _lengthened(step: Any) -> list[tuple[int, Any]]:
+    """The step for 1000, 50 and 1 samples, longest first."""
+    n, m = step.size1_in(0), step.size1_in(2)
+    state, u = casadi.SX.sym("s", n), casadi.SX.sym("u", 2, UNROLLED)
+    constants = casadi.SX.sym("c", m)
+    now, rows = state, []
+    for k in range(UNROLLED):
+        now, row = step(now, u[:, k], constants)
+        rows.append(row)
+    several = casadi.Function("several", [state, u, constants], [now, casadi.horzcat(*rows)], {"cse": True})
+    many = several.mapaccum("many", CHAINED)
+    s, c = casadi.MX.sym("s", n), casadi.MX.sym("c", m)
+    U = casadi.MX.sym("u", 2, UNROLLED * CHAINED)
+    states, outputs = many(s, U, casadi.repmat(c, 1, CHAINED))
+    block = casadi.Function("block", [s, U, c], [states[:, -1], outputs])
+    return [(UNROLLED * CHAINED, block), (UNROLLED, several), (1, step)]
+
+
+def _drive(
+    functions: list[tuple[int, Any]],
+    state: FloatArray,
+    voltages: FloatArray,
+    constants: FloatArray,
+    outputs: FloatArray,
+) -> None:
+    """Run through a record, `state` updated in place, by buffers: no CasADi matrix is made."""
+    done, after = 0, np.empty_like(state)
+    for length, function in functions:
+        if voltages.shape[0] - done < length:
+            continue
+        buffer, evaluate = function.buffer()
+        buffer.set_arg(0, state.data)
+        buffer.set_arg(2, constants.data)
+        buffer.set_res(0, after.data)
+        while voltages.shape[0] - done >= length:
+            buffer.set_arg(1, voltages[done : done + length].data)
+            buffer.set_res(1, outputs[done : done + length].data)
+            evaluate()
+            state[:] = after
+            done += length
+
+
+@lru_cache(maxsize=8)
+def simulation(creep_terms: int = 0) -> Simulation:
+    """Simulation with so many creep terms; made once.
+
+    Parameters
+    ----------
+    creep_terms : int
+        Number of creep terms.
+    """
+    return Simulation(creep_terms)
+
+
+class Evaluation(NamedTuple):
+    """A nonlinear programme at one point.
+
+    objective; gradient (n,); constraints (m,); constraint_jacobian (m, n); hessian (n, n), of the
+    objective or what stands for it.
+    """
+
+    objective: float
+    gradient: FloatArray
+    constraints: FloatArray
+    constraint_jacobian: FloatArray
+    hessian: FloatArray
+
+
+class Minimum(NamedTuple):
+    """Where IPOPT ended, and its own words."""
+
+    z: FloatArray
+    success: bool
+    message: str
+    iterations: int
+
+
+def ipopt(
+    evaluate: Callable[[FloatArray], Evaluation],
+    start: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    constraints: int,
+    max_iterations: int,
+    tolerance: float,
+) -> Minimum:
+    """Minimise subject to bounds and constraints = 0, by IPOPT.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Gives an `Evaluation` at z (n,); called once a point.
+    start, lower, upper : ndarray, shape (n,)
+        Start and bounds.
+    constraints : int
+        Number of equality constraints.
+    max_iterations : int
+        IPOPT's ``max_iter``.
+    tolerance : float
+        IPOPT's ``tol``.
+    """
+    point = _Point(evaluate)
+    n, m = start.size, constraints
+    values = _Part("values", [n], [(1, 1), (m, 1)], lambda e: (e.objective, e.constraints), point)
+    parts = {
+        "grad_f": _Part("grad_f", [n, 0], [(1, 1), (n, 1)], lambda e: (e.objective, e.gradient), point),
+        "jac_g": _Part(
+            "jac_g", [n, 0], [(m, 1), (m, n)], lambda e: (e.constraints, e.constraint_jacobian), point
+        ),
+        "hess_lag": _Hessian("hess_lag", [n, 0, 1, m], [(n, n)], lambda e: (np.triu(e.hessian),), point),
+    }
+    z = casadi.MX.sym("z", n)
+    objective, g = values(z)
+    problem: Any = {"x": z, "f": objective, "g": g}
+    options: Any = {
+        **parts,
+        "print_time": False,
+        "no_nlp_grad": True,
+        "ipopt": {
+            "print_level": 0,
+            "sb": "yes",
+            "max_iter": max_iterations,
+            "tol": tolerance,
+            # Admissible means admissible: the bounds are not relaxed.
+            "bound_relax_factor": 0.0,
+        },
+    }
+    solver = casadi.nlpsol("solver", "ipopt", problem, options)
+    solution = solver(x0=start, lbx=lower, ubx=upper, lbg=0.0, ubg=0.0)
+    stats = solver.stats()
+    return Minimum(
+        solution["x"].full()[:, 0],
+        bool(stats["success"]),
+        f"IPOPT: {stats['return_status']}",
+        int(stats["iter_count"]),
+    )
+
+
+class _Point:
+    """Last point evaluated: IPOPT asks for value, gradient, Jacobian and Hessian one by one."""
+
+    __slots__ = ("_evaluate", "_value", "_z")
+
+    def __init__(self, evaluate: Callable[[FloatArray], Evaluation]) -> None:
+        self._evaluate = evaluate
+        self._z: bytes | None = None
+        self._value: Evaluation
+
+    def __call__(self, z: FloatArray) -> Evaluation:
+        if z.tobytes() != self._z:
+            self._value, self._z = self._evaluate(z), z.tobytes()
+        return self._value
+
+
+class _Part(casadi.Callback):
+    """Some parts of an `Evaluation` as a CasADi Function of z."""
+
+    def __init__(
+        self,
+        name: str,
+        inputs: list[int],
+        outputs: list[tuple[int, int]],
+        choose: Callable[[Evaluation], tuple[Any, ...]],
+        point: _Point,
+    ) -> None:
+        super().__init__()
+        self._inputs, self._outputs, self._choose, self._point = inputs, outputs, choose, point
+        self.construct(name, {})
+
+    def get_n_in(self) -> int:
+        return len(self._inputs)
+
+    def get_n_out(self) -> int:
+        return len(self._outputs)
+
+    def get_sparsity_in(self, i: int) -> Any:
+        return casadi.Sparsity.dense(self._inputs[i], 1)
+
+    def get_sparsity_out(self, i: int) -> Any:
+        return casadi.Sparsity.dense(*self._outputs[i])
+
+    def eval(self, arguments: Any) -> list[Any]:
+        chosen = self._choose(self._point(arguments[0].full()[:, 0]))
+        return [casadi.DM(value) for value in chosen]
+
+
+class _Hessian(_Part):
+    """Upper triangle of the objective's Hessian, times its multiplier."""
+
+    def get_sparsity_out(self, i: int) -> Any:
+        return casadi.Sparsity.upper(self._outputs[i][0])
+
+    def eval(self, arguments: Any) -> list[Any]:
+        (hessian,) = super().eval(arguments)
+        return [casadi.project(hessian * float(arguments[2]), self.get_sparsity_out(0))]

@@ -1,0 +1,235 @@
+"""MovingHorizon: one solve a hop, parity, tracking, arrival cost, thinning, bad solves."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest.estimators import horizon, shooting
+from piezoest.estimators.batch import BatchFit
+from piezoest.estimators.horizon import MovingHorizon
+from piezoest.estimators.thinning import thinned
+
+TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
+RATE = 2000.0
+NOISE = 1e-3
+
+
+def record(seconds: float = 1.0, noise: float = NOISE, seed: int = 0, model: Any = TRUE) -> tuple[Any, Any]:
+    u = pz.signals.triangle(33.0, 5.0, 5.0 * seconds, RATE).values
+    return u, model.simulate(u) + noise * np.random.default_rng(seed).standard_normal(u.size)
+
+
+def test_finds_the_parameters_within_its_standard_errors() -> None:
+    worst = []
+    for seed in range(5):
+        u, x = record(seed=seed)
+        estimator = MovingHorizon(RATE, noise=NOISE)
+        estimator.run(u, x)
+        worst.append(np.abs(estimator.theta - TRUE.theta) / estimator.standard_errors)
+        np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=0.01)
+    assert np.max(worst) < 3.0
+
+
+def test_solves_once_a_hop_and_holds_between(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[int] = []
+    solve = shooting.single_shooting
+
+    def counted(*arguments: Any) -> Any:
+        calls.append(estimator.status.samples)
+        return solve(*arguments)
+
+    monkeypatch.setattr(horizon, "single_shooting", counted)
+    u, x = record(0.5)
+    estimator = MovingHorizon(RATE, hop=0.05)
+    assert (estimator.solves, estimator.solver_message) == (0, "")
+    changes, last = [], estimator.theta
+    for k in range(u.size):
+        before = len(calls)
+        estimator.step(u[k], x[k])
+        solved = len(calls) - before
+        assert solved == ((k + 1) % 100 == 0)
+        assert estimator.status.last == ("updated" if solved else "held")
+        if not np.array_equal(estimator.theta, last):
+            changes.append(k + 1)
+            last = estimator.theta
+    assert calls == changes == list(range(100, u.size + 1, 100))
+    assert estimator.solves == estimator.status.updates == 10
+    assert estimator.status.held == u.size - 10
+    assert estimator.failures == 0
+    assert estimator.last_solve_seconds > 0.0
+    assert "satisfied" in estimator.solver_message
+
+
+@pytest.mark.parametrize("offset", [False, True])
+def test_step_run_and_split_run_are_the_same_bits(offset: bool) -> None:
+    u, x = record(0.8)
+    x[[333, 800]] = np.nan
+    u[500] = np.nan
+    whole, steps, halves = (MovingHorizon(RATE, window=0.3, offset=offset) for _ in range(3))
+    trace = whole.run(u, x, record=("y", "S", "P"))
+    for k in range(u.size):
+        steps.step(float(u[k]), float(x[k]))
+    halves.run(u[:711], x[:711])
+    resumed = MovingHorizon.from_dict(json.loads(json.dumps(halves.to_dict(), allow_nan=False)))
+    later = pickle.loads(pickle.dumps(resumed)).run(u[711:], x[711:], every=3, record=("y",))
+    np.testing.assert_array_equal(later.theta, trace.theta[713::3])
+    resumed.run(u[711:], x[711:])
+    for other in (steps, resumed, whole.copy()):
+        np.testing.assert_array_equal(other.theta, whole.theta)
+        np.testing.assert_array_equal(other.P, whole.P)
+        np.testing.assert_array_equal(other.K, whole.K)
+        assert (other.y, other.S, other.status) == (whole.y, whole.S, whole.status)
+    assert trace.y is not None
+    assert trace.P is not None
+    assert trace.y[-1] == whole.y
+    np.testing.assert_array_equal(trace.P[-1], whole.P)
+    whole.reset()
+    np.testing.assert_array_equal(whole.run(u, x).theta, trace.theta)
+
+
+def test_tracks_a_step_of_the_gain() -> None:
+    u, before = record(2.0)
+    later = pz.ColemanHodgdon(0.021, 0.147 * 1.2, 0.00429 * 1.2)
+    x = np.where(np.arange(u.size) < 2000, before, record(2.0, model=later)[1])
+    estimator = MovingHorizon(RATE)
+    theta = estimator.run(u, x).theta
+    np.testing.assert_allclose(theta[1999], TRUE.theta, rtol=0.01)
+    # A window and a hop after the step, nothing of the old plant is left in the window.
+    np.testing.assert_allclose(theta[2000 + 1000 + 200 :], np.tile(later.theta, (800, 1)), rtol=0.02)
+    assert np.abs(theta[2000 + 100, :] / later.theta - 1.0).max() > 0.05
+    assert estimator.failures == 0
+
+
+def test_arrival_cost_keeps_what_has_left_the_window() -> None:
+    """Without process noise the window and its arrival cost are the whole record."""
+    u, x = record(2.0)
+    options: dict[str, Any] = {
+        "window": 0.2,
+        "hop": 0.05,
+        "decimation": 1,
+        "noise": NOISE,
+        "uncertainty": 50.0,
+    }
+    keeping = MovingHorizon(RATE, process_noise=0.0, **options)
+    forgetting = MovingHorizon(RATE, process_noise=10.0, **options)
+    keeping.run(u, x)
+    forgetting.run(u, x)
+    whole = BatchFit(RATE, noise=NOISE).fit(u, x)
+    assert np.all(keeping.standard_errors < 1.6 * whole.standard_errors[:3])
+    assert np.all(forgetting.standard_errors > 2.5 * whole.standard_errors[:3])
+    assert np.all(np.abs(keeping.theta - whole.theta[:3]) < 1.5 * whole.standard_errors[:3])
+
+
+def test_offset_and_linear_gain() -> None:
+    u, x = record()
+    estimator = MovingHorizon(RATE, offset=True)
+    estimator.run(u + 60.0, x - 120.0)
+    assert estimator.parameter_names == ("alpha", "beta", "gamma", "offset")
+    np.testing.assert_allclose(estimator.theta[:3], TRUE.theta, rtol=0.02)
+    assert estimator.model.offset == pytest.approx(-120.0 - 60.0 * TRUE.c, abs=0.05)
+    u, x = record(model=pz.LinearGain(0.155, 3.0))
+    estimator = MovingHorizon(RATE, offset=True, initial_model=pz.LinearGain(0.1))
+    estimator.run(u, x)
+    np.testing.assert_allclose(estimator.theta, [0.155, 3.0], rtol=1e-4)
+
+
+def test_a_bad_solve_keeps_the_last_good_model() -> None:
+    u, x = record()
+    estimator = MovingHorizon(RATE, max_iterations=1)
+    trace = estimator.run(u, x)
+    assert estimator.solves == estimator.failures == 10
+    assert estimator.solver_message == "The maximum number of function evaluations is exceeded."
+    assert estimator.status.updates == 0
+    assert np.all(trace.theta == [0.02, 0.12, 0.0036])
+    assert np.all(np.isfinite(estimator.P))
+
+
+def test_dwell_keeps_the_model() -> None:
+    u, x = record()
+    estimator = MovingHorizon(RATE)
+    estimator.run(u, x)
+    before = estimator.theta
+    noise = NOISE * np.random.default_rng(1).standard_normal(10_000)
+    estimator.run(np.full(10_000, u[-1]), TRUE.simulate(u)[-1] + noise)
+    np.testing.assert_allclose(estimator.theta, before, rtol=0.02)
+    assert estimator.model.is_admissible
+    estimator.run(u, x)
+    np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=0.01)
+
+
+def test_missing_samples_and_nothing_at_all() -> None:
+    u, x = record()
+    x[np.random.default_rng(1).random(x.size) < 0.3] = np.nan
+    estimator = MovingHorizon(RATE)
+    estimator.run(u, x)
+    np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=0.01)
+    for given in ((np.full(900, np.nan), x[:900]), (u[:900], np.full(900, np.nan))):
+        nothing = MovingHorizon(RATE)
+        nothing.run(*given)
+        np.testing.assert_allclose(nothing.theta, [0.02, 0.12, 0.0036], rtol=1e-9)
+        assert nothing.status.missing == 900
+        assert nothing.status.last == "missing"
+
+
+# ---------------------------------------------------------------- thinning
+
+
+@pytest.mark.parametrize("first", [0, 7, 1234])
+def test_thinning_loses_neither_path_nor_displacement(first: int) -> None:
+    """Without noise each mean is the model's output at its point, path and turning points kept."""
+    turns = 2.0 * np.pi * np.arange(30_000) / 50_000.0
+    model, u = TRUE, 25.0 * np.sin(5.0 * turns) + 8.0 * np.sin(15.0 * turns)
+    x = model.simulate(u)
+    x[4321] = np.nan
+    points, shift, mean, root_weight = thinned(u, x, first, 9, 333)
+    assert points.size < u.size / 8
+    assert {0, 333, u.size - 1} <= set(points.tolist())
+    np.testing.assert_allclose(
+        model.simulate(u[points], allow_jumps=True), model.simulate(u)[points], atol=1e-12
+    )
+    counted = root_weight > 0.0
+    error = mean - model.c * shift - model.simulate(u)[points]
+    assert np.abs(error[counted]).max() < 1e-5
+    assert np.sum(root_weight**2) > 0.97 * u.size
+
+
+def test_thinning_slides_with_the_stream() -> None:
+    u, x = record()
+    one = thinned(u[:1000], x[:1000], 0, 7, 0)
+    other = thinned(u[100:1100], x[100:1100], 100, 7, 0)
+    shared = np.intersect1d(one[0][one[3] > 0.0], other[0][other[3] > 0.0] + 100)
+    assert shared.size > 120
+
+
+def test_a_voltage_that_turns_all_the_time_is_taken_at_full_rate() -> None:
+    u = np.random.default_rng(0).standard_normal(500)
+    points, shift, _, root_weight = thinned(u, u, 0, 10, 0)
+    np.testing.assert_array_equal(points, np.arange(500))
+    assert np.all(root_weight == 1.0)
+    assert not shift.any()
+
+
+def test_decimation_costs_no_accuracy() -> None:
+    u, x = record(1.0)
+    full = MovingHorizon(RATE, decimation=1, noise=NOISE)
+    few = MovingHorizon(RATE, decimation=5, noise=NOISE)
+    full.run(u, x)
+    few.run(u, x)
+    np.testing.assert_allclose(few.standard_errors, full.standard_errors, rtol=0.15)
+
+
+def test_wrong_arguments() -> None:
+    with pytest.raises(ValueError, match="hop must be shorter than the window"):
+        MovingHorizon(RATE, window=0.1, hop=0.1)
+    with pytest.raises(ValueError, match="initial_model must be admissible"):
+        MovingHorizon(RATE, initial_model=pz.ColemanHodgdon(0.02, 0.12, 1.0))
+    with pytest.raises(ValueError, match="decimation"):
+        MovingHorizon(RATE, decimation=0)
+    with pytest.raises(ValueError, match="process_noise"):
+        MovingHorizon(RATE, process_noise=-1.0)
