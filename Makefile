@@ -10,7 +10,7 @@ export MPLBACKEND ?= Agg
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo test lint format types layers docs docs-live bench-smoke bench clean
+.PHONY: help venv demo test lint format types layers docs docs-live figures bench-smoke bench clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -70,6 +70,9 @@ docs: $(VENV)/.installed-docs  ## Build the documentation into docs/_build/html;
 
 docs-live: $(VENV)/.installed-docs-live  ## Serve the documentation and rebuild it on every change
 	$(BIN)/sphinx-autobuild --watch piezoest --ignore "docs/gallery/*" --ignore "docs/generated/*" docs docs/_build/live
+
+figures: $(VENV)/.installed  ## Run the paper's experiment: numbers and figures of docs/paper.rst
+	$(BIN)/piezoest bench paper --json docs/data/paper.json --figures docs/figures/paper
 
 # ---------------------------------------------------------------- benchmarks
 

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import re
+import sys
+from pathlib import Path
 from typing import Any
 
 import piezoest
+
+sys.path.insert(0, str(Path(__file__).parent))
+import paper_page
 
 project = "piezoest"
 author = "The piezoest developers"
@@ -45,7 +50,13 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
-html_sidebars: dict[str, list[str]] = {"start": [], "your_own_stage": [], "mathematics": [], "design": []}
+html_sidebars: dict[str, list[str]] = {
+    "start": [],
+    "your_own_stage": [],
+    "mathematics": [],
+    "paper": [],
+    "design": [],
+}
 
 sphinx_gallery_conf = {
     "examples_dirs": "examples",
@@ -86,5 +97,6 @@ def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, li
 
 
 def setup(app: Any) -> None:
+    app.connect("builder-inited", paper_page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
+from piezoest.bench.commands import app as bench
+
 if TYPE_CHECKING:
     from piezoest.demo import Demo
     from piezoest.identification import Identification
@@ -26,6 +28,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Exit codes: 0 done, 1 the input cannot be used, 2 wrong usage.",
 )
+
+app.add_typer(bench, name="bench")
 
 USER_ERROR, INTERRUPTED = 1, 130
 

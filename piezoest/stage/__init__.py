@@ -3,5 +3,6 @@
 from piezoest.stage.instruments import Amplifier, Gauge
 from piezoest.stage.paper import PaperStage
 from piezoest.stage.stage import SimulatedStage
+from piezoest.stage.temperature import TemperatureLaw
 
-__all__ = ["Amplifier", "Gauge", "PaperStage", "SimulatedStage"]
+__all__ = ["Amplifier", "Gauge", "PaperStage", "SimulatedStage", "TemperatureLaw"]

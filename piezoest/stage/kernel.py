@@ -18,7 +18,7 @@ from piezoest.equations.play import prandtl_ishlinskii_step
 from piezoest.stage.instruments import amplifier_step, gauge_step
 
 # The state vector, in this order:
-SAMPLE = 4  # voltage or displacement, noise, factor and reading of a single sample
+SAMPLE = 5  # voltage or displacement, noise, factor, shape and reading of a single sample
 AMPLIFIER = SAMPLE + 2
 AMPLIFIER_FILTER = AMPLIFIER + 2
 COLEMAN_HODGDON = AMPLIFIER_FILTER + 2  # last voltage, w_h
@@ -48,16 +48,22 @@ def _coleman_hodgdon_step(w_h: Any, du: Any, a: Any, b: Any) -> Any:
 
 @register_jitable
 def _deform(
-    x: Any, factor: Any, memory: Any, settings: Any, plays: Any, thresholds: Any, weights: Any
+    x: Any, factor: Any, shape: Any, memory: Any, settings: Any, plays: Any, thresholds: Any, weights: Any
 ) -> None:
-    """Voltage to displacement without offset: the models are cases of gain u + plays + w_h."""
+    """Voltage to displacement without offset: the models are cases of gain u + plays + w_h.
+
+    `factor` scales all of it, `shape` the plays and w_h alone; where they are 1 the result
+    is that of the models, to the bit.
+    """
     every = int(factor.size > 1)  # one value serves all samples
+    every_shape = int(shape.size > 1)
     for k in range(x.size):
         u = x[k]
         w = prandtl_ishlinskii_step(plays, u, settings[0], thresholds, weights)
         memory[1] = _coleman_hodgdon_step(memory[1], u - memory[0], settings[1], settings[2])
         memory[0] = u
-        x[k] = factor[k * every] * (w + memory[1])
+        w = w + memory[1]
+        x[k] = factor[k * every] * (w + (shape[k * every_shape] - 1.0) * (w - settings[0] * u))
 
 
 @register_jitable
@@ -90,12 +96,14 @@ def run(
     x: Any,
     noise: Any,
     factor: Any,
+    shape: Any,
     measured: Any,
 ) -> None:
     """Run a record through a stage of so many plays and creep terms.
 
     `x` (N,) comes as voltage and goes as true displacement; `state` and `measured` (N,) are
-    written; `noise` and `factor` are of shape (N,), or (1,) for the same value throughout.
+    written; `noise`, `factor` and `shape` are of shape (N,), or (1,) for the same value
+    throughout.
     """
     creep = GAUGE_FILTER + plays
     line = creep + terms
@@ -112,6 +120,7 @@ def run(
     _deform(
         x,
         factor,
+        shape,
         state[AMPLIFIER_FILTER:COLEMAN_HODGDON],
         settings[AMPLIFIER_COEFFICIENTS:HYSTERESIS_SETTINGS],
         state[GAUGE_FILTER:creep],
@@ -133,11 +142,12 @@ def run(
 
 @njit(cache=True)
 def step(
-    state: Any, settings: Any, plays: int, terms: int, u: float, noise: float, factor: float
+    state: Any, settings: Any, plays: int, terms: int, u: float, noise: float, factor: float, shape: float
 ) -> tuple[float, float]:
     """(measured, true) displacement after one sample: `run` with a record of one."""
     state[0] = u
     state[1] = noise
     state[2] = factor
-    run(state, settings, plays, terms, state[0:1], state[1:2], state[2:3], state[3:4])
-    return state[3], state[0]
+    state[3] = shape
+    run(state, settings, plays, terms, state[0:1], state[1:2], state[2:3], state[3:4], state[4:5])
+    return state[4], state[0]

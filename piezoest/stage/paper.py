@@ -14,7 +14,7 @@ from piezoest.models.creep import Creep
 from piezoest.models.mechanics import MassSpringDamper
 from piezoest.models.prandtl_ishlinskii import PrandtlIshlinskii
 from piezoest.stage.instruments import Amplifier, Gauge
-from piezoest.stage.stage import GainSchedule, SimulatedStage
+from piezoest.stage.stage import Schedule, SimulatedStage
 
 
 class PaperStage(SimulatedStage):
@@ -23,7 +23,8 @@ class PaperStage(SimulatedStage):
     The true plant is a Prandtl-Ishlinskii operator fitted to Tables I and II, with creep,
     mechanics and instruments around it; it is not a Coleman-Hodgdon model, so that the
     mismatch of that model near the extrema comes out by itself. Every number, with where
-    it comes from, stands in ``piezoest/stage/paper_stage.json``.
+    it comes from, stands in ``piezoest/stage/paper_stage.json`` (what temperature does, in
+    `TemperatureLaw`).
 
     From the paper: sample rate, amplifier gain of 20 V/V, gauge of 5 µm/V, a scaling
     amplifier before the converter, programmable filters. Assumed, for the paper does not
@@ -40,7 +41,11 @@ class PaperStage(SimulatedStage):
     seed : int
         Start of the random numbers of the gauge's noise.
     gain_schedule : callable or array_like, shape (M, 2), optional
-        Factor of the hysteresis over time: see `SimulatedStage`.
+        Factor of the hysteresis over time, for ageing: see `SimulatedStage`.
+    temperature : float, callable or array_like, shape (M, 2), optional
+        Temperature [°C] over time: see `SimulatedStage`. Gain and shape change by
+        `TemperatureLaw`, an assumption; at 20 °C, and without it, the stage is that of the
+        tables.
     noise : float, optional
         Standard deviation of the gauge's white noise [µm]; the data file's if not given, 0
         for none.
@@ -71,7 +76,8 @@ class PaperStage(SimulatedStage):
         sample_rate: float = 50_000.0,
         seed: int = 0,
         *,
-        gain_schedule: GainSchedule | ArrayLike | None = None,
+        gain_schedule: Schedule | ArrayLike | None = None,
+        temperature: Schedule | ArrayLike | None = None,
         noise: float | None = None,
         quantisation: bool = True,
         filters: bool = True,
@@ -101,6 +107,7 @@ class PaperStage(SimulatedStage):
                 maximum=gauge["maximum"],
             ),
             gain_schedule=gain_schedule,
+            temperature=temperature,
             seed=seed,
         )
 

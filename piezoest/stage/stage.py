@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, integer, positive
+from piezoest._checks import FloatArray, array_1d, finite, integer, positive
 from piezoest.models.coleman_hodgdon import ColemanHodgdon
 from piezoest.models.creep import Creep
 from piezoest.models.linear_gain import LinearGain
@@ -17,10 +17,12 @@ from piezoest.models.mechanics import MassSpringDamper
 from piezoest.models.prandtl_ishlinskii import PrandtlIshlinskii
 from piezoest.stage import kernel
 from piezoest.stage.instruments import Amplifier, Gauge
+from piezoest.stage.temperature import TemperatureLaw
 
 Hysteresis = LinearGain | ColemanHodgdon | PrandtlIshlinskii
-GainSchedule = Callable[[FloatArray], FloatArray]
+Schedule = Callable[[FloatArray], FloatArray]
 
+_ONE = np.ones(1)
 _NO_MECHANICS = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
 
 
@@ -51,6 +53,11 @@ class SimulatedStage:
         Factor of the hysteresis (not of its offset) over time. An array holds rows of time
         [s] and factor, joined by straight lines and constant outside. A callable gets an
         array of times [s], shape (N,), and returns the factors.
+    temperature : float, callable or array_like, shape (M, 2), optional
+        Temperature [°C] over time, in the same ways, or one for all times. Gain and shape of
+        the hysteresis then follow `temperature_law`; without it nothing changes.
+    temperature_law : TemperatureLaw, optional
+        What temperature does; its defaults if not given.
     seed : int
         Start of the random numbers of the gauge's noise.
 
@@ -78,6 +85,8 @@ class SimulatedStage:
         "_seed",
         "_settings",
         "_state",
+        "_temperature",
+        "_temperature_law",
         "_terms",
     )
 
@@ -89,7 +98,9 @@ class SimulatedStage:
         mechanics: MassSpringDamper | None = None,
         amplifier: Amplifier | None = None,
         gauge: Gauge | None = None,
-        gain_schedule: GainSchedule | ArrayLike | None = None,
+        gain_schedule: Schedule | ArrayLike | None = None,
+        temperature: Schedule | ArrayLike | None = None,
+        temperature_law: TemperatureLaw | None = None,
         seed: int = 0,
     ) -> None:
         self._sample_rate = positive("sample_rate", sample_rate)
@@ -100,7 +111,15 @@ class SimulatedStage:
         )
         self._amplifier = Amplifier() if amplifier is None else _part("amplifier", amplifier, (Amplifier,))
         self._gauge = Gauge() if gauge is None else _part("gauge", gauge, (Gauge,))
-        self._schedule = None if gain_schedule is None else _schedule(gain_schedule)
+        self._schedule = (
+            None if gain_schedule is None else _schedule("gain_schedule", "factor", gain_schedule)
+        )
+        self._temperature = _temperature(temperature)
+        self._temperature_law = (
+            TemperatureLaw()
+            if temperature_law is None
+            else _part("temperature_law", temperature_law, (TemperatureLaw,))
+        )
         self._seed = integer("seed", seed)
         self._noisy = self._gauge.noise > 0.0
         self._displacement: float | FloatArray
@@ -188,10 +207,10 @@ class SimulatedStage:
         float
             Measured displacement at the end of the sample [µm].
         """
-        factor = 1.0 if self._schedule is None else float(self._factors(1)[0])
+        factor, shape = (float(values[0]) for values in self._factors(1))
         noise = self._generator.standard_normal() if self._noisy else 0.0
         measured, displacement = kernel.step(
-            self._state, self._settings, self._plays, self._terms, float(u), noise, factor
+            self._state, self._settings, self._plays, self._terms, float(u), noise, factor, shape
         )
         self._count += 1
         self._displacement = displacement
@@ -217,9 +236,9 @@ class SimulatedStage:
         """
         x = array_1d("u", u, allow_nan=True).copy()  # voltage, which the kernel turns into displacement
         measured = np.empty_like(x)
-        factor = np.ones(1) if self._schedule is None else self._factors(x.size)
+        factor, shape = self._factors(x.size)
         noise = self._generator.standard_normal(x.size) if self._noisy else np.zeros(1)
-        kernel.run(self._state, self._settings, self._plays, self._terms, x, noise, factor, measured)
+        kernel.run(self._state, self._settings, self._plays, self._terms, x, noise, factor, shape, measured)
         self._count += x.size
         self._displacement = x
         return measured
@@ -231,22 +250,19 @@ class SimulatedStage:
         self._count = 0
         self._displacement = self._hysteresis.offset
 
-    def _factors(self, n: int) -> FloatArray:
-        """Gain factors of the next n samples, shape (n,)."""
-        schedule = cast(GainSchedule, self._schedule)
+    def _factors(self, n: int) -> tuple[FloatArray, FloatArray]:
+        """Factors of the hysteresis and of its shape for the next n samples: shape (n,), or (1,) for 1."""
+        if self._schedule is None and self._temperature is None:
+            return _ONE, _ONE
         times = (self._count + np.arange(n)) / self._sample_rate
-        factors = np.empty(n)
-        try:
-            factors[:] = schedule(times)
-        except (TypeError, ValueError) as error:
-            raise ValueError(
-                f"gain_schedule must return one factor per time, shape ({n},): {error}"
-            ) from error
-        if not np.all(np.isfinite(factors)):
-            raise ValueError(
-                f"gain_schedule returned NaN or infinity after {times[0]:g} s: return finite factors"
-            )
-        return factors
+        factor = shape = _ONE
+        if self._schedule is not None:
+            factor = _values("gain_schedule", "factor", self._schedule, times)
+        if self._temperature is not None:
+            temperature = _values("temperature", "temperature", self._temperature, times)
+            factor = factor * self._temperature_law.gain_factor(temperature)
+            shape = self._temperature_law.hysteresis_factor(temperature)
+        return factor, shape
 
 
 def _part(name: str, value: Any, kinds: tuple[type, ...]) -> Any:
@@ -267,16 +283,37 @@ def _hysteresis_settings(model: Hysteresis) -> tuple[FloatArray, FloatArray, Flo
     return head, none, none
 
 
-def _schedule(schedule: Any) -> GainSchedule:
-    """The gain schedule as a function of an array of times."""
+def _schedule(name: str, quantity: str, schedule: Any) -> Schedule:
+    """A schedule as a function of an array of times."""
     if callable(schedule):
-        return cast(GainSchedule, schedule)
+        return cast(Schedule, schedule)
     table = np.array(schedule, dtype=np.float64)
     if table.ndim != 2 or table.shape[0] < 1 or table.shape[1] != 2:
-        raise ValueError(f"gain_schedule must have shape (M, 2), time and factor, got {table.shape}")
-    array_1d("gain_schedule", table.ravel())
+        raise ValueError(f"{name} must have shape (M, 2), time and {quantity}, got {table.shape}")
+    array_1d(name, table.ravel())
     if np.any(np.diff(table[:, 0]) <= 0.0):
-        raise ValueError(
-            "gain_schedule must have rising times: sort its rows, and ramp where the factor jumps"
-        )
+        raise ValueError(f"{name} must have rising times: sort its rows, and ramp where the {quantity} jumps")
     return functools.partial(cast(Any, np.interp), xp=table[:, 0], fp=table[:, 1])
+
+
+def _temperature(temperature: Any) -> Schedule | None:
+    """The schedule of the temperature; a plain number stands for all times."""
+    if temperature is None:
+        return None
+    if not callable(temperature) and np.ndim(temperature) == 0:
+        temperature = [[0.0, finite("temperature", temperature)]]
+    return _schedule("temperature", "temperature", temperature)
+
+
+def _values(name: str, quantity: str, schedule: Schedule, times: FloatArray) -> FloatArray:
+    """What a schedule returns for the times, shape (N,)."""
+    values = np.empty(times.size)
+    try:
+        values[:] = schedule(times)
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            f"{name} must return one {quantity} per time, shape ({times.size},): {error}"
+        ) from error
+    if not np.all(np.isfinite(values)):
+        raise ValueError(f"{name} returned NaN or infinity after {times[0]:g} s: return finite values")
+    return values

@@ -1,0 +1,239 @@
+"""The paper's tables beside those of `PaperStage`: what `piezoest bench paper` shows."""
+
+from __future__ import annotations
+
+import dataclasses
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from typing import Any
+
+from piezoest._checks import integer, positive
+from piezoest.bench.paper_experiment import (
+    MEMORY,
+    PRBS,
+    SAMPLE_RATE,
+    SETTLED,
+    START,
+    START_GAIN,
+    STATIONARY_PERIODS,
+    TRIANGLES,
+    UPDATE_INTERVAL,
+    Experiment,
+    Run,
+)
+from piezoest.bench.paper_tables import Published, crossed_row, published
+from piezoest.models import ColemanHodgdon
+
+REFERENCES = (*TRIANGLES, PRBS)
+CROSSED = ((TRIANGLES[0], TRIANGLES[3]), (TRIANGLES[3], TRIANGLES[0]))  # applied, found for
+SWEPT = TRIANGLES[2]  # the row of Figs. 3 and 4
+MEMORIES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # s; its period is 0.2 s
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A number of the paper beside ours.
+
+    Parameters
+    ----------
+    paper : Published
+        The paper's.
+    ours : float
+        The simulated stage's, in the same unit.
+    """
+
+    paper: Published
+    ours: float
+
+    @property
+    def ratio(self) -> float:
+        """Ours over the paper's."""
+        return self.ours / self.paper.value
+
+    @property
+    def within(self) -> bool | None:
+        """Whether the deviation is within its bound; None without one."""
+        bound = self.paper.bound
+        return None if bound is None else bool(abs(self.paper.deviation(self.ours)) <= bound)
+
+
+@dataclass(frozen=True, slots=True)
+class PaperResult:
+    """The paper's experiment, run again.
+
+    Parameters
+    ----------
+    memory : float
+        Of the estimator [s].
+    seed : int
+        Start of the random numbers of the stage's noise.
+    linear, inverse : dict of str to Run
+        Both compensations by the row's name, parameters estimated while running.
+    crossed : dict of str to Run
+        Rows of Table III.
+    sweep : dict of float to Run
+        Inverse compensation of one reference by memory [s].
+    """
+
+    memory: float
+    seed: int
+    linear: dict[str, Run] = field(repr=False)
+    inverse: dict[str, Run] = field(repr=False)
+    crossed: dict[str, Run] = field(repr=False)
+    sweep: dict[float, Run] = field(repr=False)
+
+    def compare(self) -> list[Comparison]:
+        """Every number of the tables beside ours."""
+        return [Comparison(number, self._ours(number)) for number in published()]
+
+    def _ours(self, number: Published) -> float:
+        if number.table == "III":
+            return _error(self.crossed[number.row], number.quantity)
+        linear, inverse = self.linear[number.row], self.inverse[number.row]
+        if number.quantity == "K":
+            return linear.parameters[0]
+        if number.quantity in ("alpha", "beta", "gamma"):
+            return inverse.parameters[("alpha", "beta", "gamma").index(number.quantity)]
+        if number.quantity == "error_reduction":
+            return 100.0 * (1.0 - inverse.max_error / linear.max_error)
+        return _error(linear if number.quantity.startswith("linear") else inverse, number.quantity)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-safe dictionary: the tables, the transients, the sweep, and what was chosen."""
+        return {
+            "conditions": {
+                "stage": "PaperStage",
+                "seed": self.seed,
+                "memory_s": self.memory,
+                "sample_rate_hz": SAMPLE_RATE,
+                "update_interval_samples": UPDATE_INTERVAL,
+                "stationary_periods": STATIONARY_PERIODS,
+                "settled_below": SETTLED,
+                "start": START.to_dict(),
+                "linear_start": START_GAIN.to_dict(),
+            },
+            "tables": [
+                {
+                    **dataclasses.asdict(pair.paper),
+                    "ours": pair.ours,
+                    "ratio": pair.ratio,
+                    "deviation": pair.paper.deviation(pair.ours),
+                    "bound": pair.paper.bound,
+                    "within": pair.within,
+                }
+                for pair in self.compare()
+            ],
+            "adaptation": [run.to_dict() for rows in (self.linear, self.inverse) for run in rows.values()],
+            "memory": [run.to_dict() for run in self.sweep.values()],
+        }
+
+
+def run_paper(
+    *,
+    memory: float = MEMORY,
+    memories: Iterable[float] = MEMORIES,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> PaperResult:
+    """Run the paper's experiment on the simulated stage.
+
+    Parameters
+    ----------
+    memory : float
+        Time constant of the estimator's forgetting [s]; the paper names none.
+    memories : iterable of float
+        Further ones, for the error of one row against memory.
+    seed : int
+        Start of the random numbers of the stage's noise.
+    workers : int, optional
+        Processes to run in; default one for each processor, 0 for this one. A script that
+        calls this with others needs ``if __name__ == "__main__":``.
+    progress : callable, optional
+        Called with a sentence after each run.
+
+    Returns
+    -------
+    PaperResult
+
+    Raises
+    ------
+    ValueError
+        If memory or seed is out of its range.
+    """
+    memory, seed = positive("memory", memory), integer("seed", seed)
+    workers = integer("workers", os.cpu_count() or 1 if workers is None else workers)
+    sweep = sorted({positive("memories", value) for value in memories} - {memory})
+
+    inverse = {r: Experiment(r, START, memory, seed) for r in REFERENCES}
+    linear = {r: Experiment(r, START_GAIN, memory, seed) for r in REFERENCES}
+    swept = {value: Experiment(SWEPT, START, value, seed) for value in sweep}
+    # The longest first, so that no process waits for the last one.
+    first = sorted([*inverse.values(), *linear.values(), *swept.values()], key=lambda e: -e.seconds)
+    with _executor(workers) as executor:
+        runs = _run_all(executor, first, len(first) + len(CROSSED), progress)
+        crossed = {
+            crossed_row(applied.amplitude, applied.frequency, found_for.amplitude): Experiment(
+                applied, _model(runs[inverse[found_for]]), None, seed
+            )
+            for applied, found_for in CROSSED
+        }
+        runs |= _run_all(executor, list(crossed.values()), len(first) + len(CROSSED), progress, len(first))
+    by_memory = {value: runs[experiment] for value, experiment in swept.items()}
+    if by_memory:
+        by_memory[memory] = runs[inverse[SWEPT]]
+    return PaperResult(
+        memory=memory,
+        seed=seed,
+        linear={r.name: runs[experiment] for r, experiment in linear.items()},
+        inverse={r.name: runs[experiment] for r, experiment in inverse.items()},
+        crossed={row: runs[experiment] for row, experiment in crossed.items()},
+        sweep=dict(sorted(by_memory.items())),
+    )
+
+
+class _ThisProcess(Executor):
+    """An executor that runs what it is given at once."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def _executor(workers: int) -> Executor:
+    if workers == 0:
+        return _ThisProcess()
+    return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
+
+
+def _run_all(
+    executor: Executor,
+    experiments: list[Experiment],
+    total: int,
+    progress: Callable[[str], None] | None,
+    done: int = 0,
+) -> dict[Experiment, Run]:
+    futures = {executor.submit(experiment.run): experiment for experiment in experiments}
+    runs = {}
+    try:
+        for future in as_completed(futures):
+            runs[futures[future]] = future.result()
+            if progress is not None:
+                progress(f"{done + len(runs)} of {total}: {futures[future].name}")
+    except BaseException:
+        executor.shutdown(wait=False, cancel_futures=True)
+        raise
+    return runs
+
+
+def _model(run: Run) -> ColemanHodgdon:
+    # A mean of admissible parameters is admissible unless they wander.
+    return ColemanHodgdon(*run.parameters).nearest_admissible()
+
+
+def _error(run: Run, quantity: str) -> float:
+    return run.relative_error if quantity.endswith("relative_error") else run.max_error

@@ -1,0 +1,197 @@
+"""Figures 3, 4 and 5 in the paper's layout, and what the paper lacks: adaptation and memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piezoest.bench.paper import SWEPT, PaperResult
+from piezoest.bench.paper_experiment import PRBS, SETTLED, Run, last_periods
+from piezoest.models import ColemanHodgdon
+from piezoest.tracking import draw_map, draw_series
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DPI = 110
+WAYS = {"linear": "linear feed-forward", "inverse": "hysteresis compensation"}
+
+
+def write_figures(result: PaperResult, folder: Path) -> list[Path]:
+    """Write all figures as PNG.
+
+    Parameters
+    ----------
+    result : PaperResult
+        To draw.
+    folder : Path
+        To write to; made if it is not there.
+
+    Returns
+    -------
+    list of Path
+        The files.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, figure in _figures(result):
+        path = folder / f"{name}.png"
+        figure.savefig(path, dpi=DPI)
+        written.append(path)
+    return written
+
+
+def _figures(result: PaperResult) -> Iterator[tuple[str, Figure]]:
+    yield "figure3", input_output_map(result.inverse[SWEPT.name])
+    yield "figure4", triangle_tracking(result.linear[SWEPT.name], result.inverse[SWEPT.name])
+    yield "figure5", prbs_tracking(result.linear[PRBS.name], result.inverse[PRBS.name])
+    yield "adaptation", adaptation(result)
+    if result.sweep:
+        yield "memory", error_against_memory(result)
+
+
+def input_output_map(run: Run) -> Figure:
+    """Fig. 3: displacement over voltage, the stage's and that of the identified model.
+
+    Parameters
+    ----------
+    run : Run
+        Hysteresis compensation of a triangle.
+    """
+    record = last_periods(run.stationary, 1)
+    voltage, displacement = record.voltage, record.displacement
+    model = ColemanHodgdon(*run.parameters)
+    # Round after round, until the model's loop has closed as the stage's has.
+    response = model.simulate(np.tile(voltage, 10), allow_jumps=True)[-voltage.size :]
+    figure = _figure(5.2, 4.2)
+    axes = figure.subplots()
+    axes.plot(voltage, displacement, color="0.55", lw=3.0, label="stage")
+    axes.plot(voltage, response, color="C0", lw=1.0, label="identified model")
+    axes.set(xlabel="voltage [V]", ylabel="displacement [µm]")
+    axes.set_title(f"Fig. 3: {run.experiment.reference.name}")
+    axes.grid(alpha=0.3)
+    axes.legend(loc="upper left")
+    return figure
+
+
+def triangle_tracking(linear: Run, inverse: Run) -> Figure:
+    """Fig. 4: time series (a), (b) and reference-to-displacement maps (c), (d).
+
+    Parameters
+    ----------
+    linear, inverse : Run
+        Both compensations of the same triangle.
+    """
+    figure = _figure(10.0, 7.4)
+    series, maps = figure.subplots(2, 2, height_ratios=[1.0, 1.3])
+    for column, (letters, run) in enumerate((("ac", linear), ("bd", inverse))):
+        _series(series[column], letters[0], run, periods=2)
+        _map(maps[column], letters[1], run)
+    _legend(figure)
+    figure.suptitle(f"Fig. 4: {linear.experiment.reference.name}")
+    return figure
+
+
+def prbs_tracking(linear: Run, inverse: Run) -> Figure:
+    """Fig. 5: time series (a), (b) of the filtered PRBS.
+
+    Parameters
+    ----------
+    linear, inverse : Run
+        Both compensations of the same signal.
+    """
+    figure = _figure(10.0, 3.8)
+    for axes, letter, run in zip(figure.subplots(1, 2), "ab", (linear, inverse), strict=True):
+        _series(axes, letter, run, periods=1)
+    _legend(figure)
+    figure.suptitle(f"Fig. 5: {linear.experiment.reference.name}")
+    return figure
+
+
+def adaptation(result: PaperResult) -> Figure:
+    """Largest error of each period after the start, for every row of Table II.
+
+    Parameters
+    ----------
+    result : PaperResult
+        To draw.
+    """
+    figure = _figure(10.0, 4.2)
+    axes = figure.subplots(1, 2, sharey=True)
+    for ax, way, runs in ((axes[0], "linear", result.linear), (axes[1], "inverse", result.inverse)):
+        for (name, run), marker in zip(runs.items(), "os^vD", strict=True):
+            end = run.period * np.arange(1, len(run.errors) + 1)
+            (line,) = ax.plot(end, run.errors, f"{marker}-", ms=3.5, lw=1.0, label=name)
+            if (settled := run.settling_periods) is not None:
+                ax.plot(end[settled], run.errors[settled], marker, ms=9.0, mfc="none", color=line.get_color())
+        ax.set(xlabel="time [s]", yscale="log", title=WAYS[way])
+        ax.grid(alpha=0.3, which="both")
+    axes[0].set_ylabel("largest error of the period [µm]")
+    axes[1].legend(fontsize="small", loc="upper right")
+    figure.suptitle(
+        f"Adaptation, memory {result.memory:g} s; ringed: first period that stays "
+        f"within {100.0 * (SETTLED - 1.0):.0f} % of the stationary error"
+    )
+    return figure
+
+
+def error_against_memory(result: PaperResult) -> Figure:
+    """Stationary error and time to settle over the memory of the estimator.
+
+    Parameters
+    ----------
+    result : PaperResult
+        To draw, with a sweep.
+    """
+    memory = np.array(list(result.sweep))
+    runs = list(result.sweep.values())
+    figure = _figure(10.0, 3.9)
+    left, right = figure.subplots(1, 2)
+    left.loglog(memory, [run.max_error for run in runs], "o-")
+    left.loglog(result.memory, result.sweep[result.memory].max_error, "o", ms=11.0, mfc="none", color="C3")
+    left.set(xlabel="memory [s]", ylabel="largest stationary error [µm]")
+    times = [np.nan if run.settling_time is None else run.settling_time for run in runs]
+    right.semilogx(memory, times, "o-")
+    right.set(xlabel="memory [s]", ylabel="settles after [s]")
+    for axes in (left, right):
+        axes.set_xticks(memory, [f"{value:g}" for value in memory], minor=False)
+        axes.set_xticks([], minor=True)
+        axes.axvline(runs[0].period, color="0.6", ls="--", lw=1.0)
+        axes.text(
+            runs[0].period, 0.98, " one period", transform=axes.get_xaxis_transform(), va="top", color="0.4"
+        )
+        axes.grid(alpha=0.3, which="both")
+    figure.suptitle(
+        f"Memory of the estimator, {runs[0].experiment.reference.name}; ringed: that of the tables"
+    )
+    return figure
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _series(axes: Any, letter: str, run: Run, periods: int) -> None:
+    draw_series(axes, last_periods(run.stationary, periods))
+    axes.get_legend().remove()
+    axes.set_title(
+        f"({letter}) {WAYS[run.experiment.compensation]}: largest error {run.max_error:.3f} µm",
+        fontsize="medium",
+    )
+
+
+def _map(axes: Any, letter: str, run: Run) -> None:
+    draw_map(axes, last_periods(run.stationary, 1))
+    axes.set_title(f"({letter}) {WAYS[run.experiment.compensation]}", fontsize="medium")
+
+
+def _legend(figure: Figure) -> None:
+    """One legend for all series, where it hides nothing: the curves are the same in each."""
+    handles = [line for axes in figure.axes for line in axes.get_lines()]
+    by_name = {str(line.get_label()): line for line in handles if not str(line.get_label()).startswith("_")}
+    figure.legend(by_name.values(), by_name.keys(), loc="outside lower center", ncols=3)

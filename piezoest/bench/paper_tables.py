@@ -1,0 +1,118 @@
+"""Tables I, II and III as published, and how close the simulated stage has to come to them."""
+
+from __future__ import annotations
+
+import csv
+import functools
+from dataclasses import dataclass
+from importlib import resources
+
+SOURCE = "Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012)"
+
+# Largest deviation that passes, in parts of the published number (error_reduction: in points
+# of per cent). Relative errors have none: they are the maximum errors over the peak of the
+# reference, printed with two digits.
+Bounds = dict[str, float]
+CALIBRATION_BOUNDS: Bounds = {
+    "alpha": 0.15,
+    "beta": 0.02,
+    "gamma": 0.15,
+    "K": 0.02,
+    "linear_max_error": 0.05,
+    "compensated_max_error": 0.25,
+    "error_reduction": 2.0,
+}
+PRBS_BOUNDS: Bounds = {
+    "alpha": 0.15,
+    "beta": 0.03,
+    "gamma": 0.15,
+    "K": 0.03,
+    "linear_max_error": 0.10,
+    "compensated_max_error": 0.20,
+    "error_reduction": 6.0,
+}
+TABLE_III_BOUNDS: Bounds = {"compensated_max_error": 0.20}
+
+IN_POINTS = "error_reduction"
+
+
+@dataclass(frozen=True, slots=True)
+class Published:
+    """One number of the paper.
+
+    Parameters
+    ----------
+    table : str
+        ``"I"``, ``"II"`` or ``"III"``.
+    row : str
+        Reference signal, as `triangle_row` and `PRBS_ROW` name it.
+    quantity : str
+        Column: alpha, beta, gamma, K, linear_max_error and so on.
+    value : float
+        As printed.
+    unit : str
+        Of the value.
+    held_out : bool
+        Whether the calibration of the stage never saw it.
+    """
+
+    table: str
+    row: str
+    quantity: str
+    value: float
+    unit: str
+    held_out: bool
+
+    @property
+    def bound(self) -> float | None:
+        """Largest deviation that passes; None if the number has no bound."""
+        if not self.held_out:
+            bounds = CALIBRATION_BOUNDS
+        else:
+            bounds = TABLE_III_BOUNDS if self.table == "III" else PRBS_BOUNDS
+        return bounds.get(self.quantity)
+
+    def deviation(self, ours: float) -> float:
+        """Deviation of `ours`, in parts of the value or in points of per cent.
+
+        Parameters
+        ----------
+        ours : float
+            The same number from the simulated stage.
+        """
+        difference = ours - self.value
+        return difference if self.quantity == IN_POINTS else difference / self.value
+
+
+PRBS_ROW = "Filtered PRBS"
+
+
+def triangle_row(amplitude: float, frequency: float) -> str:
+    """Name of a triangle reference in the tables: amplitude [µm], frequency [Hz]."""
+    return f"{amplitude:.1f} µm @ {frequency:.1f} Hz"
+
+
+def crossed_row(amplitude: float, frequency: float, found_for: float) -> str:
+    """Name of a row of Table III: with the parameters found for another amplitude [µm]."""
+    return f"{triangle_row(amplitude, frequency)}, parameters of {found_for:.1f} µm"
+
+
+@functools.cache
+def published() -> tuple[Published, ...]:
+    """Every number of Tables I, II and III, in their order."""
+    text = resources.files("piezoest.bench").joinpath("paper_tables.csv").read_text(encoding="utf-8")
+    return tuple(_number(line) for line in csv.DictReader(text.splitlines()))
+
+
+def _number(line: dict[str, str]) -> Published:
+    reference = line["reference"]
+    if reference == "prbs":
+        row = PRBS_ROW
+    elif "parameters of" in reference:
+        found_for = float(reference.split("parameters of")[1].split()[0])
+        row = crossed_row(float(line["amplitude_um"]), float(line["frequency_hz"]), found_for)
+    else:
+        row = triangle_row(float(line["amplitude_um"]), float(line["frequency_hz"]))
+    held_out = reference == "prbs" or line["table"] == "III"
+    unit = line["unit"].replace("um", "µm").replace("^2", "²")
+    return Published(line["table"], row, line["quantity"], float(line["value"]), unit, held_out)
