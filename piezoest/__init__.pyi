@@ -20,6 +20,7 @@ from .models import ColemanHodgdon, Creep, LinearGain, MassSpringDamper, Prandtl
 from .records import Record, read_record
 from .signals import Signal
 from .stage import Amplifier, Gauge, PaperStage, SimulatedStage, TemperatureLaw
+from .supervisor import Event, Supervisor
 from .tracking import TrackingRecord, track
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "CompensatorStatus",
     "Creep",
     "Estimator",
+    "Event",
     "FilterPyEKF",
     "FilterPyUKF",
     "Gauge",
@@ -49,6 +51,7 @@ __all__ = [
     "Signal",
     "SimulatedStage",
     "Status",
+    "Supervisor",
     "TemperatureLaw",
     "Trace",
     "TrackingRecord",

@@ -9,6 +9,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, integer
 from piezoest.signals import check_continuity
+from piezoest.supervisor import Supervisor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -166,6 +167,7 @@ def track(
     update_interval: int = 50,
     sample_rate: float | None = None,
     allow_jumps: bool = False,
+    supervisor: Supervisor | None = None,
 ) -> TrackingRecord:
     """Let a stage follow a reference, and the compensator learn from the estimator.
 
@@ -187,6 +189,9 @@ def track(
     allow_jumps : bool
         Take a reference with unfiltered steps instead of refusing it; without a slew-rate limit
         they reach the voltage.
+    supervisor : Supervisor, optional
+        Guard that falls back to the last good model, or to linear feed-forward, when the
+        compensated error is worse than linear feed-forward's.
 
     Returns
     -------
@@ -215,10 +220,15 @@ def track(
         part = slice(start, min(start + interval, N))
         _turn(part, stage, compensator, reference, voltage, measured, displacement)
         if estimator is not None:
-            history.append(compensator.model.theta)
-            names = compensator.model.parameter_names
+            present = compensator.model
+            history.append(present.theta)
+            names = present.parameter_names
             _feed(estimator, voltage[part], measured[part])
-            compensator.model = estimator.model
+            model = estimator.model
+            if supervisor is not None:
+                parts = reference[part], voltage[part], measured[part]
+                model = supervisor.review(*parts, compensator.model, model)
+            compensator.model = model
     theta = np.repeat(history, interval, axis=0)[:N] if history else np.empty((N, 0))
     period = getattr(r, "period", None)
     return TrackingRecord(

@@ -1,0 +1,110 @@
+"""The supervisor: adaptation that misbehaves is caught, and tried again."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import piezoest as pz
+from piezoest.equations.coleman_hodgdon import stationary_gain
+
+FS = 20_000.0
+START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+R = pz.signals.triangle(5.0, 5.0, 12, FS)
+
+
+def ring(estimator: Any, supervisor: Any = None) -> Any:
+    return pz.track(
+        R,
+        stage=pz.PaperStage(sample_rate=FS, seed=0),
+        compensator=pz.InverseCompensator(START, pz.VoltageLimits(-100.0, 100.0)),
+        estimator=estimator,
+        update_interval=20,
+        supervisor=supervisor,
+    )
+
+
+class Wild:
+    """Learns well for five periods, then hands out nonsense for two."""
+
+    def __init__(self) -> None:
+        self._inner = pz.HysteresisRLS(FS)
+        self._samples = 0
+
+    def run(self, u: Any, x: Any) -> None:
+        self._samples += len(u)
+        self._inner.run(u, x)
+
+    def step(self, u: float, x: float | None) -> None:
+        self.run(np.array([u]), np.array([np.nan if x is None else x]))
+
+    @property
+    def model(self) -> Any:
+        if 5 < self._samples / (FS / 5.0) < 7:
+            return pz.ColemanHodgdon(0.2, 0.06, 0.02)
+        return self._inner.model
+
+
+def test_leaves_a_good_estimator_alone() -> None:
+    supervisor = pz.Supervisor(FS, window=0.2)
+    plain, guarded = ring(pz.HysteresisRLS(FS)), ring(pz.HysteresisRLS(FS), supervisor)
+    np.testing.assert_array_equal(plain.displacement[-8000:], guarded.displacement[-8000:])
+    assert not supervisor.holding
+
+
+def test_keeps_nonsense_away_from_the_stage() -> None:
+    supervisor = pz.Supervisor(FS, window=0.2)
+    plain, guarded = ring(Wild()), ring(Wild(), supervisor)
+    linear = 0.55
+    assert plain.max_error_per_period()[5:7].max() > 1.5 * linear
+    assert guarded.max_error_per_period()[1:].max() < linear
+    assert guarded.max_error_per_period()[-1] < 0.05
+    assert any(event.action == "kept" for event in supervisor.events)
+    assert "gain" in supervisor.events[0].reason
+
+
+def test_falls_back_when_the_error_is_worse_than_linear() -> None:
+    class WrongLoop:
+        """The right gain, with a loop three times too wide."""
+
+        model = pz.ColemanHodgdon.from_loop(0.021, 0.147, 0.295)
+
+        def step(self, u: float, x: float | None) -> None:
+            pass
+
+    supervisor = pz.Supervisor(FS, window=0.2)
+    plain, guarded = ring(WrongLoop()), ring(WrongLoop(), supervisor)
+    assert plain.max_error_per_period()[2:].min() > 0.55 * 1.2
+    assert [event.action for event in supervisor.events[:2]] == ["fell back", "resumed"]
+    assert guarded.rms_error() < plain.rms_error()
+    supervisor.reset()
+    assert supervisor.events == ()
+
+
+def test_short_memory_is_guarded() -> None:
+    """Exponential forgetting over a twentieth of a period runs away; with the guard it does not stay away."""
+    estimators = [pz.HysteresisRLS(FS, memory=0.01) for _ in range(2)]
+    plain, guarded = ring(estimators[0]), ring(estimators[1], pz.Supervisor(FS, window=0.2))
+    assert guarded.max_error_per_period()[2:].max() < plain.max_error_per_period()[2:].max()
+
+
+@given(st.floats(1e-3, 0.5), st.floats(0.1, 100.0), st.floats(0.05, 0.5))
+def test_stationary_gain_is_that_of_the_simulated_loop(a: float, amplitude: float, part: float) -> None:
+    model = pz.ColemanHodgdon.from_loop(a, part * 0.2, 0.2)
+    turns = np.tile([1.0, -1.0], 200) * amplitude
+    u = np.interp(np.arange(0, turns.size - 1, 0.05), np.arange(turns.size), turns)
+    x = model.simulate(u, initial_state=-np.tanh(a * amplitude) * model.b / a)
+    peak = np.argmax(u[-60:])
+    expected = x[-60:][peak] / u[-60:][peak]
+    assert stationary_gain(amplitude, model.a, model.b, model.c) == pytest.approx(expected, rel=1e-6)
+
+
+def test_wrong_arguments() -> None:
+    with pytest.raises(ValueError, match="window must be above zero"):
+        pz.Supervisor(FS, window=0.0)
+    with pytest.raises(ValueError, match="limit must be above zero"):
+        pz.Supervisor(FS, limit=-1.0)
