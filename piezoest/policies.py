@@ -17,6 +17,7 @@ __all__ = [
     "NormBound",
     "Normalisation",
     "OutlierRejection",
+    "PeriodicForgetting",
     "RandomWalk",
 ]
 
@@ -85,6 +86,29 @@ class RandomWalk:
     def __post_init__(self) -> None:
         positive("memory", self.memory)
         positive("drift", self.drift)
+
+
+@dataclass(frozen=True, slots=True)
+class PeriodicForgetting:
+    """Exponential forgetting with a memory in parts of the reference's own period.
+
+    For a linear gain: over less than a period it would follow the shape of the loop.
+
+    Parameters
+    ----------
+    memory : float
+        Time constant in periods.
+
+    Raises
+    ------
+    ValueError
+        If memory is not above zero.
+    """
+
+    memory: float = 2.0
+
+    def __post_init__(self) -> None:
+        positive("memory", self.memory)
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +221,14 @@ class DeadZone:
 
 
 Policy = (
-    Forgetting | RandomWalk | NormBound | Normalisation | CovarianceResetting | DeadZone | OutlierRejection
+    Forgetting
+    | RandomWalk
+    | PeriodicForgetting
+    | NormBound
+    | Normalisation
+    | CovarianceResetting
+    | DeadZone
+    | OutlierRejection
 )
 
 

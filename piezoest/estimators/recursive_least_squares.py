@@ -77,7 +77,7 @@ def new_state(theta: FloatArray, P_0: FloatArray) -> FloatArray:
 
 
 @register_jitable
-def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, walk: Any) -> None:
+def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, walk: Any, forgetting: Any) -> None:
     """One sample of the law: gate, resetting, growth by `walk`, update with noise variance R."""
     theta = state[HEAD : HEAD + n]
     P = state[HEAD + n : HEAD + n + n * n]
@@ -99,7 +99,7 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, walk: Any) 
         )
     else:
         equations.random_walk(P, walk, config[BOUND], n)
-        y, S = equations.discrete_update(theta, P, phi, z, n, config[FORGETTING], R, config[BOUND], 1.0, work)
+        y, S = equations.discrete_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
     state[INNOVATION] = y
     state[INNOVATION_VARIANCE] = S
     state[UPDATES] += 1.0
@@ -108,7 +108,7 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, walk: Any) 
 
 @njit("void(f8[::1], f8[::1], f8[::1], f8, i8)", cache=True)
 def _update(state: Any, config: Any, phi: Any, z: float, n: int) -> None:
-    adapt(state, config, phi, z, n, config[NOISE], 0.0)
+    adapt(state, config, phi, z, n, config[NOISE], 0.0, config[FORGETTING])
 
 
 class RecursiveLeastSquares:

@@ -20,6 +20,7 @@ from piezoest.policies import (
     Normalisation,
     NormBound,
     OutlierRejection,
+    PeriodicForgetting,
     Policy,
     RandomWalk,
     policy_from_dict,
@@ -36,10 +37,6 @@ LEAST = 1e-2
 PAPER_MEMORY = 0.4
 # Seconds of half a period until the voltage has turned for the first time.
 FIRST_HALF = 0.05
-# Periods of memory of a linear gain: over less than one it would follow the loop's shape.
-GAIN_MEMORY = 2.0
-# Its walk, per root second: so slow that the start is forgotten within a part of a period.
-GAIN_DRIFT = 0.1
 
 
 class HysteresisRLS(EstimatorBase):
@@ -58,7 +55,8 @@ class HysteresisRLS(EstimatorBase):
         ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack actuator.
     memory : float, None or "period"
         ``"period"`` (default): random-walk forgetting with a memory in parts of the
-        reference's own period, see `policies.RandomWalk`. A number: time constant of
+        reference's own period, see `policies.RandomWalk` and, for a `LinearGain`,
+        `policies.PeriodicForgetting`. A number: time constant of
         exponential forgetting [s], as in the paper. None: no forgetting. With the continuous
         time base ``"period"`` means 0.4 s.
     uncertainty : float
@@ -83,8 +81,9 @@ class HysteresisRLS(EstimatorBase):
         in seconds.
     policies : tuple of policies, optional
         Policies beside `memory`. Default with ``memory="period"``: ``(RandomWalk(), NormBound(10),
-        DeadZone(), OutlierRejection())``; else ``(NormBound(), DeadZone(), Normalisation())``, the
-        paper's with a dead zone.
+        DeadZone(), OutlierRejection())``, for a `LinearGain` with `PeriodicForgetting` for
+        `RandomWalk`; else ``(NormBound(), DeadZone(), Normalisation())``, the paper's with a dead
+        zone.
 
     Raises
     ------
@@ -131,8 +130,12 @@ class HysteresisRLS(EstimatorBase):
         if policies is None:
             policies = self._default_policies(memory, initial)
         walk = select(policies, RandomWalk)
-        if walk is not None and (time_base == "continuous" or memory != "period"):
-            raise ValueError("policies: RandomWalk goes with memory='period' and the discrete time base")
+        periodic = select(policies, PeriodicForgetting)
+        if (walk or periodic) and (time_base == "continuous" or memory != "period"):
+            raise ValueError(
+                "policies: RandomWalk and PeriodicForgetting go with memory='period' and the "
+                "discrete time base"
+            )
         if offset is None:
             offset = memory == "period" and isinstance(initial, ColemanHodgdon)
         cutoff = min(positive("cutoff", cutoff), 0.5 * sample_rate)
@@ -156,6 +159,8 @@ class HysteresisRLS(EstimatorBase):
         if isinstance(walk, RandomWalk):
             config[kernel.WALK] = walk.drift**2 / sample_rate
             config[kernel.WALK_MEMORY] = walk.memory
+        if isinstance(periodic, PeriodicForgetting):
+            config[kernel.PERIODS] = periodic.memory
         rejection = select(policies, OutlierRejection)
         if isinstance(rejection, OutlierRejection) and hysteretic:
             config[kernel.OUTLIER] = 1.0
@@ -204,7 +209,7 @@ class HysteresisRLS(EstimatorBase):
     def _default_policies(memory: Any, initial: Model) -> tuple[Policy, ...]:
         if memory != "period":
             return NormBound(), DeadZone(), Normalisation()
-        walk = RandomWalk(GAIN_MEMORY, GAIN_DRIFT) if isinstance(initial, LinearGain) else RandomWalk()
+        walk = PeriodicForgetting() if isinstance(initial, LinearGain) else RandomWalk()
         return walk, NormBound(10.0), DeadZone(), OutlierRejection()
 
     @staticmethod

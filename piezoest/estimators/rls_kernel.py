@@ -26,9 +26,9 @@ FRONT = EXCITATION + 36  # the law's state begins here, the delay line follows i
 
 # Configuration of the front end; the law's follows.
 N, HYSTERETIC, LOW_POLE, HIGH_POLE, HIGH_PASS, FRACTION, OFFSET, LONGEST_GAP, NOISE_RATIO = range(9)
-OUTLIER, FIRST_HALF, WALK, WALK_MEMORY, WARM_UP = 9, 10, 11, 12, 13
-SCALE = 14  # four scales of the parameters, one of the output
-CONFIG = 19
+OUTLIER, FIRST_HALF, WALK, WALK_MEMORY, WARM_UP, PERIODS = 9, 10, 11, 12, 13, 14
+SCALE = 15  # four scales of the parameters, one of the output
+CONFIG = 20
 
 # A change of x is believed up to so many usual steps, plus what so many times the slope explains.
 BELIEVED_STEPS, BELIEVED_SLOPES = 20.0, 3.0
@@ -95,13 +95,12 @@ def _regression(state: Any, config: Any, x: Any, phi: Any, n: int) -> Any:
 
 
 @register_jitable
-def _walk(state: Any, config: Any, phi: Any, n: int) -> Any:
+def _walk(state: Any, config: Any, phi: Any, n: int, half: Any) -> Any:
     """Noise variance and growth of P that give random-walk forgetting its memory.
 
     With P growing by q a sample, the best excited direction forgets within
     sqrt(R / (q phi²)) samples: R follows from the memory wanted and the mean of phi².
     """
-    half = swing.half_period(state[SWING : SWING + swing.STATE], config[FIRST_HALF])
     share = 1.0 / min(state[FRONT + law.UPDATES] + 1.0, half)
     power = 0.0
     for i in range(n):
@@ -114,7 +113,7 @@ def _walk(state: Any, config: Any, phi: Any, n: int) -> Any:
 
 
 @register_jitable
-def _propagate_error(state: Any, config: Any, phi: Any, n: int, restart: bool) -> None:
+def _propagate_error(state: Any, config: Any, phi: Any, n: int, forgetting: Any, restart: bool) -> None:
     """Covariance of the estimate's error under the sensor's noise, coloured by W_p and difference."""
     C = state[ERROR : ERROR + n * n]
     start = FRONT + law.HEAD + n + n * n
@@ -122,7 +121,7 @@ def _propagate_error(state: Any, config: Any, phi: Any, n: int, restart: bool) -
     if restart:
         for i in range(n * n):
             C[i] = state[start + i]
-    scale = 1.0 / (config[CONFIG + law.FORGETTING] * state[FRONT + law.INNOVATION_VARIANCE])
+    scale = 1.0 / (forgetting * state[FRONT + law.INNOVATION_VARIANCE])
     for i in range(n):
         gain[i] *= scale
     least_squares.propagate_error(
@@ -171,11 +170,17 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     if state[FROZEN] != 0.0:
         law_state[law.LAST] = law.HOLDING
         return
-    R = _walk(state, config, phi, n)
+    half = swing.half_period(state[SWING : SWING + swing.STATE], config[FIRST_HALF])
+    R = _walk(state, config, phi, n, half)
+    forgetting = config[CONFIG + law.FORGETTING]
+    if config[PERIODS] > 0.0:
+        samples = 2.0 * half * config[PERIODS]
+        forgetting = samples / (samples + 1.0)
     resets, updates = law_state[law.RESETS], law_state[law.UPDATES]
-    law.adapt(law_state, config[CONFIG:], phi, z, n, R, config[WALK])
+    law.adapt(law_state, config[CONFIG:], phi, z, n, R, config[WALK], forgetting)
     if law_state[law.LAST] == law.UPDATED and config[CONFIG + law.CONTINUOUS] == 0.0:
-        _propagate_error(state, config, phi, n, updates == 0.0 or law_state[law.RESETS] != resets)
+        restart = updates == 0.0 or law_state[law.RESETS] != resets
+        _propagate_error(state, config, phi, n, forgetting, restart)
 
 
 @njit("void(f8[::1], f8[::1], f8, f8)", cache=True)

@@ -31,7 +31,7 @@ def record(seconds: float = 1.0, noise: float = 1e-3) -> tuple[Any, Any]:
 def test_settles_within_two_periods_from_a_cold_start() -> None:
     errors = ring(pz.signals.triangle(5.0, 5.0, 8, FS)).max_error_per_period()
     assert np.all(errors[2:] < 0.012 * 5.0)
-    assert errors[-1] < 0.03
+    assert errors[-1] < 0.04
 
 
 def test_settles_within_two_periods_of_a_change_of_amplitude() -> None:
@@ -141,7 +141,7 @@ def test_excitation() -> None:
 
 
 def test_wrong_arguments() -> None:
-    with pytest.raises(ValueError, match="RandomWalk goes with memory='period'"):
+    with pytest.raises(ValueError, match="RandomWalk and PeriodicForgetting go with memory='period'"):
         pz.HysteresisRLS(FS, memory=0.4, policies=(pz.policies.RandomWalk(),))
     with pytest.raises(ValueError, match="memory must be above zero"):
         pz.policies.RandomWalk(memory=0.0)
