@@ -1,0 +1,127 @@
+"""Run HysteresisRLS for a thousand million samples, and look whether it is still what it was.
+
+A model of the kind that is estimated, with the gauge's noise, is followed for 5.6 hours of a stage at
+50 kHz. At every check P has to be symmetric and positive definite, and theta within the noise of where
+it was after the first block: within so many of its standard deviations over the first blocks, of
+which there is one value a block. The trend over the whole soak has to be within that as well.
+
+    python benchmarks/soak.py [--samples N] [--json FILE]
+
+It takes some twenty minutes; a tenth of it (--samples 1e8) says nearly as much.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import piezoest as pz
+from piezoest.bench.machine import describe_machine, versions
+
+FloatArray = NDArray[np.float64]
+
+SAMPLE_RATE = 50_000.0
+TRUE = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+NOISE = 1.2e-3  # µm
+BLOCK_PERIODS = 50  # of 5 Hz: 500 000 samples
+CHECKS = 200
+FIRST = 20  # blocks whose scatter is the noise of theta
+WITHIN = 8.0  # standard deviations: an estimate from so few of them is itself uncertain
+
+
+def stationary_loop() -> tuple[FloatArray, FloatArray]:
+    """A block of voltage, and displacement without noise, that continue themselves without a seam."""
+    u = np.asarray(pz.signals.triangle(35.0, 5.0, BLOCK_PERIODS, SAMPLE_RATE))
+    twice = TRUE.simulate(np.tile(u, 2))
+    return u, twice[u.size :]
+
+
+def check(estimator: pz.HysteresisRLS) -> dict[str, Any]:
+    P = estimator.P
+    scale = np.sqrt(np.diag(P))
+    correlation = P / np.outer(scale, scale)
+    eigenvalues = np.linalg.eigvalsh(0.5 * (correlation + correlation.T))
+    return {
+        "samples": estimator.status.samples,
+        "theta": estimator.theta.tolist(),
+        "symmetric": bool(np.array_equal(P, P.T)),
+        "smallest_eigenvalue": float(eigenvalues[0]),  # of P scaled to a unit diagonal
+        "sound": bool(np.all(np.isfinite(P)) and eigenvalues[0] > 0.0 and np.array_equal(P, P.T)),
+    }
+
+
+def verdict(checks: list[dict[str, Any]], scatter: FloatArray) -> dict[str, Any]:
+    """Largest deviation and trend of theta, in standard deviations of the start."""
+    theta = np.array([each["theta"] for each in checks])
+    deviation = (theta - theta[0]) / scatter
+    time_ = np.linspace(0.0, 1.0, len(checks))
+    trend = np.polyfit(time_, deviation, 1)[0] if len(checks) > 2 else np.zeros(theta.shape[1])
+    return {
+        "largest_deviation": float(np.max(np.abs(deviation))),
+        "trend": trend.tolist(),
+        "sound": all(each["sound"] for each in checks),
+        "within_noise": bool(np.max(np.abs(deviation)) <= WITHIN and np.max(np.abs(trend)) <= WITHIN),
+    }
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--samples", type=float, default=1e9)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--memory", type=float, help="[s]; default the estimator's own")
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+
+    rng = np.random.default_rng(arguments.seed)
+    u, loop = stationary_loop()
+    blocks = max(FIRST + 2, round(arguments.samples / u.size))
+    options = {} if arguments.memory is None else {"memory": arguments.memory}
+    estimator = pz.HysteresisRLS(SAMPLE_RATE, **options)
+    estimator.run(u, loop + NOISE * rng.standard_normal(u.size), every=u.size)  # away from the start
+    began = time.perf_counter()
+    first: list[FloatArray] = []
+    checks = [check(estimator)]
+    for k in range(1, blocks):
+        noise = NOISE * rng.standard_normal(u.size)
+        estimator.run(u, loop + noise, every=u.size)
+        if k <= FIRST:
+            first.append(estimator.theta)
+        if k * CHECKS // blocks > (k - 1) * CHECKS // blocks or k == blocks - 1:
+            checks.append(check(estimator))
+            seconds = time.perf_counter() - began
+            last = checks[-1]
+            print(
+                f"{last['samples']:.3g} samples, {seconds:.0f} s, theta {estimator.theta}, "
+                f"smallest eigenvalue {last['smallest_eigenvalue']:.3g}",
+                file=sys.stderr,
+            )
+    scatter = np.std(first, axis=0, ddof=1)
+    document = {
+        "suite": "soak",
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": describe_machine(),
+        "versions": versions(),
+        "seconds": round(time.perf_counter() - began, 1),
+        "true": TRUE.theta.tolist(),
+        "noise_of_theta": scatter.tolist(),
+        **verdict(checks, scatter),
+        "checks": checks,
+    }
+    text = json.dumps(document, indent=1, ensure_ascii=False)
+    if arguments.json:
+        arguments.json.write_text(text + "\n", encoding="utf-8")
+    else:
+        print(text)
+    return 0 if document["sound"] and document["within_noise"] else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,327 @@
+"""Scenarios × estimators × seeds: how fast each adapts, and what it does on the way."""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import integer
+from piezoest.bench.candidates import candidate
+from piezoest.bench.estimators import REFERENCE, find_estimators
+from piezoest.bench.metrics import Metrics, measure
+from piezoest.bench.scenarios import SCENARIOS, Case
+from piezoest.compensators import InverseCompensator, LinearCompensator, VoltageLimits
+from piezoest.estimators.rls import HysteresisRLS
+from piezoest.models import LinearGain
+from piezoest.supervisor import Supervisor
+from piezoest.tracking import TrackingRecord, track
+
+LIMITS = VoltageLimits(-100.0, 100.0)  # V, the stage's
+TRANSFER = 0.01  # s, of a bumpless change of model: the compensators' default at 50 kHz
+# Linear feed-forward learns its gain from whole loops, at any frequency; 0.4 s at 5 Hz.
+LINEAR_MEMORY = 2.0  # periods
+FIXED_MEMORIES = (0.1, 0.4, 1.0)  # s
+SOON = 2  # periods, within which a change should be over
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What one process does at a time: linear feed-forward and some estimators on one case.
+
+    Parameters
+    ----------
+    scenario : str
+        Name in `SCENARIOS`.
+    seed : int
+        Start of the random numbers.
+    estimators : tuple of str
+        As `piezoest.bench.candidates.candidate` reads them.
+    overrides : dict
+        Fields of `piezoest.bench.scenarios.Conditions`.
+    guard : bool
+        Whether the supervisor of the ring is on.
+    """
+
+    scenario: str
+    seed: int
+    estimators: tuple[str, ...]
+    overrides: dict[str, Any] = field(default_factory=dict)
+    guard: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What one estimator made of one case.
+
+    Parameters
+    ----------
+    scenario : str
+        Name in `SCENARIOS`.
+    seed : int
+        Start of the random numbers.
+    estimator : str
+        As it was asked for, or "linear feed-forward".
+    amplitude : float
+        After the change [µm].
+    metrics : Metrics or None
+        None where it failed.
+    failure : str or None
+        What it raised.
+    """
+
+    scenario: str
+    seed: int
+    estimator: str
+    amplitude: float
+    metrics: Metrics | None
+    failure: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-safe dictionary, numbers that are not finite as null."""
+        return dict(_json_safe(asdict(self)))
+
+
+def default_estimators() -> tuple[str, ...]:
+    """What is compared if nothing is asked for: the defaults, and the paper's law with fixed memories."""
+    public = find_estimators()
+    fixed = [f"HysteresisRLS(memory={memory:g})" for memory in FIXED_MEMORIES]
+    names = ("HysteresisRLS", *fixed, "HysteresisEKF", "OutputErrorRLS")
+    return tuple(name for name in names if name.partition("(")[0] in public)
+
+
+def follow(case: Case, estimator: str | None, *, guard: bool = False) -> TrackingRecord:
+    """Send a case round the ring.
+
+    Parameters
+    ----------
+    case : Case
+        Reference, stage and start.
+    estimator : str or None
+        As `piezoest.bench.candidates.candidate` reads it; None for linear feed-forward.
+    guard : bool
+        Whether the supervisor of the ring is on.
+
+    Returns
+    -------
+    TrackingRecord
+
+    Raises
+    ------
+    ValueError
+        If the estimator is unknown.
+    """
+    rate = case.sample_rate
+    transfer = max(1, round(TRANSFER * rate))
+    compensator: LinearCompensator | InverseCompensator
+    if estimator is None:
+        memory = LINEAR_MEMORY * case.period / rate
+        made: Any = HysteresisRLS(rate, initial_model=case.linear_start, memory=memory)
+        compensator = LinearCompensator(case.linear_start, LIMITS, transfer_samples=transfer)
+    else:
+        made = candidate(estimator)(rate, case.start)
+        start = case.linear_start if isinstance(made.model, LinearGain) else case.start
+        compensator = InverseCompensator(start, LIMITS, transfer_samples=transfer)
+    return track(
+        case.reference,
+        stage=case.new_stage(),
+        compensator=compensator,
+        estimator=made,
+        update_interval=case.update_interval,
+        supervisor=Supervisor(rate, window=case.period / rate) if guard else None,
+    )
+
+
+def play(job: Job) -> list[Run]:
+    """Run a job; what an estimator raises is its own failure.
+
+    Parameters
+    ----------
+    job : Job
+        The runs.
+
+    Returns
+    -------
+    list of Run
+        Linear feed-forward first.
+    """
+    case = SCENARIOS[job.scenario].build(job.seed, **job.overrides)
+    linear = follow(case, None)
+    runs = [Run(job.scenario, job.seed, REFERENCE, case.amplitude, measure(linear, linear, case))]
+    for estimator in job.estimators:
+        metrics, failure = None, None
+        try:
+            metrics = measure(follow(case, estimator, guard=job.guard), linear, case)
+        except Exception as error:
+            failure = f"{type(error).__name__}: {error}"
+        runs.append(Run(job.scenario, job.seed, estimator, case.amplitude, metrics, failure))
+    return runs
+
+
+def jobs_for(
+    scenarios: Sequence[str], estimators: Sequence[str], seeds: Iterable[int], overrides: dict[str, Any]
+) -> list[Job]:
+    """Every scenario with every seed.
+
+    Parameters
+    ----------
+    scenarios : sequence of str
+        Names in `SCENARIOS`.
+    estimators : sequence of str
+        As `piezoest.bench.candidates.candidate` reads them.
+    seeds : iterable of int
+        Starts of the random numbers.
+    overrides : dict
+        Fields of `piezoest.bench.scenarios.Conditions`.
+
+    Returns
+    -------
+    list of Job
+
+    Raises
+    ------
+    ValueError
+        If a scenario or an estimator is unknown.
+    """
+    if unknown := [name for name in scenarios if name not in SCENARIOS]:
+        raise ValueError(f"scenario {', '.join(unknown)}: choose of {', '.join(SCENARIOS)}")
+    for estimator in estimators:
+        candidate(estimator)
+    named = tuple(estimators)
+    return [Job(name, seed, named, overrides) for seed in seeds for name in scenarios]
+
+
+def in_parallel(jobs: Sequence[Job], processes: int | None = None) -> Iterator[list[Run]]:
+    """Run jobs over the cores, in no particular order.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+        To run.
+    processes : int, optional
+        How many; default one for each core, 1 runs them here.
+
+    Yields
+    ------
+    list of Run
+        Of each job as it is done.
+    """
+    processes = integer("processes", os.cpu_count() or 1 if processes is None else processes, 1)
+    if processes == 1 or len(jobs) == 1:
+        yield from map(play, jobs)
+        return
+    # Numba and forked processes do not go together.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(processes, len(jobs)), mp_context=context) as pool:
+        try:
+            queue = iter(jobs)
+            pending: set[Future[list[Run]]] = set()
+            while True:
+                for job in queue:
+                    pending.add(pool.submit(play, job))
+                    if len(pending) >= 2 * processes:
+                        break
+                if not pending:
+                    return
+                done, pending = wait(pending, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield future.result()
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+QUANTITIES = (
+    "settling_periods",
+    "periods_to_final",
+    "worst_error",
+    "settled_max",
+    "settled_rms",
+    "excursion",
+    "ratio",
+    "run_ratio",
+    "worst_ratio",
+    "rest_excursion",
+    "first_after_rest",
+)
+
+
+def summarise(runs: Iterable[Run]) -> list[dict[str, Any]]:
+    """Median and 95 % quantile of every number, for each scenario and estimator.
+
+    Parameters
+    ----------
+    runs : iterable of Run
+        In any order.
+
+    Returns
+    -------
+    list of dict
+        Sorted by scenario; a run that failed or did not settle counts as infinite, which
+        stands as null.
+    """
+    groups: dict[tuple[str, str], list[Run]] = {}
+    for run in runs:
+        groups.setdefault((run.scenario, run.estimator), []).append(run)
+    order = list(SCENARIOS)
+    rows = [_summary(key, groups[key]) for key in sorted(groups, key=lambda key: order.index(key[0]))]
+    return [dict(_json_safe(row)) for row in rows]
+
+
+def _summary(key: tuple[str, str], runs: list[Run]) -> dict[str, Any]:
+    soon = [run.metrics is not None and _infinite(run.metrics.settling_periods) <= SOON for run in runs]
+    row: dict[str, Any] = {
+        "scenario": key[0],
+        "estimator": key[1],
+        "runs": len(runs),
+        "failures": sum(run.metrics is None for run in runs),
+        "settled_soon": float(np.mean(soon)),
+        "diverged": sum(run.metrics is None or run.metrics.diverged for run in runs),
+        "diverged_in_a_period": sum(run.metrics is None or run.metrics.diverged_in_a_period for run in runs),
+    }
+    for quantity in QUANTITIES:
+        values = [_quantity(run, quantity) for run in runs]
+        known = [math.inf if math.isnan(value) else value for value in values if value is not None]
+        # The quantile is a value that occurred: no mean with an infinite neighbour.
+        row[quantity] = {
+            "median": float(np.quantile(known, 0.5, method="inverted_cdf")) if known else None,
+            "q95": float(np.quantile(known, 0.95, method="inverted_cdf")) if known else None,
+        }
+    transients = [run.metrics.errors for run in runs if run.metrics is not None]
+    row["transient"] = np.median(transients, axis=0).tolist() if transients else []
+    return row
+
+
+def _quantity(run: Run, quantity: str) -> float | None:
+    """A number of a run; None where the scenario has no such number."""
+    metrics = run.metrics
+    if metrics is None:
+        return math.inf
+    if quantity == "first_after_rest":
+        if metrics.rest_excursion is None or metrics.before_max is None:
+            return None
+        return metrics.errors[0] / metrics.before_max
+    value = getattr(metrics, quantity)
+    if quantity in ("settling_periods", "periods_to_final"):
+        return _infinite(value)
+    return None if value is None else float(value)
+
+
+def _infinite(periods: int | None) -> float:
+    return math.inf if periods is None else float(periods)
+
+
+def _json_safe(value: Any) -> Any:
+    """The same with plain lists, and null for what is not finite."""
+    if isinstance(value, dict):
+        return {key: _json_safe(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_json_safe(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,271 @@
+"""The benchmark of adaptation: candidates, runs, summaries and the command, on tiny selections."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import math
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+import piezoest as pz
+from piezoest.bench import adaptation as bench
+from piezoest.bench.adaptation_report import criteria
+from piezoest.bench.candidates import candidate
+from piezoest.bench.scenarios import RIGHT_MODEL, SCENARIOS
+from piezoest.cli import app
+from piezoest.policies import DeadZone, NormBound
+
+FS = 4000.0
+SMALL: dict[str, Any] = {"sample_rate": FS, "before": 2, "after": 4, "rest": 0.4, "drift": 1.0, "updates": 40}
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+
+OWN = """
+class Still:
+    def __init__(self, sample_rate, initial_model, size=1.0):
+        self.model = initial_model
+        self.size = size
+
+    model = None
+
+    def step(self, u, x):
+        pass
+
+class Broken(Still):
+    def step(self, u, x):
+        raise RuntimeError("no idea")
+"""
+
+
+def run(*arguments: object) -> Result:
+    words = ["bench", "adaptation", *(str(argument) for argument in arguments)]
+    return CliRunner().invoke(app, words, env={"COLUMNS": "80"})
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "own_estimators_of_adaptation.py").write_text(OWN, encoding="utf-8")
+    return "own_estimators_of_adaptation"
+
+
+def load_script(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, BENCHMARKS / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_candidates(own: str) -> None:
+    made = candidate("HysteresisRLS(memory=0.2, policies=(NormBound(limit=50.0), DeadZone()))")(
+        FS, RIGHT_MODEL
+    )
+    expected = pz.HysteresisRLS(
+        FS, initial_model=RIGHT_MODEL, memory=0.2, policies=(NormBound(50.0), DeadZone())
+    )
+    assert made.to_dict() == expected.to_dict()
+    plain = candidate("HysteresisEKF")(FS, RIGHT_MODEL)
+    assert plain.to_dict() == pz.HysteresisEKF(FS, initial_model=RIGHT_MODEL).to_dict()
+    mine = candidate(f"{own}:Still(size=-2)")(FS, RIGHT_MODEL)
+    assert (mine.model, mine.size) == (RIGHT_MODEL, -2)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("NoSuch", "choose of"),
+        ("HysteresisRLS(0.2)", "needs its name"),
+        ("HysteresisRLS(memory=)", "invalid syntax"),
+        ("HysteresisRLS(memory=0.2", "never closed"),
+        ("HysteresisRLS(memory=0.2) + 1", "write it as"),
+        ("HysteresisRLS(memory=later)", "no number"),
+        ("HysteresisRLS(memory=open())", "no policy"),
+        ("HysteresisRLS(policies=(DeadZone(size=1),))", "size"),
+        ("HysteresisRLS(memry=0.2)", "takes no memry"),
+        ("nonsense:", "module:Class"),
+    ],
+)
+def test_refuses_what_is_no_candidate(text: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        candidate(text)
+
+
+def test_default_estimators() -> None:
+    names = bench.default_estimators()
+    assert names[:4] == (
+        "HysteresisRLS",
+        "HysteresisRLS(memory=0.1)",
+        "HysteresisRLS(memory=0.4)",
+        "HysteresisRLS(memory=1)",
+    )
+    assert "HysteresisEKF" in names
+    assert ("OutputErrorRLS" in names) == hasattr(pz, "OutputErrorRLS")
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_scenario_runs(name: str) -> None:
+    runs = bench.play(bench.Job(name, 1, ("HysteresisEKF",), SMALL))
+    assert [each.estimator for each in runs] == ["linear feed-forward", "HysteresisEKF"]
+    for each in runs:
+        assert each.failure is None
+        assert each.metrics is not None
+        assert math.isfinite(each.metrics.settled_max)
+        assert len(each.metrics.errors) == (5 if name == "drift" else 4)
+    linear, adaptive = (each.metrics for each in runs)
+    assert linear is not None
+    assert adaptive is not None
+    assert linear.ratio == linear.run_ratio == linear.worst_ratio == 1.0
+    assert adaptive.linear_settled_max == linear.settled_max
+    assert (adaptive.rest_excursion is not None) == (name == "dwell")
+    json.dumps([each.to_dict() for each in runs], allow_nan=False)
+
+
+def test_voltage_stays_within_the_stage() -> None:
+    case = SCENARIOS["cold-start"].build(0, **{**SMALL, "amplitude": 30.0})
+    for estimator in (None, "HysteresisRLS(memory=0.02)"):
+        assert np.max(np.abs(bench.follow(case, estimator).voltage)) <= 100.0
+
+
+def test_jobs_and_processes_give_the_same_runs() -> None:
+    jobs = bench.jobs_for(["cold-start", "noise"], ["HysteresisEKF"], range(2), SMALL)
+    assert [(job.scenario, job.seed) for job in jobs] == [
+        ("cold-start", 0), ("noise", 0), ("cold-start", 1), ("noise", 1),
+    ]  # fmt: skip
+    here = [each for some in bench.in_parallel(jobs, 1) for each in some]
+    there = [each for some in bench.in_parallel(jobs, 2) for each in some]
+    assert sorted(map(repr, here)) == sorted(map(repr, there))
+    assert bench.summarise(here) == bench.summarise(there)
+    with pytest.raises(ValueError, match="nowhere"):
+        bench.jobs_for(["nowhere"], [], range(1), {})
+
+
+def test_summary_counts_what_did_not_settle_as_infinite(own: str) -> None:
+    job = bench.Job("cold-start", 0, (f"{own}:Broken", f"{own}:Still"), SMALL)
+    runs = bench.play(job)
+    rows = {row["estimator"]: row for row in bench.summarise(runs)}
+    broken, still = rows[f"{own}:Broken"], rows[f"{own}:Still"]
+    assert runs[1].failure == "RuntimeError: no idea"
+    assert (broken["failures"], broken["diverged"], broken["settled_soon"]) == (1, 1, 0.0)
+    assert broken["settled_max"] == {"median": None, "q95": None}
+    assert broken["transient"] == []
+    assert (still["failures"], still["runs"]) == (0, 1)
+    assert still["settling_periods"]["median"] is None
+    assert still["excursion"]["median"] == 0.0
+    assert still["rest_excursion"] == {"median": None, "q95": None}
+    assert len(still["transient"]) == 4
+
+
+def row(scenario: str, estimator: str, **values: float | None) -> dict[str, Any]:
+    numbers = {"settled_max": 0.02, "ratio": 0.02, "rest_excursion": 1e-4, "first_after_rest": 1.0, **values}
+    found: dict[str, Any] = {key: {"median": value, "q95": value} for key, value in numbers.items()}
+    return {"scenario": scenario, "estimator": estimator, "settled_soon": 1.0, "diverged": 0, **found}
+
+
+def test_criteria() -> None:
+    rows = [
+        row("cold-start", "HysteresisRLS"),
+        row("cold-start", "HysteresisRLS(memory=0.4)", settled_max=0.018),
+        row("cold-start", "HysteresisRLS(memory=1)", settled_max=None),
+        row("cold-start", "OutputErrorRLS", ratio=0.04),
+        row("dwell", "HysteresisRLS", first_after_rest=2.0),
+    ]
+    found = {each["what"]: (each["value"], each["met"]) for each in criteria(rows)}
+    assert found == {
+        "cold-start: part settled within 2 periods": (1.0, True),
+        "cold-start: settled error over the best fixed memory's": (pytest.approx(0.02 / 0.018), True),
+        "cold-start, OutputErrorRLS: settled error over linear feed-forward's": (0.04, False),
+        "dwell: parameters' excursion": (1e-4, True),
+        "dwell: first error after over last before": (2.0, False),
+        "runs that diverged": (0.0, True),
+    }
+    assert criteria([]) == []
+
+
+SHORT = ("--scenario", "cold-start", "--sample-rate", 4000, "--periods", 4, "--jobs", 1)
+
+
+def test_command_end_to_end(own: str) -> None:
+    own_one = f"{own}:Broken"
+    result = run(
+        *SHORT, "--seeds", 2, "--estimator", "HysteresisEKF", "--estimator", own_one, "--json", "a.json"
+    )
+    assert result.exit_code == 0, result.output
+    for word in ("cold-start", "linear feed-forward", "HysteresisEKF", "2 seeds at 4000 Hz", "no idea"):
+        assert word in result.stdout
+    assert "2 of 2 cases" in result.stderr
+    document = json.loads(Path("a.json").read_text(encoding="utf-8"))
+    assert document["suite"] == "adaptation"
+    assert {"cpu", "cores", "platform", "python"} <= set(document["machine"])
+    assert document["versions"]["piezoest"] == pz.__version__
+    assert document["date"].endswith("+00:00")
+    assert document["seeds"] == 2
+    assert document["conditions"] == {"sample_rate": 4000.0, "after": 4}
+    assert document["estimators"] == ["HysteresisEKF", own_one]
+    assert [each["seed"] for each in document["runs"]] == [0, 0, 0, 1, 1, 1]
+    assert len(document["failures"]) == 2
+    assert len(document["summary"]) == 3
+
+
+def test_command_prints_json_alone() -> None:
+    result = run(*SHORT, "--seeds", 1, "--estimator", "HysteresisRLS", "--json", "-")
+    assert result.exit_code == 0
+    document = json.loads(result.stdout)
+    assert {each["what"] for each in document["criteria"]} == {
+        "cold-start: part settled within 2 periods",
+        "runs that diverged",
+    }
+
+
+def test_command_refuses_wrong_words(tmp_path: Path) -> None:
+    for arguments in (
+        ("--scenario", "nowhere"),
+        ("--estimator", "NoSuch"),
+        ("--seeds", 0),
+        ("--json", tmp_path / "nowhere" / "a.json"),
+    ):
+        assert run(*arguments).exit_code == 2, arguments
+
+
+def test_monte_carlo_resumes(tmp_path: Path) -> None:
+    script = load_script("monte_carlo")
+    runs = [script.draw(number, script.TUNED) for number in range(400)]
+    assert runs[7] == script.draw(7, script.TUNED)
+    assert {each["scenario"] for each in runs} == set(SCENARIOS)
+    for key, (low, high) in (("amplitude", (0.5, 10.0)), ("frequency", (0.5, 20.0)), ("noise", (1e-4, 3e-2))):
+        values = [each["conditions"][key] for each in runs]
+        assert low <= min(values) < 1.2 * low
+        assert high / 1.2 < max(values) <= high
+    result = script.one(script.draw(0, "HysteresisEKF"))
+    assert result["unguarded"]["ratio"] > 0.0
+    assert result["guarded"]["ratio"] > 0.0
+    path = tmp_path / "runs.jsonl"
+    path.write_text(json.dumps(result) + "\n" + '{"number": 1, "cut', encoding="utf-8")
+    assert list(script.finished(path, "HysteresisEKF")) == [0]
+    assert script.finished(path, "HysteresisRLS") == {}
+    found = script.summary([result])
+    assert found["runs"] == 1
+    assert found["unguarded"]["failures"] == found["guarded"]["failures"] == 0
+
+
+def test_soak_judges() -> None:
+    script = load_script("soak")
+    estimator = pz.HysteresisRLS(50_000.0)
+    u, x = script.stationary_loop()
+    estimator.run(u[:50_000], x[:50_000], every=50_000)
+    first = script.check(estimator)
+    assert first["sound"]
+    assert first["samples"] == 50_000
+    n = estimator.theta.size
+    scatter = np.full(n, 1e-3)
+    assert script.verdict([first, first], scatter)["within_noise"]
+    drifted = [{**first, "theta": (estimator.theta + k * 1e-3).tolist()} for k in range(20)]
+    assert not script.verdict(drifted, scatter)["within_noise"]
+    assert not script.verdict([first, {**first, "sound": False}], scatter)["sound"]

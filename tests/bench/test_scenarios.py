@@ -1,0 +1,171 @@
+"""Scenarios: the same seed the same case, each with what its name says."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pytest
+
+from piezoest.bench.scenarios import (
+    DRIFT,
+    GAIN_RAMP,
+    NOISE,
+    RIGHT_GAIN,
+    RIGHT_MODEL,
+    SCENARIOS,
+    Case,
+)
+from piezoest.signals import check_continuity
+
+NAMES = [
+    "cold-start", "amplitude-switch", "amplitude-drop", "gain-step", "drift",
+    "dwell", "prbs", "random-walk", "two-tone", "noise",
+]  # fmt: skip
+SMALL: dict[str, Any] = {"sample_rate": 4000.0, "before": 3, "after": 4, "rest": 0.5, "drift": 1.0}
+
+
+def case(name: str, seed: int = 0, **overrides: Any) -> Case:
+    return SCENARIOS[name].build(seed, **{**SMALL, **overrides})
+
+
+def factors(made: Case) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """The stage's gain at every sample."""
+    times, values = np.array(made.gain_schedule or ((0.0, 1.0),)).T
+    return np.interp(made.reference.time, times, values)
+
+
+def test_names_are_for_good() -> None:
+    assert list(SCENARIOS) == NAMES
+    assert all(scenario.name == name and scenario.description for name, scenario in SCENARIOS.items())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_seed_gives_the_same_case_and_the_same_stage(name: str) -> None:
+    first, again, other = case(name, 3), case(name, 3), case(name, 4)
+    for field in fields(Case):
+        if field.name != "reference":
+            assert getattr(first, field.name) == getattr(again, field.name), field.name
+    np.testing.assert_array_equal(first.reference.values, again.reference.values)
+    u = 5.0 * np.asarray(first.reference)
+    np.testing.assert_array_equal(first.new_stage().run(u), again.new_stage().run(u))
+    assert np.any(first.start.theta != other.start.theta)
+    assert np.any(first.new_stage().run(u) != other.new_stage().run(u))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_case_is_fit_for_the_ring(name: str) -> None:
+    for seed in range(20):
+        made = case(name, seed)
+        assert made.start.is_admissible
+        assert made.linear_start.is_admissible
+        assert 0 <= made.change <= len(made.reference) - made.period
+        assert made.new_stage().sample_rate == made.sample_rate == 4000.0
+        spread = 0.1 if made.change else 0.5
+        assert np.max(np.abs(made.start.theta / RIGHT_MODEL.theta - 1.0)) <= spread
+        assert abs(made.linear_start.gain / RIGHT_GAIN.gain - 1.0) <= spread
+        assert np.max(np.abs(made.reference.values)) <= 1.1 * max(made.amplitude, 7.5)
+    check_continuity(made.reference.values, made.sample_rate)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_amplitude_frequency_and_sample_rate_scale(name: str) -> None:
+    base, large = case(name), case(name, amplitude=2.0, frequency=2.5, rest=1.0, drift=2.0)
+    assert large.period == 2.0 * base.period
+    assert large.change == 2 * base.change
+    assert large.update_interval == 2 * base.update_interval
+    assert len(large.reference) == 2 * len(base.reference)
+    ratio = large.reference.amplitude / base.reference.amplitude
+    assert ratio == pytest.approx(large.amplitude / base.amplitude, rel=1e-3)
+    finer = case(name, sample_rate=8000.0)
+    assert finer.period == 2.0 * base.period
+    np.testing.assert_allclose(finer.reference.values[::2], base.reference.values, atol=0.02)
+    np.testing.assert_array_equal(finer.start.theta, base.start.theta)
+
+
+def test_starts_fill_their_range() -> None:
+    starts = np.array([case("cold-start", seed).start.theta for seed in range(200)]) / RIGHT_MODEL.theta
+    assert np.all(starts.min(axis=0) < 0.65)
+    assert np.all(starts.max(axis=0) > 1.35)
+
+
+@pytest.mark.parametrize(
+    ("name", "before", "after"), [("amplitude-switch", 2.5, 7.5), ("amplitude-drop", 7.5, 2.5)]
+)
+def test_amplitudes_change_where_the_case_says(name: str, before: float, after: float) -> None:
+    made = case(name)
+    assert made.amplitude == pytest.approx(after)
+    r = np.abs(made.reference.values)
+    assert np.max(r[: made.change]) == pytest.approx(before, rel=0.05)
+    assert np.max(r[made.change :]) == pytest.approx(after, rel=0.05)
+    assert r[made.change] < 1e-9
+
+
+def test_gain_steps_within_a_twentieth_of_a_period() -> None:
+    phases = []
+    for seed in range(30):
+        made = case("gain-step", seed)
+        factor = factors(made)
+        ramp = round(GAIN_RAMP * made.period)
+        assert np.all(factor[: made.change] == 1.0)
+        np.testing.assert_allclose(factor[made.change + ramp + 1 :], 0.8)
+        assert 3 * made.period <= made.change < 4 * made.period
+        phases.append(made.change / made.period % 1.0)
+    assert min(phases) < 0.2 < 0.8 < max(phases)
+
+
+def test_drift_is_one_per_cent_a_second_to_the_end() -> None:
+    made = case("drift", drift=2.0)
+    factor = factors(made)
+    assert np.all(factor[: made.change + 1] == 1.0)
+    slope = np.diff(factor[made.change :]) * made.sample_rate
+    np.testing.assert_allclose(slope, DRIFT)
+    assert (len(made.reference) - made.change) / made.sample_rate == pytest.approx(2.0)
+    assert SCENARIOS["drift"].build(0, sample_rate=1000.0).reference.duration == pytest.approx(32.0)
+
+
+def test_dwell_rests_and_goes_on() -> None:
+    made = case("dwell")
+    assert made.rest is not None
+    first, end = made.rest
+    assert made.change == end
+    assert np.all(made.reference.values[first:end] == 0.0)
+    assert (end - first) / made.sample_rate == 0.5
+    np.testing.assert_array_equal(made.reference.values[end : end + 800], made.reference.values[:800])
+
+
+def test_noise_is_drawn_evenly_in_its_logarithm() -> None:
+    noise = np.array([case("noise", seed).noise for seed in range(200)], dtype=float)
+    assert NOISE[0] <= noise.min() < 2.0 * NOISE[0]
+    assert 0.5 * NOISE[1] < noise.max() <= NOISE[1]
+    assert np.median(noise) == pytest.approx(np.sqrt(NOISE[0] * NOISE[1]), rel=0.5)
+    assert case("noise", noise=0.002).noise == 0.002
+    assert case("cold-start", noise=0.002).new_stage().gauge.noise == 0.002
+    assert case("cold-start").new_stage().gauge.noise == 0.0012
+
+
+def test_minor_loops_and_other_references() -> None:
+    turns = {name: int(np.sum(np.diff(np.sign(np.diff(case(name).reference.values))) != 0)) for name in NAMES}
+    # A triangle turns twice a period; the fast tone of the two makes it turn seven times in five.
+    assert turns["cold-start"] == 8
+    assert turns["two-tone"] == 4 * 14
+    assert turns["random-walk"] > 8
+    assert np.any(case("random-walk", 1).reference.values != case("random-walk", 2).reference.values)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        ({"sample_rate": 0.0}, "sample_rate"),
+        ({"amplitude": -1.0}, "amplitude"),
+        ({"noise": -1.0}, "noise"),
+        ({"before": 0}, "before"),
+        ({"updates": 0}, "updates"),
+    ],
+)
+def test_refuses_wrong_conditions(overrides: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        case("cold-start", **overrides)
+    with pytest.raises(TypeError):
+        case("cold-start", amplitud=1.0)
