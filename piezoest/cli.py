@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import os
 import sys
@@ -26,18 +27,23 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Exit codes: 0 done, 1 the input cannot be used, 2 wrong usage.",
+    epilog="Exit codes: 0 done, 1 the input cannot be used, 2 wrong usage, 130 interrupted.",
 )
 
 app.add_typer(bench, name="bench")
 
 USER_ERROR, INTERRUPTED = 1, 130
+FIGURE_FORMATS = (".png", ".pdf", ".svg", ".jpg", ".jpeg")
 
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 
 
 def main() -> None:
     """Run the command line."""
+    for stream in (sys.stdout, sys.stderr):
+        # A µ or a frame that the terminal's encoding lacks must not end a command.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
     try:
         app(prog_name="piezoest")
     except KeyboardInterrupt:
@@ -123,7 +129,7 @@ def demo(
     A smoothed triangle of 5 µm at 5 Hz, noise and quantisation on, from wrong start parameters.
     """
     with _errors(debug):
-        _check_writable(output)
+        _check_figure(output)
         with _progress("loading (compiles once after the installation)") as say:
             from piezoest.demo import run_demo
 
@@ -201,9 +207,10 @@ def identify(
     """
     with _errors(debug):
         figure = None if no_plot else plot or Path(f"{file.stem}_identified.png")
-        for target in (figure, output):
-            if target is not None:
-                _check_writable(target)
+        if figure is not None:
+            _check_figure(figure, keep=(file,))
+        if output is not None:
+            _check_writable(output, keep=(file,) if figure is None else (file, figure))
         with _progress("loading (compiles once after the installation)") as say:
             from piezoest.identification import identify as run
             from piezoest.records import read_record
@@ -292,7 +299,7 @@ def compensate(
     The voltage starts from 0 V without hysteresis, or from the limit nearest to it.
     """
     with _errors(debug):
-        _check_writable(output)
+        _check_writable(output, keep=(reference,) if parameters is None else (reference, parameters))
         with _progress("loading (compiles once after the installation)"):
             from piezoest.compensators import InverseCompensator, VoltageLimits
             from piezoest.records import read_reference, write_columns
@@ -340,7 +347,7 @@ def _model(path: Path | None, given: dict[str, float | None], offset: float | No
         raise ValueError(f"{path} is not JSON: {error}") from None
     if isinstance(data, dict) and isinstance(data.get("model"), dict):
         data = data["model"]
-    if not isinstance(data, dict):
+    if not isinstance(data, dict) or not isinstance(data.get("model", ""), str):
         raise ValueError(f"{path} holds no model: write it with identify --output")
     data.setdefault("model", "ColemanHodgdon")
     try:
@@ -369,8 +376,17 @@ def _number(name: str, text: str) -> float:
         raise ValueError(f"{name} must be a number or auto, got {text!r}") from None
 
 
-def _check_writable(path: Path) -> None:
-    """Refuse before the work is done, not after."""
+def _check_figure(path: Path, keep: tuple[Path, ...] = ()) -> None:
+    """Refuse a name that no figure can have, and what `_check_writable` refuses."""
+    if path.suffix.lower() not in FIGURE_FORMATS:
+        raise ValueError(f"{path}: a figure's name must end in one of {' '.join(FIGURE_FORMATS)}")
+    _check_writable(path, keep)
+
+
+def _check_writable(path: Path, keep: tuple[Path, ...] = ()) -> None:
+    """Refuse before the work is done, not after; files to keep are not written over."""
+    if any(path.resolve() == other.resolve() for other in keep):
+        raise ValueError(f"{path} is named twice: give what is written a file of its own")
     if path.is_dir():
         raise ValueError(f"{path} is a folder: name a file in it")
     if not path.resolve().parent.is_dir():

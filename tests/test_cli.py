@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -155,7 +156,9 @@ def test_mistakes_in_logs(log: Path) -> None:
     refused(run("identify", log, "--delay", "soon"), "--delay")
     refused(run("identify", log, "--train", 2), "train")
     refused(run("identify", log, "--plot", "no/such/figure.png"), "no folder")
-    refused(run("identify", log, "--plot", "figure.xyz"), "xyz")
+    for name in ("figure.xyz", "figure"):
+        refused(run("identify", log, "--plot", name), name, ".png")
+        refused(run("demo", "--output", name), name, ".png")
     lines = log.read_text().splitlines()
     Path("dwell.csv").write_text("\n".join([lines[0], *(f"{k / 100},5.0,{1 + k % 2}" for k in range(300))]))
     refused(run("identify", "dwell.csv"), "too little excitation", "5 V")
@@ -170,7 +173,13 @@ def test_mistakes_in_compensate(reference: Path) -> None:
         run("compensate", reference, *THETA, "--minimum", 5, "--maximum", 1, *out), "minimum must be below"
     )
     refused(run("compensate", reference, "-p", "none.json", *out), "none.json")
-    contents = {"{": "not JSON", "[1]": "no model", '{"model": "Foo"}': "Foo", '{"alpha": 1}': "describe"}
+    contents = {
+        "{": "not JSON",
+        "[1]": "no model",
+        '{"model": ["a"]}': "no model",
+        '{"model": "Foo"}': "Foo",
+        '{"alpha": 1}': "describe",
+    }
     for text, word in contents.items():
         Path("model.json").write_text(text)
         refused(run("compensate", reference, "-p", "model.json", *out), "model.json", word)
@@ -178,6 +187,23 @@ def test_mistakes_in_compensate(reference: Path) -> None:
     write_columns("jump.csv", {"time_s": np.arange(40.0), "r_um": np.repeat([0.0, 1.0], 20)})
     refused(run("compensate", "jump.csv", *THETA, *out), "the reference jumps")
     assert not Path("voltage.csv").exists()
+
+
+def test_nothing_is_written_over_what_was_read(log: Path, reference: Path) -> None:
+    refused(run("identify", log, "--no-plot", "--output", log), "log.csv", "named twice")
+    refused(run("identify", log, "--plot", "a.png", "--output", "./a.png"), "named twice")
+    refused(run("compensate", reference, *THETA, "-o", reference), "reference.csv", "named twice")
+    assert log.read_text().startswith("time_s,voltage_V")
+    assert reference.read_text().startswith("time_s,reference_um")
+
+
+def test_an_encoding_without_our_signs_is_no_mistake(log: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "piezoest", "identify", str(log), "--no-plot"],
+        capture_output=True, text=True, env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "held out" in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -93,6 +93,20 @@ def test_drift_is_found_and_said() -> None:
     assert any("drifts" in sentence for sentence in found.advice)
 
 
+def test_spikes_are_counted_and_said() -> None:
+    whole = made()
+    assert not any("spikes" in sentence for sentence in identify(whole).advice)
+    x = whole.displacement.copy()
+    x[[300, 700]] += 20.0
+    advice = identify(Record.from_arrays(whole.voltage, x, RATE)).advice
+    assert any(sentence.startswith("2 of the fitted samples are off") for sentence in advice)
+
+
+def test_what_is_no_record_is_refused_with_the_way_to_one() -> None:
+    with pytest.raises(ValueError, match=r"record must be a Record, got str: use read_record\(path\)"):
+        identify("log.csv")  # type: ignore[arg-type]
+
+
 def bad_records() -> dict[str, tuple[Record, str]]:
     u, time = voltage(), np.arange(voltage().size) / RATE
     noise = 1e-2 * np.random.default_rng(0).standard_normal(u.size)

@@ -214,3 +214,10 @@ def test_reference(tmp_path: Path) -> None:
 def test_columns_of_different_lengths_are_not_written(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="one length"):
         write_columns(tmp_path / "out.csv", {"a": [1.0], "b": [1.0, 2.0]})
+
+
+def test_numbers_that_no_stage_can_have_are_missing(tmp_path: Path) -> None:
+    record = read_record(log(tmp_path, line5="0.030,1e300,1.0", line9="0.070,1.0,-1e12"))
+    assert record.skipped == 2
+    assert any("2 samples are without usable numbers" in note for note in record.notes)
+    assert np.flatnonzero(~record.usable).tolist() == [3, 7]

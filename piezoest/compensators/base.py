@@ -99,7 +99,11 @@ class Compensator:
     def __init__(
         self, model: Model, limits: VoltageLimits | None, method: Method, transfer_samples: int
     ) -> None:
-        self._limits = VoltageLimits() if limits is None else limits
+        if limits is None:
+            limits = VoltageLimits()
+        elif not isinstance(limits, VoltageLimits):
+            raise ValueError(f"limits must be VoltageLimits(minimum, maximum), got {limits!r}")
+        self._limits = limits
         self._config = np.zeros(CONFIG)
         self._config[MINIMUM] = self._limits.minimum
         self._config[MAXIMUM] = self._limits.maximum
@@ -110,7 +114,12 @@ class Compensator:
             raise ValueError(f"method must be 'closed-form' or 'bogacki-shampine', got {method!r}")
         self._config[INTEGRATED] = method == "bogacki-shampine"
         if not self._accepts(model).is_admissible:
-            raise ValueError(f"model {model} is not admissible and has no inverse: use nearest_admissible()")
+            hint = (
+                "use nearest_admissible()"
+                if isinstance(model, ColemanHodgdon)
+                else "its gain must not be zero"
+            )
+            raise ValueError(f"model {model} is not admissible and has no inverse: {hint}")
         self._model = model
         self._projected = False
         self._start = model

@@ -27,7 +27,7 @@ class IntegralFeedback:
     Raises
     ------
     ValueError
-        If the gain or the sample rate is not above zero.
+        If the compensator is none, or the gain or the sample rate is not above zero.
 
     Notes
     -----
@@ -41,6 +41,10 @@ class IntegralFeedback:
     needs_measurement = True
 
     def __init__(self, compensator: Compensator, *, gain: float, sample_rate: float) -> None:
+        if not isinstance(compensator, Compensator):
+            raise ValueError(
+                f"compensator must be a LinearCompensator or an InverseCompensator, got {compensator!r}"
+            )
         self._compensator = compensator
         self._gain = positive("gain", gain)
         self._step_gain = self._gain / positive("sample_rate", sample_rate)

@@ -25,7 +25,8 @@ class InverseCompensator(Compensator):
     Raises
     ------
     ValueError
-        If the model is of another kind or not admissible, or the method is unknown.
+        If the model is of another kind or not admissible, the limits are no `VoltageLimits`, or the
+        method is unknown.
 
     Notes
     -----

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any
 
 from piezoest._checks import finite, positive
 
@@ -24,7 +26,7 @@ class VoltageLimits:
     Raises
     ------
     ValueError
-        If the range is empty, or the slew rate comes without a sample rate.
+        If a limit is no number, the range is empty, or the slew rate comes without a sample rate.
     """
 
     minimum: float = -math.inf
@@ -33,8 +35,11 @@ class VoltageLimits:
     sample_rate: float | None = None
 
     def __post_init__(self) -> None:
-        if math.isnan(self.minimum) or math.isnan(self.maximum) or not self.minimum < self.maximum:
-            raise ValueError(f"minimum must be below maximum, got {self.minimum} V and {self.maximum} V")
+        for name in ("minimum", "maximum"):
+            object.__setattr__(self, name, _bound(name, getattr(self, name)))
+        # Not >=: a limit that is NaN must be refused too.
+        if not self.minimum < self.maximum:
+            raise ValueError(f"minimum must be below maximum, got {self.minimum:g} V and {self.maximum:g} V")
         if self.slew_rate is not None:
             positive("slew_rate", self.slew_rate)
             if self.sample_rate is None:
@@ -53,3 +58,10 @@ class VoltageLimits:
     def rest(self) -> float:
         """The voltage within the range that is nearest to 0 V."""
         return finite("rest", min(max(0.0, self.minimum), self.maximum))
+
+
+def _bound(name: str, value: Any) -> float:
+    """One number, infinite or not."""
+    if not isinstance(value, Real):
+        raise ValueError(f"{name} must be a number of volts, got {value!r}: leave it out for no limit")
+    return float(value)

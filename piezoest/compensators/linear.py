@@ -22,7 +22,7 @@ class LinearCompensator(Compensator):
     Raises
     ------
     ValueError
-        If the model is of another kind or its gain is zero.
+        If the model is of another kind, its gain is zero, or the limits are no `VoltageLimits`.
     """
 
     __slots__ = ()

@@ -19,6 +19,8 @@ FEWEST_SAMPLES = 50
 TURN = 0.05
 FEWEST_TURNS = 2
 SMALLEST_SIGNAL_TO_NOISE = 10.0
+# Samples off the model by this many (robust) standard deviations are spikes.
+SPIKE = 20.0
 # A model whose loop is not known to this part of itself was not excited by the record.
 LARGEST_RELATIVE_ERROR = 0.5
 # The start is left out as long as it is off by this many (robust) standard deviations.
@@ -62,9 +64,14 @@ def identify(
     Raises
     ------
     ValueError
-        If the record is too short, its voltage excites too little (with the figure), its displacement
-        falls as the voltage rises, or an argument is out of its range.
+        If the record is no `Record` or too short, its voltage excites too little (with the figure), its
+        displacement falls as the voltage rises, or an argument is out of its range.
     """
+    if not isinstance(record, Record):
+        raise ValueError(
+            f"record must be a Record, got {type(record).__name__}: "
+            "use read_record(path) or Record.from_arrays(voltage, displacement, sample_rate)"
+        )
     train = fraction("train", train, 0.1, 0.9)
     trained = round(train * len(record))
     start_delay, fit_delay = _delay_argument(delay)
@@ -207,6 +214,13 @@ def _unsettled(residual: FloatArray) -> int:
     return min(2 * end, off.size)
 
 
+def _spikes(residual: FloatArray) -> int:
+    """Samples so far off that they are no part of the rest."""
+    known = residual[np.isfinite(residual)]
+    deviation = 1.4826 * float(np.median(np.abs(known)))
+    return int(np.sum(np.abs(known) > SPIKE * deviation)) if deviation > 0.0 else 0
+
+
 def _check_known(fit: fitting.Fit, errors: FloatArray, data: fitting.Data, turns: FloatArray) -> None:
     """Refuse a model of which the record leaves a parameter open."""
     model = fitting.model_of(fit.p, data)
@@ -238,7 +252,7 @@ def _advice(found: Identification, fit: fitting.Fit, data: fitting.Data, turns: 
     if abs(data.middle) > 0.1 * data.extent or abs(model.offset) > 0.1 * float(np.ptp(data.x[data.counts])):
         said.append(
             f"The loop is not centred at zero (voltage {data.middle:.3g} V, displacement "
-            f"{fit.p[fitting.CENTRE]:.4g} µm): use HysteresisRLS(offset=True)."
+            f"{fit.p[fitting.CENTRE]:.4g} µm): let HysteresisRLS estimate the offset, as it does by default."
         )
     if found.delay_estimated and found.delay > max(0.1, 2.0 * found.standard_errors["delay"]):
         said.append(
@@ -253,6 +267,12 @@ def _advice(found: Identification, fit: fitting.Fit, data: fitting.Data, turns: 
         said.append(
             "The fit lies on the edge of the admissible parameters: the best model beyond it has no inverse. "
             "Check signs and columns, or the delay."
+        )
+    if spikes := _spikes(fit.residual):
+        said.append(
+            f"{spikes} of the fitted samples {'is' if spikes == 1 else 'are'} off the model by more than "
+            f"{SPIKE:g} times what is usual: if these are spikes of the sensor, empty them in the log, for "
+            "they pull the fit."
         )
     tops = np.abs(turns - data.middle)
     if turns.size > 2 and np.ptp(tops[1:]) < 0.1 * data.extent:

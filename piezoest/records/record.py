@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, fraction, positive
+from piezoest._checks import WILDEST, FloatArray, array_1d, fraction, positive
 from piezoest.records.table import read_table
 from piezoest.records.timing import even_time, spread
 
@@ -28,7 +28,7 @@ class Record:
     time : array_like, shape (N,)
         [s].
     voltage, displacement : array_like, shape (N,)
-        [V], [µm]; NaN where a sample is missing.
+        [V], [µm]; NaN where a sample is missing. Numbers that no stage can have, beyond 1e9, become NaN.
     sample_rate : float
         [Hz].
     source : str
@@ -55,7 +55,7 @@ class Record:
     def __post_init__(self) -> None:
         for name in ("time", "voltage", "displacement"):
             values = array_1d(name, getattr(self, name), allow_nan=name != "time", minimum_length=2)
-            object.__setattr__(self, name, values)
+            object.__setattr__(self, name, values if name == "time" else _sane(values))
             if values.size != self.time.size:
                 raise ValueError(
                     f"{name} must have shape ({self.time.size},) as time has, got ({values.size},)"
@@ -182,7 +182,7 @@ def read_record(
     """
     wanted = ("voltage", "displacement") if sample_rate is not None else ("time", "voltage", "displacement")
     table = read_table(Path(path), wanted, dict(columns or {}))
-    voltage, displacement = table.values["voltage"], table.values["displacement"]
+    voltage, displacement = _sane(table.values["voltage"]), _sane(table.values["displacement"])
     notes = list(table.notes)
     if sample_rate is None:
         time, where, said = even_time(table)
@@ -198,6 +198,11 @@ def read_record(
         noun = "sample is" if skipped == 1 else "samples are"
         notes.append(f"{skipped} {noun} without usable numbers: skipped, the timing is kept")
     return Record(time, voltage, displacement, sample_rate, str(path), skipped, tuple(notes))
+
+
+def _sane(values: FloatArray) -> FloatArray:
+    """Values with NaN for what no stage can have."""
+    return np.where(np.abs(values) < WILDEST, values, np.nan)
 
 
 def read_reference(

@@ -130,6 +130,16 @@ def test_wrong_arguments() -> None:
         pz.VoltageLimits(1.0, -1.0)
     with pytest.raises(ValueError, match="slew_rate needs sample_rate"):
         pz.VoltageLimits(slew_rate=10.0)
+    with pytest.raises(ValueError, match="maximum must be a number of volts, got '100'"):
+        pz.VoltageLimits(maximum="100")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="minimum must be below maximum, got -inf V and nan V"):
+        pz.VoltageLimits(maximum=float("nan"))
+    with pytest.raises(ValueError, match=r"limits must be VoltageLimits\(minimum, maximum\), got \(0, 5\)"):
+        pz.InverseCompensator(MODEL, (0, 5))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="its gain must not be zero"):
+        pz.LinearCompensator(pz.LinearGain(0.0))
+    with pytest.raises(ValueError, match="compensator must be a LinearCompensator or"):
+        pz.IntegralFeedback(MODEL, gain=1.0, sample_rate=1e3)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="use InverseCompensator"):
         pz.LinearCompensator(MODEL)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="method must be"):
