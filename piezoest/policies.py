@@ -240,6 +240,8 @@ def select(policies: tuple[Policy, ...], kind: type[Policy]) -> Policy | None:
     ValueError
         If there are two of the kind, or something that is no policy.
     """
+    if not isinstance(policies, tuple | list):
+        raise ValueError(f"policies must be a tuple of policies, got {policies!r}")
     for policy in policies:
         if not isinstance(policy, Policy):
             raise ValueError(f"policies must be made of policies, got {policy!r}: see piezoest.policies")

@@ -194,20 +194,20 @@ class Compensator:
             projected=self._projected,
         )
 
-    def step(self, r: float) -> float:
+    def step(self, r: float | None) -> float:
         """Voltage for the next sample of the reference.
 
         Parameters
         ----------
         r : float
-            Reference displacement [µm]; NaN or infinity holds the last voltage.
+            Reference displacement [µm]; None, NaN or infinity holds the last voltage.
 
         Returns
         -------
         float
             Voltage [V], within the limits.
         """
-        return _step(self._state, self._config, r)
+        return _step(self._state, self._config, np.nan if r is None else r)
 
     def run(self, r: Any) -> FloatArray:
         """Voltages for a whole reference; continues from the current state, as a loop of `step`.

@@ -37,6 +37,6 @@ def model_from_dict(data: dict[str, Any]) -> Model:
         kind.__name__: kind for kind in (ColemanHodgdon, LinearGain, PrandtlIshlinskii)
     }
     name = data.get("model")
-    if name not in kinds:
+    if not isinstance(name, str) or name not in kinds:
         raise ValueError(f"model {name!r} is unknown: choose of {sorted(kinds)}")
     return kinds[name].from_dict(data)

@@ -249,6 +249,12 @@ def test_wrong_arguments() -> None:
         pz.HysteresisRLS(FS, time_base="seconds")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="policies holds 2 of NormBound"):
         pz.HysteresisRLS(FS, policies=(pz.policies.NormBound(), pz.policies.NormBound()))
+    with pytest.raises(ValueError, match="memory must be seconds, None or 'period', got 'foo'"):
+        pz.HysteresisRLS(FS, memory="foo")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="offset must be True, False or None"):
+        pz.HysteresisRLS(FS, offset="x")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="policies must be a tuple"):
+        pz.HysteresisRLS(FS, policies=3)  # type: ignore[arg-type]
     estimator = pz.HysteresisRLS(FS)
     with pytest.raises(ValueError, match="u and x must have the same length, got 3 and 2"):
         estimator.run([1.0, 2.0, 3.0], [1.0, 2.0])
