@@ -125,10 +125,8 @@ class HysteresisRLS(EstimatorBase):
             raise ValueError(f"initial_model must be a ColemanHodgdon or a LinearGain, got {initial!r}")
         if np.any(initial.theta == 0.0):
             raise ValueError(f"initial_model must have no parameter at zero, got {initial}")
-        if isinstance(memory, bool) or not (
-            memory is None or memory == "period" or isinstance(memory, float | int)
-        ):
-            raise ValueError(f"memory must be seconds, None or 'period', got {memory!r}")
+        if memory is not None and memory != "period":
+            memory = positive("memory", memory)
         if not isinstance(offset, bool | None):
             raise ValueError(f"offset must be True, False or None, got {offset!r}")
         if time_base == "continuous" and memory == "period":

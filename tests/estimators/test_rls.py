@@ -249,7 +249,7 @@ def test_wrong_arguments() -> None:
         pz.HysteresisRLS(FS, time_base="seconds")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="policies holds 2 of NormBound"):
         pz.HysteresisRLS(FS, policies=(pz.policies.NormBound(), pz.policies.NormBound()))
-    with pytest.raises(ValueError, match="memory must be seconds, None or 'period', got 'foo'"):
+    with pytest.raises(ValueError, match="memory must be one number, got 'foo'"):
         pz.HysteresisRLS(FS, memory="foo")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="offset must be True, False or None"):
         pz.HysteresisRLS(FS, offset="x")  # type: ignore[arg-type]
