@@ -10,7 +10,7 @@ export MPLBACKEND ?= Agg
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo test lint format types layers docs docs-live figures bench-smoke bench clean
+.PHONY: help venv demo calibrate test lint format types layers docs docs-live figures bench-smoke bench clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -42,6 +42,9 @@ venv: $(VENV)/.installed-dev  ## Set up .venv with everything a contributor need
 demo: $(VENV)/.installed  ## Run the demonstration: linear against adaptive compensation
 	$(BIN)/piezoest demo
 
+calibrate: $(VENV)/.installed  ## Fit the simulated stage to the paper's tables anew, in some ten minutes
+	$(BIN)/python calibration/calibrate_paper_stage.py
+
 # ---------------------------------------------------------------- checks
 
 test: $(VENV)/.installed-test  ## Run the tests (ARGS="-k name" passes options to pytest)
@@ -71,8 +74,12 @@ docs: $(VENV)/.installed-docs  ## Build the documentation into docs/_build/html;
 docs-live: $(VENV)/.installed-docs-live  ## Serve the documentation and rebuild it on every change
 	$(BIN)/sphinx-autobuild --watch piezoest --ignore "docs/gallery/*" --ignore "docs/generated/*" docs docs/_build/live
 
-figures: $(VENV)/.installed  ## Run the paper's experiment: numbers and figures of docs/paper.rst
+figures: $(VENV)/.installed  ## Make the numbers and figures of the documentation anew, in some minutes
 	$(BIN)/piezoest bench paper --json docs/data/paper.json --figures docs/figures/paper
+	$(BIN)/piezoest bench estimators --json docs/data/estimators.json
+	$(BIN)/python benchmarks/batch_fit.py --json docs/data/batch_fit.json
+	$(BIN)/python benchmarks/filterpy_parity.py --json docs/data/filterpy_parity.json
+	$(BIN)/python docs/consistency.py --json docs/data/consistency.json
 
 # ---------------------------------------------------------------- benchmarks
 
@@ -85,4 +92,4 @@ bench: $(VENV)/.installed  ## The same on a longer signal, written to benchmarks
 clean:  ## Remove builds, caches and generated pages, keep .venv
 	rm -rf build dist docs/_build docs/gallery docs/generated docs/sg_execution_times.rst
 	rm -rf .numba_cache .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
-	find piezoest tests benchmarks -type d -name __pycache__ -prune -exec rm -rf {} +
+	find piezoest tests benchmarks calibration -type d -name __pycache__ -prune -exec rm -rf {} +

@@ -4,16 +4,20 @@ Absolute times are the machine's; the ratios travel. The first fit in a process 
 functions and loads scipy.optimize: it is shown on a line of its own.
 
     python benchmarks/batch_fit.py [--repeats N] [--json FILE]
+
+The memory of a fit is the largest that a process of its own ever held (Linux only): it grows in
+proportion to the record.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import resource
+import multiprocessing
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +38,9 @@ LENGTHS = (20_001, 200_000)
 NOISE = 1e-3
 METHODS: tuple[Any, ...] = ("single-shooting", "multiple-shooting")
 HORIZON_SECONDS = 4.0
+# The first is what a process holds that fits hardly anything.
+MEMORY_LENGTHS = (1_000, 200_000, 400_000)
+STATUS = Path("/proc/self/status")
 
 
 @dataclass(frozen=True)
@@ -127,8 +134,42 @@ def horizon() -> list[Row]:
     return rows
 
 
+@dataclass(frozen=True)
+class MemoryRow:
+    """Largest memory of a process that makes one fit."""
+
+    method: str
+    samples: int
+    megabytes: float
+    bytes_per_sample: float | None
+
+
+def largest_memory(method: Any, samples: int) -> float:
+    """Largest memory [MB] of this process, after a fit."""
+    BatchFit(SAMPLE_RATE, method=method).fit(*record(samples))
+    (line,) = (line for line in STATUS.read_text(encoding="ascii").splitlines() if line.startswith("VmHWM"))
+    return float(line.split()[1]) / 1024.0
+
+
+def memories() -> list[MemoryRow]:
+    """Each method and length in a process of its own; nothing where the system does not tell."""
+    rows: list[MemoryRow] = []
+    if not STATUS.exists():
+        return rows
+    for method in METHODS:
+        least = 0.0
+        for samples in MEMORY_LENGTHS:
+            with multiprocessing.get_context("spawn").Pool(1) as pool:
+                found = pool.apply(largest_memory, (method, samples))
+            first = samples == MEMORY_LENGTHS[0]
+            least = found if first else least
+            grown = None if first else 2**20 * (found - least) / (samples - MEMORY_LENGTHS[0])
+            rows.append(MemoryRow(method, samples, found, grown))
+    return rows
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(
         description="Time the CasADi estimators against one compiled simulation of the record.",
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
@@ -148,13 +189,21 @@ def main() -> None:
             f"{row.name:<26}{row.samples:8d}{1e3 * row.seconds:11.2f}{1e3 * row.median_seconds:12.2f}"
             f"{row.simulations:13.0f}{row.worst_parameter_error:13.1e}  {row.solver}"
         )
-    # Linux counts it in kB.
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    print(f"\nlargest memory of the process: {memory:.0f} MB")
+    memory = memories()
+    if memory:
+        print(f"\n{'memory of a process':<26}{'samples':>8}{'MB':>11}{'bytes a sample':>17}")
+    for each in memory:
+        grown = "" if each.bytes_per_sample is None else f"{each.bytes_per_sample:17.0f}"
+        print(f"{each.method:<26}{each.samples:8d}{each.megabytes:11.0f}{grown}")
     if arguments.json is not None:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
-        document = {"machine": about, "rows": [asdict(row) for row in rows], "memory_mb": memory}
-        arguments.json.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+        document = {
+            "date": datetime.now(UTC).isoformat(timespec="seconds"),
+            "machine": about,
+            "rows": [asdict(row) for row in rows],
+            "memory": [asdict(row) for row in memory],
+        }
+        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

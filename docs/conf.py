@@ -10,6 +10,7 @@ from typing import Any
 import piezoest
 
 sys.path.insert(0, str(Path(__file__).parent))
+import estimators_page
 import paper_page
 
 project = "piezoest"
@@ -55,6 +56,7 @@ html_sidebars: dict[str, list[str]] = {
     "your_own_stage": [],
     "mathematics": [],
     "paper": [],
+    "estimators": [],
     "design": [],
 }
 
@@ -98,5 +100,6 @@ def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, li
 
 def setup(app: Any) -> None:
     app.connect("builder-inited", paper_page.write)
+    app.connect("builder-inited", estimators_page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

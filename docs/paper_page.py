@@ -20,11 +20,15 @@ TARGET = DOCS / "generated" / "paper"
 
 
 def write(app: Any = None) -> None:
-    """Write what the page includes; untouched where nothing changed, so that no rebuild follows a rebuild."""
-    document = json.loads(SOURCE.read_text(encoding="utf-8"))
-    TARGET.mkdir(parents=True, exist_ok=True)
-    for name, text in pieces(document).items():
-        path = TARGET / f"{name}.inc"
+    """Write what the page includes."""
+    write_pieces(TARGET, pieces(json.loads(SOURCE.read_text(encoding="utf-8"))))
+
+
+def write_pieces(target: Path, texts: dict[str, str]) -> None:
+    """Write texts by the name of their file; untouched where nothing changed, so that no rebuild follows."""
+    target.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        path = target / f"{name}.inc"
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
 

@@ -245,7 +245,7 @@ def _print(scenario: Scenario, rows: list[Row]) -> None:
         console.print(f"{row.name:<20} {what}", highlight=False, markup=False, soft_wrap=True)
     about = describe_machine()
     options = "; ".join(
-        f"{row.name} with {', '.join(f'{key}={value:g}' for key, value in OPTIONS[row.name].items())}"
+        f"{row.name} with {', '.join(f'{key}={value!r}' for key, value in OPTIONS[row.name].items())}"
         for row in rows
         if row.name in OPTIONS
     )

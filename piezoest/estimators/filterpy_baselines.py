@@ -79,6 +79,14 @@ class _FilterPyBaseline(ekf.HysteresisEKF):
     def _update(self, x: float, h: FloatArray) -> None:
         raise NotImplementedError
 
+    def _process_noise(self, du: float) -> FloatArray:
+        """Covariance that the process adds over du, the second-order variance of a w_h with it."""
+        Q = np.diag(self._config[ekf.CONFIG :])
+        if self._config[ekf.HYSTERETIC]:
+            s, P = self._filter.x, self._filter.P
+            Q[0, 0] += kalman.bilinear_variance(P.ravel(), du, s[1], self._n)
+        return Q
+
     @property
     def filter(self) -> Any:
         """The filterpy object itself, for filterpy's own tools such as `filterpy.common.Saver`."""
@@ -201,12 +209,10 @@ class FilterPyEKF(_FilterPyBaseline):
 
     def _predict(self, du: float) -> None:
         F = np.eye(self._n)
-        Q = np.diag(self._config[ekf.CONFIG :])
         if self._config[ekf.HYSTERETIC]:
             s = self._filter.x
             F[0, :3] = equations.hysteresis_jacobian(s[0], du, s[1], s[2])
-            Q[0, 0] += kalman.bilinear_variance(self._filter.P.ravel(), du, s[1], self._n)
-        self._filter.F, self._filter.Q = F, Q
+        self._filter.F, self._filter.Q = F, self._process_noise(du)
         self._filter.predict(du)
 
     def _update(self, x: float, h: FloatArray) -> None:
@@ -265,6 +271,9 @@ class FilterPyUKF(_FilterPyBaseline):
         )
 
     def _predict(self, du: float) -> None:
+        # Sigma points see the product of errors within a sample only, not that it keeps its sign
+        # over many: without its variance the errors reported are far too small.
+        self._filter.Q = self._process_noise(du)
         self._filter.predict(du=du)
 
     def _update(self, x: float, h: FloatArray) -> None:

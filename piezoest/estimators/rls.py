@@ -7,26 +7,15 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from piezoest._checks import FloatArray, positive
-from piezoest.equations import admissible, filters
+from piezoest.equations import admissible
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
+from piezoest.estimators import rls_settings as settings
 from piezoest.estimators.base import EstimatorBase, Status, Trace
 from piezoest.estimators.delay_line import delay_line
 from piezoest.models import ColemanHodgdon, LinearGain, Model, model_from_dict
-from piezoest.policies import (
-    DeadZone,
-    Forgetting,
-    Normalisation,
-    NormBound,
-    OutlierRejection,
-    PeriodicForgetting,
-    Policy,
-    RandomWalk,
-    policy_from_dict,
-    policy_to_dict,
-    select,
-)
+from piezoest.policies import Forgetting, Policy, policy_from_dict, policy_to_dict
 
 # The model handed out keeps this distance from the faces of the admissible set: parts of
 # gamma, and least alpha and beta in parts of their initial values.
@@ -35,8 +24,6 @@ LEAST = 1e-2
 
 # Seconds of memory where the paper's law is asked for without one.
 PAPER_MEMORY = 0.4
-# Seconds of half a period until the voltage has turned for the first time.
-FIRST_HALF = 0.05
 
 
 class HysteresisRLS(EstimatorBase):
@@ -132,71 +119,39 @@ class HysteresisRLS(EstimatorBase):
         if time_base == "continuous" and memory == "period":
             memory = PAPER_MEMORY
         if policies is None:
-            policies = self._default_policies(memory, initial)
-        walk = select(policies, RandomWalk)
-        periodic = select(policies, PeriodicForgetting)
-        if (walk or periodic) and (time_base == "continuous" or memory != "period"):
-            raise ValueError(
-                "policies: RandomWalk and PeriodicForgetting go with memory='period' and the "
-                "discrete time base"
-            )
+            policies = settings.default_policies(memory, initial)
+        settings.check_policies(policies, memory, time_base)
         if offset is None:
             offset = memory == "period" and isinstance(initial, ColemanHodgdon)
         cutoff = min(positive("cutoff", cutoff), 0.5 * sample_rate)
         fraction, line = delay_line(delay)
         self._initial = initial
-        hysteretic = isinstance(initial, ColemanHodgdon)
-        self._n = n = initial.theta.size + bool(offset)
+        self._scale = settings.parameter_scale(initial, offset)
+        self._n = n = self._scale.size
 
-        config = np.zeros(kernel.CONFIG)
-        pole = float(filters.first_order_pole(cutoff, sample_rate))
-        config[kernel.N] = n
-        config[kernel.HYSTERETIC] = hysteretic
-        config[kernel.LOW_POLE] = pole
-        config[kernel.HIGH_PASS] = high_pass is not None
-        if high_pass is not None:
-            config[kernel.HIGH_POLE] = filters.first_order_pole(positive("high_pass", high_pass), sample_rate)
-        config[kernel.FRACTION] = fraction
-        config[kernel.OFFSET] = bool(offset)
-        config[kernel.LONGEST_GAP] = max(1, int(0.002 * sample_rate))
-        config[kernel.FIRST_HALF] = max(1.0, FIRST_HALF * sample_rate)
-        if isinstance(walk, RandomWalk):
-            config[kernel.WALK] = walk.drift**2 / sample_rate
-            config[kernel.WALK_MEMORY] = walk.memory
-        if isinstance(periodic, PeriodicForgetting):
-            config[kernel.PERIODS] = periodic.memory
-        rejection = select(policies, OutlierRejection)
-        if isinstance(rejection, OutlierRejection) and hysteretic:
-            config[kernel.OUTLIER] = 1.0
-            config[kernel.WARM_UP] = rejection.warm_up
-        # Noise of x behind W_p, and of its difference behind W_p (white noise in x).
-        white = (1.0 - pole) / (1.0 + pole)
-        blue = 2.0 * (1.0 - pole) ** 2 / (1.0 + pole)
-        gain = np.sqrt(blue if hysteretic else white)
-        output_noise = positive("noise", noise) * gain
-        config[kernel.NOISE_RATIO] = 1.0 / gain
-        self._scale = np.append(np.abs(initial.theta), self._offset_scale(initial) if offset else [])
-        config[kernel.SCALE : kernel.SCALE + n] = self._scale / output_noise
-        config[kernel.SCALE + 4] = 1.0 / output_noise
-        if time_base == "continuous":
-            config[kernel.SCALE : kernel.SCALE + 5] *= sample_rate if hysteretic else 1.0
-
-        start = np.append(np.sign(initial.theta), np.zeros(int(bool(offset))))
-        P_0 = np.diag(np.full(n, positive("uncertainty", uncertainty) ** 2))
-        law_config = law.configure(
-            (Forgetting(memory if isinstance(memory, float | int) else np.inf), *policies),
-            1.0 / sample_rate,
-            time_base,
-            1.0,
-            P_0,
+        config = settings.front_end(
+            sample_rate,
+            self._scale,
+            hysteretic=isinstance(initial, ColemanHodgdon),
+            offset=offset,
+            cutoff=cutoff,
+            high_pass=high_pass,
+            fraction=fraction,
+            noise=positive("noise", noise),
+            per_second=time_base == "continuous",
         )
+        settings.policy_settings(config, policies, sample_rate)
+        P_0 = np.diag(np.full(n, positive("uncertainty", uncertainty) ** 2))
+        forgetting = Forgetting(memory if isinstance(memory, float) else np.inf)
+        law_config = law.configure((forgetting, *policies), 1.0 / sample_rate, time_base, 1.0, P_0)
         self._config = np.concatenate([config, law_config])
+        start = np.append(np.sign(initial.theta), np.zeros(int(offset)))
         state = np.concatenate([np.zeros(kernel.FRONT), law.new_state(start, P_0), line])
         self._begin(
             {
                 "sample_rate": sample_rate,
                 "initial_model": initial.to_dict(),
-                "memory": float(memory) if isinstance(memory, float | int) and memory < np.inf else memory,
+                "memory": memory,
                 "uncertainty": float(uncertainty),
                 "noise": float(noise),
                 "cutoff": cutoff,
@@ -208,18 +163,6 @@ class HysteresisRLS(EstimatorBase):
             },
             state,
         )
-
-    @staticmethod
-    def _default_policies(memory: Any, initial: Model) -> tuple[Policy, ...]:
-        if memory != "period":
-            return NormBound(), DeadZone(), Normalisation()
-        walk = PeriodicForgetting() if isinstance(initial, LinearGain) else RandomWalk()
-        return walk, NormBound(10.0), DeadZone(), OutlierRejection()
-
-    @staticmethod
-    def _offset_scale(initial: ColemanHodgdon | LinearGain) -> float:
-        """Scale of the offset's parameter: a centre that is off by some ten volts."""
-        return 10.0 * abs(initial.gamma) if isinstance(initial, ColemanHodgdon) else 10.0 * abs(initial.gain)
 
     @classmethod
     def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:

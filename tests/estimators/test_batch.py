@@ -65,16 +65,16 @@ def test_parameters_lie_within_three_standard_errors(seed: int) -> None:
 def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
     u, _ = record()
     bound = cramer_rao(u, NOISE)
-    fits = [BatchFit(RATE).fit(*record(seed=seed)) for seed in range(30)]
+    fits = [BatchFit(RATE).fit(*record(seed=seed)) for seed in range(200)]
     errors = np.array([fit.theta[:3] - TRUE.theta for fit in fits])
     assert np.all(errors.std(axis=0) < 1.3 * np.sqrt(np.diag(bound)))
     together = np.mean(np.einsum("ki,ij,kj->k", errors, np.linalg.inv(bound), errors)) / 3.0
-    assert 0.75 < np.sqrt(together) < 1.3
+    assert 0.9 < np.sqrt(together) < 1.1
     # What the fit says of itself is the bound too.
     said = np.mean([fit.P[:3, :3] for fit in fits], axis=0)
     np.testing.assert_allclose(said / bound, 1.0, rtol=0.05)
     inside = np.abs(errors) < 3.0 * np.array([fit.standard_errors[:3] for fit in fits])
-    assert inside.mean() > 0.95
+    assert np.all(inside, axis=1).mean() >= 0.95
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -51,19 +51,22 @@ def squared(error: FloatArray, P: FloatArray) -> float:
     return float(error @ np.linalg.solve(P, error))
 
 
-def outcome(new: Callable[[], Any], runs: int = RUNS) -> Outcome:
+def outcome(new: Callable[[], Any], runs: int = RUNS, rate: float = FS) -> Outcome:
     rows = []
-    settled = slice(VOLTAGE.size // 4, None)
+    voltage = VOLTAGE if rate == FS else pz.signals.triangle(33.0, 5.0, 10.0, rate).values
+    displacement = DISPLACEMENT if rate == FS else TRUE.simulate(voltage)
+    settled = slice(voltage.size // 4, None)
     for seed in range(runs):
-        x = DISPLACEMENT + NOISE * np.random.default_rng(seed).standard_normal(VOLTAGE.size)
+        x = displacement + NOISE * np.random.default_rng(seed).standard_normal(voltage.size)
         estimator = new()
-        trace = estimator.run(VOLTAGE, x, record=("y", "S"))
-        error = estimator.theta - TRUE.theta
+        trace = estimator.run(voltage, x, record=("y", "S"))
+        error = estimator.theta[:3] - TRUE.theta
         state_nees = np.nan
         if isinstance(estimator, pz.HysteresisEKF):
             state_nees = squared(estimator.state - TRUE_STATE, estimator.state_covariance)
         nis = np.mean(trace.y[settled] ** 2 / trace.S[settled])
-        rows.append((error, estimator.standard_errors, squared(error, estimator.P), state_nees, nis))
+        errors_said, P = estimator.standard_errors[:3], estimator.P[:3, :3]
+        rows.append((error, errors_said, squared(error, P), state_nees, nis))
     return Outcome(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
@@ -120,7 +123,47 @@ def test_ekf_told_of_a_mismatch_is_cautious() -> None:
     assert np.mean(found.nis) < 1.0
 
 
+# ---------------------------------------------------------------- the baselines
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pz.FilterPyEKF,
+        pz.FilterPyUKF,
+    ],
+)
+def test_filterpy_baselines_are_consistent(kind: Any) -> None:
+    """Fewer samples and seeds, for filterpy is slow; `docs/consistency.py` takes all seeds."""
+    runs, rate = 40, 250.0
+    found = outcome(lambda: kind(rate, noise=NOISE, drift=0.0, mismatch=0.0), runs, rate)
+    assert found.within_three >= 0.95
+    low, high = band(3, runs)
+    assert low < np.mean(found.nees) < high
+
+
+# ---------------------------------------------------------------- the moving horizon
+
+
+def test_moving_horizon_is_consistent() -> None:
+    rate = 500.0
+    found = outcome(lambda: pz.MovingHorizon(rate, noise=NOISE, hop=0.35), RUNS, rate)
+    assert found.within_three >= 0.95
+    scatter = found.errors.std(axis=0)
+    np.testing.assert_allclose(found.standard_errors.mean(axis=0), scatter, rtol=0.15)
+    assert np.all(np.abs(found.errors.mean(axis=0)) < 0.5 * scatter)
+
+
 # ---------------------------------------------------------------- recursive least squares
+
+
+def test_rls_of_default_settings_says_what_its_start_may_be_off_by() -> None:
+    """Its random walk forgets slowly where the regressor says little: what is left of the start is in it."""
+    found = outcome(lambda: pz.HysteresisRLS(FS, noise=NOISE))
+    assert found.within_three >= 0.95
+    z = np.sqrt(np.mean((found.errors / found.standard_errors) ** 2, axis=0))
+    assert np.all(z > 0.1)
+    assert np.all(z < 1.0)
 
 
 def test_rls_with_a_memory_is_consistent() -> None:

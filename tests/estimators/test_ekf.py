@@ -34,7 +34,8 @@ def loop(model: pz.ColemanHodgdon) -> FloatArray:
 # ---------------------------------------------------------------- the Jacobian
 
 
-@pytest.mark.parametrize("travel", [1e-2, 1e-1, 0.5, 1.0, 3.0])
+# At 50 kHz and 5 Hz a sample's travel a |du| is 3e-4.
+@pytest.mark.parametrize("travel", [1e-6, 3e-4, 1e-2, 1e-1, 0.5, 1.0, 3.0])
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_jacobian_is_casadis_derivative(travel: float, sign: float) -> None:
     casadi.GlobalOptions.setNumpyMode(1)
@@ -244,6 +245,19 @@ def test_covariance_stays_definite_over_a_million_samples() -> None:
         scale = np.sqrt(np.diag(P))
         assert np.linalg.eigvalsh(P / np.outer(scale, scale))[0] > 0.0
     assert estimator.status.samples == 1_000_000
+
+
+def test_defaults_work_on_the_papers_stage() -> None:
+    """Untouched, and from a compensator that knows as little as they do."""
+    fs, start = 50_000.0, pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    reference = pz.signals.triangle(5.0, 5.0, 6.0, fs)
+    ring = pz.track(
+        reference,
+        stage=pz.PaperStage(fs, seed=0),
+        compensator=pz.InverseCompensator(start),
+        estimator=pz.HysteresisEKF(fs),
+    )
+    assert ring.max_error(last_periods=2) < 0.012 * 5.0
 
 
 def test_wrong_arguments() -> None:

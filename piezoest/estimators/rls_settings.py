@@ -1,0 +1,112 @@
+"""What `HysteresisRLS` is told, put into the flat numbers that its compiled inside reads."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import FloatArray, positive
+from piezoest.equations import filters
+from piezoest.estimators import rls_kernel as kernel
+from piezoest.models import ColemanHodgdon, LinearGain, Model
+from piezoest.policies import (
+    DeadZone,
+    Normalisation,
+    NormBound,
+    OutlierRejection,
+    PeriodicForgetting,
+    Policy,
+    RandomWalk,
+    select,
+)
+
+# Seconds of half a period until the voltage has turned for the first time.
+FIRST_HALF = 0.05
+# Seconds without a measurement that are bridged.
+LONGEST_GAP = 0.002
+# Bound of the covariance that walks, as a multiple of its start.
+WALKING_BOUND = 10.0
+# The offset's scale: a centre that is off by so many volts.
+CENTRE = 10.0
+
+
+def default_policies(memory: Any, initial: Model) -> tuple[Policy, ...]:
+    """Policies that go with a memory: the paper's with a dead zone, or those of the reference's own clock."""
+    if memory != "period":
+        return NormBound(), DeadZone(), Normalisation()
+    forgetting = PeriodicForgetting() if isinstance(initial, LinearGain) else RandomWalk()
+    return forgetting, NormBound(WALKING_BOUND), DeadZone(), OutlierRejection()
+
+
+def check_policies(policies: tuple[Policy, ...], memory: Any, time_base: str) -> None:
+    """Refuse the clock's policies without their memory.
+
+    Raises
+    ------
+    ValueError
+        If there is one of them with another memory or the continuous time base.
+    """
+    clocked = select(policies, RandomWalk) or select(policies, PeriodicForgetting)
+    if clocked and (time_base == "continuous" or memory != "period"):
+        raise ValueError(
+            "policies: RandomWalk and PeriodicForgetting go with memory='period' and the discrete time base"
+        )
+
+
+def parameter_scale(initial: ColemanHodgdon | LinearGain, offset: bool) -> FloatArray:
+    """Scale of each parameter, shape (n,): the initial value, and for the offset ten volts' worth."""
+    scale = np.abs(initial.theta)
+    return np.append(scale, CENTRE * scale[-1]) if offset else scale
+
+
+def policy_settings(config: FloatArray, policies: tuple[Policy, ...], sample_rate: float) -> None:
+    """Write what the front end needs of the policies into its configuration."""
+    walk = select(policies, RandomWalk)
+    if isinstance(walk, RandomWalk):
+        config[kernel.WALK] = walk.drift**2 / sample_rate
+        config[kernel.WALK_MEMORY] = walk.memory
+    periodic = select(policies, PeriodicForgetting)
+    if isinstance(periodic, PeriodicForgetting):
+        config[kernel.PERIODS] = periodic.memory
+    rejection = select(policies, OutlierRejection)
+    if isinstance(rejection, OutlierRejection) and config[kernel.HYSTERETIC]:
+        config[kernel.OUTLIER] = 1.0
+        config[kernel.WARM_UP] = rejection.warm_up
+
+
+def front_end(
+    sample_rate: float,
+    scale: FloatArray,
+    *,
+    hysteretic: bool,
+    offset: bool,
+    cutoff: float,
+    high_pass: float | None,
+    fraction: float,
+    noise: float,
+    per_second: bool,
+) -> FloatArray:
+    """Configuration of the front end, without the policies'."""
+    config = np.zeros(kernel.CONFIG)
+    pole = float(filters.first_order_pole(cutoff, sample_rate))
+    n = scale.size
+    config[kernel.N] = n
+    config[kernel.HYSTERETIC] = hysteretic
+    config[kernel.LOW_POLE] = pole
+    if high_pass is not None:
+        config[kernel.HIGH_PASS] = 1.0
+        config[kernel.HIGH_POLE] = filters.first_order_pole(positive("high_pass", high_pass), sample_rate)
+    config[kernel.FRACTION] = fraction
+    config[kernel.OFFSET] = offset
+    config[kernel.LONGEST_GAP] = max(1, int(LONGEST_GAP * sample_rate))
+    config[kernel.FIRST_HALF] = max(1.0, FIRST_HALF * sample_rate)
+    # Noise of x behind W_p, and of its difference behind W_p (white noise in x).
+    white = (1.0 - pole) / (1.0 + pole)
+    blue = 2.0 * (1.0 - pole) ** 2 / (1.0 + pole)
+    gain = np.sqrt(blue if hysteretic else white)
+    config[kernel.NOISE_RATIO] = 1.0 / gain
+    unit = sample_rate if per_second and hysteretic else 1.0
+    config[kernel.SCALE : kernel.SCALE + n] = scale / (noise * gain) * unit
+    config[kernel.SCALE + 4] = unit / (noise * gain)
+    return config
