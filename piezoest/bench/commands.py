@@ -88,7 +88,7 @@ def estimators(
 
 @app.command(
     epilog="Examples: piezoest bench paper; piezoest bench paper --json paper.json --figures figures; "
-    "piezoest bench paper --memory 1 --quick"
+    "piezoest bench paper --memory 0.4 --quick"
 )
 def paper(
     json_to: Annotated[
@@ -99,8 +99,11 @@ def paper(
         Path | None, typer.Option("--figures", metavar="DIR", help="Write Figs. 3 to 5 and two more as PNG.")
     ] = None,
     memory: Annotated[
-        float, typer.Option(min=0.01, max=20.0, help="Of the estimator [s]; the paper names none.")
-    ] = 0.4,
+        float | None,
+        typer.Option(
+            min=0.01, max=20.0, help="Of the estimator [s]; the paper names none. Default: the calibration's."
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Start of the random numbers of the stage.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Without the sweep over the memory.")] = False,
     workers: Annotated[
@@ -119,10 +122,14 @@ def paper(
     try:
         with _progress() as say:
             say("loading (compiles once after the installation)")
-            from piezoest.bench.paper import MEMORIES, run_paper
+            from piezoest.bench.paper import MEMORIES, MEMORY, run_paper
 
             result = run_paper(
-                memory=memory, memories=() if quick else MEMORIES, seed=seed, workers=workers, progress=say
+                memory=MEMORY if memory is None else memory,
+                memories=() if quick else MEMORIES,
+                seed=seed,
+                workers=workers,
+                progress=say,
             )
     except KeyboardInterrupt:
         raise typer.Exit(INTERRUPTED) from None

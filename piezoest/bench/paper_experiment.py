@@ -31,7 +31,7 @@ Compensation = Literal["linear", "inverse"]
 
 SAMPLE_RATE = 50_000.0  # Hz, the paper's
 UPDATE_INTERVAL = 50  # samples between two models of the compensator: 1 ms
-MEMORY = 0.4  # s: two periods at 5 Hz, one at 2.5 Hz
+MEMORY = 1.0  # s, that of the calibration: the compensated error hangs on it
 START = ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)  # no row of Table I
 START_GAIN = LinearGain(0.12)
 STATIONARY_PERIODS = 2

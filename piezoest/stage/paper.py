@@ -20,18 +20,17 @@ from piezoest.stage.stage import Schedule, SimulatedStage
 class PaperStage(SimulatedStage):
     """The stage of Eielsen, Gravdahl and Pettersen (2012), simulated.
 
-    The true plant is a Prandtl-Ishlinskii operator fitted to Tables I and II, with creep,
-    mechanics and instruments around it; it is not a Coleman-Hodgdon model, so that the
-    mismatch of that model near the extrema comes out by itself. Every number, with where
-    it comes from, stands in ``piezoest/stage/paper_stage.json`` (what temperature does, in
-    `TemperatureLaw`).
+    The true plant is a Prandtl-Ishlinskii operator with creep, fitted to the triangle rows of
+    Tables I and II, with mechanics and instruments around it; it is not a Coleman-Hodgdon
+    model, so that the mismatch of that model near the extrema comes out by itself. Every
+    number, with where it comes from, stands in ``piezoest/stage/paper_stage.json`` (what
+    temperature does, in `TemperatureLaw`).
 
     From the paper: sample rate, amplifier gain of 20 V/V, gauge of 5 µm/V, a scaling
     amplifier before the converter, programmable filters. Assumed, for the paper does not
-    say: resonance (780 Hz, damping ratio 0.02), creep, 16-bit converters of ±10 V (6.1 mV
-    a step at the stage), a voltage range of ±100 V and a slew rate of 1e5 V/s, a gauge
-    range scaled to ±12.5 µm, white gauge noise of 1.2 nm rms, filters of second order at
-    10 kHz.
+    say: resonance (780 Hz, damping ratio 0.02), 16-bit converters of ±10 V (6.1 mV a step at
+    the stage), a voltage range of ±100 V and a slew rate of 1e5 V/s, a gauge range scaled to
+    ±12.5 µm, white gauge noise of 1.2 nm rms, filters of second order at 10 kHz.
 
     Parameters
     ----------

@@ -14,21 +14,19 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from piezoest.bench.paper import SWEPT, _executor
+from piezoest.bench.paper import MEMORY, SWEPT, _executor
 from piezoest.bench.paper_experiment import START, Experiment
 from piezoest.bench.paper_report import print_report
 from piezoest.bench.paper_tables import PRBS_ROW, Published, published
 from piezoest.cli import app
 
 # What the stage misses: each has to miss still, so that a better stage shortens the list.
-PROVISIONAL = "the stage is not calibrated yet"
 MISSES = {
-    ("5.0 µm @ 5.0 Hz", "alpha"): PROVISIONAL,
-    ("7.5 µm @ 5.0 Hz", "alpha"): PROVISIONAL,
-    ("5.0 µm @ 2.5 Hz", "compensated_max_error"): PROVISIONAL,
-    ("5.0 µm @ 2.5 Hz", "error_reduction"): PROVISIONAL,
+    ("7.5 µm @ 5.0 Hz, parameters of 2.5 µm", "compensated_max_error"): (
+        "the parameters of the 2.5 µm row, off by less than their bounds, are extrapolated threefold: "
+        "calibration/trade_off.md"
+    ),
 }
-NOT_CREEPING_ENOUGH = pytest.mark.xfail(strict=True, reason=PROVISIONAL)
 
 
 @dataclass(frozen=True)
@@ -83,9 +81,9 @@ def test_number_is_within_its_bound(number: Published, bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("quantity", "sign"),
     [
-        pytest.param("alpha", -1, marks=NOT_CREEPING_ENOUGH),
+        ("alpha", -1),
         ("beta", 1),
-        pytest.param("gamma", -1, marks=NOT_CREEPING_ENOUGH),
+        ("gamma", -1),
         ("K", 1),
         ("compensated_max_error", 1),
     ],
@@ -129,7 +127,7 @@ def test_every_row_adapts_and_settles(bench: Bench) -> None:
         assert max(run["max_error_um"][-2:]) == run["stationary_max_error_um"]
         if run["compensation"] == "inverse" and run["row"] != PRBS_ROW:
             # The start belongs to no row: the first period shows it.
-            assert run["max_error_um"][0] > 5.0 * run["stationary_max_error_um"]
+            assert run["max_error_um"][0] > 3.0 * run["stationary_max_error_um"]
 
 
 def test_a_single_run_repeats_that_of_the_bench_to_the_bit(bench: Bench) -> None:
@@ -151,7 +149,7 @@ def test_json_says_when_and_on_what(bench: Bench) -> None:
     assert document["machine"]["cores"] >= 1
     assert "numba" in document["versions"]
     assert document["conditions"]["seed"] == 0
-    assert document["conditions"]["memory_s"] == 0.4
+    assert document["conditions"]["memory_s"] == MEMORY
     assert document["memory"] == []
 
 
