@@ -27,7 +27,7 @@ for name, model in start.items():
         r,
         stage=pz.PaperStage(sample_rate=fs, seed=0),
         compensator=pz.InverseCompensator(model),
-        estimator=pz.HysteresisRLS(sample_rate=fs, initial_model=model, memory=0.4),
+        estimator=pz.HysteresisRLS(sample_rate=fs, initial_model=model),
     )
 
 # %%

@@ -122,7 +122,8 @@ def paper(
     try:
         with _progress() as say:
             say("loading (compiles once after the installation)")
-            from piezoest.bench.paper import MEMORIES, MEMORY, run_paper
+            from piezoest.bench.paper import MEMORIES, run_paper
+            from piezoest.bench.paper_experiment import MEMORY
 
             result = run_paper(
                 memory=MEMORY if memory is None else memory,

@@ -14,8 +14,8 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from piezoest.bench.paper import MEMORY, SWEPT, _executor
-from piezoest.bench.paper_experiment import START, Experiment
+from piezoest.bench.paper import SWEPT, _executor
+from piezoest.bench.paper_experiment import MEMORY, START, Experiment
 from piezoest.bench.paper_report import print_report
 from piezoest.bench.paper_tables import PRBS_ROW, Published, published
 from piezoest.cli import app
