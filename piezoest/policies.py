@@ -59,9 +59,10 @@ class RandomWalk:
     """Forgetting by parameters that walk: P grows by a constant, not by a factor.
 
     A direction without excitation is forgotten linearly and not exponentially, and each
-    direction at the pace at which the data renew it. The memory is in parts of the
-    reference's own period, which the estimator takes from the voltage's turning points: the same
-    setting serves any amplitude, frequency and unit.
+    direction at the pace at which the data renew it. Everything is counted in travel of the
+    voltage and not in time, for hysteresis knows no time: at rest nothing is forgotten, and one
+    setting serves any amplitude, frequency and unit. A swing, from one turning point of the
+    voltage to the next, is half a period.
 
     L. Ljung, System Identification, 2nd ed. (1999), sec. 11.2; L. Guo, L. Ljung, IEEE Trans.
     Autom. Control 40 (1995) 1353-1385.
@@ -71,8 +72,8 @@ class RandomWalk:
     memory : float
         Memory of the best excited direction, in periods.
     drift : float
-        Random walk of each parameter, in parts of its initial value per root second. It sets
-        how fast the start is forgotten; once settled, only `memory` matters.
+        Random walk of each parameter over a period, in parts of its own value. It sets how fast the
+        start is forgotten; once settled, only `memory` matters.
 
     Raises
     ------
@@ -81,7 +82,7 @@ class RandomWalk:
     """
 
     memory: float = 0.15
-    drift: float = 2.0
+    drift: float = 0.4
 
     def __post_init__(self) -> None:
         positive("memory", self.memory)

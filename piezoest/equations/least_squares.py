@@ -128,17 +128,15 @@ def continuous_update(theta, P, phi, z, n, h, forgetting_rate, normalised, bound
 
 
 @register_jitable
-def random_walk(P, q, bound, n):
-    """P + q I, where its trace stays within `bound`: forgetting by parameters that walk.
+def random_walk(variance, growth, ceiling):
+    """P_ii after the parameter has walked: it grows by a constant as long as it is below a ceiling.
 
     L. Ljung, System Identification, 2nd ed. (1999), sec. 11.2, the Kalman filter's
     interpretation of recursive least squares. Unlike division by a forgetting factor this grows
     P by a constant: a direction without excitation is forgotten linearly and not
     exponentially.
     """
-    within = ((trace(P, n) + n * q) <= bound) * 1.0
-    for i in range(n):
-        P[i * n + i] = P[i * n + i] + within * q
+    return variance + growth * (variance < ceiling)
 
 
 @register_jitable

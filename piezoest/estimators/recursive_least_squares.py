@@ -77,8 +77,8 @@ def new_state(theta: FloatArray, P_0: FloatArray) -> FloatArray:
 
 
 @register_jitable
-def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, walk: Any, forgetting: Any) -> None:
-    """One sample of the law: gate, resetting, growth by `walk`, update with noise variance R."""
+def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
+    """One sample of the law: gate, resetting, update with noise variance R."""
     theta = state[HEAD : HEAD + n]
     P = state[HEAD + n : HEAD + n + n * n]
     P_0 = state[HEAD + n + n * n : HEAD + n + 2 * n * n]
@@ -98,7 +98,6 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, walk: Any, 
             theta, P, phi, z, n, config[STEP], config[RATE], config[NORMALISED], config[BOUND], 1.0, work
         )
     else:
-        equations.random_walk(P, walk, config[BOUND], n)
         y, S = equations.discrete_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
     state[INNOVATION] = y
     state[INNOVATION_VARIANCE] = S
@@ -108,7 +107,7 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, walk: Any, 
 
 @njit("void(f8[::1], f8[::1], f8[::1], f8, i8)", cache=True)
 def _update(state: Any, config: Any, phi: Any, z: float, n: int) -> None:
-    adapt(state, config, phi, z, n, config[NOISE], 0.0, config[FORGETTING])
+    adapt(state, config, phi, z, n, config[NOISE], config[FORGETTING])
 
 
 class RecursiveLeastSquares:

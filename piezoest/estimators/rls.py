@@ -9,6 +9,7 @@ import numpy as np
 from piezoest._checks import FloatArray, positive
 from piezoest.equations import admissible
 from piezoest.equations import coleman_hodgdon as equations
+from piezoest.estimators import level
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
 from piezoest.estimators import rls_settings as settings
@@ -18,9 +19,8 @@ from piezoest.models import ColemanHodgdon, LinearGain, Model, model_from_dict
 from piezoest.policies import Forgetting, Policy, policy_from_dict, policy_to_dict
 
 # The model handed out keeps this distance from the faces of the admissible set: parts of
-# gamma, and least alpha and beta in parts of their initial values.
+# gamma.
 MARGIN = 1e-3
-LEAST = 1e-2
 
 # Seconds of memory where the paper's law is asked for without one.
 PAPER_MEMORY = 0.4
@@ -67,8 +67,8 @@ class HysteresisRLS(EstimatorBase):
         Time base of the law, see `RecursiveLeastSquares`; ``"continuous"`` is the paper's,
         in seconds.
     policies : tuple of policies, optional
-        Policies beside `memory`. Default with ``memory="period"``: ``(RandomWalk(), NormBound(10),
-        DeadZone(), OutlierRejection())``, for a `LinearGain` with `PeriodicForgetting` for
+        Policies beside `memory`. Default with ``memory="period"``: ``(RandomWalk(), DeadZone(),
+        OutlierRejection())``, for a `LinearGain` with `PeriodicForgetting` for
         `RandomWalk`; else ``(NormBound(), DeadZone(), Normalisation())``, the paper's with a dead
         zone.
 
@@ -217,7 +217,7 @@ class HysteresisRLS(EstimatorBase):
 
     @property
     def excitation(self) -> float:
-        """Least eigenvalue of the regressor's mean square over half a period, in parts of the mean one.
+        """Least eigenvalue of the regressor's mean square over a swing, in parts of the mean one.
 
         The alpha_0 of (A8) for the scaled regressor, normalised: 1 if every direction is
         excited alike, 0 if one is not excited at all.
@@ -321,14 +321,14 @@ class HysteresisRLS(EstimatorBase):
 
     @property
     def _least(self) -> tuple[float, float]:
-        return LEAST * float(self._scale[0]), LEAST * float(self._scale[1])
+        return kernel.LEAST * float(self._scale[0]), kernel.LEAST * float(self._scale[1])
 
     @property
     def model(self) -> Model:
         """Admissible model as known now: `theta` itself, or its nearest point in the metric of P."""
         theta = self.theta
         if isinstance(self._initial, LinearGain):
-            least = LEAST * self._initial.gain
+            least = kernel.LEAST * self._initial.gain
             gain = theta[0] if theta[0] * self._initial.gain > 0.0 else least
             offset = self._initial.offset
             if self._n == 2:
@@ -341,5 +341,8 @@ class HysteresisRLS(EstimatorBase):
         if self._n == 4:
             c = gamma / alpha
             centre = self._state[kernel.X_CENTRE] - c * self._state[kernel.U_CENTRE]
-            offset = float(equations.offset_from_rate_parameters(alpha, theta[3]) + centre)
+            slopes = float(equations.offset_from_rate_parameters(alpha, theta[3]))
+            trust = float(kernel.trust_in_levels(self._state, self._config))
+            levels = level.offset(self._state[kernel.LEVEL : kernel.FRONT], c - beta, c) if trust else 0.0
+            offset = centre + slopes + trust * (float(levels) - slopes)
         return ColemanHodgdon(alpha, beta, gamma, offset)

@@ -11,8 +11,8 @@ from numba.extending import register_jitable
 from piezoest._checks import WILDEST
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations import filters, least_squares
+from piezoest.estimators import level, swing
 from piezoest.estimators import recursive_least_squares as law
-from piezoest.estimators import swing
 from piezoest.estimators.delay_line import delayed
 
 # State: what is known of the last good sample, and of the voltage's way since.
@@ -20,18 +20,33 @@ PRIMED, U_LAST, X_LAST, TRAVEL, MOMENT, RISE, GAP, SAMPLES, MISSED, OUTLIERS = r
 U_CENTRE, X_CENTRE, USUAL_STEP, FROZEN, SEEN = 10, 11, 12, 13, 14
 LOW, HIGH, PHI = 15, 20, 25  # five filters each: four regressors and the output
 SWING = 30
-EXCITATION = SWING + swing.STATE  # mean of phi phi' over half a period
+EXCITATION = SWING + swing.STATE  # mean over a swing of phi phi', both in unit of motion
 ERROR, GAIN = EXCITATION + 16, EXCITATION + 32  # covariance of the estimate's error, filtered gain
-FRONT = EXCITATION + 36  # the law's state begins here, the delay line follows it
+# Filtered part of a swing that a sample is, and the swings (up to one) in EXCITATION's mean.
+MOTION, WAY = EXCITATION + 36, EXCITATION + 37
+# The sensor's noise: its variance as seen, and the last two changes of x it is seen from.
+NOISE, CHANGE, CHANGE_BEFORE, SEEN_NOISE = range(EXCITATION + 38, EXCITATION + 42)
+LEVEL = EXCITATION + 42
+FRONT = LEVEL + level.STATE  # the law's state begins here, the delay line follows it
 
 # Configuration of the front end; the law's follows.
 N, HYSTERETIC, LOW_POLE, HIGH_POLE, HIGH_PASS, FRACTION, OFFSET, LONGEST_GAP, NOISE_RATIO = range(9)
-OUTLIER, FIRST_HALF, WALK, WALK_MEMORY, WARM_UP, PERIODS = 9, 10, 11, 12, 13, 14
-SCALE = 15  # four scales of the parameters, one of the output
-CONFIG = 20
+OUTLIER, FIRST_HALF, WALK, WALK_MEMORY, WARM_UP, PERIODS, DECAY_SCALE = 9, 10, 11, 12, 13, 14, 15
+SCALE = 16  # four scales of the parameters, one of the output
+CONFIG = 21
 
 # A change of x is believed up to so many usual steps, plus what so many times the slope explains.
 BELIEVED_STEPS, BELIEVED_SLOPES = 20.0, 3.0
+# Slower than so many swings a sample the voltage is at rest; slower than this part of its usual
+# pace it counts as going at that.
+SLOWEST, SLOW = 1e-12, 0.2
+# Positions in theta; the offset may be off by this part of a swing, a parameter walks at least
+# so much (squared), and no variance grows beyond so many times its start.
+GAMMA, OFFSET_SLOPE = 2, 3
+NOISE_SAMPLES, PRECISION = 2000.0, 3e-3
+# Least alpha and beta of the model handed out, in parts of their initial values.
+LEAST = 1e-2
+OFF_CENTRE, LEAST_STEP, CEILING = 0.3, 1e-6, 1e4
 
 
 @register_jitable
@@ -77,6 +92,7 @@ def _regression(state: Any, config: Any, x: Any, phi: Any, n: int) -> Any:
     """Regressor into `phi` and output, from the last good sample to this one; starts the next."""
     if config[HYSTERETIC] != 0.0:
         z = x - state[X_LAST]
+        _measure_noise(state, z)
         phi[0] = -0.5 * (x + state[X_LAST]) * state[TRAVEL]
         phi[1] = state[RISE]
         phi[2] = state[MOMENT]
@@ -95,21 +111,81 @@ def _regression(state: Any, config: Any, x: Any, phi: Any, n: int) -> Any:
 
 
 @register_jitable
-def _walk(state: Any, config: Any, phi: Any, n: int, half: Any) -> Any:
-    """Noise variance and growth of P that give random-walk forgetting its memory.
+def _measure_noise(state: Any, change: Any) -> None:
+    """Variance of the sensor's noise, from the third differences of x: a stage moves more smoothly."""
+    third = change - 2.0 * state[CHANGE] + state[CHANGE_BEFORE]
+    state[CHANGE_BEFORE] = state[CHANGE]
+    state[CHANGE] = change
+    state[SEEN_NOISE] = min(state[SEEN_NOISE] + 1.0, NOISE_SAMPLES)
+    if state[SEEN_NOISE] > 3.0:  # of the first differences none is whole
+        state[NOISE] += (third * third / 20.0 - state[NOISE]) / (state[SEEN_NOISE] - 3.0)
 
-    With P growing by q a sample, the best excited direction forgets within
-    sqrt(R / (q phi²)) samples: R follows from the memory wanted and the mean of phi².
+
+@register_jitable
+def _noise_memory(state: Any, config: Any) -> Any:
+    """Square of the memory in swings that it takes for the sensor's noise to move the gain by no more.
+
+    Over a swing of the displacement noise behind W_p leaves the slope uncertain by sqrt(2) parts of its
+    size.
     """
-    share = 1.0 / min(state[FRONT + law.UPDATES] + 1.0, half)
-    power = 0.0
+    if state[SWING + swing.USUAL] == 0.0:
+        return 0.0  # nobody knows yet how far a swing goes
+    swing_of_x = (
+        state[SWING + swing.SIZE] * state[FRONT + law.HEAD + 1] * config[SCALE + 1] / config[SCALE + 4]
+    )
+    pole = config[LOW_POLE]
+    noise = 2.0 * state[NOISE] * (1.0 - pole) / (1.0 + pole)
+    return noise / max((PRECISION * swing_of_x) ** 2, SLOWEST)
+
+
+@register_jitable
+def trust_in_levels(state: Any, config: Any) -> Any:
+    """Part of the offset to take from levels: 0 with a good sensor, 1 where noise covers the changes of x."""
+    noise = _noise_memory(state, config) * (config[WALK] > 0.0) * level.is_known(state[LEVEL:FRONT])
+    return noise / (noise + config[WALK_MEMORY] ** 2 + SLOWEST)
+
+
+@register_jitable
+def _decay(state: Any, config: Any) -> Any:
+    """alpha [1/V] as estimated, kept to what its model may have."""
+    return max(state[FRONT + law.HEAD], LEAST) * abs(config[DECAY_SCALE])
+
+
+@register_jitable
+def _square_step(state: Any, config: Any, i: int) -> Any:
+    """Square of what a parameter walks in a swing: a part of itself; the offset, a part of the swing."""
+    head = FRONT + law.HEAD
+    size = state[head + i]
+    if i == OFFSET_SLOPE:
+        swing_in_offset = state[SWING + swing.SIZE] * config[SCALE + GAMMA] / config[SCALE + OFFSET_SLOPE]
+        size = OFF_CENTRE * state[head + GAMMA] * swing_in_offset
+    return config[WALK] * max(size * size, LEAST_STEP)
+
+
+@register_jitable
+def _walk(state: Any, config: Any, phi: Any, n: int, part: Any, half: Any) -> Any:
+    """Let P grow, and return the noise variance of a sample that gives the memory wanted.
+
+    Everything is counted in swings of the voltage. With P growing by q a swing, the best
+    excited direction forgets within sqrt(rho/(q phi²)) swings, where phi is the regressor and rho
+    the noise variance of a whole swing: rho follows from the memory wanted and the mean of phi².
+    """
+    state[MOTION] = part = filters.low_pass_step(state[MOTION], part, config[LOW_POLE])
+    if state[WAY] + part < SLOWEST:
+        return 1.0
+    state[WAY] = min(state[WAY] + part, 1.0)
+    rho = 0.0
     for i in range(n):
         for j in range(n):
             k = EXCITATION + i * n + j
-            state[k] += share * (phi[i] * phi[j] - state[k])
-        power += state[EXCITATION + i * n + i]
-    memory = 2.0 * half * config[WALK_MEMORY]
-    return 1.0 + memory * memory * config[WALK] * power
+            state[k] += (phi[i] * phi[j] / max(part, SLOWEST) - part * state[k]) / state[WAY]
+        q = _square_step(state, config, i)
+        rho += q * state[EXCITATION + i * n + i]
+        k = FRONT + law.HEAD + n + i * n + i
+        state[k] = least_squares.random_walk(state[k], q * part, CEILING * max(q, state[k + n * n]))
+    # Near a standstill the mechanics still move, which says nothing of the hysteresis.
+    memory_squared = config[WALK_MEMORY] ** 2 + _noise_memory(state, config)
+    return 1.0 + memory_squared * rho * max(part, SLOW / half)
 
 
 @register_jitable
@@ -151,6 +227,7 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
         # A short gap is bridged: the voltage's integrals go on, the displacement's mean
         # is taken between the good samples on its two sides.
         u -= state[U_CENTRE]
+        du = u - state[U_LAST]
         rise, moment, travel = equations.sample_regressor(state[U_LAST], u)
         state[RISE] += rise
         state[MOMENT] += moment
@@ -158,6 +235,10 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
         state[U_LAST] = u
         if rise != 0.0:
             swing.follow(state[SWING : SWING + swing.STATE], u)
+            if n == 4:
+                level.move(state[LEVEL:FRONT], du, _decay(state, config))
+                if state[SWING + swing.SINCE] == 0.0:
+                    level.turn(state[LEVEL:FRONT])
     if measured and not _believable(state, config, x):
         state[OUTLIERS] += 1.0
         law_state[law.LAST] = law.REJECTED
@@ -165,19 +246,22 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     if not measured:
         state[GAP] += 1.0
         return
+    if n == 4:
+        level.measure(state[LEVEL:FRONT], u, x - state[X_CENTRE])
     phi = state[PHI : PHI + n]
+    part = swing.part_of_swing(state[SWING : SWING + swing.STATE], state[TRAVEL], config[FIRST_HALF])
     z = _regression(state, config, x - state[X_CENTRE], phi, n)
     if state[FROZEN] != 0.0:
         law_state[law.LAST] = law.HOLDING
         return
     half = swing.half_period(state[SWING : SWING + swing.STATE], config[FIRST_HALF])
-    R = _walk(state, config, phi, n, half)
+    R = _walk(state, config, phi, n, part, half)
     forgetting = config[CONFIG + law.FORGETTING]
     if config[PERIODS] > 0.0:
         samples = 2.0 * half * config[PERIODS]
         forgetting = samples / (samples + 1.0)
     resets, updates = law_state[law.RESETS], law_state[law.UPDATES]
-    law.adapt(law_state, config[CONFIG:], phi, z, n, R, config[WALK], forgetting)
+    law.adapt(law_state, config[CONFIG:], phi, z, n, R, forgetting)
     if law_state[law.LAST] == law.UPDATED and config[CONFIG + law.CONTINUOUS] == 0.0:
         restart = updates == 0.0 or law_state[law.RESETS] != resets
         _propagate_error(state, config, phi, n, forgetting, restart)

@@ -25,8 +25,6 @@ from piezoest.policies import (
 FIRST_HALF = 0.05
 # Seconds without a measurement that are bridged.
 LONGEST_GAP = 0.002
-# Bound of the covariance that walks, as a multiple of its start.
-WALKING_BOUND = 10.0
 # The offset's scale: a centre that is off by so many volts.
 CENTRE = 10.0
 
@@ -36,7 +34,7 @@ def default_policies(memory: Any, initial: Model) -> tuple[Policy, ...]:
     if memory != "period":
         return NormBound(), DeadZone(), Normalisation()
     forgetting = PeriodicForgetting() if isinstance(initial, LinearGain) else RandomWalk()
-    return forgetting, NormBound(WALKING_BOUND), DeadZone(), OutlierRejection()
+    return forgetting, DeadZone(), OutlierRejection()
 
 
 def check_policies(policies: tuple[Policy, ...], memory: Any, time_base: str) -> None:
@@ -64,8 +62,8 @@ def policy_settings(config: FloatArray, policies: tuple[Policy, ...], sample_rat
     """Write what the front end needs of the policies into its configuration."""
     walk = select(policies, RandomWalk)
     if isinstance(walk, RandomWalk):
-        config[kernel.WALK] = walk.drift**2 / sample_rate
-        config[kernel.WALK_MEMORY] = walk.memory
+        config[kernel.WALK] = 0.5 * walk.drift**2
+        config[kernel.WALK_MEMORY] = 2.0 * walk.memory
     periodic = select(policies, PeriodicForgetting)
     if isinstance(periodic, PeriodicForgetting):
         config[kernel.PERIODS] = periodic.memory
@@ -107,6 +105,7 @@ def front_end(
     gain = np.sqrt(blue if hysteretic else white)
     config[kernel.NOISE_RATIO] = 1.0 / gain
     unit = sample_rate if per_second and hysteretic else 1.0
+    config[kernel.DECAY_SCALE] = scale[0]
     config[kernel.SCALE : kernel.SCALE + n] = scale / (noise * gain) * unit
     config[kernel.SCALE + 4] = unit / (noise * gain)
     return config

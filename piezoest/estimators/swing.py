@@ -8,13 +8,12 @@ import numpy as np
 from numba.extending import register_jitable
 
 # Flat state: direction of travel, furthest voltage in it, samples since it was entered,
-# samples of a usual swing (0: none seen yet), size of the largest recent swing [V].
-DIRECTION, FURTHEST, SINCE, USUAL, SIZE, STATE = range(6)
+# samples of a usual swing (0: none seen yet), size of a usual swing, or of the present one if
+# larger [V], where the present one began.
+DIRECTION, FURTHEST, SINCE, USUAL, SIZE, TURNED, STATE = range(7)
 
-# A way back counts as a turn from this part of the largest recent swing on; the memory of
-# that swing fades over so many samples.
+# A way back counts as a turn from this part of a usual swing on.
 TURN = 0.1
-FADING = 1e-5
 # No clock is slower than this, in samples.
 LONGEST = 1e6
 
@@ -24,7 +23,7 @@ def follow(swing: Any, u: Any) -> None:
     """Take the next voltage; `swing` is updated in place."""
     swing[SINCE] += 1.0
     way = u - swing[FURTHEST]
-    swing[SIZE] = max(swing[SIZE] * (1.0 - FADING), abs(way))
+    swing[SIZE] = max(swing[SIZE], abs(u - swing[TURNED]))
     if swing[DIRECTION] * way >= 0.0:
         if swing[DIRECTION] == 0.0:
             swing[DIRECTION] = np.sign(way)
@@ -34,7 +33,9 @@ def follow(swing: Any, u: Any) -> None:
             swing[USUAL] = swing[SINCE]
         else:
             swing[USUAL] += 0.5 * (swing[SINCE] - swing[USUAL])
+        swing[SIZE] += 0.8 * (abs(swing[FURTHEST] - swing[TURNED]) - swing[SIZE])
         swing[DIRECTION] = -swing[DIRECTION]
+        swing[TURNED] = swing[FURTHEST]
         swing[FURTHEST] = u
         swing[SINCE] = 0.0
 
@@ -44,3 +45,15 @@ def half_period(swing: Any, otherwise: Any) -> Any:
     """Samples of half a period; `otherwise` until there was a turn, and never less than the swing at hand."""
     usual = swing[USUAL] if swing[USUAL] > 0.0 else otherwise
     return min(max(usual, swing[SINCE]), LONGEST)
+
+
+@register_jitable
+def part_of_swing(swing: Any, travel: Any, otherwise: Any) -> Any:
+    """What part of a whole swing a travel of the voltage is: half a period in unit of motion.
+
+    Hysteresis knows no time: what is remembered and what drifts is counted in this. Until the
+    voltage has turned once nobody knows how far it will go, and time has to do.
+    """
+    if swing[USUAL] == 0.0:
+        return (travel > 0.0) / max(otherwise, swing[SINCE])
+    return min(travel / swing[SIZE], 1.0)

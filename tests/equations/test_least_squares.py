@@ -175,3 +175,11 @@ def test_numpy_numba_and_casadi_agree() -> None:
         for i in range(2):
             np.testing.assert_allclose(compiled[i], plain[i], rtol=1e-13)
             np.testing.assert_allclose(symbolic[i], plain[i], rtol=1e-13)
+
+
+def test_a_variance_walks_up_to_its_ceiling_and_no_further() -> None:
+    variance = 1.0
+    for _ in range(100):
+        variance = ls.random_walk(variance, 0.1, 2.0)
+    assert variance == pytest.approx(2.0, abs=0.11)
+    assert ls.random_walk(3.0, 0.1, 2.0) == 3.0
