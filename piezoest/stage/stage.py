@@ -279,6 +279,10 @@ def _hysteresis_settings(model: Hysteresis) -> tuple[FloatArray, FloatArray, Flo
         return np.array([model.c, model.a, model.b, model.offset]), none, none
     head = np.array([model.gain, 0.0, 0.0, model.offset])
     if isinstance(model, PrandtlIshlinskii):
+        if not model.is_plain:
+            raise ValueError(
+                "hysteresis must have neither creep nor dead zones of its own: pass creep=model.creep to the stage"
+            )
         return head, model.thresholds, model.weights
     return head, none, none
 
