@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, finite
+from piezoest._checks import FloatArray, array_1d, finite, positive
 from piezoest.equations import play as equations
 from piezoest.equations.creep import creep_to_come, unit_creep_step
 from piezoest.equations.dead_zone import bend, bend_inverse
@@ -46,6 +46,8 @@ class PrandtlIshlinskii(Model):
         on what lies above it, one below zero on what lies below it.
     bend_weights : array_like, shape (m,), optional
         Relative slope that each dead zone adds beyond its threshold [1].
+    sample_rate : float, optional
+        Rate at which creep proceeds where no other is given [Hz].
 
     Raises
     ------
@@ -72,6 +74,7 @@ class PrandtlIshlinskii(Model):
     creep: Creep | None = None
     bend_thresholds: FloatArray = dataclasses.field(default_factory=lambda: np.empty(0))
     bend_weights: FloatArray = dataclasses.field(default_factory=lambda: np.empty(0))
+    sample_rate: float | None = None
 
     def __init__(
         self,
@@ -82,6 +85,7 @@ class PrandtlIshlinskii(Model):
         creep: Creep | None = None,
         bend_thresholds: ArrayLike = (),
         bend_weights: ArrayLike = (),
+        sample_rate: float | None = None,
     ) -> None:
         thresholds, weights = _pair("thresholds", thresholds, "weights", weights)
         if thresholds.size and thresholds[0] <= 0.0:
@@ -101,6 +105,8 @@ class PrandtlIshlinskii(Model):
         object.__setattr__(self, "creep", creep)
         object.__setattr__(self, "bend_thresholds", bends)
         object.__setattr__(self, "bend_weights", slopes)
+        rate = None if sample_rate is None else positive("sample_rate", sample_rate)
+        object.__setattr__(self, "sample_rate", rate)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, PrandtlIshlinskii):
@@ -181,6 +187,8 @@ class PrandtlIshlinskii(Model):
         if self.bend_thresholds.size:
             data["bend_thresholds"] = self.bend_thresholds.tolist()
             data["bend_weights"] = self.bend_weights.tolist()
+        if self.sample_rate is not None:
+            data["sample_rate"] = self.sample_rate
         return data
 
     @classmethod
@@ -234,7 +242,7 @@ class PrandtlIshlinskii(Model):
             Play states [V] before the first sample, and after them those of the creep terms
             in parts of their gains [µm]; zeros if not given.
         sample_rate : float, optional
-            [Hz]; needed with creep only.
+            [Hz]; needed with creep only, and there the model's own if not given.
 
         Returns
         -------
@@ -269,7 +277,7 @@ class PrandtlIshlinskii(Model):
             Play states [V] before the first sample, and after them those of the creep terms
             in parts of their gains [µm]; zeros if not given.
         sample_rate : float, optional
-            [Hz]; needed with creep only.
+            [Hz]; needed with creep only, and there the model's own if not given.
 
         Returns
         -------
@@ -299,6 +307,7 @@ class PrandtlIshlinskii(Model):
         if self.creep is None:
             gains = decays = np.empty(0)
         else:
+            sample_rate = self.sample_rate if sample_rate is None else sample_rate
             if sample_rate is None:
                 raise ValueError("sample_rate is needed for a model with creep: pass it in Hz")
             gains, decays = self.creep.gains, self.creep.decays(sample_rate)
