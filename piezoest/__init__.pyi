@@ -13,13 +13,14 @@ from .estimators.batch_result import BatchFitResult
 from .estimators.ekf import HysteresisEKF
 from .estimators.filterpy_baselines import FilterPyEKF, FilterPyUKF
 from .estimators.horizon import MovingHorizon
+from .estimators.play_rls import PrandtlIshlinskiiRLS
 from .estimators.recursive_least_squares import RecursiveLeastSquares
 from .estimators.rls import HysteresisRLS
 from .identification import Identification, identify
-from .models import ColemanHodgdon, Creep, LinearGain, MassSpringDamper, PrandtlIshlinskii
+from .models import ColemanHodgdon, Creep, LinearGain, MassSpringDamper, PrandtlIshlinskii, Preisach
 from .records import Record, read_record
 from .signals import Signal
-from .stage import Amplifier, Gauge, PaperStage, SimulatedStage, TemperatureLaw
+from .stage import Amplifier, Gauge, PaperStage, PreisachStage, SimulatedStage, TemperatureLaw
 from .supervisor import Event, Supervisor
 from .tracking import TrackingRecord, track
 
@@ -46,6 +47,9 @@ __all__ = [
     "MovingHorizon",
     "PaperStage",
     "PrandtlIshlinskii",
+    "PrandtlIshlinskiiRLS",
+    "Preisach",
+    "PreisachStage",
     "Record",
     "RecursiveLeastSquares",
     "Signal",

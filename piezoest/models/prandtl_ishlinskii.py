@@ -87,7 +87,7 @@ class PrandtlIshlinskii(Model):
         bend_weights: ArrayLike = (),
         sample_rate: float | None = None,
     ) -> None:
-        thresholds, weights = _pair("thresholds", thresholds, "weights", weights)
+        thresholds, weights = rising_pair("thresholds", thresholds, "weights", weights)
         if thresholds.size and thresholds[0] <= 0.0:
             raise ValueError(
                 f"thresholds must be above zero, got {thresholds[0]:g} first: "
@@ -95,7 +95,7 @@ class PrandtlIshlinskii(Model):
             )
         if creep is not None and not isinstance(creep, Creep):
             raise ValueError(f"creep must be a Creep or None, got {type(creep).__name__}")
-        bends, slopes = _pair("bend_thresholds", bend_thresholds, "bend_weights", bend_weights)
+        bends, slopes = rising_pair("bend_thresholds", bend_thresholds, "bend_weights", bend_weights)
         if np.any(bends == 0.0):
             raise ValueError("bend_thresholds must not be zero: one side of zero is one of the gain's")
         object.__setattr__(self, "gain", finite("gain", gain))
@@ -333,7 +333,7 @@ class PrandtlIshlinskii(Model):
         return y, z
 
 
-def _pair(name: str, thresholds: Any, other: str, weights: Any) -> tuple[FloatArray, FloatArray]:
+def rising_pair(name: str, thresholds: Any, other: str, weights: Any) -> tuple[FloatArray, FloatArray]:
     """Rising thresholds and as many weights, as arrays that nobody else can write to."""
     thresholds = array_1d(name, thresholds).copy()
     weights = array_1d(other, weights).copy()
