@@ -1,4 +1,4 @@
-"""The compiled inverse of a Prandtl-Ishlinskii model with creep and dead zones, sample by sample."""
+"""The compiled inverse of a Prandtl-Ishlinskii model with creep and bends, sample by sample."""
 
 from __future__ import annotations
 
@@ -27,20 +27,23 @@ from piezoest.compensators.layout import (
     STATE,
     VOLTAGE,
 )
+from piezoest.equations.bent_plays import (
+    bent_plays_output,
+    bent_plays_step,
+    prandtl_ishlinskii_voltage,
+)
 from piezoest.equations.creep import creep_to_come, unit_creep_step
-from piezoest.equations.dead_zone import bend, bend_inverse
-from piezoest.equations.play import prandtl_ishlinskii_inverse, prandtl_ishlinskii_step
 from piezoest.equations.turning_points import remember
 
-# After the configuration that all models share: how many plays, creep terms and dead zones, then
-# thresholds, weights, creep gains, decays, thresholds and weights of the dead zones.
+# After the configuration that all models share: how many plays, creep terms and bends, then
+# thresholds, weights, creep gains, decays, bends and their weights.
 PLAYS, TERMS, BENDS, ARRAYS = CONFIG, CONFIG + 1, CONFIG + 2, CONFIG + 3
 
 
-@register_jitable(inline="always")
+@register_jitable
 def _voltage(
     state: Any, config: Any, y: Any, z: Any, thresholds: Any, weights: Any, gains: Any, decays: Any,
-    bends: Any, slopes: Any, r: Any,
+    bends: Any, changes: Any, r: Any,
 ) -> Any:  # fmt: skip
     """Voltage for the next reference sample; plays and creep follow the voltage really given out."""
     state[SAMPLES] += 1.0
@@ -49,8 +52,8 @@ def _voltage(
     if np.abs(r) < WILDEST:
         state[OWED] *= config[DECAY]
         held, share = creep_to_come(z, gains, decays)
-        v = bend_inverse(r - state[OWED] - config[OFFSET], bends, slopes)
-        wanted = prandtl_ishlinskii_inverse(y, (v - held) / (1.0 + share), config[C], thresholds, weights)
+        w = (r - state[OWED] - config[OFFSET] - held) / (1.0 + share)
+        wanted = prandtl_ishlinskii_voltage(y, u, w, config[C], thresholds, weights, bends, changes)
         slewed = min(max(wanted, u - config[LARGEST_STEP]), u + config[LARGEST_STEP])
         given = min(max(slewed, config[MINIMUM]), config[MAXIMUM])
         state[SLEWED] += slewed != wanted
@@ -60,7 +63,7 @@ def _voltage(
         remember(state, MEMORY, given)
     else:
         state[MISSED] += 1.0
-    w = prandtl_ishlinskii_step(y, state[VOLTAGE], config[C], thresholds, weights)
+    w = bent_plays_step(y, state[VOLTAGE], config[C], thresholds, weights, bends, changes)
     # Creep goes on while the voltage is held, too.
     unit_creep_step(z, w, decays)
     return state[VOLTAGE]
@@ -76,9 +79,9 @@ def run(state: Any, config: Any, r: Any, u: Any) -> None:
     a += 2 * n
     gains, decays = config[a : a + m], config[a + m : a + 2 * m]
     a += 2 * m
-    bends, slopes = config[a : a + b], config[a + b : a + 2 * b]
+    bends, changes = config[a : a + b], config[a + b : a + b + b * (n + 1)]
     for k in range(r.size):
-        u[k] = _voltage(state, config, y, z, thresholds, weights, gains, decays, bends, slopes, r[k])
+        u[k] = _voltage(state, config, y, z, thresholds, weights, gains, decays, bends, changes, r[k])
 
 
 @njit("f8(f8[::1], f8[::1], f8)", cache=True)
@@ -91,20 +94,24 @@ def step(state: Any, config: Any, r: float) -> Any:
     a += 2 * n
     gains, decays = config[a : a + m], config[a + m : a + 2 * m]
     a += 2 * m
-    bends, slopes = config[a : a + b], config[a + b : a + 2 * b]
-    return _voltage(state, config, y, z, thresholds, weights, gains, decays, bends, slopes, r)
+    bends, changes = config[a : a + b], config[a + b : a + b + b * (n + 1)]
+    return _voltage(state, config, y, z, thresholds, weights, gains, decays, bends, changes, r)
 
 
 @njit("f8(f8[::1], f8[::1])", cache=True)
 def expected(state: Any, config: Any) -> Any:
     """Displacement that the model expects of the last sample [µm]."""
     n, m, b = int(config[PLAYS]), int(config[TERMS]), int(config[BENDS])
-    a = ARRAYS
-    v = config[C] * state[VOLTAGE]
-    for i in range(n):
-        v += config[a + n + i] * state[STATE + i]
-    a += 2 * n
+    gains = ARRAYS + 2 * n
+    bends = gains + 2 * m
+    x = bent_plays_output(
+        state[STATE : STATE + n],
+        state[VOLTAGE],
+        config[C],
+        config[ARRAYS + n : gains],
+        config[bends : bends + b],
+        config[bends + b :],
+    )
     for i in range(m):
-        v += config[a + i] * state[STATE + n + i]
-    a += 2 * m
-    return bend(v, config[a : a + b], config[a + b : a + 2 * b]) + config[OFFSET]
+        x += config[gains + i] * state[STATE + n + i]
+    return x + config[OFFSET]

@@ -11,9 +11,8 @@ from numba import njit
 from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, finite, positive
-from piezoest.equations import play as equations
+from piezoest.equations.bent_plays import bent_plays_step, prandtl_ishlinskii_voltage
 from piezoest.equations.creep import creep_to_come, unit_creep_step
-from piezoest.equations.dead_zone import bend, bend_inverse
 from piezoest.models._base import Model
 from piezoest.models.creep import Creep
 
@@ -25,8 +24,8 @@ _STATE_TOLERANCE = 1e-9
 class PrandtlIshlinskii(Model):
     """Prandtl-Ishlinskii hysteresis with optional creep and asymmetry.
 
-    w = gain u + sum_i weights[i] play_i[u], v = w + creep of w,
-    x = v + sum_j bend_weights[j] dead_zone_j(v) + offset.
+    w = gain u + sum_i weights[i] play_i[u], x = w + creep of w + offset. For asymmetric loops
+    the slope of the voltage's part and of each play's may change at given voltages.
 
     Parameters
     ----------
@@ -41,29 +40,30 @@ class PrandtlIshlinskii(Model):
         Displacement at zero voltage and plays at zero [µm].
     creep : Creep, optional
         First-order terms driven by w; `simulate` and `invert` then need the sample rate.
-    bend_thresholds : array_like, shape (m,), optional
-        Thresholds of one-sided dead zones [µm], rising and not zero: one above zero acts
-        on what lies above it, one below zero on what lies below it.
-    bend_weights : array_like, shape (m,), optional
-        Relative slope that each dead zone adds beyond its threshold [1].
+    bends : array_like, shape (k,), optional
+        Voltages at which slopes change [V], rising.
+    bend_weights : array_like, shape (k, 1 + n), optional
+        Change of slope above each bend [µm/V]: of the gain, where the voltage is above it, then
+        of each weight, where that play is.
     sample_rate : float, optional
         Rate at which creep proceeds where no other is given [Hz].
 
     Raises
     ------
     ValueError
-        If a value is not finite, the thresholds are not above zero and rising, the
-        dead zones' not rising or zero, the lengths differ, or the creep is no `Creep`.
+        If a value is not finite, the thresholds are not above zero and rising, the bends not
+        rising, the shapes do not fit, or the creep is no `Creep`.
 
     Notes
     -----
     Admissible, so that x rises with u and the inverse exists, are gain > 0 and
-    gain + weights[0] + … + weights[i] > 0 for every i, creep gains that do not sum to -1 or
-    less, and dead zones that leave the slope above zero. `theta` holds the gain, the
-    thresholds, the weights, then the creep gains and the bend weights.
+    gain + weights[0] + … + weights[i] > 0 for every i, with bends for the least that each
+    of them becomes, and negative creep gains that do not sum to -1 or less. `theta` holds the
+    gain, the thresholds, the weights, then the creep gains and the bend weights row by row.
 
     Sources: P. Krejci, K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001) 185-192; K.
-    Kuhnen, European Journal of Control 9 (2003) 407-418 (dead zones); K. Kuhnen, P. Krejci,
+    Kuhnen, European Journal of Control 9 (2003) 407-418 (one-sided dead zones, here on
+    each play, see `piezoest.equations.bent_plays`); K. Kuhnen, P. Krejci,
     IEEE Trans. Autom. Control 54 (2009) 537-550 (creep).
     """
 
@@ -72,8 +72,8 @@ class PrandtlIshlinskii(Model):
     weights: FloatArray
     offset: float = 0.0
     creep: Creep | None = None
-    bend_thresholds: FloatArray = dataclasses.field(default_factory=lambda: np.empty(0))
-    bend_weights: FloatArray = dataclasses.field(default_factory=lambda: np.empty(0))
+    bends: FloatArray = dataclasses.field(default_factory=lambda: np.empty(0))
+    bend_weights: FloatArray = dataclasses.field(default_factory=lambda: np.empty((0, 1)))
     sample_rate: float | None = None
 
     def __init__(
@@ -83,7 +83,7 @@ class PrandtlIshlinskii(Model):
         weights: ArrayLike,
         offset: float = 0.0,
         creep: Creep | None = None,
-        bend_thresholds: ArrayLike = (),
+        bends: ArrayLike = (),
         bend_weights: ArrayLike = (),
         sample_rate: float | None = None,
     ) -> None:
@@ -95,16 +95,14 @@ class PrandtlIshlinskii(Model):
             )
         if creep is not None and not isinstance(creep, Creep):
             raise ValueError(f"creep must be a Creep or None, got {type(creep).__name__}")
-        bends, slopes = rising_pair("bend_thresholds", bend_thresholds, "bend_weights", bend_weights)
-        if np.any(bends == 0.0):
-            raise ValueError("bend_thresholds must not be zero: one side of zero is one of the gain's")
+        bends, changes = _bends(bends, bend_weights, weights.size)
         object.__setattr__(self, "gain", finite("gain", gain))
         object.__setattr__(self, "thresholds", thresholds)
         object.__setattr__(self, "weights", weights)
         object.__setattr__(self, "offset", finite("offset", offset))
         object.__setattr__(self, "creep", creep)
-        object.__setattr__(self, "bend_thresholds", bends)
-        object.__setattr__(self, "bend_weights", slopes)
+        object.__setattr__(self, "bends", bends)
+        object.__setattr__(self, "bend_weights", changes)
         rate = None if sample_rate is None else positive("sample_rate", sample_rate)
         object.__setattr__(self, "sample_rate", rate)
 
@@ -118,8 +116,8 @@ class PrandtlIshlinskii(Model):
 
     @property
     def is_plain(self) -> bool:
-        """Whether it has neither creep nor dead zones."""
-        return self.creep is None and self.bend_thresholds.size == 0
+        """Whether it has neither creep nor bends."""
+        return self.creep is None and self.bends.size == 0
 
     @property
     def parameter_names(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -130,19 +128,20 @@ class PrandtlIshlinskii(Model):
             *(f"thresholds[{i}]" for i in indices),
             *(f"weights[{i}]" for i in indices),
             *(f"creep.gains[{i}]" for i in terms),
-            *(f"bend_weights[{i}]" for i in range(self.bend_weights.size)),
+            *(f"bend_weights[{j},{i}]" for j, i in np.ndindex(self.bend_weights.shape)),
         )
 
     @property
     def parameter_units(self) -> tuple[str, ...]:  # type: ignore[override]
         """Units of the entries of `theta`."""
-        n, m = self.thresholds.size, self._creep_gains.size + self.bend_weights.size
-        return ("µm/V",) + ("V",) * n + ("µm/V",) * n + ("1",) * m
+        n = self.thresholds.size
+        creep, bends = ("1",) * self._creep_gains.size, ("µm/V",) * self.bend_weights.size
+        return ("µm/V",) + ("V",) * n + ("µm/V",) * n + creep + bends
 
     @property
     def theta(self) -> FloatArray:
         """Gain, thresholds, weights, creep gains and bend weights in one vector, shape (1 + 2n + …,)."""
-        parts = ([self.gain], self.thresholds, self.weights, self._creep_gains, self.bend_weights)
+        parts = ([self.gain], self.thresholds, self.weights, self._creep_gains, self.bend_weights.ravel())
         return np.concatenate(parts)
 
     @property
@@ -151,7 +150,7 @@ class PrandtlIshlinskii(Model):
 
     @classmethod
     def from_theta(cls, theta: Any, offset: float = 0.0) -> Self:
-        """Make the model without creep and dead zones from its parameter vector.
+        """Make the model without creep and bends from its parameter vector.
 
         Parameters
         ----------
@@ -184,8 +183,8 @@ class PrandtlIshlinskii(Model):
         }
         if self.creep is not None:
             data["creep"] = self.creep.to_dict()
-        if self.bend_thresholds.size:
-            data["bend_thresholds"] = self.bend_thresholds.tolist()
+        if self.bends.size:
+            data["bends"] = self.bends.tolist()
             data["bend_weights"] = self.bend_weights.tolist()
         if self.sample_rate is not None:
             data["sample_rate"] = self.sample_rate
@@ -213,17 +212,10 @@ class PrandtlIshlinskii(Model):
     @property
     def is_admissible(self) -> bool:
         """Whether x rises with u from every state, so that the inverse exists."""
-        bends, slopes = self.bend_thresholds, self.bend_weights
-        above = 1.0 + np.cumsum(slopes[bends > 0.0])
-        below = 1.0 + np.cumsum(slopes[bends < 0.0][::-1])
         negative_creep = float(np.minimum(self._creep_gains, 0.0).sum())
-        return bool(
-            self.gain > 0.0
-            and np.all(self.gain + np.cumsum(self.weights) > 0.0)
-            and np.all(above > 0.0)
-            and np.all(below > 0.0)
-            and negative_creep > -1.0
-        )
+        lowest = np.vstack([np.zeros(self.weights.size + 1), np.cumsum(self.bend_weights, axis=0)])
+        slopes = np.append(self.gain, self.weights) + lowest.min(axis=0)
+        return bool(np.all(np.cumsum(slopes) > 0.0) and negative_creep > -1.0)
 
     def simulate(
         self,
@@ -294,8 +286,7 @@ class PrandtlIshlinskii(Model):
             slopes = self.gain + np.concatenate(([0.0], np.cumsum(self.weights)))
             raise ValueError(
                 f"the model has no inverse, its lowest slope is {slopes.min():g} µm/V: gain and "
-                "gain + weights[0] + … + weights[i] must be above zero, and what bends and creep "
-                "make of it"
+                "gain + weights[0] + … + weights[i] must be above zero, with every bend"
             )
         u = array_1d("r", r).copy()
         y, z = self._start(initial_state)
@@ -303,7 +294,7 @@ class PrandtlIshlinskii(Model):
         return u
 
     def _arrays(self, sample_rate: float | None) -> tuple[FloatArray, ...]:
-        """Thresholds, weights, creep gains and decays, bend thresholds and weights."""
+        """Thresholds, weights, creep gains and decays, bends and their weights, all flat."""
         if self.creep is None:
             gains = decays = np.empty(0)
         else:
@@ -311,7 +302,7 @@ class PrandtlIshlinskii(Model):
             if sample_rate is None:
                 raise ValueError("sample_rate is needed for a model with creep: pass it in Hz")
             gains, decays = self.creep.gains, self.creep.decays(sample_rate)
-        return self.thresholds, self.weights, gains, decays, self.bend_thresholds, self.bend_weights
+        return self.thresholds, self.weights, gains, decays, self.bends, self.bend_weights.ravel()
 
     def _start(self, initial_state: FloatArray | None) -> tuple[FloatArray, FloatArray]:
         """Play states (n,) and creep states (m,) to start from, as own arrays."""
@@ -352,28 +343,51 @@ def rising_pair(name: str, thresholds: Any, other: str, weights: Any) -> tuple[F
     return thresholds, weights
 
 
+def _bends(bends: Any, weights: Any, plays: int) -> tuple[FloatArray, FloatArray]:
+    """Rising voltages and a row of changes for each, as arrays that nobody else can write to."""
+    bends = array_1d("bends", bends).copy()
+    shape = (bends.size, 1 + plays)
+    changes = np.array(weights, dtype=np.float64)
+    if changes.size == 0:
+        changes = changes.reshape(0, 1 + plays)
+    if changes.shape != shape:
+        raise ValueError(
+            f"bend_weights must have shape {shape}, a row for each of bends and a column for the gain "
+            f"and each weight, got {changes.shape}"
+        )
+    array_1d("bend_weights", changes.ravel())
+    if np.any(np.diff(bends) <= 0.0):
+        raise ValueError(f"bends must rise from entry to entry, got {bends}: sort them with their weights")
+    bends.flags.writeable = False
+    changes.flags.writeable = False
+    return bends, changes
+
+
 @njit(cache=True)
 def _simulate(
     x: Any, y: Any, z: Any, gain: float, thresholds: Any, weights: Any, gains: Any, decays: Any,
-    bends: Any, slopes: Any, offset: float,
+    bends: Any, changes: Any, offset: float,
 ) -> None:  # fmt: skip
     """`x` comes as voltage and goes as displacement; `y` and `z` are updated."""
     for k in range(x.size):
-        w = equations.prandtl_ishlinskii_step(y, x[k], gain, thresholds, weights)
+        w = bent_plays_step(y, x[k], gain, thresholds, weights, bends, changes)
         unit_creep_step(z, w, decays)
         for i in range(z.size):
             w = w + gains[i] * z[i]
-        x[k] = bend(w, bends, slopes) + offset
+        x[k] = w + offset
 
 
 @njit(cache=True)
 def _invert(
     u: Any, y: Any, z: Any, gain: float, thresholds: Any, weights: Any, gains: Any, decays: Any,
-    bends: Any, slopes: Any, offset: float,
+    bends: Any, changes: Any, offset: float,
 ) -> None:  # fmt: skip
     """`u` comes as displacement and goes as voltage; `y` and `z` are updated."""
+    last = 0.0
     for k in range(u.size):
         held, share = creep_to_come(z, gains, decays)
-        w = (bend_inverse(u[k] - offset, bends, slopes) - held) / (1.0 + share)
-        u[k] = equations.prandtl_ishlinskii_inverse_step(y, w, gain, thresholds, weights)
+        w = (u[k] - offset - held) / (1.0 + share)
+        last = prandtl_ishlinskii_voltage(y, last, w, gain, thresholds, weights, bends, changes)
+        bent_plays_step(y, last, gain, thresholds, weights, bends, changes)
         unit_creep_step(z, w, decays)
+        u[k] = last

@@ -283,7 +283,7 @@ def _hysteresis_settings(model: Hysteresis) -> tuple[FloatArray, FloatArray, Flo
     if isinstance(model, PrandtlIshlinskii):
         if not model.is_plain:
             raise ValueError(
-                "hysteresis must have neither creep nor dead zones of its own: pass creep=model.creep to the stage"
+                "hysteresis must have neither bends nor creep of its own: pass creep=model.creep to the stage"
             )
         return head, model.thresholds, model.weights
     if isinstance(model, Preisach):
