@@ -63,8 +63,8 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
     the range; then one update is made. Each parameter's variance grows by the travel of its own
     regressor, up to its start: a weight whose play does not move is not forgotten. A level
     walks fast along with them and takes what changes slowly and is no parameter's. At a dwell only
-    the level moves. Slopes and creep gains stay at zero or more, by projection in the metric of P.
-    `theta` holds slopes and creep gains; the level, averaged over a period, is the model's offset.
+    the level moves. `theta` holds slopes and creep gains; in `model` they are zero or more, by the
+    shortest way in the metric of P, and the level, averaged over a period, is the offset.
 
     An update costs some 3 N² multiplications for N = (1 + n)(1 + k) + m + 1 parameters, a
     sample some 3 N.
@@ -211,6 +211,11 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
         return self._part(kernel.THETA, self._scale.size) * self._scale
 
     @property
+    def _usable(self) -> FloatArray:
+        """`theta`, or its nearest point in the metric of P where nothing is below its least."""
+        return self._part(kernel.USED, self._scale.size) * self._scale
+
+    @property
     def P(self) -> FloatArray:
         """Covariance of `theta` as the law sees it, shape (n, n)."""
         n, size = self._scale.size, self._scale.size + 1
@@ -257,7 +262,7 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
             held=int(state[kernel.HELD]),
             outliers=int(state[kernel.OUTLIERS]),
             resets=int(state[kernel.RESETS]),
-            projected=False,
+            projected=bool(np.any(self._part(kernel.FORCE, self._scale.size) > 0.0)),
             last=("waiting", "updated", "missing", "held", "rejected")[int(state[kernel.LAST])],
         )
 
@@ -266,9 +271,9 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
         """Model as known now, always admissible: a `LinearGain` if it began as one."""
         offset = float(self._state[kernel.OFFSET])
         if isinstance(self._initial, LinearGain):
-            return LinearGain(float(self.theta[0]), offset)
+            return LinearGain(float(self._usable[0]), offset)
         n, k, m = (int(self._config[name]) for name in (kernel.PLAYS, kernel.BENDS, kernel.TERMS))
-        theta = self.theta
+        theta = self._usable
         slopes = theta[: (n + 1) * (k + 1)].reshape(n + 1, k + 1)
         bends = self._part(kernel.EDGES, k + 2)[1:-1]
         # Of plays that only move together the weights are those of one: no weight is lost.

@@ -30,11 +30,15 @@ ARRAYS = MEMORY + MEMORY_SIZE  # where the arrays begin, see `layout`
 N, PLAYS, BENDS, TERMS, GAIN, NOISE, FRACTION, FIRST_HALF, FIXED, LONGEST_GAP = range(10)
 SLACK, LEVEL_TRAVEL, LEVEL_TIME, COMMON_WALK, SINGLE_WALK, WINDOWS, LEAST = range(10, 17)
 AT = 17  # first of each array of the state
-Y, Z, PHI, SUM, WAY, SEGMENTS, THETA, P, WORK, OLD, THRESHOLDS, EDGES, LINE = range(AT, AT + 13)
+Y, Z, PHI, SUM, WAY, SEGMENTS, THETA, P, WORK, OLD, THRESHOLDS, EDGES = range(AT, AT + 12)
+USED, FORCE, LINE = range(AT + 12, AT + 15)
 # The first of each array of the configuration: relative thresholds and bends, creep decays, prior.
-RELATIVE, RELATIVE_BENDS, DECAYS, PRIOR, SPREAD = range(AT + 13, AT + 18)
-CONFIG = AT + 18
+RELATIVE, RELATIVE_BENDS, DECAYS, PRIOR, SPREAD = range(AT + 15, AT + 20)
+CONFIG = AT + 20
 
+SWEEPS = 10
+AT_REST = 8.0  # a window with less than this part of its travel is a dwell
+LEVEL_START = 0.03  # deviation of the level where nothing is known of it, in parts of the stroke
 WAITING, UPDATED, MISSING, HOLDING, REJECTED = range(5)
 BELIEVED_STEPS, BELIEVED_SLOPES, WARM_UP = 20.0, 3.0, 100.0
 FAR = 1e30
@@ -45,7 +49,7 @@ def layout(config: Any, n: int, k: int, m: int, line: int) -> int:
     slopes = (n + 1) * (k + 1)
     total = slopes + m + 1
     config[N], config[PLAYS], config[BENDS], config[TERMS] = total, n, k, m
-    sizes = (n, m, total, total, slopes, slopes, total, total * total, total, slopes, n, k + 2, line)
+    sizes = (n, m, total, total, slopes, slopes, total, total * total, total, slopes, n, k + 2, total, total, line)
     place = ARRAYS
     for name, size in zip(range(Y, LINE + 1), sizes, strict=True):
         config[name] = place
@@ -133,10 +137,13 @@ def regrid(state: Any, config: Any, centre: Any, half: Any) -> None:
     for i in range(size * size):
         state[int(config[P]) + i] = config[int(config[PRIOR]) + i]
     place = int(config[P]) + size * size - 1
-    state[place] = (config[SLACK] * config[GAIN] * half) ** 2
+    state[place] = (LEVEL_START * config[GAIN] * half) ** 2
     _regressor(state, config, 0.0)
     state[theta + size - 1] += expected - _output(state, config)
     _new_window(state, config)
+    for i in range(size):
+        state[int(config[FORCE]) + i] = 0.0
+    _constrain(state, config)
     state[RESETS] += 1.0
 
 
@@ -174,7 +181,7 @@ def _regressor(state: Any, config: Any, counted: Any) -> None:
 def _advance(state: Any, config: Any, u: Any) -> None:
     """Plays, creep and regressor after the next voltage."""
     n = int(config[PLAYS])
-    y, thresholds, theta = int(config[Y]), int(config[THRESHOLDS]), int(config[THETA])
+    y, thresholds, used = int(config[Y]), int(config[THRESHOLDS]), int(config[USED])
     for i in range(n):
         state[y + i] = play(state[y + i], u, state[thresholds + i])
     state[TRAVEL] += abs(u - state[U_LAST])
@@ -187,7 +194,7 @@ def _advance(state: Any, config: Any, u: Any) -> None:
     phi = int(config[PHI])
     w = 0.0
     for i in range(slopes):
-        w += state[theta + i] * state[phi + i]
+        w += state[used + i] * state[phi + i]
     for i in range(terms):
         place = int(config[Z]) + i
         state[place] += (1.0 - config[int(config[DECAYS]) + i]) * (w - state[place])
@@ -234,30 +241,46 @@ def _walk(state: Any, config: Any, half: Any) -> None:
 
 @register_jitable
 def _constrain(state: Any, config: Any) -> None:
-    """Slopes and creep gains back to zero or more, by the shortest way in the metric of P."""
+    """Parameters to use: the estimate's nearest in the metric of P with nothing below its least.
+
+    The estimate and its covariance are left alone: what is told against a constraint stays
+    known. C. Hildreth, Naval Research Logistics Quarterly 4 (1957) 79-85: each force lifts one
+    parameter to its bound, and they are kept from update to update.
+    """
     size = int(config[N])
     columns = int(config[BENDS]) + 1
-    theta, P0 = int(config[THETA]), int(config[P])
-    for _ in range(3 * size):
-        worst, which, short = 0.0, -1, 0.0
-        for i in range(size - 1):
-            lack = (config[LEAST] if i < columns else 0.0) - state[theta + i]
-            if lack > 0.0:
-                far = lack / np.sqrt(max(state[P0 + i * size + i], 1e-300))
-                if far > worst:
-                    worst, which, short = far, i, lack
-        if which < 0 or short < 1e-12:
-            break
-        scale = short / max(state[P0 + which * size + which], 1e-300)
-        for j in range(size):
-            state[theta + j] += state[P0 + j * size + which] * scale
+    theta, P0, used, force = int(config[THETA]), int(config[P]), int(config[USED]), int(config[FORCE])
+    for i in range(size):
+        state[used + i] = state[theta + i]
     for i in range(size - 1):
-        state[theta + i] = max(state[theta + i], config[LEAST] if i < columns else 0.0)
+        if state[force + i] > 0.0:
+            for j in range(size):
+                state[used + j] += state[P0 + i * size + j] * state[force + i]
+    for _ in range(SWEEPS):
+        moved = 0.0
+        for i in range(size - 1):
+            least = config[LEAST] if i < columns else 0.0
+            variance = state[P0 + i * size + i]
+            change = (least - state[used + i]) / variance
+            change = max(change, -state[force + i])
+            if change != 0.0:
+                state[force + i] += change
+                moved = max(moved, abs(change) * np.sqrt(variance))
+                for j in range(size):
+                    state[used + j] += state[P0 + i * size + j] * change
+        if moved < 1e-3:
+            break
+    for i in range(size - 1):
+        state[used + i] = max(state[used + i], config[LEAST] if i < columns else 0.0)
 
 
 @register_jitable
-def _update(state: Any, config: Any, half: Any) -> None:
-    """One step of the law, on the means over the window that ends here."""
+def _update(state: Any, config: Any, half: Any, first: int) -> None:
+    """One step of the law, on the means over the window that ends here.
+
+    Parameters before `first` are left alone, but what is unknown of them counts (S. F. Schmidt's
+    consider filter): at a dwell the slopes say nothing.
+    """
     size = int(config[N])
     theta, P0, mean, work = int(config[THETA]), int(config[P]), int(config[SUM]), int(config[WORK])
     _walk(state, config, half)
@@ -265,9 +288,7 @@ def _update(state: Any, config: Any, half: Any) -> None:
     for i in range(size):
         state[mean + i] /= state[COUNT]
         y -= state[theta + i] * state[mean + i]
-    stroke = config[GAIN] * state[RANGE]
-    R = (config[SLACK] * stroke) ** 2 + config[NOISE] ** 2 / state[COUNT]
-    S = R
+    S = (config[SLACK] * config[GAIN] * state[RANGE]) ** 2 + config[NOISE] ** 2 / state[COUNT]
     for i in range(size):
         total = 0.0
         for j in range(size):
@@ -275,38 +296,17 @@ def _update(state: Any, config: Any, half: Any) -> None:
         state[work + i] = total
         S += state[mean + i] * total
     state[INNOVATION], state[VARIANCE] = y, S
-    for i in range(size):
-        state[theta + i] += state[work + i] / S * y
-        for j in range(i, size):
-            entry = state[P0 + i * size + j] - state[work + i] * state[work + j] / S
+    for i in range(first, size):
+        gain = state[work + i] / S
+        state[theta + i] += gain * y
+        # Rows and columns before `first` lose their share once, the rest once for both.
+        for j in range(i + 1):
+            entry = state[P0 + i * size + j] - gain * state[work + j]
             state[P0 + i * size + j] = entry
             state[P0 + j * size + i] = entry
     for i in range(size):
         state[P0 + i * size + i] = max(state[P0 + i * size + i], 1e-18)
     _constrain(state, config)
-    state[UPDATES] += 1.0
-    state[LAST] = UPDATED
-
-
-@register_jitable
-def _level_only(state: Any, config: Any, half: Any) -> None:
-    """At a dwell only the level follows the displacement."""
-    size = int(config[N])
-    theta, P0, mean = int(config[THETA]), int(config[P]), int(config[SUM])
-    _walk(state, config, half)
-    y = state[X_SUM] / state[COUNT]
-    for i in range(size):
-        y -= state[theta + i] * state[mean + i] / state[COUNT]
-    R = (config[SLACK] * config[GAIN] * state[RANGE]) ** 2 + config[NOISE] ** 2 / state[COUNT]
-    last = size - 1
-    S = state[P0 + size * size - 1] + R
-    K = state[P0 + size * size - 1] / S
-    state[INNOVATION], state[VARIANCE] = y, S
-    state[theta + last] += K * y
-    for i in range(last):
-        state[P0 + i * size + last] *= 1.0 - K
-        state[P0 + last * size + i] *= 1.0 - K
-    state[P0 + size * size - 1] *= 1.0 - K
 
 
 @register_jitable
@@ -372,7 +372,7 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     if state[PRIMED] == 0.0:
         state[PRIMED] = 1.0
         state[level] += x - _output(state, config)
-        state[OFFSET] = state[level]
+        state[int(config[USED]) + size - 1] = state[OFFSET] = state[level]
         state[X_LAST] = x
         state[GAP] = state[GAP_TRAVEL] = 0.0
         _new_window(state, config)
@@ -384,7 +384,10 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
             state[LAST] = REJECTED
             return
         # It stays there: a new level, or a voltage that was away for long.
-        state[level] += x - _output(state, config)
+        jump = x - _output(state, config)
+        state[level] += jump
+        state[int(config[USED]) + size - 1] += jump
+        state[OFFSET] += jump
         state[SEEN] = 0.0
         _new_window(state, config)
     state[X_LAST] = x
@@ -399,14 +402,17 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     for i in range(size):
         state[int(config[SUM]) + i] += state[int(config[PHI]) + i]
     half = swing.half_period(state[SWING : SWING + swing.STATE], config[FIRST_HALF])
-    moved = state[TRAVEL] * config[WINDOWS] >= state[RANGE]
-    if not moved and state[ELAPSED] * config[WINDOWS] < half:
+    moved = state[TRAVEL] * config[WINDOWS]
+    if moved < state[RANGE] and state[ELAPSED] * config[WINDOWS] < 2.0 * half:
         return
-    if moved:
+    if moved * AT_REST >= state[RANGE]:
         state[HELD] -= 1.0
-        _update(state, config, half)
+        state[UPDATES] += 1.0
+        state[LAST] = UPDATED
+        _update(state, config, half, 0)
     else:
-        _level_only(state, config, half)
+        _update(state, config, half, size - 1 - int(config[TERMS]))
+    level = int(config[USED]) + size - 1
     share = max(min(state[ELAPSED] / (2.0 * half), 1.0), 1.0 / (1.0 + state[UPDATES]))
     state[OFFSET] += share * (state[level] - state[OFFSET])
     _new_window(state, config)
@@ -442,3 +448,4 @@ def start(state: Any, config: Any) -> None:
     """Grid of a state that is all zero but for the grid's middle and half-width."""
     lay_grid(state, config)
     _regressor(state, config, 0.0)
+    _constrain(state, config)

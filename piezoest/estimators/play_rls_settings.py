@@ -16,16 +16,16 @@ FIRST_HALF = 0.1  # s, half a period before the voltage has turned
 LONGEST_GAP = 2e-3  # s, after which an outlier is a new level
 
 # In parts of the stroke, of the start, or of the range travelled.
-SLACK = 1e-3  # misfit of one window that is no parameter's
-LEVEL_TRAVEL = 3e-3  # walk of the level per root of the range travelled
-LEVEL_TIME = 3e-3  # ... and of half a period
+SLACK = 5e-3  # misfit of one window that is no parameter's
+LEVEL_TRAVEL = 1e-3  # walk of the level per root of the range travelled
+LEVEL_TIME = 1e-3  # ... and of half a period
 COMMON_WALK = 0.02  # walk of all slopes together per root of the range travelled
 SINGLE_WALK = 0.05  # ... and of each by itself, in parts of its prior deviation
 WINDOWS = 32.0  # updates while the voltage travels half its range
 LEAST_GAIN = 0.05  # least slope just after a turn, in parts of the start's
 
 # Prior: deviations of the gain, of each weight in parts of the mean one, between segments.
-GAIN_DEVIATION, WEIGHT_DEVIATION, SEGMENT_SHARE = 0.15, 1.0, 0.3
+GAIN_DEVIATION, WEIGHT_DEVIATION, SEGMENT_SHARE = 0.15, 1.0, 0.6
 CORRELATION = 3.0  # thresholds over which the weights' deviations are alike
 CREEP_START, CREEP_DEVIATION = 0.01, 0.03
 
@@ -148,6 +148,6 @@ def prior(plan: Plan, uncertainty: float, config: FloatArray) -> tuple[FloatArra
     P[: flat.size, : flat.size] = shape + uncertainty**2 * np.outer(flat, flat)
     place = np.arange(flat.size, flat.size + m)
     P[place, place] = CREEP_DEVIATION**2
-    P[-1, -1] = (config[kernel.SLACK] * plan.unit * plan.half) ** 2
+    P[-1, -1] = (kernel.LEVEL_START * plan.unit * plan.half) ** 2
     spread = np.concatenate([np.repeat(deviation, columns), np.full(m, CREEP_DEVIATION), [0.0]])
     return np.concatenate([flat, plan.gains, [plan.offset]]), spread, P
