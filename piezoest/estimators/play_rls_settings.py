@@ -20,7 +20,7 @@ SLACK = 5e-3  # misfit of one window that is no parameter's
 LEVEL_TRAVEL = 1e-3  # walk of the level per root of the range travelled
 LEVEL_TIME = 1e-3  # ... and of half a period
 COMMON_WALK = 0.02  # walk of all slopes together per root of the range travelled
-SINGLE_WALK = 0.05  # ... and of each by itself, in parts of its prior deviation
+SINGLE_WALK = 0.15  # ... and of each by itself, in parts of its prior deviation
 WINDOWS = 32.0  # updates while the voltage travels half its range
 LEAST_GAIN = 0.05  # least slope just after a turn, in parts of the start's
 
