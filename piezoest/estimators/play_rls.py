@@ -10,11 +10,10 @@ from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, integer, non_negative, positive
 from piezoest.estimators import play_rls_kernel as kernel
-from piezoest.estimators import swing
+from piezoest.estimators import play_rls_settings as settings
 from piezoest.estimators.base import EstimatorBase, Status, Trace
 from piezoest.estimators.delay_line import delay_line
 from piezoest.models import ColemanHodgdon, Creep, LinearGain, Model, PrandtlIshlinskii, model_from_dict
-from piezoest.estimators import play_rls_settings as settings
 
 
 class PrandtlIshlinskiiRLS(EstimatorBase):
@@ -78,6 +77,7 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
     conformance_exceptions: ClassVar[dict[str, str]] = {
         "learns_the_parameters": "Its parameters are slopes of plays, not those of the Coleman-Hodgdon "
         "plant of that test.",
+        "a_dwell_moves_nothing": "At a dwell creep shows, and its gains are learnt; no slope moves.",
         "works_in_the_ring": "Its model has another number of parameters than the ring's first one.",
         "a_missing_sample_changes_nothing_but_itself": "Samples are taken in windows of travel, and "
         "weights near zero differ by more than parts of themselves.",
@@ -276,7 +276,6 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
         theta = self._usable
         slopes = theta[: (n + 1) * (k + 1)].reshape(n + 1, k + 1)
         bends = self._part(kernel.EDGES, k + 2)[1:-1]
-        # Of plays that only move together the weights are those of one: no weight is lost.
         return PrandtlIshlinskii(
             float(slopes[0, 0]),
             self.thresholds,

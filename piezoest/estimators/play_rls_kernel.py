@@ -37,6 +37,8 @@ RELATIVE, RELATIVE_BENDS, DECAYS, PRIOR, SPREAD = range(AT + 15, AT + 20)
 CONFIG = AT + 20
 
 SWEEPS = 10
+SMALLEST = 1e-18
+WILD = 100.0  # standard deviations beyond which an innovation counts no more
 AT_REST = 8.0  # a window with less than this part of its travel is a dwell
 LEVEL_START = 0.03  # deviation of the level where nothing is known of it, in parts of the stroke
 WAITING, UPDATED, MISSING, HOLDING, REJECTED = range(5)
@@ -261,6 +263,8 @@ def _constrain(state: Any, config: Any) -> None:
         for i in range(size - 1):
             least = config[LEAST] if i < columns else 0.0
             variance = state[P0 + i * size + i]
+            if variance <= SMALLEST:
+                continue
             change = (least - state[used + i]) / variance
             change = max(change, -state[force + i])
             if change != 0.0:
@@ -288,14 +292,22 @@ def _update(state: Any, config: Any, half: Any, first: int) -> None:
     for i in range(size):
         state[mean + i] /= state[COUNT]
         y -= state[theta + i] * state[mean + i]
-    S = (config[SLACK] * config[GAIN] * state[RANGE]) ** 2 + config[NOISE] ** 2 / state[COUNT]
+    R = (config[SLACK] * config[GAIN] * state[RANGE]) ** 2 + config[NOISE] ** 2 / state[COUNT]
+    S = R
     for i in range(size):
         total = 0.0
         for j in range(size):
             total += state[P0 + i * size + j] * state[mean + j]
         state[work + i] = total
         S += state[mean + i] * total
+    if not (S >= R and abs(y) < WILDEST):
+        # Rounding has spoilt the covariance, as voltages of another order of magnitude can.
+        for i in range(size * size):
+            state[P0 + i] = config[int(config[PRIOR]) + i]
+        state[RESETS] += 1.0
+        return
     state[INNOVATION], state[VARIANCE] = y, S
+    y = max(min(y, WILD * np.sqrt(S)), -WILD * np.sqrt(S))
     for i in range(first, size):
         gain = state[work + i] / S
         state[theta + i] += gain * y
@@ -305,7 +317,7 @@ def _update(state: Any, config: Any, half: Any, first: int) -> None:
             state[P0 + i * size + j] = entry
             state[P0 + j * size + i] = entry
     for i in range(size):
-        state[P0 + i * size + i] = max(state[P0 + i * size + i], 1e-18)
+        state[P0 + i * size + i] = max(state[P0 + i * size + i], SMALLEST)
     _constrain(state, config)
 
 
