@@ -25,21 +25,25 @@ RATE = 50_000.0  # Hz
 UPDATE_INTERVAL = 50  # samples
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
 STAGES = {"PaperStage": pz.PaperStage, "PreisachStage": pz.PreisachStage}
-ESTIMATORS = {"linear": None, "HysteresisRLS": pz.HysteresisRLS, "PrandtlIshlinskiiRLS": pz.PrandtlIshlinskiiRLS}
+ESTIMATORS = {
+    "linear": None,
+    "HysteresisRLS": pz.HysteresisRLS,
+    "PrandtlIshlinskiiRLS": pz.PrandtlIshlinskiiRLS,
+}
 RECORDING_START = pz.ColemanHodgdon(0.5, 8.0, 6.0)
 PERIOD = 200  # samples of the recording
 
 
 def references() -> dict[str, pz.Signal]:
     rows = ((2.5, 5.0), (5.0, 2.5), (5.0, 5.0), (7.5, 5.0))
-    found = {
-        f"triangle {a:g} µm {f:g} Hz": pz.signals.triangle(a, f, round(5.0 * f), RATE) for a, f in rows
-    }
+    found = {f"triangle {a:g} µm {f:g} Hz": pz.signals.triangle(a, f, round(5.0 * f), RATE) for a, f in rows}
     found["PRBS"] = pz.signals.prbs(5.0, sample_rate=RATE, start="zero").repeat(8)
     return found
 
 
-def follow(reference: pz.Signal, stage: type, estimator: Any, rate: float, **options: Any) -> pz.TrackingRecord:
+def follow(
+    reference: pz.Signal, stage: type, estimator: Any, rate: float, **options: Any
+) -> pz.TrackingRecord:
     """Send a reference round the ring; without an estimator, linear feed-forward with its gain estimated."""
     limits = pz.VoltageLimits(-100.0, 100.0)
     transfer = max(1, round(0.01 * rate))
@@ -162,7 +166,9 @@ def recording(folder: Path) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--json", type=Path, help="file to write")
     data = Path(os.environ.get("PIEZOEST_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
     parser.add_argument("--data", type=Path, default=data, help="folder of the recordings")

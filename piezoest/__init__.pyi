@@ -16,7 +16,7 @@ from .estimators.horizon import MovingHorizon
 from .estimators.play_rls import PrandtlIshlinskiiRLS
 from .estimators.recursive_least_squares import RecursiveLeastSquares
 from .estimators.rls import HysteresisRLS
-from .identification import Identification, identify
+from .identification import Identification, ModelChoice, choose_model, identify
 from .models import ColemanHodgdon, Creep, LinearGain, MassSpringDamper, PrandtlIshlinskii, Preisach
 from .records import Record, read_record
 from .signals import Signal
@@ -44,6 +44,7 @@ __all__ = [
     "LinearCompensator",
     "LinearGain",
     "MassSpringDamper",
+    "ModelChoice",
     "MovingHorizon",
     "PaperStage",
     "PrandtlIshlinskii",
@@ -61,6 +62,7 @@ __all__ = [
     "TrackingRecord",
     "VoltageLimits",
     "__version__",
+    "choose_model",
     "identify",
     "models",
     "policies",

@@ -13,9 +13,6 @@ from numba.extending import register_jitable
 from piezoest._checks import WILDEST, FloatArray, array_1d, integer, positive
 from piezoest.compensators import play_inverse
 from piezoest.compensators.layout import (
-    A,
-    B,
-    C,
     CONFIG,
     DECAY,
     INTEGRATED,
@@ -33,6 +30,9 @@ from piezoest.compensators.layout import (
     STATE,
     VOLTAGE,
     W_H,
+    A,
+    B,
+    C,
 )
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.equations import coleman_hodgdon as equations
@@ -41,6 +41,7 @@ from piezoest.equations.turning_points import recall, remember
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
 
 Method = Literal["closed-form", "bogacki-shampine"]
+
 
 @register_jitable
 def _voltage(state: Any, config: Any, r: Any) -> Any:
@@ -128,7 +129,9 @@ class Compensator:
         elif not isinstance(limits, VoltageLimits):
             raise ValueError(f"limits must be VoltageLimits(minimum, maximum), got {limits!r}")
         self._limits = limits
-        self._sample_rate = limits.sample_rate if sample_rate is None else positive("sample_rate", sample_rate)
+        self._sample_rate = (
+            limits.sample_rate if sample_rate is None else positive("sample_rate", sample_rate)
+        )
         self._config = np.zeros(CONFIG)
         self._config[MINIMUM] = self._limits.minimum
         self._config[MAXIMUM] = self._limits.maximum

@@ -10,7 +10,6 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.compensators.layout import (
-    C,
     CONFIG,
     DECAY,
     LARGEST_STEP,
@@ -26,6 +25,7 @@ from piezoest.compensators.layout import (
     SLEWED,
     STATE,
     VOLTAGE,
+    C,
 )
 from piezoest.equations.bent_plays import (
     bent_plays_output,

@@ -51,7 +51,23 @@ def layout(config: Any, n: int, k: int, m: int, line: int) -> int:
     slopes = (n + 1) * (k + 1)
     total = slopes + m + 1
     config[N], config[PLAYS], config[BENDS], config[TERMS] = total, n, k, m
-    sizes = (n, m, total, total, slopes, slopes, total, total * total, total, slopes, n, k + 2, total, total, line)
+    sizes = (
+        n,
+        m,
+        total,
+        total,
+        slopes,
+        slopes,
+        total,
+        total * total,
+        total,
+        slopes,
+        n,
+        k + 2,
+        total,
+        total,
+        line,
+    )
     place = ARRAYS
     for name, size in zip(range(Y, LINE + 1), sizes, strict=True):
         config[name] = place
@@ -237,7 +253,9 @@ def _walk(state: Any, config: Any, half: Any) -> None:
             if state[P0 + i * size + i] < config[prior + i * size + i]:
                 state[P0 + i * size + i] += single * travel * config[spread + i] ** 2
     stroke = config[GAIN] * state[RANGE]
-    level = config[LEVEL_TRAVEL] ** 2 * travel / state[RANGE] + config[LEVEL_TIME] ** 2 * state[ELAPSED] / half
+    level = (
+        config[LEVEL_TRAVEL] ** 2 * travel / state[RANGE] + config[LEVEL_TIME] ** 2 * state[ELAPSED] / half
+    )
     state[P0 + size * size - 1] = min(state[P0 + size * size - 1] + level * stroke**2, stroke**2)
 
 
@@ -437,7 +455,9 @@ def step(state: Any, config: Any, u: float, x: float) -> None:
 
 
 @njit("void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])", cache=True)
-def run(state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, y: Any, S: Any, covariance: Any) -> None:
+def run(
+    state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, y: Any, S: Any, covariance: Any
+) -> None:
     """Take whole records; every `every`-th sample into the histories that have room."""
     size = int(config[N])
     for k in range(u.size):

@@ -45,9 +45,7 @@ class Plan(NamedTuple):
     offset: float
 
 
-def plan(
-    initial: Any, voltage_range: Any, thresholds: int, bends: int, times: FloatArray
-) -> Plan:
+def plan(initial: Any, voltage_range: Any, thresholds: int, bends: int, times: FloatArray) -> Plan:
     """Grid and start that the arguments ask for."""
     if not isinstance(initial, PrandtlIshlinskii | ColemanHodgdon | LinearGain):
         raise ValueError(

@@ -249,7 +249,7 @@ class PrandtlIshlinskii(Model):
         """
         x = array_1d("u", u).copy()
         y, z = self._start(initial_state)
-        _simulate(x, y, z, self.gain, *self._arrays(sample_rate), self.offset)
+        _simulate(x, y, z, self.gain, self.offset, *self._arrays(sample_rate))
         return x
 
     def invert(
@@ -290,7 +290,7 @@ class PrandtlIshlinskii(Model):
             )
         u = array_1d("r", r).copy()
         y, z = self._start(initial_state)
-        _invert(u, y, z, self.gain, *self._arrays(sample_rate), self.offset)
+        _invert(u, y, z, self.gain, self.offset, *self._arrays(sample_rate))
         return u
 
     def _arrays(self, sample_rate: float | None) -> tuple[FloatArray, ...]:
@@ -365,8 +365,8 @@ def _bends(bends: Any, weights: Any, plays: int) -> tuple[FloatArray, FloatArray
 
 @njit(cache=True)
 def _simulate(
-    x: Any, y: Any, z: Any, gain: float, thresholds: Any, weights: Any, gains: Any, decays: Any,
-    bends: Any, changes: Any, offset: float,
+    x: Any, y: Any, z: Any, gain: float, offset: float, thresholds: Any, weights: Any, gains: Any,
+    decays: Any, bends: Any, changes: Any,
 ) -> None:  # fmt: skip
     """`x` comes as voltage and goes as displacement; `y` and `z` are updated."""
     for k in range(x.size):
@@ -379,8 +379,8 @@ def _simulate(
 
 @njit(cache=True)
 def _invert(
-    u: Any, y: Any, z: Any, gain: float, thresholds: Any, weights: Any, gains: Any, decays: Any,
-    bends: Any, changes: Any, offset: float,
+    u: Any, y: Any, z: Any, gain: float, offset: float, thresholds: Any, weights: Any, gains: Any,
+    decays: Any, bends: Any, changes: Any,
 ) -> None:  # fmt: skip
     """`u` comes as displacement and goes as voltage; `y` and `z` are updated."""
     last = 0.0

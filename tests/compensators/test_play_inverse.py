@@ -45,7 +45,7 @@ def test_limits_and_gaps_leave_the_model_where_the_voltage_is() -> None:
     x = MODEL.simulate(u)
     free = (np.abs(u - 20.0) > 1e-9) & (np.abs(u + 12.0) > 1e-9)
     free[1:] &= np.abs(np.diff(u)) < 0.3 - 1e-9
-    free[500:520] = False
+    free[[0, *range(500, 520)]] = False
     np.testing.assert_allclose(x[free], r[free], atol=1e-9)
 
 
