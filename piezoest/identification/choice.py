@@ -133,6 +133,10 @@ class ModelChoice:
         series.set(xlabel="time [s]", ylabel="measured − model [µm]")
         series.legend(loc="upper right", fontsize="small", ncols=3)
         series.margins(x=0.01)
+        # What was left out at the start would hide everything else.
+        settled = self.candidates[0].residual[max(self.base.left_out, time.size // 50) :]
+        largest = 1.1 * float(np.nanmax(np.abs(settled)))
+        series.set_ylim(-largest, largest)
         return figure
 
 
