@@ -10,6 +10,7 @@ from typing import Any
 import piezoest
 
 sys.path.insert(0, str(Path(__file__).parent))
+import beyond_page
 import estimators_page
 import paper_page
 
@@ -100,6 +101,7 @@ def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, li
 
 def setup(app: Any) -> None:
     app.connect("builder-inited", paper_page.write)
+    app.connect("builder-inited", beyond_page.write)
     app.connect("builder-inited", estimators_page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

@@ -13,13 +13,14 @@ from .estimators.batch_result import BatchFitResult
 from .estimators.ekf import HysteresisEKF
 from .estimators.filterpy_baselines import FilterPyEKF, FilterPyUKF
 from .estimators.horizon import MovingHorizon
+from .estimators.play_rls import PrandtlIshlinskiiRLS
 from .estimators.recursive_least_squares import RecursiveLeastSquares
 from .estimators.rls import HysteresisRLS
-from .identification import Identification, identify
-from .models import ColemanHodgdon, Creep, LinearGain, MassSpringDamper, PrandtlIshlinskii
+from .identification import Identification, ModelChoice, choose_model, identify
+from .models import ColemanHodgdon, Creep, LinearGain, MassSpringDamper, PrandtlIshlinskii, Preisach
 from .records import Record, read_record
 from .signals import Signal
-from .stage import Amplifier, Gauge, PaperStage, SimulatedStage, TemperatureLaw
+from .stage import Amplifier, Gauge, PaperStage, PreisachStage, SimulatedStage, TemperatureLaw
 from .supervisor import Event, Supervisor
 from .tracking import TrackingRecord, track
 
@@ -43,9 +44,13 @@ __all__ = [
     "LinearCompensator",
     "LinearGain",
     "MassSpringDamper",
+    "ModelChoice",
     "MovingHorizon",
     "PaperStage",
     "PrandtlIshlinskii",
+    "PrandtlIshlinskiiRLS",
+    "Preisach",
+    "PreisachStage",
     "Record",
     "RecursiveLeastSquares",
     "Signal",
@@ -57,6 +62,7 @@ __all__ = [
     "TrackingRecord",
     "VoltageLimits",
     "__version__",
+    "choose_model",
     "identify",
     "models",
     "policies",

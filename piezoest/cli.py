@@ -18,7 +18,7 @@ from piezoest.bench.commands import app as bench
 
 if TYPE_CHECKING:
     from piezoest.demo import Demo
-    from piezoest.identification import Identification
+    from piezoest.identification import Identification, ModelChoice
     from piezoest.models import Model
 
 app = typer.Typer(
@@ -187,6 +187,10 @@ def identify(
     sample_rate: Annotated[
         float | None, typer.Option(help="Samples per second; a column of time is then ignored.")
     ] = None,
+    model: Annotated[
+        str,
+        typer.Option(help="coleman-hodgdon, or auto: compare models of all kinds and say which to use."),
+    ] = "coleman-hodgdon",
     train: Annotated[float, typer.Option(help="Part to fit, from the start; the rest is held out.")] = 0.5,
     delay: Annotated[
         str, typer.Option(help="Samples by which the displacement lags the voltage, or auto.")
@@ -206,19 +210,24 @@ def identify(
     Columns and units are guessed from a header such as time_s,voltage_V,displacement_um.
     """
     with _errors(debug):
+        if model not in ("coleman-hodgdon", "auto"):
+            raise ValueError(f"--model must be coleman-hodgdon or auto, got {model}")
         figure = None if no_plot else plot or Path(f"{file.stem}_identified.png")
         if figure is not None:
             _check_figure(figure, keep=(file,))
         if output is not None:
             _check_writable(output, keep=(file,) if figure is None else (file, figure))
         with _progress("loading (compiles once after the installation)") as say:
+            from piezoest.identification import choose_model
             from piezoest.identification import identify as run
             from piezoest.records import read_record
 
             say(f"reading {file.name}")
             record = read_record(file, columns=_columns(columns), sample_rate=sample_rate)
             say("fitting")
-            found = run(record, train=train, delay="auto" if delay == "auto" else _number("--delay", delay))
+            lag: Any = "auto" if delay == "auto" else _number("--delay", delay)
+            fit: Any = choose_model if model == "auto" else run
+            found = fit(record, train=train, delay=lag)
             if figure is not None:
                 say("drawing")
                 found.plot().savefig(figure, dpi=130)
@@ -229,10 +238,30 @@ def identify(
         if as_json:
             typer.echo(json.dumps(found.to_dict(), indent=2, allow_nan=False))
             return
-        _print_identification(found)
+        if model == "auto":
+            _print_choice(found)
+        else:
+            _print_identification(found)
         for name, path in (("Figure", figure), ("Model", output)):
             if path is not None:
                 typer.echo(f"{name}: {path}")
+
+
+def _print_choice(found: ModelChoice) -> None:
+    from rich.table import Table
+
+    console = Console()
+    console.print(found.base.record.source, highlight=False, markup=False, soft_wrap=True)
+    table = Table(title="Free-running error [µm]")
+    for title in ("", "model", "n", "fitted rms", "held out rms", "largest", "BIC"):
+        left = title in ("", "model")
+        table.add_column(title, justify="left" if left else "right", no_wrap=left)
+    for item in found.candidates:
+        errors = (item.train.rms, item.held_out.rms, item.held_out.max)
+        cells = (f"{item.parameters}", *(f"{value:.4g}" for value in errors), f"{item.bic:.0f}")
+        table.add_row("▸" if item is found.best else "", item.name, *cells)
+    console.print(table)
+    console.print(found.reason, highlight=False, markup=False, soft_wrap=True)
 
 
 def _print_identification(found: Identification) -> None:
@@ -310,8 +339,8 @@ def compensate(
                 minimum=-float("inf") if minimum is None else minimum,
                 maximum=float("inf") if maximum is None else maximum,
             )
-            compensator = InverseCompensator(model, limits)
             signal = read_reference(reference, column=column, sample_rate=sample_rate)
+            compensator = InverseCompensator(model, limits, sample_rate=signal.sample_rate)
             check_continuity(signal.values, signal.sample_rate, "the reference")
             voltage = compensator.run(signal.values)
             columns = {"time_s": signal.time, "voltage_V": voltage, "reference_um": signal.values}
@@ -332,7 +361,7 @@ def _model(path: Path | None, given: dict[str, float | None], offset: float | No
     """Model from a JSON file, or from the three options."""
     import dataclasses
 
-    from piezoest.models import ColemanHodgdon, LinearGain, model_from_dict
+    from piezoest.models import ColemanHodgdon, LinearGain, PrandtlIshlinskii, model_from_dict
 
     stated = {name: value for name, value in given.items() if value is not None}
     if path is None:
@@ -354,7 +383,7 @@ def _model(path: Path | None, given: dict[str, float | None], offset: float | No
         model = model_from_dict(data)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    if not isinstance(model, ColemanHodgdon | LinearGain):
+    if not isinstance(model, ColemanHodgdon | LinearGain | PrandtlIshlinskii):
         raise ValueError(f"{path}: a {type(model).__name__} cannot be inverted here: use a ColemanHodgdon")
     return model if offset is None else dataclasses.replace(model, offset=offset)
 

@@ -25,7 +25,9 @@ class TrackingRecord:
         r [µm], u [V], measured x [µm], true x [µm] (the measured one where the stage does
         not know better).
     theta : ndarray, shape (N, n)
-        Parameters of the compensator's model at each sample; n = 0 without an estimator.
+        Parameters of the compensator's model at each sample; n = 0 without an estimator. Where
+        a model had another number of them than the last, as a start of another kind, those
+        of the next one stand.
     parameter_names : tuple of str
         Names of the columns of `theta`.
     sample_rate : float
@@ -229,7 +231,7 @@ def track(
                 parts = reference[part], voltage[part], measured[part]
                 model = supervisor.review(*parts, compensator.model, model)
             compensator.model = model
-    theta = np.repeat(history, interval, axis=0)[:N] if history else np.empty((N, 0))
+    theta = np.repeat(_of_one_kind(history), interval, axis=0)[:N] if history else np.empty((N, 0))
     period = getattr(r, "period", None)
     return TrackingRecord(
         reference, voltage, measured, displacement, theta, names, rate,
@@ -254,6 +256,18 @@ def _turn(
             u[k] = compensator.step(float(r[k]))
         x[k] = stage.step(float(u[k]))
         true[k] = getattr(stage, "displacement", x[k])
+
+
+def _of_one_kind(history: list[FloatArray]) -> FloatArray:
+    """Parameters as rows; a model of another kind than the last is shown as the next of its kind."""
+    size = history[-1].size
+    rows = np.empty((len(history), size))
+    row = history[-1]
+    for k in range(len(history) - 1, -1, -1):
+        if history[k].size == size:
+            row = history[k]
+        rows[k] = row
+    return rows
 
 
 def _feed(estimator: Any, u: FloatArray, x: FloatArray) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import piezoest as pz
 from piezoest import signals
 from piezoest.identification import Identification, Whiteness, identify
 from piezoest.models import ColemanHodgdon
@@ -189,3 +190,30 @@ def test_free_running_sees_only_the_voltage(real: Identification) -> None:
     x[real.trained :] = 0.0
     blind = identify(Record.from_arrays(record.voltage, x, record.sample_rate))
     np.testing.assert_allclose(blind.prediction, real.prediction, atol=1e-6)
+
+
+def test_chooses_the_model_a_stage_needs() -> None:
+    rate = 2000.0
+    t = np.arange(16_000) / rate
+    u = 30.0 * np.sin(2.0 * np.pi * 2.0 * t) * np.linspace(0.4, 1.0, t.size) + 5.0 * np.sin(
+        2.0 * np.pi * 9.0 * t
+    )
+    x = pz.PreisachStage(rate, seed=0).run(u)
+    found = pz.choose_model(pz.Record.from_arrays(u, x, rate), delay=0.0)
+    assert "asymmetric" in found.best.name
+    assert isinstance(found.model, pz.PrandtlIshlinskii)
+    errors = {item.name: item.held_out.rms for item in found.candidates}
+    assert errors[found.best.name] < 0.25 * errors["Coleman-Hodgdon"]
+    assert found.best.name in found.reason
+    saved = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert pz.models.model_from_dict(saved["model"]) == found.model
+    assert len(found.plot().axes) == 2
+
+
+def test_chooses_the_simplest_that_will_do() -> None:
+    rate = 1000.0
+    u = 30.0 * np.sin(2.0 * np.pi * np.arange(8000) / rate * 1.7) * np.linspace(1.0, 0.5, 8000)
+    model = pz.ColemanHodgdon(0.02, 0.14, 0.004)
+    x = model.simulate(u) + 2e-3 * np.random.default_rng(0).standard_normal(u.size)
+    found = pz.choose_model(pz.Record.from_arrays(u, x, rate), delay=0.0)
+    assert found.best.name == "Coleman-Hodgdon"

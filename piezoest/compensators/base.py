@@ -10,18 +10,37 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from piezoest._checks import WILDEST, FloatArray, array_1d, integer
+from piezoest._checks import WILDEST, FloatArray, array_1d, integer, positive
+from piezoest.compensators import play_inverse
+from piezoest.compensators.layout import (
+    CONFIG,
+    DECAY,
+    INTEGRATED,
+    LARGEST_STEP,
+    LIMITED_NOW,
+    MAXIMUM,
+    MEMORY,
+    MINIMUM,
+    MISSED,
+    OFFSET,
+    OWED,
+    SAMPLES,
+    SATURATED,
+    SLEWED,
+    STATE,
+    VOLTAGE,
+    W_H,
+    A,
+    B,
+    C,
+)
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations.integrators import bogacki_shampine
-from piezoest.models import ColemanHodgdon, LinearGain, Model
+from piezoest.equations.turning_points import recall, remember
+from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
 
 Method = Literal["closed-form", "bogacki-shampine"]
-
-# State: last voltage, its w_h, what the last change of model still owes [µm], counters.
-VOLTAGE, W_H, OWED, SAMPLES, SATURATED, SLEWED, MISSED, LIMITED_NOW, STATE = range(9)
-# Configuration.
-A, B, C, OFFSET, MINIMUM, MAXIMUM, LARGEST_STEP, DECAY, INTEGRATED, CONFIG = range(10)
 
 
 @register_jitable
@@ -51,6 +70,7 @@ def _voltage(state: Any, config: Any, r: Any) -> Any:
         w_next = equations.hysteresis_step(w_h, given - u, a, b)
     state[W_H] = w_next
     state[VOLTAGE] = given
+    remember(state, MEMORY, given)
     return given
 
 
@@ -94,16 +114,24 @@ class Compensator:
     See `LinearCompensator` and `InverseCompensator`.
     """
 
-    __slots__ = ("_config", "_limits", "_model", "_projected", "_start", "_state")
+    __slots__ = ("_config", "_limits", "_model", "_projected", "_sample_rate", "_start", "_state")
 
     def __init__(
-        self, model: Model, limits: VoltageLimits | None, method: Method, transfer_samples: int
+        self,
+        model: Model,
+        limits: VoltageLimits | None,
+        method: Method,
+        transfer_samples: int,
+        sample_rate: float | None = None,
     ) -> None:
         if limits is None:
             limits = VoltageLimits()
         elif not isinstance(limits, VoltageLimits):
             raise ValueError(f"limits must be VoltageLimits(minimum, maximum), got {limits!r}")
         self._limits = limits
+        self._sample_rate = (
+            limits.sample_rate if sample_rate is None else positive("sample_rate", sample_rate)
+        )
         self._config = np.zeros(CONFIG)
         self._config[MINIMUM] = self._limits.minimum
         self._config[MAXIMUM] = self._limits.maximum
@@ -114,40 +142,85 @@ class Compensator:
             raise ValueError(f"method must be 'closed-form' or 'bogacki-shampine', got {method!r}")
         self._config[INTEGRATED] = method == "bogacki-shampine"
         if not self._accepts(model).is_admissible:
-            hint = (
-                "use nearest_admissible()"
-                if isinstance(model, ColemanHodgdon)
-                else "its gain must not be zero"
-            )
+            hint = "its gain must not be zero"
+            if isinstance(model, ColemanHodgdon):
+                hint = "use nearest_admissible()"
+            elif isinstance(model, PrandtlIshlinskii):
+                hint = "all its slopes must be above zero"
             raise ValueError(f"model {model} is not admissible and has no inverse: {hint}")
-        self._model = model
         self._projected = False
         self._start = model
-        self._state = np.zeros(STATE)
+        self._begin(model)
+
+    def _begin(self, model: Model) -> None:
+        """Start at rest, at the voltage nearest to zero."""
         self._configure(model)
+        self._model = model
+        self._state = np.zeros(STATE)
         self._state[VOLTAGE] = self._limits.rest
+        remember(self._state, MEMORY, self._limits.rest)
+        self._place(model, model)
 
     def _accepts(self, model: Model) -> Model:
         """Return the model if it is of a kind this compensator can invert."""
-        if not isinstance(model, ColemanHodgdon | LinearGain):
-            raise ValueError(f"model must be a ColemanHodgdon or a LinearGain, got {type(model).__name__}")
+        if not isinstance(model, ColemanHodgdon | LinearGain | PrandtlIshlinskii):
+            raise ValueError(
+                "model must be a ColemanHodgdon, a PrandtlIshlinskii or a LinearGain, "
+                f"got {type(model).__name__}"
+            )
         return model
 
     def _configure(self, model: Model) -> None:
+        """Take over the model's numbers; states that only a Prandtl-Ishlinskii model has come and go."""
+        head = self._config[:CONFIG]
         if isinstance(model, ColemanHodgdon):
-            self._config[[A, B, C, OFFSET]] = model.a, model.b, model.c, model.offset
+            head[[A, B, C, OFFSET]] = model.a, model.b, model.c, model.offset
         elif isinstance(model, LinearGain):
             # No hysteresis: b = 0, and any a.
-            self._config[[A, B, C, OFFSET]] = 1.0, 0.0, model.gain, model.offset
+            head[[A, B, C, OFFSET]] = 1.0, 0.0, model.gain, model.offset
+        elif isinstance(model, PrandtlIshlinskii):
+            rate = model.sample_rate if self._sample_rate is None else self._sample_rate
+            arrays = model._arrays(rate)
+            counts = [float(values.size) for values in arrays[::2]]
+            head[[A, B, C, OFFSET]] = 1.0, 0.0, model.gain, model.offset
+            self._config = np.concatenate([head, counts, *arrays])
+            return
+        self._config = head.copy()
+
+    def _expected(self) -> float:
+        """Displacement that the model in use expects of the last sample [µm]."""
+        config, state = self._config, self._state
+        if isinstance(self._model, PrandtlIshlinskii):
+            return float(play_inverse.expected(state, config))
+        return float(config[C] * state[VOLTAGE] + state[W_H] + config[OFFSET])
+
+    def _place(self, model: Model, before: Model) -> None:
+        """Bring the model's memory to where the voltage is, as far as it is known."""
+        state = self._state
+        if not isinstance(model, PrandtlIshlinskii):
+            self._state = state[:STATE].copy()
+            return
+        terms = 0 if model.creep is None else model.creep.gains.size
+        z = np.zeros(terms)
+        if isinstance(before, PrandtlIshlinskii):
+            n = before.thresholds.size
+            if np.array_equal(before.thresholds, model.thresholds) and state.size == STATE + n + terms:
+                return
+            if state.size - STATE - n == terms:
+                z = state[STATE + n :]
+        y = [recall(state, MEMORY, r) for r in model.thresholds.tolist()]
+        self._state = np.concatenate([state[:STATE], y, z])
 
     @property
     def model(self) -> Model:
         """Model whose inverse is used. Setting it is bumpless.
 
-        The place in the loop, w_h in parts of its limit b/a, is kept. What the new model makes of
-        the present voltage differs from what the old one made of it; that difference is
-        paid back exponentially over `transfer_samples`. An inadmissible model is replaced
-        by its nearest admissible one, and `status` says so: a stream must not stop.
+        The place in the loop is kept: w_h in parts of its limit b/a, and plays as the voltage's
+        turning points have left them. What the new model makes of the present voltage differs
+        from what the old one made of it; that difference is paid back exponentially over
+        `transfer_samples`. An inadmissible model is replaced by its nearest admissible one, a
+        `PrandtlIshlinskii` or `LinearGain` not taken, and `status` says so: a stream must not
+        stop.
         """
         return self._model
 
@@ -159,13 +232,15 @@ class Compensator:
             if not isinstance(model, ColemanHodgdon):
                 return
             model = model.nearest_admissible()
-        old, state = self._config, self._state
-        expected = old[C] * state[VOLTAGE] + state[W_H] + old[OFFSET] + state[OWED]
-        place = state[W_H] * old[A] / old[B] if old[B] > 0.0 else 0.0
+        old = self._config
+        expected = self._expected() + self._state[OWED]
+        place = self._state[W_H] * old[A] / old[B] if old[B] > 0.0 else 0.0
         self._configure(model)
+        self._place(model, self._model)
         self._model = model
-        state[W_H] = min(max(place, -1.0), 1.0) * old[B] / old[A]
-        state[OWED] = expected - (old[C] * state[VOLTAGE] + state[W_H] + old[OFFSET])
+        config = self._config
+        self._state[W_H] = min(max(place, -1.0), 1.0) * config[B] / config[A]
+        self._state[OWED] = expected - self._expected()
 
     @property
     def limits(self) -> VoltageLimits:
@@ -207,6 +282,8 @@ class Compensator:
         float
             Voltage [V], within the limits.
         """
+        if isinstance(self._model, PrandtlIshlinskii):
+            return play_inverse.step(self._state, self._config, np.nan if r is None else r)
         return _step(self._state, self._config, np.nan if r is None else r)
 
     def run(self, r: Any) -> FloatArray:
@@ -229,15 +306,14 @@ class Compensator:
         """
         r = array_1d("r", r, allow_nan=True)
         u = np.empty_like(r)
-        _run(self._state, self._config, r, u)
+        run = play_inverse.run if isinstance(self._model, PrandtlIshlinskii) else _run
+        run(self._state, self._config, r, u)
         return u
 
     def reset(self) -> None:
         """Return to the state after construction, with the model given there."""
-        self._model, self._projected = self._start, False
-        self._configure(self._start)
-        self._state[:] = 0.0
-        self._state[VOLTAGE] = self._limits.rest
+        self._projected = False
+        self._begin(self._start)
 
     def copy(self) -> Self:
         """Return an independent compensator in the same state."""

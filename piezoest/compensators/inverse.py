@@ -12,7 +12,7 @@ class InverseCompensator(Compensator):
 
     Parameters
     ----------
-    model : ColemanHodgdon or LinearGain
+    model : ColemanHodgdon, PrandtlIshlinskii or LinearGain
         Model to invert; must be admissible. A `LinearGain` is the case without hysteresis.
     limits : VoltageLimits, optional
         Limits of the voltage (default none).
@@ -21,18 +21,24 @@ class InverseCompensator(Compensator):
         between samples, or by integrating (17) with the paper's Runge-Kutta method.
     transfer_samples : int
         Time constant of a bumpless change of model, in samples (default 500); 0 for none.
+    sample_rate : float, optional
+        [Hz]. Only a model with creep needs it; default that of the limits, or the model's own.
 
     Raises
     ------
     ValueError
-        If the model is of another kind or not admissible, the limits are no `VoltageLimits`, or the
-        method is unknown.
+        If the model is of another kind or not admissible, the limits are no `VoltageLimits`, the
+        method is unknown, or a model with creep comes without a sample rate.
 
     Notes
     -----
     The state follows the voltage that was really given out, so that limits do not wind it
     up. Start: 0 V and w_h = 0, the equilibrium of the paper.
-    Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012).
+    The inverse of a `PrandtlIshlinskii` is exact for each sample: one walk over its thresholds,
+    creep being known from the past. `method` does not apply to it.
+
+    Sources: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012); Krejci and
+    Kuhnen, IEE Proc. Control Theory Appl. 148 (2001) 185-192.
     """
 
     __slots__ = ()
@@ -44,5 +50,6 @@ class InverseCompensator(Compensator):
         *,
         method: Method = "closed-form",
         transfer_samples: int = 500,
+        sample_rate: float | None = None,
     ) -> None:
-        super().__init__(model, limits, method, transfer_samples)
+        super().__init__(model, limits, method, transfer_samples, sample_rate)

@@ -22,3 +22,29 @@ def creep_step(z, w, gains, decays):
         z[i] = z[i] + (1.0 - decays[i]) * (gains[i] * w - z[i])
         x = x + z[i]
     return x
+
+
+@register_jitable(inline="always")
+def unit_creep_step(z, w, decays):
+    """`creep_step` with all gains one: the states `z` (n,) [µm] follow w, in place.
+
+    x_creep = sum_i gains[i] z[i]; such states stay right when the gains change.
+    """
+    for i in range(z.shape[0]):
+        z[i] = z[i] + (1.0 - decays[i]) * (w - z[i])
+
+
+@register_jitable(inline="always")
+def creep_to_come(z, gains, decays):
+    """(held, share) of the next sample: x_creep = held + share w, for the w held over it.
+
+    What the past makes of the next sample is known before it, and what the sample itself
+    adds is linear in w: creep is inverted without iteration. `z` are the states of
+    `unit_creep_step`.
+    """
+    held = 0.0
+    share = 0.0
+    for i in range(z.shape[0]):
+        held = held + gains[i] * decays[i] * z[i]
+        share = share + gains[i] * (1.0 - decays[i])
+    return held, share

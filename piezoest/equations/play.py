@@ -33,8 +33,8 @@ def prandtl_ishlinskii_step(y, u, gain, thresholds, weights):
 
 
 @register_jitable(inline="always")
-def prandtl_ishlinskii_inverse_step(y, w, gain, thresholds, weights):
-    """The u for which `prandtl_ishlinskii_step` gives w; `y` (n,) is updated in place.
+def prandtl_ishlinskii_inverse(y, w, gain, thresholds, weights):
+    """The u for which `prandtl_ishlinskii_step` gives w; the states `y` (n,) are left alone.
 
     Seen from the states y, w is a piecewise linear function of u: between the breakpoints
     y[0] - r[0] and y[0] + r[0] no play moves and its slope is the gain; each breakpoint
@@ -53,6 +53,13 @@ def prandtl_ishlinskii_inverse_step(y, w, gain, thresholds, weights):
         slope = slope + weights[i]
         beyond = np.fmax(u - (y[i] + thresholds[i]), 0.0) + np.fmin(u - (y[i] - thresholds[i]), 0.0)
         u = u - beyond * (weights[i] / slope)
+    return u
+
+
+@register_jitable(inline="always")
+def prandtl_ishlinskii_inverse_step(y, w, gain, thresholds, weights):
+    """The u of `prandtl_ishlinskii_inverse`; the states `y` (n,) follow it in place."""
+    u = prandtl_ishlinskii_inverse(y, w, gain, thresholds, weights)
     for i in range(y.shape[0]):
         y[i] = play(y[i], u, thresholds[i])
     return u

@@ -1,6 +1,7 @@
 """A recorded log to a model: parameters with standard errors, free-running error, advice."""
 
+from piezoest.identification.choice import Candidate, ModelChoice, choose_model
 from piezoest.identification.procedure import identify
 from piezoest.identification.result import Identification, Misfit, Whiteness
 
-__all__ = ["Identification", "Misfit", "Whiteness", "identify"]
+__all__ = ["Candidate", "Identification", "Misfit", "ModelChoice", "Whiteness", "choose_model", "identify"]

@@ -8,6 +8,7 @@ from piezoest.models.creep import Creep
 from piezoest.models.linear_gain import LinearGain
 from piezoest.models.mechanics import MassSpringDamper
 from piezoest.models.prandtl_ishlinskii import PrandtlIshlinskii
+from piezoest.models.preisach import Preisach
 
 __all__ = [
     "ColemanHodgdon",
@@ -16,6 +17,7 @@ __all__ = [
     "MassSpringDamper",
     "Model",
     "PrandtlIshlinskii",
+    "Preisach",
     "model_from_dict",
 ]
 
@@ -34,7 +36,7 @@ def model_from_dict(data: dict[str, Any]) -> Model:
         If the name is unknown or the fields do not fit.
     """
     kinds: dict[str, type[Model]] = {
-        kind.__name__: kind for kind in (ColemanHodgdon, LinearGain, PrandtlIshlinskii)
+        kind.__name__: kind for kind in (ColemanHodgdon, LinearGain, PrandtlIshlinskii, Preisach)
     }
     name = data.get("model")
     if not isinstance(name, str) or name not in kinds:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -9,9 +10,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, finite
-from piezoest.equations import play as equations
+from piezoest._checks import FloatArray, array_1d, finite, positive
+from piezoest.equations.bent_plays import bent_plays_step, prandtl_ishlinskii_voltage
+from piezoest.equations.creep import creep_to_come, unit_creep_step
 from piezoest.models._base import Model
+from piezoest.models.creep import Creep
 
 # Rounding allowed for in a given initial state, in parts of the largest threshold.
 _STATE_TOLERANCE = 1e-9
@@ -19,7 +22,10 @@ _STATE_TOLERANCE = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class PrandtlIshlinskii(Model):
-    """Prandtl-Ishlinskii hysteresis: x = gain u + sum_i weights[i] play_i[u] + offset.
+    """Prandtl-Ishlinskii hysteresis with optional creep and asymmetry.
+
+    w = gain u + sum_i weights[i] play_i[u], x = w + creep of w + offset. For asymmetric loops
+    the slope of the voltage's part and of each play's may change at given voltages.
 
     Parameters
     ----------
@@ -32,79 +38,119 @@ class PrandtlIshlinskii(Model):
         Slope that each play adds once it moves [µm/V].
     offset : float
         Displacement at zero voltage and plays at zero [µm].
+    creep : Creep, optional
+        First-order terms driven by w; `simulate` and `invert` then need the sample rate.
+    bends : array_like, shape (k,), optional
+        Voltages at which slopes change [V], rising.
+    bend_weights : array_like, shape (k, 1 + n), optional
+        Change of slope above each bend [µm/V]: of the gain, where the voltage is above it, then
+        of each weight, where that play is.
+    sample_rate : float, optional
+        Rate at which creep proceeds where no other is given [Hz].
 
     Raises
     ------
     ValueError
-        If a value is not finite, the thresholds are not above zero and rising, or the
-        lengths differ.
+        If a value is not finite, the thresholds are not above zero and rising, the bends not
+        rising, the shapes do not fit, or the creep is no `Creep`.
 
     Notes
     -----
     Admissible, so that x rises with u and the inverse exists, are gain > 0 and
-    gain + weights[0] + … + weights[i] > 0 for every i. `theta` holds the gain, the
-    thresholds, then the weights. Source: P. Krejci, K. Kuhnen, IEE Proc. Control Theory
-    Appl. 148 (2001) 185-192.
+    gain + weights[0] + … + weights[i] > 0 for every i, with bends for the least that each
+    of them becomes, and negative creep gains that do not sum to -1 or less. `theta` holds the
+    gain, the thresholds, the weights, then the creep gains and the bend weights row by row.
+
+    Sources: P. Krejci, K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001) 185-192; K.
+    Kuhnen, European Journal of Control 9 (2003) 407-418 (one-sided dead zones, here on
+    each play, see `piezoest.equations.bent_plays`); K. Kuhnen, P. Krejci,
+    IEEE Trans. Autom. Control 54 (2009) 537-550 (creep).
     """
 
     gain: float
     thresholds: FloatArray
     weights: FloatArray
     offset: float = 0.0
+    creep: Creep | None = None
+    bends: FloatArray = dataclasses.field(default_factory=lambda: np.empty(0))
+    bend_weights: FloatArray = dataclasses.field(default_factory=lambda: np.empty((0, 1)))
+    sample_rate: float | None = None
 
-    def __init__(self, gain: float, thresholds: ArrayLike, weights: ArrayLike, offset: float = 0.0) -> None:
-        thresholds = array_1d("thresholds", thresholds).copy()
-        weights = array_1d("weights", weights).copy()
-        if thresholds.size != weights.size:
-            raise ValueError(
-                f"weights must have one value per threshold, got {weights.size} weights for "
-                f"{thresholds.size} thresholds"
-            )
+    def __init__(
+        self,
+        gain: float,
+        thresholds: ArrayLike,
+        weights: ArrayLike,
+        offset: float = 0.0,
+        creep: Creep | None = None,
+        bends: ArrayLike = (),
+        bend_weights: ArrayLike = (),
+        sample_rate: float | None = None,
+    ) -> None:
+        thresholds, weights = rising_pair("thresholds", thresholds, "weights", weights)
         if thresholds.size and thresholds[0] <= 0.0:
             raise ValueError(
                 f"thresholds must be above zero, got {thresholds[0]:g} first: "
                 "add the weight of a threshold of zero to the gain"
             )
-        if np.any(np.diff(thresholds) <= 0.0):
-            raise ValueError(
-                f"thresholds must rise from entry to entry, got {thresholds}: "
-                "sort them together with the weights and merge equal ones"
-            )
-        thresholds.flags.writeable = False
-        weights.flags.writeable = False
+        if creep is not None and not isinstance(creep, Creep):
+            raise ValueError(f"creep must be a Creep or None, got {type(creep).__name__}")
+        bends, changes = _bends(bends, bend_weights, weights.size)
         object.__setattr__(self, "gain", finite("gain", gain))
         object.__setattr__(self, "thresholds", thresholds)
         object.__setattr__(self, "weights", weights)
         object.__setattr__(self, "offset", finite("offset", offset))
+        object.__setattr__(self, "creep", creep)
+        object.__setattr__(self, "bends", bends)
+        object.__setattr__(self, "bend_weights", changes)
+        rate = None if sample_rate is None else positive("sample_rate", sample_rate)
+        object.__setattr__(self, "sample_rate", rate)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, PrandtlIshlinskii):
             return NotImplemented
-        return bool(np.array_equal(self.theta, other.theta) and self.offset == other.offset)
+        return self.to_dict() == other.to_dict()
 
     def __hash__(self) -> int:
         return hash((*self.theta.tolist(), self.offset))
 
     @property
+    def is_plain(self) -> bool:
+        """Whether it has neither creep nor bends."""
+        return self.creep is None and self.bends.size == 0
+
+    @property
     def parameter_names(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Names of the entries of `theta`: the gain, the thresholds, the weights."""
-        indices = range(self.thresholds.size)
-        return ("gain", *(f"thresholds[{i}]" for i in indices), *(f"weights[{i}]" for i in indices))
+        """Names of the entries of `theta`."""
+        indices, terms = range(self.thresholds.size), range(self._creep_gains.size)
+        return (
+            "gain",
+            *(f"thresholds[{i}]" for i in indices),
+            *(f"weights[{i}]" for i in indices),
+            *(f"creep.gains[{i}]" for i in terms),
+            *(f"bend_weights[{j},{i}]" for j, i in np.ndindex(self.bend_weights.shape)),
+        )
 
     @property
     def parameter_units(self) -> tuple[str, ...]:  # type: ignore[override]
         """Units of the entries of `theta`."""
         n = self.thresholds.size
-        return ("µm/V",) + ("V",) * n + ("µm/V",) * n
+        creep, bends = ("1",) * self._creep_gains.size, ("µm/V",) * self.bend_weights.size
+        return ("µm/V",) + ("V",) * n + ("µm/V",) * n + creep + bends
 
     @property
     def theta(self) -> FloatArray:
-        """Gain, thresholds, weights in one vector, shape (1 + 2n,)."""
-        return np.concatenate(([self.gain], self.thresholds, self.weights))
+        """Gain, thresholds, weights, creep gains and bend weights in one vector, shape (1 + 2n + …,)."""
+        parts = ([self.gain], self.thresholds, self.weights, self._creep_gains, self.bend_weights.ravel())
+        return np.concatenate(parts)
+
+    @property
+    def _creep_gains(self) -> FloatArray:
+        return np.empty(0) if self.creep is None else self.creep.gains
 
     @classmethod
     def from_theta(cls, theta: Any, offset: float = 0.0) -> Self:
-        """Make the model from its parameter vector.
+        """Make the model without creep and bends from its parameter vector.
 
         Parameters
         ----------
@@ -128,28 +174,67 @@ class PrandtlIshlinskii(Model):
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe dictionary with the class name under ``"model"``."""
-        return {
+        data: dict[str, Any] = {
             "model": type(self).__name__,
             "gain": self.gain,
             "thresholds": self.thresholds.tolist(),
             "weights": self.weights.tolist(),
             "offset": self.offset,
         }
+        if self.creep is not None:
+            data["creep"] = self.creep.to_dict()
+        if self.bends.size:
+            data["bends"] = self.bends.tolist()
+            data["bend_weights"] = self.bend_weights.tolist()
+        if self.sample_rate is not None:
+            data["sample_rate"] = self.sample_rate
+        return data
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Self:
+        """Make the model from what `to_dict` gave.
+
+        Parameters
+        ----------
+        data : dict
+            The dictionary; ``"model"``, if there, must name this class.
+
+        Raises
+        ------
+        ValueError
+            If a field is missing or unknown, or the dictionary is of another model.
+        """
+        if data.get("creep") is not None:
+            data = {**data, "creep": Creep.from_dict(data["creep"])}
+        # Named, for a class with slots is made twice and `super()` then finds the first.
+        return super(PrandtlIshlinskii, cls).from_dict(data)
 
     @property
     def is_admissible(self) -> bool:
         """Whether x rises with u from every state, so that the inverse exists."""
-        return bool(self.gain > 0.0 and np.all(self.gain + np.cumsum(self.weights) > 0.0))
+        negative_creep = float(np.minimum(self._creep_gains, 0.0).sum())
+        lowest = np.vstack([np.zeros(self.weights.size + 1), np.cumsum(self.bend_weights, axis=0)])
+        slopes = np.append(self.gain, self.weights) + lowest.min(axis=0)
+        return bool(np.all(np.cumsum(slopes) > 0.0) and negative_creep > -1.0)
 
-    def simulate(self, u: FloatArray, *, initial_state: FloatArray | None = None) -> FloatArray:
-        """Displacement for a voltage record; exact, whatever the sample rate.
+    def simulate(
+        self,
+        u: FloatArray,
+        *,
+        initial_state: FloatArray | None = None,
+        sample_rate: float | None = None,
+    ) -> FloatArray:
+        """Displacement for a voltage record; exact for a voltage held over each sample.
 
         Parameters
         ----------
         u : array_like, shape (N,)
             Voltage [V].
-        initial_state : array_like, shape (n,), optional
-            Play states [V] before the first sample; zeros if not given.
+        initial_state : array_like, shape (n,) or (n + m,), optional
+            Play states [V] before the first sample, and after them those of the creep terms
+            in parts of their gains [µm]; zeros if not given.
+        sample_rate : float, optional
+            [Hz]; needed with creep only, and there the model's own if not given.
 
         Returns
         -------
@@ -159,21 +244,32 @@ class PrandtlIshlinskii(Model):
         Raises
         ------
         ValueError
-            If u is not a finite 1-D array, or no input can leave `initial_state` behind.
+            If u is not a finite 1-D array, no input can leave `initial_state` behind, or the
+            sample rate is missing.
         """
         x = array_1d("u", u).copy()
-        _simulate(x, self._start(initial_state), self.gain, self.thresholds, self.weights, self.offset)
+        y, z = self._start(initial_state)
+        _simulate(x, y, z, self.gain, self.offset, *self._arrays(sample_rate))
         return x
 
-    def invert(self, r: FloatArray, *, initial_state: FloatArray | None = None) -> FloatArray:
+    def invert(
+        self,
+        r: FloatArray,
+        *,
+        initial_state: FloatArray | None = None,
+        sample_rate: float | None = None,
+    ) -> FloatArray:
         """Voltage under which the model follows a reference exactly.
 
         Parameters
         ----------
         r : array_like, shape (N,)
             Reference displacement [µm].
-        initial_state : array_like, shape (n,), optional
-            Play states [V] before the first sample; zeros if not given.
+        initial_state : array_like, shape (n,) or (n + m,), optional
+            Play states [V] before the first sample, and after them those of the creep terms
+            in parts of their gains [µm]; zeros if not given.
+        sample_rate : float, optional
+            [Hz]; needed with creep only, and there the model's own if not given.
 
         Returns
         -------
@@ -183,26 +279,41 @@ class PrandtlIshlinskii(Model):
         Raises
         ------
         ValueError
-            If the model is not admissible, r is not a finite 1-D array, or no input can
-            leave `initial_state` behind.
+            If the model is not admissible, r is not a finite 1-D array, no input can leave
+            `initial_state` behind, or the sample rate is missing.
         """
         if not self.is_admissible:
             slopes = self.gain + np.concatenate(([0.0], np.cumsum(self.weights)))
             raise ValueError(
-                f"the model has no inverse, its lowest slope is {slopes.min():g} µm/V: "
-                "gain and gain + weights[0] + … + weights[i] must be above zero"
+                f"the model has no inverse, its lowest slope is {slopes.min():g} µm/V: gain and "
+                "gain + weights[0] + … + weights[i] must be above zero, with every bend"
             )
         u = array_1d("r", r).copy()
-        _invert(u, self._start(initial_state), self.gain, self.thresholds, self.weights, self.offset)
+        y, z = self._start(initial_state)
+        _invert(u, y, z, self.gain, self.offset, *self._arrays(sample_rate))
         return u
 
-    def _start(self, initial_state: FloatArray | None) -> FloatArray:
-        """Play states to start from, as an own array (n,)."""
+    def _arrays(self, sample_rate: float | None) -> tuple[FloatArray, ...]:
+        """Thresholds, weights, creep gains and decays, bends and their weights, all flat."""
+        if self.creep is None:
+            gains = decays = np.empty(0)
+        else:
+            sample_rate = self.sample_rate if sample_rate is None else sample_rate
+            if sample_rate is None:
+                raise ValueError("sample_rate is needed for a model with creep: pass it in Hz")
+            gains, decays = self.creep.gains, self.creep.decays(sample_rate)
+        return self.thresholds, self.weights, gains, decays, self.bends, self.bend_weights.ravel()
+
+    def _start(self, initial_state: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+        """Play states (n,) and creep states (m,) to start from, as own arrays."""
+        n, m = self.thresholds.size, self._creep_gains.size
         if initial_state is None:
-            return np.zeros(self.thresholds.size)
-        y = array_1d("initial_state", initial_state).copy()
-        if y.size != self.thresholds.size:
-            raise ValueError(f"initial_state must hold {self.thresholds.size} play states, got {y.size}")
+            return np.zeros(n), np.zeros(m)
+        state = array_1d("initial_state", initial_state).copy()
+        if state.size not in (n, n + m):
+            and_creep = f" and {m} of creep" if m else ""
+            raise ValueError(f"initial_state must hold {n} play states{and_creep}, got {state.size} values")
+        y, z = state[:n], state[n:] if state.size > n else np.zeros(m)
         # The inverse's walk relies on it: neighbouring plays drift apart no further than this.
         slack = _STATE_TOLERANCE * self.thresholds[-1:].sum()
         if np.any(np.abs(np.diff(y)) > np.diff(self.thresholds) + slack):
@@ -210,18 +321,73 @@ class PrandtlIshlinskii(Model):
                 "initial_state cannot be reached by any voltage: neighbouring play states may differ "
                 "by no more than their thresholds do; take it from a simulation"
             )
-        return y
+        return y, z
+
+
+def rising_pair(name: str, thresholds: Any, other: str, weights: Any) -> tuple[FloatArray, FloatArray]:
+    """Rising thresholds and as many weights, as arrays that nobody else can write to."""
+    thresholds = array_1d(name, thresholds).copy()
+    weights = array_1d(other, weights).copy()
+    if thresholds.size != weights.size:
+        raise ValueError(
+            f"{other} must have one value per threshold, got {weights.size} weights for "
+            f"{thresholds.size} thresholds"
+        )
+    if np.any(np.diff(thresholds) <= 0.0):
+        raise ValueError(
+            f"{name} must rise from entry to entry, got {thresholds}: "
+            "sort them together with the weights and merge equal ones"
+        )
+    thresholds.flags.writeable = False
+    weights.flags.writeable = False
+    return thresholds, weights
+
+
+def _bends(bends: Any, weights: Any, plays: int) -> tuple[FloatArray, FloatArray]:
+    """Rising voltages and a row of changes for each, as arrays that nobody else can write to."""
+    bends = array_1d("bends", bends).copy()
+    shape = (bends.size, 1 + plays)
+    changes = np.array(weights, dtype=np.float64)
+    if changes.size == 0:
+        changes = changes.reshape(0, 1 + plays)
+    if changes.shape != shape:
+        raise ValueError(
+            f"bend_weights must have shape {shape}, a row for each of bends and a column for the gain "
+            f"and each weight, got {changes.shape}"
+        )
+    array_1d("bend_weights", changes.ravel())
+    if np.any(np.diff(bends) <= 0.0):
+        raise ValueError(f"bends must rise from entry to entry, got {bends}: sort them with their weights")
+    bends.flags.writeable = False
+    changes.flags.writeable = False
+    return bends, changes
 
 
 @njit(cache=True)
-def _simulate(x: Any, y: Any, gain: float, thresholds: Any, weights: Any, offset: float) -> None:
-    """`x` comes as voltage and goes as displacement; `y` is updated."""
+def _simulate(
+    x: Any, y: Any, z: Any, gain: float, offset: float, thresholds: Any, weights: Any, gains: Any,
+    decays: Any, bends: Any, changes: Any,
+) -> None:  # fmt: skip
+    """`x` comes as voltage and goes as displacement; `y` and `z` are updated."""
     for k in range(x.size):
-        x[k] = equations.prandtl_ishlinskii_step(y, x[k], gain, thresholds, weights) + offset
+        w = bent_plays_step(y, x[k], gain, thresholds, weights, bends, changes)
+        unit_creep_step(z, w, decays)
+        for i in range(z.size):
+            w = w + gains[i] * z[i]
+        x[k] = w + offset
 
 
 @njit(cache=True)
-def _invert(u: Any, y: Any, gain: float, thresholds: Any, weights: Any, offset: float) -> None:
-    """`u` comes as displacement and goes as voltage; `y` is updated."""
+def _invert(
+    u: Any, y: Any, z: Any, gain: float, offset: float, thresholds: Any, weights: Any, gains: Any,
+    decays: Any, bends: Any, changes: Any,
+) -> None:  # fmt: skip
+    """`u` comes as displacement and goes as voltage; `y` and `z` are updated."""
+    last = 0.0
     for k in range(u.size):
-        u[k] = equations.prandtl_ishlinskii_inverse_step(y, u[k] - offset, gain, thresholds, weights)
+        held, share = creep_to_come(z, gains, decays)
+        w = (u[k] - offset - held) / (1.0 + share)
+        last = prandtl_ishlinskii_voltage(y, last, w, gain, thresholds, weights, bends, changes)
+        bent_plays_step(y, last, gain, thresholds, weights, bends, changes)
+        unit_creep_step(z, w, decays)
+        u[k] = last

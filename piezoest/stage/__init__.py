@@ -2,7 +2,8 @@
 
 from piezoest.stage.instruments import Amplifier, Gauge
 from piezoest.stage.paper import PaperStage
+from piezoest.stage.preisach_stage import PreisachStage
 from piezoest.stage.stage import SimulatedStage
 from piezoest.stage.temperature import TemperatureLaw
 
-__all__ = ["Amplifier", "Gauge", "PaperStage", "SimulatedStage", "TemperatureLaw"]
+__all__ = ["Amplifier", "Gauge", "PaperStage", "PreisachStage", "SimulatedStage", "TemperatureLaw"]

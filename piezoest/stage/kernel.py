@@ -15,6 +15,7 @@ from piezoest.equations.coleman_hodgdon import hysteresis_step
 from piezoest.equations.creep import creep_step
 from piezoest.equations.mechanics import mechanics_step
 from piezoest.equations.play import prandtl_ishlinskii_step
+from piezoest.equations.preisach import preisach_step
 from piezoest.stage.instruments import amplifier_step, gauge_step
 
 # The state vector, in this order:
@@ -28,7 +29,7 @@ GAUGE_FILTER = MECHANICS + 2  # then the plays, the creep terms, the delay line
 # The settings vector, in this order:
 AMPLIFIER_SETTINGS = 4
 AMPLIFIER_COEFFICIENTS = AMPLIFIER_SETTINGS + 5
-HYSTERESIS_SETTINGS = AMPLIFIER_COEFFICIENTS + 4  # gain, a, b, offset
+HYSTERESIS_SETTINGS = AMPLIFIER_COEFFICIENTS + 6  # gain, a, b, centre, width, offset
 MECHANICS_SETTINGS = HYSTERESIS_SETTINGS + 6
 GAUGE_SETTINGS = MECHANICS_SETTINGS + 5
 GAUGE_COEFFICIENTS = GAUGE_SETTINGS + 5  # then thresholds, weights, creep gains, creep decays
@@ -52,6 +53,7 @@ def _deform(
 ) -> None:
     """Voltage to displacement without offset: the models are cases of gain u + plays + w_h.
 
+    A width above zero is that of a Preisach density, through which the plays then go.
     `factor` scales all of it, `shape` the plays and w_h alone; where they are 1 the result
     is that of the models, to the bit.
     """
@@ -59,7 +61,10 @@ def _deform(
     every_shape = int(shape.size > 1)
     for k in range(x.size):
         u = x[k]
-        w = prandtl_ishlinskii_step(plays, u, settings[0], thresholds, weights)
+        if settings[4] > 0.0:
+            w = preisach_step(plays, u, settings[0], thresholds, weights, settings[3], settings[4])
+        else:
+            w = prandtl_ishlinskii_step(plays, u, settings[0], thresholds, weights)
         memory[1] = _coleman_hodgdon_step(memory[1], u - memory[0], settings[1], settings[2])
         memory[0] = u
         w = w + memory[1]

@@ -14,7 +14,7 @@ from piezoest.models.creep import Creep
 from piezoest.models.mechanics import MassSpringDamper
 from piezoest.models.prandtl_ishlinskii import PrandtlIshlinskii
 from piezoest.stage.instruments import Amplifier, Gauge
-from piezoest.stage.stage import Schedule, SimulatedStage
+from piezoest.stage.stage import Hysteresis, Schedule, SimulatedStage
 
 
 class PaperStage(SimulatedStage):
@@ -84,31 +84,63 @@ class PaperStage(SimulatedStage):
         mechanics: bool = True,
     ) -> None:
         data = _data()
-        sample_rate = positive("sample_rate", sample_rate)
-        amplifier, gauge = data["amplifier"], data["gauge"]
         super().__init__(
-            sample_rate,
-            PrandtlIshlinskii(**_numbers(data["hysteresis"])),
-            creep=Creep(**_numbers(data["creep"])) if creep else None,
-            mechanics=MassSpringDamper(**_numbers(data["mechanics"])) if mechanics else None,
-            amplifier=Amplifier(
-                minimum=amplifier["minimum"],
-                maximum=amplifier["maximum"],
-                resolution=amplifier["resolution"] if quantisation else 0.0,
-                slew_rate=amplifier["slew_rate"],
-                cutoff=_cutoff(amplifier["cutoff"], sample_rate, filters),
-            ),
-            gauge=Gauge(
-                noise=gauge["noise"] if noise is None else non_negative("noise", noise),
-                cutoff=_cutoff(gauge["cutoff"], sample_rate, filters),
-                resolution=gauge["resolution"] if quantisation else 0.0,
-                minimum=gauge["minimum"],
-                maximum=gauge["maximum"],
-            ),
-            gain_schedule=gain_schedule,
-            temperature=temperature,
-            seed=seed,
+            **around(
+                PrandtlIshlinskii(**_numbers(data["hysteresis"])),
+                Creep(**_numbers(data["creep"])),
+                positive("sample_rate", sample_rate),
+                seed,
+                gain_schedule=gain_schedule,
+                temperature=temperature,
+                noise=noise,
+                quantisation=quantisation,
+                filters=filters,
+                creep=creep,
+                mechanics=mechanics,
+            )
         )
+
+
+def around(
+    hysteresis: Hysteresis,
+    slow: Creep,
+    sample_rate: float,
+    seed: int,
+    *,
+    gain_schedule: Schedule | ArrayLike | None = None,
+    temperature: Schedule | ArrayLike | None = None,
+    noise: float | None = None,
+    quantisation: bool = True,
+    filters: bool = True,
+    creep: bool = True,
+    mechanics: bool = True,
+) -> dict[str, Any]:
+    """Arguments of a `SimulatedStage` with these two and the rest of the paper's stage."""
+    data = _data()
+    amplifier, gauge = data["amplifier"], data["gauge"]
+    return {
+        "sample_rate": sample_rate,
+        "hysteresis": hysteresis,
+        "creep": slow if creep else None,
+        "mechanics": MassSpringDamper(**_numbers(data["mechanics"])) if mechanics else None,
+        "amplifier": Amplifier(
+            minimum=amplifier["minimum"],
+            maximum=amplifier["maximum"],
+            resolution=amplifier["resolution"] if quantisation else 0.0,
+            slew_rate=amplifier["slew_rate"],
+            cutoff=_cutoff(amplifier["cutoff"], sample_rate, filters),
+        ),
+        "gauge": Gauge(
+            noise=gauge["noise"] if noise is None else non_negative("noise", noise),
+            cutoff=_cutoff(gauge["cutoff"], sample_rate, filters),
+            resolution=gauge["resolution"] if quantisation else 0.0,
+            minimum=gauge["minimum"],
+            maximum=gauge["maximum"],
+        ),
+        "gain_schedule": gain_schedule,
+        "temperature": temperature,
+        "seed": seed,
+    }
 
 
 @functools.cache

@@ -15,11 +15,13 @@ from piezoest.models.creep import Creep
 from piezoest.models.linear_gain import LinearGain
 from piezoest.models.mechanics import MassSpringDamper
 from piezoest.models.prandtl_ishlinskii import PrandtlIshlinskii
+from piezoest.models.preisach import Preisach
 from piezoest.stage import kernel
 from piezoest.stage.instruments import Amplifier, Gauge
 from piezoest.stage.temperature import TemperatureLaw
 
-Hysteresis = LinearGain | ColemanHodgdon | PrandtlIshlinskii
+Hysteresis = LinearGain | ColemanHodgdon | PrandtlIshlinskii | Preisach
+HYSTERESES = (LinearGain, ColemanHodgdon, PrandtlIshlinskii, Preisach)
 Schedule = Callable[[FloatArray], FloatArray]
 
 _ONE = np.ones(1)
@@ -39,7 +41,7 @@ class SimulatedStage:
     ----------
     sample_rate : float
         [Hz].
-    hysteresis : LinearGain, ColemanHodgdon or PrandtlIshlinskii
+    hysteresis : LinearGain, ColemanHodgdon, PrandtlIshlinskii or Preisach
         Voltage [V] to displacement [µm].
     creep : Creep, optional
         Slow terms added to the displacement.
@@ -104,7 +106,7 @@ class SimulatedStage:
         seed: int = 0,
     ) -> None:
         self._sample_rate = positive("sample_rate", sample_rate)
-        self._hysteresis = _part("hysteresis", hysteresis, (LinearGain, ColemanHodgdon, PrandtlIshlinskii))
+        self._hysteresis = _part("hysteresis", hysteresis, HYSTERESES)
         self._creep = creep if creep is None else _part("creep", creep, (Creep,))
         self._mechanics = (
             mechanics if mechanics is None else _part("mechanics", mechanics, (MassSpringDamper,))
@@ -273,12 +275,19 @@ def _part(name: str, value: Any, kinds: tuple[type, ...]) -> Any:
 
 
 def _hysteresis_settings(model: Hysteresis) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(gain, a, b, offset), thresholds and weights: all models are cases of one sum."""
+    """(gain, a, b, centre, width, offset), thresholds and weights: all models are cases of one sum."""
     none = np.empty(0)
     if isinstance(model, ColemanHodgdon):
-        return np.array([model.c, model.a, model.b, model.offset]), none, none
-    head = np.array([model.gain, 0.0, 0.0, model.offset])
+        return np.array([model.c, model.a, model.b, 0.0, 0.0, model.offset]), none, none
+    head = np.array([model.gain, 0.0, 0.0, 0.0, 0.0, model.offset])
     if isinstance(model, PrandtlIshlinskii):
+        if not model.is_plain:
+            raise ValueError(
+                "hysteresis must have neither bends nor creep of its own: pass creep=model.creep to the stage"
+            )
+        return head, model.thresholds, model.weights
+    if isinstance(model, Preisach):
+        head[3:5] = model.centre, model.width
         return head, model.thresholds, model.weights
     return head, none, none
 

@@ -1,0 +1,117 @@
+"""The compiled inverse of a Prandtl-Ishlinskii model with creep and bends, sample by sample."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST
+from piezoest.compensators.layout import (
+    CONFIG,
+    DECAY,
+    LARGEST_STEP,
+    LIMITED_NOW,
+    MAXIMUM,
+    MEMORY,
+    MINIMUM,
+    MISSED,
+    OFFSET,
+    OWED,
+    SAMPLES,
+    SATURATED,
+    SLEWED,
+    STATE,
+    VOLTAGE,
+    C,
+)
+from piezoest.equations.bent_plays import (
+    bent_plays_output,
+    bent_plays_step,
+    prandtl_ishlinskii_voltage,
+)
+from piezoest.equations.creep import creep_to_come, unit_creep_step
+from piezoest.equations.turning_points import remember
+
+# After the configuration that all models share: how many plays, creep terms and bends, then
+# thresholds, weights, creep gains, decays, bends and their weights.
+PLAYS, TERMS, BENDS, ARRAYS = CONFIG, CONFIG + 1, CONFIG + 2, CONFIG + 3
+
+
+@register_jitable
+def _voltage(
+    state: Any, config: Any, y: Any, z: Any, thresholds: Any, weights: Any, gains: Any, decays: Any,
+    bends: Any, changes: Any, r: Any,
+) -> Any:  # fmt: skip
+    """Voltage for the next reference sample; plays and creep follow the voltage really given out."""
+    state[SAMPLES] += 1.0
+    u = state[VOLTAGE]
+    wanted = u
+    if np.abs(r) < WILDEST:
+        state[OWED] *= config[DECAY]
+        held, share = creep_to_come(z, gains, decays)
+        w = (r - state[OWED] - config[OFFSET] - held) / (1.0 + share)
+        wanted = prandtl_ishlinskii_voltage(y, u, w, config[C], thresholds, weights, bends, changes)
+        slewed = min(max(wanted, u - config[LARGEST_STEP]), u + config[LARGEST_STEP])
+        given = min(max(slewed, config[MINIMUM]), config[MAXIMUM])
+        state[SLEWED] += slewed != wanted
+        state[SATURATED] += given != slewed
+        state[LIMITED_NOW] = np.sign(wanted - given)
+        state[VOLTAGE] = given
+        remember(state, MEMORY, given)
+    else:
+        state[MISSED] += 1.0
+    w = bent_plays_step(y, state[VOLTAGE], config[C], thresholds, weights, bends, changes)
+    # Creep goes on while the voltage is held, too.
+    unit_creep_step(z, w, decays)
+    return state[VOLTAGE]
+
+
+@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True)
+def run(state: Any, config: Any, r: Any, u: Any) -> None:
+    """Voltages `u` for a whole reference `r`."""
+    n, m, b = int(config[PLAYS]), int(config[TERMS]), int(config[BENDS])
+    y, z = state[STATE : STATE + n], state[STATE + n : STATE + n + m]
+    a = ARRAYS
+    thresholds, weights = config[a : a + n], config[a + n : a + 2 * n]
+    a += 2 * n
+    gains, decays = config[a : a + m], config[a + m : a + 2 * m]
+    a += 2 * m
+    bends, changes = config[a : a + b], config[a + b : a + b + b * (n + 1)]
+    for k in range(r.size):
+        u[k] = _voltage(state, config, y, z, thresholds, weights, gains, decays, bends, changes, r[k])
+
+
+@njit("f8(f8[::1], f8[::1], f8)", cache=True)
+def step(state: Any, config: Any, r: float) -> Any:
+    """Voltage for one sample of the reference."""
+    n, m, b = int(config[PLAYS]), int(config[TERMS]), int(config[BENDS])
+    y, z = state[STATE : STATE + n], state[STATE + n : STATE + n + m]
+    a = ARRAYS
+    thresholds, weights = config[a : a + n], config[a + n : a + 2 * n]
+    a += 2 * n
+    gains, decays = config[a : a + m], config[a + m : a + 2 * m]
+    a += 2 * m
+    bends, changes = config[a : a + b], config[a + b : a + b + b * (n + 1)]
+    return _voltage(state, config, y, z, thresholds, weights, gains, decays, bends, changes, r)
+
+
+@njit("f8(f8[::1], f8[::1])", cache=True)
+def expected(state: Any, config: Any) -> Any:
+    """Displacement that the model expects of the last sample [µm]."""
+    n, m, b = int(config[PLAYS]), int(config[TERMS]), int(config[BENDS])
+    gains = ARRAYS + 2 * n
+    bends = gains + 2 * m
+    x = bent_plays_output(
+        state[STATE : STATE + n],
+        state[VOLTAGE],
+        config[C],
+        config[ARRAYS + n : gains],
+        config[bends : bends + b],
+        config[bends + b :],
+    )
+    for i in range(m):
+        x += config[gains + i] * state[STATE + n + i]
+    return x + config[OFFSET]

@@ -1,0 +1,130 @@
+"""Bent plays: segments, the walk of the inverse, the memory of turning points, Preisach's properties."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import piezoest as pz
+from piezoest.equations import bent_plays, turning_points
+from piezoest.equations.play import play
+
+RATE = 1000.0
+
+
+def random_model(seed: int, bends: int = 3) -> pz.PrandtlIshlinskii:
+    """Admissible, with weights of both signs, bends and creep."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 8))
+    thresholds = np.cumsum(rng.uniform(0.2, 5.0, n))
+    changes = rng.uniform(-0.01, 0.03, (bends, n + 1))
+    base = np.append(0.1, rng.uniform(0.0, 0.03, n))
+    lowest = np.vstack([np.zeros(n + 1), np.cumsum(changes, axis=0)]).min(axis=0)
+    base = np.maximum(base, -lowest + np.append(0.02, np.zeros(n)))
+    return pz.PrandtlIshlinskii(
+        base[0], thresholds, base[1:], 0.3,
+        creep=pz.Creep([0.04, 0.02], [0.01, 0.5]),
+        bends=np.sort(rng.uniform(-15.0, 15.0, bends)), bend_weights=changes, sample_rate=RATE,
+    )  # fmt: skip
+
+
+@given(seed=st.integers(0, 10_000), bends=st.integers(0, 4), scale=st.floats(1e-3, 3.0))
+def test_inverse_is_exact(seed: int, bends: int, scale: float) -> None:
+    model = random_model(seed, bends)
+    assert model.is_admissible
+    r = scale * np.cumsum(np.random.default_rng(seed).standard_normal(300))
+    u = model.invert(r)
+    np.testing.assert_allclose(model.simulate(u), r, atol=1e-9)
+    np.testing.assert_allclose(model.invert(model.simulate(u)), u, atol=1e-9)
+    assert pz.PrandtlIshlinskii.from_dict(model.to_dict()) == model
+
+
+def test_segments_add_up_to_the_play() -> None:
+    p = np.linspace(-5.0, 5.0, 101)
+    edges = [-1e30, -2.0, 1.0, 1e30]
+    parts = [bent_plays.segment(p, low, high) for low, high in itertools.pairwise(edges)]
+    np.testing.assert_allclose(sum(parts), p, atol=1e-15)
+
+
+def test_creep_needs_a_sample_rate() -> None:
+    model = pz.PrandtlIshlinskii(0.1, [1.0], [0.02], creep=pz.Creep([0.04], [0.1]))
+    with pytest.raises(ValueError, match="sample_rate"):
+        model.simulate(np.zeros(3))
+    with pytest.raises(ValueError, match=r"creep=model\.creep"):
+        pz.SimulatedStage(RATE, model)
+    stage = pz.SimulatedStage(RATE, pz.PrandtlIshlinskii(0.1, [1.0], [0.02]), creep=pz.Creep([0.04], [0.1]))
+    u = 10.0 * np.sin(np.arange(500) / 30.0)
+    np.testing.assert_allclose(model.simulate(u, sample_rate=RATE), stage.run(u), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("fields", "name"),
+    [
+        ({"bends": [1.0]}, "bend_weights"),
+        ({"bends": [2.0, 1.0], "bend_weights": np.zeros((2, 2))}, "bends"),
+        ({"creep": 3.0}, "creep"),
+        ({"sample_rate": 0.0}, "sample_rate"),
+    ],
+)
+def test_refuses(fields: dict[str, Any], name: str) -> None:
+    with pytest.raises(ValueError, match=name):
+        pz.PrandtlIshlinskii(0.1, [1.0], [0.02], **fields)
+
+
+@given(seed=st.integers(0, 10_000), scale=st.floats(0.1, 10.0))
+def test_turning_points_hold_all_the_memory_of_plays(seed: int, scale: float) -> None:
+    u = np.round(scale * np.cumsum(np.random.default_rng(seed).standard_normal(150)), 1)
+    memory = np.zeros(turning_points.SIZE)
+    thresholds = np.linspace(0.1, 8.0, 9)
+    y = np.zeros(9)
+    for value in u.tolist():
+        y = play(y, value, thresholds)
+        turning_points.remember(memory, 0, value)
+        np.testing.assert_array_equal([turning_points.recall(memory, 0, r) for r in thresholds], y)
+
+
+def line(*turns: float) -> Any:
+    """Straight lines from turn to turn."""
+    parts = [np.linspace(a, b, 101)[1:] for a, b in itertools.pairwise(turns)]
+    return np.concatenate([[turns[0]], *parts])
+
+
+PREISACH = pz.PreisachStage(50_000.0).hysteresis
+
+
+def test_preisach_wipes_out_and_is_congruent() -> None:
+    assert isinstance(PREISACH, pz.Preisach)
+    # Wiping-out: a loop that was passed leaves nothing behind.
+    plain = PREISACH.simulate(line(0.0, 40.0, -20.0, 50.0))
+    with_loop = PREISACH.simulate(line(0.0, 40.0, 10.0, 25.0, -20.0, 50.0))
+    np.testing.assert_allclose(with_loop[-1], plain[-1], atol=1e-12)
+    # Congruency: loops between the same turns are the same but for their level.
+    up = PREISACH.simulate(line(0.0, 10.0, 20.0, 10.0, 20.0))[-201:]
+    down = PREISACH.simulate(line(0.0, 60.0, 10.0, 20.0, 10.0, 20.0))[-201:]
+    np.testing.assert_allclose(np.diff(up - down), 0.0, atol=1e-12)
+
+
+def test_preisach_loops_differ_with_their_place_and_direction() -> None:
+    assert isinstance(PREISACH, pz.Preisach)
+    low = np.ptp(PREISACH.simulate(line(0.0, -60.0, -50.0, -60.0, -50.0))[-201:])
+    high = np.ptp(PREISACH.simulate(line(0.0, 20.0, 30.0, 20.0, 30.0))[-201:])
+    assert high > 1.05 * low
+    u = line(0.0, 40.0, -40.0, 40.0)
+    asymmetry = PREISACH.simulate(u) + PREISACH.simulate(-u)
+    assert np.abs(asymmetry[-100:]).max() > 0.05
+    with pytest.raises(ValueError, match="weights"):
+        pz.Preisach(0.1, [1.0], [-0.1], 0.0, 10.0)
+
+
+def test_preisach_stage_runs_as_it_steps() -> None:
+    u = 30.0 * np.sin(np.arange(300) / 20.0)
+    ran, stepped = pz.PreisachStage(10_000.0, seed=3), pz.PreisachStage(10_000.0, seed=3)
+    x = ran.run(u)
+    np.testing.assert_array_equal(x, [stepped.step(value) for value in u.tolist()])
+    quiet = pz.SimulatedStage(10_000.0, PREISACH)
+    np.testing.assert_allclose(quiet.run(u), PREISACH.simulate(u), atol=1e-12)
