@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numba import njit
@@ -54,6 +54,19 @@ def _voltage(state: Any, config: Any, r: Any) -> Any:
     return given
 
 
+@register_jitable
+def change_model(state: Any, config: Any, a: Any, b: Any, c: Any, offset: Any) -> None:
+    """Take another model without a bump: the place in the loop is kept, the difference owed."""
+    expected = config[C] * state[VOLTAGE] + state[W_H] + config[OFFSET] + state[OWED]
+    place = state[W_H] * config[A] / config[B] if config[B] > 0.0 else 0.0
+    config[A] = a
+    config[B] = b
+    config[C] = c
+    config[OFFSET] = offset
+    state[W_H] = min(max(place, -1.0), 1.0) * b / a
+    state[OWED] = expected - (c * state[VOLTAGE] + state[W_H] + offset)
+
+
 @njit("f8(f8[::1], f8[::1], f8)", cache=True)
 def _step(state: Any, config: Any, r: float) -> Any:
     return _voltage(state, config, r)
@@ -63,6 +76,11 @@ def _step(state: Any, config: Any, r: float) -> Any:
 def _run(state: Any, config: Any, r: Any, u: Any) -> None:
     for k in range(r.size):
         u[k] = _voltage(state, config, r[k])
+
+
+@njit("void(f8[::1], f8[::1], f8, f8, f8, f8)", cache=True)
+def _change_model(state: Any, config: Any, a: float, b: float, c: float, offset: float) -> None:
+    change_model(state, config, a, b, c, offset)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +106,15 @@ class CompensatorStatus:
     projected: bool
 
 
+def _loop(model: Model) -> tuple[float, float, float, float]:
+    """(a, b, c, offset) of a model."""
+    if isinstance(model, ColemanHodgdon):
+        return model.a, model.b, model.c, model.offset
+    assert isinstance(model, LinearGain)
+    # No hysteresis: b = 0, and any a.
+    return 1.0, 0.0, model.gain, model.offset
+
+
 class Compensator:
     """Feed-forward through the inverse of a model.
 
@@ -95,6 +122,11 @@ class Compensator:
     """
 
     __slots__ = ("_config", "_limits", "_model", "_projected", "_start", "_state")
+
+    #: Functions that a controller's code is generated from: voltage, change of model.
+    _compiled: ClassVar[tuple[Any, Any]] = (_voltage, change_model)
+    #: Positions in the configuration that no change of model or limits touches.
+    _fixed: ClassVar[tuple[int, ...]] = (DECAY, INTEGRATED)
 
     def __init__(
         self, model: Model, limits: VoltageLimits | None, method: Method, transfer_samples: int
@@ -134,11 +166,7 @@ class Compensator:
         return model
 
     def _configure(self, model: Model) -> None:
-        if isinstance(model, ColemanHodgdon):
-            self._config[[A, B, C, OFFSET]] = model.a, model.b, model.c, model.offset
-        elif isinstance(model, LinearGain):
-            # No hysteresis: b = 0, and any a.
-            self._config[[A, B, C, OFFSET]] = 1.0, 0.0, model.gain, model.offset
+        self._config[[A, B, C, OFFSET]] = _loop(model)
 
     @property
     def model(self) -> Model:
@@ -159,13 +187,8 @@ class Compensator:
             if not isinstance(model, ColemanHodgdon):
                 return
             model = model.nearest_admissible()
-        old, state = self._config, self._state
-        expected = old[C] * state[VOLTAGE] + state[W_H] + old[OFFSET] + state[OWED]
-        place = state[W_H] * old[A] / old[B] if old[B] > 0.0 else 0.0
-        self._configure(model)
         self._model = model
-        state[W_H] = min(max(place, -1.0), 1.0) * old[B] / old[A]
-        state[OWED] = expected - (old[C] * state[VOLTAGE] + state[W_H] + old[OFFSET])
+        _change_model(self._state, self._config, *_loop(model))
 
     @property
     def limits(self) -> VoltageLimits:

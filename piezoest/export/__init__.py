@@ -1,0 +1,6 @@
+"""From the notebook to the controller: C code, co-simulation units, tables."""
+
+from piezoest.export.c_code import CCode, c
+from piezoest.export.ring import Controller
+
+__all__ = ["CCode", "Controller", "c"]
