@@ -1,4 +1,4 @@
-from . import models, policies, signals
+from . import export, models, policies, signals
 from ._version import __version__
 from .compensators import (
     CompensatorStatus,
@@ -57,6 +57,7 @@ __all__ = [
     "TrackingRecord",
     "VoltageLimits",
     "__version__",
+    "export",
     "identify",
     "models",
     "policies",

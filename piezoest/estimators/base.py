@@ -111,11 +111,14 @@ class Compiled(NamedTuple):
         (gain, -, -, offset), into `model`.
     frozen : int or None
         Position in the state of a flag that holds the estimate; None if there is none.
+    unneeded : tuple of callable
+        Functions within `sample` that no model depends on: a controller leaves them out.
     """
 
     sample: Any
     proposed: Any
     frozen: int | None
+    unneeded: tuple[Any, ...] = ()
 
 
 class EstimatorBase(ABC):

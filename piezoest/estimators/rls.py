@@ -83,7 +83,9 @@ class HysteresisRLS(EstimatorBase):
 
     __slots__ = ("_config", "_initial", "_n", "_scale", "_terms")
 
-    _compiled = Compiled(kernel._sample, rls_model.proposed, kernel.FROZEN)
+    _compiled = Compiled(
+        kernel._sample, rls_model.proposed, kernel.FROZEN, unneeded=(kernel._propagate_error,)
+    )
 
     conformance_exceptions: ClassVar[dict[str, str]] = {}
 

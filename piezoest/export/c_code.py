@@ -12,6 +12,7 @@ import numpy as np
 from piezoest._checks import integer
 from piezoest._version import __version__
 from piezoest.compensators import Compensator
+from piezoest.compensators.base import OFFSET
 from piezoest.estimators.base import Compiled
 from piezoest.export import c_text as text
 from piezoest.export import ring
@@ -122,7 +123,8 @@ class _Generator:
     def __init__(self, estimator: Any, compensator: Compensator, name: str, precision: str, interval: int):
         self.estimator, self.compensator, self.name, self.interval = estimator, compensator, name, interval
         self.precision = precision
-        self.translator = Translator(real=precision, single=precision == "float")
+        unneeded = () if estimator is None else estimator._compiled.unneeded
+        self.translator = Translator(real=precision, single=precision == "float", unneeded=unneeded)
         self.voltage, self.change = compensator._compiled
         self.members: list[tuple[str, np.ndarray[Any, Any], str]] = []
         self.hysteretic = isinstance(compensator.model, ColemanHodgdon)
@@ -137,7 +139,7 @@ class _Generator:
         start = np.zeros(ring.STATE)
         start[ring.PREVIOUS] = self.compensator.voltage
         start[ring.MODEL : ring.MODEL + model.theta.size] = model.theta
-        start[ring.MODEL + 3] = model.offset
+        start[ring.MODEL + 3] = self.compensator._config[OFFSET]
         self.member("ring", start, "voltage given out last, counters, model in use")
         if self.estimator is not None:
             self.member("estimator", self.estimator._state, "state of the estimator")

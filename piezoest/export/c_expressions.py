@@ -61,61 +61,11 @@ _INTRINSICS: dict[Any, str] = {
 }  # fmt: skip
 _LIBRARY = {"fabs", "exp", "sqrt"}
 _RESERVED = frozenset(
-    [
-        "auto",
-        "break",
-        "case",
-        "char",
-        "const",
-        "continue",
-        "default",
-        "do",
-        "double",
-        "else",
-        "enum",
-        "extern",
-        "float",
-        "for",
-        "goto",
-        "if",
-        "inline",
-        "int",
-        "long",
-        "register",
-        "restrict",
-        "return",
-        "short",
-        "signed",
-        "sizeof",
-        "static",
-        "struct",
-        "switch",
-        "typedef",
-        "union",
-        "unsigned",
-        "void",
-        "volatile",
-        "while",
-        "real",
-        "exp",
-        "sqrt",
-        "fabs",
-        "sign",
-        "larger",
-        "smaller",
-        "larger_number",
-        "smaller_number",
-        "exp_minus_one",
-        "gamma",
-        "y0",
-        "y1",
-        "yn",
-        "j0",
-        "j1",
-        "jn",
-        "index",
-        "signal",
-    ]
+    """auto break case char const continue default do double else enum extern float for goto if inline
+    int long register restrict return short signed sizeof static struct switch typedef union unsigned void
+    volatile while
+    exp expf sqrt sqrtf fabs fabsf expm1 sign larger smaller larger_number smaller_number exp_minus_one
+    gamma y0 y1 yn j0 j1 jn index signal""".split()  # noqa: SIM905
 )
 
 
@@ -338,6 +288,8 @@ class Expressions:
         ) and not isinstance(op, ast.Div)
         if sign in ("%", "//") and (not whole or sign == "//"):
             raise self.source.error(node, f"{sign} on numbers that are not whole cannot be translated to C")
+        if sign == "%" and isinstance(right, Known) and right.value == 1:
+            return Known(0)
         a, b = (self.whole(s, node) if whole else self.real(s, node) for s in (left, right))
         self.check_order(node, a, b)
         text = f"{wrap(a, strength)} {sign} {wrap(b, strength + 1 if sign != '+' or not whole else strength)}"
@@ -500,6 +452,8 @@ class Expressions:
     def invoke(self, called: Any, arguments: list[Value], node: ast.AST) -> Value:
         """A call of a translated function; several results arrive in locals."""
         function, flat = self.translator.function(called, arguments)
+        if function.constant is not None:
+            return function.constant
         texts: list[str] = []
         uses: frozenset[str] = frozenset()
         scalars: list[Expr] = []
@@ -529,7 +483,7 @@ class Expressions:
             text = f"{function.name}({', '.join(texts)})"
             kind = function.returns[0] if function.returns else "none"
             return Expr(text, kind, uses=uses, reads=reads, impure=function.impure)
-        results = []
+        results: list[Expr] = []
         for kind in function.returns:
             name = f"{function.source.tree.name.strip('_')}_{len(results)}"
             while name in self.locals:
@@ -545,6 +499,8 @@ class Expressions:
         """A call whose result is not used."""
         if not isinstance(node, ast.Call):
             raise self.source.error(node, "a statement that does nothing")
+        if plain(self.called(node)) in self.translator.unneeded:
+            return
         value = self.call(node)
         if isinstance(value, Expr):
             self.out.append(printer.Line(f"{value.text};", value.uses))

@@ -1,4 +1,4 @@
-"""Python functions as the translator reads them: syntax tree, globals, comments, parameters that must be known."""
+"""Python functions as the translator reads them: tree, comments, and which parameters must be known."""
 
 from __future__ import annotations
 
@@ -114,6 +114,10 @@ def _names(node: ast.AST | None) -> set[str]:
     return set() if node is None else {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
 
 
+def _is_part(node: ast.AST) -> bool:
+    return isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice)
+
+
 def _needs(tree: ast.FunctionDef, names: dict[str, Any]) -> tuple[frozenset[str], frozenset[str]]:
     """Parameters whose value, and arrays whose size, decide what the code looks like."""
     values: set[str] = set()
@@ -125,9 +129,8 @@ def _needs(tree: ast.FunctionDef, names: dict[str, Any]) -> tuple[frozenset[str]
             values |= _names(node.test)
         elif isinstance(node, ast.Slice):
             values |= _names(node.lower) | _names(node.upper)
-        elif (isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice)) or (
-            isinstance(node, ast.Attribute) and node.attr in ("size", "shape")
-        ):
+        elif _is_part(node) or (isinstance(node, ast.Attribute) and node.attr in ("size", "shape")):
+            assert isinstance(node, ast.Subscript | ast.Attribute)
             sizes |= _names(node.value)
         elif isinstance(node, ast.Call):
             _needs_of_call(node, names, values, sizes)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import inspect
+import re
 from typing import TYPE_CHECKING, Any
 
+from piezoest.compensators import base
 from piezoest.export import c_printer as printer
+from piezoest.export import ring
 from piezoest.export.c_translator import Function, Translator
 from piezoest.export.c_values import literal
 
 if TYPE_CHECKING:
     from piezoest.export.c_code import _Generator
 
-LICENCE = """Copyright (c) The piezoest developers. MIT licence: permission is granted, free of charge, to use, copy,
-modify, merge, publish, distribute, sublicense and sell this code, provided that this notice stays in it.
-It comes as is, without warranty of any kind."""
+LICENCE = """Copyright (c) The piezoest developers. MIT licence: permission is granted, free of charge, to
+use, copy, modify, merge, publish, distribute, sublicense and sell this code, provided that this notice
+stays in it. It comes as is, without warranty of any kind."""
 
 _HELPERS = {
     "sign": "return (real)((x > 0) - (x < 0));",
@@ -61,6 +64,9 @@ void {name}_init({name}_state *state);
 /* Hold the model (1) or learn on (0). */
 void {name}_freeze({name}_state *state, int frozen);
 
+/* Voltage given out last [V]. */
+{real} {name}_get_voltage(const {name}_state *state);
+
 /* Model in use: {kind}, offset [um]. */
 void {name}_get_parameters(const {name}_state *state, {real} parameters[4]);
 
@@ -84,35 +90,25 @@ int {name}_set_limits({name}_state *state, {real} minimum, {real} maximum);
 
 def source(made: _Generator, entries: dict[str, str]) -> str:
     """Text of the source."""
-    name, real = made.name, made.precision
-    translator = made.translator
+    name, real, translator = made.name, made.precision, made.translator
+    zero, one = literal(0.0, translator.single), literal(1.0, translator.single)
     functions = "\n".join(_function(function, translator) for function in translator.functions)
-    # The positions that the text around the functions uses.
-    where = {key: translator.positions[key] for key in translator.positions}
-    for key in ("PREVIOUS", "STARTED", "FROZEN", "MODEL"):
-        from piezoest.export import ring
-
-        where[f"RING_{key}"] = getattr(ring, key)
-    from piezoest.compensators import base
-
-    minimum, maximum = base.MINIMUM, base.MAXIMUM
-    where["COMPENSATORS_MINIMUM"], where["COMPENSATORS_MAXIMUM"] = minimum, maximum
-    used = "\n".join([functions, *entries.values()])
-    around = {"RING_STARTED", "RING_FROZEN", "RING_MODEL", "COMPENSATORS_MINIMUM", "COMPENSATORS_MAXIMUM"}
-    positions = {key: value for key, value in where.items() if key in around or key in used}
-    learn = ""
-    x_unused = "    (void)x;\n"
+    learn = "    (void)x;\n"
     if "learn" in entries:
-        x_unused = ""
-        learn = f"    if (state->ring[RING_STARTED] != {literal(0.0, translator.single)}) {{\n        {entries['learn']};\n    }}\n"
+        learn = f"    if (state->ring[RING_STARTED] != {zero}) {{\n        {entries['learn']};\n    }}\n"
     starts = "\n".join(
         f"static const {real} start_{member}[{values.size}] = {_numbers(values, translator.single)};"
         for member, values, _ in made.members
     )
     copies = "\n".join(
-        f"    for (int i = 0; i < {values.size}; ++i) {{\n        state->{member}[i] = start_{member}[i];\n    }}"
+        f"    for (int i = 0; i < {values.size}; ++i) {{\n"
+        f"        state->{member}[i] = start_{member}[i];\n    }}"
         for member, values, _ in made.members
     )
+    around = {f"RING_{key}": getattr(ring, key) for key in ("PREVIOUS", "STARTED", "FROZEN", "MODEL")}
+    around |= {f"COMPENSATORS_{key}": getattr(base, key) for key in ("MINIMUM", "MAXIMUM")}
+    words = set(re.findall(r"[A-Z][A-Z_0-9]+", functions))
+    positions = around | {key: value for key, value in translator.positions.items() if key in words}
     return f"""{_head(made)}
 #include "{name}.h"
 
@@ -131,12 +127,17 @@ void {name}_init({name}_state *state)
 
 {real} {name}_step({name}_state *state, {real} r, {real} x)
 {{
-{x_unused}{learn}    return {entries["give"]};
+{learn}    return {entries["give"]};
 }}
 
 void {name}_freeze({name}_state *state, int frozen)
 {{
-    state->ring[RING_FROZEN] = frozen != 0 ? {literal(1.0, translator.single)} : {literal(0.0, translator.single)};
+    state->ring[RING_FROZEN] = frozen != 0 ? {one} : {zero};
+}}
+
+{real} {name}_get_voltage(const {name}_state *state)
+{{
+    return state->ring[RING_PREVIOUS];
 }}
 
 void {name}_get_parameters(const {name}_state *state, {real} parameters[4])

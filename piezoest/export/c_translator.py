@@ -38,6 +38,7 @@ class Function:
     returns: tuple[str, ...]  # kinds; more than one go out through pointers
     body: list[printer.Statement]
     impure: bool
+    constant: Known | None = None  # what it always returns, if that is known
 
     def result(self, real: str) -> str:
         """Type of the result in C."""
@@ -70,10 +71,13 @@ class Translator:
         Name of the type of real numbers in C.
     single : bool
         Whether it is float.
+    unneeded : tuple of callable
+        Functions whose calls, as statements, are left out.
     """
 
     real: str
     single: bool
+    unneeded: tuple[Any, ...] = ()
     functions: list[Function] = field(default_factory=list)
     tables: dict[str, tuple[float, ...]] = field(default_factory=dict)
     positions: dict[str, int] = field(default_factory=dict)
@@ -102,7 +106,8 @@ class Translator:
             self._in_work.append(key)
             self._made[key] = self._translate(source, kept)
             self._in_work.pop()
-            self.functions.append(self._made[key])
+            if self._made[key].constant is None:
+                self.functions.append(self._made[key])
         return self._made[key], _flatten(kept)
 
     def _settle(self, source: Source, name: str, value: Value) -> Value:
@@ -143,7 +148,9 @@ class Translator:
         }
         printer.declare(statements, types)
         impure = any(isinstance(kind, Root) and kind.written for _, kind in slots)
-        return Function(self._name(source), source, parameters, body.returns or (), statements, impure)
+        return Function(
+            self._name(source), source, parameters, body.returns or (), statements, impure, body.constant
+        )
 
     def _name(self, source: Source) -> str:
         module = source.function.__module__.split(".")
@@ -186,6 +193,7 @@ class Body(Expressions):
         super().__init__(translator, source)
         self.returns: tuple[str, ...] | None = None
         self.inside = 0  # branches and loops around the statement at hand
+        self.constant: Known | None = None
         self._temporaries = 0
 
     def bind_parameter(self, name: str, value: Value, slots: list[tuple[str, Any]]) -> None:
@@ -265,10 +273,7 @@ class Body(Expressions):
         """An if; without C where the condition is known."""
         test = self.truth(self.value(node.test), node)
         if isinstance(test, Known):
-            for inner in node.body if test.value else node.orelse:
-                if self.statement(inner):
-                    return True
-            return False
+            return any(self.statement(inner) for inner in (node.body if test.value else node.orelse))
         self.inside += 1
         body, orelse = self.block(node.body), self.block(node.orelse)
         self.inside -= 1
@@ -288,13 +293,13 @@ class Body(Expressions):
         start, stop = (self.translator.runtime(Known(0)), ends[0]) if len(ends) == 1 else ends[:2]
         if len(ends) == 3:
             raise self.source.error(node, "range with a step: count from 0 and compute the position")
-        name = "turn" if node.target.id == "_" else self.safe(node.target.id)
-        self.names[node.target.id] = Expr(name, "int", uses=frozenset({name}))
-        head = f"for (int {name} = {start.text}; {name} < {stop.text}; ++{name})"
+        i = "turn" if node.target.id == "_" else self.safe(node.target.id)
+        self.names[node.target.id] = Expr(i, "int", uses=frozenset({i}))
+        head = f"for (int {i} = {start.text}; {i} < {stop.text}; ++{i})"
         self.inside += 1
         body = self.block(node.body)
         self.inside -= 1
-        self.out.append(printer.Block(head, start.uses | stop.uses, body, loop=True, own=name))
+        self.out.append(printer.Block(head, start.uses | stop.uses, body, loop=True, own=i))
 
     def assign(self, node: ast.stmt, targets: list[ast.expr], value_node: ast.expr) -> None:
         """An assignment, to one or more targets."""
@@ -420,6 +425,8 @@ class Body(Expressions):
     def give_back(self, node: ast.Return) -> None:
         """A return; several values go out through pointers."""
         value = Items(()) if node.value is None else self.value(node.value)
+        if isinstance(value, Known) and not self.out and not self.inside:
+            self.constant = value
         items = value.items if isinstance(value, Items) else (value,)
         if any(isinstance(item, Array | Items) for item in items):
             raise self.source.error(node, "a function that returns arrays may only name them")

@@ -18,7 +18,7 @@ PREVIOUS, STARTED, WAITED, FROZEN, MODEL, STATE = 0, 1, 2, 3, 4, 8
 
 
 def adopt(compensator: Any, settings: Any, model: Any, hysteretic: bool, change: Any) -> bool:
-    """Hand (alpha, beta, gamma, offset) or (gain, -, -, offset) to the compensator; False if it has no inverse."""
+    """Hand (alpha, beta, gamma, offset) or (gain, -, -, offset) to the compensator; False if it cannot be."""
     for i in range(4):
         if not abs(model[i]) < WILDEST:
             return False
