@@ -58,9 +58,7 @@ def count_cycles(listing: str, trace: Path) -> tuple[Any, Any]:
     """
     costs = {int(at, 16): cost(name, operands) for at, name, operands in _LINE.findall(listing)}
     start = {name: int(at, 16) for at, name in _SYMBOL.findall(listing)}["one_step"]
-    callers = {
-        int(at, 16) + 4 for at, name, operands in _LINE.findall(listing) if "<one_step>" in operands
-    }
+    callers = {int(at, 16) + 4 for at, name, operands in _LINE.findall(listing) if "<one_step>" in operands}
     instructions: list[int] = []
     cycles: list[int] = []
     inside, last = False, 0

@@ -203,10 +203,10 @@ def main() -> int:
     ]
     for row in rows:
         print(
-            f"{row['controller']:<24} {row['precision']:<7} {row['instructions_mean']:6.0f} instructions, at most "
-            f"{row['instructions_largest']:5d}; {row['cycles_mean']:6.0f} cycles, at most {row['cycles_largest']:5d} "
-            f"({100.0 * row['load_largest']:.0f} % of 50 kHz); flash {row['flash_controller']} B, "
-            f"state {row['ram_state']} B, stack {row['stack']} B; "
+            f"{row['controller']:<24} {row['precision']:<7}{row['instructions_mean']:6.0f} instructions, "
+            f"at most {row['instructions_largest']:5d}; {row['cycles_mean']:6.0f} cycles, "
+            f"at most {row['cycles_largest']:5d} ({100.0 * row['load_largest']:.0f} % of 50 kHz); "
+            f"flash {row['flash_controller']} B, state {row['ram_state']} B, stack {row['stack']} B; "
             f"off host by {row['largest_difference_from_host']:.1e}"
         )
     if arguments.json is not None:

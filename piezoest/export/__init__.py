@@ -1,8 +1,5 @@
 """From the notebook to the controller: C code, co-simulation units, tables."""
 
-from piezoest.export.c_code import CCode, c
-from piezoest.export.compiled import CompiledController
-from piezoest.export.fmu import fmu
-from piezoest.export.ring import Controller
+import lazy_loader as _lazy
 
-__all__ = ["CCode", "CompiledController", "Controller", "c", "fmu"]
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

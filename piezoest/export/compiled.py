@@ -93,6 +93,9 @@ class CompiledController:
 
     __slots__ = ("_folder", "_frozen", "_library", "_pointer", "_real", "code")
 
+    #: `piezoest.track` hands each measurement back: it can run a controller as its compensator.
+    needs_measurement = True
+
     def __init__(self, code: CCode) -> None:
         self.code = code
         # Removed with the object; the loader keeps the library itself open.

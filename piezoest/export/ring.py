@@ -101,6 +101,9 @@ class Controller:
 
     __slots__ = ("_compensator", "_estimator", "_frozen", "_interval", "_voltage", "_waited")
 
+    #: `piezoest.track` hands each measurement back: it can run a controller as its compensator.
+    needs_measurement = True
+
     def __init__(self, estimator: Any, compensator: Compensator, *, update_interval: int = 50) -> None:
         if not isinstance(compensator, Compensator):
             raise ValueError(
