@@ -123,7 +123,7 @@ class Compensator:
 
     __slots__ = ("_config", "_limits", "_model", "_projected", "_start", "_state")
 
-    #: Functions that a controller's code is generated from: voltage, change of model.
+    #: Functions that a controller's code is generated from: voltage; change of model, or None.
     _compiled: ClassVar[tuple[Any, Any]] = (_voltage, change_model)
     #: Positions in the configuration that no change of model or limits touches.
     _fixed: ClassVar[tuple[int, ...]] = (DECAY, INTEGRATED)
@@ -175,13 +175,18 @@ class Compensator:
         The place in the loop, w_h in parts of its limit b/a, is kept. What the new model makes of
         the present voltage differs from what the old one made of it; that difference is
         paid back exponentially over `transfer_samples`. An inadmissible model is replaced
-        by its nearest admissible one, and `status` says so: a stream must not stop.
+        by its nearest admissible one, one with parameters beyond 1e9 is not taken; `status` says
+        so: a stream must not stop.
         """
         return self._model
 
     @model.setter
     def model(self, model: Model) -> None:
         model = self._accepts(model)
+        if not np.all(np.abs([*model.theta, _loop(model)[-1]]) < WILDEST):
+            # An estimator that ran away: what its model's inverse gives is no number.
+            self._projected = True
+            return
         self._projected = not model.is_admissible
         if self._projected:
             if not isinstance(model, ColemanHodgdon):

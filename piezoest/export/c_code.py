@@ -111,12 +111,19 @@ def c(
         raise ValueError(
             f"compensator must be an InverseCompensator or a LinearCompensator, got {compensator!r}"
         )
-    if estimator is not None and not isinstance(getattr(estimator, "_compiled", None), Compiled):
+    if estimator is not None and not _has_kernel(estimator):
         raise ValueError(
             f"estimator must be a HysteresisRLS or a HysteresisEKF, got {type(estimator).__name__}: "
             "only estimators with a compiled kernel can be exported"
         )
     return _Generator(estimator, compensator, name, precision, interval).code()
+
+
+def _has_kernel(estimator: Any) -> bool:
+    """Whether its samples are taken by the compiled functions that it or a base of it names."""
+    kind = type(estimator)
+    owner = next((base for base in kind.__mro__ if isinstance(vars(base).get("_compiled"), Compiled)), None)
+    return owner is not None and kind._sample is owner._sample  # type: ignore[attr-defined]
 
 
 class _Generator:
@@ -129,23 +136,29 @@ class _Generator:
         self.members: list[tuple[str, np.ndarray[Any, Any], str]] = []
         self.hysteretic = isinstance(compensator.model, ColemanHodgdon)
         if estimator is not None:
-            offered = isinstance(estimator.model, ColemanHodgdon)
+            if self.change is None:
+                raise ValueError(
+                    f"a {type(compensator).__name__} takes no other model: leave out the estimator"
+                )
             compensator._accepts(estimator.model)
-            self.hysteretic = offered
+            self.hysteretic = isinstance(estimator.model, ColemanHodgdon)
 
     def code(self) -> CCode:
         """Translate, and put the pieces together."""
         model = self.compensator.model
         start = np.zeros(ring.STATE)
         start[ring.PREVIOUS] = self.compensator.voltage
-        start[ring.MODEL : ring.MODEL + model.theta.size] = model.theta
-        start[ring.MODEL + 3] = self.compensator._config[OFFSET]
+        if self.change is not None:
+            start[ring.MODEL : ring.MODEL + model.theta.size] = model.theta
+            start[ring.MODEL + 3] = self.compensator._config[OFFSET]
         self.member("ring", start, "voltage given out last, counters, model in use")
         if self.estimator is not None:
             self.member("estimator", self.estimator._state, "state of the estimator")
         self.member("compensator", self.compensator._state, "state of the compensator")
         self.member("settings", self.compensator._config, "inverse and limits of the compensator")
-        entries = {"give": self.entry_give(), "adopt": self.entry_adopt()}
+        entries = {"give": self.entry_give()}
+        if self.change is not None:
+            entries["adopt"] = self.entry_adopt()
         if self.estimator is not None:
             entries["learn"] = self.entry_learn()
         return CCode(

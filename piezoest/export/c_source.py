@@ -37,6 +37,10 @@ class Source:
         return TranslationError(f"{self.file}:{line}: {problem}")
 
 
+# Functions whose sources are being read: one that calls itself is refused later, with its line.
+_reading: list[Any] = []
+
+
 def plain(function: Any) -> Any:
     """The Python function inside a compiled one."""
     return getattr(function, "py_func", function)
@@ -77,7 +81,10 @@ def read(function: Any) -> Source:
             f"{file}:{first_line}: {tree.name} has default, keyword or starred parameters: "
             "give it positional ones only"
         )
+    tree.decorator_list = []
+    _reading.append(function)
     needs_value, needs_size = _needs(tree, function.__globals__)
+    _reading.pop()
     return Source(
         function, tree, file, first_line, _comments(lines), _assignments(tree), needs_value, needs_size
     )
@@ -155,6 +162,8 @@ def _needs_of_call(node: ast.Call, names: dict[str, Any], values: set[str], size
         return
     if name in ("empty", "int"):
         values.update(*(_names(argument) for argument in node.args))
+        return
+    if plain(called) in _reading:
         return
     if not inspect.isfunction(plain(called)) or getattr(called, "__module__", "").startswith("numpy"):
         return

@@ -149,19 +149,7 @@ void {name}_get_parameters(const {name}_state *state, {real} parameters[4])
 
 int {name}_set_parameters({name}_state *state, const {real} parameters[4])
 {{
-    {real} model[4];
-
-    for (int i = 0; i < 4; ++i) {{
-        model[i] = parameters[i];
-    }}
-    if (!{entries["adopt"]}) {{
-        return 0;
-    }}
-    for (int i = 0; i < 4; ++i) {{
-        state->ring[RING_MODEL + i] = model[i];
-    }}
-    return 1;
-}}
+{_set_parameters(real, entries.get("adopt"))}}}
 
 void {name}_get_limits(const {name}_state *state, {real} *minimum, {real} *maximum)
 {{
@@ -178,6 +166,25 @@ int {name}_set_limits({name}_state *state, {real} minimum, {real} maximum)
     state->settings[COMPENSATORS_MAXIMUM] = maximum;
     return 1;
 }}
+"""
+
+
+def _set_parameters(real: str, adopt: str | None) -> str:
+    """Body of the function of that name."""
+    if adopt is None:
+        return "    (void)state;\n    (void)parameters;\n    return 0;\n"
+    return f"""    {real} model[4];
+
+    for (int i = 0; i < 4; ++i) {{
+        model[i] = parameters[i];
+    }}
+    if (!{adopt}) {{
+        return 0;
+    }}
+    for (int i = 0; i < 4; ++i) {{
+        state->ring[RING_MODEL + i] = model[i];
+    }}
+    return 1;
 """
 
 

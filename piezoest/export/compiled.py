@@ -91,21 +91,21 @@ class CompiledController:
         If there is no C compiler.
     """
 
-    __slots__ = ("_folder", "_frozen", "_library", "_pointer", "_real", "code")
+    __slots__ = ("_frozen", "_library", "_pointer", "_real", "code")
 
     #: `piezoest.track` hands each measurement back: it can run a controller as its compensator.
     needs_measurement = True
 
     def __init__(self, code: CCode) -> None:
         self.code = code
-        # Removed with the object; the loader keeps the library itself open.
-        self._folder = tempfile.TemporaryDirectory(prefix="piezoest_")
-        folder = Path(self._folder.name)
-        code.write(folder)
-        loop = _LOOP.format(name=code.name, real=code.precision)
-        (folder / "loop.c").write_text(loop, encoding="utf-8")
-        build_shared(folder, [f"{code.name}.c", "loop.c"], folder / "controller.so")
-        self._library = ctypes.CDLL(str(folder / "controller.so"))
+        # The loader keeps the library open after its file is gone.
+        with tempfile.TemporaryDirectory(prefix="piezoest_", ignore_cleanup_errors=True) as place:
+            folder = Path(place)
+            code.write(folder)
+            loop = _LOOP.format(name=code.name, real=code.precision)
+            (folder / "loop.c").write_text(loop, encoding="utf-8")
+            build_shared(folder, [f"{code.name}.c", "loop.c"], folder / "controller.so")
+            self._library = ctypes.CDLL(str(folder / "controller.so"))
         double = code.precision == "double"
         real = ctypes.c_double if double else ctypes.c_float
         self._real = np.float64 if double else np.float32
@@ -140,7 +140,7 @@ class CompiledController:
 
     @parameters.setter
     def parameters(self, parameters: Any) -> None:
-        values = array_1d("parameters", parameters, minimum_length=4).astype(self._real)
+        values = array_1d("parameters", parameters, allow_nan=True, minimum_length=4).astype(self._real)
         if not self._library.set(self._at(values)):
             raise ValueError(f"parameters {values.tolist()} belong to no model that has an inverse")
 
