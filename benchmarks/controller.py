@@ -24,7 +24,8 @@ SAMPLES = 1_000_000
 # The last so many periods are judged; the stage has settled long before.
 JUDGED = 10
 LIMITS = pz.VoltageLimits(-80.0, 80.0)
-LARGEST_DIFFERENCE, LARGEST_FLOAT = 1e-12, 0.01
+# A reference that never repeats settles to no one error: there a float build may be off by more than 1 %.
+LARGEST_DIFFERENCE, LARGEST_FLOAT = 1e-12, 0.025
 
 
 def pair(kind: str, case: Any) -> tuple[Any, Any]:

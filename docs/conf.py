@@ -10,6 +10,7 @@ from typing import Any
 import piezoest
 
 sys.path.insert(0, str(Path(__file__).parent))
+import controller_page
 import estimators_page
 import paper_page
 
@@ -57,6 +58,7 @@ html_sidebars: dict[str, list[str]] = {
     "mathematics": [],
     "paper": [],
     "estimators": [],
+    "controller": [],
     "design": [],
 }
 
@@ -101,5 +103,6 @@ def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, li
 def setup(app: Any) -> None:
     app.connect("builder-inited", paper_page.write)
     app.connect("builder-inited", estimators_page.write)
+    app.connect("builder-inited", controller_page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

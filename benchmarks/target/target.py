@@ -191,6 +191,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Exported controllers on an emulated Cortex-M4F.")
     parser.add_argument("--samples", type=int, default=SAMPLES, help="samples compared with the host")
     parser.add_argument("--traced", type=int, default=TRACED, help="samples whose instructions are counted")
+    parser.add_argument("--only", choices=sorted(controllers()), help="only this controller")
+    parser.add_argument("--precision", choices=["float", "double"], help="only this precision")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures to this file too")
     arguments = parser.parse_args()
     if absent := missing_tools():
@@ -198,8 +200,8 @@ def main() -> int:
         return 2
     rows = [
         measure(name, precision, arguments.samples, arguments.traced)
-        for name in controllers()
-        for precision in ("float", "double")
+        for name in ([arguments.only] if arguments.only else controllers())
+        for precision in ([arguments.precision] if arguments.precision else ("float", "double"))
     ]
     for row in rows:
         print(

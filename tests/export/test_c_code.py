@@ -204,10 +204,11 @@ def test_freeze_holds_the_model_as_in_python(name: str) -> None:
     case = SCENARIOS["cold-start"].build(0)
     stages = case.new_stage(), case.new_stage()
     ours, theirs = pz.export.CompiledController(code(name)), pz.export.Controller(*PAIRS[name]())
+    both: tuple[Any, Any] = ours, theirs
     for part, frozen in ((slice(0, 8000), False), (slice(8000, 12_000), True), (slice(12_000, None), False)):
         before = ours.parameters
         voltages = []
-        for controller, stage in zip((ours, theirs), stages, strict=True):
+        for controller, stage in zip(both, stages, strict=True):
             controller.frozen = frozen
             assert controller.frozen == frozen
             x = None
@@ -217,7 +218,7 @@ def test_freeze_holds_the_model_as_in_python(name: str) -> None:
                 x = stage.step(float(u[k]))
             voltages.append(u)
         assert np.array_equal(before, ours.parameters) == frozen
-        np.testing.assert_allclose(*voltages, rtol=0.0, atol=1e-12 * 60.0)
+        np.testing.assert_allclose(voltages[0], voltages[1], rtol=0.0, atol=1e-12 * 60.0)
 
 
 def test_parameters_are_those_of_the_model(log: tuple[Any, Any]) -> None:
