@@ -29,7 +29,8 @@ CPU = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 # -std=c99 leaves fused multiply-add out, so that the voltages can be compared bit for bit.
 FLAGS = ("-std=c99", "-O3", "-ffunction-sections", "-fdata-sections")
 SAMPLE_RATE, CLOCK = 50_000.0, 168e6  # Hz
-SAMPLES, TRACED = 4000, 400
+SAMPLES, TRACED = 4000, 200
+OUTSIDE = pz.ColemanHodgdon(0.02, 0.12, 0.0072)
 LIMITS = pz.VoltageLimits(-60.0, 60.0)
 
 
@@ -48,6 +49,11 @@ def controllers() -> dict[str, tuple[Any, Any]]:
             pz.LinearCompensator(line, LIMITS),
         ),
         "RLS and inverse": (pz.HysteresisRLS(SAMPLE_RATE, initial_model=start), inverse()),
+        # Outside of the admissible set, and sure of it: every model handed over has to be moved.
+        "RLS, model moved": (
+            pz.HysteresisRLS(SAMPLE_RATE, initial_model=OUTSIDE, uncertainty=1e-3),
+            inverse(),
+        ),
         "RLS, the paper's memory": (
             pz.HysteresisRLS(SAMPLE_RATE, initial_model=start, memory=0.4),
             inverse(),

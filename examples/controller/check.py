@@ -81,7 +81,7 @@ def main() -> int:
     difference = float(np.max(np.abs(board - library)) / np.max(np.abs(library)))
     limit = LARGEST_DIFFERENCE[arguments.precision]
     print(
-        f"{r.size} samples in {arguments.precision}: largest difference {difference:.2g} of the largest voltage"
+        f"{r.size} samples in {arguments.precision}: off by at most {difference:.2g} of the largest voltage"
     )
     print("equal" if difference <= limit else f"differs: more than {limit:g}")
     return 0 if difference <= limit else 1

@@ -49,7 +49,7 @@ def build(folder: Path, function: Any, *arguments: Any) -> Callable[..., Any]:
     text, _, name = translate(function, *arguments)
     (folder / "one.c").write_text(text, encoding="utf-8")
     build_shared(folder, ["one.c"], folder / f"{name}.so")
-    return getattr(ctypes.CDLL(str(folder / f"{name}.so")), name)  # type: ignore[no-any-return]
+    return getattr(ctypes.CDLL(str(folder / f"{name}.so")), name)
 
 
 def pointer(values: Any) -> Any:
@@ -89,8 +89,9 @@ def test_update_in_place_is_the_same(tmp_path: Path) -> None:
         tmp_path, least_squares.discrete_update, array("theta"), array("P"), array("phi"), Expr("z", "real"),
         Known(n), *(Expr(name, "real") for name in ("forgetting", "R", "bound", "enable")), array("work"),
     )  # fmt: skip
-    ours = [values.copy() for values in arrays]
-    y, S = least_squares.discrete_update(*ours, 1.5, n, 0.99, 0.1, 1e9, 1.0, work.copy())
+    ours: Any = [values.copy() for values in arrays]
+    update: Any = least_squares.discrete_update
+    y, S = update(*ours, 1.5, n, 0.99, 0.1, 1e9, 1.0, work.copy())
     results = np.zeros(1), np.zeros(1)
     function.argtypes = [*[type(pointer(theta))] * 3, *[ctypes.c_double] * 5, *[type(pointer(theta))] * 3]  # type: ignore[attr-defined]
     function(*map(pointer, arrays), 1.5, 0.99, 0.1, 1e9, 1.0, pointer(work), *map(pointer, results))
