@@ -10,7 +10,7 @@ export MPLBACKEND ?= Agg
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv demo calibrate test lint format types layers docs docs-live figures bench-smoke bench clean
+.PHONY: help venv tools demo calibrate target test lint format types layers docs docs-live figures bench-smoke bench clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -37,10 +37,20 @@ $(VENV)/.installed-%: pyproject.toml | $(BIN)/python
 
 venv: $(VENV)/.installed-dev  ## Set up .venv with everything a contributor needs
 
+# Compilers, checker and emulator for the exported C; tests that need one skip where it is absent.
+TOOLS := gcc libc6-dev clang cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
+
+tools:  ## Install what the exported C is checked with (Debian's packages, as root)
+	apt-get update
+	DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends $(TOOLS)
+
 # ---------------------------------------------------------------- use
 
 demo: $(VENV)/.installed  ## Run the demonstration: linear against adaptive compensation
 	$(BIN)/piezoest demo
+
+target: $(VENV)/.installed  ## Count the instructions of exported controllers on an emulated Cortex-M4F
+	$(BIN)/python benchmarks/target/target.py --json docs/data/target.json
 
 calibrate: $(VENV)/.installed  ## Fit the simulated stage to the paper's tables anew, in some ten minutes
 	$(BIN)/python calibration/calibrate_paper_stage.py
@@ -80,6 +90,9 @@ figures: $(VENV)/.installed  ## Make the numbers and figures of the documentatio
 	$(BIN)/python benchmarks/batch_fit.py --json docs/data/batch_fit.json
 	$(BIN)/python benchmarks/filterpy_parity.py --json docs/data/filterpy_parity.json
 	$(BIN)/python docs/consistency.py --json docs/data/consistency.json
+	$(BIN)/python benchmarks/controller.py --json docs/data/controller.json
+	$(BIN)/python benchmarks/target/target.py --json docs/data/target.json
+	$(BIN)/python docs/controller_page.py --figure
 
 # ---------------------------------------------------------------- benchmarks
 

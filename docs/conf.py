@@ -11,6 +11,7 @@ import piezoest
 
 sys.path.insert(0, str(Path(__file__).parent))
 import beyond_page
+import controller_page
 import estimators_page
 import paper_page
 
@@ -58,6 +59,7 @@ html_sidebars: dict[str, list[str]] = {
     "mathematics": [],
     "paper": [],
     "estimators": [],
+    "controller": [],
     "design": [],
 }
 
@@ -103,5 +105,6 @@ def setup(app: Any) -> None:
     app.connect("builder-inited", paper_page.write)
     app.connect("builder-inited", beyond_page.write)
     app.connect("builder-inited", estimators_page.write)
+    app.connect("builder-inited", controller_page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

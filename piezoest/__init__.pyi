@@ -1,4 +1,4 @@
-from . import models, policies, signals
+from . import export, models, policies, signals
 from ._version import __version__
 from .compensators import (
     CompensatorStatus,
@@ -63,6 +63,7 @@ __all__ = [
     "VoltageLimits",
     "__version__",
     "choose_model",
+    "export",
     "identify",
     "models",
     "policies",

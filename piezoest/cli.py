@@ -15,6 +15,7 @@ import typer
 from rich.console import Console
 
 from piezoest.bench.commands import app as bench
+from piezoest.export.commands import app as export
 
 if TYPE_CHECKING:
     from piezoest.demo import Demo
@@ -31,6 +32,7 @@ app = typer.Typer(
 )
 
 app.add_typer(bench, name="bench")
+app.add_typer(export, name="export")
 
 USER_ERROR, INTERRUPTED = 1, 130
 FIGURE_FORMATS = (".png", ".pdf", ".svg", ".jpg", ".jpeg")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numba import njit
@@ -74,6 +74,19 @@ def _voltage(state: Any, config: Any, r: Any) -> Any:
     return given
 
 
+@register_jitable
+def change_model(state: Any, config: Any, a: Any, b: Any, c: Any, offset: Any) -> None:
+    """Take another model without a bump: the place in the loop is kept, the difference owed."""
+    expected = config[C] * state[VOLTAGE] + state[W_H] + config[OFFSET] + state[OWED]
+    place = state[W_H] * config[A] / config[B] if config[B] > 0.0 else 0.0
+    config[A] = a
+    config[B] = b
+    config[C] = c
+    config[OFFSET] = offset
+    state[W_H] = min(max(place, -1.0), 1.0) * b / a
+    state[OWED] = expected - (c * state[VOLTAGE] + state[W_H] + offset)
+
+
 @njit("f8(f8[::1], f8[::1], f8)", cache=True)
 def _step(state: Any, config: Any, r: float) -> Any:
     return _voltage(state, config, r)
@@ -83,6 +96,11 @@ def _step(state: Any, config: Any, r: float) -> Any:
 def _run(state: Any, config: Any, r: Any, u: Any) -> None:
     for k in range(r.size):
         u[k] = _voltage(state, config, r[k])
+
+
+@njit("void(f8[::1], f8[::1], f8, f8, f8, f8)", cache=True)
+def _change_model(state: Any, config: Any, a: float, b: float, c: float, offset: float) -> None:
+    change_model(state, config, a, b, c, offset)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +126,15 @@ class CompensatorStatus:
     projected: bool
 
 
+def _loop(model: Model) -> tuple[float, float, float, float]:
+    """(a, b, c, offset) of a model."""
+    if isinstance(model, ColemanHodgdon):
+        return model.a, model.b, model.c, model.offset
+    assert isinstance(model, LinearGain)
+    # No hysteresis: b = 0, and any a.
+    return 1.0, 0.0, model.gain, model.offset
+
+
 class Compensator:
     """Feed-forward through the inverse of a model.
 
@@ -115,6 +142,11 @@ class Compensator:
     """
 
     __slots__ = ("_config", "_limits", "_model", "_projected", "_sample_rate", "_start", "_state")
+
+    #: Functions that a controller's code is generated from: voltage; change of model, or None.
+    _compiled: ClassVar[tuple[Any, Any]] = (_voltage, change_model)
+    #: Positions in the configuration that no change of model or limits touches.
+    _fixed: ClassVar[tuple[int, ...]] = (DECAY, INTEGRATED)
 
     def __init__(
         self,
@@ -173,19 +205,15 @@ class Compensator:
     def _configure(self, model: Model) -> None:
         """Take over the model's numbers; states that only a Prandtl-Ishlinskii model has come and go."""
         head = self._config[:CONFIG]
-        if isinstance(model, ColemanHodgdon):
-            head[[A, B, C, OFFSET]] = model.a, model.b, model.c, model.offset
-        elif isinstance(model, LinearGain):
-            # No hysteresis: b = 0, and any a.
-            head[[A, B, C, OFFSET]] = 1.0, 0.0, model.gain, model.offset
-        elif isinstance(model, PrandtlIshlinskii):
-            rate = model.sample_rate if self._sample_rate is None else self._sample_rate
-            arrays = model._arrays(rate)
-            counts = [float(values.size) for values in arrays[::2]]
-            head[[A, B, C, OFFSET]] = 1.0, 0.0, model.gain, model.offset
-            self._config = np.concatenate([head, counts, *arrays])
+        if not isinstance(model, PrandtlIshlinskii):
+            head[[A, B, C, OFFSET]] = _loop(model)
+            self._config = head.copy()
             return
-        self._config = head.copy()
+        rate = model.sample_rate if self._sample_rate is None else self._sample_rate
+        arrays = model._arrays(rate)
+        counts = [float(values.size) for values in arrays[::2]]
+        head[[A, B, C, OFFSET]] = 1.0, 0.0, model.gain, model.offset
+        self._config = np.concatenate([head, counts, *arrays])
 
     def _expected(self) -> float:
         """Displacement that the model in use expects of the last sample [µm]."""
@@ -219,27 +247,33 @@ class Compensator:
         turning points have left them. What the new model makes of the present voltage differs
         from what the old one made of it; that difference is paid back exponentially over
         `transfer_samples`. An inadmissible model is replaced by its nearest admissible one, a
-        `PrandtlIshlinskii` or `LinearGain` not taken, and `status` says so: a stream must not
-        stop.
+        `PrandtlIshlinskii` or `LinearGain`, or one with parameters beyond 1e9, not taken, and
+        `status` says so: a stream must not stop.
         """
         return self._model
 
     @model.setter
     def model(self, model: Model) -> None:
         model = self._accepts(model)
+        if not np.all(np.abs([*model.theta, getattr(model, "offset", 0.0)]) < WILDEST):
+            # An estimator that ran away: what its model's inverse gives is no number.
+            self._projected = True
+            return
         self._projected = not model.is_admissible
         if self._projected:
             if not isinstance(model, ColemanHodgdon):
                 return
             model = model.nearest_admissible()
-        old = self._config
+        before, self._model = self._model, model
+        if not isinstance(model, PrandtlIshlinskii) and not isinstance(before, PrandtlIshlinskii):
+            _change_model(self._state, self._config, *_loop(model))
+            return
+        self._model = before
         expected = self._expected() + self._state[OWED]
-        place = self._state[W_H] * old[A] / old[B] if old[B] > 0.0 else 0.0
         self._configure(model)
-        self._place(model, self._model)
+        self._place(model, before)
         self._model = model
-        config = self._config
-        self._state[W_H] = min(max(place, -1.0), 1.0) * config[B] / config[A]
+        self._state[W_H] = 0.0
         self._state[OWED] = expected - self._expected()
 
     @property

@@ -14,6 +14,9 @@ from numba.extending import register_jitable
 # the result admissible however far it came.
 _ITERATIONS = 8
 
+# Distance kept from the faces where a model is moved into the set, in parts of gamma.
+NEAREST_MARGIN = 1e-6
+
 
 @register_jitable
 def is_admissible(alpha, beta, gamma, alpha_least, beta_least, margin):
@@ -79,3 +82,29 @@ def project_admissible(theta, P, n, alpha_least, beta_least, margin):
     theta[1] = np.fmax(theta[1], beta_least)
     area = theta[0] * theta[1]
     theta[2] = np.fmin(np.fmax(theta[2], (1.0 + margin) * area), (2.0 - margin) * area)
+
+
+@register_jitable
+def has_inverse(alpha, beta, gamma):
+    """True if the parameters are admissible to the letter: a > 0, beta > 0, b > 0 and c >= 2b."""
+    if not (alpha > 0.0 and beta > 0.0):
+        return False
+    c = gamma / alpha
+    b = c - beta
+    return b > 0.0 and c >= 2.0 * b
+
+
+@register_jitable
+def nearest_admissible(theta, P, margin):
+    """Move theta (3,) in place into the set, each parameter measured in parts of its own value.
+
+    `P` (9,) is work space.
+    """
+    for i in range(9):
+        P[i] = 0.0
+    for i in range(3):
+        scale = np.fmax(np.abs(theta[i]), 1e-12)
+        P[i * 3 + i] = scale * scale
+    alpha_least = 1e-9 * np.fmax(np.abs(theta[0]), 1e-12)
+    beta_least = 1e-9 * np.fmax(np.abs(theta[1]), 1e-12)
+    project_admissible(theta, P, 3, alpha_least, beta_least, margin)

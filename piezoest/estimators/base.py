@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -97,6 +97,28 @@ class Trace:
     y: FloatArray | None = None
     S: FloatArray | None = None
     P: FloatArray | None = field(default=None, repr=False)
+
+
+class Compiled(NamedTuple):
+    """Functions on flat arrays that an estimator consists of; a controller's code is generated from them.
+
+    Parameters
+    ----------
+    sample : callable
+        ``sample(state, config, u, x)``: one sample.
+    proposed : callable
+        ``proposed(state, config, terms, model)``: admissible (alpha, beta, gamma, offset), or
+        (gain, -, -, offset), into `model`.
+    frozen : int or None
+        Position in the state of a flag that holds the estimate; None if there is none.
+    unneeded : tuple of callable
+        Functions within `sample` that no model depends on: a controller leaves them out.
+    """
+
+    sample: Any
+    proposed: Any
+    frozen: int | None
+    unneeded: tuple[Any, ...] = ()
 
 
 class EstimatorBase(ABC):

@@ -9,9 +9,9 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST, FloatArray, non_negative, positive
+from piezoest.equations import admissible, kalman
 from piezoest.equations import coleman_hodgdon as equations
-from piezoest.equations import kalman
-from piezoest.estimators.base import EstimatorBase, Status, Trace
+from piezoest.estimators.base import Compiled, EstimatorBase, Status, Trace
 from piezoest.estimators.delay_line import delay_line, delayed
 from piezoest.models import ColemanHodgdon, LinearGain, Model, model_from_dict
 
@@ -127,6 +127,36 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     state[LAST] = UPDATED
 
 
+@register_jitable
+def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
+    """(alpha, beta, gamma, offset) or (gain, -, -, offset) into `model`, admissible; `terms` = start's."""
+    s = state[HEAD : HEAD + int(config[N])]
+    offset = terms[1]
+    if config[HYSTERETIC] == 0.0:
+        gain = s[0] if s[0] * terms[0] > 0.0 else 1e-2 * terms[0]
+        if config[OFFSET] != 0.0:
+            offset = s[1] + state[X_CENTRE] - gain * state[U_CENTRE]
+        model[0] = gain
+        model[3] = offset
+        return
+    if config[OFFSET] != 0.0:
+        offset = s[4] + state[X_CENTRE] - s[3] * state[U_CENTRE]
+    a = s[1] if s[1] != 0.0 else config[LEAST_A]
+    alpha, beta, gamma = equations.rate_parameters(a, s[2], s[3])
+    model[0] = alpha
+    model[1] = beta
+    model[2] = gamma
+    model[3] = offset
+    if not admissible.has_inverse(alpha, beta, gamma):
+        work = np.empty(9)
+        admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
+
+
+@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True)
+def _propose(state: Any, config: Any, terms: Any, model: Any) -> None:
+    proposed(state, config, terms, model)
+
+
 @njit("void(f8[::1], f8[::1], f8, f8)", cache=True)
 def _step(state: Any, config: Any, u: float, x: float) -> None:
     _sample(state, config, u, x)
@@ -200,7 +230,9 @@ class HysteresisEKF(EstimatorBase):
     and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), (2)-(4).
     """
 
-    __slots__ = ("_config", "_initial", "_n")
+    __slots__ = ("_config", "_initial", "_n", "_terms")
+
+    _compiled = Compiled(_sample, proposed, None)
 
     conformance_exceptions: ClassVar[dict[str, str]] = {}
 
@@ -231,6 +263,7 @@ class HysteresisEKF(EstimatorBase):
         n = start.size
         self._initial, self._n = initial, n
         hysteretic = isinstance(initial, ColemanHodgdon)
+        self._terms = np.array([initial.gain if isinstance(initial, LinearGain) else 0.0, initial.offset])
         self._config = np.zeros(CONFIG + n)
         self._config[N] = n
         self._config[HYSTERETIC] = hysteretic
@@ -381,19 +414,12 @@ class HysteresisEKF(EstimatorBase):
     @property
     def model(self) -> Model:
         """Admissible model as known now."""
-        s = self.state
-        offset = self._initial.offset
+        values = np.zeros(4)
+        _propose(self._state, self._config, self._terms, values)
+        alpha, beta, gamma, offset = values.tolist()
         if isinstance(self._initial, LinearGain):
-            gain = float(s[0]) if s[0] * self._initial.gain > 0.0 else 1e-2 * self._initial.gain
-            if self._config[OFFSET]:
-                offset = float(s[1] + self._state[X_CENTRE] - gain * self._state[U_CENTRE])
-            return LinearGain(gain, offset)
-        a, b, c = (float(value) for value in s[1:4])
-        if self._config[OFFSET]:
-            offset = float(s[4] + self._state[X_CENTRE] - c * self._state[U_CENTRE])
-        if a == 0.0:
-            a = float(self._config[LEAST_A])
-        return ColemanHodgdon.from_loop(a, b, c, offset).nearest_admissible()
+            return LinearGain(alpha, offset)
+        return ColemanHodgdon(alpha, beta, gamma, offset)
 
 
 def starting_point(

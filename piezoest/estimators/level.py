@@ -47,9 +47,9 @@ def turn(level: Any) -> None:
 
 
 @register_jitable
-def is_known(level: Any) -> bool:
+def is_known(level: Any) -> Any:
     """Whether there was a whole period."""
-    return bool((level[TURNS] >= ENOUGH_TURNS) * (level[PERIOD] > 0.0))
+    return level[TURNS] >= ENOUGH_TURNS and level[PERIOD] > 0.0
 
 
 @register_jitable

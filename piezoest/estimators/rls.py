@@ -7,20 +7,14 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from piezoest._checks import FloatArray, positive
-from piezoest.equations import admissible
-from piezoest.equations import coleman_hodgdon as equations
-from piezoest.estimators import level
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
+from piezoest.estimators import rls_model
 from piezoest.estimators import rls_settings as settings
-from piezoest.estimators.base import EstimatorBase, Status, Trace
+from piezoest.estimators.base import Compiled, EstimatorBase, Status, Trace
 from piezoest.estimators.delay_line import delay_line
 from piezoest.models import ColemanHodgdon, LinearGain, Model, model_from_dict
 from piezoest.policies import Forgetting, Policy, policy_from_dict, policy_to_dict
-
-# The model handed out keeps this distance from the faces of the admissible set: parts of
-# gamma.
-MARGIN = 1e-3
 
 # Seconds of memory where the paper's law is asked for without one.
 PAPER_MEMORY = 0.4
@@ -87,7 +81,11 @@ class HysteresisRLS(EstimatorBase):
     and App. A.
     """
 
-    __slots__ = ("_config", "_initial", "_n", "_scale")
+    __slots__ = ("_config", "_initial", "_n", "_scale", "_terms")
+
+    _compiled = Compiled(
+        kernel._sample, rls_model.proposed, kernel.FROZEN, unneeded=(kernel._propagate_error,)
+    )
 
     conformance_exceptions: ClassVar[dict[str, str]] = {}
 
@@ -128,6 +126,8 @@ class HysteresisRLS(EstimatorBase):
         self._initial = initial
         self._scale = settings.parameter_scale(initial, offset)
         self._n = n = self._scale.size
+        gain = initial.gain if isinstance(initial, LinearGain) else 0.0
+        self._terms = rls_model.model_terms(self._scale, gain, initial.offset)
 
         config = settings.front_end(
             sample_rate,
@@ -317,32 +317,14 @@ class HysteresisRLS(EstimatorBase):
         theta = self.theta
         if isinstance(self._initial, LinearGain):
             return bool(theta[0] * self._initial.gain > 0.0)
-        return bool(admissible.is_admissible(theta[0], theta[1], theta[2], *self._least, MARGIN))
-
-    @property
-    def _least(self) -> tuple[float, float]:
-        return kernel.LEAST * float(self._scale[0]), kernel.LEAST * float(self._scale[1])
+        return bool(rls_model.is_admissible(theta, self._terms))
 
     @property
     def model(self) -> Model:
         """Admissible model as known now: `theta` itself, or its nearest point in the metric of P."""
-        theta = self.theta
+        values = np.zeros(4)
+        rls_model.propose(self._state, self._config, self._terms, values)
+        alpha, beta, gamma, offset = values.tolist()
         if isinstance(self._initial, LinearGain):
-            least = kernel.LEAST * self._initial.gain
-            gain = theta[0] if theta[0] * self._initial.gain > 0.0 else least
-            offset = self._initial.offset
-            if self._n == 2:
-                offset = float(theta[1] + self._state[kernel.X_CENTRE] - gain * self._state[kernel.U_CENTRE])
-            return LinearGain(float(gain), offset)
-        if not self._as_estimated_is_admissible():
-            admissible.project_admissible(theta, self.P.ravel(), self._n, *self._least, MARGIN)
-        alpha, beta, gamma = (float(value) for value in theta[:3])
-        offset = self._initial.offset
-        if self._n == 4:
-            c = gamma / alpha
-            centre = self._state[kernel.X_CENTRE] - c * self._state[kernel.U_CENTRE]
-            slopes = float(equations.offset_from_rate_parameters(alpha, theta[3]))
-            trust = float(kernel.trust_in_levels(self._state, self._config))
-            levels = level.offset(self._state[kernel.LEVEL : kernel.FRONT], c - beta, c) if trust else 0.0
-            offset = centre + slopes + trust * (float(levels) - slopes)
+            return LinearGain(alpha, offset)
         return ColemanHodgdon(alpha, beta, gamma, offset)

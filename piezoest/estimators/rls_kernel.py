@@ -135,14 +135,15 @@ def _noise_memory(state: Any, config: Any) -> Any:
     )
     pole = config[LOW_POLE]
     noise = 2.0 * state[NOISE] * (1.0 - pole) / (1.0 + pole)
-    return noise / max((PRECISION * swing_of_x) ** 2, SLOWEST)
+    allowed = PRECISION * swing_of_x
+    return noise / max(allowed * allowed, SLOWEST)
 
 
 @register_jitable
 def trust_in_levels(state: Any, config: Any) -> Any:
     """Part of the offset to take from levels: 0 with a good sensor, 1 where noise covers the changes of x."""
     noise = _noise_memory(state, config) * (config[WALK] > 0.0) * level.is_known(state[LEVEL:FRONT])
-    return noise / (noise + config[WALK_MEMORY] ** 2 + SLOWEST)
+    return noise / (noise + config[WALK_MEMORY] * config[WALK_MEMORY] + SLOWEST)
 
 
 @register_jitable
@@ -184,7 +185,7 @@ def _walk(state: Any, config: Any, phi: Any, n: int, part: Any, half: Any) -> An
         k = FRONT + law.HEAD + n + i * n + i
         state[k] = least_squares.random_walk(state[k], q * part, CEILING * max(q, state[k + n * n]))
     # Near a standstill the mechanics still move, which says nothing of the hysteresis.
-    memory_squared = config[WALK_MEMORY] ** 2 + _noise_memory(state, config)
+    memory_squared = config[WALK_MEMORY] * config[WALK_MEMORY] + _noise_memory(state, config)
     return 1.0 + memory_squared * rho * max(part, SLOW / half)
 
 

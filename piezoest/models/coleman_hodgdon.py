@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 
 from piezoest._checks import FloatArray, array_1d, finite
+from piezoest.equations import admissible
 from piezoest.equations import coleman_hodgdon as equations
-from piezoest.equations.admissible import project_admissible
 from piezoest.models._base import Model
 from piezoest.signals import check_continuity
 
@@ -91,9 +91,9 @@ class ColemanHodgdon(Model):
     @property
     def is_admissible(self) -> bool:
         """Whether the parameters are thermodynamically admissible and invertible."""
-        return bool(self.alpha > 0.0 and self.beta > 0.0 and self.b > 0.0 and self.c >= 2.0 * self.b)
+        return bool(admissible.has_inverse(self.alpha, self.beta, self.gamma))
 
-    def nearest_admissible(self, margin: float = 1e-6) -> Self:
+    def nearest_admissible(self, margin: float = admissible.NEAREST_MARGIN) -> Self:
         """Nearest admissible model, each parameter measured in parts of its own value.
 
         Parameters
@@ -109,9 +109,7 @@ class ColemanHodgdon(Model):
         if self.is_admissible:
             return self
         theta = self.theta
-        scale = np.maximum(np.abs(theta), 1e-12)
-        covariance = np.diag(scale**2).ravel()
-        project_admissible(theta, covariance, 3, 1e-9 * float(scale[0]), 1e-9 * float(scale[1]), margin)
+        admissible.nearest_admissible(theta, np.empty(9), margin)
         alpha, beta, gamma = (float(value) for value in theta)
         return type(self)(alpha, beta, gamma, self.offset)
 

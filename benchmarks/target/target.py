@@ -1,0 +1,236 @@
+"""Run exported controllers on an emulated Cortex-M4F: equal voltages, instructions, cycles, flash, RAM.
+
+Needs arm-none-eabi-gcc with newlib, and qemu-system-arm (`make tools`).
+
+    python benchmarks/target/target.py [--samples N] [--traced N] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from cycles import count_cycles
+
+import piezoest as pz
+from piezoest.bench.scenarios import SCENARIOS
+
+HERE = Path(__file__).resolve().parent
+CROSS, EMULATOR = "arm-none-eabi-", "qemu-system-arm"
+CPU = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
+# -std=c99 leaves fused multiply-add out, so that the voltages can be compared bit for bit.
+FLAGS = ("-std=c99", "-O3", "-ffunction-sections", "-fdata-sections")
+SAMPLE_RATE, CLOCK = 50_000.0, 168e6  # Hz
+SAMPLES, TRACED = 4000, 200
+OUTSIDE = pz.ColemanHodgdon(0.02, 0.12, 0.0072)
+LIMITS = pz.VoltageLimits(-60.0, 60.0)
+
+
+def controllers() -> dict[str, tuple[Any, Any]]:
+    """What is measured, by name: estimator and compensator."""
+    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    line = pz.LinearGain(0.15)
+
+    def inverse() -> Any:
+        return pz.InverseCompensator(start, LIMITS)
+
+    return {
+        "inverse alone": (None, inverse()),
+        "linear gain learnt": (
+            pz.HysteresisRLS(SAMPLE_RATE, initial_model=line),
+            pz.LinearCompensator(line, LIMITS),
+        ),
+        "RLS and inverse": (pz.HysteresisRLS(SAMPLE_RATE, initial_model=start), inverse()),
+        # Outside of the admissible set, and sure of it: every model handed over has to be moved.
+        "RLS, model moved": (
+            pz.HysteresisRLS(SAMPLE_RATE, initial_model=OUTSIDE, uncertainty=1e-3),
+            inverse(),
+        ),
+        "RLS, the paper's memory": (
+            pz.HysteresisRLS(SAMPLE_RATE, initial_model=start, memory=0.4),
+            inverse(),
+        ),
+        "EKF and inverse": (pz.HysteresisEKF(SAMPLE_RATE, initial_model=start), inverse()),
+    }
+
+
+def log(samples: int) -> tuple[Any, Any]:
+    """Reference, and displacement measured before each sample of it, from the simulated stage."""
+    case = SCENARIOS["cold-start"].build(0)
+    r = case.reference.values[:samples]
+    record = pz.track(r, stage=case.new_stage(), compensator=pz.InverseCompensator(case.start))
+    return r, np.concatenate([[np.nan], record.measured[:-1]])
+
+
+def missing_tools() -> list[str]:
+    """Names of programs that are not there."""
+    return [name for name in (f"{CROSS}gcc", f"{CROSS}objdump", EMULATOR) if shutil.which(name) is None]
+
+
+def measure(name: str, precision: Any, samples: int, traced: int) -> dict[str, Any]:
+    """Build, run and count one controller."""
+    estimator, compensator = controllers()[name]
+    code = pz.export.c(estimator, compensator, name="controller", precision=precision)
+    r, x = log(samples)
+    expected = pz.export.CompiledController(code).run(r, x)
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        code.write(folder)
+        firmware = build(folder, precision, r, x)
+        voltages, stack = run(firmware, precision)
+        few = build(folder, precision, r[:traced], x[:traced])
+        counts, cycles = trace(few)
+        sizes = flash_and_ram(folder, firmware)
+    apart = np.abs(voltages - expected) / np.max(np.abs(expected))
+    budget = CLOCK / SAMPLE_RATE
+    # The first turns are lighter: nothing is learnt yet.
+    return {
+        "controller": name,
+        "precision": precision,
+        "samples": samples,
+        "largest_difference_from_host": float(np.max(apart)),
+        "equal_to_the_bit": float(np.mean(apart == 0.0)),
+        "instructions_mean": float(np.mean(counts[10:])),
+        "instructions_largest": int(np.max(counts)),
+        "cycles_mean": float(np.mean(cycles[10:])),
+        "cycles_largest": int(np.max(cycles)),
+        "load_mean": float(np.mean(cycles[10:])) / budget,
+        "load_largest": int(np.max(cycles)) / budget,
+        "half_left": bool(np.max(cycles) <= 0.5 * budget),
+        "stack": stack,
+        **sizes,
+    }
+
+
+def build(folder: Path, precision: str, r: Any, x: Any) -> Path:
+    """Firmware with the log in it."""
+    suffix = "f" if precision == "float" else ""
+
+    def listed(values: Any) -> str:
+        texts = ("NAN" if np.isnan(v) else f"{v!r}{suffix}" for v in map(float, values))
+        return "{" + ",\n".join(texts) + "}"
+
+    (folder / "log.h").write_text(
+        f"#include <math.h>\ntypedef {precision} real_t;\n#define LOG_SIZE {len(r)}\n"
+        f"static const real_t log_r[] = {listed(r)};\nstatic const real_t log_x[] = {listed(x)};\n"
+    )
+    target = folder / f"firmware_{len(r)}.elf"
+    command = [
+        f"{CROSS}gcc", *CPU, *FLAGS, "-I", str(folder), str(HERE / "firmware.c"), "controller.c",
+        "-nostartfiles", "-T", str(HERE / "stm32f405.ld"), "-Wl,--gc-sections", "-o", str(target),
+        "--specs=nano.specs", "-lm",
+    ]  # fmt: skip
+    subprocess.run(command, cwd=folder, check=True)
+    return target
+
+
+def emulate(firmware: Path, *options: str) -> str:
+    """What the firmware prints."""
+    command = [
+        EMULATOR, "-M", "netduinoplus2", "-nographic", "-monitor", "none", "-serial", "none",
+        "-semihosting-config", "enable=on,target=native", *options, "-kernel", str(firmware),
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
+    text = done.stdout + done.stderr
+    if "fault" in text or "stack" not in text:
+        raise RuntimeError(f"the firmware did not end well:\n{text[-2000:]}")
+    return text
+
+
+def run(firmware: Path, precision: str) -> tuple[Any, int]:
+    """Voltages and bytes of stack."""
+    text = emulate(firmware)
+    digits, kind, whole = (8, np.float32, np.uint32) if precision == "float" else (16, np.float64, np.uint64)
+    before, after = text.split("stack ")
+    words = re.findall(rf"^[0-9a-f]{{{digits}}}$", before, re.M)
+    voltages = np.array([int(word, 16) for word in words], whole).view(kind).astype(np.float64)
+    return voltages, int(after.split()[0], 16)
+
+
+def trace(firmware: Path) -> tuple[Any, Any]:
+    """Instructions and cycles of each step, from a trace of every instruction."""
+    listing = subprocess.run(
+        [f"{CROSS}objdump", "-d", "--no-show-raw-insn", str(firmware)],
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    path = firmware.with_suffix(".trace")
+    emulate(firmware, "-singlestep", "-d", "exec,nochain", "-D", str(path))
+    result = count_cycles(listing, path)
+    path.unlink()
+    return result
+
+
+def flash_and_ram(folder: Path, firmware: Path) -> dict[str, int]:
+    """Bytes of the controller's code and constants, of the whole firmware with its log, of the state."""
+    subprocess.run([f"{CROSS}gcc", *CPU, *FLAGS, "-c", "controller.c", "-o", "c.o"], cwd=folder, check=True)
+    return {
+        "flash_controller": sizes(folder / "c.o")[0],
+        "flash_firmware": sizes(firmware)[0],
+        "ram_state": symbol_size(firmware, "state"),
+    }
+
+
+def sizes(binary: Path) -> list[int]:
+    """Bytes of code and constants, of data, of zeroed data."""
+    done = subprocess.run([f"{CROSS}size", str(binary)], capture_output=True, text=True, check=True)
+    return [int(number) for number in done.stdout.splitlines()[1].split()[:3]]
+
+
+def symbol_size(binary: Path, name: str) -> int:
+    """Bytes of a variable."""
+    command = [f"{CROSS}nm", "-S", "--defined-only", str(binary)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    rows = [line.split() for line in done.stdout.splitlines()]
+    return next(int(row[1], 16) for row in rows if len(row) == 4 and row[3] == name)
+
+
+def main() -> int:
+    """Print the table; 1 if a voltage differs from the host's by more than rounding."""
+    parser = argparse.ArgumentParser(description="Exported controllers on an emulated Cortex-M4F.")
+    parser.add_argument("--samples", type=int, default=SAMPLES, help="samples compared with the host")
+    parser.add_argument("--traced", type=int, default=TRACED, help="samples whose instructions are counted")
+    parser.add_argument("--only", choices=sorted(controllers()), help="only this controller")
+    parser.add_argument("--precision", choices=["float", "double"], help="only this precision")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures to this file too")
+    arguments = parser.parse_args()
+    if absent := missing_tools():
+        print(f"not found: {', '.join(absent)}: run make tools", file=sys.stderr)
+        return 2
+    rows = [
+        measure(name, precision, arguments.samples, arguments.traced)
+        for name in ([arguments.only] if arguments.only else controllers())
+        for precision in ([arguments.precision] if arguments.precision else ("float", "double"))
+    ]
+    for row in rows:
+        print(
+            f"{row['controller']:<24} {row['precision']:<7}{row['instructions_mean']:6.0f} instructions, "
+            f"at most {row['instructions_largest']:5d}; {row['cycles_mean']:6.0f} cycles, "
+            f"at most {row['cycles_largest']:5d} ({100.0 * row['load_largest']:.0f} % of 50 kHz); "
+            f"flash {row['flash_controller']} B, state {row['ram_state']} B, stack {row['stack']} B; "
+            f"off host by {row['largest_difference_from_host']:.1e}"
+        )
+    if arguments.json is not None:
+        document = {"clock_Hz": CLOCK, "sample_rate_Hz": SAMPLE_RATE, "tools": tools(), "rows": rows}
+        arguments.json.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    apart = [row for row in rows if not row["largest_difference_from_host"] < 1e-5]
+    return 1 if apart else 0
+
+
+def tools() -> list[str]:
+    """First line of what each program says of itself."""
+    return [
+        subprocess.run([name, "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
+        for name in (f"{CROSS}gcc", EMULATOR)
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,184 @@
+"""One turn of the ring as a controller runs it: measurement in, estimate, model, voltage out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import WILDEST, FloatArray, array_1d, integer
+from piezoest.compensators import Compensator
+from piezoest.equations import admissible
+from piezoest.equations import coleman_hodgdon as equations
+from piezoest.models import Model
+
+# State of the ring: voltage given out last, whether there is one, samples since the last
+# change of model, whether the model is held, and the model: alpha, beta, gamma, offset.
+PREVIOUS, STARTED, WAITED, FROZEN, MODEL, STATE = 0, 1, 2, 3, 4, 8
+
+
+def adopt(compensator: Any, settings: Any, model: Any, hysteretic: bool, change: Any) -> bool:
+    """Hand (alpha, beta, gamma, offset) or (gain, -, -, offset) to the compensator; False if it cannot be."""
+    for i in range(4):
+        if not abs(model[i]) < WILDEST:
+            return False
+    if not hysteretic:
+        if model[0] == 0.0:
+            return False
+        # No hysteresis: b = 0, and any a.
+        change(compensator, settings, 1.0, 0.0, model[0], model[3])
+        return True
+    if not admissible.has_inverse(model[0], model[1], model[2]):
+        work = np.empty(9)
+        admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
+    a, b, c = equations.loop_parameters(model[0], model[1], model[2])
+    change(compensator, settings, a, b, c, model[3])
+    return True
+
+
+def learn(
+    ring: Any,
+    estimator: Any,
+    estimator_settings: Any,
+    terms: Any,
+    compensator: Any,
+    settings: Any,
+    sample: Any,
+    proposed: Any,
+    change: Any,
+    interval: int,
+    frozen_at: int,
+    hysteretic: bool,
+    x: Any,
+) -> None:
+    """Give the estimator the measurement of the previous voltage; hand its model over when it is time."""
+    if frozen_at >= 0:
+        estimator[frozen_at] = ring[FROZEN]
+    elif ring[FROZEN] != 0.0:
+        x = np.nan
+    sample(estimator, estimator_settings, ring[PREVIOUS], x)
+    ring[WAITED] += 1.0
+    if ring[WAITED] >= interval:
+        ring[WAITED] = 0.0
+        if ring[FROZEN] == 0.0:
+            model = np.zeros(4)
+            proposed(estimator, estimator_settings, terms, model)
+            if adopt(compensator, settings, model, hysteretic, change):
+                for i in range(4):
+                    ring[MODEL + i] = model[i]
+
+
+def give(ring: Any, compensator: Any, settings: Any, voltage: Any, r: Any) -> Any:
+    """Voltage for the next sample of the reference; a number, whatever came in."""
+    u = voltage(compensator, settings, r)
+    if abs(u) < WILDEST:
+        ring[PREVIOUS] = u
+        ring[STARTED] = 1.0
+    return ring[PREVIOUS]
+
+
+class Controller:
+    """What the exported code does, in Python: one `step` from reference and measurement to voltage.
+
+    Parameters
+    ----------
+    estimator : object with ``step(u, x)`` and ``model``, or None
+        Such as `HysteresisRLS`; None leaves the compensator's model as it is.
+    compensator : LinearCompensator or InverseCompensator
+        The feed-forward.
+    update_interval : int
+        Samples between two changes of the compensator's model (default 50: 1 ms at 50 kHz).
+
+    Raises
+    ------
+    ValueError
+        If the compensator is none, or the interval is no whole number above zero.
+
+    Notes
+    -----
+    A loop of ``x = stage.step(u); u = controller.step(r, x)`` is `piezoest.track`, bit for bit.
+    """
+
+    __slots__ = ("_compensator", "_estimator", "_frozen", "_interval", "_voltage", "_waited")
+
+    #: `piezoest.track` hands each measurement back: it can run a controller as its compensator.
+    needs_measurement = True
+
+    def __init__(self, estimator: Any, compensator: Compensator, *, update_interval: int = 50) -> None:
+        if not isinstance(compensator, Compensator):
+            raise ValueError(
+                f"compensator must be a LinearCompensator or an InverseCompensator, got {compensator!r}"
+            )
+        self._estimator = estimator
+        self._compensator = compensator
+        self._interval = integer("update_interval", update_interval, 1)
+        self._voltage: float | None = None
+        self._waited = 0
+        self._frozen = False
+
+    @property
+    def model(self) -> Model:
+        """Model whose inverse is used."""
+        return self._compensator.model
+
+    @property
+    def frozen(self) -> bool:
+        """Whether the model is held; settable."""
+        return self._frozen
+
+    @frozen.setter
+    def frozen(self, frozen: bool) -> None:
+        self._frozen = bool(frozen)
+        if hasattr(self._estimator, "frozen"):
+            self._estimator.frozen = self._frozen
+
+    def step(self, r: float | None, x: float | None) -> float:
+        """One turn.
+
+        Parameters
+        ----------
+        r : float
+            Next sample of the reference [µm]; NaN or infinity holds the voltage.
+        x : float or None
+            Displacement measured after the previous voltage [µm]; None, NaN or infinity where
+            there is none. At the first turn there was no voltage yet, and x is not looked at.
+
+        Returns
+        -------
+        float
+            Voltage [V], within the compensator's limits.
+        """
+        if self._voltage is not None and self._estimator is not None:
+            held = self._frozen and not hasattr(self._estimator, "frozen")
+            self._estimator.step(self._voltage, np.nan if held else x)
+            self._waited += 1
+            if self._waited == self._interval:
+                self._waited = 0
+                if not self._frozen:
+                    self._compensator.model = self._estimator.model
+        self._voltage = self._compensator.step(r)
+        return self._voltage
+
+    def run(self, r: Any, x: Any) -> FloatArray:
+        """Turns for a whole log.
+
+        Parameters
+        ----------
+        r, x : array_like, shape (N,)
+            Reference, and the displacement measured before each sample of it [µm]; NaN where
+            there is none.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Voltage [V].
+
+        Raises
+        ------
+        ValueError
+            If the arrays are not one-dimensional, or of two lengths.
+        """
+        r, x = array_1d("r", r, allow_nan=True), array_1d("x", x, allow_nan=True)
+        if r.size != x.size:
+            raise ValueError(f"r and x must have the same length, got {r.size} and {x.size}")
+        return np.array([self.step(a, b) for a, b in zip(r.tolist(), x.tolist(), strict=True)])

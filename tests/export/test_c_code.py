@@ -1,0 +1,388 @@
+"""Generated controllers: clean to compilers, equal to the library, safe with any input."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numba.extending import register_jitable
+
+import piezoest as pz
+from piezoest.bench.scenarios import SCENARIOS
+from piezoest.equations import play
+from piezoest.export.compiled import compiler
+
+FS = 50_000.0
+START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+LINE = pz.LinearGain(0.15)
+LIMITS = pz.VoltageLimits(-60.0, 60.0)
+STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-O2")
+
+try:
+    compiler()
+except ValueError as absent:
+    pytest.skip(str(absent), allow_module_level=True)
+
+
+def inverse(**options: Any) -> Any:
+    return pz.InverseCompensator(START, LIMITS, **options)
+
+
+def rls(**options: Any) -> Any:
+    return pz.HysteresisRLS(FS, **{"initial_model": START, **options})
+
+
+PAIRS: dict[str, Any] = {
+    "inverse": lambda: (None, inverse()),
+    "line": lambda: (None, pz.LinearCompensator(LINE, LIMITS)),
+    "rls": lambda: (rls(), inverse()),
+    "rls-paper": lambda: (rls(memory=0.4, offset=False), inverse()),
+    "rls-continuous": lambda: (rls(time_base="continuous"), inverse(method="bogacki-shampine")),
+    "rls-delay-highpass": lambda: (rls(delay=2.3, high_pass=0.5, memory=0.2), inverse(transfer_samples=0)),
+    "rls-resetting": lambda: (
+        rls(memory=0.05, policies=(pz.policies.CovarianceResetting(1e-3), pz.policies.DeadZone())),
+        inverse(),
+    ),
+    "rls-line": lambda: (rls(initial_model=LINE), pz.LinearCompensator(LINE, LIMITS)),
+    "rls-line-offset": lambda: (rls(initial_model=LINE, offset=True), pz.LinearCompensator(LINE, LIMITS)),
+    "ekf": lambda: (pz.HysteresisEKF(FS, initial_model=START), inverse()),
+    "ekf-offset": lambda: (pz.HysteresisEKF(FS, initial_model=START, offset=True, delay=1.5), inverse()),
+    "ekf-line": lambda: (
+        pz.HysteresisEKF(FS, initial_model=LINE),
+        pz.InverseCompensator(LINE, pz.VoltageLimits(-60.0, 60.0, slew_rate=1e4, sample_rate=FS)),
+    ),
+}
+
+
+def code(name: str, precision: Any = "double") -> Any:
+    return pz.export.c(*PAIRS[name](), precision=precision, name="controller")
+
+
+@pytest.fixture(scope="module")
+def log() -> tuple[Any, Any]:
+    """Reference, and measurement before each sample of it."""
+    case = SCENARIOS["cold-start"].build(0, after=2)
+    record = pz.track(
+        case.reference, stage=case.new_stage(), compensator=pz.InverseCompensator(case.start, LIMITS)
+    )
+    return record.reference, np.concatenate([[np.nan], record.measured[:-1]])
+
+
+def tool(name: str) -> str:
+    found = shutil.which(name)
+    if found is None:
+        pytest.skip(f"{name} is not installed: make tools")
+    return found
+
+
+# ---------------------------------------------------------------- the text
+
+
+@pytest.mark.parametrize("name", PAIRS)
+@pytest.mark.parametrize("precision", ["double", "float"])
+def test_same_input_gives_the_same_text(name: str, precision: str) -> None:
+    first, second = code(name, precision), code(name, precision)
+    assert (first.header, first.source) == (second.header, second.source)
+    for word in ("malloc", "calloc", "goto"):
+        assert word not in first.source
+
+
+@pytest.mark.parametrize("cc", ["gcc", "clang"])
+@pytest.mark.parametrize("precision", ["double", "float"])
+def test_compiles_without_a_warning(cc: str, precision: str, tmp_path: Path) -> None:
+    cc = tool(cc)
+    for name in PAIRS:
+        code(name, precision).write(tmp_path)
+        done = subprocess.run(
+            [cc, *STRICT, "-c", "controller.c", "-o", "controller.o"],
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, f"{name}: {done.stderr}"
+
+
+@pytest.mark.parametrize("precision", ["double", "float"])
+def test_cppcheck_is_silent(precision: str, tmp_path: Path) -> None:
+    cppcheck = tool("cppcheck")
+    for name in PAIRS:
+        code(name, precision).write(tmp_path)
+        # The public functions are called from elsewhere, math.h is not looked into.
+        options = [
+            "--enable=all",
+            "--std=c99",
+            "--suppress=missingIncludeSystem",
+            "--suppress=unusedFunction",
+        ]
+        command = [cppcheck, *options, "--quiet", "--error-exitcode=1", "controller.c"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"{name}: {done.stderr}"
+        assert done.stdout + done.stderr == ""
+
+
+def test_only_math_h_is_needed(tmp_path: Path) -> None:
+    nm = tool("nm")
+    for name in PAIRS:
+        code(name).write(tmp_path)
+        subprocess.run(
+            [compiler(), "-std=c99", "-O2", "-c", "controller.c", "-o", "c.o"], cwd=tmp_path, check=True
+        )
+        done = subprocess.run([nm, "-u", "c.o"], cwd=tmp_path, capture_output=True, text=True, check=True)
+        needed = {line.split()[-1].split("@")[0] for line in done.stdout.splitlines()}
+        # A compiler may turn a loop that copies into a call.
+        assert needed <= {"expm1", "sqrt", "memcpy", "memset", "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}, (
+            name
+        )
+
+
+# ---------------------------------------------------------------- parity
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_double_equals_the_library(name: str, log: tuple[Any, Any]) -> None:
+    r, x = (values.copy() for values in log)
+    x[5000:5100] = np.nan
+    x[7000] = 40.0
+    r[9000] = np.inf
+    if name == "ekf-offset":
+        # The log is another controller's: on so foreign a one this filter runs away, past any number.
+        r, x = r[:3500], x[:3500]
+    theirs = pz.export.Controller(*PAIRS[name]()).run(r, x)
+    ours = pz.export.CompiledController(code(name)).run(r, x)
+    np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-12 * np.max(np.abs(theirs)))
+
+
+@pytest.mark.parametrize("kind", ["HysteresisRLS", "HysteresisEKF"])
+def test_double_equals_the_library_over_every_scenario(kind: str) -> None:
+    total = 0
+    for name, scenario in SCENARIOS.items():
+        case = scenario.build(0, before=3, after=7, rest=0.5, drift=1.5)
+        r = case.reference.values[:100_000]
+        estimator = getattr(pz, kind)(FS, initial_model=case.start)
+        compensator = pz.InverseCompensator(case.start, LIMITS)
+        ours = pz.export.CompiledController(pz.export.c(estimator, compensator))
+        record = pz.track(
+            pz.signals.from_array(r, FS), stage=case.new_stage(), compensator=compensator, estimator=estimator
+        )
+        voltage = ours.run(r, np.concatenate([[np.nan], record.measured[:-1]]))
+        atol = 1e-12 * np.max(np.abs(record.voltage))
+        np.testing.assert_allclose(voltage, record.voltage, rtol=0.0, atol=atol, err_msg=name)
+        total += r.size
+    assert total >= 500_000
+
+
+def test_controller_is_track(log: tuple[Any, Any]) -> None:
+    r = log[0]
+    estimator, compensator = PAIRS["rls"]()
+    case = SCENARIOS["cold-start"].build(0)
+    record = pz.track(r, stage=case.new_stage(), compensator=compensator, estimator=estimator)
+    own = pz.track(
+        r, stage=case.new_stage(), compensator=pz.export.Controller(*PAIRS["rls"]()), sample_rate=FS
+    )
+    np.testing.assert_array_equal(own.voltage, record.voltage)
+
+
+@pytest.mark.parametrize("name", ["rls", "ekf"])
+def test_float_settles_to_the_same_error(name: str) -> None:
+    case = SCENARIOS["cold-start"].build(0, after=10)
+    estimator, compensator = PAIRS[name]()
+    single = pz.export.CompiledController(code(name, "float"))
+    library = pz.track(case.reference, stage=case.new_stage(), compensator=compensator, estimator=estimator)
+    own = pz.track(case.reference, stage=case.new_stage(), compensator=single)
+    assert own.max_error(2) == pytest.approx(library.max_error(2), rel=0.01)
+
+
+# ---------------------------------------------------------------- handling
+
+
+@pytest.mark.parametrize("name", ["rls", "ekf"])
+def test_freeze_holds_the_model_as_in_python(name: str) -> None:
+    r = SCENARIOS["cold-start"].build(0, after=2).reference.values
+    case = SCENARIOS["cold-start"].build(0)
+    stages = case.new_stage(), case.new_stage()
+    ours, theirs = pz.export.CompiledController(code(name)), pz.export.Controller(*PAIRS[name]())
+    both: tuple[Any, Any] = ours, theirs
+    for part, frozen in ((slice(0, 8000), False), (slice(8000, 12_000), True), (slice(12_000, None), False)):
+        before = ours.parameters
+        voltages = []
+        for controller, stage in zip(both, stages, strict=True):
+            controller.frozen = frozen
+            assert controller.frozen == frozen
+            x = None
+            u = np.empty_like(r[part])
+            for k, value in enumerate(r[part]):
+                u[k] = controller.step(float(value), x)
+                x = stage.step(float(u[k]))
+            voltages.append(u)
+        assert np.array_equal(before, ours.parameters) == frozen
+        np.testing.assert_allclose(voltages[0], voltages[1], rtol=0.0, atol=1e-12 * 60.0)
+
+
+def test_parameters_are_those_of_the_model(log: tuple[Any, Any]) -> None:
+    r, x = log
+    ours, theirs = pz.export.CompiledController(code("rls")), pz.export.Controller(*PAIRS["rls"]())
+    ours.run(r, x)
+    theirs.run(r, x)
+    model = theirs.model
+    assert isinstance(model, pz.ColemanHodgdon)
+    np.testing.assert_array_equal(ours.parameters, [*model.theta, model.offset])
+
+
+def test_parameters_can_be_set(log: tuple[Any, Any]) -> None:
+    r, x = log
+    ours = pz.export.CompiledController(code("inverse"))
+    compensator = inverse()
+    ours.run(r[:500], x[:500])
+    compensator.run(r[:500])
+    ours.parameters = [0.021, 0.14, 0.0042, 0.1]
+    compensator.model = pz.ColemanHodgdon(0.021, 0.14, 0.0042, 0.1)
+    np.testing.assert_array_equal(ours.run(r[500:], x[500:]), compensator.run(r[500:]))
+    # An inadmissible model becomes its nearest admissible one; one that is no number is refused.
+    ours.parameters = [0.021, 0.14, 0.1, 0.0]
+    assert pz.ColemanHodgdon(*ours.parameters).is_admissible
+    for wrong in ([np.nan, 0.1, 0.1, 0.0], [0.02, np.inf, 0.1, 0.0]):
+        with pytest.raises(ValueError, match="parameters"):
+            ours.parameters = wrong
+
+
+def test_limits_are_kept_and_can_be_set(log: tuple[Any, Any]) -> None:
+    r, x = log
+    ours = pz.export.CompiledController(code("rls"))
+    ours.set_limits(-5.0, 7.0)
+    u = ours.run(r, x)
+    assert u.min() >= -5.0
+    assert u.max() == 7.0
+    with pytest.raises(ValueError, match="below"):
+        ours.set_limits(3.0, 3.0)
+
+
+@pytest.mark.parametrize("precision", ["double", "float"])
+@pytest.mark.parametrize("name", ["rls", "rls-paper", "ekf", "rls-line"])
+def test_whatever_comes_in_a_number_within_the_limits_goes_out(name: str, precision: str) -> None:
+    rng = np.random.default_rng(1)
+    n = 50_000
+    r = 5.0 * np.sin(np.arange(n) * 2e-3) + rng.normal(size=n)
+    x = r + rng.normal(size=n)
+    wild = np.array([np.nan, np.inf, -np.inf, 1e308, -1e308, 1e30, -1e30, 9e8, -9e8, 1e5, 0.0, 5e-324])
+    for values, share in ((r, 0.1), (x, 0.2)):
+        places = rng.random(n) < share
+        values[places] = rng.choice(wild, int(places.sum()))
+    u = pz.export.CompiledController(code(name, precision)).run(r, x)
+    assert np.all(np.isfinite(u))
+    assert np.all(np.abs(u) <= 60.0)
+
+
+DRIVER = """#include "controller.h"
+#include <stdio.h>
+
+int main(void)
+{
+    static controller_state state;
+    double pair[2];
+
+    controller_init(&state);
+    while (fread(pair, sizeof(double), 2, stdin) == 2) {
+        volatile double u = (double)controller_step(&state, (REAL)pair[0], (REAL)pair[1]);
+        if (!(u >= -60.0 && u <= 60.0)) {
+            return 3;
+        }
+    }
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("precision", ["double", "float"])
+@pytest.mark.parametrize("name", ["rls", "rls-continuous", "rls-delay-highpass", "ekf-offset"])
+def test_sanitizers_are_silent(name: str, precision: str, tmp_path: Path, log: tuple[Any, Any]) -> None:
+    code(name, precision).write(tmp_path)
+    (tmp_path / "driver.c").write_text(DRIVER)
+    flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O1", f"-DREAL={precision}"]
+    command = [compiler(), "-std=c99", *flags, "driver.c", "controller.c", "-o", "driver", "-lm"]
+    built = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    if built.returncode != 0:
+        pytest.skip(f"the compiler has no sanitizers: {built.stderr.strip().splitlines()[-1]}")
+    pairs = np.column_stack(log)
+    pairs[3000:3200, 1] = np.nan
+    pairs[4000, 1], pairs[4001, 1], pairs[4002, 0] = np.inf, 1e30, -np.inf
+    done = subprocess.run([str(tmp_path / "driver")], input=pairs.tobytes(), capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+# ---------------------------------------------------------------- other compensators
+
+
+@register_jitable
+def plays(state: Any, config: Any, r: Any) -> Any:
+    if not abs(r) < 1e9:
+        return state[0]
+    n = int(config[6])
+    y = state[1 : 1 + n]
+    wanted = play.prandtl_ishlinskii_inverse_step(
+        y, r, config[0], config[7 : 7 + n], config[7 + n : 7 + 2 * n]
+    )
+    given = min(max(wanted, config[4]), config[5])
+    for i in range(n):
+        y[i] = play.play(y[i], given, config[7 + i])
+    state[0] = given
+    return given
+
+
+class Plays:
+    """Another kind of compensator: a kernel on flat arrays is all that the export asks for."""
+
+    _compiled, _fixed = (plays, None), (6,)
+
+    def __init__(self, model: pz.PrandtlIshlinskii) -> None:
+        self.model, self.limits, self.voltage = model, LIMITS, 0.0
+        head = [model.gain, 0.0, 0.0, 0.0, -60.0, 60.0, model.weights.size]
+        self._config = np.concatenate([head, model.thresholds, model.weights])
+        self._state = np.zeros(1 + model.weights.size)
+
+
+def test_prandtl_ishlinskii_inverse_is_exported() -> None:
+    model = pz.PrandtlIshlinskii(0.1, np.linspace(0.5, 30.0, 20), np.full(20, 2e-3))
+    compensator: Any = Plays(model)
+    r = np.concatenate([np.zeros(1), 4.0 * np.sin(np.arange(20_000) * 1e-3)])
+    u = pz.export.CompiledController(pz.export.c(None, compensator)).run(r, np.zeros_like(r))
+    np.testing.assert_allclose(u, model.invert(r), rtol=0.0, atol=1e-12 * np.max(np.abs(u)))
+
+
+# ---------------------------------------------------------------- refusals
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        ({"name": "9lives"}, "name"),
+        ({"name": "double-u"}, "name"),
+        ({"precision": "half"}, "precision"),
+        ({"update_interval": 0}, "update_interval"),
+    ],
+)
+def test_wrong_arguments_are_refused(arguments: dict[str, Any], word: str) -> None:
+    with pytest.raises(ValueError, match=word):
+        pz.export.c(*PAIRS["rls"](), **arguments)
+
+
+def test_what_has_no_kernel_is_refused() -> None:
+    with pytest.raises(ValueError, match="FilterPyEKF"):
+        pz.export.c(pz.FilterPyEKF(FS), inverse())
+    with pytest.raises(ValueError, match="compensator"):
+        pz.export.c(None, START)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="LinearGain"):
+        pz.export.c(rls(), pz.LinearCompensator(LINE))
+
+
+def test_compiled_takes_single_samples(log: tuple[Any, Any]) -> None:
+    r, x = log
+    ours = pz.export.CompiledController(code("rls"))
+    whole = ours.run(r[:300], x[:300])
+    ours.reset()
+    single = [ours.step(a, b) for a, b in zip(r[:300].tolist(), x[:300].tolist(), strict=True)]
+    np.testing.assert_array_equal(single, whole)
+    assert np.isfinite(ours.copy().step(None, None))
+    assert ctypes.sizeof(ctypes.c_double) == 8

@@ -1,0 +1,128 @@
+"""The co-simulation unit: valid, and equal to the library where it runs."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest.export.compiled import compiler
+
+fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install piezoest[export]")
+fmi2 = pytest.importorskip("fmpy.fmi2")
+validation = pytest.importorskip("fmpy.validation")
+
+try:
+    compiler()
+except ValueError as absent:
+    pytest.skip(str(absent), allow_module_level=True)
+
+FS = 50_000.0
+LIMITS = pz.VoltageLimits(-60.0, 60.0)
+
+
+def pair(kind: str = "rls") -> tuple[Any, Any]:
+    if kind == "line":
+        return None, pz.LinearCompensator(pz.LinearGain(0.15), pz.VoltageLimits(sample_rate=FS))
+    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    made = pz.HysteresisRLS if kind == "rls" else pz.HysteresisEKF
+    return made(FS, initial_model=start), pz.InverseCompensator(start, LIMITS)
+
+
+@pytest.fixture(scope="module")
+def unit(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return pz.export.fmu(*pair(), tmp_path_factory.mktemp("fmu") / "controller.fmu")
+
+
+@pytest.mark.parametrize("kind", ["rls", "ekf", "line"])
+@pytest.mark.parametrize("precision", ["double", "float"])
+def test_is_valid(kind: str, precision: Any, tmp_path: Path) -> None:
+    path = pz.export.fmu(*pair(kind), tmp_path / "a.fmu", precision=precision)
+    assert validation.validate_fmu(str(path)) == []
+
+
+def test_holds_sources_and_a_binary(unit: Path) -> None:
+    names = zipfile.ZipFile(unit).namelist()
+    assert "sources/piezoest_controller.c" in names
+    assert "sources/fmi2.c" in names
+    assert any(name.startswith("binaries/") for name in names)
+
+
+def test_same_input_gives_the_same_description(unit: Path, tmp_path: Path) -> None:
+    again = pz.export.fmu(*pair(), tmp_path / "again.fmu")
+    first, second = zipfile.ZipFile(unit), zipfile.ZipFile(again)
+    for name in ("modelDescription.xml", "sources/piezoest_controller.c", "sources/fmi2.c"):
+        assert first.read(name) == second.read(name)
+
+
+def start(unit: Path, folder: Path) -> Any:
+    description = fmpy.read_model_description(str(unit))
+    fmpy.extract(str(unit), unzipdir=str(folder))
+    running = fmi2.FMU2Slave(
+        guid=description.guid, unzipDirectory=str(folder),
+        modelIdentifier=description.coSimulation.modelIdentifier, instanceName="one",
+    )  # fmt: skip
+    running.instantiate()
+    running.setupExperiment(startTime=0.0)
+    running.enterInitializationMode()
+    running.exitInitializationMode()
+    return running
+
+
+def test_equals_the_library(unit: Path, tmp_path: Path) -> None:
+    r = pz.signals.triangle(5.0, 5.0, 1, FS).values[:6000]
+    estimator, compensator = pair()
+    record = pz.track(r, stage=pz.PaperStage(FS, seed=0), compensator=compensator, estimator=estimator)
+    running = start(unit, tmp_path)
+    assert running.getReal([2]) == [0.0]
+    u = np.empty(r.size)
+    x = np.nan
+    for k in range(r.size):
+        if k == 3000:
+            saved = running.getFMUState()
+        running.setReal([0, 1], [float(r[k]), x])
+        running.doStep(k / FS, 1.0 / FS)
+        u[k] = running.getReal([2])[0]
+        x = float(record.measured[k])
+    np.testing.assert_allclose(u, record.voltage, rtol=0.0, atol=1e-12 * np.max(np.abs(u)))
+    assert running.getReal([5])[0] == pytest.approx(record.theta[-1, 0], rel=0.5)
+    # A state that was kept goes on as it did.
+    running.setFMUState(saved)
+    running.setReal([0, 1], [float(r[3000]), float(record.measured[2999])])
+    running.doStep(3000 / FS, 1.0 / FS)
+    assert running.getReal([2])[0] == u[3000]
+    running.freeFMUState(saved)
+    running.setBoolean([0], [True])
+    assert running.getBoolean([0]) == [True]
+    running.setReal([3, 4], [-1.0, 1.0])
+    running.doStep(3001 / FS, 2.0 / FS)
+    assert abs(running.getReal([2])[0]) <= 1.0
+    running.reset()
+    assert running.getReal([2, 3, 4]) == [0.0, -60.0, 60.0]
+    running.terminate()
+    running.freeInstance()
+
+
+def test_runs_in_fmpy(unit: Path) -> None:
+    r = pz.signals.sine(3.0, 50.0, 1, FS).values
+    given = np.zeros(r.size, dtype=[("time", float), ("r", float), ("x", float)])
+    given["time"], given["r"], given["x"] = np.arange(r.size) / FS, r, np.nan
+    result = fmpy.simulate_fmu(
+        str(unit), input=given, stop_time=(r.size - 1) / FS, output_interval=1.0 / FS, output=["u"]
+    )
+    u = pair()[1].run(r)
+    # FMPy interpolates its inputs at times that are no whole number of samples to the last digit.
+    np.testing.assert_allclose(result["u"][1:], u[: result.size - 1], rtol=0.0, atol=1e-9 * np.max(np.abs(u)))
+
+
+def test_wrong_arguments_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"\.fmu"):
+        pz.export.fmu(*pair(), tmp_path / "a.zip")
+    with pytest.raises(ValueError, match="sample_rate"):
+        pz.export.fmu(None, pz.LinearCompensator(pz.LinearGain(0.15)), tmp_path / "a.fmu")
+    with pytest.raises(ValueError, match="sample_rate"):
+        pz.export.fmu(*pair(), tmp_path / "a.fmu", sample_rate=1e3)

@@ -1,0 +1,98 @@
+"""`piezoest export`: what it writes and refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+import piezoest as pz
+from piezoest.cli import app
+from piezoest.records import write_columns
+
+MODEL = {"model": "ColemanHodgdon", "alpha": 0.02, "beta": 0.12, "gamma": 0.0036}
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, ["export", *map(str, arguments)], env={"COLUMNS": "120"})
+
+
+@pytest.fixture
+def model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "model.json"
+    path.write_text(json.dumps(MODEL))
+    return path
+
+
+def test_model_becomes_a_feed_forward(model: Path) -> None:
+    result = run("c", model, "-o", "out", "--minimum", 0, "--maximum", 150, "--precision", "float")
+    assert result.exit_code == 0, result.output
+    text = Path("out/piezoest_controller.c").read_text()
+    assert "Estimator: none" in text
+    assert "150.0f" in text
+
+
+@pytest.mark.parametrize("kind", ["rls", "ekf"])
+def test_model_learns_on(model: Path, kind: str) -> None:
+    result = run("c", model, "-o", "out", "--estimator", kind, "--sample-rate", 50_000, "--name", "stage")
+    assert result.exit_code == 0, result.output
+    assert f"Hysteresis{kind.upper()}" in Path("out/stage.c").read_text()
+
+
+def test_profile_is_the_same_as_the_objects(model: Path) -> None:
+    estimator = pz.HysteresisRLS(50_000.0)
+    profile = {
+        "model": MODEL,
+        "estimator": estimator.to_dict(),
+        "limits": {"minimum": -10.0, "maximum": 100.0},
+    }
+    model.write_text(json.dumps(profile))
+    assert run("c", model, "-o", "out", "--name", "stage").exit_code == 0
+    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    limits = pz.VoltageLimits(-10.0, 100.0, sample_rate=50_000.0)
+    code = pz.export.c(estimator, pz.InverseCompensator(start, limits), name="stage")
+    assert Path("out/stage.c").read_text() == code.source
+
+
+def test_estimator_alone_is_a_profile(model: Path) -> None:
+    model.write_text(json.dumps(pz.HysteresisEKF(20_000.0).to_dict()))
+    assert run("c", model, "-o", "out").exit_code == 0
+
+
+def test_tables_are_written(model: Path) -> None:
+    r = pz.signals.triangle(2.0, 5.0, 1, 1000.0)
+    write_columns("r.csv", {"time_s": r.time, "reference_um": r.values})
+    result = run("table", model, "r.csv", "-o", "out", "--points", 33)
+    assert result.exit_code == 0, result.output
+    assert len(Path("out/waveform.csv").read_text().splitlines()) == 1 + len(r)
+    assert len(Path("out/branches.csv").read_text().splitlines()) == 1 + 2 * 33
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (("c", "model.json", "-o", "out", "--estimator", "rls"), "--sample-rate"),
+        (("c", "model.json", "-o", "out", "--estimator", "kalman"), "kalman"),
+        (("c", "model.json", "-o", "out", "--precision", "half"), "precision"),
+        (("c", "absent.json", "-o", "out"), "absent.json"),
+        (("c", "model.json", "-o", "out", "--minimum", 5, "--maximum", 1), "minimum"),
+        (("fmu", "model.json", "-o", "out.zip", "--sample-rate", 1e4), ".fmu"),
+        (("fmu", "model.json", "-o", "out.fmu"), "sample_rate"),
+    ],
+)
+def test_mistakes_are_one_sentence(model: Path, arguments: tuple[object, ...], word: str) -> None:
+    result = run(*arguments)
+    assert result.exit_code == 1
+    assert result.stderr.startswith("error: ")
+    assert word in result.stderr
+
+
+@pytest.mark.parametrize("text", ["no json", "[]", '{"model": "Unknown"}', '{"estimator": "Unknown"}'])
+def test_files_that_hold_no_model_are_refused(model: Path, text: str) -> None:
+    model.write_text(text)
+    result = run("c", model, "-o", "out")
+    assert result.exit_code == 1
+    assert "error: " in result.stderr

@@ -1,0 +1,77 @@
+"""Tables: settled waveforms and branches, exact against the model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest.records import read_record
+
+MODELS = {
+    "coleman-hodgdon": pz.ColemanHodgdon(0.02, 0.12, 0.0036, offset=0.3),
+    "plays": pz.PrandtlIshlinskii(0.1, np.linspace(0.5, 30.0, 20), np.full(20, 2e-3)),
+    "line": pz.LinearGain(0.15, offset=0.2),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_settled_voltage_gives_the_reference(name: str) -> None:
+    model: Any = MODELS[name]
+    r = pz.signals.triangle(4.0, 5.0, 1, 5000.0)
+    made = pz.export.table(model, r)
+    # From the start the loop closes within some periods, the last of which is the reference.
+    x = model.simulate(np.concatenate([np.linspace(0.0, made.voltage[0], 200), np.tile(made.voltage, 8)]))
+    np.testing.assert_allclose(x[-r.values.size :], made.reference, atol=1e-6)
+
+
+def test_branches_run_between_turning_points() -> None:
+    r = pz.signals.triangle(4.0, 5.0, 1, 5000.0)
+    made = pz.export.table(MODELS["coleman-hodgdon"], r, points=65)
+    assert [b.shape for b in made.branches] == [(65, 2)] * 2
+    for branch in made.branches:
+        steps = np.diff(branch, axis=0)
+        assert np.all(steps > 0.0) or np.all(steps < 0.0)
+        for x, u in branch[::16]:
+            near = np.argsort(np.abs(made.reference - x))[:8]
+            assert np.min(np.abs(made.voltage[near] - u)) < 0.2
+    falling, rising = sorted(made.branches, key=lambda branch: branch[0, 0], reverse=True)
+    np.testing.assert_allclose(falling[0], rising[-1], rtol=1e-6)
+    # A loop: between its ends the falling branch needs less voltage than the rising one.
+    middle = len(rising) // 2
+    assert falling[middle, 1] < rising[middle, 1] - 1.0
+
+
+def test_two_tones_have_a_branch_for_each_way() -> None:
+    t = np.arange(5000) / 5000.0
+    made = pz.export.table(
+        MODELS["plays"], 3.0 * np.sin(2.0 * np.pi * t) + 1.5 * np.sin(6.0 * np.pi * t), sample_rate=5000.0
+    )
+    assert len(made.branches) == 6
+
+
+def test_files_can_be_read_back(tmp_path: Path) -> None:
+    made = pz.export.table(MODELS["coleman-hodgdon"], pz.signals.triangle(4.0, 5.0, 1, 5000.0))
+    waveform, branches = made.write(tmp_path / "new")
+    record = read_record(waveform, columns={"displacement": "reference_um"})
+    np.testing.assert_allclose(record.voltage, made.voltage, rtol=1e-8)
+    assert branches.read_text().splitlines()[0] == "branch,displacement_um,voltage_V"
+
+
+def test_a_constant_has_no_branches() -> None:
+    assert pz.export.table(MODELS["line"], np.zeros(10), sample_rate=10.0).branches == ()
+
+
+def test_wrong_references_are_refused() -> None:
+    model = MODELS["coleman-hodgdon"]
+    with pytest.raises(ValueError, match="sample_rate"):
+        pz.export.table(model, np.zeros(10))
+    with pytest.raises(ValueError, match="sample_rate"):
+        pz.export.table(model, pz.signals.triangle(4.0, 5.0, 1, 5000.0), sample_rate=1.0)
+    with pytest.raises(ValueError, match="whole number"):
+        pz.export.table(model, pz.Signal(np.zeros(100), 100.0, 33.3))
+    with pytest.raises(ValueError, match="jump"):
+        pz.export.table(model, np.linspace(0.0, 5.0, 500), sample_rate=500.0)
