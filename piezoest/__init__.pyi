@@ -13,6 +13,7 @@ from .estimators.batch_result import BatchFitResult
 from .estimators.ekf import HysteresisEKF
 from .estimators.filterpy_baselines import FilterPyEKF, FilterPyUKF
 from .estimators.horizon import MovingHorizon
+from .estimators.output_error import OutputErrorRLS
 from .estimators.play_rls import PrandtlIshlinskiiRLS
 from .estimators.recursive_least_squares import RecursiveLeastSquares
 from .estimators.rls import HysteresisRLS
@@ -36,6 +37,7 @@ __all__ = [
     "FilterPyEKF",
     "FilterPyUKF",
     "Gauge",
+    "OutputErrorRLS",
     "HysteresisEKF",
     "HysteresisRLS",
     "Identification",
