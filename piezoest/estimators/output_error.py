@@ -118,7 +118,6 @@ class OutputErrorRLS(EstimatorBase):
         config[front.N] = 4
         config[front.HYSTERETIC] = config[front.OFFSET] = 1.0
         slack = max(1.0, SLACK * sample_rate)
-        config[front.LOW_POLE] = slack / (slack + 1.0)
         config[front.FRACTION] = fraction
         config[front.LONGEST_GAP] = max(1, int(LONGEST_GAP * sample_rate))
         config[front.FIRST_HALF] = max(1.0, FIRST_HALF * sample_rate)
@@ -131,7 +130,7 @@ class OutputErrorRLS(EstimatorBase):
         config[front.SCALE + 4] = 1.0
         config[kernel.SLACK] = slack**2
         config[kernel.LASTING] = LASTING
-        config[kernel.VARIANCE] = (positive("noise", noise) / initial.c) ** 2
+        config[kernel.VARIANCE] = positive("noise", noise) ** 2
         config[kernel.MEMBERS] = members
         decays = initial.a * np.geomspace(1.0 / span, span, members)
         config[kernel.STEP] = np.log(decays[1] / decays[0])

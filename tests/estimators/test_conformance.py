@@ -441,6 +441,8 @@ def hostile(name: str, rng: np.random.Generator) -> tuple[FloatArray, FloatArray
 )
 @pytest.mark.parametrize("model", [None, pz.LinearGain(0.1)])
 def test_model_is_admissible_after_anything(kind: Any, name: str, model: Any) -> None:
+    if model is not None and "learns_a_linear_gain" in kind.conformance_exceptions:
+        pytest.skip(f"{kind.__name__}: {kind.conformance_exceptions['learns_a_linear_gain']}")
     u, x = hostile(name, np.random.default_rng(2))
     estimator = kind(RATE) if model is None else kind(RATE, initial_model=model)
     compensator: Any = pz.InverseCompensator(TRUE) if model is None else pz.LinearCompensator(model)

@@ -1,0 +1,216 @@
+"""OutputErrorRLS: exact on its own plant, textbook parity, noise, a larger start, rest, holes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import piezoest as pz
+from piezoest.equations import coleman_hodgdon, output_error
+from piezoest.estimators import output_error_kernel as kernel
+from tests.reference.output_error import OutputErrorFilter
+
+FloatArray = NDArray[np.float64]
+
+RATE = 2000.0
+TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
+
+
+def voltage(periods: float = 8.0) -> FloatArray:
+    return pz.signals.triangle(33.0, 5.0, periods, RATE).values
+
+
+def loop_error(model: pz.ColemanHodgdon, u: FloatArray, offset: float = 0.0) -> float:
+    """Largest difference over the last period [µm]."""
+    return float(np.abs(model.simulate(u) - TRUE.simulate(u) - offset)[-400:].max())
+
+
+# ---------------------------------------------------------------- equations
+
+
+def test_slope_is_the_derivative_by_the_logarithm_of_the_decay() -> None:
+    u = voltage(1.0)
+    step = 1e-6
+
+    def h(a: float) -> float:
+        value = 0.0
+        for du in np.diff(u):
+            value = coleman_hodgdon.hysteresis_step(value, du, a, 1.0)
+        return value
+
+    value, slope = 0.0, 0.0
+    for du in np.diff(u):
+        value, slope = output_error.hysteresis_and_slope(value, slope, du, 0.021)
+    expected = (h(0.021 * np.exp(step)) - h(0.021 * np.exp(-step))) / (2.0 * step)
+    assert value == h(0.021)
+    assert slope == pytest.approx(expected, rel=1e-6)
+
+
+def test_walk_covariance_is_that_of_independent_parts() -> None:
+    a, b, c, step = 0.02, 0.06, 0.2, 1e-6
+    alpha, beta, gamma = coleman_hodgdon.rate_parameters(a, b, c)
+    columns = []
+    for i in range(3):
+        moved = np.array([alpha, beta, gamma])
+        moved[i] *= 1.0 + step
+        a_1, b_1, c_1 = coleman_hodgdon.loop_parameters(*moved)
+        columns.append([b_1 - b, c_1 - c, b_1 * np.log(a_1 / a)])
+    jacobian = np.array(columns).T / step
+    Q = np.zeros(9)
+    output_error.walk_covariance(b, c, Q)
+    np.testing.assert_allclose(Q.reshape(3, 3), jacobian @ jacobian.T, rtol=1e-4, atol=1e-9)
+
+
+def test_recentre_describes_the_same_decay() -> None:
+    rng = np.random.default_rng(0)
+    root = rng.standard_normal((5, 5))
+    s, P = np.array([0.3, 1.0, 0.06, 0.1, 0.2]), (root @ root.T).ravel()
+    T = np.eye(5)
+    T[2, 0] = -0.15
+    expected_s, expected_P = T @ s, T @ P.reshape(5, 5) @ T.T
+    output_error.recentre(s, P, 5, 0.15)
+    np.testing.assert_allclose(s, expected_s, rtol=1e-14)
+    np.testing.assert_allclose(P.reshape(5, 5), expected_P, rtol=1e-12, atol=1e-14)
+
+
+# ---------------------------------------------------------------- what it learns
+
+
+def test_equals_the_textbook() -> None:
+    u = voltage(3.0)
+    x = TRUE.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
+    estimator = pz.OutputErrorRLS(RATE)
+    textbook = OutputErrorFilter(RATE, TRUE_START, estimator.decays)
+    trace = estimator.run(u, x, record=("y", "S"))
+    assert trace.y is not None
+    assert trace.S is not None
+    expected = np.array([textbook.step(u_k, x_k) for u_k, x_k in zip(u, x, strict=True)])
+    np.testing.assert_allclose(trace.y, expected[:, 0], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(trace.S, expected[:, 1], rtol=1e-6)
+
+
+TRUE_START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+
+
+@pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0), (0.6, 1.0, 0.7), (1.5, 0.8, 1.3)])
+def test_recovers_the_loop_from_any_start(factors: tuple[float, float, float]) -> None:
+    u = voltage(40.0)
+    start = pz.ColemanHodgdon(*(TRUE.theta * factors).tolist()).nearest_admissible(1e-3)
+    estimator = pz.OutputErrorRLS(RATE, initial_model=start, noise=1e-6)
+    estimator.run(u, TRUE.simulate(u))
+    np.testing.assert_allclose(estimator.theta[:3], TRUE.theta, rtol=0.1)
+    assert loop_error(estimator.model, u) < 5e-3
+
+
+def test_finds_an_offset() -> None:
+    u = voltage(20.0)
+    estimator = pz.OutputErrorRLS(RATE)
+    x = TRUE.simulate(u) + 0.8
+    # A start that fits, then a level that shifts as after a larger loop.
+    estimator.run(u[:4000], x[:4000])
+    estimator.run(u[4000:], x[4000:] + 0.3 * np.minimum(np.arange(u.size - 4000) / 100.0, 1.0))
+    assert loop_error(estimator.model, u, 1.1) < 0.02
+
+
+@pytest.mark.parametrize("noise", [1e-3, 3e-2])
+def test_noise_makes_no_bias(noise: float) -> None:
+    u = voltage(40.0)
+    x = TRUE.simulate(u) + noise * np.random.default_rng(0).standard_normal(u.size)
+    estimator = pz.OutputErrorRLS(RATE)
+    theta = estimator.run(u, x).theta[u.size // 2 :].mean(axis=0)
+    np.testing.assert_allclose(theta[:3], TRUE.theta, rtol=0.03 + 3.0 * noise)
+    assert loop_error(estimator.model, u) < 2e-3 + 2.0 * noise
+
+
+def test_a_decay_outside_the_bank_is_taken_for_its_end() -> None:
+    u = voltage(10.0)
+    estimator = pz.OutputErrorRLS(RATE, initial_model=pz.ColemanHodgdon(0.2, 0.147, 0.0429), span=2.0)
+    estimator.run(u, TRUE.simulate(u))
+    assert estimator.theta[0] >= estimator.decays[0] * 0.7
+    assert estimator.model.is_admissible
+
+
+# ---------------------------------------------------------------- what must not move it
+
+
+def test_rest_moves_nothing() -> None:
+    u = voltage(6.0)
+    x = TRUE.simulate(u)
+    estimator = pz.OutputErrorRLS(RATE)
+    estimator.run(u, x)
+    before, held = estimator.theta, estimator.status.held
+    creep = 0.1 * np.linspace(0.0, 1.0, 20_000)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(creep.size)
+    estimator.run(np.full(creep.size, u[-1]), x[-1] + creep + noise)
+    np.testing.assert_array_equal(estimator.theta, before)
+    assert estimator.status.held == held + creep.size
+    assert estimator.status.last == "held"
+
+
+def test_frozen_holds_the_parameters_and_keeps_up_with_the_voltage() -> None:
+    u = voltage(6.0)
+    x = TRUE.simulate(u)
+    held, free = pz.OutputErrorRLS(RATE), pz.OutputErrorRLS(RATE)
+    held.frozen = True
+    held.run(u, x)
+    np.testing.assert_array_equal(held.theta[:3], pz.OutputErrorRLS(RATE).theta[:3])
+    held.frozen = False
+    held.run(u, x)
+    free.run(np.tile(u, 2), np.tile(x, 2))
+    assert loop_error(held.model, u) < 0.02
+
+
+def test_holes_and_spikes_are_left_out() -> None:
+    u = voltage(8.0)
+    x = TRUE.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
+    rng = np.random.default_rng(1)
+    lost = rng.choice(np.arange(400, u.size), 60, replace=False)
+    x[lost[:30]] = np.nan
+    x[lost[30:]] += 20.0
+    estimator = pz.OutputErrorRLS(RATE)
+    estimator.run(u, x)
+    assert estimator.status.missing == 30
+    assert estimator.status.outliers == 30
+    assert loop_error(estimator.model, u) < 0.03
+
+
+# ---------------------------------------------------------------- arguments
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"span": 1.0}, "span"),
+        ({"members": 2}, "members"),
+        ({"noise": 0.0}, "noise"),
+        ({"uncertainty": -1.0}, "uncertainty"),
+        ({"policies": ()}, "RandomWalk"),
+        ({"policies": (pz.policies.RandomWalk(), pz.policies.NormBound())}, "NormBound"),
+        ({"initial_model": pz.ColemanHodgdon(0.02, 0.2, 0.0036)}, "not admissible"),
+    ],
+)
+def test_refuses_what_it_cannot_use(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        pz.OutputErrorRLS(RATE, **options)
+
+
+def test_settles_within_two_periods_from_a_bad_start() -> None:
+    fs = 10_000.0
+    start = pz.ColemanHodgdon(0.014, 0.2, 0.0054).nearest_admissible(1e-3)
+    reference = pz.signals.triangle(5.0, 5.0, 8.0, fs)
+    record = pz.track(
+        reference,
+        stage=pz.PaperStage(sample_rate=fs, seed=0),
+        compensator=pz.InverseCompensator(start, transfer_samples=100),
+        estimator=pz.OutputErrorRLS(fs, initial_model=start),
+        update_interval=10,
+    )
+    assert np.abs(record.error)[4000:].max() < 0.06
+
+
+def test_state_has_room_for_all() -> None:
+    assert kernel.BANK > kernel.WORK + kernel.SIZE * kernel.SIZE
+    assert kernel.RESTED < kernel.front.PHI
