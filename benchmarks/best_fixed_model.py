@@ -3,8 +3,8 @@
     python benchmarks/best_fixed_model.py [--json FILE] [--evaluations N]
 
 For each triangle row of the paper the inverse of (a, b, c, offset) feeds forward, the error of the last two
-periods is taken, and Nelder and Mead's search makes first its mean square and then its largest value as
-small as it gets, over the four parameters themselves: no estimator is in between. Beside it is the best linear
+periods is taken, and Nelder and Mead's search makes first its mean square and then its largest value
+as small as it gets, over the four parameters themselves: no estimator is in between. Beside it is the best linear
 feed-forward, found the same way. What an estimator of this model reaches beyond these figures it owes to
 adapting within the period.
 """

@@ -36,7 +36,8 @@ WORK = GAIN + SIZE
 BANK = WORK + SIZE * SIZE + SIZE
 
 # Configuration behind the front end's: the sample's slack in samples, squared; memory of the
-# disturbance in swings; ratio of the bank's neighbours, in logarithm; least variance of the noise [µm²]; members.
+# disturbance in swings; ratio of the bank's neighbours, in logarithm; least variance of the noise
+# [µm²]; members.
 SLACK, LASTING, STEP, VARIANCE, MEMBERS, DECAYS = range(front.CONFIG, front.CONFIG + 6)
 
 # Another member of the bank is taken from this part of the way to it on.
