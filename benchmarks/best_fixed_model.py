@@ -2,11 +2,11 @@
 
     python benchmarks/best_fixed_model.py [--json FILE] [--evaluations N]
 
-For each triangle row of the paper the inverse of (a, b, c, offset) feeds forward, the error of the last two
-periods is taken, and Nelder and Mead's search makes first its mean square and then its largest value
-as small as it gets, over the four parameters themselves: no estimator is in between. Beside it is the best linear
-feed-forward, found the same way. What an estimator of this model reaches beyond these figures it owes to
-adapting within the period.
+For each triangle row of the paper the inverse of (a, b, c, offset) feeds forward, and the error of the last
+two periods is taken. Nelder and Mead's search over the four parameters makes first its mean square as small
+as it gets, then its largest value; no estimator is in between. Beside it is the best linear feed-forward,
+found the same way. What an estimator of this model reaches beyond these figures it owes to adapting within
+the period.
 """
 
 from __future__ import annotations
