@@ -26,16 +26,6 @@ def hysteresis_and_slope(h, by_log_a, du, a):
 
 
 @register_jitable
-def bent_regressors(h, slope, curvature, z):
-    """Regressors of b and d at ln(a/a_0) = z, with the second derivative of h by ln(a).
-
-    (h - z² h''/2, h' + z h''): derivatives of b h(a) by b and d = b z to second order in z, and b and
-    d times them is b (h + z h' + z² h''/2), the hysteresis itself.
-    """
-    return h - 0.5 * z * z * curvature, slope + z * curvature
-
-
-@register_jitable
 def recentre(s, P, n, step):
     """Go from a_0 to a_0 exp(step): d = b ln(a/a_0) becomes d - step b, in s (n,) and P (n*n,)."""
     s[2] = s[2] - step * s[0]

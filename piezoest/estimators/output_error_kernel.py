@@ -141,25 +141,13 @@ def _choose_member(state: Any, config: Any) -> None:
 
 
 @register_jitable
-def _regressors(state: Any, config: Any, u: Any, phi: Any) -> None:
-    """Regressors at the decay estimated, curvature by the differences of the member's neighbours."""
-    member = state[MEMBER]
-    k = BANK + 2 * int(member)
-    curvature, z = 0.0, 0.0
-    if member > 0.0 and member < config[MEMBERS] - 1.0:
-        curvature = (state[k + 2] - 2.0 * state[k] + state[k - 2]) / (config[STEP] * config[STEP])
-        z = equations.log_ratio(state[S + B], state[S + D], config[STEP])
-    phi[B], phi[D] = equations.bent_regressors(state[k], state[k + 1], curvature, z)
-    phi[C] = u
-    phi[CENTRE] = phi[DISTURBANCE] = 1.0
-
-
-@register_jitable
 def _adapt(state: Any, config: Any, u: Any, x: Any, part: Any, jumped: Any) -> None:
     """One update of the filter."""
     s, cov = state[S : S + SIZE], state[P : P + SIZE * SIZE]
     phi = state[front.PHI : front.PHI + SIZE]
-    _regressors(state, config, u, phi)
+    k = BANK + 2 * int(state[MEMBER])
+    phi[B], phi[C], phi[D] = state[k], u, state[k + 1]
+    phi[CENTRE] = phi[DISTURBANCE] = 1.0
     _excite(state, phi, part)
     clock = state[front.SWING : front.SWING + swing.STATE]
     pace = max(part, front.SLOW / swing.half_period(clock, config[front.FIRST_HALF]))

@@ -79,9 +79,7 @@ class OutputErrorFilter:
         half = min(max(self.usual or self.first_half, self.since), 1e6)
         part = 1.0 / max(self.first_half, self.since) if self.usual == 0.0 else min(abs(du) / self.size, 1.0)
 
-        i, z = self.member, float(np.clip(self.s[2] / self.s[0], -self.step_size, self.step_size))
-        bend = (self.h[i + 1] - 2.0 * self.h[i] + self.h[i - 1]) / self.step_size**2
-        phi = np.array([self.h[i] - 0.5 * z**2 * bend, u, self.slope[i] + z * bend, 1.0, 1.0])
+        phi = np.array([self.h[self.member], u, self.slope[self.member], 1.0, 1.0])
         if self.member == self.member_before:
             self.way = min(self.way + part, 1.0)
             change = phi[:3] - self.before
