@@ -79,11 +79,12 @@ def change_model(state: Any, config: Any, a: Any, b: Any, c: Any, offset: Any) -
     """Take another model without a bump: the place in the loop is kept, the difference owed."""
     expected = config[C] * state[VOLTAGE] + state[W_H] + config[OFFSET] + state[OWED]
     place = state[W_H] * config[A] / config[B] if config[B] > 0.0 else 0.0
+    place = equations.carried_place(min(max(place, -1.0), 1.0), a / config[A])
     config[A] = a
     config[B] = b
     config[C] = c
     config[OFFSET] = offset
-    state[W_H] = min(max(place, -1.0), 1.0) * b / a
+    state[W_H] = place * b / a
     state[OWED] = expected - (c * state[VOLTAGE] + state[W_H] + offset)
 
 
@@ -243,7 +244,7 @@ class Compensator:
     def model(self) -> Model:
         """Model whose inverse is used. Setting it is bumpless.
 
-        The place in the loop is kept: w_h in parts of its limit b/a, and plays as the voltage's
+        The place in the loop is kept: the amplitude at which w_h would turn there, and plays as the voltage's
         turning points have left them. What the new model makes of the present voltage differs
         from what the old one made of it; that difference is paid back exponentially over
         `transfer_samples`. An inadmissible model is replaced by its nearest admissible one, a
