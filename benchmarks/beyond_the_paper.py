@@ -232,7 +232,9 @@ def main() -> None:
         "conditions": {"sample_rate_Hz": RATE, "start": START.to_dict(), "seed": 0},
     }
     if given.only and given.json and given.json.is_file():
-        document = json.loads(given.json.read_text(encoding="utf-8")) | document
+        # The date stays that of the parts that are kept; those run now have their own.
+        document |= json.loads(given.json.read_text(encoding="utf-8"))
+    now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     parts: dict[str, Callable[[], Any]] = {
         "recording": lambda: recording(folder) if folder.is_dir() else None,
         "amplitudes": amplitudes,
@@ -244,6 +246,7 @@ def main() -> None:
     for name, part in parts.items():
         if not given.only or name in given.only:
             document[name] = part()
+            document.setdefault("dates", {})[name] = now
     if given.json:
         given.json.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 

@@ -47,7 +47,7 @@ class LeadFilter:
     """A second-order lead before a feed-forward, for references that reach towards the resonance.
 
     The compensator gets r + c1 r' + c2 r'', which is what the stage's mechanics and delay will turn
-    into r again. Worth it from about a hundredth to a twentieth of the resonance.
+    into r again. Worth it for references that reach a twentieth of the resonance or have corners there.
 
     Parameters
     ----------
