@@ -4,6 +4,7 @@ from .compensators import (
     CompensatorStatus,
     IntegralFeedback,
     InverseCompensator,
+    LeadFilter,
     LinearCompensator,
     VoltageLimits,
 )
@@ -41,6 +42,7 @@ __all__ = [
     "Identification",
     "IntegralFeedback",
     "InverseCompensator",
+    "LeadFilter",
     "LinearCompensator",
     "LinearGain",
     "MassSpringDamper",

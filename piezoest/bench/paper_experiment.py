@@ -239,5 +239,6 @@ def last_periods(record: TrackingRecord, periods: int) -> TrackingRecord:
         voltage=last(record.voltage),
         measured=last(record.measured),
         displacement=last(record.displacement),
-        theta=last(record.theta),
+        parameters=last(record.theta),
+        update_interval=1,
     )

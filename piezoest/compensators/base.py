@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numba import njit
@@ -144,11 +144,6 @@ class Compensator:
 
     __slots__ = ("_config", "_limits", "_model", "_projected", "_sample_rate", "_start", "_state")
 
-    #: Functions that a controller's code is generated from: voltage; change of model, or None.
-    _compiled: ClassVar[tuple[Any, Any]] = (_voltage, change_model)
-    #: Positions in the configuration that no change of model or limits touches.
-    _fixed: ClassVar[tuple[int, ...]] = (DECAY, INTEGRATED)
-
     def __init__(
         self,
         model: Model,
@@ -184,6 +179,20 @@ class Compensator:
         self._projected = False
         self._start = model
         self._begin(model)
+
+    @property
+    def _compiled(self) -> tuple[Any, Any]:
+        """Functions that a controller's code is generated from: voltage; change of model, or None."""
+        if isinstance(self._model, PrandtlIshlinskii):
+            return play_inverse.step, None
+        return _voltage, change_model
+
+    @property
+    def _fixed(self) -> tuple[int, ...]:
+        """Positions in the configuration that no change of model or limits in that code touches."""
+        if isinstance(self._model, PrandtlIshlinskii):
+            return A, B, C, OFFSET, DECAY, INTEGRATED, *range(CONFIG, self._config.size)
+        return DECAY, INTEGRATED
 
     def _begin(self, model: Model) -> None:
         """Start at rest, at the voltage nearest to zero."""
