@@ -118,7 +118,7 @@ class HysteresisRLS(EstimatorBase):
             memory = PAPER_MEMORY
         if policies is None:
             policies = settings.default_policies(memory, initial)
-        settings.check_policies(policies, memory, time_base)
+        settings.check_policies(policies, memory, time_base, initial)
         if offset is None:
             offset = memory == "period" and isinstance(initial, ColemanHodgdon)
         cutoff = min(positive("cutoff", cutoff), 0.5 * sample_rate)
@@ -146,7 +146,8 @@ class HysteresisRLS(EstimatorBase):
         law_config = law.configure((forgetting, *policies), 1.0 / sample_rate, time_base, 1.0, P_0)
         self._config = np.concatenate([config, law_config])
         start = np.append(np.sign(initial.theta), np.zeros(int(offset)))
-        state = np.concatenate([np.zeros(kernel.FRONT), law.new_state(start, P_0), line])
+        extra = np.zeros(int(config[kernel.EXTRA]))
+        state = np.concatenate([np.zeros(kernel.FRONT), law.new_state(start, P_0), extra, line])
         self._begin(
             {
                 "sample_rate": sample_rate,
