@@ -214,22 +214,20 @@ def _propagate_error(state: Any, config: Any, phi: Any, n: int, forgetting: Any,
 
 
 @register_jitable
-def _visit(state: Any, config: Any, u: Any, n: int, part: Any) -> None:
-    """Let the memory of amplitudes look at the voltage."""
+def _visit(state: Any, config: Any, n: int, part: Any) -> None:
+    """Let the memory of amplitudes look at the swing."""
     start = FRONT + law.HEAD
     clock = state[SWING : SWING + swing.STATE]
     extra = state[FRONT + law.state_size(n) :]
     theta = state[start : start + n]
-    if policies.visit(extra, clock, u, theta, n, part, int(config[PLACES]), config[TOLERANCE]):
+    if policies.visit(extra, clock, theta, n, part, int(config[PLACES]), config[TOLERANCE]):
         policies.enlarge(state[start + n : start + n + n * n], n, config[RECALLED])
         policies.enlarge(state[ERROR : ERROR + n * n], n, config[RECALLED])
         state[FRONT + law.RESETS] += 1.0
 
 
 @register_jitable
-def _varied(
-    state: Any, config: Any, phi: Any, z: Any, n: int, R: Any, forgetting: Any, half: Any
-) -> Any:
+def _varied(state: Any, config: Any, phi: Any, z: Any, n: int, R: Any, forgetting: Any, half: Any) -> Any:
     """Factor of variable forgetting, against the innovation's usual energy."""
     least = config[CONFIG + law.LEAST_FACTOR]
     if config[PERIODS] > 0.0:
@@ -301,7 +299,7 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
         law_state[law.LAST] = law.HOLDING
         return
     if config[PLACES] > 0.0:
-        _visit(state, config, u, n, part)
+        _visit(state, config, n, part)
     half = swing.half_period(state[SWING : SWING + swing.STATE], config[FIRST_HALF])
     R = _walk(state, config, phi, n, part, half)
     forgetting = config[CONFIG + law.FORGETTING]

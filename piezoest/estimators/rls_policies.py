@@ -128,10 +128,11 @@ def store(extra: Any, n: Any, places: Any, tolerance: Any, size: Any) -> None:
 
 
 @register_jitable
-def visit(
-    extra: Any, clock: Any, u: Any, theta: Any, n: Any, part: Any, places: Any, tolerance: Any
-) -> bool:
-    """Take a voltage: store what a steady swing taught, take up what is known of a new one (True then)."""
+def visit(extra: Any, clock: Any, theta: Any, n: Any, part: Any, places: Any, tolerance: Any) -> bool:
+    """At a turn store what a steady swing taught, or take up what is known of a new size (True then).
+
+    Only there: amid a swing another theta would throw the inverse.
+    """
     if clock[swing.USUAL] == 0.0:
         extra[BEGAN] = clock[swing.TURNED]
         return False
@@ -157,10 +158,6 @@ def visit(
                 extra[ODD] = 0.0
         for i in range(n + 1):
             extra[TRAVELLED + i] = 0.0
-    elif extra[AT] > 0.0 and extra[ANNOUNCED] == 0.0:
-        new_size = 2.0 * abs(u - extra[MIDDLE])
-        if new_size < extra[AT]:
-            new_size = 0.0
     extra[TRAVELLED] += part
     for i in range(n):
         extra[SUMS + i] += part * theta[i]
