@@ -56,10 +56,11 @@ def configure(
     if time_base not in ("discrete", "continuous"):
         raise ValueError(f"time_base must be 'discrete' or 'continuous', got {time_base!r}")
     chosen = forgetting_of(policies)
-    varying = isinstance(chosen, DirectionalForgetting | VariableForgetting) and chosen.unit == "second"
-    forgetting = Forgetting()
-    if varying or isinstance(chosen, Forgetting):
-        forgetting = Forgetting(chosen.memory)
+    forgetting, timed = Forgetting(), False
+    if isinstance(chosen, Forgetting):
+        forgetting = chosen
+    elif isinstance(chosen, DirectionalForgetting | VariableForgetting) and chosen.unit == "second":
+        forgetting, timed = Forgetting(chosen.memory), True
     bound = select(policies, NormBound)
     resetting = select(policies, CovarianceResetting)
     dead_zone = select(policies, DeadZone)
@@ -78,7 +79,7 @@ def configure(
     config[DEAD_ZONE] = dead_zone.threshold if isinstance(dead_zone, DeadZone) else -1.0
     config[DIRECTIONAL] = isinstance(chosen, DirectionalForgetting)
     if isinstance(chosen, VariableForgetting):
-        config[LEAST_FACTOR] = chosen.least_factor(step) if varying else LEAST_BY_THE_CLOCK
+        config[LEAST_FACTOR] = chosen.least_factor(step) if timed else LEAST_BY_THE_CLOCK
     return config
 
 
@@ -176,7 +177,7 @@ class RecursiveLeastSquares:
         ``1 / sample_rate`` for seconds.
     policies : tuple of policies
         Any of `Forgetting`, `DirectionalForgetting` and `VariableForgetting` (at most one of
-        the three, its memory in seconds meaning the unit of `step`), `NormBound`, `Normalisation`, `CovarianceResetting`,
+        the three; its "second" is the unit of `step`), `NormBound`, `Normalisation`, `CovarianceResetting`,
         `DeadZone`, at most one of each. Default: none of them but `Normalisation`.
 
     Raises

@@ -73,7 +73,7 @@ def changed(extra: Any, y: Any, S: Any, part: Any, threshold: Any, drift: Any) -
 
 @register_jitable
 def nominal(extra: Any, forgetting: Any) -> Any:
-    """Factor for which variable forgetting keeps the memory wanted at the usual energy; 1 until that is known."""
+    """Factor that gives the memory wanted at the usual energy; as good as 1 until that is known."""
     if extra[WAY] < ENOUGH:
         return 1.0 - (1.0 - forgetting) / 1e30
     return 1.0 - (1.0 - forgetting) / max(extra[USUAL], 1e-30)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from piezoest._checks import FloatArray
+from piezoest._checks import FloatArray, positive
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
 from piezoest.estimators import rls_policies as policies
@@ -54,7 +54,7 @@ def announce(state: FloatArray, config: FloatArray, scale: FloatArray, amplitude
     extra, places = _places(state, config, scale)
     profile = read(state, config, scale)
     if profile.swings.size == 0:
-        AmplitudeProfile([1.0], [[0.02, 0.12, 0.0036]]).swing_for(amplitude)  # refuses what is none
+        positive("amplitude", amplitude)
         return False
     n, head = scale.size, kernel.FRONT + law.HEAD
     size = profile.swing_for(amplitude)

@@ -91,7 +91,7 @@ class AmplitudeProfile:
         return swing
 
     def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary; its ``"model"`` is that of the largest swing, for whoever needs one."""
+        """Return a JSON-safe dictionary; its ``"model"`` is that of the largest swing."""
         data: dict[str, Any] = {
             "profile": type(self).__name__,
             "format": _FORMAT,
