@@ -212,10 +212,10 @@ class RecursiveLeastSquares:
         noise_variance = positive("noise_variance", noise_variance)
         if time_base == "continuous" and noise_variance != 1.0:
             raise ValueError("noise_variance must be 1 in the continuous law: scale z and phi instead")
+        self._config = configure(tuple(policies), positive("step", step), time_base, noise_variance, P_0)
         for policy in policies:
             if not isinstance(policy, _OWN) or getattr(policy, "unit", "second") != "second":
                 raise ValueError(f"policies: {policy!r} needs a voltage's clock: see HysteresisRLS")
-        self._config = configure(tuple(policies), positive("step", step), time_base, noise_variance, P_0)
         self._state = new_state(start, P_0)
 
     def update(self, z: float, phi: Any) -> None:

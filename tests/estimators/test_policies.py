@@ -174,10 +174,10 @@ def test_projection_keeps_theta_admissible() -> None:
 
 
 def test_amplitudes_are_remembered(tmp_path: Path) -> None:
-    """Another loop at each amplitude: on return theta starts from what was learnt there."""
+    """Another loop at each amplitude: a long memory then starts from what was learnt there."""
     small, large = pz.ColemanHodgdon(0.024, 0.14, 0.0046), TRUE
     parts = [record(8.0, volts, model) for volts, model in ((15.0, small), (45.0, large), (15.0, small))]
-    estimator = made(p.RandomWalk(), p.AmplitudeMemory())
+    estimator = made(p.PeriodicForgetting(1.0), p.AmplitudeMemory())
     for part in parts[:2]:
         estimator.run(*part)
     profile = estimator.profile
@@ -191,7 +191,7 @@ def test_amplitudes_are_remembered(tmp_path: Path) -> None:
     profile.save(path)
     loaded = pz.AmplitudeProfile.load(path)
     np.testing.assert_array_equal(loaded.theta, profile.theta)
-    fresh = made(p.RandomWalk(), p.AmplitudeMemory())
+    fresh = made(p.PeriodicForgetting(1.0), p.AmplitudeMemory())
     fresh.profile = loaded
     np.testing.assert_allclose(fresh.profile.theta, profile.theta, rtol=1e-14)
     amplitude = 0.5 * np.ptp(small.simulate(parts[0][0])[4000:])
@@ -199,7 +199,7 @@ def test_amplitudes_are_remembered(tmp_path: Path) -> None:
     fresh.announce_change(amplitude=amplitude)
     np.testing.assert_allclose(fresh.theta[:3], profile.at(30.0).theta, rtol=0.02)
 
-    known, unknown = estimator, made(p.RandomWalk())
+    known, unknown = estimator, made(p.PeriodicForgetting(1.0))
     for part in parts[:2]:
         unknown.run(*part)
     resets = known.status.resets
