@@ -50,7 +50,9 @@ def carried_place(place, ratio):
     A loop of amplitude A turns at tanh(a A), so that tanh(ratio artanh(place)) keeps A; this is
     its algebraic neighbour, which keeps w_h/b in a small loop and w_h a/b in a large one.
     """
-    return place * ratio / np.sqrt(1.0 + place * place * (ratio * ratio - 1.0))
+    ratio = np.fmin(np.fmax(ratio, 1e-9), 1e9)  # beyond, its square is no number any more
+    square = place * place
+    return place * ratio / np.sqrt((1.0 - square) + square * ratio * ratio)
 
 
 @register_jitable
