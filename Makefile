@@ -90,6 +90,7 @@ figures: $(VENV)/.installed  ## Make the numbers and figures of the documentatio
 	$(BIN)/python benchmarks/batch_fit.py --json docs/data/batch_fit.json
 	$(BIN)/python benchmarks/filterpy_parity.py --json docs/data/filterpy_parity.json
 	$(BIN)/python docs/consistency.py --json docs/data/consistency.json
+	$(BIN)/python benchmarks/beyond_the_paper.py --json docs/data/beyond.json
 	$(BIN)/python benchmarks/controller.py --json docs/data/controller.json
 	$(BIN)/python benchmarks/target/target.py --json docs/data/target.json
 	$(BIN)/python docs/controller_page.py --figure

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import argparse
 import datetime
+import functools
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +44,7 @@ def references() -> dict[str, pz.Signal]:
 
 
 def follow(
-    reference: pz.Signal, stage: type, estimator: Any, rate: float, **options: Any
+    reference: pz.Signal, stage: Callable[[float], Any], estimator: Any, rate: float, **options: Any
 ) -> pz.TrackingRecord:
     """Send a reference round the ring; without an estimator, linear feed-forward with its gain estimated."""
     limits = pz.VoltageLimits(-100.0, 100.0)
@@ -129,6 +131,54 @@ def scenarios(rate: float = 20_000.0) -> list[dict[str, Any]]:
     return rows
 
 
+# Of the simulated stages: resonance, delay of the amplifier's filter, and of the gauge's.
+MECHANICS, AMPLIFIER_DELAY, GAUGE_DELAY = pz.MassSpringDamper(780.0, 0.02), 1.95e-5, 1.95e-5
+
+
+def near_the_resonance() -> list[dict[str, Any]]:
+    """Towards a twentieth of the resonance, with a lead and without; the sensor's delay is told to both."""
+    rows = []
+    for stage, cls in STAGES.items():
+        for frequency, periods in ((5.0, 8), (20.0, 25), (39.0625, 40)):
+            for shape in ("sine", "triangle"):
+                reference = getattr(pz.signals, shape)(5.0, frequency, periods, RATE)
+                errors = {}
+                for way in ("without", "lead"):
+                    compensator: Any = pz.InverseCompensator(START, pz.VoltageLimits(-100.0, 100.0))
+                    options: dict[str, Any] = {"delay": GAUGE_DELAY * RATE}
+                    if way == "lead":
+                        compensator = pz.LeadFilter(
+                            compensator, MECHANICS, sample_rate=RATE, delay=AMPLIFIER_DELAY
+                        )
+                        options = {"delay": (AMPLIFIER_DELAY + GAUGE_DELAY) * RATE, "mechanics": MECHANICS}
+                    estimator = pz.PrandtlIshlinskiiRLS(RATE, initial_model=START, **options)
+                    record = pz.track(
+                        reference, stage=cls(RATE), compensator=compensator, estimator=estimator
+                    )
+                    errors[way] = {"max_um": record.max_error(2), "rms_um": record.rms_error(2)}
+                rows.append({"stage": stage, "shape": shape, "frequency_Hz": frequency, "error": errors})
+                print(rows[-1], flush=True)
+    return rows
+
+
+def small_triangle() -> list[dict[str, Any]]:
+    """What is left of the smallest triangle on the paper's stage, and what of it has which cause."""
+    reference = pz.signals.triangle(2.5, 5.0, 15, RATE)
+    rows = []
+    for name, parts, options in (
+        ("as it is", {}, {}),
+        ("sensor's delay told", {}, {"delay": GAUGE_DELAY * RATE}),
+        ("without converter steps", {"quantisation": False}, {}),
+        ("without resonance", {"mechanics": False}, {}),
+        ("without noise", {"noise": 0.0}, {}),
+    ):
+        stage = functools.partial(pz.PaperStage, **parts)
+        record = follow(reference, stage, pz.PrandtlIshlinskiiRLS, RATE, **options)
+        rows.append({"case": name, "max_um": record.max_error(2), "rms_um": record.rms_error(2)})
+        print(rows[-1], flush=True)
+    return rows
+
+
 def recording(folder: Path) -> dict[str, float]:
     """Rms errors [µm] of a model learnt in one pass over recorded data, the sensor one sample late."""
     model_file, test_file = (pz.read_record(folder / name) for name in ("model_1hz.csv", "test_1hz.csv"))
@@ -172,6 +222,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="file to write")
     data = Path(os.environ.get("PIEZOEST_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
     parser.add_argument("--data", type=Path, default=data, help="folder of the recordings")
+    parser.add_argument("--only", nargs="*", help="parts to run; the file keeps its others")
     given = parser.parse_args()
     folder = given.data / "discrete_backlash_operator"
     document = {
@@ -179,11 +230,23 @@ def main() -> None:
         "machine": describe_machine(),
         "versions": {"piezoest": pz.__version__},
         "conditions": {"sample_rate_Hz": RATE, "start": START.to_dict(), "seed": 0},
-        "recording": recording(folder) if folder.is_dir() else None,
-        "amplitudes": amplitudes(),
-        "settled": settled(),
-        "scenarios": scenarios(),
     }
+    if given.only and given.json and given.json.is_file():
+        # The date stays that of the parts that are kept; those run now have their own.
+        document |= json.loads(given.json.read_text(encoding="utf-8"))
+    now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    parts: dict[str, Callable[[], Any]] = {
+        "recording": lambda: recording(folder) if folder.is_dir() else None,
+        "amplitudes": amplitudes,
+        "settled": settled,
+        "scenarios": scenarios,
+        "near_the_resonance": near_the_resonance,
+        "small_triangle": small_triangle,
+    }
+    for name, part in parts.items():
+        if not given.only or name in given.only:
+            document[name] = part()
+            document.setdefault("dates", {})[name] = now
     if given.json:
         given.json.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 

@@ -29,14 +29,14 @@ def prbs() -> Any:
 def numbers(stage: Any, r: Any) -> Any:
     """(alpha, beta, gamma, K, linear error, compensated error), all estimated while running."""
     gain, linear = _follow(stage, r, pz.LinearCompensator(START_GAIN), _estimator(START_GAIN))
-    theta, compensated = _follow(stage, r, pz.InverseCompensator(START), _estimator(START))
+    theta, compensated = _follow(stage, r, pz.InverseCompensator(START, hand_over="place"), _estimator(START))
     return np.array([*theta, gain[0], linear, compensated])
 
 
 def with_parameters_of(stage: Any, r: Any, theta: Any) -> float:
     """Compensated error with parameters that were found elsewhere."""
     model = pz.ColemanHodgdon(*(float(value) for value in theta))
-    return _follow(stage, r, pz.InverseCompensator(model), None)[1]
+    return _follow(stage, r, pz.InverseCompensator(model, hand_over="place"), None)[1]
 
 
 def _estimator(model: Any) -> Any:

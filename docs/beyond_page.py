@@ -27,6 +27,10 @@ def pieces(document: dict[str, Any]) -> dict[str, str]:
         "settled": table("Largest error of the last two periods [nm]", *settled(document["settled"])),
         "amplitudes": table("Worst error of the first period [nm]", *amplitudes(document["amplitudes"])),
         "scenarios": table("Adaptation scenarios, PaperStage [nm]", *scenarios(document["scenarios"])),
+        "lead": table(
+            "Largest (rms) error of the last two periods [nm]", *lead(document["near_the_resonance"])
+        ),
+        "small": table("Triangle of 2.5 µm at 5 Hz, PaperStage [nm]", *small(document["small_triangle"])),
         "numbers": f".. |beyond date| replace:: {document['date'][:10]}\n"
         f".. |beyond machine| replace:: {document['machine']['cpu']}\n",
     }
@@ -78,6 +82,20 @@ def scenarios(entries: list[dict[str, Any]]) -> tuple[list[str], list[list[str]]
         for entry in entries
     ]
     return ["scenario", "estimator", "worst after the change", "settled"], body
+
+
+def lead(entries: list[dict[str, Any]]) -> tuple[list[str], list[list[str]]]:
+    body = []
+    for entry in entries:
+        errors = [entry["error"][way] for way in ("without", "lead")]
+        cells = [f"{nm(error['max_um'])} ({nm(error['rms_um'])})" for error in errors]
+        body.append([f"{entry['shape']} {entry['frequency_Hz']:.0f} Hz", entry["stage"], *cells])
+    return ["reference", "stage", "without", "with lead"], body
+
+
+def small(entries: list[dict[str, Any]]) -> tuple[list[str], list[list[str]]]:
+    body = [[entry["case"], nm(entry["max_um"]), nm(entry["rms_um"])] for entry in entries]
+    return ["case", "largest error", "rms"], body
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from .compensators import (
     CompensatorStatus,
     IntegralFeedback,
     InverseCompensator,
+    LeadFilter,
     LinearCompensator,
     VoltageLimits,
 )
@@ -18,7 +19,15 @@ from .estimators.play_rls import PrandtlIshlinskiiRLS
 from .estimators.recursive_least_squares import RecursiveLeastSquares
 from .estimators.rls import HysteresisRLS
 from .identification import Identification, ModelChoice, choose_model, identify
-from .models import ColemanHodgdon, Creep, LinearGain, MassSpringDamper, PrandtlIshlinskii, Preisach
+from .models import (
+    AmplitudeProfile,
+    ColemanHodgdon,
+    Creep,
+    LinearGain,
+    MassSpringDamper,
+    PrandtlIshlinskii,
+    Preisach,
+)
 from .records import Record, read_record
 from .signals import Signal
 from .stage import Amplifier, Gauge, PaperStage, PreisachStage, SimulatedStage, TemperatureLaw
@@ -27,6 +36,7 @@ from .tracking import TrackingRecord, track
 
 __all__ = [
     "Amplifier",
+    "AmplitudeProfile",
     "BatchFit",
     "BatchFitResult",
     "ColemanHodgdon",
@@ -43,6 +53,7 @@ __all__ = [
     "Identification",
     "IntegralFeedback",
     "InverseCompensator",
+    "LeadFilter",
     "LinearCompensator",
     "LinearGain",
     "MassSpringDamper",

@@ -4,22 +4,36 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 
 from piezoest._checks import fraction, integer, non_negative, positive
 
 __all__ = [
+    "AmplitudeMemory",
+    "ChangeDetection",
     "CovarianceResetting",
     "DeadZone",
+    "DirectionalForgetting",
+    "ExcitationGate",
     "Forgetting",
     "NormBound",
     "Normalisation",
     "OutlierRejection",
     "PeriodicForgetting",
+    "Projection",
     "RandomWalk",
+    "VariableForgetting",
 ]
+
+Unit = Literal["period", "second"]
+
+
+def _check_memory(memory: float, unit: str) -> None:
+    positive("memory", memory)
+    if unit not in ("period", "second"):
+        raise ValueError(f"unit must be 'period' or 'second', got {unit!r}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +124,196 @@ class PeriodicForgetting:
 
     def __post_init__(self) -> None:
         positive("memory", self.memory)
+
+
+@dataclass(frozen=True, slots=True)
+class DirectionalForgetting:
+    """Forget only along the present regressor: what the data do not renew is kept.
+
+    R. Kulhavy, Automatica 23 (1987) 589-600; L. Cao, H. Schwartz, Automatica 36 (2000) 1725-1731.
+    See `piezoest.equations.least_squares.directional_update`.
+
+    Parameters
+    ----------
+    memory : float
+        Time constant along the regressor.
+    unit : {"period", "second"}
+        Of memory: the reference's own period, or seconds (the unit of `step` in
+        `RecursiveLeastSquares`).
+
+    Raises
+    ------
+    ValueError
+        If memory is not above zero, or the unit is another.
+    """
+
+    memory: float = 1.0
+    unit: Unit = "period"
+
+    def __post_init__(self) -> None:
+        _check_memory(self.memory, self.unit)
+
+
+@dataclass(frozen=True, slots=True)
+class VariableForgetting:
+    """Exponential forgetting whose memory shortens as the innovation's energy rises.
+
+    T. Fortescue, L. Kershenbaum, B. Ydstie, Automatica 17 (1981) 831-835. See
+    `piezoest.equations.least_squares.variable_forgetting`. `HysteresisRLS` takes the innovation's
+    usual variance over the memory for that of the noise: much of it is the model's own error.
+
+    Parameters
+    ----------
+    memory : float
+        Time constant while the innovation is as usual.
+    shortest : float
+        Least time constant, in parts of memory.
+    unit : {"period", "second"}
+        Of memory: the reference's own period, or seconds (the unit of `step` in
+        `RecursiveLeastSquares`).
+
+    Raises
+    ------
+    ValueError
+        If memory is not above zero, shortest not within (0, 1], or the unit is another.
+    """
+
+    memory: float = 1.0
+    shortest: float = 0.1
+    unit: Unit = "period"
+
+    def __post_init__(self) -> None:
+        _check_memory(self.memory, self.unit)
+        positive("shortest", fraction("shortest", self.shortest))
+
+    def least_factor(self, step: float) -> float:
+        """Least weight that the past keeps over one step: exp(-step/(shortest memory)).
+
+        Parameters
+        ----------
+        step : float
+            Time between samples, in the unit of `memory`.
+        """
+        return float(np.exp(-step / (self.shortest * self.memory)))
+
+
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """Keep theta itself in the admissible set: after each update the nearest point in the metric of P.
+
+    Without it theta goes where the data say, and only the model handed out is projected.
+
+    P. Ioannou, J. Sun, Robust Adaptive Control (1996), sec. 4.4; G. Goodwin, K. Sin, Adaptive
+    Filtering, Prediction and Control (1984), sec. 3.7; D. Simon, IET Control Theory Appl. 4 (2010)
+    1303-1318.
+
+    Parameters
+    ----------
+    margin : float
+        Distance from the faces alpha beta < gamma <= 2 alpha beta, in parts of alpha beta.
+
+    Raises
+    ------
+    ValueError
+        If margin is not within (0, 0.4].
+    """
+
+    margin: float = 0.01
+
+    def __post_init__(self) -> None:
+        positive("margin", fraction("margin", self.margin, 0.0, 0.4))
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeDetection:
+    """Add the initial covariance to P when the innovation says that something changed.
+
+    A cumulative sum over the travel of the voltage: of the innovation's energy in parts of its usual
+    one, less 1 + drift. As long as nothing changes it gains nothing over a swing, whatever the loop
+    does within it; after a detection the usual energy is learnt anew over two swings.
+
+    E. Page, Biometrika 41 (1954) 100-115; F. Gustafsson, Adaptive Filtering and Change Detection
+    (2000), sec. 2.6 and 5.1.
+
+    Parameters
+    ----------
+    threshold : float
+        Of the sum, in swings of the usual energy.
+    drift : float
+        Rise of the energy that is no change, in parts of the usual one.
+
+    Raises
+    ------
+    ValueError
+        If threshold is not above zero, or drift negative.
+    """
+
+    threshold: float = 2.0
+    drift: float = 1.0
+
+    def __post_init__(self) -> None:
+        positive("threshold", self.threshold)
+        non_negative("drift", self.drift)
+
+
+@dataclass(frozen=True, slots=True)
+class ExcitationGate:
+    """Adapt only while every direction is excited: `HysteresisRLS.excitation` above a level.
+
+    The condition (A8) of Eielsen et al. (2012) for convergence, over the last swing; Ioannou and Sun,
+    Robust Adaptive Control (1996), sec. 4.3. Looked at once in 64 samples. While it is shut samples
+    count as held, and P does not grow.
+
+    Parameters
+    ----------
+    least : float
+        Least excitation, of 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        If least is not within (0, 1).
+    """
+
+    least: float = 1e-4
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.least < 1.0:
+            raise ValueError(f"least must lie within (0, 1), got {self.least}")
+
+
+@dataclass(frozen=True, slots=True)
+class AmplitudeMemory:
+    """Remember what was learnt at each swing of the voltage, and start from there on return.
+
+    The last paragraph of sec. IV of Eielsen et al. (2012): parameters scheduled by amplitude. At the end
+    of a swing like those before it the mean estimate over the swing is stored with its size; when
+    the size changes and it, or one on either side of it, is known, theta goes to what was stored,
+    interpolated. See `HysteresisRLS.profile` and `AmplitudeProfile`.
+
+    Parameters
+    ----------
+    places : int
+        Amplitudes that are remembered; a further one replaces the nearest.
+    tolerance : float
+        Sizes that differ by less, in parts, are the same amplitude.
+    uncertainty : float
+        Standard deviation of what was stored when it is taken up, in parts of the initial model.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+
+    places: int = 8
+    tolerance: float = 0.1
+    uncertainty: float = 0.05
+
+    def __post_init__(self) -> None:
+        integer("places", self.places, 1)
+        positive("tolerance", fraction("tolerance", self.tolerance, 0.0, 0.5))
+        positive("uncertainty", self.uncertainty)
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,7 +434,15 @@ Policy = (
     | CovarianceResetting
     | DeadZone
     | OutlierRejection
+    | DirectionalForgetting
+    | VariableForgetting
+    | Projection
+    | ChangeDetection
+    | ExcitationGate
+    | AmplitudeMemory
 )
+
+_FORGETTINGS = (Forgetting, RandomWalk, PeriodicForgetting, DirectionalForgetting, VariableForgetting)
 
 
 def select(policies: tuple[Policy, ...], kind: type[Policy]) -> Policy | None:
@@ -249,6 +461,23 @@ def select(policies: tuple[Policy, ...], kind: type[Policy]) -> Policy | None:
     found = [policy for policy in policies if isinstance(policy, kind)]
     if len(found) > 1:
         raise ValueError(f"policies holds {len(found)} of {kind.__name__}: pass one")
+    return found[0] if found else None
+
+
+def forgetting_of(policies: tuple[Policy, ...]) -> Policy | None:
+    """Return the one policy that forgets, or None.
+
+    Raises
+    ------
+    ValueError
+        If there are two of them.
+    """
+    found = [one for kind in _FORGETTINGS if (one := select(policies, kind)) is not None]
+    # `Forgetting` without end is none.
+    found = [one for one in found if not (isinstance(one, Forgetting) and np.isinf(one.memory))]
+    if len(found) > 1:
+        names = " and ".join(type(one).__name__ for one in found)
+        raise ValueError(f"policies: {names} exclude each other: pass one way to forget")
     return found[0] if found else None
 
 

@@ -1,28 +1,35 @@
-"""The guard in the ring: adaptation may never be worse than linear feed-forward for long."""
+"""The guard in the ring: a model has to explain what has just happened better than a straight line."""
 
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
 from piezoest._checks import FloatArray, positive
-from piezoest.equations.coleman_hodgdon import stationary_gain
-from piezoest.estimators.rls import HysteresisRLS
+from piezoest.equations.coleman_hodgdon import carried_place, hysteresis_step
 from piezoest.models import ColemanHodgdon, LinearGain, Model
 
-# Below this the reference is at rest, and nothing is judged [µm].
-AT_REST = 1e-3
-# A proposed model's gain may differ by so much from the gain that is measured.
-GAIN_TOLERANCE = 0.35
-# A model is good enough to fall back to if its error was below this part of the linear one.
-GOOD = 0.7
+# An interval whose voltage moves by no more than this part of its size is one at rest.
+AT_REST = 1e-4
+# Points that are kept of an interval, and at most of a window.
+POINTS, MOST = 4, 800
+# What happened this part of a window ago counts for half.
+HALF_LIFE = 0.5
+# A model that is right to this part of the displacement's range is good enough anyway.
+NEGLIGIBLE = 0.005
+# After a fall a model must be better than the line by this, or the two would take turns.
+CLEARLY = 0.7
+# It is not tried again for this part of a window, and the line fallen back to stays until it misses
+# so many times what is allowed.
+AGAIN, STALE = 0.25, 1.05
+# The line's gain must be known this well before anything is judged by it.
+GAIN_KNOWN = 0.05
 # b in parts of c in a Coleman-Hodgdon model that stands for a line.
 NO_LOOP = 1e-9
-# Fraction of the window over which the error is taken at its worst.
-RECENT = 0.25
+# Rows of what is kept of the past.
+TIME, VOLTAGE, MEASURED, PLACE, DECAY, ROWS = range(6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +41,8 @@ class Event:
     time : float
         Seconds since its start.
     action : str
-        ``"kept"`` (a proposed model was not taken), ``"fell back"`` or ``"resumed"``.
+        ``"kept"`` (a proposed model was not taken, the present one stays), ``"fell back"`` (to
+        the last good model or to a line) or ``"resumed"``.
     reason : str
         Why, with the figures.
     """
@@ -45,14 +53,15 @@ class Event:
 
 
 class Supervisor:
-    """Compares the tracking error with that of linear feed-forward, and falls back when it is worse.
+    """Lets only those models through to the compensator that are better than linear feed-forward.
 
-    The gain K is estimated beside the ring (12). What linear feed-forward would miss is the
-    opening of the loop, max|x - K u|, over the last window, scaled to the reference. Where
-    the error passes `limit` times that, the compensator gets back the last model that was
-    good, or linear feed-forward itself if there is none, for one window; then adaptation
-    is tried again. A proposed model whose gain (at the present amplitude) is not the
-    measured one is not taken in the first place.
+    Every proposed model is run over the voltages of the last window, and its error against the
+    measured displacement compared with that of the straight line x = K u + offset that fits
+    the window best. A model whose error is above `limit` times the line's is not handed on: the
+    compensator keeps its present model if that one passes, else gets the last one that had passed if it
+    still does, else the line itself. What linear feed-forward would miss of a reference is
+    what a line misses of the displacement, so that adaptation is never worse than that
+    for longer than it takes to see it. Errors are root mean squares; the recent past weighs more.
 
     Parameters
     ----------
@@ -61,34 +70,42 @@ class Supervisor:
     window : float
         Seconds over which errors are compared: about one period of the reference.
     limit : float
-        Error that is allowed, in parts of linear feed-forward's.
+        Error that is allowed, in parts of the line's.
 
     Raises
     ------
     ValueError
         If a value is not above zero.
+
+    Notes
+    -----
+    Where a model's memory stood at the window's start is known for `ColemanHodgdon`; of any other
+    model the mean error is left out instead.
     """
 
-    __slots__ = ("_elapsed", "_events", "_gain", "_good", "_held", "_limit", "_recent", "_until", "_window")
+    __slots__ = (
+        "_count", "_decay", "_elapsed", "_events", "_good", "_held", "_kept",
+        "_limit", "_moved", "_past", "_place", "_sample_rate", "_until", "_voltage", "_window",
+    )  # fmt: skip
 
-    def __init__(self, sample_rate: float, *, window: float = 0.2, limit: float = 1.2) -> None:
+    def __init__(self, sample_rate: float, *, window: float = 0.2, limit: float = 1.0) -> None:
+        self._sample_rate = positive("sample_rate", sample_rate)
         self._window = positive("window", window)
         self._limit = positive("limit", limit)
-        self._gain = HysteresisRLS(
-            positive("sample_rate", sample_rate), initial_model=LinearGain(0.15), memory=window, offset=True
-        )
         self.reset()
 
     def reset(self) -> None:
         """Return to the state after construction."""
-        self._gain.reset()
-        self._elapsed = 0.0
-        self._until = -math.inf
+        self._elapsed = self._moved = 0.0  # s, the second without what was at rest
+        self._until = 0.0
+        self._voltage = 0.0
+        self._place, self._decay = 0.0, 1.0
+        self._past = np.empty((ROWS, 4 * MOST))
+        self._count = 0
         self._good: Model | None = None
         self._held: Model | None = None
+        self._kept = False
         self._events: list[Event] = []
-        # Per interval: its end, largest |r - x|, |x - K u|, |x|, |r|, |u|.
-        self._recent: deque[tuple[float, ...]] = deque()
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -118,80 +135,144 @@ class Supervisor:
         Model
             `proposed`, `present` or one to fall back to.
         """
-        self._take(r, u, x)
-        if self._elapsed < RECENT * self._window:
+        self._elapsed += u.size / self._sample_rate
+        if self._is_at_rest(u):
+            # Creep alone moves the stage: nothing to judge a model by.
+            return proposed if self._held is None else self._held
+        self._take(u, x, present)
+        past = self._recent()
+        weights = 0.5 ** ((self._moved - past[TIME]) / (HALF_LIFE * self._window))
+        line = _line(past, weights, whole=self._moved >= self._window)
+        if line is None:
             return proposed
-        error, linear = self._compare()
+        gain, offset, unexplained = line
+        span = float(np.ptp(past[MEASURED]))
+        limit = allowed = max(self._limit * unexplained, NEGLIGIBLE * span)
+        error = _error(proposed, past, weights)
         if self._held is not None:
-            if self._elapsed < self._until:
-                return self._held
-            self._held = None
-            self._note("resumed", f"error {error:.3g} µm, linear feed-forward {linear:.3g} µm")
-        if self._elapsed > self._window and error > self._limit * linear > 0.0:
-            return self._fall_back(error, linear, present)
-        if error < GOOD * linear:
-            self._good = present
-        return self._plausible(present, proposed)
-
-    def _take(self, r: FloatArray, u: FloatArray, x: FloatArray) -> None:
-        self._gain.run(u, x, every=max(1, u.size))
-        self._elapsed += r.size / self._gain.sample_rate
-        good = np.isfinite(x)
-        if np.any(good):
-            model = self._gain.model
-            line = model.simulate(u[good]) if isinstance(model, LinearGain) else x[good]
-            largest = (np.max(np.abs(part)) for part in (r[good] - x[good], x[good] - line, x[good], r, u))
-            self._recent.append((self._elapsed, *(float(value) for value in largest)))
-        while self._recent and self._recent[0][0] < self._elapsed - self._window:
-            self._recent.popleft()
-
-    def _compare(self) -> tuple[float, float]:
-        """Recent largest error, and what linear feed-forward's would have been; zeros at rest."""
-        if not self._recent:
-            return 0.0, 0.0
-        values = np.array(self._recent)
-        late = values[:, 0] > self._elapsed - RECENT * self._window
-        _, _, opening, size, reference, _ = values.max(axis=0)
-        if reference < AT_REST or size < AT_REST or not np.any(late):
-            return 0.0, 0.0
-        return float(values[late, 1].max()), float(opening / size * reference)
-
-    def _fall_back(self, error: float, linear: float, present: Model) -> Model:
-        good = self._good
-        self._held = good if good is not None and self._fits(good) else self._line(present)
-        self._until = self._elapsed + self._window
-        self._note(
-            "fell back", f"error {error:.3g} µm, linear feed-forward {linear:.3g} µm; now {self._held}"
-        )
-        return self._held
-
-    def _plausible(self, present: Model, proposed: Model) -> Model:
-        if self._fits(proposed):
+            allowed = max(CLEARLY * allowed, NEGLIGIBLE * span)
+            if self._moved < self._until:
+                allowed = 0.0
+        if error <= allowed:
+            self._pass(proposed, error, unexplained)
             return proposed
-        if not self._events or self._events[-1].action != "kept":
-            self._note("kept", f"{proposed} does not have the measured gain {self._gain.model}")
-        return present if self._fits(present) else self._line(present)
+        reason = f"{proposed} misses {error:.3g} µm, a line {unexplained:.3g} µm"
+        if self._held is None and _error(present, past, weights) <= limit:
+            if not self._kept:
+                self._note("kept", reason)
+            self._kept = True
+            return present
+        return self._fall_back(past, weights, limit, gain, offset, present, reason)
 
-    def _line(self, present: Model) -> Model:
-        """Linear feed-forward, as a model of the kind in use: without a loop to speak of."""
-        line = self._gain.model
-        if isinstance(present, ColemanHodgdon) and isinstance(line, LinearGain):
-            return ColemanHodgdon.from_loop(present.a, NO_LOOP * line.gain, line.gain, line.offset)
-        return line
+    def _is_at_rest(self, u: FloatArray) -> bool:
+        largest = max(
+            float(np.max(np.abs(u))), float(np.max(np.abs(self._past[VOLTAGE, : self._count]), initial=0.0))
+        )
+        return float(np.ptp(u)) <= AT_REST * largest
 
-    def _fits(self, model: Model) -> bool:
-        """Whether the model's gain at the present amplitude is about the measured one."""
-        line = self._gain.model
-        if not self._recent or not isinstance(line, LinearGain):
-            return True
-        amplitude = max(row[5] for row in self._recent)
-        if isinstance(model, ColemanHodgdon):
-            gain = float(stationary_gain(amplitude, model.a, model.b, model.c))
-        elif isinstance(model, LinearGain):
-            gain = model.gain
+    def _take(self, u: FloatArray, x: FloatArray, present: Model) -> None:
+        picked = np.unique(np.linspace(0, u.size - 1, min(POINTS, u.size)).astype(int))
+        for k in range(u.size) if u.size <= POINTS else picked:
+            voltage = float(u[k])
+            if isinstance(present, ColemanHodgdon):
+                # Place in the loop: w_h in parts of its limit b/a.
+                self._place = float(carried_place(self._place, present.a / self._decay))
+                self._decay = present.a
+                self._place = float(
+                    hysteresis_step(self._place, voltage - self._voltage, present.a, present.a)
+                )
+            self._voltage = voltage
+            if not math.isfinite(x[k]):
+                continue
+            if self._count == self._past.shape[1]:
+                half = self._count // 2
+                self._past[:, :half] = self._past[:, half:]
+                self._count = half
+            time = self._moved + (k + 1) / self._sample_rate
+            self._past[:, self._count] = time, voltage, float(x[k]), self._place, self._decay
+            self._count += 1
+        self._moved += u.size / self._sample_rate
+
+    def _recent(self) -> FloatArray:
+        """Points of the last window, thinned where there are many."""
+        past = self._past[:, : self._count]
+        past = past[:, np.searchsorted(past[TIME], self._moved - self._window) :]
+        return past[:, :: 1 + past.shape[1] // MOST]
+
+    def _pass(self, model: Model, error: float, unexplained: float) -> None:
+        if self._held is not None:
+            self._note("resumed", f"{model} misses {error:.3g} µm, a line {unexplained:.3g} µm")
+        self._good, self._held, self._kept = model, None, False
+
+    def _fall_back(
+        self,
+        past: FloatArray,
+        weights: FloatArray,
+        allowed: float,
+        gain: float,
+        offset: float,
+        present: Model,
+        reason: str,
+    ) -> Model:
+        if self._held is not None and _error(self._held, past, weights) <= STALE * allowed:
+            return self._held
+        fallen = self._held is not None
+        good = self._good
+        if good is not None and _error(good, past, weights) <= allowed:
+            self._held = good
         else:
-            return True
-        return abs(gain / line.gain - 1.0) < GAIN_TOLERANCE
+            self._held = _as_model(gain, offset, present)
+        if not fallen:
+            self._until = self._moved + AGAIN * self._window
+            self._note("fell back", f"{reason}; now {self._held}")
+        return self._held
 
     def _note(self, action: str, reason: str) -> None:
         self._events.append(Event(self._elapsed, action, reason))
+
+
+def _line(past: FloatArray, weights: FloatArray, *, whole: bool) -> tuple[float, float, float] | None:
+    """Gain and offset of the best line, and its weighted error; None while the gain is not known.
+
+    Over less than a whole window the line goes through the first point: a part of a loop has
+    another centre than the loop.
+    """
+    size = past.shape[1]
+    if size < 3:
+        return None
+    u, x = past[VOLTAGE], past[MEASURED]
+    u_mean, x_mean = (float(np.mean(u)), float(np.mean(x))) if whole else (float(u[0]), float(x[0]))
+    u, x = u - u_mean, x - x_mean
+    spread = float(u @ u)
+    if spread <= 0.0:
+        return None
+    gain = float(u @ x) / spread
+    missed = x - gain * u
+    if not math.sqrt(float(missed @ missed) / size) < GAIN_KNOWN * abs(gain) * math.sqrt(spread):
+        return None
+    return gain, x_mean - gain * u_mean, math.sqrt(float(weights @ missed**2) / float(weights.sum()))
+
+
+def _error(model: Model, past: FloatArray, weights: FloatArray) -> float:
+    """Root mean square of what a model misses of the past [µm]."""
+    u = np.ascontiguousarray(past[VOLTAGE])
+    total = float(weights.sum())
+    with np.errstate(all="ignore"):
+        if isinstance(model, ColemanHodgdon):
+            place = carried_place(past[PLACE, 0], model.a / past[DECAY, 0])
+            start = place * model.b / model.a
+            missed = past[MEASURED] - model.simulate(u, initial_state=float(start), allow_jumps=True)
+        elif isinstance(model, LinearGain):
+            missed = past[MEASURED] - model.simulate(u)
+        else:
+            missed = past[MEASURED] - model.simulate(u, allow_jumps=True)  # type: ignore[attr-defined]
+            missed = missed - float(weights @ missed) / total
+        error = math.sqrt(float(weights @ missed**2) / total)
+    return error if math.isfinite(error) else math.inf
+
+
+def _as_model(gain: float, offset: float, present: Model) -> Model:
+    """Linear feed-forward as a model; of the kind in use, so that `theta` keeps its shape."""
+    if isinstance(present, ColemanHodgdon) and gain > 0.0:
+        return ColemanHodgdon.from_loop(present.a, NO_LOOP * gain, gain, offset)
+    return LinearGain(gain, offset)

@@ -24,26 +24,34 @@ class TrackingRecord:
     reference, voltage, measured, displacement : ndarray, shape (N,)
         r [µm], u [V], measured x [µm], true x [µm] (the measured one where the stage does
         not know better).
-    theta : ndarray, shape (N, n)
-        Parameters of the compensator's model at each sample; n = 0 without an estimator. Where
-        a model had another number of them than the last, as a start of another kind, those
-        of the next one stand.
+    parameters : ndarray, shape (M, n)
+        Parameters of the compensator's model, a row for each `update_interval` samples; n = 0
+        without an estimator. Where a model had another number of them than the last, as a start
+        of another kind, those of the next one stand. `theta` has a row for each sample.
     parameter_names : tuple of str
         Names of the columns of `theta`.
     sample_rate : float
         [Hz].
     period : int or None
         Samples per period of the reference; None if it has none.
+    update_interval : int
+        Samples that share a row of `parameters` (default 1).
     """
 
     reference: FloatArray = field(repr=False)
     voltage: FloatArray = field(repr=False)
     measured: FloatArray = field(repr=False)
     displacement: FloatArray = field(repr=False)
-    theta: FloatArray = field(repr=False)
+    parameters: FloatArray = field(repr=False)
     parameter_names: tuple[str, ...]
     sample_rate: float
     period: int | None
+    update_interval: int = 1
+
+    @property
+    def theta(self) -> FloatArray:
+        """Parameters of the compensator's model at each sample, shape (N, n); made when asked for."""
+        return np.repeat(self.parameters, self.update_interval, axis=0)[: self.reference.size]
 
     @property
     def error(self) -> FloatArray:
@@ -72,6 +80,10 @@ class TrackingRecord:
                 "the reference has no period: use record.error, or give track() a periodic signal"
             )
         return self.period
+
+    def _row(self, sample: int) -> FloatArray:
+        row: FloatArray = self.parameters[sample // self.update_interval]
+        return row
 
     def _tail(self, last_periods: int | None) -> slice:
         if last_periods is None:
@@ -114,7 +126,7 @@ class TrackingRecord:
         lines = [f"{'period':>6}{'max error [µm]':>16}{'rms error [µm]':>16}{names}"]
         for k in range(self.periods):
             error = self.error[k * period : (k + 1) * period]
-            values = "".join(f"{value:14.5g}" for value in self.theta[(k + 1) * period - 1])
+            values = "".join(f"{value:14.5g}" for value in self._row((k + 1) * period - 1))
             lines.append(f"{k + 1:6d}{np.max(np.abs(error)):16.4f}{np.sqrt(np.mean(error**2)):16.4f}{values}")
         return "\n".join(lines)
 
@@ -231,11 +243,11 @@ def track(
                 parts = reference[part], voltage[part], measured[part]
                 model = supervisor.review(*parts, compensator.model, model)
             compensator.model = model
-    theta = np.repeat(_of_one_kind(history), interval, axis=0)[:N] if history else np.empty((N, 0))
+    parameters = _of_one_kind(history) if history else np.empty((-(-N // interval), 0))
     period = getattr(r, "period", None)
     return TrackingRecord(
-        reference, voltage, measured, displacement, theta, names, rate,
-        None if period is None else round(period),
+        reference, voltage, measured, displacement, parameters, names, rate,
+        None if period is None else round(period), interval,
     )  # fmt: skip
 
 

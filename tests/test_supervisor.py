@@ -52,7 +52,8 @@ class Wild:
 def test_leaves_a_good_estimator_alone() -> None:
     supervisor = pz.Supervisor(FS, window=0.2)
     plain, guarded = ring(pz.HysteresisRLS(FS)), ring(pz.HysteresisRLS(FS), supervisor)
-    np.testing.assert_array_equal(plain.displacement[-8000:], guarded.displacement[-8000:])
+    assert guarded.max_error(last_periods=2) == pytest.approx(plain.max_error(last_periods=2), rel=0.02)
+    assert guarded.max_error_per_period()[1:].max() < 1.1 * plain.max_error_per_period()[1:].max()
     assert not supervisor.holding
 
 
@@ -63,11 +64,12 @@ def test_keeps_nonsense_away_from_the_stage() -> None:
     assert plain.max_error_per_period()[5:7].max() > 1.5 * linear
     assert guarded.max_error_per_period()[1:].max() < linear
     assert guarded.max_error_per_period()[-1] < 0.05
-    assert any(event.action == "kept" for event in supervisor.events)
-    assert "gain" in supervisor.events[0].reason
+    times = [event.time for event in supervisor.events if event.action in ("kept", "fell back")]
+    assert any(1.0 < time < 1.4 for time in times)
+    assert "a line" in supervisor.events[0].reason
 
 
-def test_falls_back_when_the_error_is_worse_than_linear() -> None:
+def test_falls_back_to_a_line_and_stays_there() -> None:
     class WrongLoop:
         """The right gain, with a loop three times too wide."""
 
@@ -79,17 +81,19 @@ def test_falls_back_when_the_error_is_worse_than_linear() -> None:
     supervisor = pz.Supervisor(FS, window=0.2)
     plain, guarded = ring(WrongLoop()), ring(WrongLoop(), supervisor)
     assert plain.max_error_per_period()[2:].min() > 0.55 * 1.2
-    assert [event.action for event in supervisor.events[:2]] == ["fell back", "resumed"]
-    assert guarded.rms_error() < plain.rms_error()
+    assert [event.action for event in supervisor.events] == ["fell back"]
+    assert supervisor.holding
+    assert guarded.max_error_per_period()[2:].max() < 1.2 * 0.55
     supervisor.reset()
     assert supervisor.events == ()
 
 
 def test_short_memory_is_guarded() -> None:
-    """Exponential forgetting over a twentieth of a period runs away; with the guard it does not stay away."""
-    estimators = [pz.HysteresisRLS(FS, memory=0.01) for _ in range(2)]
+    """Exponential forgetting over a hundredth of a period runs away; with the guard it does not stay away."""
+    estimators = [pz.HysteresisRLS(FS, memory=0.002) for _ in range(2)]
     plain, guarded = ring(estimators[0]), ring(estimators[1], pz.Supervisor(FS, window=0.2))
-    assert guarded.max_error_per_period()[2:].max() < plain.max_error_per_period()[2:].max()
+    assert guarded.rms_error() < 0.5 * plain.rms_error()
+    assert np.median(guarded.max_error_per_period()[1:]) < 1.2 * 0.55
 
 
 @given(st.floats(1e-3, 0.5), st.floats(0.1, 100.0), st.floats(0.05, 0.5))

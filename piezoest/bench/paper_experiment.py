@@ -31,6 +31,7 @@ Compensation = Literal["linear", "inverse"]
 
 SAMPLE_RATE = 50_000.0  # Hz, the paper's
 UPDATE_INTERVAL = 50  # samples between two models of the compensator: 1 ms
+HAND_OVER: Literal["place"] = "place"  # that of the calibration too; the paper does not name its own
 MEMORY = 1.0  # s, that of the calibration: the compensated error hangs on it
 START = ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)  # no row of Table I
 START_GAIN = LinearGain(0.12)
@@ -127,7 +128,7 @@ class Experiment:
         compensator = (
             LinearCompensator(self.model)
             if isinstance(self.model, LinearGain)
-            else InverseCompensator(self.model)
+            else InverseCompensator(self.model, hand_over=HAND_OVER)
         )
         estimator = (
             None
@@ -239,5 +240,6 @@ def last_periods(record: TrackingRecord, periods: int) -> TrackingRecord:
         voltage=last(record.voltage),
         measured=last(record.measured),
         displacement=last(record.displacement),
-        theta=last(record.theta),
+        parameters=last(record.theta),
+        update_interval=1,
     )

@@ -15,7 +15,7 @@ from piezoest import signals
 from piezoest._checks import FloatArray, integer, non_negative, positive
 from piezoest.models import ColemanHodgdon, LinearGain
 from piezoest.signals import Signal
-from piezoest.stage import PaperStage
+from piezoest.stage import PaperStage, PreisachStage
 
 # Table I, triangle of 5 µm at 5 Hz: what a start would be that is right.
 RIGHT_MODEL = ColemanHodgdon(alpha=2.10e-2, beta=1.47e-1, gamma=4.29e-3)
@@ -120,6 +120,8 @@ class Case:
         Standard deviation of the gauge's noise [µm]; None for the stage's own.
     gain_schedule : tuple, optional
         Time [s] and factor of the stage's hysteresis, see `PaperStage`.
+    stage : type
+        `PaperStage` or `PreisachStage`; ``dataclasses.replace(case, stage=...)`` plays it on the other.
     """
 
     scenario: str
@@ -134,15 +136,16 @@ class Case:
     rest: tuple[int, int] | None = None
     noise: float | None = None
     gain_schedule: tuple[tuple[float, float], ...] | None = None
+    stage: type[PaperStage] | type[PreisachStage] = PaperStage
 
     @property
     def sample_rate(self) -> float:
         """[Hz]."""
         return self.reference.sample_rate
 
-    def new_stage(self) -> PaperStage:
+    def new_stage(self) -> PaperStage | PreisachStage:
         """Stage at rest; every one of the same case is identical, its noise included."""
-        return PaperStage(
+        return self.stage(
             self.sample_rate, seed=self.seed, noise=self.noise, gain_schedule=self.gain_schedule
         )
 

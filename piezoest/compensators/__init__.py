@@ -3,6 +3,7 @@
 from piezoest.compensators.base import Compensator, CompensatorStatus
 from piezoest.compensators.feedback import IntegralFeedback
 from piezoest.compensators.inverse import InverseCompensator
+from piezoest.compensators.lead import LeadFilter
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.compensators.linear import LinearCompensator
 
@@ -11,6 +12,7 @@ __all__ = [
     "CompensatorStatus",
     "IntegralFeedback",
     "InverseCompensator",
+    "LeadFilter",
     "LinearCompensator",
     "VoltageLimits",
 ]

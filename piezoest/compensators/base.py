@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numba import njit
@@ -16,6 +16,7 @@ from piezoest.compensators.layout import (
     CONFIG,
     DECAY,
     INTEGRATED,
+    KEEP_AMPLITUDE,
     LARGEST_STEP,
     LIMITED_NOW,
     MAXIMUM,
@@ -41,6 +42,7 @@ from piezoest.equations.turning_points import recall, remember
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
 
 Method = Literal["closed-form", "bogacki-shampine"]
+HandOver = Literal["amplitude", "place"]
 
 
 @register_jitable
@@ -79,11 +81,14 @@ def change_model(state: Any, config: Any, a: Any, b: Any, c: Any, offset: Any) -
     """Take another model without a bump: the place in the loop is kept, the difference owed."""
     expected = config[C] * state[VOLTAGE] + state[W_H] + config[OFFSET] + state[OWED]
     place = state[W_H] * config[A] / config[B] if config[B] > 0.0 else 0.0
+    place = min(max(place, -1.0), 1.0)
+    if config[KEEP_AMPLITUDE] != 0.0:
+        place = equations.carried_place(place, a / config[A])
     config[A] = a
     config[B] = b
     config[C] = c
     config[OFFSET] = offset
-    state[W_H] = min(max(place, -1.0), 1.0) * b / a
+    state[W_H] = place * b / a
     state[OWED] = expected - (c * state[VOLTAGE] + state[W_H] + offset)
 
 
@@ -143,11 +148,6 @@ class Compensator:
 
     __slots__ = ("_config", "_limits", "_model", "_projected", "_sample_rate", "_start", "_state")
 
-    #: Functions that a controller's code is generated from: voltage; change of model, or None.
-    _compiled: ClassVar[tuple[Any, Any]] = (_voltage, change_model)
-    #: Positions in the configuration that no change of model or limits touches.
-    _fixed: ClassVar[tuple[int, ...]] = (DECAY, INTEGRATED)
-
     def __init__(
         self,
         model: Model,
@@ -155,6 +155,7 @@ class Compensator:
         method: Method,
         transfer_samples: int,
         sample_rate: float | None = None,
+        hand_over: HandOver = "amplitude",
     ) -> None:
         if limits is None:
             limits = VoltageLimits()
@@ -173,6 +174,9 @@ class Compensator:
         if method not in ("closed-form", "bogacki-shampine"):
             raise ValueError(f"method must be 'closed-form' or 'bogacki-shampine', got {method!r}")
         self._config[INTEGRATED] = method == "bogacki-shampine"
+        if hand_over not in ("amplitude", "place"):
+            raise ValueError(f"hand_over must be 'amplitude' or 'place', got {hand_over!r}")
+        self._config[KEEP_AMPLITUDE] = hand_over == "amplitude"
         if not self._accepts(model).is_admissible:
             hint = "its gain must not be zero"
             if isinstance(model, ColemanHodgdon):
@@ -183,6 +187,20 @@ class Compensator:
         self._projected = False
         self._start = model
         self._begin(model)
+
+    @property
+    def _compiled(self) -> tuple[Any, Any]:
+        """Functions that a controller's code is generated from: voltage; change of model, or None."""
+        if isinstance(self._model, PrandtlIshlinskii):
+            return play_inverse.step, None
+        return _voltage, change_model
+
+    @property
+    def _fixed(self) -> tuple[int, ...]:
+        """Positions in the configuration that no change of model or limits in that code touches."""
+        if isinstance(self._model, PrandtlIshlinskii):
+            return A, B, C, OFFSET, DECAY, INTEGRATED, KEEP_AMPLITUDE, *range(CONFIG, self._config.size)
+        return DECAY, INTEGRATED, KEEP_AMPLITUDE
 
     def _begin(self, model: Model) -> None:
         """Start at rest, at the voltage nearest to zero."""
@@ -243,8 +261,8 @@ class Compensator:
     def model(self) -> Model:
         """Model whose inverse is used. Setting it is bumpless.
 
-        The place in the loop is kept: w_h in parts of its limit b/a, and plays as the voltage's
-        turning points have left them. What the new model makes of the present voltage differs
+        The place in the loop is kept as `hand_over` says, and plays as the voltage's turning
+        points have left them. What the new model makes of the present voltage differs
         from what the old one made of it; that difference is paid back exponentially over
         `transfer_samples`. An inadmissible model is replaced by its nearest admissible one, a
         `PrandtlIshlinskii` or `LinearGain`, or one with parameters beyond 1e9, not taken, and

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from piezoest.compensators.base import Compensator, Method
+from piezoest.compensators.base import Compensator, HandOver, Method
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.models import Model
 
@@ -23,6 +23,9 @@ class InverseCompensator(Compensator):
         Time constant of a bumpless change of model, in samples (default 500); 0 for none.
     sample_rate : float, optional
         [Hz]. Only a model with creep needs it; default that of the limits, or the model's own.
+    hand_over : {"amplitude", "place"}
+        What a change of a Coleman-Hodgdon model keeps of its memory: the amplitude of the loop that
+        w_h belongs to, which serves small loops too, or w_h in parts of its limit b/a.
 
     Raises
     ------
@@ -51,5 +54,6 @@ class InverseCompensator(Compensator):
         method: Method = "closed-form",
         transfer_samples: int = 500,
         sample_rate: float | None = None,
+        hand_over: HandOver = "amplitude",
     ) -> None:
-        super().__init__(model, limits, method, transfer_samples, sample_rate)
+        super().__init__(model, limits, method, transfer_samples, sample_rate, hand_over)

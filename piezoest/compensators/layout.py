@@ -9,4 +9,4 @@ from piezoest.equations import turning_points
 VOLTAGE, W_H, OWED, SAMPLES, SATURATED, SLEWED, MISSED, LIMITED_NOW, MEMORY = range(9)
 STATE = MEMORY + turning_points.SIZE
 # Configuration; what else a Prandtl-Ishlinskii model needs follows.
-A, B, C, OFFSET, MINIMUM, MAXIMUM, LARGEST_STEP, DECAY, INTEGRATED, CONFIG = range(10)
+A, B, C, OFFSET, MINIMUM, MAXIMUM, LARGEST_STEP, DECAY, INTEGRATED, KEEP_AMPLITUDE, CONFIG = range(11)

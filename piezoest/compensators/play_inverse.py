@@ -42,13 +42,12 @@ PLAYS, TERMS, BENDS, ARRAYS = CONFIG, CONFIG + 1, CONFIG + 2, CONFIG + 3
 
 @register_jitable
 def _voltage(
-    state: Any, config: Any, y: Any, z: Any, thresholds: Any, weights: Any, gains: Any, decays: Any,
-    bends: Any, changes: Any, r: Any,
+    state: Any, config: Any, r: Any, y: Any, z: Any, thresholds: Any, weights: Any, gains: Any, decays: Any,
+    bends: Any, changes: Any,
 ) -> Any:  # fmt: skip
     """Voltage for the next reference sample; plays and creep follow the voltage really given out."""
     state[SAMPLES] += 1.0
     u = state[VOLTAGE]
-    wanted = u
     if np.abs(r) < WILDEST:
         state[OWED] *= config[DECAY]
         held, share = creep_to_come(z, gains, decays)
@@ -69,33 +68,39 @@ def _voltage(
     return state[VOLTAGE]
 
 
+@register_jitable
+def _parts(state: Any, config: Any) -> Any:
+    """Plays, creep states, thresholds, weights, creep gains, decays, bends and their weights."""
+    n = int(config[PLAYS])
+    m = int(config[TERMS])
+    b = int(config[BENDS])
+    gains = ARRAYS + 2 * n
+    bends = gains + 2 * m
+    changes = bends + b
+    return (
+        state[STATE : STATE + n],
+        state[STATE + n : STATE + n + m],
+        config[ARRAYS : ARRAYS + n],
+        config[ARRAYS + n : gains],
+        config[gains : gains + m],
+        config[gains + m : bends],
+        config[bends:changes],
+        config[changes : changes + b * (n + 1)],
+    )
+
+
 @njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True)
 def run(state: Any, config: Any, r: Any, u: Any) -> None:
     """Voltages `u` for a whole reference `r`."""
-    n, m, b = int(config[PLAYS]), int(config[TERMS]), int(config[BENDS])
-    y, z = state[STATE : STATE + n], state[STATE + n : STATE + n + m]
-    a = ARRAYS
-    thresholds, weights = config[a : a + n], config[a + n : a + 2 * n]
-    a += 2 * n
-    gains, decays = config[a : a + m], config[a + m : a + 2 * m]
-    a += 2 * m
-    bends, changes = config[a : a + b], config[a + b : a + b + b * (n + 1)]
+    y, z, thresholds, weights, gains, decays, bends, changes = _parts(state, config)
     for k in range(r.size):
-        u[k] = _voltage(state, config, y, z, thresholds, weights, gains, decays, bends, changes, r[k])
+        u[k] = _voltage(state, config, r[k], y, z, thresholds, weights, gains, decays, bends, changes)
 
 
 @njit("f8(f8[::1], f8[::1], f8)", cache=True)
 def step(state: Any, config: Any, r: float) -> Any:
     """Voltage for one sample of the reference."""
-    n, m, b = int(config[PLAYS]), int(config[TERMS]), int(config[BENDS])
-    y, z = state[STATE : STATE + n], state[STATE + n : STATE + n + m]
-    a = ARRAYS
-    thresholds, weights = config[a : a + n], config[a + n : a + 2 * n]
-    a += 2 * n
-    gains, decays = config[a : a + m], config[a + m : a + 2 * m]
-    a += 2 * m
-    bends, changes = config[a : a + b], config[a + b : a + b + b * (n + 1)]
-    return _voltage(state, config, y, z, thresholds, weights, gains, decays, bends, changes, r)
+    return _voltage(state, config, r, *_parts(state, config))
 
 
 @njit("f8(f8[::1], f8[::1])", cache=True)

@@ -128,6 +128,58 @@ def continuous_update(theta, P, phi, z, n, h, forgetting_rate, normalised, bound
 
 
 @register_jitable
+def directional_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
+    """One sample that forgets only along the present regressor; returns (y, S).
+
+    R. Kulhavy, Restricted exponential forgetting in real-time identification, Automatica 23
+    (1987) 589-600; in terms of the information matrix, L. Cao, H. Schwartz, Automatica 36 (2000)
+    1725-1731. With q = phi' P phi and mu = `forgetting`: K = P phi/(R + q),
+    P^-1 += (mu - (1 - mu) R/q) phi phi'/R. Along phi this is exponential forgetting, across it
+    nothing is lost. `bound`, `enable` and `work` as in `discrete_update`.
+    """
+    y = z - predicted_output(theta, phi, n)
+    q = covariance_times(P, phi, n, work)
+    S = q + R
+    lost = (1.0 - forgetting) * R
+    shrink = (forgetting * q - lost) / (forgetting * S * (q + (q == 0.0)))
+    size = 0.0
+    removed = 0.0
+    for i in range(n):
+        theta[i] = theta[i] + enable * work[i] * y / S
+        size = size + P[i * n + i]
+        removed = removed + work[i] * work[i]
+    within = np.fmin((size - removed * shrink <= bound) * 1.0 + (shrink >= 0.0) * 1.0, 1.0) * enable
+    for i in range(n):
+        for j in range(i, n):
+            entry = P[i * n + j] - within * shrink * work[i] * work[j]
+            P[i * n + j] = entry
+            P[j * n + i] = entry
+    return y, S
+
+
+@register_jitable
+def variable_forgetting(y, quadratic, R, forgetting, least):
+    """Forgetting factor from the innovation's energy: short where the model no longer fits.
+
+    T. Fortescue, L. Kershenbaum, B. Ydstie, Implementation of self-tuning regulators with variable
+    forgetting factors, Automatica 17 (1981) 831-835: mu = 1 - (1 - phi' K) y²/(N_0 R), N_0 the
+    nominal memory in samples, 1/(1 - `forgetting`); never below `least`. `quadratic` = phi' P phi.
+    """
+    energy = y * y / (R + quadratic)
+    return np.fmax(1.0 - energy * (1.0 - forgetting), least)
+
+
+@register_jitable
+def cusum(total, value, drift):
+    """One-sided cumulative sum of what exceeds `drift`, never below zero.
+
+    E. Page, Continuous inspection schemes, Biometrika 41 (1954) 100-115; F. Gustafsson, Adaptive
+    Filtering and Change Detection (2000), sec. 2.6.
+    """
+    return np.fmax(total + value - drift, 0.0)
+
+
+@register_jitable
 def random_walk(variance, growth, ceiling):
     """P_ii after the parameter has walked: it grows by a constant as long as it is below a ceiling.
 
@@ -197,6 +249,16 @@ def above_floor(P, n, floor, work):
                 entry = entry - work[i * n + k] * work[j * n + k]
             work[i * n + j] = entry / root
     return positive
+
+
+@register_jitable
+def add_covariance(P, P_0, n):
+    """Say that a change was seen: P += P_0, the start's uncertainty on top of the present one.
+
+    F. Gustafsson, Adaptive Filtering and Change Detection (2000), sec. 5.1.
+    """
+    for i in range(n * n):
+        P[i] = P[i] + P_0[i]
 
 
 @register_jitable

@@ -13,7 +13,15 @@ from piezoest.estimators import play_rls_kernel as kernel
 from piezoest.estimators import play_rls_settings as settings
 from piezoest.estimators.base import EstimatorBase, Status, Trace
 from piezoest.estimators.delay_line import delay_line
-from piezoest.models import ColemanHodgdon, Creep, LinearGain, Model, PrandtlIshlinskii, model_from_dict
+from piezoest.models import (
+    ColemanHodgdon,
+    Creep,
+    LinearGain,
+    MassSpringDamper,
+    Model,
+    PrandtlIshlinskii,
+    model_from_dict,
+)
 
 
 class PrandtlIshlinskiiRLS(EstimatorBase):
@@ -49,6 +57,9 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
         Standard deviation of the displacement's noise [µm].
     delay : float
         Samples by which the measured displacement lags the voltage; may be fractional.
+    mechanics : MassSpringDamper, optional
+        Resonance that the voltage goes through before it is compared, so that it is not learnt
+        as hysteresis: for references that reach towards it, with a `LeadFilter`.
 
     Raises
     ------
@@ -95,6 +106,7 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
         uncertainty: float = 0.5,
         noise: float = 1.5e-3,
         delay: float = 0.0,
+        mechanics: MassSpringDamper | None = None,
     ) -> None:
         sample_rate = positive("sample_rate", sample_rate)
         initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
@@ -120,7 +132,11 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
         settings.tune(config)
         theta, spread, P = settings.prior(plan, positive("uncertainty", uncertainty), config)
         decays = np.exp(-1.0 / (sample_rate * plan.times))
-        self._config = np.concatenate([config, plan.relative, plan.bends, decays, P.ravel(), spread])
+        if mechanics is not None and not isinstance(mechanics, MassSpringDamper):
+            raise ValueError(f"mechanics must be a MassSpringDamper, got {mechanics!r}")
+        config[kernel.INERT] = mechanics is not None
+        motion = np.zeros(6) if mechanics is None else mechanics.coefficients(sample_rate)
+        self._config = np.concatenate([config, plan.relative, plan.bends, decays, P.ravel(), spread, motion])
         state = np.zeros(size)
         state[kernel.CENTRE], state[kernel.RANGE] = plan.centre, plan.half
         for name, values in ((kernel.THETA, theta), (kernel.P, P.ravel()), (kernel.LINE, line)):
@@ -141,13 +157,17 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
                 "uncertainty": float(uncertainty),
                 "noise": float(noise),
                 "delay": float(delay),
+                "mechanics": None if mechanics is None else mechanics.to_dict(),
             },
             state,
         )
 
     @classmethod
     def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        return {**arguments, "initial_model": model_from_dict(arguments["initial_model"])}
+        given = {**arguments, "initial_model": model_from_dict(arguments["initial_model"])}
+        if given.get("mechanics") is not None:
+            given["mechanics"] = MassSpringDamper.from_dict(given["mechanics"])
+        return given
 
     def _sample(self, u: float, x: float) -> None:
         kernel.step(self._state, self._config, u, x)

@@ -10,6 +10,7 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.equations.bent_plays import segment
+from piezoest.equations.mechanics import mechanics_step
 from piezoest.equations.play import play
 from piezoest.equations.turning_points import SIZE as MEMORY_SIZE
 from piezoest.equations.turning_points import recall, remember
@@ -28,13 +29,14 @@ ARRAYS = MEMORY + MEMORY_SIZE  # where the arrays begin, see `layout`
 
 # Configuration: sizes, scales, tuning; then where the arrays of the state begin.
 N, PLAYS, BENDS, TERMS, GAIN, NOISE, FRACTION, FIRST_HALF, FIXED, LONGEST_GAP = range(10)
-SLACK, LEVEL_TRAVEL, LEVEL_TIME, COMMON_WALK, SINGLE_WALK, WINDOWS, LEAST = range(10, 17)
-AT = 17  # first of each array of the state
+SLACK, LEVEL_TRAVEL, LEVEL_TIME, COMMON_WALK, SINGLE_WALK, WINDOWS, LEAST, INERT = range(10, 18)
+AT = 18  # first of each array of the state
 Y, Z, PHI, SUM, WAY, SEGMENTS, THETA, P, WORK, OLD, THRESHOLDS, EDGES = range(AT, AT + 12)
-USED, FORCE, LINE = range(AT + 12, AT + 15)
-# The first of each array of the configuration: relative thresholds and bends, creep decays, prior.
-RELATIVE, RELATIVE_BENDS, DECAYS, PRIOR, SPREAD = range(AT + 15, AT + 20)
-CONFIG = AT + 20
+USED, FORCE, MOTION, LINE = range(AT + 12, AT + 16)
+# The first of each array of the configuration: relative thresholds and bends, creep decays, prior,
+# and the mechanics' coefficients.
+RELATIVE, RELATIVE_BENDS, DECAYS, PRIOR, SPREAD, MECHANICS = range(AT + 16, AT + 22)
+CONFIG = AT + 22
 
 SWEEPS = 10
 SMALLEST = 1e-18
@@ -66,6 +68,7 @@ def layout(config: Any, n: int, k: int, m: int, line: int) -> int:
         k + 2,
         total,
         total,
+        2,
         line,
     )
     place = ARRAYS
@@ -73,7 +76,7 @@ def layout(config: Any, n: int, k: int, m: int, line: int) -> int:
         config[name] = place
         place += size
     place_in_config = CONFIG
-    for name, size in zip(range(RELATIVE, SPREAD + 1), (n, k, m, total * total, total), strict=True):
+    for name, size in zip(range(RELATIVE, MECHANICS + 1), (n, k, m, total * total, total, 6), strict=True):
         config[name] = place_in_config
         place_in_config += size
     return place
@@ -374,6 +377,9 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     if known:
         u = delayed(state[int(config[LINE]) :], config[FRACTION], u)
         known = np.abs(u) < WILDEST
+    if known and config[INERT] != 0.0:
+        place, numbers = int(config[MOTION]), int(config[MECHANICS])
+        u = mechanics_step(state[place : place + 2], u, config[numbers : numbers + 6])
     measured = known and np.abs(x) < WILDEST
     if not measured:
         state[MISSED] += 1.0

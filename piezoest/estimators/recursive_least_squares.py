@@ -13,23 +13,31 @@ from piezoest.equations import least_squares as equations
 from piezoest.policies import (
     CovarianceResetting,
     DeadZone,
+    DirectionalForgetting,
     Forgetting,
     Normalisation,
     NormBound,
     Policy,
+    VariableForgetting,
+    forgetting_of,
     select,
 )
 
 TimeBase = Literal["discrete", "continuous"]
 
 # Configuration of the law: positions in a flat array.
-FORGETTING, NOISE, BOUND, CONTINUOUS, STEP, RATE, NORMALISED, FLOOR, DEAD_ZONE, CONFIG_SIZE = range(10)
+FORGETTING, NOISE, BOUND, CONTINUOUS, STEP, RATE, NORMALISED, FLOOR, DEAD_ZONE = range(9)
+# Flag of directional forgetting; least factor of variable forgetting, 0 without it.
+DIRECTIONAL, LEAST_FACTOR, CONFIG_SIZE = 9, 10, 11
 
 # Head of the law's state; theta, P, P_0 and the work space follow.
 INNOVATION, INNOVATION_VARIANCE, UPDATES, HELD, RESETS, LAST, HEAD = range(7)
 
 # Values of LAST.
 WAITING, UPDATED, MISSING, HOLDING, REJECTED = 0.0, 1.0, 2.0, 3.0, 4.0
+
+# Positive: variable forgetting is on, and whoever knows the clock sets its least factor.
+LEAST_BY_THE_CLOCK = 1e-300
 
 # Beyond this a number is no measurement, and its square could overflow.
 LARGEST = 1e100
@@ -47,11 +55,17 @@ def configure(
     """Flat configuration of the law from its policies."""
     if time_base not in ("discrete", "continuous"):
         raise ValueError(f"time_base must be 'discrete' or 'continuous', got {time_base!r}")
-    forgetting = select(policies, Forgetting) or Forgetting()
+    chosen = forgetting_of(policies)
+    forgetting, timed = Forgetting(), False
+    if isinstance(chosen, Forgetting):
+        forgetting = chosen
+    elif isinstance(chosen, DirectionalForgetting | VariableForgetting) and chosen.unit == "second":
+        forgetting, timed = Forgetting(chosen.memory), True
     bound = select(policies, NormBound)
     resetting = select(policies, CovarianceResetting)
     dead_zone = select(policies, DeadZone)
-    assert isinstance(forgetting, Forgetting)
+    if time_base == "continuous" and isinstance(chosen, DirectionalForgetting | VariableForgetting):
+        raise ValueError(f"policies: {type(chosen).__name__} goes with the discrete time base")
     config = np.zeros(CONFIG_SIZE)
     config[FORGETTING] = forgetting.factor(step)
     config[NOISE] = noise
@@ -63,6 +77,9 @@ def configure(
     if isinstance(resetting, CovarianceResetting):
         config[FLOOR] = resetting.floor * np.linalg.eigvalsh(P_0)[0]
     config[DEAD_ZONE] = dead_zone.threshold if isinstance(dead_zone, DeadZone) else -1.0
+    config[DIRECTIONAL] = isinstance(chosen, DirectionalForgetting)
+    if isinstance(chosen, VariableForgetting):
+        config[LEAST_FACTOR] = chosen.least_factor(step) if timed else LEAST_BY_THE_CLOCK
     return config
 
 
@@ -74,6 +91,15 @@ def new_state(theta: FloatArray, P_0: FloatArray) -> FloatArray:
     state[HEAD + n : HEAD + n + n * n] = P_0.ravel()
     state[HEAD + n + n * n : HEAD + n + 2 * n * n] = P_0.ravel()
     return state
+
+
+@register_jitable
+def varied(state: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any, least: Any) -> Any:
+    """Forgetting factor of this sample by variable forgetting."""
+    y = z - equations.predicted_output(state[HEAD : HEAD + n], phi, n)
+    work = state[HEAD + n + 2 * n * n :]
+    quadratic = equations.covariance_times(state[HEAD + n : HEAD + n + n * n], phi, n, work)
+    return equations.variable_forgetting(y, quadratic, R, forgetting, least)
 
 
 @register_jitable
@@ -97,6 +123,8 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting:
         y, S = equations.continuous_update(
             theta, P, phi, z, n, config[STEP], config[RATE], config[NORMALISED], config[BOUND], 1.0, work
         )
+    elif config[DIRECTIONAL] != 0.0:
+        y, S = equations.directional_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
     else:
         y, S = equations.discrete_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
     state[INNOVATION] = y
@@ -107,7 +135,22 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting:
 
 @njit("void(f8[::1], f8[::1], f8[::1], f8, i8)", cache=True)
 def _update(state: Any, config: Any, phi: Any, z: float, n: int) -> None:
-    adapt(state, config, phi, z, n, config[NOISE], config[FORGETTING])
+    forgetting = config[FORGETTING]
+    if config[LEAST_FACTOR] > 0.0:
+        forgetting = varied(state, phi, z, n, config[NOISE], forgetting, config[LEAST_FACTOR])
+    adapt(state, config, phi, z, n, config[NOISE], forgetting)
+
+
+# What any regression can do.
+_OWN = (
+    Forgetting,
+    DirectionalForgetting,
+    VariableForgetting,
+    NormBound,
+    Normalisation,
+    CovarianceResetting,
+    DeadZone,
+)
 
 
 class RecursiveLeastSquares:
@@ -133,7 +176,8 @@ class RecursiveLeastSquares:
         Time between samples, in the unit of `Forgetting.memory`: 1 for samples (default),
         ``1 / sample_rate`` for seconds.
     policies : tuple of policies
-        Any of `Forgetting`, `NormBound`, `Normalisation`, `CovarianceResetting`,
+        Any of `Forgetting`, `DirectionalForgetting` and `VariableForgetting` (at most one of
+        the three; its "second" is the unit of `step`), `NormBound`, `Normalisation`, `CovarianceResetting`,
         `DeadZone`, at most one of each. Default: none of them but `Normalisation`.
 
     Raises
@@ -169,6 +213,9 @@ class RecursiveLeastSquares:
         if time_base == "continuous" and noise_variance != 1.0:
             raise ValueError("noise_variance must be 1 in the continuous law: scale z and phi instead")
         self._config = configure(tuple(policies), positive("step", step), time_base, noise_variance, P_0)
+        for policy in policies:
+            if not isinstance(policy, _OWN) or getattr(policy, "unit", "second") != "second":
+                raise ValueError(f"policies: {policy!r} needs a voltage's clock: see HysteresisRLS")
         self._state = new_state(start, P_0)
 
     def update(self, z: float, phi: Any) -> None:

@@ -9,11 +9,11 @@ import numpy as np
 from piezoest._checks import FloatArray, positive
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
-from piezoest.estimators import rls_model
+from piezoest.estimators import rls_model, rls_profile
 from piezoest.estimators import rls_settings as settings
 from piezoest.estimators.base import Compiled, EstimatorBase, Status, Trace
 from piezoest.estimators.delay_line import delay_line
-from piezoest.models import ColemanHodgdon, LinearGain, Model, model_from_dict
+from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain, Model, model_from_dict
 from piezoest.policies import Forgetting, Policy, policy_from_dict, policy_to_dict
 
 # Seconds of memory where the paper's law is asked for without one.
@@ -118,7 +118,7 @@ class HysteresisRLS(EstimatorBase):
             memory = PAPER_MEMORY
         if policies is None:
             policies = settings.default_policies(memory, initial)
-        settings.check_policies(policies, memory, time_base)
+        settings.check_policies(policies, memory, time_base, initial)
         if offset is None:
             offset = memory == "period" and isinstance(initial, ColemanHodgdon)
         cutoff = min(positive("cutoff", cutoff), 0.5 * sample_rate)
@@ -146,7 +146,8 @@ class HysteresisRLS(EstimatorBase):
         law_config = law.configure((forgetting, *policies), 1.0 / sample_rate, time_base, 1.0, P_0)
         self._config = np.concatenate([config, law_config])
         start = np.append(np.sign(initial.theta), np.zeros(int(offset)))
-        state = np.concatenate([np.zeros(kernel.FRONT), law.new_state(start, P_0), line])
+        extra = np.zeros(int(config[kernel.EXTRA]))
+        state = np.concatenate([np.zeros(kernel.FRONT), law.new_state(start, P_0), extra, line])
         self._begin(
             {
                 "sample_rate": sample_rate,
@@ -200,11 +201,38 @@ class HysteresisRLS(EstimatorBase):
         self._state[head + n : head + n + n * n] = self._state[head + n + n * n : head + n + 2 * n * n]
         self._state[kernel.FRONT + law.RESETS] += 1.0
 
-    def announce_change(self) -> None:
-        """Say that the stage or the reference is about to change: adds the initial covariance to P."""
+    def announce_change(self, amplitude: float | None = None) -> None:
+        """Say that the stage or the reference is about to change: adds the initial covariance to P.
+
+        Parameters
+        ----------
+        amplitude : float, optional
+            Of the reference from now on [µm]: if it is known to `profile`, the estimate goes to what was
+            learnt there, and P only as far as that is uncertain. Needs `policies.AmplitudeMemory`.
+
+        Raises
+        ------
+        ValueError
+            If amplitude is not above zero, or given without `policies.AmplitudeMemory`.
+        """
+        if amplitude is not None and rls_profile.announce(self._state, self._config, self._scale, amplitude):
+            return
         n, start = self._n, kernel.FRONT + law.HEAD + self._n
         self._state[start : start + n * n] += self._state[start + n * n : start + 2 * n * n]
         self._state[kernel.FRONT + law.RESETS] += 1.0
+
+    @property
+    def profile(self) -> AmplitudeProfile:
+        """What was learnt at each swing of the voltage, with `policies.AmplitudeMemory`; settable.
+
+        Parameters move with the stage's amplitude: a profile that was saved spares the next start
+        what this one had to learn.
+        """
+        return rls_profile.read(self._state, self._config, self._scale)
+
+    @profile.setter
+    def profile(self, profile: AmplitudeProfile) -> None:
+        rls_profile.write(self._state, self._config, self._scale, profile)
 
     @property
     def frozen(self) -> bool:

@@ -13,6 +13,7 @@ from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations import filters, least_squares
 from piezoest.estimators import level, swing
 from piezoest.estimators import recursive_least_squares as law
+from piezoest.estimators import rls_policies as policies
 from piezoest.estimators.delay_line import delayed
 
 # State: what is known of the last good sample, and of the voltage's way since.
@@ -27,13 +28,17 @@ MOTION, WAY = EXCITATION + 36, EXCITATION + 37
 # The sensor's noise: its variance as seen, and the last two changes of x it is seen from.
 NOISE, CHANGE, CHANGE_BEFORE, SEEN_NOISE = range(EXCITATION + 38, EXCITATION + 42)
 LEVEL = EXCITATION + 42
-FRONT = LEVEL + level.STATE  # the law's state begins here, the delay line follows it
+FRONT = LEVEL + level.STATE  # the law's state begins here, the policies' and the delay line follow it
 
 # Configuration of the front end; the law's follows.
 N, HYSTERETIC, LOW_POLE, HIGH_POLE, HIGH_PASS, FRACTION, OFFSET, LONGEST_GAP, NOISE_RATIO = range(9)
 OUTLIER, FIRST_HALF, WALK, WALK_MEMORY, WARM_UP, PERIODS, DECAY_SCALE = 9, 10, 11, 12, 13, 14, 15
 SCALE = 16  # four scales of the parameters, one of the output
-CONFIG = 21
+# Policies that are off by default: numbers that their state takes (behind the law's), projection's margin,
+# threshold and drift of the detection, least excitation, shortest memory of variable forgetting in
+# parts of it, places of the memory of amplitudes, its tolerance, its variance.
+EXTRA, MARGIN, THRESHOLD, RISEN, EXCITED, SHORTEST, PLACES, TOLERANCE, RECALLED = range(21, 30)
+CONFIG = 30
 
 # A change of x is believed up to so many usual steps, plus what so many times the slope explains.
 BELIEVED_STEPS, BELIEVED_SLOPES = 20.0, 3.0
@@ -183,6 +188,8 @@ def _walk(state: Any, config: Any, phi: Any, n: int, part: Any, half: Any) -> An
         q = _square_step(state, config, i)
         rho += q * state[EXCITATION + i * n + i]
         k = FRONT + law.HEAD + n + i * n + i
+        if config[EXCITED] > 0.0:
+            q *= 1.0 - state[FRONT + law.state_size(n) + policies.SHUT]
         state[k] = least_squares.random_walk(state[k], q * part, CEILING * max(q, state[k + n * n]))
     # Near a standstill the mechanics still move, which says nothing of the hysteresis.
     memory_squared = config[WALK_MEMORY] * config[WALK_MEMORY] + _noise_memory(state, config)
@@ -207,12 +214,48 @@ def _propagate_error(state: Any, config: Any, phi: Any, n: int, forgetting: Any,
 
 
 @register_jitable
+def _visit(state: Any, config: Any, n: int, part: Any) -> None:
+    """Let the memory of amplitudes look at the swing."""
+    start = FRONT + law.HEAD
+    clock = state[SWING : SWING + swing.STATE]
+    extra = state[FRONT + law.state_size(n) :]
+    theta = state[start : start + n]
+    if policies.visit(extra, clock, theta, n, part, int(config[PLACES]), config[TOLERANCE]):
+        policies.enlarge(state[start + n : start + n + n * n], n, config[RECALLED])
+        policies.enlarge(state[ERROR : ERROR + n * n], n, config[RECALLED])
+        state[FRONT + law.RESETS] += 1.0
+
+
+@register_jitable
+def _varied(state: Any, config: Any, phi: Any, z: Any, n: int, R: Any, forgetting: Any, half: Any) -> Any:
+    """Factor of variable forgetting, against the innovation's usual energy."""
+    least = config[CONFIG + law.LEAST_FACTOR]
+    if config[PERIODS] > 0.0:
+        samples = 2.0 * half * config[PERIODS] * config[SHORTEST]
+        least = samples / (samples + 1.0)
+    forgetting = policies.nominal(state[FRONT + law.state_size(n) :], forgetting)
+    return law.varied(state[FRONT:], phi, z, n, R, forgetting, least)
+
+
+@register_jitable
+def _watch(state: Any, config: Any, n: int, part: Any) -> None:
+    """Learn the innovation's usual energy, and add P_0 where it says that something changed."""
+    extra = state[FRONT + law.state_size(n) :]
+    y, S = state[FRONT + law.INNOVATION], state[FRONT + law.INNOVATION_VARIANCE]
+    if policies.changed(extra, y, S, part, config[THRESHOLD], config[RISEN]):
+        start = FRONT + law.HEAD + n
+        P_0 = state[start + n * n : start + 2 * n * n]
+        least_squares.add_covariance(state[start : start + n * n], P_0, n)
+        state[FRONT + law.RESETS] += 1.0
+
+
+@register_jitable
 def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     """One raw sample: a regression for the law, or a note of why there is none."""
     n = int(config[N])
     law_state = state[FRONT:]
     if np.abs(u) < WILDEST:
-        u = delayed(state[FRONT + law.state_size(n) :], config[FRACTION], u)
+        u = delayed(state[FRONT + law.state_size(n) + int(config[EXTRA]) :], config[FRACTION], u)
     state[SAMPLES] += 1.0
     known = np.abs(u) < WILDEST
     measured = known and np.abs(x) < WILDEST
@@ -255,16 +298,43 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     if state[FROZEN] != 0.0:
         law_state[law.LAST] = law.HOLDING
         return
+    if config[PLACES] > 0.0:
+        _visit(state, config, n, part)
     half = swing.half_period(state[SWING : SWING + swing.STATE], config[FIRST_HALF])
     R = _walk(state, config, phi, n, part, half)
     forgetting = config[CONFIG + law.FORGETTING]
     if config[PERIODS] > 0.0:
         samples = 2.0 * half * config[PERIODS]
         forgetting = samples / (samples + 1.0)
+    if config[EXCITED] > 0.0:
+        extra = law_state[law.state_size(n) :]
+        work = law_state[law.HEAD + n + 2 * n * n :]
+        policies.gate(extra, state[EXCITATION : EXCITATION + n * n], n, config[EXCITED], work)
+        if extra[policies.SHUT] != 0.0:
+            law_state[law.LAST] = law.HOLDING
+            law_state[law.HELD] += 1.0
+            return
+    if config[CONFIG + law.LEAST_FACTOR] > 0.0:
+        forgetting = _varied(state, config, phi, z, n, R, forgetting, half)
     resets, updates = law_state[law.RESETS], law_state[law.UPDATES]
     law.adapt(law_state, config[CONFIG:], phi, z, n, R, forgetting)
+    if config[EXTRA] > 0.0 and law_state[law.LAST] == law.UPDATED:
+        _watch(state, config, n, part)
+    if config[MARGIN] > 0.0:
+        head = law.HEAD
+        policies.project(
+            law_state[head : head + n],
+            law_state[head + n : head + n + n * n],
+            n,
+            config[SCALE : SCALE + 5],
+            LEAST,
+            config[MARGIN],
+            law_state[head + 2 * n + 2 * n * n :],  # of the work space what the law's gain is not in
+        )
     if law_state[law.LAST] == law.UPDATED and config[CONFIG + law.CONTINUOUS] == 0.0:
         restart = updates == 0.0 or law_state[law.RESETS] != resets
+        if config[CONFIG + law.DIRECTIONAL] != 0.0:
+            forgetting = 1.0  # it is not in that law's gain
         _propagate_error(state, config, phi, n, forgetting, restart)
 
 

@@ -9,15 +9,24 @@ import numpy as np
 from piezoest._checks import FloatArray, positive
 from piezoest.equations import filters
 from piezoest.estimators import rls_kernel as kernel
+from piezoest.estimators import rls_policies as extra
 from piezoest.models import ColemanHodgdon, LinearGain, Model
 from piezoest.policies import (
+    AmplitudeMemory,
+    ChangeDetection,
     DeadZone,
+    DirectionalForgetting,
+    ExcitationGate,
+    Forgetting,
     Normalisation,
     NormBound,
     OutlierRejection,
     PeriodicForgetting,
     Policy,
+    Projection,
     RandomWalk,
+    VariableForgetting,
+    forgetting_of,
     select,
 )
 
@@ -37,19 +46,29 @@ def default_policies(memory: Any, initial: Model) -> tuple[Policy, ...]:
     return forgetting, DeadZone(), OutlierRejection()
 
 
-def check_policies(policies: tuple[Policy, ...], memory: Any, time_base: str) -> None:
-    """Refuse the clock's policies without their memory.
+def check_policies(policies: tuple[Policy, ...], memory: Any, time_base: str, initial: Model) -> None:
+    """Refuse the clock's policies without their memory, and what excludes each other.
 
     Raises
     ------
     ValueError
-        If there is one of them with another memory or the continuous time base.
+        If there is one of them with another memory or the continuous time base, two ways to forget, or one
+        that the model does not go with.
     """
     clocked = select(policies, RandomWalk) or select(policies, PeriodicForgetting)
     if clocked and (time_base == "continuous" or memory != "period"):
         raise ValueError(
             "policies: RandomWalk and PeriodicForgetting go with memory='period' and the discrete time base"
         )
+    stated = () if memory in (None, "period") else (Forgetting(memory),)
+    forgetting_of((*policies, *stated))
+    clocked_kinds = (ExcitationGate, ChangeDetection, AmplitudeMemory, Projection)
+    for kind in clocked_kinds if time_base == "continuous" else ():
+        if select(policies, kind):
+            raise ValueError(f"policies: {kind.__name__} goes with the discrete time base")
+    for kind in (Projection, AmplitudeMemory) if isinstance(initial, LinearGain) else ():
+        if select(policies, kind):
+            raise ValueError(f"policies: {kind.__name__} goes with a ColemanHodgdon, not with a LinearGain")
 
 
 def parameter_scale(initial: ColemanHodgdon | LinearGain, offset: bool) -> FloatArray:
@@ -67,10 +86,37 @@ def policy_settings(config: FloatArray, policies: tuple[Policy, ...], sample_rat
     periodic = select(policies, PeriodicForgetting)
     if isinstance(periodic, PeriodicForgetting):
         config[kernel.PERIODS] = periodic.memory
+    by_clock = select(policies, DirectionalForgetting) or select(policies, VariableForgetting)
+    if isinstance(by_clock, DirectionalForgetting | VariableForgetting) and by_clock.unit == "period":
+        config[kernel.PERIODS] = by_clock.memory
+    _switched_settings(config, policies)
     rejection = select(policies, OutlierRejection)
     if isinstance(rejection, OutlierRejection) and config[kernel.HYSTERETIC]:
         config[kernel.OUTLIER] = 1.0
         config[kernel.WARM_UP] = rejection.warm_up
+
+
+def _switched_settings(config: FloatArray, policies: tuple[Policy, ...]) -> None:
+    """The part of what is off by default."""
+    projection = select(policies, Projection)
+    if isinstance(projection, Projection):
+        config[kernel.MARGIN] = projection.margin
+    detection = select(policies, ChangeDetection)
+    if isinstance(detection, ChangeDetection):
+        config[kernel.THRESHOLD], config[kernel.RISEN] = detection.threshold, detection.drift
+    gate = select(policies, ExcitationGate)
+    if isinstance(gate, ExcitationGate):
+        config[kernel.EXCITED] = gate.least
+    variable = select(policies, VariableForgetting)
+    if isinstance(variable, VariableForgetting):
+        config[kernel.SHORTEST] = variable.shortest
+    amplitudes = select(policies, AmplitudeMemory)
+    if isinstance(amplitudes, AmplitudeMemory):
+        config[kernel.PLACES] = amplitudes.places
+        config[kernel.TOLERANCE] = amplitudes.tolerance
+        config[kernel.RECALLED] = amplitudes.uncertainty**2
+    if detection or gate or variable or amplitudes:
+        config[kernel.EXTRA] = extra.HEAD + extra.PLACE * config[kernel.PLACES]
 
 
 def front_end(

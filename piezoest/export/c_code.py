@@ -13,14 +13,19 @@ from piezoest._checks import integer
 from piezoest._version import __version__
 from piezoest.compensators import Compensator
 from piezoest.compensators.layout import OFFSET
+from piezoest.equations import turning_points
 from piezoest.estimators.base import Compiled
 from piezoest.export import c_text as text
 from piezoest.export import ring
 from piezoest.export.c_translator import Translator
 from piezoest.export.c_values import Array, Expr, Known, Root, Value
-from piezoest.models import ColemanHodgdon
+from piezoest.models import ColemanHodgdon, Model, PrandtlIshlinskii
 
 Precision = Literal["double", "float"]
+
+_FIXED = "it fixed: c(None, InverseCompensator(estimator.model))"
+# What rounding cannot tell apart is more in float.
+_FLOAT = {("piezoest.equations.bent_plays", "SAME"): 1e-5}
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +89,7 @@ def c(
     estimator : HysteresisRLS, HysteresisEKF or None
         In its present state; None for feed-forward with a fixed model.
     compensator : InverseCompensator or LinearCompensator
-        In its present state, with its limits.
+        In its present state, with its limits. A `PrandtlIshlinskii` model in it stays fixed.
     name : str
         Prefix of all public names, and name of the files.
     precision : {"double", "float"}
@@ -112,9 +117,11 @@ def c(
             f"compensator must be an InverseCompensator or a LinearCompensator, got {compensator!r}"
         )
     if estimator is not None and not _has_kernel(estimator):
+        hint = "only estimators with a compiled kernel can be exported"
+        if isinstance(getattr(estimator, "model", None), PrandtlIshlinskii):
+            hint = "learn a Prandtl-Ishlinskii model beside the controller, and export " + _FIXED
         raise ValueError(
-            f"estimator must be a HysteresisRLS or a HysteresisEKF, got {type(estimator).__name__}: "
-            "only estimators with a compiled kernel can be exported"
+            f"estimator must be a HysteresisRLS or a HysteresisEKF, got {type(estimator).__name__}: {hint}"
         )
     return _Generator(estimator, compensator, name, precision, interval).code()
 
@@ -126,19 +133,36 @@ def _has_kernel(estimator: Any) -> bool:
     return owner is not None and kind._sample is owner._sample  # type: ignore[attr-defined]
 
 
+def _described(model: Model) -> str:
+    """The model in one line; the numbers of plays stand in the settings."""
+    if not isinstance(model, PrandtlIshlinskii):
+        return str(model)
+    terms = 0 if model.creep is None else model.creep.gains.size
+    return (
+        f"PrandtlIshlinskii of {model.thresholds.size} plays, {model.bends.size} bends and {terms} creep "
+        f"terms, gain {model.gain!r}, offset {model.offset!r}"
+    )
+
+
 class _Generator:
     def __init__(self, estimator: Any, compensator: Compensator, name: str, precision: str, interval: int):
         self.estimator, self.compensator, self.name, self.interval = estimator, compensator, name, interval
         self.precision = precision
         unneeded = () if estimator is None else estimator._compiled.unneeded
-        self.translator = Translator(real=precision, single=precision == "float", unneeded=unneeded)
         self.voltage, self.change = compensator._compiled
+        if self.change is None:
+            # Only another model's plays would be set from it.
+            unneeded = (*unneeded, turning_points.remember)
+        single = precision == "float"
+        self.translator = Translator(precision, single, unneeded, _FLOAT if single else {})
         self.members: list[tuple[str, np.ndarray[Any, Any], str]] = []
         self.hysteretic = isinstance(compensator.model, ColemanHodgdon)
         if estimator is not None:
             if self.change is None:
+                kind = type(compensator.model).__name__
                 raise ValueError(
-                    f"a {type(compensator).__name__} takes no other model: leave out the estimator"
+                    f"the code for a {kind} takes no other model: leave out the estimator, "
+                    "or start the compensator with a ColemanHodgdon or LinearGain"
                 )
             compensator._accepts(estimator.model)
             self.hysteretic = isinstance(estimator.model, ColemanHodgdon)
@@ -151,6 +175,8 @@ class _Generator:
         if self.change is not None:
             start[ring.MODEL : ring.MODEL + model.theta.size] = model.theta
             start[ring.MODEL + 3] = self.compensator._config[OFFSET]
+        elif isinstance(model, PrandtlIshlinskii):
+            start[ring.MODEL], start[ring.MODEL + 3] = model.gain, model.offset
         self.member("ring", start, "voltage given out last, counters, model in use")
         if self.estimator is not None:
             self.member("estimator", self.estimator._state, "state of the estimator")
@@ -231,7 +257,7 @@ class _Generator:
         estimator = "none" if self.estimator is None else type(self.estimator).__name__
         lines = [
             f"Generated by piezoest {__version__}; regenerate it instead of editing it.",
-            f"Compensator: {type(self.compensator).__name__}, {self.compensator.model}.",
+            f"Compensator: {type(self.compensator).__name__}, {_described(self.compensator.model)}.",
             f"Limits: {self.compensator.limits}.",
             f"Estimator: {estimator}.",
         ]

@@ -152,7 +152,7 @@ class Expressions:
             text = f"{owner.lstrip('_')}_{name.lstrip('_')}".upper()
             self.translator.positions[text] = value
             return Known(value, text)
-        return Known(value)
+        return Known(self.translator.coarser.get((module, name), value))
 
     def attribute(self, node: ast.Attribute) -> Value:
         """An attribute of a module, or the size of an array."""

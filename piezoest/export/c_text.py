@@ -19,6 +19,12 @@ LICENCE = """Copyright (c) The piezoest developers. MIT licence: permission is g
 use, copy, modify, merge, publish, distribute, sublicense and sell this code, provided that this notice
 stays in it. It comes as is, without warranty of any kind."""
 
+_CHANGE = """
+/* Use another model, without a bump; freeze before, or the next one learnt replaces it. An inadmissible
+ * model is replaced by its nearest admissible one; returns 0, and changes nothing, if there is none. */
+""".strip()
+_NO_CHANGE = "/* The model of this controller is fixed: returns 0, and changes nothing. */"
+
 _HELPERS = {
     "sign": "return (real)((x > 0) - (x < 0));",
     "larger": "return b > a ? b : a;",
@@ -37,6 +43,7 @@ def header(made: _Generator) -> str:
     name, real = made.name, made.precision
     guard = f"{name.upper()}_H"
     kind = "alpha [1/V], beta [um/V], gamma [um/V^2]" if made.hysteretic else "gain [um/V], 0, 0"
+    change = _CHANGE if made.change is not None else _NO_CHANGE
     members = "\n".join(
         f"    {real} {member}[{values.size}]; /* {meaning} */" for member, values, meaning in made.members
     )
@@ -70,8 +77,7 @@ void {name}_freeze({name}_state *state, int frozen);
 /* Model in use: {kind}, offset [um]. */
 void {name}_get_parameters(const {name}_state *state, {real} parameters[4]);
 
-/* Use another model, without a bump; freeze before, or the next one learnt replaces it. An inadmissible
- * model is replaced by its nearest admissible one; returns 0, and changes nothing, if there is none. */
+{change}
 int {name}_set_parameters({name}_state *state, const {real} parameters[4]);
 
 /* Limits of the voltage [V]. */

@@ -70,11 +70,14 @@ class Translator:
         Whether it is float.
     unneeded : tuple of callable
         Functions whose calls, as statements, are left out.
+    coarser : dict
+        Constants, by module and name, that have another value here.
     """
 
     real: str
     single: bool
     unneeded: tuple[Any, ...] = ()
+    coarser: dict[tuple[str, str], float] = field(default_factory=dict)
     functions: list[Function] = field(default_factory=list)
     tables: dict[str, tuple[float, ...]] = field(default_factory=dict)
     positions: dict[str, int] = field(default_factory=dict)

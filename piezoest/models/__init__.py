@@ -3,6 +3,7 @@
 from typing import Any
 
 from piezoest.models._base import Model
+from piezoest.models.amplitude_profile import AmplitudeProfile
 from piezoest.models.coleman_hodgdon import ColemanHodgdon
 from piezoest.models.creep import Creep
 from piezoest.models.linear_gain import LinearGain
@@ -11,6 +12,7 @@ from piezoest.models.prandtl_ishlinskii import PrandtlIshlinskii
 from piezoest.models.preisach import Preisach
 
 __all__ = [
+    "AmplitudeProfile",
     "ColemanHodgdon",
     "Creep",
     "LinearGain",

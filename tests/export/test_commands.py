@@ -35,6 +35,19 @@ def test_model_becomes_a_feed_forward(model: Path) -> None:
     assert "150.0f" in text
 
 
+def test_plays_become_a_feed_forward(model: Path) -> None:
+    plays = pz.PrandtlIshlinskii(0.1, [1.0, 5.0], [0.02, 0.03], creep=pz.Creep([0.01], [1.0]))
+    model.write_text(json.dumps(plays.to_dict()))
+    assert run("c", model, "-o", "out", "--sample-rate", 50_000).exit_code == 0
+    assert (
+        "PrandtlIshlinskii of 2 plays, 0 bends and 1 creep" in Path("out/piezoest_controller.c").read_text()
+    )
+    for kind in ("rls", "ekf"):
+        refused = run("c", model, "-o", "out", "--sample-rate", 50_000, "--estimator", kind)
+        assert refused.exit_code == 1
+        assert "PrandtlIshlinskii" in refused.stderr
+
+
 @pytest.mark.parametrize("kind", ["rls", "ekf"])
 def test_model_learns_on(model: Path, kind: str) -> None:
     result = run("c", model, "-o", "out", "--estimator", kind, "--sample-rate", 50_000, "--name", "stage")

@@ -1,0 +1,177 @@
+"""A lead for mechanics and delay, before a feed-forward."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any, Self
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST, FloatArray, array_1d, finite, positive
+from piezoest.compensators.base import Compensator, CompensatorStatus
+from piezoest.compensators.limits import VoltageLimits
+from piezoest.equations.lead import lead_coefficients, lead_step
+from piezoest.models import MassSpringDamper, Model
+
+# State: last r, r', r'', whether there was a sample before.
+STARTED, STATE = 3, 4
+
+
+@register_jitable
+def _lead(state: Any, coefficients: Any, r: Any) -> Any:
+    """Reference to hand on; a missing sample is handed on, and the next one starts from rest."""
+    if not np.abs(r) < WILDEST:
+        state[STARTED] = 0.0
+        return np.nan
+    if state[STARTED] == 0.0:
+        state[STARTED] = 1.0
+        state[0] = r
+        state[1] = state[2] = 0.0
+    return lead_step(state, r, coefficients)
+
+
+@njit("f8(f8[::1], f8[::1], f8)", cache=True)
+def _step(state: Any, coefficients: Any, r: float) -> Any:
+    return _lead(state, coefficients, r)
+
+
+@njit("void(f8[::1], f8[::1], f8[::1])", cache=True)
+def _run(state: Any, coefficients: Any, r: Any) -> None:
+    for k in range(r.size):
+        r[k] = _lead(state, coefficients, r[k])
+
+
+class LeadFilter:
+    """A second-order lead before a feed-forward, for references that reach towards the resonance.
+
+    The compensator gets r + c1 r' + c2 r'', which is what the stage's mechanics and delay will turn
+    into r again. Worth it for references that reach a twentieth of the resonance or have corners there.
+
+    Parameters
+    ----------
+    compensator : LinearCompensator or InverseCompensator
+        The feed-forward.
+    mechanics : MassSpringDamper
+        Resonance of the stage.
+    sample_rate : float
+        [Hz].
+    delay : float
+        From the voltage to the force on the stage [s], such as an amplifier's filter; half a sample
+        of hold is known of and not part of it, nor is the delay of the sensor.
+    smoothing : float, optional
+        Time constant of the differences [s]; default 1/omega of the mechanics. What is faster is
+        amplified by 1 + c1/smoothing + c2/smoothing², about twice by default.
+
+    Raises
+    ------
+    ValueError
+        If the compensator is none, the mechanics no `MassSpringDamper`, or a number out of range.
+
+    Notes
+    -----
+    Stable for all settings: its one pole lies within the unit circle. The voltage stays within the
+    compensator's limits. An estimator beside it has to know the same lag, or learns it as
+    hysteresis and compensates twice: see `mechanics` and `delay` of `PrandtlIshlinskiiRLS`.
+    Equations: `piezoest.equations.lead`.
+    """
+
+    __slots__ = ("_coefficients", "_compensator", "_state")
+
+    def __init__(
+        self,
+        compensator: Compensator,
+        mechanics: MassSpringDamper,
+        *,
+        sample_rate: float,
+        delay: float = 0.0,
+        smoothing: float | None = None,
+    ) -> None:
+        if not isinstance(compensator, Compensator):
+            raise ValueError(
+                f"compensator must be a LinearCompensator or an InverseCompensator, got {compensator!r}"
+            )
+        if not isinstance(mechanics, MassSpringDamper):
+            raise ValueError(f"mechanics must be a MassSpringDamper, got {mechanics!r}")
+        omega = 2.0 * np.pi * mechanics.natural_frequency
+        self._compensator = compensator
+        self._coefficients = lead_coefficients(
+            mechanics.natural_frequency,
+            mechanics.damping_ratio,
+            finite("delay", delay),
+            1.0 / omega if smoothing is None else positive("smoothing", smoothing),
+            1.0 / positive("sample_rate", sample_rate),
+        )
+        self._state = np.zeros(STATE)
+
+    @property
+    def model(self) -> Model:
+        """Model of the feed-forward; settable, bumpless."""
+        return self._compensator.model
+
+    @model.setter
+    def model(self, model: Model) -> None:
+        self._compensator.model = model
+
+    @property
+    def compensator(self) -> Compensator:
+        """The feed-forward inside."""
+        return self._compensator
+
+    @property
+    def limits(self) -> VoltageLimits:
+        """Limits that the voltage never leaves."""
+        return self._compensator.limits
+
+    @property
+    def status(self) -> CompensatorStatus:
+        """What happened to the samples so far."""
+        return self._compensator.status
+
+    def step(self, r: float | None) -> float:
+        """Voltage for the next sample of the reference.
+
+        Parameters
+        ----------
+        r : float
+            Reference displacement [µm]; None, NaN or infinity holds the last voltage.
+
+        Returns
+        -------
+        float
+            Voltage [V], within the limits.
+        """
+        lead = _step(self._state, self._coefficients, np.nan if r is None else r)
+        return self._compensator.step(lead)
+
+    def run(self, r: Any) -> FloatArray:
+        """Voltages for a whole reference; continues from the current state, as a loop of `step`.
+
+        Parameters
+        ----------
+        r : array_like, shape (N,)
+            Reference displacement [µm]; NaN holds the last voltage.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Voltage [V], within the limits.
+
+        Raises
+        ------
+        ValueError
+            If r is not a 1-D array of numbers.
+        """
+        lead = array_1d("r", r, allow_nan=True).copy()
+        _run(self._state, self._coefficients, lead)
+        return self._compensator.run(lead)
+
+    def reset(self) -> None:
+        """Return to the state after construction."""
+        self._state = np.zeros(STATE)
+        self._compensator.reset()
+
+    def copy(self) -> Self:
+        """Return an independent one in the same state."""
+        return copy.deepcopy(self)

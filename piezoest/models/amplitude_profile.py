@@ -1,0 +1,154 @@
+"""Models per size of the voltage's swing: what was learnt at each amplitude, as a file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from piezoest._checks import FloatArray, array_1d, positive
+from piezoest.models.coleman_hodgdon import ColemanHodgdon
+
+_FORMAT = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AmplitudeProfile:
+    """Coleman-Hodgdon parameters per swing of the voltage.
+
+    Parameters
+    ----------
+    swings : array_like, shape (M,)
+        Size of each swing, turning point to turning point [V]; in ascending order.
+    theta : array_like, shape (M, 3)
+        alpha [1/V], beta [µm/V] and gamma [µm/V²] at each.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not match, a swing is not above the one before, or a value is not finite.
+
+    Notes
+    -----
+    Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), last paragraph of
+    sec. IV: parameters scheduled by the reference's amplitude.
+    """
+
+    swings: FloatArray
+    theta: FloatArray
+
+    def __post_init__(self) -> None:
+        swings = array_1d("swings", self.swings)
+        theta = np.array(self.theta, dtype=np.float64).reshape(-1, 3) if swings.size == 0 else self.theta
+        theta = np.array(theta, dtype=np.float64)
+        if theta.shape != (swings.size, 3) or not np.all(np.isfinite(theta)):
+            raise ValueError(f"theta must be finite with shape ({swings.size}, 3), got {theta.shape}")
+        if np.any(np.diff(swings, prepend=0.0) <= 0.0):
+            raise ValueError(f"swings must be above zero and ascend, got {swings.tolist()}")
+        object.__setattr__(self, "swings", swings)
+        object.__setattr__(self, "theta", theta)
+
+    def at(self, swing: float) -> ColemanHodgdon:
+        """Model for a size of swing: interpolated, and beyond the ends that of the nearest.
+
+        Parameters
+        ----------
+        swing : float
+            [V].
+
+        Raises
+        ------
+        ValueError
+            If the profile is empty, or swing is not above zero.
+        """
+        if self.swings.size == 0:
+            raise ValueError("the profile is empty: let an estimator with AmplitudeMemory learn first")
+        swing = positive("swing", swing)
+        values = [float(np.interp(swing, self.swings, self.theta[:, i])) for i in range(3)]
+        return ColemanHodgdon(*values)
+
+    def swing_for(self, amplitude: float) -> float:
+        """Size of swing [V] that moves the stage by an amplitude to both sides.
+
+        Parameters
+        ----------
+        amplitude : float
+            [µm].
+
+        Raises
+        ------
+        ValueError
+            If the profile is empty, or amplitude is not above zero.
+        """
+        r = positive("amplitude", amplitude) * np.sin(np.linspace(0.0, 6.0 * np.pi, 1500))
+        swing = float(self.swings[-1]) if self.swings.size else 1.0
+        for _ in range(5):
+            u = self.at(swing).invert(r)[500:]
+            swing = float(np.max(u) - np.min(u))
+        return swing
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a JSON-safe dictionary; its ``"model"`` is that of the largest swing."""
+        data: dict[str, Any] = {
+            "profile": type(self).__name__,
+            "format": _FORMAT,
+            "swings": self.swings.tolist(),
+            "theta": self.theta.tolist(),
+        }
+        if self.swings.size:
+            data["model"] = self.at(float(self.swings[-1])).to_dict()
+        return data
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Self:
+        """Make the profile from what `to_dict` gave.
+
+        Parameters
+        ----------
+        data : dict
+            The dictionary.
+
+        Raises
+        ------
+        ValueError
+            If it describes no profile, or one of another format.
+        """
+        if data.get("profile") != cls.__name__ or data.get("format") != _FORMAT:
+            raise ValueError(f"data is no {cls.__name__} of format {_FORMAT}: write it with save()")
+        return cls(data.get("swings"), data.get("theta"))  # type: ignore[arg-type]
+
+    def save(self, path: str | Path) -> None:
+        """Write the profile as JSON.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write. `piezoest compensate` and `piezoest export` take it for the model of its largest
+            swing.
+        """
+        Path(path).write_text(json.dumps(self.to_dict(), indent=2) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read what `save` wrote.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Raises
+        ------
+        ValueError
+            If the file holds no profile.
+        """
+        try:
+            data = json.loads(Path(path).read_text(encoding="utf-8"))
+        except (json.JSONDecodeError, UnicodeDecodeError) as error:
+            raise ValueError(f"{path} is not JSON: {error}") from None
+        if not isinstance(data, dict):
+            raise ValueError(f"{path} holds no profile")
+        return cls.from_dict(data)

@@ -1,0 +1,275 @@
+"""Policies that are off by default: each does what it says, refuses bad values, and is saved."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest import policies as p
+from piezoest.equations import least_squares as ls
+
+FS = 5000.0
+TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
+BASE = (p.DeadZone(), p.OutlierRejection())
+POLICIES: dict[str, tuple[Any, ...]] = {
+    "directional": (p.DirectionalForgetting(),),
+    "directional-seconds": (p.DirectionalForgetting(0.2, "second"),),
+    "variable": (p.VariableForgetting(),),
+    "variable-seconds": (p.VariableForgetting(0.2, 0.1, "second"),),
+    "projection": (p.RandomWalk(), p.Projection()),
+    "detection": (p.RandomWalk(), p.ChangeDetection()),
+    "gate": (p.RandomWalk(), p.ExcitationGate()),
+    "amplitudes": (p.RandomWalk(), p.AmplitudeMemory()),
+    "all": (
+        p.VariableForgetting(),
+        p.Projection(),
+        p.ChangeDetection(),
+        p.ExcitationGate(),
+        p.AmplitudeMemory(),
+    ),
+}
+
+
+def record(periods: float, volts: float = 33.0, model: Any = TRUE) -> tuple[Any, Any]:
+    u = pz.signals.triangle(volts, 5.0, periods, FS).values
+    return u, model.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
+
+
+def made(*policies: Any, **options: Any) -> Any:
+    return pz.HysteresisRLS(FS, policies=(*policies, *BASE), **options)
+
+
+def profile_of(swings: Any, theta: Any) -> Any:
+    return pz.AmplitudeProfile(swings, theta)
+
+
+def start() -> tuple[Any, Any, Any]:
+    rng = np.random.default_rng(3)
+    A = rng.normal(size=(3, 3))
+    return rng.normal(size=3), A @ A.T + np.eye(3), rng
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_same_bits_by_step_run_and_from_a_file(name: str) -> None:
+    u, x = record(6.0)
+    u = np.concatenate([u, 0.5 * u, u])
+    x = TRUE.simulate(u) + 1e-3 * np.random.default_rng(1).standard_normal(u.size)
+    whole, steps, halves = (made(*POLICIES[name], delay=1.5) for _ in range(3))
+    fresh = whole.to_dict()
+    whole.run(u, x)
+    for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+        steps.step(u_k, x_k)
+    halves.run(u[:7000], x[:7000])
+    resumed = pz.HysteresisRLS.from_dict(json.loads(json.dumps(halves.to_dict(), allow_nan=False)))
+    resumed.run(u[7000:], x[7000:])
+    for other in (steps, resumed, whole.copy()):
+        assert other.to_dict() == whole.to_dict()
+    np.testing.assert_allclose(whole.theta[:3], TRUE.theta, rtol=0.15)
+    assert np.linalg.eigvalsh(whole.P / np.sqrt(np.outer(np.diag(whole.P), np.diag(whole.P))))[0] > 0.0
+    whole.reset()
+    assert whole.to_dict() == fresh
+
+
+def test_directional_forgetting_is_the_textbook() -> None:
+    theta, P, rng = start()
+    flat, expected, information = P.ravel().copy(), theta.copy(), np.linalg.inv(P)
+    mu, R = 0.9, 0.3
+    for _ in range(50):
+        phi, z = rng.normal(size=3), rng.normal()
+        covariance = np.linalg.inv(information)
+        q = phi @ covariance @ phi
+        expected = expected + covariance @ phi / (R + q) * (z - expected @ phi)
+        information = information + (mu - (1.0 - mu) * R / q) * np.outer(phi, phi) / R
+        ls.directional_update(theta, flat, phi, z, 3, mu, R, np.inf, 1.0, np.zeros(3))
+    np.testing.assert_allclose(theta, expected, rtol=1e-8)
+    np.testing.assert_allclose(np.linalg.inv(flat.reshape(3, 3)), information, rtol=1e-7)
+
+
+def test_directional_forgetting_keeps_what_is_not_excited() -> None:
+    """One direction for long: exponential forgetting loses the others, this does not."""
+    estimators = []
+    for policy in (p.Forgetting(20.0), p.DirectionalForgetting(20.0, "second")):
+        estimator = pz.RecursiveLeastSquares(2, P=1.0, policies=(policy,))
+        for k in range(2000):
+            estimator.update(1.0, [1.0, 0.0 if k else 1.0])
+        estimators.append(np.linalg.eigvalsh(estimator.P)[-1])
+    assert estimators[0] > 1e9
+    assert estimators[1] < 1.5
+
+
+def test_variable_forgetting_is_the_textbook() -> None:
+    theta, P, rng = start()
+    estimator = pz.RecursiveLeastSquares(
+        3, theta=theta, P=P, noise_variance=0.04, policies=(p.VariableForgetting(50.0, 0.1, "second"),)
+    )
+    memory = 1.0 / (1.0 - np.exp(-1.0 / 50.0))
+    for _ in range(100):
+        phi, z = rng.normal(size=3), rng.normal()
+        y, q = z - theta @ phi, phi @ P @ phi
+        mu = max(1.0 - y * y / (0.04 + q) / memory, np.exp(-1.0 / 5.0))
+        K = P @ phi / (mu * 0.04 + q)
+        theta, P = theta + K * y, (P - np.outer(K, phi) @ P) / mu
+        estimator.update(z, phi)
+    np.testing.assert_allclose(estimator.theta, theta, rtol=1e-8)
+    np.testing.assert_allclose(estimator.P, P, rtol=1e-7)
+
+
+def test_cusum_is_pages() -> None:
+    values = np.random.default_rng(0).exponential(size=300) + (np.arange(300) > 200)
+    total, sums = 0.0, np.concatenate([[0.0], np.cumsum(values - 1.5)])
+    for k, value in enumerate(values):
+        total = ls.cusum(total, value, 1.5)
+        # Page: the walk's height above its lowest point so far.
+        assert total == pytest.approx(sums[k + 1] - sums[: k + 2].min(), abs=1e-9)
+
+
+@pytest.mark.parametrize("forgetting", [p.RandomWalk(), p.PeriodicForgetting(2.0)])
+def test_a_step_of_the_gain_is_detected_once(forgetting: Any) -> None:
+    u, x = record(20.0)
+    half = u.size // 2
+    with_it, without = made(forgetting, p.ChangeDetection()), made(forgetting)
+    with_it.run(u[:half], x[:half])
+    assert with_it.status.resets == 0
+    without.run(u[:half], x[:half])
+    for estimator in (with_it, without):
+        estimator.run(u[half : half + 1500], 0.8 * x[half : half + 1500])
+    assert with_it.status.resets == 1
+    expected = TRUE.theta * [1.0, 0.8, 0.8]
+    errors = [np.abs(e.theta[:3] / expected - 1.0).max() for e in (with_it, without)]
+    assert errors[0] < errors[1]
+
+
+def test_gate_shuts_where_nothing_excites() -> None:
+    u, x = record(6.0)
+    gated = made(p.RandomWalk(), p.ExcitationGate(0.2))
+    gated.run(u, x)
+    assert gated.excitation < 0.2
+    assert gated.status.updates < 64 * 3
+    assert gated.status.last == "held"
+    P = gated.P
+    gated.run(u, x)
+    np.testing.assert_array_equal(gated.P, P)
+    opened = made(p.RandomWalk(), p.ExcitationGate())
+    opened.run(u, x)
+    assert opened.status.updates > 0.9 * u.size
+
+
+def test_projection_keeps_theta_admissible() -> None:
+    """A straight line has no admissible Coleman-Hodgdon model: the data pull theta out of the set."""
+    u, x = record(4.0, model=pz.LinearGain(0.15))
+    inside, free = made(p.RandomWalk(), p.Projection(0.02)), made(p.RandomWalk())
+    theta = inside.run(u, x).theta
+    free.run(u, x)
+    assert free.status.projected
+    assert not inside.status.projected
+    area = theta[:, 0] * theta[:, 1]
+    assert np.all(theta[:, 2] >= 1.02 * area * (1.0 - 1e-12))
+    assert np.all(theta[:, 2] <= 1.98 * area * (1.0 + 1e-12))
+    np.testing.assert_array_equal(inside.model.theta, inside.theta[:3])
+
+
+def test_amplitudes_are_remembered(tmp_path: Path) -> None:
+    """Another loop at each amplitude: a long memory then starts from what was learnt there."""
+    small, large = pz.ColemanHodgdon(0.024, 0.14, 0.0046), TRUE
+    parts = [record(8.0, volts, model) for volts, model in ((15.0, small), (45.0, large), (15.0, small))]
+    estimator = made(p.PeriodicForgetting(1.0), p.AmplitudeMemory())
+    for part in parts[:2]:
+        estimator.run(*part)
+    profile = estimator.profile
+    np.testing.assert_allclose(profile.swings, [30.0, 90.0], rtol=0.05)
+    np.testing.assert_allclose(profile.at(30.0).theta, small.theta, rtol=0.25)
+    np.testing.assert_allclose(profile.at(90.0).theta, large.theta, rtol=0.15)
+    between = profile.at(60.0).theta
+    assert np.all(np.sort([profile.theta[0], between, profile.theta[1]], axis=0)[1] == between)
+
+    path = tmp_path / "profile.json"
+    profile.save(path)
+    loaded = pz.AmplitudeProfile.load(path)
+    np.testing.assert_array_equal(loaded.theta, profile.theta)
+    fresh = made(p.PeriodicForgetting(1.0), p.AmplitudeMemory())
+    fresh.profile = loaded
+    np.testing.assert_allclose(fresh.profile.theta, profile.theta, rtol=1e-14)
+    amplitude = 0.5 * np.ptp(small.simulate(parts[0][0])[4000:])
+    assert loaded.swing_for(amplitude) == pytest.approx(30.0, rel=0.05)
+    fresh.announce_change(amplitude=amplitude)
+    np.testing.assert_allclose(fresh.theta[:3], profile.at(30.0).theta, rtol=0.02)
+
+    known, unknown = estimator, made(p.PeriodicForgetting(1.0))
+    for part in parts[:2]:
+        unknown.run(*part)
+    resets = known.status.resets
+    quarter = int(0.6 * FS / 5.0)
+    errors = []
+    for e in (known, unknown):
+        e.run(parts[2][0][:quarter], parts[2][1][:quarter])
+        errors.append(np.abs(e.theta[:3] / small.theta - 1.0).max())
+    assert known.status.resets > resets
+    assert errors[0] < errors[1]
+
+
+def test_commands_take_a_profile(tmp_path: Path) -> None:
+    from piezoest.cli import _model
+    from piezoest.export.commands import _read
+
+    path = tmp_path / "profile.json"
+    profile_of([30.0, 90.0], [[0.024, 0.14, 0.0046], TRUE.theta]).save(path)
+    assert _model(path, {}, None) == TRUE
+    assert _read(path)[0] == TRUE
+
+
+def test_two_ways_to_forget_exclude_each_other() -> None:
+    for pair in (
+        (p.RandomWalk(), p.PeriodicForgetting()),
+        (p.RandomWalk(), p.DirectionalForgetting()),
+        (p.VariableForgetting(), p.DirectionalForgetting()),
+    ):
+        with pytest.raises(ValueError, match="exclude each other"):
+            made(*pair)
+    with pytest.raises(ValueError, match="Forgetting and DirectionalForgetting exclude each other"):
+        made(p.DirectionalForgetting(), memory=0.4)
+    policy: Any
+    for policy in (p.DirectionalForgetting(), p.ChangeDetection(), p.ExcitationGate(), p.AmplitudeMemory()):
+        with pytest.raises(ValueError, match="discrete time base"):
+            made(policy, memory=None, time_base="continuous")
+    for policy in (p.Projection(), p.AmplitudeMemory()):
+        with pytest.raises(ValueError, match="goes with a ColemanHodgdon"):
+            made(policy, initial_model=pz.LinearGain(0.1))
+    for policy in (p.DirectionalForgetting(), p.ChangeDetection(), p.RandomWalk()):
+        with pytest.raises(ValueError, match="needs a voltage's clock"):
+            pz.RecursiveLeastSquares(2, policies=(policy,))
+
+
+def test_wrong_values() -> None:
+    for kind, options in (
+        (p.DirectionalForgetting, {"memory": 0.0}),
+        (p.DirectionalForgetting, {"unit": "minute"}),
+        (p.VariableForgetting, {"shortest": 0.0}),
+        (p.VariableForgetting, {"shortest": 1.5}),
+        (p.Projection, {"margin": 0.0}),
+        (p.Projection, {"margin": 0.5}),
+        (p.ChangeDetection, {"threshold": 0.0}),
+        (p.ChangeDetection, {"drift": -1.0}),
+        (p.ExcitationGate, {"least": 0.0}),
+        (p.ExcitationGate, {"least": 1.0}),
+        (p.AmplitudeMemory, {"places": 0}),
+        (p.AmplitudeMemory, {"tolerance": 0.0}),
+        (p.AmplitudeMemory, {"uncertainty": -1.0}),
+    ):
+        made_of: Any = kind
+        with pytest.raises(ValueError, match=next(iter(options))):
+            made_of(**options)
+    with pytest.raises(ValueError, match="needs policies"):
+        _ = made().profile
+    with pytest.raises(ValueError, match="amplitude must be above zero"):
+        made(p.AmplitudeMemory()).announce_change(amplitude=0.0)
+    with pytest.raises(ValueError, match="AmplitudeMemory has 1 places"):
+        made(p.AmplitudeMemory(places=1)).profile = profile_of([1.0, 2.0], [TRUE.theta] * 2)
+    with pytest.raises(ValueError, match="ascend"):
+        profile_of([2.0, 1.0], [TRUE.theta] * 2)
+    with pytest.raises(ValueError, match="empty"):
+        made(p.AmplitudeMemory()).profile.at(1.0)
