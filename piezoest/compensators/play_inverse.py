@@ -20,6 +20,7 @@ from piezoest.compensators.layout import (
     MISSED,
     OFFSET,
     OWED,
+    PATH,
     SAMPLES,
     SATURATED,
     SLEWED,
@@ -27,6 +28,7 @@ from piezoest.compensators.layout import (
     VOLTAGE,
     C,
 )
+from piezoest.equations import recent_path
 from piezoest.equations.bent_plays import (
     bent_plays_output,
     bent_plays_step,
@@ -59,6 +61,7 @@ def _voltage(
         state[SATURATED] += given != slewed
         state[LIMITED_NOW] = np.sign(wanted - given)
         state[VOLTAGE] = given
+        recent_path.follow(state, PATH, given)
         remember(state, MEMORY, given)
     else:
         state[MISSED] += 1.0

@@ -44,18 +44,6 @@ def hysteresis_rate(w_h, u_dot, a, b):
 
 
 @register_jitable
-def carried_place(place, ratio):
-    """Place in the loop, w_h in parts of its limit b/a, where a becomes `ratio` times as large.
-
-    A loop of amplitude A turns at tanh(a A), so that tanh(ratio artanh(place)) keeps A; this is
-    its algebraic neighbour, which keeps w_h/b in a small loop and w_h a/b in a large one.
-    """
-    ratio = np.fmin(np.fmax(ratio, 1e-9), 1e9)  # beyond, its square is no number any more
-    square = place * place
-    return place * ratio / np.sqrt((1.0 - square) + square * ratio * ratio)
-
-
-@register_jitable
 def relative_decay(travel):
     """(1 - exp(-travel)) / travel, which is 1 at travel = 0."""
     at_rest = (travel == 0.0) * 1.0
