@@ -11,6 +11,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST, FloatArray, array_1d, integer, positive
+from piezoest._jit import UNCOUNTED
 from piezoest.compensators import play_inverse
 from piezoest.compensators.layout import (
     BY_PATH,
@@ -100,12 +101,12 @@ def change_model(state: Any, config: Any, a: Any, b: Any, c: Any, offset: Any) -
     state[OWED] = expected - (c * state[VOLTAGE] + state[W_H] + offset)
 
 
-@njit("f8(f8[::1], f8[::1], f8)", cache=True)
+@njit("f8(f8[::1], f8[::1], f8)", cache=True, **UNCOUNTED)
 def _step(state: Any, config: Any, r: float) -> Any:
     return _voltage(state, config, r)
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True)
+@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True, **UNCOUNTED)
 def _run(state: Any, config: Any, r: Any, u: Any) -> None:
     for k in range(r.size):
         u[k] = _voltage(state, config, r[k])
@@ -137,6 +138,13 @@ class CompensatorStatus:
     slewed: int
     missing: int
     projected: bool
+
+
+def _is_tame(model: Model) -> bool:
+    """Whether no parameter is beyond what its inverse can take."""
+    if isinstance(model, ColemanHodgdon):
+        return all(abs(v) < WILDEST for v in (model.alpha, model.beta, model.gamma, model.offset))
+    return bool(np.all(np.abs([*model.theta, getattr(model, "offset", 0.0)]) < WILDEST))
 
 
 def _loop(model: Model) -> tuple[float, float, float, float]:
@@ -282,7 +290,7 @@ class Compensator:
     @model.setter
     def model(self, model: Model) -> None:
         model = self._accepts(model)
-        if not np.all(np.abs([*model.theta, getattr(model, "offset", 0.0)]) < WILDEST):
+        if not _is_tame(model):
             # An estimator that ran away: what its model's inverse gives is no number.
             self._projected = True
             return
