@@ -96,12 +96,16 @@ TRUE_START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
 
 @pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0), (0.6, 1.0, 0.7), (1.5, 0.8, 1.3)])
 def test_recovers_the_loop_from_any_start(factors: tuple[float, float, float]) -> None:
-    u = voltage(40.0)
+    # The loop is within 1.2 % of its amplitude after two periods; telling decay and slopes apart takes time.
+    u = voltage(80.0)
     start = pz.ColemanHodgdon(*(TRUE.theta * factors).tolist()).nearest_admissible(1e-3)
     estimator = pz.OutputErrorRLS(RATE, initial_model=start, noise=1e-6)
-    estimator.run(u, TRUE.simulate(u))
-    np.testing.assert_allclose(estimator.theta[:3], TRUE.theta, rtol=0.1)
-    assert loop_error(estimator.model, u) < 5e-3
+    x = TRUE.simulate(u)
+    estimator.run(u[: u.size // 40], x[: u.size // 40])
+    assert loop_error(estimator.model, u) < 0.06
+    estimator.run(u[u.size // 40 :], x[u.size // 40 :])
+    np.testing.assert_allclose(estimator.theta[:3], TRUE.theta, rtol=0.02)
+    assert loop_error(estimator.model, u) < 1e-3
 
 
 def test_finds_an_offset() -> None:
