@@ -13,11 +13,12 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
+from piezoest._jit import UNCOUNTED
 from piezoest.equations import kalman, least_squares
 from piezoest.equations import output_error as equations
+from piezoest.estimators import believing, swing
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as front
-from piezoest.estimators import swing
 from piezoest.estimators.delay_line import delayed
 
 # The filter's state: b, c and d in parts of the initial c, the loop's centre and the disturbance in
@@ -198,7 +199,7 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
         _move(state, config, u)
     jumped = state[front.GAP] > config[front.LONGEST_GAP]
     if jumped:
-        state[front.SEEN] = 0.0
+        state[front.BELIEF + believing.SEEN] = 0.0
     if measured and not front._believable(state, config, x):
         state[front.OUTLIERS] += 1.0
         law_state[law.LAST] = law.REJECTED
@@ -264,13 +265,17 @@ def propose(state: Any, config: Any, terms: Any, model: Any) -> None:
     proposed(state, config, terms, model)
 
 
-@njit("void(f8[::1], f8[::1], f8, f8)", cache=True)
+@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, **UNCOUNTED)
 def step(state: Any, config: Any, u: float, x: float) -> None:
     """Take one sample."""
     _sample(state, config, u, x)
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])", cache=True)
+@njit(
+    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
+    cache=True,
+    **UNCOUNTED,
+)
 def run(state: Any, config: Any, u: Any, x: Any, every: int, s: Any, y: Any, S_: Any, P_: Any) -> None:
     """Take whole records; every `every`-th sample into the histories that have room.
 
