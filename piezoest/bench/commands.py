@@ -15,26 +15,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from piezoest.bench import adaptation_command
+from piezoest.bench import adaptation_command, suite_command
 
 if TYPE_CHECKING:
     from piezoest.bench.estimators import Row, Scenario
 
 app = typer.Typer(
-    no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Compare estimators on the simulated stage.",
 )
 
 INTERRUPTED = 130
 
+app.callback(invoke_without_command=True)(suite_command.suite)
+app.command(epilog=suite_command.COMPARE_EPILOG)(suite_command.compare)
 app.command(epilog=adaptation_command.EPILOG)(adaptation_command.adaptation)
-
-
-@app.callback()
-def _bench() -> None:
-    """Compare estimators on the simulated stage."""
 
 
 @app.command(
