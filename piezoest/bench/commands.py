@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from piezoest.bench import adaptation_command, suite_command
+from piezoest.bench import adaptation_command, rank_command, suite_command
 
 if TYPE_CHECKING:
     from piezoest.bench.estimators import Row, Scenario
@@ -29,6 +29,7 @@ INTERRUPTED = 130
 
 app.callback(invoke_without_command=True)(suite_command.suite)
 app.command(epilog=suite_command.COMPARE_EPILOG)(suite_command.compare)
+app.command(epilog=rank_command.EPILOG)(rank_command.rank)
 app.command(epilog=adaptation_command.EPILOG)(adaptation_command.adaptation)
 
 

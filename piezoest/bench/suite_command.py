@@ -99,7 +99,7 @@ def suite(
     target = _json_target(json_to)
     folder = output or (QUICK_FOLDER if quick else FOLDER)
     began = time.perf_counter()
-    with _usage():
+    with usage():
         with _progress() as say:
             say("loading (compiles once after the installation)")
             import dataclasses
@@ -159,7 +159,7 @@ def compare(
     from piezoest.bench.commands import _json_target
 
     target = _json_target(json_to)
-    with _usage():
+    with usage():
         from piezoest.bench import changes, suite, tables
 
         documents = suite.read(before), suite.read(after)
@@ -215,7 +215,7 @@ def counting(what: str) -> Iterator[Callable[[int, int], None]]:
 
 
 @contextlib.contextmanager
-def _usage() -> Iterator[None]:
+def usage() -> Iterator[None]:
     """Turn a wrong name or value into a message, exit code 2, and an interruption into 130."""
     from piezoest.bench.commands import INTERRUPTED
 
