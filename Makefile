@@ -86,6 +86,8 @@ docs-live: $(VENV)/.installed-docs-live  ## Serve the documentation and rebuild 
 
 figures: $(VENV)/.installed  ## Make the numbers and figures of the documentation anew, in some minutes
 	$(BIN)/piezoest bench paper --json docs/data/paper.json --figures docs/figures/paper
+	$(BIN)/piezoest bench --seeds 3 --output docs/_build/suite --json docs/data/suite.json --figures docs/figures/suite
+	$(BIN)/piezoest bench rank --output docs/_build/ranking --json docs/data/ranking.json --figures docs/figures/ranking
 	$(BIN)/piezoest bench estimators --json docs/data/estimators.json
 	$(BIN)/python benchmarks/batch_fit.py --json docs/data/batch_fit.json
 	$(BIN)/python benchmarks/filterpy_parity.py --json docs/data/filterpy_parity.json

@@ -14,6 +14,7 @@ import beyond_page
 import controller_page
 import estimators_page
 import paper_page
+import which_estimator_page
 
 project = "piezoest"
 author = "The piezoest developers"
@@ -59,6 +60,8 @@ html_sidebars: dict[str, list[str]] = {
     "mathematics": [],
     "paper": [],
     "estimators": [],
+    "which_estimator": [],
+    "adaptation_speed": [],
     "controller": [],
     "design": [],
 }
@@ -106,5 +109,6 @@ def setup(app: Any) -> None:
     app.connect("builder-inited", beyond_page.write)
     app.connect("builder-inited", estimators_page.write)
     app.connect("builder-inited", controller_page.write)
+    app.connect("builder-inited", which_estimator_page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

@@ -168,7 +168,11 @@ def judge(
             some = campaign.plan(list(SCENARIOS), texts, seeds, budget.judging)
             some += campaign.plan(budget.other_scenarios, texts, seeds, other)
             tasks |= {task.key: task for task in some}
-    ordered = sorted(tasks.values(), key=lambda task: (task.seed, task.settings.stage, task.scenario))
+    # Those with the same seed and scenario one after the other; the sort is stable.
+    order = list(SCENARIOS)
+    ordered = sorted(
+        tasks.values(), key=lambda task: (task.seed, task.settings.stage, order.index(task.scenario))
+    )
     campaign.run(ordered, store, execute, progress)
     names = {each["chosen"]: each["name"] for each in tuned}
     return [

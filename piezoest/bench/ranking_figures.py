@@ -10,6 +10,7 @@ from piezoest.bench.estimators import REFERENCE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 DPI = 130
@@ -18,6 +19,7 @@ SETTLED = 0.012  # of the amplitude
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31", "#7A68A6")
 MARKERS = "osD^vPX*h"
 GREY = "0.55"
+FARTHEST = 50.0  # times the best one's error, where the colours end
 
 Document = dict[str, Any]
 
@@ -117,16 +119,18 @@ def _pareto_panel(axes: Axes, lines: list[Document], quantity: str, style: dict[
     for line, (cost, error) in zip(lines, points, strict=True):
         axes.plot(cost, 100.0 * error, ls="", ms=9, label=line["name"], **style[line["name"]])
     axes.set(xscale="log", yscale="log")
-    _plain_numbers(axes)
+    _plain_numbers(axes.xaxis, (1.0,))
+    _plain_numbers(axes.yaxis)
+    axes.grid(alpha=0.3)
 
 
-def _plain_numbers(axes: Axes) -> None:
+def _plain_numbers(axis: Axis, digits: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
+    """Mark a logarithmic axis with 1, 2, 5, 10 and so on, written as such."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.grid(alpha=0.3)
+    axis.set_major_locator(LogLocator(subs=digits))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def profile(document: Document) -> Figure:
@@ -155,16 +159,18 @@ def profile(document: Document) -> Figure:
     ratio = table / table.min(axis=0)
     figure = Figure(figsize=(11, 0.42 * len(names) + 2.2), layout="constrained")
     axes = figure.subplots()
-    shown = np.where(np.isfinite(ratio), ratio, 100.0)
-    image = axes.imshow(shown, norm=LogNorm(1.0, 100.0), cmap="RdYlGn_r", aspect="auto")
+    shown = np.where(np.isfinite(ratio), ratio, FARTHEST)
+    image = axes.imshow(shown, norm=LogNorm(1.0, FARTHEST), cmap="YlOrRd", aspect="auto")
     for (i, k), value in np.ndenumerate(ratio):
         text = "—" if not np.isfinite(value) else f"{value:.0f}" if value >= 9.95 else f"{value:.1f}"
-        axes.text(k, i, text, ha="center", va="center", fontsize=9)
+        dark = value > FARTHEST**0.6
+        axes.text(k, i, text, ha="center", va="center", fontsize=9, color="white" if dark else "black")
     axes.set_xticks(range(len(scenarios)), [name.replace(", ", ",\n") for name in scenarios], rotation=35)
     for label in axes.get_xticklabels():
         label.set_horizontalalignment("right")
     axes.set_yticks(range(len(names)), names)
-    figure.colorbar(image, ax=axes, label="settled error / the best one's", pad=0.01)
+    bar = figure.colorbar(image, ax=axes, label="settled error / the best one's", pad=0.01)
+    _plain_numbers(bar.ax.yaxis, (1.0, 3.0))
     return figure
 
 
@@ -191,7 +197,8 @@ def adaptation(document: Document) -> Figure:
         axes.axhline(100.0 * SETTLED, color="0.3", ls=":", lw=1)
         seconds = max(row["period"] or 0.0 for row in mine)
         axes.set(title=scenario, xlabel=f"period after the change ({seconds:.3g} s each)", yscale="log")
-        _plain_numbers(axes)
+        _plain_numbers(axes.yaxis)
+        axes.grid(alpha=0.3)
         axes.xaxis.get_major_locator().set_params(integer=True)
     for axes in panels[len(scenarios) :]:
         axes.remove()

@@ -65,6 +65,9 @@ def suite(
     stage: Annotated[str, typer.Option(help="paper or preisach.")] = "paper",
     guard: Annotated[bool, typer.Option("--guard", help="With the supervisor of the ring.")] = False,
     scenarios: Annotated[bool, typer.Option("--by-scenario", help="Print each scenario's table.")] = False,
+    figures: Annotated[
+        Path | None, typer.Option("--figures", metavar="DIR", help="Draw how fast each adapts, as PNG.")
+    ] = None,
     jobs: Jobs = None,
     dask: Dask = False,
     scheduler: Scheduler = None,
@@ -126,6 +129,11 @@ def suite(
             Console(stderr=True).print(f"stopped: the same command goes on from {folder}")
             raise typer.Exit(INTERRUPTED) from None
     suite.write(document, folder / suite.DOCUMENT)
+    if figures is not None:
+        from piezoest.bench.ranking_figures import write_adaptation
+
+        for path in write_adaptation(document, figures):
+            typer.echo(f"Figure: {path}", err=json_to == "-")
     if json_to == "-":
         typer.echo(json.dumps(document, indent=1, ensure_ascii=False))
         return

@@ -37,8 +37,9 @@ def print_overview(document: dict[str, Any], console: Any, *, scenarios: bool = 
     machine = document["machine"]
     for line in (
         KEY,
-        f"{document['runs']} runs at {document['settings']['sample_rate']:g} Hz; {machine['cpu']}, "
-        f"{machine['cores']} cores, {machine['python']}.",
+        f"{document['runs']} runs at {document['settings']['sample_rate']:g} Hz, the dwell "
+        f"{document['settings']['rest']:g} s and the drift {document['settings']['drift']:g} s long; "
+        f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}.",
     ):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     for failure in document["failures"]:
