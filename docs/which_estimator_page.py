@@ -168,7 +168,6 @@ def ranking_numbers(document: Document) -> str:
         {
             "rank date": document["date"][:10],
             "rank machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
-            "rank seconds": f"{document['seconds'] / 60.0:.0f} minutes",
             "draws": budget["draws"],
             "training scenarios": listed([f"*{name}*" for name in budget["training_scenarios"]]),
             "training seeds": len(budget["training_seeds"]),
@@ -200,7 +199,6 @@ def speed_pieces(document: Document) -> dict[str, str]:
                 "suite date": document["date"][:10],
                 "suite machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
                 "suite runs": document["runs"],
-                "suite seconds": f"{document['seconds'] / 60.0:.0f} minutes",
                 "suite seeds": len(document["seeds"]),
                 "suite rate": f"{settings['sample_rate']:g} Hz",
                 "suite rest": f"{settings['rest']:g} s",

@@ -17,6 +17,7 @@ from piezoest.bench.candidates import candidate
 from piezoest.bench.estimators import OPTIONS, REFERENCE, find_estimators
 from piezoest.bench.executors import in_processes, on_dask
 from piezoest.bench.machine import fingerprint
+from piezoest.bench.recorded import digest, file_of
 from piezoest.bench.runner import Row, Settings, Task, code_of, crashed, module_of, play
 from piezoest.bench.scenarios import SCENARIOS
 from piezoest.bench.store import Store
@@ -25,6 +26,7 @@ Execute = Callable[[Iterable[Task]], Iterator[Row]]
 
 # The paper's law beside the default: 0.4 s is the memory the simulated stage was calibrated with.
 PAPERS = "HysteresisRLS(memory=0.4)"
+OTHER_STAGE = ", other stage"  # after a scenario's name
 # What is lower where it is better, and infinite where a run failed or did not settle.
 QUANTITIES = ("mean_error", "settled_max", "worst_error", "settling_time")
 
@@ -48,7 +50,8 @@ def plan(
     Parameters
     ----------
     scenarios : sequence of str
-        Names in `SCENARIOS`.
+        Names in `SCENARIOS`, and of logs, see `piezoest.bench.recorded.logs_of`: these are run once,
+        for they leave nothing to chance.
     estimators : sequence of str
         As `piezoest.bench.candidates.candidate` reads them.
     seeds : iterable of int
@@ -66,15 +69,18 @@ def plan(
     ValueError
         If a scenario or an estimator is unknown.
     """
-    if unknown := [name for name in scenarios if name not in SCENARIOS]:
+    logs = {name: digest(file) for name in scenarios if (file := file_of(name)) is not None}
+    if unknown := [name for name in scenarios if name not in SCENARIOS and name not in logs]:
         raise ValueError(f"scenario {', '.join(unknown)}: choose of {', '.join(SCENARIOS)}")
     for estimator in estimators:
         candidate(estimator)
     codes = {name: code_of(name) for name in (REFERENCE, *dict.fromkeys(estimators))}
+    simulated = [name for name in dict.fromkeys(scenarios) if name not in logs]
+    places = [(name, seed, "") for seed in seeds for name in simulated]
+    places += [(name, 0, f"-{content}") for name, content in logs.items()]
     return [
-        Task(scenario, estimator, seed, settings, code)
-        for seed in seeds
-        for scenario in dict.fromkeys(scenarios)
+        Task(scenario, estimator, seed, settings, code + content)
+        for scenario, seed, content in places
         for estimator, code in codes.items()
     ]
 
@@ -206,7 +212,7 @@ def title(row: Row) -> str:
         From `piezoest.bench.runner.play`.
     """
     name = str(row["scenario"])
-    return name if row["stage"] == "paper" else f"{name}, other stage"
+    return name if row["stage"] == "paper" or file_of(name) else name + OTHER_STAGE
 
 
 def summarise(rows: Iterable[Row]) -> list[dict[str, Any]]:

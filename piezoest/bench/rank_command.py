@@ -34,7 +34,7 @@ def rank(
         int, typer.Option(min=1, help="Settings tried of each beside its default: a power of two.")
     ] = 16,
     training_seeds: Annotated[int, typer.Option(min=1, help="Seeds to tune on.")] = 2,
-    seeds: Annotated[int, typer.Option(min=1, help="Other seeds, to judge on.")] = 5,
+    seeds: Annotated[int, typer.Option(min=1, help="Other seeds, to judge on.")] = 6,
     slow_seeds: Annotated[
         int, typer.Option(min=1, help="The same for BatchFit and FilterPyUKF, the slow ones.")
     ] = 3,

@@ -61,10 +61,10 @@ class Budget:
     draws: int = 16
     training_scenarios: tuple[str, ...] = ("cold-start", "amplitude-drop", "gain-step", "two-tone")
     training_seeds: tuple[int, ...] = (FIRST_TRAINING_SEED, FIRST_TRAINING_SEED + 1)
-    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
+    seeds: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
     slow_seeds: tuple[int, ...] = (0, 1, 2)
     training: Settings = field(default_factory=lambda: Settings(before=3, after=5, after_long=2))
-    judging: Settings = field(default_factory=lambda: Settings(rest=4.0, drift=6.0))
+    judging: Settings = field(default_factory=lambda: Settings(rest=3.0, drift=4.0))
     other_scenarios: tuple[str, ...] = ("cold-start", "amplitude-drop")
 
     def __post_init__(self) -> None:

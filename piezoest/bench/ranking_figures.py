@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from piezoest.bench.estimators import REFERENCE
+from piezoest.bench.recorded import file_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -184,7 +185,8 @@ def adaptation(document: Document) -> Figure:
     """
     from matplotlib.figure import Figure
 
-    scenarios = list(dict.fromkeys(row["scenario"] for row in document["summary"]))
+    # A log has no change after which there would be periods.
+    scenarios = [name for name in document["scenarios"] if file_of(name) is None]
     style = styles([name for name in document["estimators"] if name != REFERENCE])
     columns = 3
     rows = -(-len(scenarios) // columns)

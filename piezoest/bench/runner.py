@@ -19,6 +19,7 @@ from typing import Any, Literal
 import numpy as np
 
 from piezoest._checks import FloatArray, integer
+from piezoest.bench import recorded
 from piezoest.bench.adaptation import follow, json_safe
 from piezoest.bench.candidates import candidate
 from piezoest.bench.estimators import REFERENCE, load_estimator
@@ -67,11 +68,11 @@ class Settings:
     """
 
     sample_rate: float = 5000.0
-    before: int = 5
-    after: int = 10
-    after_long: int = 4
-    rest: float = 10.0
-    drift: float = 10.0
+    before: int = 4
+    after: int = 8
+    after_long: int = 3
+    rest: float = 5.0
+    drift: float = 5.0
     updates: int = 50
     stage: Stage = "paper"
     guard: bool = False
@@ -106,7 +107,7 @@ class Task:
     Parameters
     ----------
     scenario : str
-        Name in `SCENARIOS`.
+        Name in `SCENARIOS`, or "log:" and the name of a file.
     estimator : str
         As `piezoest.bench.candidates.candidate` reads it, or "linear feed-forward".
     seed : int
@@ -173,22 +174,26 @@ def play(task: Task) -> Row:
         Flat but for ``errors``; what the estimator raised is its ``failure``, and then what is not
         known is None, as is what is not finite.
     """
-    case, linear = _linear(task.scenario, task.seed, task.settings)
-    row = _empty(task)
-    row |= {
-        "amplitude": case.amplitude,
-        "period": case.period / case.sample_rate,
-        "samples": len(case.reference),
-    }
+    row, clock = _empty(task), _Clock()
+    estimator = None if task.estimator == REFERENCE else task.estimator
     try:
-        _warm(task.estimator, case.sample_rate)
-        clock = _Clock()
-        record = linear
-        if task.estimator != REFERENCE:
-            record = follow(case, task.estimator, guard=task.settings.guard, watch=clock.watch)
-        row |= _numbers(measure(record, linear, case), case)
-        if task.estimator != REFERENCE:
-            row["microseconds"] = 1e6 * clock.seconds / len(case.reference)
+        _warm(task.estimator, task.settings.sample_rate)
+        log = recorded.file_of(task.scenario)
+        if log is not None:
+            row |= recorded.numbers(log, estimator, clock.watch)
+        else:
+            case, linear = _linear(task.scenario, task.seed, task.settings)
+            row |= {
+                "amplitude": case.amplitude,
+                "period": case.period / case.sample_rate,
+                "samples": len(case.reference),
+            }
+            record = linear
+            if estimator is not None:
+                record = follow(case, estimator, guard=task.settings.guard, watch=clock.watch)
+            row |= _numbers(measure(record, linear, case), case)
+        if estimator is not None:
+            row["microseconds"] = 1e6 * clock.seconds / row["samples"]
     except (Exception, SystemExit) as error:
         row["failure"] = f"{type(error).__name__}: {error}"
     return dict(json_safe(row))

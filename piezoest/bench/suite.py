@@ -12,6 +12,7 @@ from typing import Any
 from piezoest.bench.adaptation import json_safe
 from piezoest.bench.campaign import failures, keys_of, summarise
 from piezoest.bench.machine import fingerprint
+from piezoest.bench.recorded import described
 from piezoest.bench.runner import Row, Settings, Task
 from piezoest.bench.scenarios import SCENARIOS
 from piezoest.bench.store import Store
@@ -50,7 +51,7 @@ def describe(
         **origin,
         "settings": asdict(settings),
         "code": fingerprint(),
-        "scenarios": {name: SCENARIOS[name].description for name in names},
+        "scenarios": described(list(names), {name: each.description for name, each in SCENARIOS.items()}),
         "estimators": list(dict.fromkeys(task.estimator for task in tasks)),
         "seeds": sorted({task.seed for task in tasks}),
         "runs": len(keys),

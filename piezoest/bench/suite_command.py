@@ -42,10 +42,17 @@ def suite(
             help='Beside the package\'s; may have arguments: "HysteresisRLS(memory=0.4)", and be repeated.',
         ),
     ] = None,
-    only: Annotated[bool, typer.Option("--only", help="Only those named by --estimator.")] = False,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(help="Only this one in the place of the package's; may be repeated."),
+    ] = None,
     scenario: Annotated[
         list[str] | None,
         typer.Option("--scenario", "-s", help="Only this one; may be repeated. Default all."),
+    ] = None,
+    logs: Annotated[
+        str | None,
+        typer.Option(metavar="DIR|PATTERN", help="Recorded logs (CSV) in the place of the scenarios."),
     ] = None,
     seeds: Annotated[
         int | None,
@@ -88,6 +95,8 @@ def suite(
     Before and after a change:  [cyan]piezoest bench -o before[/cyan],  [cyan]piezoest bench -o after[/cyan],
     then  [cyan]piezoest bench compare before after[/cyan]
 
+    A fleet of recorded stages:  [cyan]piezoest bench --logs fleet/ --dask[/cyan]
+
     A cluster:  [cyan]piezoest bench --seeds 1000 --scheduler tcp://10.0.0.1:8786[/cyan]
     """
     if context.invoked_subcommand is not None:
@@ -108,15 +117,17 @@ def suite(
             import dataclasses
 
             from piezoest.bench import campaign, suite, tables
+            from piezoest.bench.recorded import logs_of
             from piezoest.bench.runner import QUICK, Settings
             from piezoest.bench.scenarios import SCENARIOS
 
             settings = dataclasses.replace(QUICK if quick else Settings(), stage=stage, guard=guard)  # type: ignore[arg-type]
             if sample_rate is not None:
                 settings = dataclasses.replace(settings, sample_rate=sample_rate)
-            named = [*([] if only else campaign.default_estimators()), *(estimator or [])]
+            named = [*(only or campaign.default_estimators()), *(estimator or [])]
             numbers = range(seeds or (1 if quick else SEEDS))
-            tasks = campaign.plan(scenario or list(SCENARIOS), named, numbers, settings)
+            places = list(scenario or ([] if logs else SCENARIOS)) + (logs_of(logs) if logs else [])
+            tasks = campaign.plan(places, named, numbers, settings)
             format = tables.checked_format(table)
         execute = executor(jobs, dask, scheduler, named)
         try:
@@ -205,10 +216,12 @@ def counting(what: str) -> Iterator[Callable[[int, int], None]]:
     console = Console(stderr=True)
     began = time.perf_counter()
     if not console.is_terminal:
+        said: list[int] = []
 
         def line(done: int, of: int) -> None:
             # Some twenty lines where stderr is a file.
-            if done in (0, of) or done * 20 // of > (done - 1) * 20 // of:
+            if not said or done == of or done * 20 // of > said[-1] * 20 // of:
+                said.append(done)
                 seconds = time.perf_counter() - began
                 print(f"{done} of {of} {what}, {seconds:.0f} s", file=sys.stderr, flush=True)
 

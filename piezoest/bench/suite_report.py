@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from piezoest.bench.campaign import OTHER_STAGE
+
 Row = dict[str, Any]
 
 KEY = (
@@ -30,7 +32,7 @@ def print_overview(document: dict[str, Any], console: Any, *, scenarios: bool = 
     """
     if scenarios:
         for name, said in document["scenarios"].items():
-            rows = [row for row in document["summary"] if row["scenario"].partition(",")[0] == name]
+            rows = [row for row in document["summary"] if row["scenario"].removesuffix(OTHER_STAGE) == name]
             _print(console, f"{name}: {said}", [(row["estimator"], _scenario_cells(row)) for row in rows])
     title = f"{len(document['scenarios'])} scenarios, {len(document['seeds'])} seeds"
     _print(console, title, [(row["estimator"], _overview_cells(row)) for row in document["overview"]])

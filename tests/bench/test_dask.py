@@ -140,7 +140,7 @@ def test_a_worker_with_another_package_ends_the_campaign(
 
 
 def test_local_by_default(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "piezoest", "bench", "--quick", "--only", "-e", "HysteresisRLS"]
+    command = [sys.executable, "-m", "piezoest", "bench", "--quick", "--only", "HysteresisRLS"]
     command += ["-s", "noise", "--dask", "--jobs", "1", "--table", "csv", "-o", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -12,11 +12,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
 import piezoest as pz
-from piezoest.bench import campaign, suite, tables
+from piezoest.bench import campaign, recorded, suite, tables
 from piezoest.bench.estimators import find_estimators
 from piezoest.bench.executors import in_processes
 from piezoest.bench.machine import fingerprint
@@ -24,6 +25,7 @@ from piezoest.bench.runner import COLUMNS, QUICK, Row, Settings, Task, code_of, 
 from piezoest.bench.scenarios import SCENARIOS
 from piezoest.bench.store import Store
 from piezoest.cli import app
+from piezoest.records import Record
 
 SMALL = Settings(2000.0, before=1, after=3, after_long=2, rest=0.2, drift=0.4, updates=20)
 
@@ -292,9 +294,57 @@ def test_summary(own: str) -> None:
     assert over[f"{own}:Still"]["settled_max"] == pytest.approx(still["settled_max"]["median"] / 5.0)
 
 
+# ---------------------------------------------------------------- recorded logs
+
+
+def write_log(path: Path, seed: int) -> None:
+    u = pz.signals.triangle(30.0, 5.0, 10.0, 2000.0).values
+    x = pz.PaperStage(2000.0, seed=seed).run(u)
+    x[100:110] = np.nan
+    Record.from_arrays(u, x, 2000.0).write(path)
+
+
+def test_recorded_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("fleet").mkdir()
+    for seed, name in enumerate("ab"):
+        write_log(Path(f"fleet/{name}.csv"), seed)
+    Path("fleet/c.csv").write_text("no numbers", encoding="utf-8")
+    logs = recorded.logs_of("fleet")
+    assert (
+        logs == ["log:fleet/a.csv", "log:fleet/b.csv", "log:fleet/c.csv"] == recorded.logs_of("fleet/*.csv")
+    )
+    tasks = campaign.plan(logs, ["HysteresisRLS", "PrandtlIshlinskiiRLS"], range(3), SMALL)
+    assert len(tasks) == 9  # whatever the seeds
+    rows = [play(each) for each in tasks]
+    assert [row["failure"] is None for row in rows] == [True] * 6 + [False] * 3
+    for linear, derivative, plays in (rows[:3], rows[3:6]):
+        assert linear["ratio"] == 1.0
+        assert derivative["linear_settled_max"] == linear["settled_max"]
+        # Of a triangle on the stage the loop is a tenth of the range.
+        assert 0.0 < plays["ratio"] < derivative["ratio"] < 0.5
+        assert len(derivative["errors"]) == recorded.SEGMENTS
+        assert derivative["settled_rms"] < derivative["settled_max"] == max(derivative["errors"])
+    assert len({row["key"] for row in rows}) == 9
+    over = {row["estimator"]: row for row in suite.overview(campaign.summarise(rows))}
+    assert over["HysteresisRLS"]["failures"] == 1
+
+
+def test_a_logs_content_is_part_of_its_key(tmp_path: Path) -> None:
+    keys = set()
+    for seed in range(2):
+        (tmp_path / str(seed)).mkdir()
+        write_log(tmp_path / str(seed) / "a.csv", seed)
+        tasks = campaign.plan(recorded.logs_of(str(tmp_path / str(seed) / "a.csv")), [], range(1), SMALL)
+        keys.add(tasks[0].code)
+    assert len(keys) == 2
+    with pytest.raises(ValueError, match="no log is found at nowhere"):
+        recorded.logs_of("nowhere")
+
+
 # ---------------------------------------------------------------- the command
 
-SHORT = ("--scenario", "cold-start", "--scenario", "noise", "--quick", "--only", "-e", "HysteresisEKF")
+SHORT = ("--scenario", "cold-start", "--scenario", "noise", "--quick", "--only", "HysteresisEKF")
 
 
 def test_command_end_to_end(own: str, tmp_path: Path) -> None:
@@ -361,7 +411,7 @@ def test_command_refuses_wrong_words(own: str, arguments: tuple[str, ...], words
 
 
 def test_a_killed_campaign_goes_on(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "piezoest", "bench", "--quick", "--only", "-e", "HysteresisRLS"]
+    command = [sys.executable, "-m", "piezoest", "bench", "--quick", "--only", "HysteresisRLS"]
     command += ["--seeds", "3", "--jobs", "2", "--table", "csv", "-o", str(tmp_path)]
     killed = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     assert killed.stderr is not None
