@@ -242,5 +242,5 @@ def _over_scenarios(rows: Sequence[Row], quantity: str) -> float:
 
 
 def _median(values: Sequence[float]) -> float:
-    """The middle one, the upper of two: a value that occurred, which may be infinite."""
-    return sorted(values)[len(values) // 2]
+    """The middle one, the lower of two, as in the summary: a value that occurred, which may be infinite."""
+    return sorted(values)[(len(values) - 1) // 2]

@@ -205,7 +205,7 @@ def test_overall() -> None:
     lines = verdicts.overall(some_rows(), TIMES)
     assert [line["name"] for line in lines] == ["good", "fair", "poor", "linear feed-forward"]
     good, fair, poor, linear = lines
-    assert good["adapting"] == good["settled"] == good["worst"] == pytest.approx(0.01 * 1.03 / 5.0)
+    assert good["adapting"] == good["settled"] == good["worst"] == pytest.approx(0.01 * 1.02 / 5.0)
     assert [line["efficient"] for line in lines] == [True, True, False, False]
     assert (poor["runs"], poor["runs_settled"], poor["failures"]) == (12, 0, 1)
     assert poor["settling_time"] == math.inf
