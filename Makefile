@@ -102,8 +102,8 @@ figures: $(VENV)/.installed  ## Make the numbers and figures of the documentatio
 bench-smoke: $(VENV)/.installed  ## Time the kernels against a NumPy loop, in under a minute
 	$(BIN)/python benchmarks/smoke.py
 
-bench: $(VENV)/.installed  ## The same on a longer signal, written to benchmarks/results/smoke.local.json
-	$(BIN)/python benchmarks/smoke.py --samples 200000 --repeats 7 --json benchmarks/results/smoke.local.json
+bench: $(VENV)/.installed-bench  ## Speed against C, filterpy and padasip, with targets, in some minutes (needs gcc)
+	$(BIN)/python benchmarks/speed.py --json docs/data/speed.json --figure docs/figures/speed.png
 
 clean:  ## Remove builds, caches and generated pages, keep .venv
 	rm -rf build dist docs/_build docs/gallery docs/generated docs/sg_execution_times.rst

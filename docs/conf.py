@@ -14,6 +14,7 @@ import beyond_page
 import controller_page
 import estimators_page
 import paper_page
+import performance_page
 
 project = "piezoest"
 author = "The piezoest developers"
@@ -103,6 +104,7 @@ def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, li
 
 def setup(app: Any) -> None:
     app.connect("builder-inited", paper_page.write)
+    app.connect("builder-inited", performance_page.write)
     app.connect("builder-inited", beyond_page.write)
     app.connect("builder-inited", estimators_page.write)
     app.connect("builder-inited", controller_page.write)

@@ -8,6 +8,7 @@ from .compensators import (
     LinearCompensator,
     VoltageLimits,
 )
+from .estimators.bank import EstimatorBank
 from .estimators.base import Estimator, Status, Trace
 from .estimators.batch import BatchFit
 from .estimators.batch_result import BatchFitResult
@@ -39,6 +40,7 @@ from .signals import Signal
 from .stage import Amplifier, Gauge, PaperStage, PreisachStage, SimulatedStage, TemperatureLaw
 from .supervisor import Event, Supervisor
 from .tracking import TrackingRecord, track
+from .warming import warmup
 
 __all__ = [
     "Amplifier",
@@ -49,6 +51,7 @@ __all__ = [
     "CompensatorStatus",
     "Creep",
     "Estimator",
+    "EstimatorBank",
     "Event",
     "FilterPyEKF",
     "FilterPyUKF",
@@ -93,4 +96,5 @@ __all__ = [
     "signals",
     "stream_record",
     "track",
+    "warmup",
 ]

@@ -22,6 +22,8 @@ def finite(name: str, value: Any) -> float:
     ValueError
         If it is not one real, finite number.
     """
+    if type(value) is float and math.isfinite(value):
+        return value  # a live loop makes a model now and then
     if isinstance(value, (str, bytes)) or np.ndim(value) != 0:
         raise ValueError(f"{name} must be one number, got {value!r}: pass a plain float")
     try:
@@ -74,6 +76,15 @@ def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: 
         If it has another number of dimensions, is not numeric, is shorter than
         `minimum_length`, or holds NaN or infinity while `allow_nan` is false.
     """
+    if (
+        allow_nan
+        and type(value) is np.ndarray
+        and value.dtype == np.float64
+        and value.ndim == 1
+        and value.flags.c_contiguous
+        and value.size >= minimum_length
+    ):
+        return value
     try:
         array = np.ascontiguousarray(value, dtype=np.float64)
     except (TypeError, ValueError):

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from piezoest._checks import FloatArray, positive
-from piezoest.equations.coleman_hodgdon import carried_place, hysteresis_step
 from piezoest.models import ColemanHodgdon, LinearGain, Model
 
 # An interval whose voltage moves by no more than this part of its size is one at rest.
 AT_REST = 1e-4
-# Points that are kept of an interval, and at most of a window.
-POINTS, MOST = 4, 800
+# Points that are kept of an interval, at most of a window, and windows that are kept.
+POINTS, MOST, WINDOWS = 4, 800, 4
 # What happened this part of a window ago counts for half.
 HALF_LIFE = 0.5
 # A model that is right to this part of the displacement's range is good enough anyway.
@@ -29,7 +28,7 @@ GAIN_KNOWN = 0.05
 # b in parts of c in a Coleman-Hodgdon model that stands for a line.
 NO_LOOP = 1e-9
 # Rows of what is kept of the past.
-TIME, VOLTAGE, MEASURED, PLACE, DECAY, ROWS = range(6)
+TIME, VOLTAGE, MEASURED, ROWS = range(4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,13 +78,13 @@ class Supervisor:
 
     Notes
     -----
-    Where a model's memory stood at the window's start is known for `ColemanHodgdon`; of any other
-    model the mean error is left out instead.
+    A `ColemanHodgdon` is run from a few windows before, by when it has forgotten where it started; of
+    any other model with a memory the mean error is left out instead.
     """
 
     __slots__ = (
-        "_count", "_decay", "_elapsed", "_events", "_good", "_held", "_kept",
-        "_limit", "_moved", "_past", "_place", "_sample_rate", "_until", "_voltage", "_window",
+        "_count", "_elapsed", "_events", "_good", "_held", "_kept",
+        "_limit", "_moved", "_past", "_sample_rate", "_until", "_window",
     )  # fmt: skip
 
     def __init__(self, sample_rate: float, *, window: float = 0.2, limit: float = 1.0) -> None:
@@ -98,9 +97,7 @@ class Supervisor:
         """Return to the state after construction."""
         self._elapsed = self._moved = 0.0  # s, the second without what was at rest
         self._until = 0.0
-        self._voltage = 0.0
-        self._place, self._decay = 0.0, 1.0
-        self._past = np.empty((ROWS, 4 * MOST))
+        self._past = np.empty((ROWS, 2 * WINDOWS * MOST))
         self._count = 0
         self._good: Model | None = None
         self._held: Model | None = None
@@ -139,14 +136,15 @@ class Supervisor:
         if self._is_at_rest(u):
             # Creep alone moves the stage: nothing to judge a model by.
             return proposed if self._held is None else self._held
-        self._take(u, x, present)
+        self._take(u, x)
         past = self._recent()
-        weights = 0.5 ** ((self._moved - past[TIME]) / (HALF_LIFE * self._window))
-        line = _line(past, weights, whole=self._moved >= self._window)
+        ages = self._moved - past[TIME]
+        weights = 0.5 ** (ages / (HALF_LIFE * self._window)) * (ages <= self._window)
+        line = _line(past[:, weights > 0.0], weights[weights > 0.0], whole=self._moved >= self._window)
         if line is None:
             return proposed
         gain, offset, unexplained = line
-        span = float(np.ptp(past[MEASURED]))
+        span = float(np.ptp(past[MEASURED, weights > 0.0]))
         limit = allowed = max(self._limit * unexplained, NEGLIGIBLE * span)
         error = _error(proposed, past, weights)
         if self._held is not None:
@@ -170,34 +168,27 @@ class Supervisor:
         )
         return float(np.ptp(u)) <= AT_REST * largest
 
-    def _take(self, u: FloatArray, x: FloatArray, present: Model) -> None:
-        picked = np.unique(np.linspace(0, u.size - 1, min(POINTS, u.size)).astype(int))
-        for k in range(u.size) if u.size <= POINTS else picked:
-            voltage = float(u[k])
-            if isinstance(present, ColemanHodgdon):
-                # Place in the loop: w_h in parts of its limit b/a.
-                self._place = float(carried_place(self._place, present.a / self._decay))
-                self._decay = present.a
-                self._place = float(
-                    hysteresis_step(self._place, voltage - self._voltage, present.a, present.a)
-                )
-            self._voltage = voltage
-            if not math.isfinite(x[k]):
-                continue
-            if self._count == self._past.shape[1]:
-                half = self._count // 2
-                self._past[:, :half] = self._past[:, half:]
-                self._count = half
-            time = self._moved + (k + 1) / self._sample_rate
-            self._past[:, self._count] = time, voltage, float(x[k]), self._place, self._decay
-            self._count += 1
+    def _take(self, u: FloatArray, x: FloatArray) -> None:
+        picked = np.arange(u.size)
+        if u.size > POINTS:
+            picked = np.unique(np.linspace(0, u.size - 1, POINTS).astype(int))
+        picked = picked[np.isfinite(x[picked])]
+        if self._count + picked.size > self._past.shape[1]:
+            half = self._count // 2
+            self._past[:, : self._count - half] = self._past[:, half : self._count]
+            self._count -= half
+        new = slice(self._count, self._count + picked.size)
+        self._past[TIME, new] = self._moved + (picked + 1) / self._sample_rate
+        self._past[VOLTAGE, new] = u[picked]
+        self._past[MEASURED, new] = x[picked]
+        self._count += picked.size
         self._moved += u.size / self._sample_rate
 
     def _recent(self) -> FloatArray:
-        """Points of the last window, thinned where there are many."""
+        """Points of the last windows, thinned where there are many."""
         past = self._past[:, : self._count]
-        past = past[:, np.searchsorted(past[TIME], self._moved - self._window) :]
-        return past[:, :: 1 + past.shape[1] // MOST]
+        past = past[:, np.searchsorted(past[TIME], self._moved - WINDOWS * self._window) :]
+        return past[:, :: 1 + past.shape[1] // (WINDOWS * MOST)]
 
     def _pass(self, model: Model, error: float, unexplained: float) -> None:
         if self._held is not None:
@@ -254,14 +245,15 @@ def _line(past: FloatArray, weights: FloatArray, *, whole: bool) -> tuple[float,
 
 
 def _error(model: Model, past: FloatArray, weights: FloatArray) -> float:
-    """Root mean square of what a model misses of the past [µm]."""
+    """Root mean square of what a model misses of the past [µm], by the weights of its points."""
     u = np.ascontiguousarray(past[VOLTAGE])
     total = float(weights.sum())
     with np.errstate(all="ignore"):
         if isinstance(model, ColemanHodgdon):
-            place = carried_place(past[PLACE, 0], model.a / past[DECAY, 0])
-            start = place * model.b / model.a
-            missed = past[MEASURED] - model.simulate(u, initial_state=float(start), allow_jumps=True)
+            # Somewhere within the loop, which is soon forgotten: the middle between its branches.
+            off_centre = float(u[0]) - 0.5 * (float(np.min(u)) + float(np.max(u)))
+            start = -model.b * math.tanh(model.a * off_centre) / model.a
+            missed = past[MEASURED] - model.simulate(u, initial_state=start, allow_jumps=True)
         elif isinstance(model, LinearGain):
             missed = past[MEASURED] - model.simulate(u)
         else:

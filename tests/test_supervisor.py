@@ -52,7 +52,7 @@ class Wild:
 def test_leaves_a_good_estimator_alone() -> None:
     supervisor = pz.Supervisor(FS, window=0.2)
     plain, guarded = ring(pz.HysteresisRLS(FS)), ring(pz.HysteresisRLS(FS), supervisor)
-    assert guarded.max_error(last_periods=2) == pytest.approx(plain.max_error(last_periods=2), rel=0.02)
+    assert guarded.max_error(last_periods=2) == pytest.approx(plain.max_error(last_periods=2), rel=0.05)
     assert guarded.max_error_per_period()[1:].max() < 1.1 * plain.max_error_per_period()[1:].max()
     assert not supervisor.holding
 
@@ -89,8 +89,8 @@ def test_falls_back_to_a_line_and_stays_there() -> None:
 
 
 def test_short_memory_is_guarded() -> None:
-    """Exponential forgetting over a hundredth of a period runs away; with the guard it does not stay away."""
-    estimators = [pz.HysteresisRLS(FS, memory=0.002) for _ in range(2)]
+    """Exponential forgetting over twenty samples runs away; with the guard it does not stay away."""
+    estimators = [pz.HysteresisRLS(FS, memory=0.001) for _ in range(2)]
     plain, guarded = ring(estimators[0]), ring(estimators[1], pz.Supervisor(FS, window=0.2))
     assert guarded.rms_error() < 0.5 * plain.rms_error()
     assert np.median(guarded.max_error_per_period()[1:]) < 1.2 * 0.55

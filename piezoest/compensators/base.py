@@ -11,12 +11,13 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST, FloatArray, array_1d, integer, positive
+from piezoest._jit import UNCOUNTED
 from piezoest.compensators import play_inverse
 from piezoest.compensators.layout import (
+    BY_PATH,
     CONFIG,
     DECAY,
     INTEGRATED,
-    KEEP_AMPLITUDE,
     LARGEST_STEP,
     LIMITED_NOW,
     MAXIMUM,
@@ -25,6 +26,7 @@ from piezoest.compensators.layout import (
     MISSED,
     OFFSET,
     OWED,
+    PATH,
     SAMPLES,
     SATURATED,
     SLEWED,
@@ -37,12 +39,13 @@ from piezoest.compensators.layout import (
 )
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.equations import coleman_hodgdon as equations
+from piezoest.equations import recent_path
 from piezoest.equations.integrators import bogacki_shampine
 from piezoest.equations.turning_points import recall, remember
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
 
 Method = Literal["closed-form", "bogacki-shampine"]
-HandOver = Literal["amplitude", "place"]
+HandOver = Literal["path", "place"]
 
 
 @register_jitable
@@ -72,18 +75,24 @@ def _voltage(state: Any, config: Any, r: Any) -> Any:
         w_next = equations.hysteresis_step(w_h, given - u, a, b)
     state[W_H] = w_next
     state[VOLTAGE] = given
+    recent_path.follow(state, PATH, given)
     remember(state, MEMORY, given)
     return given
 
 
 @register_jitable
 def change_model(state: Any, config: Any, a: Any, b: Any, c: Any, offset: Any) -> None:
-    """Take another model without a bump: the place in the loop is kept, the difference owed."""
+    """Take another model without a bump: its w_h is found, the difference owed."""
     expected = config[C] * state[VOLTAGE] + state[W_H] + config[OFFSET] + state[OWED]
-    place = state[W_H] * config[A] / config[B] if config[B] > 0.0 else 0.0
+    if config[BY_PATH] != 0.0:
+        h = recent_path.hysteresis(state, PATH, a)
+        if config[B] > 0.0:
+            # What the path does not tell stays: the same model changes nothing.
+            h += state[W_H] / config[B] - recent_path.hysteresis(state, PATH, config[A])
+        place = h * a
+    else:
+        place = state[W_H] * config[A] / config[B] if config[B] > 0.0 else 0.0
     place = min(max(place, -1.0), 1.0)
-    if config[KEEP_AMPLITUDE] != 0.0:
-        place = equations.carried_place(place, a / config[A])
     config[A] = a
     config[B] = b
     config[C] = c
@@ -92,12 +101,12 @@ def change_model(state: Any, config: Any, a: Any, b: Any, c: Any, offset: Any) -
     state[OWED] = expected - (c * state[VOLTAGE] + state[W_H] + offset)
 
 
-@njit("f8(f8[::1], f8[::1], f8)", cache=True)
+@njit("f8(f8[::1], f8[::1], f8)", cache=True, **UNCOUNTED)
 def _step(state: Any, config: Any, r: float) -> Any:
     return _voltage(state, config, r)
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True)
+@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True, **UNCOUNTED)
 def _run(state: Any, config: Any, r: Any, u: Any) -> None:
     for k in range(r.size):
         u[k] = _voltage(state, config, r[k])
@@ -131,6 +140,13 @@ class CompensatorStatus:
     projected: bool
 
 
+def _is_tame(model: Model) -> bool:
+    """Whether no parameter is beyond what its inverse can take."""
+    if isinstance(model, ColemanHodgdon):
+        return all(abs(v) < WILDEST for v in (model.alpha, model.beta, model.gamma, model.offset))
+    return bool(np.all(np.abs([*model.theta, getattr(model, "offset", 0.0)]) < WILDEST))
+
+
 def _loop(model: Model) -> tuple[float, float, float, float]:
     """(a, b, c, offset) of a model."""
     if isinstance(model, ColemanHodgdon):
@@ -155,7 +171,7 @@ class Compensator:
         method: Method,
         transfer_samples: int,
         sample_rate: float | None = None,
-        hand_over: HandOver = "amplitude",
+        hand_over: HandOver = "path",
     ) -> None:
         if limits is None:
             limits = VoltageLimits()
@@ -174,9 +190,9 @@ class Compensator:
         if method not in ("closed-form", "bogacki-shampine"):
             raise ValueError(f"method must be 'closed-form' or 'bogacki-shampine', got {method!r}")
         self._config[INTEGRATED] = method == "bogacki-shampine"
-        if hand_over not in ("amplitude", "place"):
-            raise ValueError(f"hand_over must be 'amplitude' or 'place', got {hand_over!r}")
-        self._config[KEEP_AMPLITUDE] = hand_over == "amplitude"
+        if hand_over not in ("path", "place"):
+            raise ValueError(f"hand_over must be 'path' or 'place', got {hand_over!r}")
+        self._config[BY_PATH] = hand_over == "path"
         if not self._accepts(model).is_admissible:
             hint = "its gain must not be zero"
             if isinstance(model, ColemanHodgdon):
@@ -199,8 +215,8 @@ class Compensator:
     def _fixed(self) -> tuple[int, ...]:
         """Positions in the configuration that no change of model or limits in that code touches."""
         if isinstance(self._model, PrandtlIshlinskii):
-            return A, B, C, OFFSET, DECAY, INTEGRATED, KEEP_AMPLITUDE, *range(CONFIG, self._config.size)
-        return DECAY, INTEGRATED, KEEP_AMPLITUDE
+            return A, B, C, OFFSET, DECAY, INTEGRATED, BY_PATH, *range(CONFIG, self._config.size)
+        return DECAY, INTEGRATED, BY_PATH
 
     def _begin(self, model: Model) -> None:
         """Start at rest, at the voltage nearest to zero."""
@@ -208,6 +224,7 @@ class Compensator:
         self._model = model
         self._state = np.zeros(STATE)
         self._state[VOLTAGE] = self._limits.rest
+        recent_path.begin(self._state, PATH, self._limits.rest)
         remember(self._state, MEMORY, self._limits.rest)
         self._place(model, model)
 
@@ -261,7 +278,7 @@ class Compensator:
     def model(self) -> Model:
         """Model whose inverse is used. Setting it is bumpless.
 
-        The place in the loop is kept as `hand_over` says, and plays as the voltage's turning
+        The new model's w_h is found as `hand_over` says, and plays as the voltage's turning
         points have left them. What the new model makes of the present voltage differs
         from what the old one made of it; that difference is paid back exponentially over
         `transfer_samples`. An inadmissible model is replaced by its nearest admissible one, a
@@ -273,7 +290,7 @@ class Compensator:
     @model.setter
     def model(self, model: Model) -> None:
         model = self._accepts(model)
-        if not np.all(np.abs([*model.theta, getattr(model, "offset", 0.0)]) < WILDEST):
+        if not _is_tame(model):
             # An estimator that ran away: what its model's inverse gives is no number.
             self._projected = True
             return
@@ -291,7 +308,8 @@ class Compensator:
         self._configure(model)
         self._place(model, before)
         self._model = model
-        self._state[W_H] = 0.0
+        a, b = self._config[A], self._config[B]
+        self._state[W_H] = b * recent_path.hysteresis(self._state, PATH, a) if b > 0.0 else 0.0
         self._state[OWED] = expected - self._expected()
 
     @property

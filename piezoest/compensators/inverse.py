@@ -23,9 +23,9 @@ class InverseCompensator(Compensator):
         Time constant of a bumpless change of model, in samples (default 500); 0 for none.
     sample_rate : float, optional
         [Hz]. Only a model with creep needs it; default that of the limits, or the model's own.
-    hand_over : {"amplitude", "place"}
-        What a change of a Coleman-Hodgdon model keeps of its memory: the amplitude of the loop that
-        w_h belongs to, which serves small loops too, or w_h in parts of its limit b/a.
+    hand_over : {"path", "place"}
+        Where w_h stands when another Coleman-Hodgdon model is taken up: where the recent path of the
+        voltage would have brought it, or at the same part of its limit b/a as before.
 
     Raises
     ------
@@ -54,6 +54,6 @@ class InverseCompensator(Compensator):
         method: Method = "closed-form",
         transfer_samples: int = 500,
         sample_rate: float | None = None,
-        hand_over: HandOver = "amplitude",
+        hand_over: HandOver = "path",
     ) -> None:
         super().__init__(model, limits, method, transfer_samples, sample_rate, hand_over)

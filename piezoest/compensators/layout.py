@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from piezoest.equations import turning_points
+from piezoest.equations import recent_path, turning_points
 
 # State: last voltage, its w_h, what the last change of model still owes [µm], counters, the
-# voltage's turning points; play states and creep states follow where the model has any.
-VOLTAGE, W_H, OWED, SAMPLES, SATURATED, SLEWED, MISSED, LIMITED_NOW, MEMORY = range(9)
+# voltage's recent path and its turning points not wiped out; play states and creep states follow
+# where the model has any.
+VOLTAGE, W_H, OWED, SAMPLES, SATURATED, SLEWED, MISSED, LIMITED_NOW, PATH = range(9)
+MEMORY = PATH + recent_path.SIZE
 STATE = MEMORY + turning_points.SIZE
 # Configuration; what else a Prandtl-Ishlinskii model needs follows.
-A, B, C, OFFSET, MINIMUM, MAXIMUM, LARGEST_STEP, DECAY, INTEGRATED, KEEP_AMPLITUDE, CONFIG = range(11)
+A, B, C, OFFSET, MINIMUM, MAXIMUM, LARGEST_STEP, DECAY, INTEGRATED, BY_PATH, CONFIG = range(11)

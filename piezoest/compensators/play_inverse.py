@@ -9,6 +9,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
+from piezoest._jit import UNCOUNTED
 from piezoest.compensators.layout import (
     CONFIG,
     DECAY,
@@ -20,6 +21,7 @@ from piezoest.compensators.layout import (
     MISSED,
     OFFSET,
     OWED,
+    PATH,
     SAMPLES,
     SATURATED,
     SLEWED,
@@ -27,6 +29,7 @@ from piezoest.compensators.layout import (
     VOLTAGE,
     C,
 )
+from piezoest.equations import recent_path
 from piezoest.equations.bent_plays import (
     bent_plays_output,
     bent_plays_step,
@@ -59,6 +62,7 @@ def _voltage(
         state[SATURATED] += given != slewed
         state[LIMITED_NOW] = np.sign(wanted - given)
         state[VOLTAGE] = given
+        recent_path.follow(state, PATH, given)
         remember(state, MEMORY, given)
     else:
         state[MISSED] += 1.0
@@ -89,7 +93,7 @@ def _parts(state: Any, config: Any) -> Any:
     )
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True)
+@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True, **UNCOUNTED)
 def run(state: Any, config: Any, r: Any, u: Any) -> None:
     """Voltages `u` for a whole reference `r`."""
     y, z, thresholds, weights, gains, decays, bends, changes = _parts(state, config)
@@ -97,13 +101,13 @@ def run(state: Any, config: Any, r: Any, u: Any) -> None:
         u[k] = _voltage(state, config, r[k], y, z, thresholds, weights, gains, decays, bends, changes)
 
 
-@njit("f8(f8[::1], f8[::1], f8)", cache=True)
+@njit("f8(f8[::1], f8[::1], f8)", cache=True, **UNCOUNTED)
 def step(state: Any, config: Any, r: float) -> Any:
     """Voltage for one sample of the reference."""
     return _voltage(state, config, r, *_parts(state, config))
 
 
-@njit("f8(f8[::1], f8[::1])", cache=True)
+@njit("f8(f8[::1], f8[::1])", cache=True, **UNCOUNTED)
 def expected(state: Any, config: Any) -> Any:
     """Displacement that the model expects of the last sample [µm]."""
     n, m, b = int(config[PLAYS]), int(config[TERMS]), int(config[BENDS])

@@ -44,18 +44,6 @@ def hysteresis_rate(w_h, u_dot, a, b):
 
 
 @register_jitable
-def carried_place(place, ratio):
-    """Place in the loop, w_h in parts of its limit b/a, where a becomes `ratio` times as large.
-
-    A loop of amplitude A turns at tanh(a A), so that tanh(ratio artanh(place)) keeps A; this is
-    its algebraic neighbour, which keeps w_h/b in a small loop and w_h a/b in a large one.
-    """
-    ratio = np.fmin(np.fmax(ratio, 1e-9), 1e9)  # beyond, its square is no number any more
-    square = place * place
-    return place * ratio / np.sqrt((1.0 - square) + square * ratio * ratio)
-
-
-@register_jitable
 def relative_decay(travel):
     """(1 - exp(-travel)) / travel, which is 1 at travel = 0."""
     at_rest = (travel == 0.0) * 1.0
@@ -70,12 +58,17 @@ def hysteresis_step(w_h, du, a, b):
     R = (1 - exp(-a|du|))/(a|du|), so that a = 0 and du = 0 are no special cases.
     """
     travel = a * np.abs(du)
-    return w_h - relative_decay(travel) * (travel * w_h + b * du)
+    return _decayed(w_h, du, travel, b, relative_decay(travel))
 
 
 @register_jitable
-def hysteresis_jacobian(w_h, du, a, b):
-    """Derivatives of `hysteresis_step` by w_h, a and b."""
+def _decayed(w_h, du, travel, b, decay):
+    return w_h - decay * (travel * w_h + b * du)
+
+
+@register_jitable
+def hysteresis_linearised(w_h, du, a, b):
+    """`hysteresis_step` and its derivatives by w_h, a and b, for the price of one exponential."""
     distance = np.abs(du)
     travel = a * distance
     decay = relative_decay(travel)
@@ -83,7 +76,14 @@ def hysteresis_jacobian(w_h, du, a, b):
     at_rest = (travel == 0.0) * 1.0
     decay_slope = (kept - decay) / (travel + at_rest) - 0.5 * at_rest
     by_a = -distance * (decay_slope * (travel * w_h + b * du) + decay * w_h)
-    return kept, by_a, -decay * du
+    return _decayed(w_h, du, travel, b, decay), kept, by_a, -decay * du
+
+
+@register_jitable
+def hysteresis_jacobian(w_h, du, a, b):
+    """Derivatives of `hysteresis_step` by w_h, a and b."""
+    _, kept, by_a, by_b = hysteresis_linearised(w_h, du, a, b)
+    return kept, by_a, by_b
 
 
 @register_jitable

@@ -9,10 +9,11 @@ is a flat array of n*n numbers in row order, updated in place and kept exactly s
 from __future__ import annotations
 
 import numpy as np
-from numba.extending import register_jitable
+
+from piezoest._jit import unrolled
 
 
-@register_jitable
+@unrolled
 def bilinear_variance(P, du, a, n):
     """Variance that the product a w_h adds to w_h over du, beyond the filter's first order.
 
@@ -27,7 +28,7 @@ def bilinear_variance(P, du, a, n):
     return (P[n + 1] * P[0] + P[1] * P[1]) * distance / (np.abs(a) + (a == 0.0))
 
 
-@register_jitable
+@unrolled
 def predict_covariance(P, row, q, n, work):
     """P = F P F' + diag(q), F the identity but for its first `row` (n,); `work` has n numbers."""
     corner = 0.0
@@ -46,7 +47,7 @@ def predict_covariance(P, row, q, n, work):
         P[i * n + i] = P[i * n + i] + q[i]
 
 
-@register_jitable
+@unrolled
 def measure(s, h, n):
     """h . s: the predicted measurement of a linear measurement."""
     x = 0.0
@@ -55,45 +56,40 @@ def measure(s, h, n):
     return x
 
 
-@register_jitable
+@unrolled
 def update(s, P, h, y, R, n, gain, work):
     """Measurement update for one measurement; returns the innovation's variance S.
 
     S = h P h' + R, K = P h'/S, s += K y, and Joseph's form of the covariance,
     (I - K h) P (I - K h)' + K R K', row by row so that P stays symmetric. `gain` (n,)
-    receives K; `work` has n*n numbers.
+    receives K; `work` has 2 n numbers.
     """
     S = R + 0.0
     for i in range(n):
         total = 0.0
         for j in range(n):
             total = total + P[i * n + j] * h[j]
-        gain[i] = total
+        work[i] = total  # of P h', which is h P
         S = S + h[i] * total
     for i in range(n):
-        gain[i] = gain[i] / S
+        gain[i] = work[i] / S
     for i in range(n):
         s[i] = s[i] + gain[i] * y
-    # work = (I - K h) P
-    for j in range(n):
-        total = 0.0
-        for i in range(n):
-            total = total + h[i] * P[i * n + j]
-        for i in range(n):
-            work[i * n + j] = P[i * n + j] - gain[i] * total
-    # P = work (I - K h)' + K R K'
+    # (I - K h) P h'
     for i in range(n):
         total = 0.0
         for j in range(n):
-            total = total + work[i * n + j] * h[j]
+            total = total + (P[i * n + j] - gain[i] * work[j]) * h[j]
+        work[n + i] = total
+    for i in range(n):
         for j in range(i, n):
-            entry = work[i * n + j] - total * gain[j] + R * gain[i] * gain[j]
+            entry = P[i * n + j] - gain[i] * work[j] - work[n + i] * gain[j] + R * gain[i] * gain[j]
             P[i * n + j] = entry
             P[j * n + i] = entry
     return S
 
 
-@register_jitable
+@unrolled
 def project(s, P, g, least, n, work):
     """Move s to the nearest point with g . s >= least in the metric of P; P is not changed.
 

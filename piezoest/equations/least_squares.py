@@ -12,10 +12,11 @@ from __future__ import annotations
 import numpy as np
 from numba.extending import register_jitable
 
+from piezoest._jit import unrolled
 from piezoest.equations.integrators import NODES, WEIGHTS
 
 
-@register_jitable
+@unrolled
 def predicted_output(theta, phi, n):
     """theta . phi (A2)."""
     z = 0.0
@@ -24,7 +25,7 @@ def predicted_output(theta, phi, n):
     return z
 
 
-@register_jitable
+@unrolled
 def covariance_times(P, phi, n, out):
     """Write P phi into `out` (n,) and return phi' P phi, the n_s² of (A7)."""
     quadratic = 0.0
@@ -37,7 +38,7 @@ def covariance_times(P, phi, n, out):
     return quadratic
 
 
-@register_jitable
+@unrolled
 def trace(P, n):
     """Trace of P: the norm ||P|| of (A6) here (for P > 0 at least the spectral norm)."""
     total = 0.0
@@ -46,7 +47,7 @@ def trace(P, n):
     return total
 
 
-@register_jitable
+@unrolled
 def discrete_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
     """One sample of recursive least squares; returns the innovation y and its variance S.
 
@@ -127,7 +128,7 @@ def continuous_update(theta, P, phi, z, n, h, forgetting_rate, normalised, bound
     return y, S
 
 
-@register_jitable
+@unrolled
 def directional_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
     """One sample that forgets only along the present regressor; returns (y, S).
 
@@ -157,7 +158,7 @@ def directional_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
     return y, S
 
 
-@register_jitable
+@unrolled
 def variable_forgetting(y, quadratic, R, forgetting, least):
     """Forgetting factor from the innovation's energy: short where the model no longer fits.
 
@@ -169,7 +170,7 @@ def variable_forgetting(y, quadratic, R, forgetting, least):
     return np.fmax(1.0 - energy * (1.0 - forgetting), least)
 
 
-@register_jitable
+@unrolled
 def cusum(total, value, drift):
     """One-sided cumulative sum of what exceeds `drift`, never below zero.
 
@@ -179,7 +180,7 @@ def cusum(total, value, drift):
     return np.fmax(total + value - drift, 0.0)
 
 
-@register_jitable
+@unrolled
 def random_walk(variance, growth, ceiling):
     """P_ii after the parameter has walked: it grows by a constant as long as it is below a ceiling.
 
@@ -191,7 +192,7 @@ def random_walk(variance, growth, ceiling):
     return variance + growth * (variance < ceiling)
 
 
-@register_jitable
+@unrolled
 def propagate_error(C, phi, gain, filtered, n, pole, ratio, differenced):
     """Covariance C of the estimate's error after an update, under white noise before the filters.
 
@@ -228,7 +229,7 @@ def propagate_error(C, phi, gain, filtered, n, pole, ratio, differenced):
             C[j * n + i] = entry
 
 
-@register_jitable
+@unrolled
 def above_floor(P, n, floor, work):
     """1.0 if every eigenvalue of P exceeds `floor`, else 0.0: Cholesky on P - floor I.
 
@@ -251,7 +252,7 @@ def above_floor(P, n, floor, work):
     return positive
 
 
-@register_jitable
+@unrolled
 def add_covariance(P, P_0, n):
     """Say that a change was seen: P += P_0, the start's uncertainty on top of the present one.
 
@@ -261,7 +262,7 @@ def add_covariance(P, P_0, n):
         P[i] = P[i] + P_0[i]
 
 
-@register_jitable
+@unrolled
 def restore_covariance(P, P_0, n, reset):
     """Covariance resetting: P = P_0 where `reset` is 1.0 (Ioannou and Sun, sec. 4.3.6)."""
     for i in range(n * n):

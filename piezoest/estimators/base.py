@@ -113,12 +113,15 @@ class Compiled(NamedTuple):
         Position in the state of a flag that holds the estimate; None if there is none.
     unneeded : tuple of callable
         Functions within `sample` that no model depends on: a controller leaves them out.
+    bank : callable or None
+        ``bank(states, config, u, x, start, stop, every, theta)``: many channels at once.
     """
 
     sample: Any
     proposed: Any
     frozen: int | None
     unneeded: tuple[Any, ...] = ()
+    bank: Any = None
 
 
 class EstimatorBase(ABC):
@@ -247,11 +250,13 @@ class EstimatorBase(ABC):
             If the shapes do not match or a name in `record` is unknown.
         """
         # The compiled loops take writeable arrays only, though they write into none.
-        u = np.require(array_1d("u", u, allow_nan=True), requirements="W")
-        x = np.require(array_1d("x", x, allow_nan=True), requirements="W")
+        u = array_1d("u", u, allow_nan=True)
+        x = array_1d("x", x, allow_nan=True)
+        if not (u.flags.writeable and x.flags.writeable):
+            u, x = u.copy(), x.copy()
         if u.size != x.size:
             raise ValueError(f"u and x must have the same length, got {u.size} and {x.size}")
-        if unknown := sorted(set(record) - {"y", "S", "P"}):
+        if record and (unknown := sorted(set(record) - {"y", "S", "P"})):
             raise ValueError(f"record holds unknown names {unknown}: choose of 'y', 'S', 'P'")
         every = integer("every", every, 1)
         if self._pending is not None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
 from piezoest._checks import FloatArray, non_negative
+from piezoest._jit import unrolled
 
 
 def delay_line(delay: float) -> tuple[float, FloatArray]:
@@ -18,7 +18,7 @@ def delay_line(delay: float) -> tuple[float, FloatArray]:
     return delay - int(delay), storage
 
 
-@register_jitable
+@unrolled
 def delayed(line: Any, fraction: float, u: Any) -> Any:
     """Voltage as the sensor sees it now, u the newest; `line` = (position, storage), from its end.
 

@@ -9,6 +9,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST, FloatArray, non_negative, positive
+from piezoest._jit import UNCOUNTED, unrolled
 from piezoest.equations import admissible, kalman
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators.base import Compiled, EstimatorBase, Status, Trace
@@ -24,8 +25,10 @@ N, HYSTERETIC, NOISE, FRACTION, OFFSET, PROJECT, LEAST_A, LEAST_B, MARGIN, CONFI
 
 WAITING, UPDATED, MISSING = 0.0, 1.0, 2.0
 
+BLOCK = 16  # channels of a bank that share the first-level cache
 
-@register_jitable
+
+@unrolled
 def _views(state: Any, n: int) -> Any:
     """State vector s, its covariance P, last gain K, workspace, delay line."""
     i = HEAD
@@ -39,7 +42,7 @@ def _views(state: Any, n: int) -> Any:
     )
 
 
-@register_jitable
+@unrolled
 def _time_update(s: Any, P: Any, du: Any, config: Any, n: int, work: Any) -> None:
     """Exact sample map of the state, its Jacobian for the covariance, process noise."""
     row, q = work[:n], work[n : 2 * n]
@@ -47,16 +50,16 @@ def _time_update(s: Any, P: Any, du: Any, config: Any, n: int, work: Any) -> Non
         row[i] = 0.0
         q[i] = config[CONFIG + i]
     if config[HYSTERETIC] != 0.0:
-        kept, by_a, by_b = equations.hysteresis_jacobian(s[0], du, s[1], s[2])
+        w_h, kept, by_a, by_b = equations.hysteresis_linearised(s[0], du, s[1], s[2])
         q[0] += kalman.bilinear_variance(P, du, s[1], n)
-        s[0] = equations.hysteresis_step(s[0], du, s[1], s[2])
+        s[0] = w_h
         row[0], row[1], row[2] = kept, by_a, by_b
     else:
         row[0] = 1.0
     kalman.predict_covariance(P, row, q, n, work[2 * n :])
 
 
-@register_jitable
+@unrolled
 def measurement_row(h: Any, u: Any, config: Any, n: int) -> None:
     """dx/ds: x = w_h + c u (+ offset), or x = K u (+ offset)."""
     for i in range(n):
@@ -70,7 +73,7 @@ def measurement_row(h: Any, u: Any, config: Any, n: int) -> None:
         h[n - 1] = 1.0
 
 
-@register_jitable
+@unrolled
 def _onto_admissible(s: Any, P: Any, config: Any, n: int, work: Any) -> Any:
     """Project onto a >= least, b >= least, c - 2b >= margin: flat faces in this form."""
     g = work[:n]
@@ -84,7 +87,8 @@ def _onto_admissible(s: Any, P: Any, config: Any, n: int, work: Any) -> Any:
             g[1 + face] = 1.0
         else:
             g[2], g[3] = -2.0, 1.0
-        moved = max(moved, kalman.project(s, P, g, least, n, rest))
+        if kalman.measure(s, g, n) < least:
+            moved = max(moved, kalman.project(s, P, g, least, n, rest))
     # The faces meet at an angle: whatever is left over is clamped.
     s[1] = max(s[1], config[LEAST_A])
     s[2] = max(s[2], config[LEAST_B])
@@ -92,9 +96,9 @@ def _onto_admissible(s: Any, P: Any, config: Any, n: int, work: Any) -> Any:
     return moved
 
 
-@register_jitable
-def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
-    n = int(config[N])
+@unrolled
+def _take(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
+    """One sample of a filter of `n` states."""
     s, P, gain, work, line = _views(state, n)
     state[SAMPLES] += 1.0
     if np.abs(u) < WILDEST:
@@ -128,6 +132,18 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
 
 
 @register_jitable
+def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
+    """One sample."""
+    n = int(config[N])
+    if n == 4:
+        _take(state, config, u, x, 4)
+    elif n == 5:
+        _take(state, config, u, x, 5)
+    else:
+        _take(state, config, u, x, n)
+
+
+@register_jitable
 def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
     """(alpha, beta, gamma, offset) or (gain, -, -, offset) into `model`, admissible; `terms` = start's."""
     s = state[HEAD : HEAD + int(config[N])]
@@ -157,16 +173,20 @@ def _propose(state: Any, config: Any, terms: Any, model: Any) -> None:
     proposed(state, config, terms, model)
 
 
-@njit("void(f8[::1], f8[::1], f8, f8)", cache=True)
+@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, **UNCOUNTED)
 def _step(state: Any, config: Any, u: float, x: float) -> None:
     _sample(state, config, u, x)
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])", cache=True)
-def _run(state: Any, config: Any, u: Any, x: Any, every: int, s: Any, y: Any, S: Any, P: Any) -> None:
-    n = int(config[N])
+@unrolled
+def _loop(
+    state: Any, config: Any, u: Any, x: Any, every: int, s: Any, y: Any, S: Any, P: Any, n: int
+) -> None:
+    """Take a record; with `n` a constant the compiler unrolls the loops over states."""
+    if state.size < HEAD + 5 * n + 2 * n * n or config.size < CONFIG + n:
+        return
     for k in range(u.size):
-        _sample(state, config, u[k], x[k])
+        _take(state, config, u[k], x[k], n)
         if (k + 1) % every == 0:
             row = k // every
             for i in range(n):
@@ -178,6 +198,41 @@ def _run(state: Any, config: Any, u: Any, x: Any, every: int, s: Any, y: Any, S:
             if P.size > 0:
                 for i in range(n * n):
                     P[row, i] = state[HEAD + n + i]
+
+
+@njit(
+    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
+    cache=True,
+    **UNCOUNTED,
+)
+def _run(state: Any, config: Any, u: Any, x: Any, every: int, s: Any, y: Any, S: Any, P: Any) -> None:
+    n = int(config[N])
+    if n == 4:
+        _loop(state, config, u, x, every, s, y, S, P, 4)
+    elif n == 5:
+        _loop(state, config, u, x, every, s, y, S, P, 5)
+    else:
+        _loop(state, config, u, x, every, s, y, S, P, n)
+
+
+@njit(
+    "void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8, i8, f8[:, :, ::1])",
+    cache=True,
+    nogil=True,
+    **UNCOUNTED,
+)
+def _bank(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, theta: Any) -> None:
+    """Take samples (K, N) of channels `start` to `stop`, each with a row of `states`."""
+    n = int(config[N])
+    for first in range(start, stop, BLOCK):
+        last = min(first + BLOCK, stop)
+        for k in range(u.shape[0]):
+            for c in range(first, last):
+                _sample(states[c], config, u[k, c], x[k, c])
+            if (k + 1) % every == 0:
+                for c in range(first, last):
+                    for i in range(n):
+                        theta[k // every, c, i] = states[c, HEAD + i]
 
 
 class HysteresisEKF(EstimatorBase):
@@ -232,7 +287,7 @@ class HysteresisEKF(EstimatorBase):
 
     __slots__ = ("_config", "_initial", "_n", "_terms")
 
-    _compiled = Compiled(_sample, proposed, None)
+    _compiled = Compiled(_sample, proposed, None, bank=_bank)
 
     conformance_exceptions: ClassVar[dict[str, str]] = {}
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba.extending import register_jitable
-
+from piezoest._jit import unrolled
 from piezoest.equations import coleman_hodgdon as equations
 
 # Flat state: w_h for b = 1 µm/V [V]; turns so far; sums over the swing at hand, over the last one, and
@@ -21,13 +20,13 @@ PLACE, TURNS, NOW, LAST, PERIOD, STATE = 0, 1, 2, 6, 10, 14
 ENOUGH_TURNS = 3.0
 
 
-@register_jitable
+@unrolled
 def move(level: Any, du: Any, a: Any) -> None:
     """Take a change of voltage; `level` is updated in place, as by all below."""
     level[PLACE] = equations.hysteresis_step(level[PLACE], du, a, 1.0)
 
 
-@register_jitable
+@unrolled
 def measure(level: Any, u: Any, x: Any) -> None:
     """Take a measured displacement."""
     level[NOW] += 1.0
@@ -36,7 +35,7 @@ def measure(level: Any, u: Any, x: Any) -> None:
     level[NOW + 3] += level[PLACE]
 
 
-@register_jitable
+@unrolled
 def turn(level: Any) -> None:
     """Say that the voltage has turned: the swing at hand is over."""
     level[TURNS] += 1.0
@@ -46,13 +45,13 @@ def turn(level: Any) -> None:
         level[NOW + i] = 0.0
 
 
-@register_jitable
+@unrolled
 def is_known(level: Any) -> Any:
     """Whether there was a whole period."""
     return level[TURNS] >= ENOUGH_TURNS and level[PERIOD] > 0.0
 
 
-@register_jitable
+@unrolled
 def offset(level: Any, b: Any, c: Any) -> Any:
     """Mean of x - (c u + w_h) over the last whole period [µm]."""
     total = level[PERIOD + 1] - c * level[PERIOD + 2] - b * level[PERIOD + 3]

@@ -9,6 +9,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
+from piezoest._jit import UNCOUNTED
 from piezoest.equations.bent_plays import segment
 from piezoest.equations.mechanics import mechanics_step
 from piezoest.equations.play import play
@@ -454,13 +455,17 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     _new_window(state, config)
 
 
-@njit("void(f8[::1], f8[::1], f8, f8)", cache=True)
+@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, **UNCOUNTED)
 def step(state: Any, config: Any, u: float, x: float) -> None:
     """Take one sample."""
     _sample(state, config, u, x)
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])", cache=True)
+@njit(
+    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
+    cache=True,
+    **UNCOUNTED,
+)
 def run(
     state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, y: Any, S: Any, covariance: Any
 ) -> None:

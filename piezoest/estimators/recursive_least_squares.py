@@ -9,6 +9,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import FloatArray, array_1d, finite, integer, positive
+from piezoest._jit import UNCOUNTED, unrolled
 from piezoest.equations import least_squares as equations
 from piezoest.policies import (
     CovarianceResetting,
@@ -93,7 +94,7 @@ def new_state(theta: FloatArray, P_0: FloatArray) -> FloatArray:
     return state
 
 
-@register_jitable
+@unrolled
 def varied(state: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any, least: Any) -> Any:
     """Forgetting factor of this sample by variable forgetting."""
     y = z - equations.predicted_output(state[HEAD : HEAD + n], phi, n)
@@ -102,7 +103,7 @@ def varied(state: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any, least:
     return equations.variable_forgetting(y, quadratic, R, forgetting, least)
 
 
-@register_jitable
+@unrolled
 def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
     """One sample of the law: gate, resetting, update with noise variance R."""
     theta = state[HEAD : HEAD + n]
@@ -133,7 +134,7 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting:
     state[LAST] = UPDATED
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8, i8)", cache=True)
+@njit("void(f8[::1], f8[::1], f8[::1], f8, i8)", cache=True, **UNCOUNTED)
 def _update(state: Any, config: Any, phi: Any, z: float, n: int) -> None:
     forgetting = config[FORGETTING]
     if config[LEAST_FACTOR] > 0.0:

@@ -84,7 +84,11 @@ class HysteresisRLS(EstimatorBase):
     __slots__ = ("_config", "_initial", "_n", "_scale", "_terms")
 
     _compiled = Compiled(
-        kernel._sample, rls_model.proposed, kernel.FROZEN, unneeded=(kernel._propagate_error,)
+        kernel._sample,
+        rls_model.proposed,
+        kernel.FROZEN,
+        unneeded=(kernel._propagate_error,),
+        bank=kernel.bank,
     )
 
     conformance_exceptions: ClassVar[dict[str, str]] = {}
@@ -184,16 +188,19 @@ class HysteresisRLS(EstimatorBase):
         S = np.empty(rows if "S" in want else 0)
         P = np.empty((rows if "P" in want else 0, n * n))
         kernel.run(self._state, self._config, u, x, every, theta, y, S, P)
-        theta *= self._scale
-        scale = np.outer(self._scale, self._scale)
+        theta = self._theta_of(theta)
         return Trace(
             index=np.arange(1, rows + 1) * every - 1,
             theta=theta,
             parameter_names=self.parameter_names,
             y=y / self._config[kernel.SCALE + 4] if "y" in want else None,
             S=S / self._config[kernel.SCALE + 4] ** 2 if "S" in want else None,
-            P=P.reshape(-1, n, n) * scale if "P" in want else None,
+            P=P.reshape(-1, n, n) * np.outer(self._scale, self._scale) if "P" in want else None,
         )
+
+    def _theta_of(self, rows: FloatArray) -> FloatArray:
+        """Parameters of what the compiled loops write into their histories."""
+        return rows * self._scale
 
     def reset_covariance(self) -> None:
         """Put P back to its initial value: covariance resetting on call."""

@@ -9,6 +9,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
+from piezoest._jit import UNCOUNTED, unrolled
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations import filters, least_squares
 from piezoest.estimators import level, swing
@@ -45,6 +46,8 @@ BELIEVED_STEPS, BELIEVED_SLOPES = 20.0, 3.0
 # Slower than so many swings a sample the voltage is at rest; slower than this part of its usual
 # pace it counts as going at that.
 SLOWEST, SLOW = 1e-12, 0.2
+# Channels of a bank that share the first-level cache.
+BLOCK = 16
 # Positions in theta; the offset may be off by this part of a swing, a parameter walks at least
 # so much (squared), and no variance grows beyond so many times its start.
 GAMMA, OFFSET_SLOPE = 2, 3
@@ -54,7 +57,7 @@ LEAST = 1e-2
 OFF_CENTRE, LEAST_STEP, CEILING = 0.3, 1e-6, 1e4
 
 
-@register_jitable
+@unrolled
 def _filtered(state: Any, config: Any, i: int, value: Any) -> Any:
     """Low-pass (W_p of App. A), then the optional high-pass."""
     state[LOW + i] = filters.low_pass_step(state[LOW + i], value, config[LOW_POLE])
@@ -64,7 +67,7 @@ def _filtered(state: Any, config: Any, i: int, value: Any) -> Any:
     return value
 
 
-@register_jitable
+@unrolled
 def _prime(state: Any, config: Any, u: Any, x: Any) -> None:
     """Start from (u, x) as the last good sample; what is usual is learnt anew."""
     state[SEEN] = 0.0
@@ -77,7 +80,7 @@ def _prime(state: Any, config: Any, u: Any, x: Any) -> None:
     state[TRAVEL] = state[MOMENT] = state[RISE] = state[GAP] = 0.0
 
 
-@register_jitable
+@unrolled
 def _believable(state: Any, config: Any, x: Any) -> Any:
     """Whether the change of x since the last good sample is one that the stage can make."""
     if config[OUTLIER] == 0.0:
@@ -92,7 +95,7 @@ def _believable(state: Any, config: Any, x: Any) -> Any:
     return True
 
 
-@register_jitable
+@unrolled
 def _regression(state: Any, config: Any, x: Any, phi: Any, n: int) -> Any:
     """Regressor into `phi` and output, from the last good sample to this one; starts the next."""
     if config[HYSTERETIC] != 0.0:
@@ -115,7 +118,7 @@ def _regression(state: Any, config: Any, x: Any, phi: Any, n: int) -> Any:
     return _filtered(state, config, 4, z * config[SCALE + 4])
 
 
-@register_jitable
+@unrolled
 def _measure_noise(state: Any, change: Any) -> None:
     """Variance of the sensor's noise, from the third differences of x: a stage moves more smoothly."""
     third = change - 2.0 * state[CHANGE] + state[CHANGE_BEFORE]
@@ -126,7 +129,7 @@ def _measure_noise(state: Any, change: Any) -> None:
         state[NOISE] += (third * third / 20.0 - state[NOISE]) / (state[SEEN_NOISE] - 3.0)
 
 
-@register_jitable
+@unrolled
 def _noise_memory(state: Any, config: Any) -> Any:
     """Square of the memory in swings that it takes for the sensor's noise to move the gain by no more.
 
@@ -144,20 +147,20 @@ def _noise_memory(state: Any, config: Any) -> Any:
     return noise / max(allowed * allowed, SLOWEST)
 
 
-@register_jitable
+@unrolled
 def trust_in_levels(state: Any, config: Any) -> Any:
     """Part of the offset to take from levels: 0 with a good sensor, 1 where noise covers the changes of x."""
     noise = _noise_memory(state, config) * (config[WALK] > 0.0) * level.is_known(state[LEVEL:FRONT])
     return noise / (noise + config[WALK_MEMORY] * config[WALK_MEMORY] + SLOWEST)
 
 
-@register_jitable
+@unrolled
 def _decay(state: Any, config: Any) -> Any:
     """alpha [1/V] as estimated, kept to what its model may have."""
     return max(state[FRONT + law.HEAD], LEAST) * abs(config[DECAY_SCALE])
 
 
-@register_jitable
+@unrolled
 def _square_step(state: Any, config: Any, i: int) -> Any:
     """Square of what a parameter walks in a swing: a part of itself; the offset, a part of the swing."""
     head = FRONT + law.HEAD
@@ -168,7 +171,7 @@ def _square_step(state: Any, config: Any, i: int) -> Any:
     return config[WALK] * max(size * size, LEAST_STEP)
 
 
-@register_jitable
+@unrolled
 def _walk(state: Any, config: Any, phi: Any, n: int, part: Any, half: Any) -> Any:
     """Let P grow, and return the noise variance of a sample that gives the memory wanted.
 
@@ -196,7 +199,7 @@ def _walk(state: Any, config: Any, phi: Any, n: int, part: Any, half: Any) -> An
     return 1.0 + memory_squared * rho * max(part, SLOW / half)
 
 
-@register_jitable
+@unrolled
 def _propagate_error(state: Any, config: Any, phi: Any, n: int, forgetting: Any, restart: bool) -> None:
     """Covariance of the estimate's error under the sensor's noise, coloured by W_p and difference."""
     C = state[ERROR : ERROR + n * n]
@@ -249,10 +252,9 @@ def _watch(state: Any, config: Any, n: int, part: Any) -> None:
         state[FRONT + law.RESETS] += 1.0
 
 
-@register_jitable
-def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
-    """One raw sample: a regression for the law, or a note of why there is none."""
-    n = int(config[N])
+@unrolled
+def _take(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
+    """One raw sample: a regression of n parameters for the law, or a note of why there is none."""
     law_state = state[FRONT:]
     if np.abs(u) < WILDEST:
         u = delayed(state[FRONT + law.state_size(n) + int(config[EXTRA]) :], config[FRACTION], u)
@@ -338,19 +340,27 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
         _propagate_error(state, config, phi, n, forgetting, restart)
 
 
-@njit("void(f8[::1], f8[::1], f8, f8)", cache=True)
-def step(state: Any, config: Any, u: float, x: float) -> None:
-    """Take one sample."""
-    _sample(state, config, u, x)
-
-
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])", cache=True)
-def run(state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, y: Any, S: Any, P: Any) -> None:
-    """Take whole records; every `every`-th sample into the histories that have room."""
+@register_jitable
+def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
+    """One raw sample; where n is a constant its loops are unrolled."""
     n = int(config[N])
+    if n == 3:
+        _take(state, config, u, x, 3)
+    elif n == 4:
+        _take(state, config, u, x, 4)
+    else:
+        _take(state, config, u, x, n)
+
+
+@unrolled
+def _loop(
+    state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, y: Any, S: Any, P: Any, n: int
+) -> None:
     head = FRONT + law.HEAD
+    if state.size < FRONT + law.state_size(n) or config.size < CONFIG + law.CONFIG_SIZE:
+        return  # never so; said here, it saves the compiler to ask at each slice
     for k in range(u.size):
-        _sample(state, config, u[k], x[k])
+        _take(state, config, u[k], x[k], n)
         if (k + 1) % every == 0:
             row = k // every
             for i in range(n):
@@ -362,3 +372,45 @@ def run(state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, y: Any,
             if P.size > 0:
                 for i in range(n * n):
                     P[row, i] = state[head + n + i]
+
+
+@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, **UNCOUNTED)
+def step(state: Any, config: Any, u: float, x: float) -> None:
+    """Take one sample."""
+    _sample(state, config, u, x)
+
+
+@njit(
+    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
+    cache=True,
+    **UNCOUNTED,
+)
+def run(state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, y: Any, S: Any, P: Any) -> None:
+    """Take whole records; every `every`-th sample into the histories that have room."""
+    n = int(config[N])
+    if n == 3:
+        _loop(state, config, u, x, every, theta, y, S, P, 3)
+    elif n == 4:
+        _loop(state, config, u, x, every, theta, y, S, P, 4)
+    else:
+        _loop(state, config, u, x, every, theta, y, S, P, n)
+
+
+@njit(
+    "void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8, i8, f8[:, :, ::1])",
+    cache=True,
+    nogil=True,
+    **UNCOUNTED,
+)
+def bank(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, theta: Any) -> None:
+    """Take samples (K, N) of channels `start` to `stop`, each with a row of `states`."""
+    n = int(config[N])
+    for first in range(start, stop, BLOCK):
+        last = min(first + BLOCK, stop)
+        for k in range(u.shape[0]):
+            for c in range(first, last):
+                _sample(states[c], config, u[k, c], x[k, c])
+            if (k + 1) % every == 0:
+                for c in range(first, last):
+                    for i in range(n):
+                        theta[k // every, c, i] = states[c, FRONT + law.HEAD + i]

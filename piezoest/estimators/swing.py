@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
+
+from piezoest._jit import unrolled
 
 # Flat state: direction of travel, furthest voltage in it, samples since it was entered,
 # samples of a usual swing (0: none seen yet), size of a usual swing, or of the present one if
@@ -18,7 +19,7 @@ TURN = 0.1
 LONGEST = 1e6
 
 
-@register_jitable
+@unrolled
 def follow(swing: Any, u: Any) -> None:
     """Take the next voltage; `swing` is updated in place."""
     swing[SINCE] += 1.0
@@ -40,14 +41,14 @@ def follow(swing: Any, u: Any) -> None:
         swing[SINCE] = 0.0
 
 
-@register_jitable
+@unrolled
 def half_period(swing: Any, otherwise: Any) -> Any:
     """Samples of half a period; `otherwise` until there was a turn, and never less than the swing at hand."""
     usual = swing[USUAL] if swing[USUAL] > 0.0 else otherwise
     return min(max(usual, swing[SINCE]), LONGEST)
 
 
-@register_jitable
+@unrolled
 def part_of_swing(swing: Any, travel: Any, otherwise: Any) -> Any:
     """What part of a whole swing a travel of the voltage is: half a period in unit of motion.
 

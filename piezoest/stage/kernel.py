@@ -11,6 +11,7 @@ from typing import Any
 from numba import njit
 from numba.extending import register_jitable
 
+from piezoest._jit import UNCOUNTED
 from piezoest.equations.coleman_hodgdon import hysteresis_step
 from piezoest.equations.creep import creep_step
 from piezoest.equations.mechanics import mechanics_step
@@ -92,7 +93,7 @@ def _measure(
         measured[k] = gauge_step(filter_state, line, x[k], noise[k * every], settings, coefficients)
 
 
-@njit(cache=True)
+@njit("void(f8[::1], f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])", cache=True, **UNCOUNTED)
 def run(
     state: Any,
     settings: Any,
@@ -145,7 +146,7 @@ def run(
     )
 
 
-@njit(cache=True)
+@njit("UniTuple(f8, 2)(f8[::1], f8[::1], i8, i8, f8, f8, f8, f8)", cache=True, **UNCOUNTED)
 def step(
     state: Any, settings: Any, plays: int, terms: int, u: float, noise: float, factor: float, shape: float
 ) -> tuple[float, float]:

@@ -200,15 +200,3 @@ def test_jumps_are_answered_with_what_to_do() -> None:
     with pytest.raises(ValueError, match=r"r jumps by .*signals\.filtered_steps"):
         model.invert(square)
     model.simulate(signals.filtered_steps([0.0, 10.0], [0.1, 0.1], 1e4).values)
-
-
-@pytest.mark.parametrize("ratio", [1e-300, 0.3, 1.0, 4.0, 1e300])
-def test_place_is_carried_within_the_loop(ratio: float) -> None:
-    places = np.array([-1.0, -0.5, 0.0, 1e-3, 1.0])
-    carried = ch.carried_place(places, ratio)
-    assert np.all(np.abs(carried) <= 1.0)
-    assert np.all(np.sign(carried) == np.sign(places))
-    if 0.1 < ratio < 10.0:
-        exact = np.tanh(ratio * np.arctanh(0.5))
-        assert ch.carried_place(0.5, ratio) == pytest.approx(exact, rel=0.06)
-        assert ch.carried_place(1e-3, ratio) == pytest.approx(1e-3 * ratio, rel=1e-4)

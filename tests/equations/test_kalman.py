@@ -45,7 +45,7 @@ def test_update_is_the_textbook(n: int) -> None:
     h = np.array([1.0, 0.0, 0.0, 21.0, 1.0][:n])
     flat, gain = P.ravel().copy(), np.empty(n)
     moved = s.copy()
-    S = kalman.update(moved, flat, h, 0.7, 0.04, n, gain, np.empty(n * n))
+    S = kalman.update(moved, flat, h, 0.7, 0.04, n, gain, np.empty(2 * n))
     expected_s, expected_P, K, expected_S = reference.update(s, P, h, 0.7, 0.04)
     assert pytest.approx(expected_S, rel=1e-13) == S
     np.testing.assert_allclose(gain, K, rtol=1e-12)

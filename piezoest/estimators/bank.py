@@ -1,0 +1,178 @@
+"""Many stages at once: one estimator's law on many channels, over all cores."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import FloatArray, integer
+from piezoest.estimators.base import EstimatorBase, Status
+from piezoest.models import Model
+
+# Samples (of all channels) below which a second core costs more than it brings.
+WORTH_A_CORE = 4096
+
+
+class EstimatorBank:
+    """Many copies of an estimator, one for each channel, stepped together.
+
+    Each channel is an estimator of its own and gives what a single one gives, to the last
+    bit; only the loop over the channels is compiled, and spread over the cores.
+
+    Parameters
+    ----------
+    estimator : HysteresisRLS or HysteresisEKF
+        Every channel starts as a copy of it, in its present state; it is not changed itself.
+    channels : int
+        Number of stages, N.
+    threads : int, optional
+        Cores to use; default all.
+
+    Raises
+    ------
+    ValueError
+        If the estimator has no compiled loop over channels, or a number is below one.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezoest as pz
+    >>> bank = pz.EstimatorBank(pz.HysteresisRLS(50_000.0), channels=64)
+    >>> bank.step(np.zeros(64), np.zeros(64))
+    >>> bank.theta.shape
+    (64, 4)
+    """
+
+    __slots__ = ("_bank", "_none", "_reader", "_start", "_states", "_threads")
+
+    _reader: Any
+
+    def __init__(self, estimator: Any, channels: int, *, threads: int | None = None) -> None:
+        compiled = getattr(type(estimator), "_compiled", None)
+        if not isinstance(estimator, EstimatorBase) or compiled is None or compiled.bank is None:
+            raise ValueError(
+                f"estimator must be a HysteresisRLS or a HysteresisEKF, got {type(estimator).__name__}: "
+                "keep a list of estimators instead"
+            )
+        channels = integer("channels", channels, 1)
+        self._threads = integer("threads", os.cpu_count() or 1 if threads is None else threads, 1)
+        self._bank = compiled.bank
+        reader: Any = estimator.copy()
+        self._reader = reader
+        self._start = estimator._state.copy()
+        self._states = np.tile(self._start, (channels, 1))
+        self._none = np.empty((0, channels, self._reader._n))
+
+    def __len__(self) -> int:
+        """Return the number of channels."""
+        return len(self._states)
+
+    def _channels_of(self, name: str, values: Any, dimensions: int) -> FloatArray:
+        try:
+            array = np.require(values, np.float64, ["C", "W"])
+        except (TypeError, ValueError):
+            raise ValueError(f"{name} must be numbers, got {type(values).__name__}") from None
+        if array.ndim != dimensions or array.shape[-1] != len(self):
+            shape = f"(K, {len(self)})" if dimensions == 2 else f"({len(self)},)"
+            raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
+        return array
+
+    def _take(self, u: FloatArray, x: FloatArray, every: int, theta: FloatArray) -> None:
+        channels = len(self)
+        parts = min(self._threads, max(1, u.size // WORTH_A_CORE), channels)
+        reader = self._reader
+        if parts == 1:
+            self._bank(self._states, reader._config, u, x, 0, channels, every, theta)
+            return
+        edges = [channels * part // parts for part in range(parts + 1)]
+        with ThreadPoolExecutor(parts) as pool:
+            tasks = [
+                pool.submit(self._bank, self._states, reader._config, u, x, start, stop, every, theta)
+                for start, stop in itertools.pairwise(edges)
+            ]
+        for task in tasks:
+            task.result()
+
+    def step(self, u: Any, x: Any) -> None:
+        """Take one sample of every channel.
+
+        Parameters
+        ----------
+        u, x : array_like, shape (N,)
+            Voltages [V] and measured displacements [µm]; NaN where there is none.
+
+        Raises
+        ------
+        ValueError
+            If a shape is another one.
+        """
+        u, x = self._channels_of("u", u, 1), self._channels_of("x", x, 1)
+        self._take(u[np.newaxis], x[np.newaxis], 2, self._none)
+
+    def run(self, u: Any, x: Any, *, every: int = 1) -> FloatArray:
+        """Take whole records; continues from the present state.
+
+        Parameters
+        ----------
+        u, x : array_like, shape (K, N)
+            Voltages [V] and measured displacements [µm], a row for each sample.
+        every : int
+            Keep every k-th sample's parameters.
+
+        Returns
+        -------
+        ndarray, shape (K // every, N, n)
+            Parameters after those samples.
+
+        Raises
+        ------
+        ValueError
+            If a shape is another one.
+        """
+        u, x = self._channels_of("u", u, 2), self._channels_of("x", x, 2)
+        if u.shape != x.shape:
+            raise ValueError(f"u and x must have the same shape, got {u.shape} and {x.shape}")
+        every = integer("every", every, 1)
+        rows = np.empty((u.shape[0] // every, len(self), self._reader._n))
+        self._take(u, x, every, rows)
+        theta: FloatArray = self._reader._theta_of(rows)
+        return theta
+
+    def _channel(self, c: int) -> Any:
+        self._reader._state = self._states[c]
+        return self._reader
+
+    def channel(self, c: int) -> Any:
+        """Return an independent estimator in the state of channel c.
+
+        Parameters
+        ----------
+        c : int
+            Number of the channel, from 0.
+        """
+        single = self._channel(c).copy()
+        single._state = self._states[c].copy()
+        return single
+
+    @property
+    def theta(self) -> FloatArray:
+        """Parameters of every channel, shape (N, n)."""
+        return np.array([self._channel(c).theta for c in range(len(self))])
+
+    @property
+    def models(self) -> list[Model]:
+        """Admissible models as known now, one for each channel."""
+        return [self._channel(c).model for c in range(len(self))]
+
+    @property
+    def status(self) -> list[Status]:
+        """What happened to the samples so far, for each channel."""
+        return [self._channel(c).status for c in range(len(self))]
+
+    def reset(self) -> None:
+        """Return every channel to the state of the estimator given."""
+        self._states[:] = self._start

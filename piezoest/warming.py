@@ -1,0 +1,66 @@
+"""Compile and load all that a live loop will call, before it runs."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from piezoest.compensators import InverseCompensator, LinearCompensator
+from piezoest.estimators.bank import EstimatorBank
+from piezoest.estimators.ekf import HysteresisEKF
+from piezoest.estimators.play_rls import PrandtlIshlinskiiRLS
+from piezoest.estimators.recursive_least_squares import RecursiveLeastSquares
+from piezoest.estimators.rls import HysteresisRLS
+from piezoest.models import ColemanHodgdon, LinearGain, PrandtlIshlinskii
+from piezoest.stage import PaperStage
+
+
+def warmup() -> float:
+    """Compile and load the kernels of estimators, compensators and stages.
+
+    The first process after an installation compiles, which takes a minute or two; every later one
+    loads from the disk in a second. Call it before a live loop starts.
+
+    Returns
+    -------
+    float
+        Seconds it took.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> seconds = pz.warmup()
+    """
+    began = time.perf_counter()
+    sample_rate = 50_000.0
+    u = np.linspace(0.0, 1.0, 8)
+    x = 0.15 * u
+    for estimator in (HysteresisRLS(sample_rate), HysteresisEKF(sample_rate)):
+        bank = EstimatorBank(estimator, 2)
+        bank.step(u[:2], x[:2])
+    loop = ColemanHodgdon(0.02, 0.12, 0.0036)
+    plays = PrandtlIshlinskii(0.1, [1.0], [0.02])
+    for learner in (
+        HysteresisRLS(sample_rate),
+        HysteresisEKF(sample_rate),
+        PrandtlIshlinskiiRLS(sample_rate),
+    ):
+        learner.step(0.0, 0.0)
+        learner.run(u, x)
+        _ = learner.model
+    RecursiveLeastSquares(2).update(1.0, np.ones(2))
+    for compensator in (
+        LinearCompensator(LinearGain(0.15)),
+        InverseCompensator(loop),
+        InverseCompensator(plays),
+    ):
+        compensator.step(0.0)
+        compensator.run(x)
+        compensator.model = compensator.model
+    stage = PaperStage(sample_rate)
+    stage.step(0.0)
+    stage.run(u)
+    for model in (loop, plays):
+        model.simulate(u)
+    return time.perf_counter() - began

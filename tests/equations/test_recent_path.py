@@ -1,0 +1,92 @@
+"""The recent path of the voltage tells where any Coleman-Hodgdon model would stand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numba import njit
+
+from piezoest.equations import recent_path
+from piezoest.equations.coleman_hodgdon import hysteresis_step
+
+START = 3  # anywhere in a larger array
+
+
+def followed(u: np.ndarray, rest: float = 0.0) -> np.ndarray:
+    path = np.full(START + recent_path.SIZE + 2, 7.0)
+    recent_path.begin(path, START, rest)
+    for value in u:
+        recent_path.follow(path, START, float(value))
+    assert np.all(path[:START] == 7.0)
+    assert np.all(path[-2:] == 7.0)
+    return path
+
+
+def simulated(u: np.ndarray, a: float, rest: float = 0.0) -> float:
+    h, last = 0.0, rest
+    for value in u:
+        h, last = hysteresis_step(h, value - last, a, 1.0), value
+    return float(h)
+
+
+def triangle(turns: list[float], samples: int = 5) -> np.ndarray:
+    places = np.concatenate([[0.0], turns])
+    return np.interp(np.arange(1, samples * len(turns) + 1) / samples, np.arange(places.size), places)
+
+
+@given(
+    st.lists(st.floats(-50.0, 50.0), min_size=1, max_size=recent_path.MOST - 1),
+    st.floats(1e-4, 0.5),
+    st.floats(-20.0, 20.0),
+)
+def test_equals_a_model_that_had_been_running(turns: list[float], a: float, rest: float) -> None:
+    u = triangle(turns)
+    expected = simulated(u, a, rest)
+    # A way back of a hundredth of a swing is no turn, and what is long gone is left out.
+    slack = 2.0 * recent_path.TURN * (np.ptp(u) + abs(rest)) * len(turns)
+    path = followed(u, rest)
+    assert abs(recent_path.hysteresis(path, START, a) - expected) <= slack + 3.0 * recent_path.FORGOTTEN / a
+
+
+@pytest.mark.parametrize("a", [1e-3, 0.02, 0.1, 1.0])
+def test_steady_loop_is_known_however_long_it_went_on(a: float) -> None:
+    u = np.concatenate([triangle([30.0, -30.0] * 200), np.linspace(-30.0, 12.0, 20)[1:]])
+    expected = simulated(u, a)
+    h = recent_path.hysteresis(followed(u), START, a)
+    # Where memory is longer than all that went on, so is the way into the steady loop.
+    assert h == pytest.approx(expected, abs=1e-4 / a)
+
+
+def test_turns_out_of_many_small_loops_within_a_large_one() -> None:
+    """Minor loops on a slow wave: the oldest point kept stands far from the middle."""
+    t = np.linspace(0.0, 40.0, 4001)
+    u = 30.0 * np.sin(2.0 * np.pi * 0.1 * t) + 5.0 * np.sin(2.0 * np.pi * 2.0 * t)
+    for a in (0.005, 0.02, 0.1):
+        expected = simulated(u, a)
+        assert recent_path.hysteresis(followed(u), START, a) == pytest.approx(expected, abs=0.5)
+
+
+def test_jitter_does_not_wash_the_memory_out() -> None:
+    swings = triangle([30.0, -30.0] * 30 + [20.0])
+    jitter = 20.0 + 0.05 * np.random.default_rng(0).standard_normal(2000)
+    u = np.concatenate([swings, jitter])
+    path = followed(u)
+    before = followed(swings)
+    at = slice(START + recent_path.POINTS, START + recent_path.SIZE)
+    assert np.count_nonzero(path[at] != before[at]) <= 2
+    assert recent_path.largest_swing(path, START) == 60.0
+
+
+def test_compiled_equals_plain() -> None:
+    @njit
+    def compiled(u, a):  # type: ignore[no-untyped-def]
+        path = np.zeros(recent_path.SIZE)
+        recent_path.begin(path, 0, 0.0)
+        for value in u:
+            recent_path.follow(path, 0, value)
+        return recent_path.hysteresis(path, 0, a)
+
+    u = np.cumsum(np.random.default_rng(1).standard_normal(3000))
+    assert compiled(u, 0.02) == pytest.approx(recent_path.hysteresis(followed(u), START, 0.02), rel=1e-12)

@@ -1,0 +1,94 @@
+"""A bank of estimators is so many single ones; streaming keeps nothing."""
+
+from __future__ import annotations
+
+import gc
+import tracemalloc
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+
+SAMPLE_RATE = 50_000.0
+TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
+
+
+def records(K: int, N: int) -> tuple[Any, Any]:
+    """Voltages and displacements of N stages, one of them with gaps."""
+    rng = np.random.default_rng(0)
+    t = np.arange(K)[:, None] / SAMPLE_RATE
+    u = np.ascontiguousarray(20.0 * np.sin(2 * np.pi * (40.0 + np.arange(N)) * t))
+    x = np.column_stack([TRUE.simulate(u[:, c].copy()) for c in range(N)])
+    x += 1e-3 * rng.standard_normal(x.shape)
+    x[rng.random(K) < 0.05, 1] = np.nan
+    return u, x
+
+
+@pytest.mark.parametrize(
+    "estimator",
+    [
+        pz.HysteresisRLS(SAMPLE_RATE),
+        pz.HysteresisRLS(SAMPLE_RATE, memory=0.4),
+        pz.HysteresisRLS(SAMPLE_RATE, initial_model=pz.LinearGain(0.15)),
+        pz.HysteresisEKF(SAMPLE_RATE, offset=True, delay=1.5),
+    ],
+)
+@pytest.mark.parametrize("threads", [1, 3])
+def test_each_channel_is_a_single_estimator(estimator: Any, threads: int) -> None:
+    u, x = records(4000, 5)
+    bank = pz.EstimatorBank(estimator, 5, threads=threads)
+    theta = bank.run(u[:-3], x[:-3], every=7)
+    for k in (-3, -2, -1):
+        bank.step(u[k], x[k])
+    for c in range(5):
+        single = estimator.copy()
+        trace = single.run(u[:-3, c].copy(), x[:-3, c].copy(), every=7)
+        np.testing.assert_array_equal(theta[:, c], trace.theta)
+        single.run(u[-3:, c].copy(), x[-3:, c].copy())
+        np.testing.assert_array_equal(bank.theta[c], single.theta)
+        assert bank.models[c] == single.model
+        assert bank.status[c] == single.status
+        assert bank.channel(c).to_dict() == single.to_dict()
+    bank.reset()
+    np.testing.assert_array_equal(bank.theta[0], estimator.theta)
+
+
+def test_wrong_arguments_are_named() -> None:
+    with pytest.raises(ValueError, match="list of estimators"):
+        pz.EstimatorBank(pz.PrandtlIshlinskiiRLS(SAMPLE_RATE), 2)
+    bank = pz.EstimatorBank(pz.HysteresisRLS(SAMPLE_RATE), 2)
+    with pytest.raises(ValueError, match=r"u must have shape \(2,\)"):
+        bank.step(np.zeros(3), np.zeros(2))
+    with pytest.raises(ValueError, match=r"x must have shape \(K, 2\)"):
+        bank.run(np.zeros((4, 2)), np.zeros(4))
+
+
+@pytest.mark.parametrize("make", [pz.HysteresisRLS, pz.HysteresisEKF])
+def test_streaming_keeps_nothing_and_needs_no_collector(make: Any) -> None:
+    u, x = (values[:, 0].tolist() for values in records(3000, 2))
+    estimator, other = make(SAMPLE_RATE), make(SAMPLE_RATE)
+    for u_k, x_k in zip(u, x, strict=True):
+        estimator.step(u_k, x_k)
+    tracemalloc.start()
+    gc.collect()
+    before, _ = tracemalloc.get_traced_memory()
+    estimator.reset()
+    gc.disable()
+    try:
+        for u_k, x_k in zip(u, x, strict=True):
+            estimator.step(u_k, x_k)
+    finally:
+        gc.enable()
+    after, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert after - before < 5000
+    for u_k, x_k in zip(u, x, strict=True):
+        other.step(u_k, x_k)
+    np.testing.assert_array_equal(estimator.theta, other.theta)
+
+
+def test_warmup_says_how_long_it_took() -> None:
+    pz.warmup()
+    assert 0.0 < pz.warmup() < 10.0
