@@ -15,6 +15,8 @@ import controller_page
 import estimators_page
 import paper_page
 import performance_page
+import real_data_page
+import tuning_page
 
 project = "piezoest"
 author = "The piezoest developers"
@@ -57,6 +59,9 @@ html_theme_options = {
 html_sidebars: dict[str, list[str]] = {
     "start": [],
     "your_own_stage": [],
+    "real_data": [],
+    "tuning": [],
+    "coming_from": [],
     "mathematics": [],
     "paper": [],
     "estimators": [],
@@ -108,5 +113,7 @@ def setup(app: Any) -> None:
     app.connect("builder-inited", beyond_page.write)
     app.connect("builder-inited", estimators_page.write)
     app.connect("builder-inited", controller_page.write)
+    app.connect("builder-inited", tuning_page.write)
+    app.connect("builder-inited", real_data_page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

@@ -118,6 +118,10 @@ class PeriodicForgetting:
     ------
     ValueError
         If memory is not above zero.
+
+    Notes
+    -----
+    Source: the forgetting of (A4), on the reference's clock.
     """
 
     memory: float = 2.0
@@ -136,7 +140,7 @@ class DirectionalForgetting:
     Parameters
     ----------
     memory : float
-        Time constant along the regressor.
+        Time constant along the regressor, in units of `unit`.
     unit : {"period", "second"}
         Of memory: the reference's own period, or seconds (the unit of `step` in
         `RecursiveLeastSquares`).
@@ -165,7 +169,7 @@ class VariableForgetting:
     Parameters
     ----------
     memory : float
-        Time constant while the innovation is as usual.
+        Time constant while the innovation is as usual, in units of `unit`.
     shortest : float
         Least time constant, in parts of memory.
     unit : {"period", "second"}
@@ -334,6 +338,7 @@ class OutlierRejection:
     -----
     A change is believed up to 20 times the usual one plus three times what the present slope
     explains. Where x stays at its new level, it is taken for the new one after 2 ms.
+    Source: a rule of this library.
     """
 
     warm_up: int = 100
@@ -417,6 +422,10 @@ class DeadZone:
     ------
     ValueError
         If threshold is negative.
+
+    Notes
+    -----
+    Source: P. A. Ioannou, J. Sun, Robust Adaptive Control, Prentice Hall 1996, ch. 8.
     """
 
     threshold: float = 1e-9
