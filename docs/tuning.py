@@ -23,7 +23,8 @@ from piezoest.bench.machine import describe_machine, versions
 RATE, FREQUENCY, AMPLITUDE = 10_000.0, 5.0, 5.0  # Hz, Hz, µm
 SEEDS = 3
 MEMORIES = (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s; the reference's period is 0.2 s
-NOISES = (0.0, 1e-3, 3e-3, 10e-3, 30e-3)  # µm rms
+NOISES = (0.0, 1e-3, 10e-3, 30e-3, 100e-3)  # µm rms
+NOISE_MEMORIES = (0.025, 0.1, 0.4)  # s
 LAGS = (0, 2, 5, 10, 20)  # samples
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
 LEARN, JUDGE = 3.0, 2.0  # s
@@ -66,8 +67,7 @@ def noises() -> list[dict[str, Any]]:
             "noise_um": noise,
             "untold_um": settled(r, noise),
             "told_um": settled(r, noise, noise=max(noise, 1e-4)),
-            "memory_um": settled(r, noise, memory=0.4),
-            "long_memory_um": settled(r, noise, memory=1.6),
+            **{f"memory_{memory:g}_um": settled(r, noise, memory=memory) for memory in NOISE_MEMORIES},
         }
         for noise in NOISES
     ]
@@ -152,10 +152,10 @@ def delays() -> list[dict[str, Any]]:
 
 
 def draw(document: dict[str, Any], path: Path) -> None:
-    """Memory and delay, side by side."""
+    """Memory, noise and delay, side by side."""
     import matplotlib.pyplot as plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 3.9), layout="constrained")
     default, *fixed = document["memories"]
     memory = [row["memory_s"] for row in fixed]
     for key, color, label in (("worst_um", "C3", "worst, after the step"), ("settled_um", "C0", "settled")):
@@ -165,6 +165,18 @@ def draw(document: dict[str, Any], path: Path) -> None:
     left.annotate("one period", (1.0 / FREQUENCY, left.get_ylim()[1]), (3, -12), textcoords="offset points",
                   color="0.4", fontsize="small")  # fmt: skip
     left.set(xlabel="memory [s]", ylabel="largest error [µm]", title="The gain falls by 20 %")
+    rows = document["noises"]
+    noise = [1e3 * row["noise_um"] for row in rows]
+    for key, style, label in (
+        ("untold_um", "o-", "default"),
+        ("told_um", "s--", "default, noise= as it is"),
+        *((f"memory_{memory:g}_um", "^-", f"memory={memory:g}") for memory in NOISE_MEMORIES),
+    ):
+        middle.plot(noise, [1e3 * row[key] for row in rows], style, label=label)
+    middle.set(
+        xlabel="noise of the sensor [nm rms]", ylabel="largest settled error [nm]", title="Noise",
+        ylim=(0.0, None),
+    )  # fmt: skip
     rows = document["delays"]
     lag = [1e3 * row["lag_samples"] / RATE for row in rows]
     for key, style, label in (("untold_um", "o-", "delay=0"), ("told_um", "s--", "delay= as it is")):
@@ -173,7 +185,7 @@ def draw(document: dict[str, Any], path: Path) -> None:
         xlabel="lag of the sensor [ms]", ylabel="largest settled error [nm]", title="A sensor that lags",
         ylim=(0.0, None),
     )  # fmt: skip
-    for axes in (left, right):
+    for axes in (left, middle, right):
         axes.grid(alpha=0.3, which="both")
         axes.legend(fontsize="small")
     path.parent.mkdir(parents=True, exist_ok=True)

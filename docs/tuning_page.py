@@ -46,7 +46,7 @@ def memories(rows: list[dict[str, Any]]) -> str:
         periods = row["settling_periods"]
         body.append(
             [
-                row["estimator"],
+                row["estimator"] if row["memory_s"] else f"{row['estimator']}, default",
                 f"{row['worst_um']:.2f}",
                 f"{row['settled_um']:.3f}",
                 "not in the run" if periods is None else f"{periods:.0f}",
@@ -58,10 +58,12 @@ def memories(rows: list[dict[str, Any]]) -> str:
 
 def noises(rows: list[dict[str, Any]]) -> str:
     """Settled error against the sensor's noise."""
-    heading = ["noise [nm rms]", "default", "default, noise= told", "memory=0.4", "memory=1.6"]
+    memories = [key for key in rows[0] if key.startswith("memory_")]
+    heading = ["noise [nm rms]", "default", "default, noise= told"]
+    heading += [key.removesuffix("_um").replace("_", "=") for key in memories]
     body = [
         [f"{1e3 * row['noise_um']:g}"]
-        + [f"{1e3 * row[key]:.0f}" for key in ("untold_um", "told_um", "memory_um", "long_memory_um")]
+        + [f"{1e3 * row[key]:.0f}" for key in ("untold_um", "told_um", *memories)]
         for row in rows
     ]
     return table("Largest settled error [nm]", heading, body)

@@ -9,6 +9,7 @@ standard errors, and its inverse tried on the stage that was recorded.
 import tempfile
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 import piezoest as pz
@@ -32,14 +33,23 @@ record = pz.read_record(
     columns={"voltage": "command", "displacement": "gauge"},
     units={"voltage": "0.02 V", "displacement": "5 um"},
 )
-print(record)
+print(*record.notes, sep="\n")
 
 # %%
 # The first half is fitted, the second is predicted from the voltage alone.
 
 found = pz.identify(record)
 print(found)
-figure = found.plot()
+
+figure, (loop, series) = plt.subplots(1, 2, figsize=(10, 4), width_ratios=[1, 2], layout="constrained")
+loop.plot(record.voltage, record.displacement, color="0.7", lw=2, label="measured")
+loop.plot(record.voltage, found.prediction, lw=0.7, label="model, from the voltage alone")
+loop.set(xlabel="voltage [V]", ylabel="displacement [µm]")
+loop.legend()
+series.plot(record.time, found.residual, color="C3", lw=0.6)
+series.axvspan(record.time[found.trained], record.time[-1], color="C1", alpha=0.15, lw=0, label="held out")
+series.set(xlabel="time [s]", ylabel="measured − model [µm]")
+series.legend()
 
 # %%
 # Its inverse, without any adaptation, beside the best straight line:

@@ -192,6 +192,11 @@ def _add_excitation(page: Page, found: Identification | StreamedIdentification, 
         f"The voltage spans {data.extent:.4g} V about {data.middle:.4g} V and turns {turns.size} times. "
         "Hysteresis shows only at turns, and the parameters belong to the amplitudes that occur."
     )
+    if record.sample_rate < 0.99 * found.sample_rate:
+        page.text(
+            f"Drawn is every {found.sample_rate / record.sample_rate:.0f}th sample: in the spectrum, what is "
+            f"faster than {0.5 * record.sample_rate:.4g} Hz is folded back."
+        )
     figure = _plotly("subplots").make_subplots(
         rows=1, cols=3, column_widths=[0.5, 0.22, 0.28], horizontal_spacing=0.08,
         subplot_titles=("voltage over time", "where it turns", "its spectrum"),
