@@ -259,7 +259,7 @@ def test_methods_name_their_source(name: str) -> None:
 @pytest.mark.parametrize("name", [*CALLABLES, *METHODS])
 def test_what_is_raised_is_said(name: str) -> None:
     value = {**CALLABLES, **METHODS}[name]
-    function = value.fget if isinstance(value, property) else value
+    function: Any = value.fget if isinstance(value, property) else value
     if getattr(function, "_is_protocol", False):
         return
     if inspect.isclass(function):
