@@ -47,7 +47,7 @@ def checked_format(format: str | None) -> str:
     if format not in FORMATS:
         raise ValueError(f"table format must be one of {', '.join(FORMATS)}, got {format!r}")
     if format == "parquet" and default_format() == "csv":
-        raise ValueError("pyarrow is not installed: pip install 'piezoest[parquet]', or take format csv")
+        raise ValueError("pyarrow is not installed: pip install 'piezoest[formats]', or take format csv")
     return format
 
 
@@ -110,7 +110,7 @@ def read_runs(folder: Path) -> list[Row]:
     try:
         import pyarrow.parquet as parquet
     except ImportError:
-        raise ValueError(f"{newest}: reading it needs pyarrow, pip install 'piezoest[parquet]'") from None
+        raise ValueError(f"{newest}: reading it needs pyarrow, pip install 'piezoest[formats]'") from None
     return list(parquet.read_table(newest).to_pylist())
 
 
