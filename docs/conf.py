@@ -15,9 +15,9 @@ import controller_page
 import estimators_page
 import paper_page
 import performance_page
-import which_estimator_page
 import real_data_page
 import tuning_page
+import which_estimator_page
 
 project = "piezoest"
 author = "The piezoest developers"

@@ -194,7 +194,7 @@ def test_without_pyarrow_tables_are_csv(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     assert tables.checked_format(None) == "csv"
-    with pytest.raises(ValueError, match=r"pip install 'piezoest\[parquet\]'"):
+    with pytest.raises(ValueError, match=r"pip install 'piezoest\[formats\]'"):
         tables.checked_format("parquet")
 
 
