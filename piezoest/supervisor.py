@@ -12,6 +12,9 @@ from piezoest.models import ColemanHodgdon, LinearGain, Model
 
 # An interval whose voltage moves by no more than this part of its size is one at rest.
 AT_REST = 1e-4
+# A reading that is the same to the last bit over this part of the voltage's range is that of a
+# saturated or dead sensor.
+STANDS_STILL = 5e-3
 # Points that are kept of an interval, at most of a window, and windows that are kept.
 POINTS, MOST, WINDOWS = 4, 800, 4
 # What happened this part of a window ago counts for half.
@@ -84,7 +87,7 @@ class Supervisor:
 
     __slots__ = (
         "_count", "_elapsed", "_events", "_good", "_held", "_kept",
-        "_limit", "_moved", "_past", "_sample_rate", "_until", "_window",
+        "_limit", "_moved", "_past", "_read_at", "_reading", "_sample_rate", "_still", "_until", "_window",
     )  # fmt: skip
 
     def __init__(self, sample_rate: float, *, window: float = 0.2, limit: float = 1.0) -> None:
@@ -99,6 +102,7 @@ class Supervisor:
         self._until = 0.0
         self._past = np.empty((ROWS, 2 * WINDOWS * MOST))
         self._count = 0
+        self._reading, self._read_at, self._still = math.nan, 0.0, False
         self._good: Model | None = None
         self._held: Model | None = None
         self._kept = False
@@ -136,7 +140,9 @@ class Supervisor:
         if self._is_at_rest(u):
             # Creep alone moves the stage: nothing to judge a model by.
             return proposed if self._held is None else self._held
-        self._take(u, x)
+        if not self._take(u, x):
+            # Nothing was measured: nothing to judge a model by, and nothing new for it to go by.
+            return present
         past = self._recent()
         ages = self._moved - past[TIME]
         weights = 0.5 ** (ages / (HALF_LIFE * self._window)) * (ages <= self._window)
@@ -168,11 +174,17 @@ class Supervisor:
         )
         return float(np.ptp(u)) <= AT_REST * largest
 
-    def _take(self, u: FloatArray, x: FloatArray) -> None:
+    def _take(self, u: FloatArray, x: FloatArray) -> bool:
+        """Keep some points of an interval; False if there was none to keep."""
         picked = np.arange(u.size)
         if u.size > POINTS:
             picked = np.unique(np.linspace(0, u.size - 1, POINTS).astype(int))
         picked = picked[np.isfinite(x[picked])]
+        known = np.concatenate([u, self._past[VOLTAGE, : self._count]])
+        size = float(np.ptp(known)) if known.size else 0.0
+        picked = picked[[self._is_alive(float(u[k]), float(x[k]), size) for k in picked]]
+        if picked.size == 0:
+            return False
         if self._count + picked.size > self._past.shape[1]:
             half = self._count // 2
             self._past[:, : self._count - half] = self._past[:, half : self._count]
@@ -183,6 +195,15 @@ class Supervisor:
         self._past[MEASURED, new] = x[picked]
         self._count += picked.size
         self._moved += u.size / self._sample_rate
+        return True
+
+    def _is_alive(self, u: float, x: float, size: float) -> bool:
+        """Whether a reading is no repetition of the last: a saturated or dead sensor tells nothing."""
+        if x != self._reading:
+            self._reading, self._read_at, self._still = x, u, False
+        elif abs(u - self._read_at) > STANDS_STILL * size:
+            self._still = True
+        return not self._still
 
     def _recent(self) -> FloatArray:
         """Points of the last windows, thinned where there are many."""
@@ -257,7 +278,7 @@ def _error(model: Model, past: FloatArray, weights: FloatArray) -> float:
         elif isinstance(model, LinearGain):
             missed = past[MEASURED] - model.simulate(u)
         else:
-            missed = past[MEASURED] - model.simulate(u, allow_jumps=True)  # type: ignore[attr-defined]
+            missed = past[MEASURED] - model.simulate(u)  # type: ignore[attr-defined]
             missed = missed - float(weights @ missed) / total
         error = math.sqrt(float(weights @ missed**2) / total)
     return error if math.isfinite(error) else math.inf

@@ -57,6 +57,13 @@ def test_leaves_a_good_estimator_alone() -> None:
     assert not supervisor.holding
 
 
+def test_leaves_a_model_of_another_kind_alone() -> None:
+    supervisor = pz.Supervisor(FS, window=0.2)
+    guarded = ring(pz.PrandtlIshlinskiiRLS(FS), supervisor)
+    assert guarded.max_error(last_periods=2) < 0.02
+    assert not supervisor.holding
+
+
 def test_keeps_nonsense_away_from_the_stage() -> None:
     supervisor = pz.Supervisor(FS, window=0.2)
     plain, guarded = ring(Wild()), ring(Wild(), supervisor)

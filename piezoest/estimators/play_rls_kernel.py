@@ -15,16 +15,16 @@ from piezoest.equations.mechanics import mechanics_step
 from piezoest.equations.play import play
 from piezoest.equations.turning_points import SIZE as MEMORY_SIZE
 from piezoest.equations.turning_points import recall, remember
-from piezoest.estimators import swing
+from piezoest.estimators import believing, swing
 from piezoest.estimators.delay_line import delayed
 
 # State: counters, what the last sample was, the window at hand.
 SAMPLES, MISSED, OUTLIERS, UPDATES, HELD, RESETS, LAST, FROZEN, PRIMED = range(9)
 INNOVATION, VARIANCE, U_LAST, ELAPSED, COUNT, TRAVEL, X_SUM, OFFSET = range(9, 17)
-X_LAST, USUAL_STEP, SEEN, GAP, GAP_TRAVEL = range(17, 22)
+X_LAST, GAP, GAP_TRAVEL = range(17, 20)
 # The grid: its middle and half-width [V], the range seen, turns of the voltage.
-CENTRE, RANGE, LOW, HIGH, TURNS = range(22, 27)
-SWING = 27
+CENTRE, RANGE, LOW, HIGH, TURNS, BELIEF = range(20, 26)
+SWING = BELIEF + believing.STATE
 MEMORY = SWING + swing.STATE
 ARRAYS = MEMORY + MEMORY_SIZE  # where the arrays begin, see `layout`
 
@@ -45,7 +45,7 @@ WILD = 100.0  # standard deviations beyond which an innovation counts no more
 AT_REST = 8.0  # a window with less than this part of its travel is a dwell
 LEVEL_START = 0.03  # deviation of the level where nothing is known of it, in parts of the stroke
 WAITING, UPDATED, MISSING, HOLDING, REJECTED = range(5)
-BELIEVED_STEPS, BELIEVED_SLOPES, WARM_UP = 20.0, 3.0, 100.0
+WARM_UP = 100.0
 FAR = 1e30
 
 
@@ -344,18 +344,6 @@ def _update(state: Any, config: Any, half: Any, first: int) -> None:
 
 
 @register_jitable
-def _believable(state: Any, config: Any, x: Any) -> Any:
-    """Whether the change of x since the last good sample is one that the stage can make."""
-    dx = abs(x - state[X_LAST])
-    limit = BELIEVED_STEPS * state[USUAL_STEP] + BELIEVED_SLOPES * config[GAIN] * state[GAP_TRAVEL]
-    if dx > limit and state[SEEN] >= WARM_UP:
-        return False
-    state[SEEN] += 1.0
-    state[USUAL_STEP] += (dx - state[USUAL_STEP]) / min(state[SEEN], WARM_UP)
-    return True
-
-
-@register_jitable
 def _watch_range(state: Any, config: Any, u: Any) -> None:
     """Lay a new grid where the voltage leaves it, or once where it was laid far too wide."""
     state[LOW], state[HIGH] = min(state[LOW], u), max(state[HIGH], u)
@@ -415,8 +403,11 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
         _new_window(state, config)
         state[LAST] = WAITING
         return
-    if not _believable(state, config, x):
-        if state[GAP] <= config[LONGEST_GAP]:
+    memory = state[BELIEF:SWING]
+    dx, travel = x - state[X_LAST], state[GAP_TRAVEL]
+    stuck = believing.stands_still(memory, dx, travel, state[SWING + swing.SIZE])
+    if stuck or not believing.believable(memory, dx, config[GAIN], travel, WARM_UP):
+        if stuck or state[GAP] <= config[LONGEST_GAP]:
             state[OUTLIERS] += 1.0
             state[LAST] = REJECTED
             return
@@ -425,7 +416,7 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
         state[level] += jump
         state[int(config[USED]) + size - 1] += jump
         state[OFFSET] += jump
-        state[SEEN] = 0.0
+        state[BELIEF + believing.SEEN] = 0.0
         _new_window(state, config)
     state[X_LAST] = x
     state[GAP] = state[GAP_TRAVEL] = 0.0

@@ -12,23 +12,24 @@ from piezoest._checks import WILDEST
 from piezoest._jit import UNCOUNTED, unrolled
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations import filters, least_squares
-from piezoest.estimators import level, swing
+from piezoest.estimators import believing, level, swing
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_policies as policies
 from piezoest.estimators.delay_line import delayed
 
 # State: what is known of the last good sample, and of the voltage's way since.
 PRIMED, U_LAST, X_LAST, TRAVEL, MOMENT, RISE, GAP, SAMPLES, MISSED, OUTLIERS = range(10)
-U_CENTRE, X_CENTRE, USUAL_STEP, FROZEN, SEEN = 10, 11, 12, 13, 14
-LOW, HIGH, PHI = 15, 20, 25  # five filters each: four regressors and the output
-SWING = 30
+U_CENTRE, X_CENTRE, FROZEN = 10, 11, 12
+LOW, HIGH, PHI = 13, 18, 23  # five filters each: four regressors and the output
+SWING = 28
 EXCITATION = SWING + swing.STATE  # mean over a swing of phi phi', both in unit of motion
 ERROR, GAIN = EXCITATION + 16, EXCITATION + 32  # covariance of the estimate's error, filtered gain
 # Filtered part of a swing that a sample is, and the swings (up to one) in EXCITATION's mean.
 MOTION, WAY = EXCITATION + 36, EXCITATION + 37
 # The sensor's noise: its variance as seen, and the last two changes of x it is seen from.
 NOISE, CHANGE, CHANGE_BEFORE, SEEN_NOISE = range(EXCITATION + 38, EXCITATION + 42)
-LEVEL = EXCITATION + 42
+BELIEF = EXCITATION + 42
+LEVEL = BELIEF + believing.STATE
 FRONT = LEVEL + level.STATE  # the law's state begins here, the policies' and the delay line follow it
 
 # Configuration of the front end; the law's follows.
@@ -41,8 +42,6 @@ SCALE = 16  # four scales of the parameters, one of the output
 EXTRA, MARGIN, THRESHOLD, RISEN, EXCITED, SHORTEST, PLACES, TOLERANCE, RECALLED = range(21, 30)
 CONFIG = 30
 
-# A change of x is believed up to so many usual steps, plus what so many times the slope explains.
-BELIEVED_STEPS, BELIEVED_SLOPES = 20.0, 3.0
 # Slower than so many swings a sample the voltage is at rest; slower than this part of its usual
 # pace it counts as going at that.
 SLOWEST, SLOW = 1e-12, 0.2
@@ -70,7 +69,7 @@ def _filtered(state: Any, config: Any, i: int, value: Any) -> Any:
 @unrolled
 def _prime(state: Any, config: Any, u: Any, x: Any) -> None:
     """Start from (u, x) as the last good sample; what is usual is learnt anew."""
-    state[SEEN] = 0.0
+    state[BELIEF + believing.SEEN] = 0.0
     if state[PRIMED] == 0.0 and config[OFFSET] != 0.0:
         state[U_CENTRE] = u
         state[X_CENTRE] = x
@@ -82,17 +81,15 @@ def _prime(state: Any, config: Any, u: Any, x: Any) -> None:
 
 @unrolled
 def _believable(state: Any, config: Any, x: Any) -> Any:
-    """Whether the change of x since the last good sample is one that the stage can make."""
+    """Whether x is a reading that the stage can have made, after the last good one."""
     if config[OUTLIER] == 0.0:
         return True
-    dx = abs(x - state[X_CENTRE] - state[X_LAST])
-    slope = abs(state[FRONT + law.HEAD + 1]) * config[SCALE + 1] / config[SCALE + 4]
-    limit = BELIEVED_STEPS * state[USUAL_STEP] + BELIEVED_SLOPES * slope * state[TRAVEL]
-    if dx > limit and state[SEEN] >= config[WARM_UP]:
+    memory = state[BELIEF:LEVEL]
+    dx = x - state[X_CENTRE] - state[X_LAST]
+    if believing.stands_still(memory, dx, state[TRAVEL], state[SWING + swing.SIZE]):
         return False
-    state[SEEN] += 1.0
-    state[USUAL_STEP] += (dx - state[USUAL_STEP]) / min(state[SEEN], config[WARM_UP])
-    return True
+    slope = abs(state[FRONT + law.HEAD + 1]) * config[SCALE + 1] / config[SCALE + 4]
+    return believing.believable(memory, dx, slope, state[TRAVEL], config[WARM_UP])
 
 
 @unrolled

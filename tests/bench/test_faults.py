@@ -134,23 +134,28 @@ def test_refuses_what_makes_no_sense(kind: Any, arguments: dict[str, Any], words
         kind(sound(), **arguments)
 
 
-def ring(name: str, estimator: type) -> tuple[pz.TrackingRecord, Any]:
+def ring(name: str, estimator: type, *, guard: bool = False) -> tuple[pz.TrackingRecord, Any]:
     fault = FAULTS[name]
     learner = estimator(FS)
     record = pz.track(
         fault.reference(pz.signals.triangle(5.0, 5.0, 15, FS)),
         stage=fault.build(sound, FS, seed=3),
-        compensator=pz.InverseCompensator(START, LIMITS, transfer_samples=100),
+        compensator=pz.InverseCompensator(START, LIMITS, transfer_samples=100, sample_rate=FS),
         estimator=learner,
         update_interval=20,
+        supervisor=pz.Supervisor(FS, window=0.2) if guard else None,
     )
     return record, learner
 
 
-@pytest.mark.parametrize("estimator", [pz.HysteresisRLS, pz.HysteresisEKF])
+ESTIMATORS = [pz.HysteresisRLS, pz.HysteresisEKF, pz.PrandtlIshlinskiiRLS]
+
+
+@pytest.mark.parametrize("guard", [False, True])
+@pytest.mark.parametrize("estimator", ESTIMATORS)
 @pytest.mark.parametrize("name", FAULTS)
-def test_the_ring_stays_within_bounds(name: str, estimator: type) -> None:
-    record, learner = ring(name, estimator)
+def test_the_ring_stays_within_bounds(name: str, estimator: type, guard: bool) -> None:
+    record, learner = ring(name, estimator, guard=guard)
     assert np.all(np.isfinite(record.theta))
     assert np.all(np.isfinite(learner.theta))
     assert np.all(np.isfinite(learner.P))
@@ -159,13 +164,34 @@ def test_the_ring_stays_within_bounds(name: str, estimator: type) -> None:
     assert np.all(np.isfinite(record.displacement))
 
 
+RECOVERABLE = ("missing-1", "missing-50", "gap", "wrong-rate")
+
+
 @pytest.mark.parametrize(
     ("name", "estimator"),
     [
-        *((name, pz.HysteresisRLS) for name in ("missing-1", "missing-50", "gap", "spikes", "wrong-rate")),
-        *((name, pz.HysteresisEKF) for name in ("missing-1", "missing-50", "gap", "wrong-rate")),
+        *((name, pz.HysteresisRLS) for name in (*RECOVERABLE, "spikes", "stuck", "offset-step")),
+        *((name, pz.PrandtlIshlinskiiRLS) for name in (*RECOVERABLE, "spikes", "stuck", "offset-step")),
+        *((name, pz.HysteresisEKF) for name in RECOVERABLE),
     ],
 )
 def test_what_can_recover_recovers(name: str, estimator: type) -> None:
     record, _ = ring(name, estimator)
-    assert record.max_error(last_periods=3) < 0.012 * 5.0
+    # A gauge whose zero moved takes the stage along.
+    moved = 0.5 if name == "offset-step" else 0.0
+    error = record.error[-3 * 2000 :]
+    assert np.max(np.abs(error - moved)) < 0.012 * 5.0
+
+
+@pytest.mark.parametrize("estimator", [pz.HysteresisRLS, pz.PrandtlIshlinskiiRLS])
+def test_a_dead_sensor_does_not_mislead(estimator: type) -> None:
+    """For a second the reading does not change: the model stays what it was."""
+    record, _ = ring("stuck", estimator)
+    assert record.max_error_per_period()[5:].max() < 0.55
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("name", ["stuck", "adc-saturation", "spikes", "voltage-sign"])
+def test_with_the_guard_no_worse_than_a_line(name: str, estimator: type) -> None:
+    record, _ = ring(name, estimator, guard=True)
+    assert record.max_error_per_period()[3:].max() < 1.5 * 0.55
