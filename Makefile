@@ -84,7 +84,7 @@ docs: $(VENV)/.installed-docs  ## Build the documentation into docs/_build/html;
 docs-live: $(VENV)/.installed-docs-live  ## Serve the documentation and rebuild it on every change
 	$(BIN)/sphinx-autobuild --watch piezoest --ignore "docs/gallery/*" --ignore "docs/generated/*" docs docs/_build/live
 
-figures: $(VENV)/.installed  ## Make the numbers and figures of the documentation anew, in some minutes
+figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the documentation anew, in some minutes
 	$(BIN)/piezoest bench paper --json docs/data/paper.json --figures docs/figures/paper
 	$(BIN)/piezoest bench estimators --json docs/data/estimators.json
 	$(BIN)/python benchmarks/batch_fit.py --json docs/data/batch_fit.json
@@ -94,11 +94,15 @@ figures: $(VENV)/.installed  ## Make the numbers and figures of the documentatio
 	$(BIN)/python benchmarks/controller.py --json docs/data/controller.json
 	$(BIN)/python benchmarks/target/target.py --json docs/data/target.json
 	$(BIN)/python docs/controller_page.py --figure
+	$(MAKE) bench
 
 # ---------------------------------------------------------------- benchmarks
 
-bench-smoke: $(VENV)/.installed  ## Time the kernels against a NumPy loop, in under a minute
+bench-smoke: $(VENV)/.installed-bench  ## Try the benchmarks: against a NumPy loop, and on a short record against C
 	$(BIN)/python benchmarks/smoke.py
+	@if command -v gcc >/dev/null; then \
+	  $(BIN)/python benchmarks/speed.py --samples 2000 --rounds 1 --slow 300 --turns 2000; \
+	else echo "gcc is absent: no comparison with C" >&2; fi
 
 bench: $(VENV)/.installed-bench  ## Speed against C, filterpy and padasip, with targets, in some minutes (needs gcc)
 	$(BIN)/python benchmarks/speed.py --json docs/data/speed.json --figure docs/figures/speed.png
