@@ -37,10 +37,12 @@ $(VENV)/.installed-%: pyproject.toml | $(BIN)/python
 
 venv: $(VENV)/.installed-dev  ## Set up .venv with everything a contributor needs
 
-# Compilers, checker and emulator for the exported C; tests that need one skip where it is absent.
-TOOLS := gcc libc6-dev clang cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
+# Compilers, checker and emulator for the exported C, and the browser for pages; tests that need one skip
+# where it is absent.
+TOOLS := gcc libc6-dev clang cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm \
+         chromium chromium-driver
 
-tools:  ## Install what the exported C is checked with (Debian's packages, as root)
+tools:  ## Install what exported C and pages are checked with (Debian's packages, as root)
 	apt-get update
 	DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends $(TOOLS)
 
@@ -79,6 +81,7 @@ layers: $(VENV)/.installed-test  ## Check that modules import only from the floo
 docs: $(VENV)/.installed-docs  ## Build the documentation into docs/_build/html; a warning is an error
 	rm -rf docs/generated
 	$(BIN)/sphinx-build -W --keep-going -n -q -b html docs docs/_build/html
+	$(BIN)/python docs/check_links.py docs/_build/html
 	@echo "open docs/_build/html/index.html"
 
 docs-live: $(VENV)/.installed-docs-live  ## Serve the documentation and rebuild it on every change
@@ -86,6 +89,8 @@ docs-live: $(VENV)/.installed-docs-live  ## Serve the documentation and rebuild 
 
 figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the documentation anew, in some minutes
 	$(BIN)/piezoest bench paper --json docs/data/paper.json --figures docs/figures/paper
+	$(BIN)/piezoest bench --seeds 3 --output docs/_build/suite --json docs/data/suite.json --figures docs/figures/suite
+	$(BIN)/piezoest bench rank --output docs/_build/ranking --json docs/data/ranking.json --figures docs/figures/ranking
 	$(BIN)/piezoest bench estimators --json docs/data/estimators.json
 	$(BIN)/python benchmarks/batch_fit.py --json docs/data/batch_fit.json
 	$(BIN)/python benchmarks/filterpy_parity.py --json docs/data/filterpy_parity.json
@@ -94,7 +99,10 @@ figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the docume
 	$(BIN)/python benchmarks/controller.py --json docs/data/controller.json
 	$(BIN)/python benchmarks/target/target.py --json docs/data/target.json
 	$(BIN)/python docs/controller_page.py --figure
-	$(MAKE) bench
+	$(BIN)/python benchmarks/speed.py --json docs/data/speed.json --figure docs/figures/speed.png
+	$(BIN)/python docs/tuning.py
+	$(BIN)/python docs/real_data.py
+	$(BIN)/python docs/readme.py --figure
 
 # ---------------------------------------------------------------- benchmarks
 

@@ -15,6 +15,9 @@ import controller_page
 import estimators_page
 import paper_page
 import performance_page
+import real_data_page
+import tuning_page
+import which_estimator_page
 
 project = "piezoest"
 author = "The piezoest developers"
@@ -47,8 +50,11 @@ numpydoc_show_class_members = False
 html_theme = "pydata_sphinx_theme"
 html_title = "piezoest"
 html_show_sourcelink = False
+html_static_path = ["_static"]
+html_css_files = ["tables.css"]
 html_theme_options = {
     "show_toc_level": 2,
+    "header_links_before_dropdown": 4,
     "navigation_with_keys": False,
     "secondary_sidebar_items": ["page-toc"],
     "footer_start": ["copyright"],
@@ -57,9 +63,14 @@ html_theme_options = {
 html_sidebars: dict[str, list[str]] = {
     "start": [],
     "your_own_stage": [],
+    "real_data": [],
+    "tuning": [],
+    "coming_from": [],
     "mathematics": [],
     "paper": [],
     "estimators": [],
+    "which_estimator": [],
+    "adaptation_speed": [],
     "controller": [],
     "design": [],
 }
@@ -108,5 +119,8 @@ def setup(app: Any) -> None:
     app.connect("builder-inited", beyond_page.write)
     app.connect("builder-inited", estimators_page.write)
     app.connect("builder-inited", controller_page.write)
+    app.connect("builder-inited", which_estimator_page.write)
+    app.connect("builder-inited", tuning_page.write)
+    app.connect("builder-inited", real_data_page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

@@ -1,4 +1,4 @@
-from . import export, models, policies, signals
+from . import export, models, policies, report, signals
 from ._version import __version__
 from .compensators import (
     CompensatorStatus,
@@ -18,7 +18,14 @@ from .estimators.horizon import MovingHorizon
 from .estimators.play_rls import PrandtlIshlinskiiRLS
 from .estimators.recursive_least_squares import RecursiveLeastSquares
 from .estimators.rls import HysteresisRLS
-from .identification import Identification, ModelChoice, choose_model, identify
+from .identification import (
+    Identification,
+    ModelChoice,
+    StreamedIdentification,
+    choose_model,
+    identify,
+    identify_stream,
+)
 from .models import (
     AmplitudeProfile,
     ColemanHodgdon,
@@ -28,7 +35,7 @@ from .models import (
     PrandtlIshlinskii,
     Preisach,
 )
-from .records import Record, read_record
+from .records import Record, RecordStream, read_record, stream_record
 from .signals import Signal
 from .stage import Amplifier, Gauge, PaperStage, PreisachStage, SimulatedStage, TemperatureLaw
 from .supervisor import Event, Supervisor
@@ -66,10 +73,12 @@ __all__ = [
     "Preisach",
     "PreisachStage",
     "Record",
+    "RecordStream",
     "RecursiveLeastSquares",
     "Signal",
     "SimulatedStage",
     "Status",
+    "StreamedIdentification",
     "Supervisor",
     "TemperatureLaw",
     "Trace",
@@ -79,10 +88,13 @@ __all__ = [
     "choose_model",
     "export",
     "identify",
+    "identify_stream",
     "models",
     "policies",
     "read_record",
+    "report",
     "signals",
+    "stream_record",
     "track",
     "warmup",
 ]

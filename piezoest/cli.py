@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
+from piezoest._extras import MissingExtraError
 from piezoest.bench.commands import app as bench
 from piezoest.export.commands import app as export
 
 if TYPE_CHECKING:
     from piezoest.demo import Demo
-    from piezoest.identification import Identification, ModelChoice
     from piezoest.models import Model
 
 app = typer.Typer(
@@ -63,7 +63,7 @@ def _errors(debug: bool) -> Iterator[None]:
         # Whoever read us has seen enough; Python must not complain about it at its end either.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise typer.Exit(0) from None
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, MissingExtraError) as error:
         if debug:
             raise
         text = (
@@ -178,7 +178,11 @@ def _print_demo(result: Demo) -> None:
 )
 def identify(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="CSV log with time, voltage and displacement.")
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="Log with time, voltage and displacement: CSV, Parquet, HDF5, MATLAB or NumPy.",
+        ),
     ],
     columns: Annotated[
         str | None,
@@ -186,9 +190,24 @@ def identify(
             help="Columns by name or number, where guessing fails: time=t,voltage=u_mV,displacement=3"
         ),
     ] = None,
+    units: Annotated[
+        str | None,
+        typer.Option(
+            help="Units, where no name states them: displacement=nm. With a number, what one in the log "
+            "stands for: displacement=0.2um"
+        ),
+    ] = None,
     sample_rate: Annotated[
         float | None, typer.Option(help="Samples per second; a column of time is then ignored.")
     ] = None,
+    stream: Annotated[
+        bool,
+        typer.Option(
+            "--stream",
+            help="Read in blocks and learn recursively, for files larger than memory: CSV, Parquet, HDF5, "
+            "MATLAB 7.3, .npy.",
+        ),
+    ] = False,
     model: Annotated[
         str,
         typer.Option(help="coleman-hodgdon, or auto: compare models of all kinds and say which to use."),
@@ -203,6 +222,9 @@ def identify(
     plot: Annotated[
         Path | None, typer.Option("--plot", help="Figure to write; default <FILE>_identified.png here.")
     ] = None,
+    html: Annotated[
+        Path | None, typer.Option("--html", help="Report to write: one page with interactive plots.")
+    ] = None,
     no_plot: Annotated[bool, typer.Option("--no-plot", help="Write no figure.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False,
     debug: Debug = False,
@@ -214,25 +236,40 @@ def identify(
     with _errors(debug):
         if model not in ("coleman-hodgdon", "auto"):
             raise ValueError(f"--model must be coleman-hodgdon or auto, got {model}")
-        figure = None if no_plot else plot or Path(f"{file.stem}_identified.png")
+        if stream and (model == "auto" or plot is not None):
+            other = "--model auto" if model == "auto" else "--plot"
+            raise ValueError(
+                f"{other} needs the whole log in memory: leave out --stream, or draw with --html"
+            )
+        figure = None if no_plot or stream else plot or Path(f"{file.stem}_identified.png")
         if figure is not None:
             _check_figure(figure, keep=(file,))
-        if output is not None:
-            _check_writable(output, keep=(file,) if figure is None else (file, figure))
+        _check_outputs(output, html, keep=(file,) if figure is None else (file, figure))
         with _progress("loading (compiles once after the installation)") as say:
-            from piezoest.identification import choose_model
+            from piezoest import records
+            from piezoest.identification import choose_model, identify_stream
             from piezoest.identification import identify as run
-            from piezoest.records import read_record
 
             say(f"reading {file.name}")
-            record = read_record(file, columns=_columns(columns), sample_rate=sample_rate)
+            read: Any = records.stream_record if stream else records.read_record
+            record = read(
+                file,
+                columns=_pairs("--columns", "voltage=u,displacement=3", columns),
+                units=_pairs("--units", "voltage=mV,displacement=nm", units),
+                sample_rate=sample_rate,
+            )
             say("fitting")
             lag: Any = "auto" if delay == "auto" else _number("--delay", delay)
-            fit: Any = choose_model if model == "auto" else run
+            fit: Any = identify_stream if stream else choose_model if model == "auto" else run
             found = fit(record, train=train, delay=lag)
             if figure is not None:
                 say("drawing")
                 found.plot().savefig(figure, dpi=130)
+            if html is not None:
+                say("drawing")
+                from piezoest.report import write_report
+
+                write_report(found, html)
         if output is not None:
             output.write_text(
                 json.dumps(found.to_dict(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
@@ -240,66 +277,12 @@ def identify(
         if as_json:
             typer.echo(json.dumps(found.to_dict(), indent=2, allow_nan=False))
             return
-        if model == "auto":
-            _print_choice(found)
-        else:
-            _print_identification(found)
-        for name, path in (("Figure", figure), ("Model", output)):
+        from piezoest.identification.terminal import print_choice, print_identification
+
+        (print_choice if model == "auto" else print_identification)(found, Console())
+        for name, path in (("Figure", figure), ("Report", html), ("Model", output)):
             if path is not None:
                 typer.echo(f"{name}: {path}")
-
-
-def _print_choice(found: ModelChoice) -> None:
-    from rich.table import Table
-
-    console = Console()
-    console.print(found.base.record.source, highlight=False, markup=False, soft_wrap=True)
-    table = Table(title="Free-running error [µm]")
-    for title in ("", "model", "n", "fitted rms", "held out rms", "largest", "BIC"):
-        left = title in ("", "model")
-        table.add_column(title, justify="left" if left else "right", no_wrap=left)
-    for item in found.candidates:
-        errors = (item.train.rms, item.held_out.rms, item.held_out.max)
-        cells = (f"{item.parameters}", *(f"{value:.4g}" for value in errors), f"{item.bic:.0f}")
-        table.add_row("▸" if item is found.best else "", item.name, *cells)
-    console.print(table)
-    console.print(found.reason, highlight=False, markup=False, soft_wrap=True)
-
-
-def _print_identification(found: Identification) -> None:
-    from rich.table import Table
-
-    record, console = found.record, Console()
-    console.print(
-        f"{record.source}: {len(record)} samples at {record.sample_rate:.6g} Hz, {found.trained} fitted, "
-        f"{len(record) - found.trained} held out",
-        highlight=False, markup=False, soft_wrap=True,
-    )  # fmt: skip
-    parameters = Table(title="Coleman-Hodgdon model")
-    for title in ("parameter", "value", "± standard error", "unit"):
-        parameters.add_column(title, justify="right" if title in ("value", "± standard error") else "left")
-    for name, value, error, unit in found.table():
-        parameters.add_row(name, f"{value:.6g}", f"{error:.2g}" if error > 0.0 else "not estimated", unit)
-    console.print(parameters)
-    errors = Table(title="Free-running error [µm]")
-    for title in ("", "fitted rms", "held out rms", "held out largest"):
-        errors.add_column(title, justify="right" if title else "left")
-    for name, fitted, held in (
-        ("model", found.train, found.held_out),
-        ("straight line, same lag", found.line_train, found.line_held_out),
-    ):
-        errors.add_row(name, *(f"{value:.4g}" for value in (fitted.rms, held.rms, held.max)))
-    console.print(errors)
-    white = found.whiteness
-    p_value = f"= {white.p_value:.2g}" if white.p_value > 1e-9 else "< 1e-9"
-    console.print(
-        f"Residual: {'white' if white.is_white else 'not white'} (Ljung-Box over {white.lags} lags: "
-        f"p {p_value}; autocorrelation at lag 1: {white.first_autocorrelation:.2f})",
-        highlight=False,
-        soft_wrap=True,
-    )
-    for sentence in (*(f"{note}." for note in record.notes), *found.advice):
-        console.print(f"• {sentence}", highlight=False, markup=False, soft_wrap=True)
 
 
 @app.command(
@@ -390,13 +373,13 @@ def _model(path: Path | None, given: dict[str, float | None], offset: float | No
     return model if offset is None else dataclasses.replace(model, offset=offset)
 
 
-def _columns(text: str | None) -> dict[str, str] | None:
+def _pairs(option: str, example: str, text: str | None) -> dict[str, str] | None:
     """``voltage=u,displacement=3`` as a dictionary."""
     if text is None:
         return None
     pairs = [part.partition("=") for part in text.split(",")]
     if any(not name.strip() or not value.strip() for name, _, value in pairs):
-        raise ValueError(f"--columns must read like voltage=u,displacement=3, got {text!r}")
+        raise ValueError(f"{option} must read like {example}, got {text!r}")
     return {name.strip(): value.strip() for name, _, value in pairs}
 
 
@@ -412,6 +395,17 @@ def _check_figure(path: Path, keep: tuple[Path, ...] = ()) -> None:
     if path.suffix.lower() not in FIGURE_FORMATS:
         raise ValueError(f"{path}: a figure's name must end in one of {' '.join(FIGURE_FORMATS)}")
     _check_writable(path, keep)
+
+
+def _check_outputs(output: Path | None, html: Path | None, keep: tuple[Path, ...]) -> None:
+    """Refuse what cannot be written, and a report by a name that no browser opens, or without plots."""
+    if output is not None:
+        _check_writable(output, keep)
+        keep = (*keep, output)
+    if html is not None:
+        if html.suffix.lower() not in (".html", ".htm"):
+            raise ValueError(f"{html}: a report's name must end in .html")
+        _check_writable(html, keep)
 
 
 def _check_writable(path: Path, keep: tuple[Path, ...] = ()) -> None:

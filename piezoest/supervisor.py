@@ -82,7 +82,7 @@ class Supervisor:
     Notes
     -----
     A `ColemanHodgdon` is run from a few windows before, by when it has forgotten where it started; of
-    any other model with a memory the mean error is left out instead.
+    any other model with a memory the mean error is left out instead. Source: a rule of this library.
     """
 
     __slots__ = (

@@ -211,6 +211,68 @@ def test_method_is_documented(name: str) -> None:
     assert sorted(documented_parameters(docstring)) == sorted(actual_parameters(value))
 
 
+# A quantity says its unit, or what it counts or is a part of.
+UNIT = re.compile(
+    r"\[[^\]]+\]|\b(Hz|µm|V|°C|units?|[Ss]amples?|periods?|[Ss]econds?|parts?|Part|[Ff]actor|fraction|ratio|[Nn]umber|swings)\b"
+    r"|multiple|[Ss]tandard deviations?|Coefficients|Positions|0 to 1|Type of|\b0 \(no|relative|weight|rad/s"
+)
+# Of any regression, or of whichever estimator made them: their units are those of its data.
+WITHOUT_A_UNIT_OF_THEIR_OWN = ("BatchFitResult", "RecursiveLeastSquares", "Trace")
+CALLABLES = {**OBJECTS, **{name: value for name, value in METHODS.items() if not isinstance(value, property)}}
+
+
+def described_parameters(docstring: str) -> Iterator[tuple[str, str]]:
+    """Head and description of each parameter."""
+    section = re.search(r"^Parameters\n-{3,}\n(.*?)(?=^\S[^\n]*\n-{3,}\n|\Z)", docstring, re.S | re.M)
+    if section is not None:
+        yield from re.findall(r"^(\S[^\n]*)\n((?:[ \t]+[^\n]*\n?|\n)*)", section[1], re.M)
+
+
+@pytest.mark.parametrize("name", CALLABLES)
+def test_quantities_have_units(name: str) -> None:
+    if name.split(".")[0] in WITHOUT_A_UNIT_OF_THEIR_OWN:
+        return
+    for head, text in described_parameters(inspect.getdoc(CALLABLES[name]) or ""):
+        if re.search(r": .*(float|ndarray|array_like)", head):
+            assert UNIT.search(text), f"{name}: {head}: {text.strip()}"
+
+
+# An equation of the paper, a year of a publication, a named source, or the word that there is none.
+SOURCE = re.compile(
+    r"\b(19|20)\d\d\b|\(\d+\)|\([ABC]\d+\)|App(endix|\.) [A-C]|Source:|Equations: |, sec\. \d"
+)
+METHOD_MODULES = ("models", "estimators", "compensators", "stage", "policies", "supervisor")
+# They hold values, describe an instrument, or are what others fill in.
+WITHOUT_A_METHOD = (
+    "Amplifier", "BatchFitResult", "CompensatorStatus", "Estimator", "Event", "Gauge", "Status", "Trace",
+    "VoltageLimits", "models.Model",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_methods_name_their_source(name: str) -> None:
+    module = CLASSES[name].__module__.split(".")[1]
+    if module in METHOD_MODULES and name not in WITHOUT_A_METHOD:
+        assert SOURCE.search(inspect.getdoc(CLASSES[name]) or ""), f"{name} names no source"
+
+
+@pytest.mark.parametrize("name", [*CALLABLES, *METHODS])
+def test_what_is_raised_is_said(name: str) -> None:
+    value = {**CALLABLES, **METHODS}[name]
+    function: Any = value.fget if isinstance(value, property) else value
+    if getattr(function, "_is_protocol", False):
+        return
+    if inspect.isclass(function):
+        # A dataclass checks what it is given behind its generated constructor.
+        function = getattr(function, "__post_init__", function.__init__)
+    try:
+        source = inspect.getsource(function)
+    except (OSError, TypeError):  # generated, or built in
+        return
+    if re.search(r"^\s+raise (ValueError|KeyError|TypeError|RuntimeError)", source, re.M):
+        assert "Raises\n---" in (inspect.getdoc(value) or ""), f"{name} raises and does not say so"
+
+
 # ---------------------------------------------------------------- misspelt keywords and attributes
 
 

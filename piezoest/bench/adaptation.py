@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-import multiprocessing
-import os
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
-from piezoest._checks import integer
 from piezoest.bench.candidates import candidate
 from piezoest.bench.estimators import REFERENCE, find_estimators
+from piezoest.bench.executors import in_processes
 from piezoest.bench.metrics import Metrics, measure
 from piezoest.bench.scenarios import SCENARIOS, Case
 from piezoest.compensators import InverseCompensator, LinearCompensator, VoltageLimits
@@ -85,7 +82,7 @@ class Run:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-safe dictionary, numbers that are not finite as null."""
-        return dict(_json_safe(asdict(self)))
+        return dict(json_safe(asdict(self)))
 
 
 def default_estimators() -> tuple[str, ...]:
@@ -96,7 +93,13 @@ def default_estimators() -> tuple[str, ...]:
     return tuple(name for name in names if name.partition("(")[0] in public)
 
 
-def follow(case: Case, estimator: str | None, *, guard: bool = False) -> TrackingRecord:
+def follow(
+    case: Case,
+    estimator: str | None,
+    *,
+    guard: bool = False,
+    watch: Callable[[Any], Any] = lambda estimator: estimator,
+) -> TrackingRecord:
     """Send a case round the ring.
 
     Parameters
@@ -107,6 +110,8 @@ def follow(case: Case, estimator: str | None, *, guard: bool = False) -> Trackin
         As `piezoest.bench.candidates.candidate` reads it; None for linear feed-forward.
     guard : bool
         Whether the supervisor of the ring is on.
+    watch : callable
+        Is given the estimator and returns what goes into the ring in its place.
 
     Returns
     -------
@@ -132,7 +137,7 @@ def follow(case: Case, estimator: str | None, *, guard: bool = False) -> Trackin
         case.reference,
         stage=case.new_stage(),
         compensator=compensator,
-        estimator=made,
+        estimator=watch(made),
         update_interval=case.update_interval,
         supervisor=Supervisor(rate, window=case.period / rate) if guard else None,
     )
@@ -212,28 +217,7 @@ def in_parallel(jobs: Sequence[Job], processes: int | None = None) -> Iterator[l
     list of Run
         Of each job as it is done.
     """
-    processes = integer("processes", os.cpu_count() or 1 if processes is None else processes, 1)
-    if processes == 1 or len(jobs) == 1:
-        yield from map(play, jobs)
-        return
-    # Numba and forked processes do not go together.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(processes, len(jobs)), mp_context=context) as pool:
-        try:
-            queue = iter(jobs)
-            pending: set[Future[list[Run]]] = set()
-            while True:
-                for job in queue:
-                    pending.add(pool.submit(play, job))
-                    if len(pending) >= 2 * processes:
-                        break
-                if not pending:
-                    return
-                done, pending = wait(pending, return_when=FIRST_COMPLETED)
-                for future in done:
-                    yield future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    yield from in_processes(play, jobs, processes)
 
 
 QUANTITIES = (
@@ -270,7 +254,7 @@ def summarise(runs: Iterable[Run]) -> list[dict[str, Any]]:
         groups.setdefault((run.scenario, run.estimator), []).append(run)
     order = list(SCENARIOS)
     rows = [_summary(key, groups[key]) for key in sorted(groups, key=lambda key: order.index(key[0]))]
-    return [dict(_json_safe(row)) for row in rows]
+    return [dict(json_safe(row)) for row in rows]
 
 
 def _summary(key: tuple[str, str], runs: list[Run]) -> dict[str, Any]:
@@ -286,15 +270,26 @@ def _summary(key: tuple[str, str], runs: list[Run]) -> dict[str, Any]:
     }
     for quantity in QUANTITIES:
         values = [_quantity(run, quantity) for run in runs]
-        known = [math.inf if math.isnan(value) else value for value in values if value is not None]
-        # The quantile is a value that occurred: no mean with an infinite neighbour.
-        row[quantity] = {
-            "median": float(np.quantile(known, 0.5, method="inverted_cdf")) if known else None,
-            "q95": float(np.quantile(known, 0.95, method="inverted_cdf")) if known else None,
-        }
+        row[quantity] = median_and_q95([value for value in values if value is not None])
     transients = [run.metrics.errors for run in runs if run.metrics is not None]
     row["transient"] = np.median(transients, axis=0).tolist() if transients else []
     return row
+
+
+def median_and_q95(values: Iterable[float]) -> dict[str, float | None]:
+    """Median and 95 % quantile, each a value that occurred; NaN counts as infinite, none as None.
+
+    Parameters
+    ----------
+    values : iterable of float
+        In any order.
+    """
+    known = [math.inf if math.isnan(value) else value for value in values]
+    # No mean with an infinite neighbour.
+    return {
+        name: float(np.quantile(known, level, method="inverted_cdf")) if known else None
+        for name, level in (("median", 0.5), ("q95", 0.95))
+    }
 
 
 def _quantity(run: Run, quantity: str) -> float | None:
@@ -316,12 +311,18 @@ def _infinite(periods: int | None) -> float:
     return math.inf if periods is None else float(periods)
 
 
-def _json_safe(value: Any) -> Any:
-    """The same with plain lists, and null for what is not finite."""
+def json_safe(value: Any) -> Any:
+    """The same with plain lists, and None for what is not finite.
+
+    Parameters
+    ----------
+    value : object
+        Of dictionaries, lists, tuples and plain values.
+    """
     if isinstance(value, dict):
-        return {key: _json_safe(item) for key, item in value.items()}
+        return {key: json_safe(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_json_safe(item) for item in value]
+        return [json_safe(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

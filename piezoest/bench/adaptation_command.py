@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -39,15 +40,26 @@ def adaptation(
         typer.Option("--json", metavar="FILE", help="Write JSON; - prints it instead of the tables."),
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default one for each core.")] = None,
+    html: Annotated[
+        Path | None, typer.Option("--html", metavar="FILE", help="Write a page with interactive plots.")
+    ] = None,
 ) -> None:
     """How fast estimators adapt: scenarios × estimators × seeds, beside linear feed-forward.
 
     Errors are those of the true displacement in the ring of the simulated stage and the inverse
     compensator, 5 µm at 5 Hz where nothing else is said.
     """
-    from piezoest.bench.commands import INTERRUPTED, _json_target, _origin, _progress
+    from piezoest.bench.commands import (
+        INTERRUPTED,
+        _check_html,
+        _json_target,
+        _origin,
+        _progress,
+        _write_html,
+    )
 
     target = _json_target(json_to)
+    _check_html(html)
     began = time.perf_counter()
     overrides = {"sample_rate": sample_rate, "after": periods}
     try:
@@ -73,6 +85,7 @@ def adaptation(
     origin = {**_origin(), "seconds": round(time.perf_counter() - began, 1), "seeds": seeds}
     document = _document(runs, origin, overrides, list(chosen))
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    _write_html(document, html)
     if json_to == "-":
         typer.echo(text)
         return

@@ -34,7 +34,7 @@ def candidate(text: str) -> Callable[..., Any]:
         If there is no such class, or the arguments cannot be read.
     """
     name, parenthesis, _ = text.partition("(")
-    cls = _class(name.strip())
+    cls = class_of(name.strip())
     given = _arguments(text) if parenthesis else {}
     accepted = inspect.signature(cls).parameters
     if unknown := [key for key in given if key not in accepted]:
@@ -47,7 +47,19 @@ def candidate(text: str) -> Callable[..., Any]:
     return make
 
 
-def _class(name: str) -> type:
+def class_of(name: str) -> type:
+    """Class of the package, or of one's own as ``module:Class``.
+
+    Parameters
+    ----------
+    name : str
+        Without arguments.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
     if ":" in name:
         return load_estimator(name)
     found = find_estimators()

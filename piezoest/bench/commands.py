@@ -15,26 +15,27 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from piezoest.bench import adaptation_command
+from piezoest import _extras
+from piezoest.bench import adaptation_command, rank_command, suite_command
 
 if TYPE_CHECKING:
     from piezoest.bench.estimators import Row, Scenario
 
 app = typer.Typer(
-    no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Compare estimators on the simulated stage.",
 )
 
 INTERRUPTED = 130
 
+Html = Annotated[
+    Path | None, typer.Option("--html", metavar="FILE", help="Write a page with interactive plots.")
+]
+
+app.callback(invoke_without_command=True)(suite_command.suite)
+app.command(epilog=suite_command.COMPARE_EPILOG)(suite_command.compare)
+app.command(epilog=rank_command.EPILOG)(rank_command.rank)
 app.command(epilog=adaptation_command.EPILOG)(adaptation_command.adaptation)
-
-
-@app.callback()
-def _bench() -> None:
-    """Compare estimators on the simulated stage."""
 
 
 @app.command(
@@ -60,6 +61,7 @@ def estimators(
         str | None,
         typer.Option("--json", metavar="FILE", help="Write JSON; - prints it instead of the table."),
     ] = None,
+    html: Html = None,
 ) -> None:
     """Settled error, time to settle and cost of every estimator, in the same ring.
 
@@ -67,6 +69,7 @@ def estimators(
     stage: a smoothed triangle of 5 µm at 5 Hz, noise and quantisation on.
     """
     target = _json_target(json_to)
+    _check_html(html)
     try:
         with _progress() as say:
             say("loading (compiles once after the installation)")
@@ -76,7 +79,9 @@ def estimators(
             rows = compare(_chosen(own or [], only or []), scenario, say)
     except KeyboardInterrupt:
         raise typer.Exit(INTERRUPTED) from None
-    text = json.dumps(_document(scenario, rows), indent=2, ensure_ascii=False, allow_nan=False)
+    document = _document(scenario, rows)
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    _write_html(document, html)
     if json_to == "-":
         typer.echo(text)
         return
@@ -109,6 +114,7 @@ def paper(
     workers: Annotated[
         int | None, typer.Option(min=0, help="Processes; default one for each processor, 0 for none.")
     ] = None,
+    html: Html = None,
 ) -> None:
     """Tables I, II and III of the paper beside those of the simulated stage.
 
@@ -116,6 +122,7 @@ def paper(
     calibrated to the rows marked calibration; it has never seen those marked held out.
     """
     target = _json_target(json_to)
+    _check_html(html)
     if figures is not None and (figures.exists() and not figures.is_dir()):
         raise typer.BadParameter(f"{figures} is not a folder", param_hint="--figures")
     began = time.perf_counter()
@@ -141,6 +148,7 @@ def paper(
         **result.to_dict(),
     }
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    _write_html(document, html)
     if figures is not None:
         from piezoest.bench.paper_figures import write_figures
 
@@ -163,6 +171,29 @@ def _json_target(json_to: str | None) -> Path | None:
     if target is not None and (target.is_dir() or not target.resolve().parent.is_dir()):
         raise typer.BadParameter(f"{target} is no file that can be written", param_hint="--json")
     return target
+
+
+def _check_html(html: Path | None) -> None:
+    """Refuse a report that cannot be written before the work is done, not after."""
+    if html is None:
+        return
+    if html.suffix.lower() not in (".html", ".htm"):
+        raise typer.BadParameter(f"{html}: a report's name must end in .html", param_hint="--html")
+    if html.is_dir() or not html.resolve().parent.is_dir():
+        raise typer.BadParameter(f"{html} is no file that can be written", param_hint="--html")
+    try:
+        _extras.load("plotly", "report", "an HTML report")
+    except _extras.MissingExtraError as error:
+        raise typer.BadParameter(str(error), param_hint="--html") from None
+
+
+def _write_html(document: dict[str, Any], html: Path | None) -> None:
+    """Write the report, if one is wanted, and say so on stderr, for stdout may be JSON."""
+    if html is not None:
+        from piezoest.bench.html_report import write_html
+
+        write_html(document, html)
+        typer.echo(f"Report: {html}", err=True)
 
 
 def _origin() -> dict[str, Any]:

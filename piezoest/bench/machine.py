@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import importlib.metadata
 import os
 import platform
@@ -34,3 +36,14 @@ def describe_machine() -> dict[str, Any]:
 def versions() -> dict[str, str]:
     """Versions of this package and of those that do its arithmetic."""
     return {name: importlib.metadata.version(name) for name in DISTRIBUTIONS}
+
+
+@functools.cache
+def fingerprint() -> str:
+    """Sixteen hexadecimal digits that change with every file of this package's own source."""
+    root = Path(__file__).resolve().parents[1]
+    found = hashlib.sha256()
+    for path in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".json", ".csv")):
+        found.update(path.relative_to(root).as_posix().encode())
+        found.update(path.read_bytes())
+    return found.hexdigest()[:16]

@@ -209,7 +209,10 @@ def deviation(theta: FloatArray, level: FloatArray) -> float:
     """
     if theta.size == 0:
         return 0.0
-    return float(np.max(np.abs(theta - level) / np.abs(level)))
+    moved = np.abs(theta - level)
+    # A weight of a model that ended at zero: it is off by nothing, or by more than any part.
+    parts = np.divide(moved, np.abs(level), out=np.where(moved > 0.0, np.inf, 0.0), where=level != 0.0)
+    return float(np.max(parts))
 
 
 def _rest_excursion(theta: FloatArray, case: Case) -> float | None:

@@ -33,6 +33,7 @@ class IntegralFeedback:
     -----
     Anti-windup: the integral stands still while the voltage is limited in the direction in
     which it would grow, and over samples without a measurement.
+    Source: K. J. Åström, R. M. Murray, Feedback Systems, Princeton 2008, sec. 10.4.
     """
 
     __slots__ = ("_compensator", "_gain", "_integral", "_step_gain")

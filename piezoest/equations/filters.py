@@ -1,4 +1,8 @@
-"""Discrete filters as functions of one sample: first order, and second-order sections."""
+"""Discrete filters as functions of one sample: first order, and second-order sections.
+
+Source: K. J. Åström, B. Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997, ch. 2 (an input
+held over the sample) and ch. 8 (the bilinear transform and its warping).
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The recent path of a voltage: its last turning points, whether or not a larger loop wiped them out.
 
-The Coleman-Hodgdon model forgets by travel alone. Where any model of that kind stands now follows
+The Coleman-Hodgdon model forgets by travel alone, see (3). Where any model of that kind stands now follows
 from the last few swings, so that a compensator can take up a new one as if it had always had it.
 Like `turning_points` this is bookkeeping, with branches, for numbers alone.
 

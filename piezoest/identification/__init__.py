@@ -3,5 +3,16 @@
 from piezoest.identification.choice import Candidate, ModelChoice, choose_model
 from piezoest.identification.procedure import identify
 from piezoest.identification.result import Identification, Misfit, Whiteness
+from piezoest.identification.streamed import StreamedIdentification, identify_stream
 
-__all__ = ["Candidate", "Identification", "Misfit", "ModelChoice", "Whiteness", "choose_model", "identify"]
+__all__ = [
+    "Candidate",
+    "Identification",
+    "Misfit",
+    "ModelChoice",
+    "StreamedIdentification",
+    "Whiteness",
+    "choose_model",
+    "identify",
+    "identify_stream",
+]

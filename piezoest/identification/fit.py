@@ -94,15 +94,20 @@ def straight_line(data: Data, delay: float, from_sample: int = 0) -> tuple[float
 
 def starts(data: Data, sample_rate: float, delay: float, noise: float) -> list[FloatArray]:
     """Points to start from: the recursive least squares of the derivative form, and plain guesses."""
-    gain, offset = straight_line(data, delay)
-    guess = ColemanHodgdon.from_loop(2.0 / data.extent, 0.4 * gain, 1.3 * gain, offset)
-    rls = HysteresisRLS(
-        sample_rate, initial_model=guess, memory=None, offset=True, delay=delay, uncertainty=1.0, noise=noise
-    )
+    rls = recursion(data, sample_rate, delay, noise)
     rls.run(data.u, np.where(data.counts, data.x, np.nan), every=max(1, data.u.size - 1))
     learnt = rls.model
     first = [learnt.a * data.extent] if isinstance(learnt, ColemanHodgdon) else []
     return [_start(data, a, delay) for a in (*first, *A_STARTS)]
+
+
+def recursion(data: Data, sample_rate: float, delay: float, noise: float) -> HysteresisRLS:
+    """Recursive least squares without forgetting, from a guess at a loop about the straight line."""
+    gain, offset = straight_line(data, delay)
+    guess = ColemanHodgdon.from_loop(2.0 / data.extent, 0.4 * gain, 1.3 * gain, offset)
+    return HysteresisRLS(
+        sample_rate, initial_model=guess, memory=None, offset=True, delay=delay, uncertainty=1.0, noise=noise
+    )
 
 
 def _start(data: Data, a: float, delay: float) -> FloatArray:

@@ -76,8 +76,8 @@ def identify(
     trained = round(train * len(record))
     start_delay, fit_delay = _delay_argument(delay)
     whole, data = _checked(record, trained)
-    noise = _noise(data)
-    turns = _check_excitation(data, noise)
+    noise = noise_of(data)
+    turns = check_excitation(data, noise)
     rate = record.sample_rate
 
     begins = fitting.starts(data, rate, start_delay, noise)
@@ -143,26 +143,25 @@ def _checked(record: Record, trained: int) -> tuple[fitting.Data, fitting.Data]:
     return whole, fitting.prepare(record.voltage[:trained], record.displacement[:trained])
 
 
-def _noise(data: fitting.Data) -> float:
+def noise_of(data: fitting.Data) -> float:
     """Standard deviation of the displacement's noise [µm], from its third differences, robustly."""
     x = data.x[data.counts]
     third = np.diff(x, 3)
     return max(float(1.4826 * np.median(np.abs(third)) / np.sqrt(20.0)), 1e-9 * float(np.ptp(x)), 1e-12)
 
 
-def _check_excitation(data: fitting.Data, noise: float) -> FloatArray:
+def check_excitation(data: fitting.Data, noise: float) -> FloatArray:
     """Refuse a voltage that cannot show a hysteresis; return the voltages at its turns."""
     if data.extent == 0.0:
         raise ValueError(
             f"too little excitation: the voltage stays at {data.middle:.6g} V over the fitted part, "
             "it must move the stage up and down"
         )
-    turns = np.empty(data.u.size)
-    count = _turns(data.u, TURN * data.extent, turns)
-    if count < FEWEST_TURNS:
+    turns = turning_voltages(data)
+    if turns.size < FEWEST_TURNS:
         raise ValueError(
             f"too little excitation: over the fitted part the voltage moves by {data.extent:.4g} V but "
-            f"turns {count} times, at least {FEWEST_TURNS} are needed: hysteresis shows only at turns"
+            f"turns {turns.size} times, at least {FEWEST_TURNS} are needed: hysteresis shows only at turns"
         )
     extent = float(np.ptp(data.x[data.counts]))
     if extent < SMALLEST_SIGNAL_TO_NOISE * noise:
@@ -177,7 +176,13 @@ def _check_excitation(data: fitting.Data, noise: float) -> FloatArray:
             f"the displacement falls as the voltage rises ({gain:.4g} µm/V): change the sign of one of the "
             "two columns"
         )
-    return turns[:count]
+    return turns
+
+
+def turning_voltages(data: fitting.Data) -> FloatArray:
+    """Voltages at which it turns and then runs back by more than a twentieth of its range [V]."""
+    turns = np.empty(data.u.size)
+    return turns[: _turns(data.u, TURN * data.extent, turns)]
 
 
 @njit(cache=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -115,6 +116,32 @@ def autocorrelation(residual: FloatArray, lags: int) -> FloatArray:
     return np.array([float(e[: e.size - k] @ e[k:]) / power for k in range(lags + 1)])
 
 
+def parameter_rows(
+    model: ColemanHodgdon, delay: float, errors: Mapping[str, float]
+) -> list[tuple[str, float, float, str]]:
+    """Rows of parameter name, value, standard error (zero if it was not estimated) and unit."""
+    names = (*model.parameter_names, "offset", "delay")
+    units = (*model.parameter_units, "µm", "samples")
+    values = (*(float(value) for value in model.theta), model.offset, delay)
+    return [
+        (name, value, errors.get(name, 0.0), unit)
+        for name, value, unit in zip(names, values, units, strict=True)
+    ]
+
+
+def misfits_to_dict(found: Any) -> dict[str, Any]:
+    """Errors of a model and of the straight line beside it, JSON-safe."""
+    return {
+        "train": found.train.to_dict(),
+        "held_out": found.held_out.to_dict(),
+        "straight_line": {
+            "model": found.line.to_dict(),
+            "train": found.line_train.to_dict(),
+            "held_out": found.line_held_out.to_dict(),
+        },
+    }
+
+
 @dataclass(frozen=True, slots=True)
 class Identification:
     """A model identified from a record, and how far to trust it.
@@ -179,15 +206,29 @@ class Identification:
         """Measured displacement less prediction [µm], shape (N,); NaN where a sample is missing."""
         return self.record.displacement - self.prediction
 
+    @property
+    def source(self) -> str:
+        """Where the record comes from."""
+        return self.record.source
+
+    @property
+    def samples(self) -> int:
+        """Number of samples of the record."""
+        return len(self.record)
+
+    @property
+    def sample_rate(self) -> float:
+        """Of the record [Hz]."""
+        return self.record.sample_rate
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What had to be assumed or converted to read the log, in plain sentences."""
+        return self.record.notes
+
     def table(self) -> list[tuple[str, float, float, str]]:
         """Rows of parameter name, value, standard error and unit."""
-        names = (*self.model.parameter_names, "offset", "delay")
-        units = (*self.model.parameter_units, "µm", "samples")
-        values = (*(float(value) for value in self.model.theta), self.model.offset, self.delay)
-        return [
-            (name, value, self.standard_errors[name], unit)
-            for name, value, unit in zip(names, values, units, strict=True)
-        ]
+        return parameter_rows(self.model, self.delay, self.standard_errors)
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe dictionary; the model under ``"model"`` is that of `ColemanHodgdon.to_dict`."""
@@ -205,13 +246,7 @@ class Identification:
             "delay_estimated": self.delay_estimated,
             "trained_samples": self.trained,
             "left_out_samples": self.left_out,
-            "train": self.train.to_dict(),
-            "held_out": self.held_out.to_dict(),
-            "straight_line": {
-                "model": self.line.to_dict(),
-                "train": self.line_train.to_dict(),
-                "held_out": self.line_held_out.to_dict(),
-            },
+            **misfits_to_dict(self),
             "whiteness": self.whiteness.to_dict(),
             "drift_um": self.drift,
             "notes": list(self.record.notes),

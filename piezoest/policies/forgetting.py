@@ -100,6 +100,10 @@ class PeriodicForgetting:
     ------
     ValueError
         If memory is not above zero.
+
+    Notes
+    -----
+    Source: the forgetting of (A4), on the reference's clock.
     """
 
     memory: float = 2.0
@@ -118,7 +122,7 @@ class DirectionalForgetting:
     Parameters
     ----------
     memory : float
-        Time constant along the regressor.
+        Time constant along the regressor, in units of `unit`.
     unit : {"period", "second"}
         Of memory: the reference's own period, or seconds (the unit of `step` in
         `RecursiveLeastSquares`).
@@ -147,7 +151,7 @@ class VariableForgetting:
     Parameters
     ----------
     memory : float
-        Time constant while the innovation is as usual.
+        Time constant while the innovation is as usual, in units of `unit`.
     shortest : float
         Least time constant, in parts of memory.
     unit : {"period", "second"}

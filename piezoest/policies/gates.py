@@ -27,6 +27,7 @@ class OutlierRejection:
     explains. Where x stays at its new level, it is taken for the new one after 2 ms. A reading
     that is the same to the last bit while the voltage travels more than 0.5 % of a swing is that of a
     saturated converter or a dead sensor.
+    Source: rules of this library.
     """
 
     warm_up: int = 100
@@ -50,6 +51,10 @@ class DeadZone:
     ------
     ValueError
         If threshold is negative.
+
+    Notes
+    -----
+    Source: P. A. Ioannou, J. Sun, Robust Adaptive Control, Prentice Hall 1996, ch. 8.
     """
 
     threshold: float = 1e-9

@@ -1,4 +1,4 @@
-"""A recorded log, read from and written to CSV."""
+"""A recorded log in memory: read from a file of any format, written as CSV."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piezoest._checks import WILDEST, FloatArray, array_1d, fraction, positive
-from piezoest.records.table import read_table
-from piezoest.records.timing import even_time, spread
+from piezoest._checks import FloatArray, array_1d, fraction, positive
+from piezoest.records.columns import choose
+from piezoest.records.source import ROWS, open_source
+from piezoest.records.stream import FEWEST_ROWS, RecordStream, sane
+from piezoest.records.timing import scan
 
 if TYPE_CHECKING:
     from piezoest.signals import Signal
-
-FEWEST_ROWS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class Record:
     def __post_init__(self) -> None:
         for name in ("time", "voltage", "displacement"):
             values = array_1d(name, getattr(self, name), allow_nan=name != "time", minimum_length=2)
-            object.__setattr__(self, name, values if name == "time" else _sane(values))
+            object.__setattr__(self, name, values if name == "time" else sane(values))
             if values.size != self.time.size:
                 raise ValueError(
                     f"{name} must have shape ({self.time.size},) as time has, got ({values.size},)"
@@ -150,21 +150,33 @@ class Record:
 
 
 def read_record(
-    path: str | Path, *, columns: Mapping[str, str] | None = None, sample_rate: float | None = None
+    path: str | Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    sample_rate: float | None = None,
 ) -> Record:
-    """Read a log from a CSV file.
+    """Read a log from a CSV, Parquet, HDF5, MATLAB or NumPy file.
 
     Parameters
     ----------
     path : str or Path
-        Text file with one row per sample. Delimiter (comma, semicolon, tab, blank), decimal
-        comma, header and units are recognised; lines that begin with # are comments.
+        File with one row per sample; the format is recognised. In text files, delimiter (comma, semicolon,
+        tab, blank), decimal comma and header are recognised too, and lines that begin with # are comments.
+        Of HDF5 and MATLAB files every vector is a column, and so is every column of a matrix (``data:1``,
+        ``data:2``) and every field of a structure (``log.u``).
     columns : mapping of str to str, optional
         Names of the columns of ``"time"``, ``"voltage"`` and ``"displacement"`` where they should not be
         guessed, or their numbers from 1: ``{"voltage": "drive_mV", "displacement": "3"}``.
-        Units are read from the end of a name: ``drive_mV``, ``pos [nm]``, ``t (ms)``.
+    units : mapping of str to str, optional
+        Units where the file does not state them as it should: ``{"displacement": "nm"}``. With a number
+        before it, what one in the log stands for: ``{"displacement": "0.2 um"}`` for a sensor's volts. Left
+        out, a unit is read from the end of a name (``drive_mV``, ``pos [nm]``, ``t (ms)``) or from the
+        attribute ``unit`` of an HDF5 dataset or a Parquet field.
     sample_rate : float, optional
-        [Hz]; if given, the rows are taken as evenly spaced and the column of time is ignored.
+        [Hz]; if given, the rows are taken as evenly spaced and the column of time is ignored. Left out, and
+        without a column of time, a number called ``fs`` or ``sample_rate`` in a MATLAB, HDF5 or NumPy file is
+        taken, or such an entry of a Parquet file's metadata.
 
     Returns
     -------
@@ -177,38 +189,26 @@ def read_record(
     OSError
         If the file cannot be read.
     ValueError
-        If columns are missing or ambiguous, there is text in numbers, time does not increase or
-        is too uneven, or there are too few rows; the message names file, line and column.
+        If columns are missing or ambiguous, a unit is unknown, there is text in numbers, time does not
+        increase or is too uneven, there are too few rows, or the file is damaged; the message names
+        file, line and column.
+    ImportError
+        If reading the format needs a package of the extra ``formats`` that is not installed.
     """
-    wanted = ("voltage", "displacement") if sample_rate is not None else ("time", "voltage", "displacement")
-    table = read_table(Path(path), wanted, dict(columns or {}))
-    voltage, displacement = _sane(table.values["voltage"]), _sane(table.values["displacement"])
-    notes = list(table.notes)
-    if sample_rate is None:
-        time, where, said = even_time(table)
-        voltage, displacement = spread(voltage, where), spread(displacement, where)
-        sample_rate = float((time.size - 1) / (time[-1] - time[0]))
-        notes += said
-    else:
-        time = np.arange(voltage.size) / positive("sample_rate", sample_rate)
-    usable = int(np.sum(np.isfinite(voltage) & np.isfinite(displacement)))
-    if usable < FEWEST_ROWS:
-        raise ValueError(f"{path}: only {usable} usable rows, at least {FEWEST_ROWS} are needed")
-    if skipped := voltage.size - usable:
+    stream = RecordStream(path, columns=columns, units=units, sample_rate=sample_rate)
+    blocks = list(stream)
+    time, voltage, displacement = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    notes = list(stream.notes)
+    if skipped := int(np.sum(~(np.isfinite(voltage) & np.isfinite(displacement)))):
         noun = "sample is" if skipped == 1 else "samples are"
         notes.append(f"{skipped} {noun} without usable numbers: skipped, the timing is kept")
-    return Record(time, voltage, displacement, sample_rate, str(path), skipped, tuple(notes))
-
-
-def _sane(values: FloatArray) -> FloatArray:
-    """Values with NaN for what no stage can have."""
-    return np.where(np.abs(values) < WILDEST, values, np.nan)
+    return Record(time, voltage, displacement, stream.sample_rate, str(path), skipped, tuple(notes))
 
 
 def read_reference(
     path: str | Path, *, column: str | None = None, sample_rate: float | None = None
 ) -> Signal:
-    """Read a reference trajectory from a CSV file.
+    """Read a reference trajectory from a file of any format that `read_record` reads.
 
     Parameters
     ----------
@@ -234,26 +234,36 @@ def read_reference(
     """
     from piezoest.signals import Signal
 
+    source = open_source(Path(path))
     wanted = ("reference",) if sample_rate is not None else ("time", "reference")
-    table = read_table(Path(path), wanted, {} if column is None else {"reference": column})
-    values = table.values["reference"]
-    bad = np.flatnonzero(~np.all(np.isfinite(list(table.values.values())), axis=0))
+    chosen = choose(source, wanted, {} if column is None else {"reference": column}, {})
+    positions = [chosen[quantity].position for quantity in wanted]
+    source.check(positions)
+    blocks = list(source.read(positions, ROWS))
+    if not blocks:
+        raise ValueError(f"{path}: the file has no rows")
+    numbers = np.concatenate([block.numbers for block in blocks])
+    values = [
+        chosen[quantity].factor * np.concatenate([block.values[i] for block in blocks])
+        for i, quantity in enumerate(wanted)
+    ]
+    bad = np.flatnonzero(~np.all(np.isfinite(values), axis=0))
     if bad.size:
         raise ValueError(
-            f"{path}, line {table.lines[bad[0]]}: no number in the time or the reference; "
+            f"{path}, {source.place} {numbers[bad[0]]}: no number in the time or the reference; "
             "a reference must have no gaps"
         )
-    if values.size < FEWEST_ROWS:
-        raise ValueError(f"{path}: only {values.size} rows, at least {FEWEST_ROWS} are needed")
+    if numbers.size < FEWEST_ROWS:
+        raise ValueError(f"{path}: only {numbers.size} rows, at least {FEWEST_ROWS} are needed")
     if sample_rate is None:
-        time, where, _ = even_time(table)
-        if np.any(np.diff(where) > 1):
-            gap = int(np.argmax(np.diff(where) > 1))
+        timing = scan(str(path), source.place, lambda: [(numbers, values[0])])
+        if timing.usual is not None and timing.samples > timing.rows:
+            gap = int(np.argmax(np.rint(np.diff(values[0]) / timing.usual) > 1.0))
             raise ValueError(
-                f"{path}, line {table.lines[gap + 1]}: time jumps here; a reference must have no gaps"
+                f"{path}, {source.place} {numbers[gap + 1]}: time jumps here; a reference must have no gaps"
             )
-        sample_rate = float((time.size - 1) / (time[-1] - time[0]))
-    return Signal(values, sample_rate, None, Path(path).stem)
+        sample_rate = timing.sample_rate
+    return Signal(values[-1], sample_rate, None, Path(path).stem)
 
 
 def write_columns(path: str | Path, columns: Mapping[str, Any]) -> None:

@@ -180,7 +180,7 @@ class Signal:
         Parameters
         ----------
         allowed_step : float
-            Steps up to this size always pass.
+            Steps up to this size, in the unit of the values, always pass.
 
         Raises
         ------

@@ -1,0 +1,31 @@
+"""Packages that only some uses need: loaded then, and named with their extra where they are absent."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+
+class MissingExtraError(ImportError):
+    """A package of an optional extra is not installed."""
+
+
+def load(module: str, extra: str, purpose: str) -> Any:
+    """Import a module of an optional extra.
+
+    Raises
+    ------
+    MissingExtraError
+        If it is not installed; the message says what for, and how to install it.
+    """
+    package = module.partition(".")[0]
+    try:
+        importlib.import_module(package)
+    except ModuleNotFoundError as error:
+        if error.name != package:
+            raise
+        raise MissingExtraError(
+            f"{purpose} needs {package}, which is not installed: pip install 'piezoest[{extra}]'",
+            name=package,
+        ) from None
+    return importlib.import_module(module)

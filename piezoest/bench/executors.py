@@ -1,0 +1,241 @@
+"""Work over many items: in this process, over the cores, or on Dask.
+
+All three give each item's result once, in no particular order, and survive what kills a process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any, TypeVar
+
+from piezoest._checks import integer
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+# Tasks that Dask's scheduler knows of at a time: enough for a thousand cores, and no burden.
+IN_FLIGHT = 1000
+PATIENCE = 15.0  # s until a scheduler that does not answer is given up
+
+
+def in_processes(
+    work: Callable[[Item], Result],
+    items: Iterable[Item],
+    processes: int | None = None,
+    *,
+    crashed: Callable[[Item], Result] | None = None,
+) -> Iterator[Result]:
+    """Work on items over the cores.
+
+    Parameters
+    ----------
+    work : callable
+        What is done with each; a module's function, as for `pickle`.
+    items : iterable
+        Each may be pickled.
+    processes : int, optional
+        How many; default one for each core, 1 works in this process.
+    crashed : callable, optional
+        Result of an item whose process died over it. The items that were under way when a process
+        died are tried again, each alone. Without it the death is an error.
+
+    Yields
+    ------
+    object
+        Result of each as it is done.
+    """
+    processes = integer("processes", os.cpu_count() or 1 if processes is None else processes, 1)
+    if processes == 1:
+        yield from map(work, items)
+        return
+    queue = _Queue(items)
+    while not queue.empty:
+        suspects = yield from _until_death(work, queue, processes, 2 * processes)
+        if suspects and crashed is None:
+            raise BrokenProcessPool("a process died at its work")
+        alone = _Queue(suspects)
+        while crashed is not None and not alone.empty:
+            guilty = yield from _until_death(work, alone, 1, 1)
+            yield from map(crashed, guilty)
+
+
+class _Queue(Iterator[Item]):
+    """Items, of which the last one may be put back."""
+
+    def __init__(self, items: Iterable[Item]) -> None:
+        self._items = iter(items)
+
+    def __next__(self) -> Item:
+        return next(self._items)
+
+    def put_back(self, item: Item) -> None:
+        self._items = itertools.chain([item], self._items)
+
+    @property
+    def empty(self) -> bool:
+        for item in self:
+            self.put_back(item)
+            return False
+        return True
+
+
+def _until_death(
+    work: Callable[[Item], Result], queue: _Queue[Item], processes: int, at_a_time: int
+) -> Generator[Result, None, list[Item]]:
+    """Work on the queue in new processes; returns what was under way when one of them died."""
+    under_way: dict[Future[Result], Item] = {}
+    dead: list[Item] = []
+    with _pool(processes) as pool:
+        while not dead:
+            for item in itertools.islice(queue, at_a_time - len(under_way)):
+                try:
+                    under_way[pool.submit(work, item)] = item
+                except BrokenProcessPool:
+                    # Another one's death, seen before it could be told.
+                    queue.put_back(item)
+                    break
+            if not under_way:
+                break
+            for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+                item = under_way.pop(future)
+                try:
+                    result = future.result()
+                except BrokenProcessPool:
+                    dead.append(item)
+                    continue
+                yield result
+        # The pool is broken: what had been done in it is whole, the rest goes with it.
+        for future, item in under_way.items():
+            try:
+                result = future.result()
+            except BrokenProcessPool:
+                dead.append(item)
+                continue
+            yield result
+    return dead
+
+
+@contextlib.contextmanager
+def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+    """New processes, which end at once if the work is given up."""
+    # Numba and forked processes do not go together.
+    context = multiprocessing.get_context("spawn")
+    others = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(processes, context, initializer=_in_child)
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for child in set(multiprocessing.active_children()) - others:
+            child.terminate()
+        raise
+    pool.shutdown()
+
+
+def _in_child() -> None:
+    """Leave Ctrl-C to the process that asked for the work, and end with it, however it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    if (parent := multiprocessing.parent_process()) is not None:
+        parent.join()
+        os._exit(1)
+
+
+def on_dask(
+    work: Callable[[Item], Result],
+    items: Iterable[Item],
+    scheduler: str | None = None,
+    processes: int | None = None,
+    *,
+    crashed: Callable[[Item], Result] | None = None,
+    modules: Sequence[Path] = (),
+) -> Iterator[Result]:
+    """Work on items with Dask: the work of a worker that is lost is done again by another.
+
+    Parameters
+    ----------
+    work : callable
+        What is done with each; a function of a module that the workers have.
+    items : iterable
+        Each may be pickled.
+    scheduler : str, optional
+        Address of a cluster's scheduler, as in ``tcp://10.0.0.1:8786``; default a cluster of this
+        machine's cores, for the time of the work.
+    processes : int, optional
+        Workers of the latter; default one for each core.
+    crashed : callable, optional
+        Result of an item over which worker after worker died. Without it that is an error.
+    modules : sequence of Path
+        Files that the workers need to import, sent to them first.
+
+    Yields
+    ------
+    object
+        Result of each as it is done.
+
+    Raises
+    ------
+    ValueError
+        If Dask is not installed, or the scheduler does not answer.
+    """
+    try:
+        import distributed
+    except ImportError:
+        raise ValueError("Dask is not installed: pip install 'piezoest[dask]'") from None
+    with _client(scheduler, processes) as client:
+        for path in modules:
+            client.upload_file(str(path))
+        queue = iter(items)
+        under_way: dict[Any, Item] = {}
+
+        def submit_next() -> list[Any]:
+            for item in queue:
+                # Not pure: Dask must not take two equal calls for one.
+                future = client.submit(work, item, pure=False)
+                under_way[future] = item
+                return [future]
+            return []
+
+        first = [future for _ in range(IN_FLIGHT) for future in submit_next()]
+        completed = distributed.as_completed(first, loop=client.loop)
+        for future in completed:
+            item = under_way.pop(future)
+            try:
+                result = future.result()
+            except distributed.KilledWorker:
+                if crashed is None:
+                    raise
+                result = crashed(item)
+            completed.update(submit_next())
+            yield result
+
+
+@contextlib.contextmanager
+def _client(scheduler: str | None, processes: int | None) -> Iterator[Any]:
+    """Client of a cluster, or of one made for it on this machine."""
+    import distributed
+
+    with contextlib.ExitStack() as stack:
+        if scheduler is None:
+            workers = integer("processes", os.cpu_count() or 1 if processes is None else processes, 1)
+            cluster = distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+            )
+            scheduler = stack.enter_context(cluster).scheduler_address
+        try:
+            client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise ValueError(f"scheduler {scheduler} does not answer: {error}") from None
+        yield stack.enter_context(client)

@@ -1,0 +1,177 @@
+"""Runs on recorded logs: an estimator learns from the first part, and its model predicts the rest.
+
+The model sees nothing but the voltage, from the first sample on. What it misses of the displacement after the
+part that was learnt from is its error, beside that of the straight line that fits the learnt part best.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import math
+from collections.abc import Callable, Sequence
+from glob import glob
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.bench.candidates import candidate
+from piezoest.identification import fit
+from piezoest.models import ColemanHodgdon, LinearGain, Model
+from piezoest.records import read_record
+from piezoest.tracking import _feed
+
+LOG = "log:"  # before a file's name, in the place of a scenario's
+LEARNT = 0.7  # of the samples
+AT_A_TIME = 1000  # samples, so that no estimator keeps its history of the whole
+SEGMENTS = 10  # of the rest, the largest error of each of which is taken
+DIVERGED = 1.5  # times the line's error
+
+
+def logs_of(pattern: str) -> list[str]:
+    """Names that stand for recorded logs in the place of scenarios.
+
+    Parameters
+    ----------
+    pattern : str
+        A file, a folder of CSV files, or a pattern such as ``fleet/*.csv``.
+
+    Returns
+    -------
+    list of str
+        Sorted.
+
+    Raises
+    ------
+    ValueError
+        If no file is found.
+    """
+    files = sorted(glob(f"{pattern}/*.csv" if Path(pattern).is_dir() else pattern, recursive=True))
+    if not files:
+        raise ValueError(f"no log is found at {pattern}")
+    return [LOG + file for file in files]
+
+
+def file_of(scenario: str) -> Path | None:
+    """File of a scenario that is a recorded log; None of any other.
+
+    Parameters
+    ----------
+    scenario : str
+        Name in the place of a scenario's.
+    """
+    return Path(scenario.removeprefix(LOG)) if scenario.startswith(LOG) else None
+
+
+@functools.lru_cache(maxsize=4096)
+def digest(path: Path) -> str:
+    """Fingerprint of a log's content.
+
+    Parameters
+    ----------
+    path : Path
+        Of the log.
+    """
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+def numbers(
+    path: Path, estimator: str | None, watch: Callable[[Any], Any] = lambda made: made
+) -> dict[str, Any]:
+    """Take the numbers of one estimator on one log.
+
+    Parameters
+    ----------
+    path : Path
+        Of the log, as `piezoest.records.read_record` reads it.
+    estimator : str or None
+        As `piezoest.bench.candidates.candidate` reads it; None for the straight line.
+    watch : callable
+        Is given the estimator and returns what learns in its place.
+
+    Returns
+    -------
+    dict
+        Columns of `piezoest.bench.runner.COLUMNS` that a log has: there is no change to settle after.
+
+    Raises
+    ------
+    ValueError
+        If the log cannot be read or used.
+    """
+    data, sample_rate = _read(path)
+    learnt = round(LEARNT * data.u.size)
+    first = fit.prepare(data.u[:learnt], np.where(data.counts, data.x, np.nan)[:learnt])
+    if first.extent == 0.0 or not np.any(first.counts) or not np.any(data.counts[learnt:]):
+        raise ValueError(f"{path}: there is nothing to learn from, or nothing to predict")
+    line = LinearGain(*fit.straight_line(first, 0.0))
+    line_error = _missed(line, data, learnt)
+    error = line_error
+    if estimator is not None:
+        error = _missed(_learn(estimator, first, line, sample_rate, watch), data, learnt)
+    largest = [float(np.max(part)) for part in np.array_split(error, min(SEGMENTS, error.size))]
+    settled, line_settled = float(np.max(error)), float(np.max(line_error))
+    return {
+        "amplitude": 0.5 * float(np.ptp(data.x[data.counts])),
+        "period": error.size / SEGMENTS / sample_rate,
+        "samples": data.u.size,
+        "mean_error": math.exp(float(np.mean(np.log(np.maximum(largest, 1e-300))))),
+        "settled_max": settled,
+        "settled_rms": float(np.sqrt(np.mean(error**2))),
+        "worst_error": settled,
+        "linear_settled_max": line_settled,
+        "ratio": settled / line_settled if line_settled > 0.0 else math.inf,
+        "diverged": not settled <= DIVERGED * line_settled,
+        "errors": largest,
+    }
+
+
+@functools.lru_cache(maxsize=1)
+def _read(path: Path) -> tuple[fit.Data, float]:
+    record = read_record(path)
+    return fit.prepare(record.voltage, record.displacement), record.sample_rate
+
+
+def _learn(
+    estimator: str, data: fit.Data, line: LinearGain, sample_rate: float, watch: Callable[[Any], Any]
+) -> Model:
+    """Model of an estimator after the part to learn from; it starts from a plain guess about the line."""
+    a, b, c = 2.0 / data.extent, 0.4 * line.gain, 1.3 * line.gain
+    made = watch(candidate(estimator)(sample_rate, ColemanHodgdon.from_loop(a, b, c, line.offset)))
+    x = np.where(data.counts, data.x, np.nan)
+    for begins in range(0, data.u.size, AT_A_TIME):
+        part = slice(begins, begins + AT_A_TIME)
+        _feed(made, data.u[part], x[part])
+    model: Model = made.model
+    return model
+
+
+def _missed(model: Any, data: fit.Data, learnt: int) -> FloatArray:
+    """What a model misses of the displacement after the learnt part, at the samples that have one.
+
+    The gauge's zero is no matter of hysteresis: the mean error of the learnt part is taken off.
+    """
+    # A log may begin anywhere, and have gaps.
+    jumps = {"allow_jumps": True} if isinstance(model, ColemanHodgdon) else {}
+    error = data.x - model.simulate(data.u, **jumps)
+    before = error[:learnt][data.counts[:learnt]]
+    after: FloatArray = np.abs(error[learnt:][data.counts[learnt:]] - np.mean(before))
+    return after
+
+
+def described(scenarios: Sequence[str], known: dict[str, str]) -> dict[str, str]:
+    """One line about each scenario.
+
+    Parameters
+    ----------
+    scenarios : sequence of str
+        Names, of logs among them.
+    known : dict
+        Of those that are no logs.
+    """
+    return {
+        name: f"Recorded log {file}." if (file := file_of(name)) is not None else known[name]
+        for name in scenarios
+    }

@@ -1,0 +1,191 @@
+"""Which column holds what: names, numbers and units, as told or guessed."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from piezoest.records.source import Source
+
+# Names by which logs call the quantities, in lower case; the unit stands beside them.
+NAMES = {
+    "time": ("time", "t", "timestamp", "seconds", "elapsed", "zeit"),
+    "voltage": ("voltage", "u", "v", "volt", "volts", "vin", "drive", "input", "control voltage", "spannung"),
+    "displacement": (
+        "displacement", "x", "y", "w", "disp", "position", "pos", "measured", "measurement", "output",
+        "sensor", "gauge", "weg",
+    ),
+    "reference": ("reference", "ref", "r", "setpoint", "target", "desired"),
+}  # fmt: skip
+UNITS = {
+    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
+    "voltage": {"v": 1.0, "mv": 1e-3, "uv": 1e-6, "kv": 1e3},
+    "displacement": {"um": 1.0, "micron": 1.0, "microns": 1.0, "nm": 1e-3, "pm": 1e-6, "mm": 1e3, "m": 1e6},
+}
+UNITS["reference"] = UNITS["displacement"]
+BASE_UNITS = {"time": "s", "voltage": "V", "displacement": "µm", "reference": "µm"}
+# More than these are counted in a message, not listed.
+MOST_LISTED = 40
+
+
+class Column(NamedTuple):
+    """A column that was chosen, and the factor that brings it to s, V or µm."""
+
+    position: int
+    title: str
+    factor: float
+    note: str
+
+
+def choose(
+    source: Source, wanted: tuple[str, ...], named: Mapping[str, str], units: Mapping[str, str]
+) -> dict[str, Column]:
+    """Columns of the wanted quantities, as told, else by name, else by unit.
+
+    Raises
+    ------
+    ValueError
+        If that cannot be decided; the message lists the columns that there are.
+    """
+    for argument, given in (("columns", named), ("units", units)):
+        if unknown := sorted(set(given) - set(NAMES)):
+            raise ValueError(f"{argument} has {unknown}: known are time, voltage and displacement")
+    factors = {quantity: _stated_factor(quantity, text) for quantity, text in units.items()}
+    if not source.titles and not named:
+        return _by_position(source, wanted, factors)
+    chosen: dict[str, Column] = {}
+    for quantity in wanted:
+        index = _find(source, quantity, named[quantity]) if quantity in named else _guess(source, quantity)
+        title = source.titles[index] if source.titles else str(index + 1)
+        factor = factors.get(quantity)
+        chosen[quantity] = Column(
+            index, title, *(_factor(source.path, title, quantity) if factor is None else factor)
+        )
+    indices = [column.position for column in chosen.values()]
+    for quantity, column in chosen.items():
+        if indices.count(column.position) > 1:
+            raise ValueError(
+                f"{source.path}: column {column.title!r} would be {quantity} and something else: "
+                "name the columns"
+            )
+    return chosen
+
+
+def has_column(source: Source, quantity: str) -> bool:
+    """Whether a column of the quantity would be found by its name or unit."""
+    try:
+        _guess(source, quantity)
+    except ValueError:
+        return False
+    return True
+
+
+def _by_position(
+    source: Source, wanted: tuple[str, ...], factors: dict[str, tuple[float, str]]
+) -> dict[str, Column]:
+    if source.width < len(wanted):
+        raise ValueError(
+            f"{source.path}: {source.width} columns without a header, {len(wanted)} are needed: "
+            f"{', '.join(wanted)}"
+        )
+    # Without a column of time wanted, a first of three columns is still time.
+    shift = source.width - len(wanted) if source.width == 3 and "time" not in wanted else 0
+    return {
+        quantity: Column(i + shift, str(i + shift + 1), *factors.get(quantity, (1.0, "")))
+        for i, quantity in enumerate(wanted)
+    }
+
+
+def _find(source: Source, quantity: str, name: str) -> int:
+    for candidates in (source.names, source.titles, [split_unit(title)[0] for title in source.titles]):
+        if candidates.count(name) == 1:
+            return candidates.index(name)
+    if name.isdigit() and 1 <= int(name) <= source.width:
+        return int(name) - 1
+    raise ValueError(f"{source.path}: no column {name!r} for {quantity}; there {_listed(source)}")
+
+
+def _guess(source: Source, quantity: str) -> int:
+    split = [split_unit(title) for title in source.titles]
+    found = [i for i, (name, _) in enumerate(split) if name.lower() in NAMES[quantity]]
+    if not found and quantity == "reference":
+        return _guess(source, "displacement")
+    if not found:
+        known = {name for names in NAMES.values() for name in names}
+        found = [
+            i for i, (name, unit) in enumerate(split)
+            if unit in UNITS[quantity] and name.lower() not in known
+        ]  # fmt: skip
+    if len(found) == 1:
+        return found[0]
+    if found:
+        titles = ", ".join(source.names[i] for i in found)
+        raise ValueError(
+            f"{source.path}: the columns {titles} could all be the {quantity}: name the one that is"
+        )
+    hint = " or give the sample rate" if quantity == "time" else ""
+    raise ValueError(f"{source.path}: no column for {quantity} found; there {_listed(source)}: name it{hint}")
+
+
+def _listed(source: Source) -> str:
+    if not source.titles:
+        return f"are {source.width} columns without names"
+    more = len(source.names) - MOST_LISTED
+    ending = f" and {more} more" if more > 0 else ""
+    return f"are the columns {', '.join(source.names[:MOST_LISTED])}{ending}"
+
+
+def split_unit(title: str) -> tuple[str, str]:
+    """Split ``drive_mV``, ``pos [nm]``, ``t (ms)``, ``x/µm`` into name and unit in lower case."""
+    plain = _plain(title.strip())
+    match = re.fullmatch(r"(.+?)\s*(?:\[(\w+)\]|\((\w+)\)|[/_\s.]\s*([^\W_]+))", plain)
+    if match is None:
+        return plain, ""
+    unit = next(group for group in match.groups()[1:] if group).lower()
+    if any(unit in units for units in UNITS.values()):
+        return match[1].replace("_", " ").strip(), unit
+    return plain.replace("_", " "), ""
+
+
+def _plain(text: str) -> str:
+    """With u for the signs of micro, one of which is what a wrong encoding leaves of them."""
+    return text.replace("µ", "u").replace("μ", "u").replace("\N{REPLACEMENT CHARACTER}", "u")
+
+
+def _factor(path: Path, title: str, quantity: str) -> tuple[float, str]:
+    """Factor to the base unit, and a note where one was applied or a unit assumed."""
+    # Only mega would differ from milli by case, and no log has it: units are in lower case here.
+    _, unit = split_unit(title)
+    base = BASE_UNITS[quantity]
+    if unit and unit not in UNITS[quantity]:
+        raise ValueError(
+            f"{path}: column {title!r} has the unit {unit}, but {quantity} must be in {base}: convert it, "
+            f"or say what one of it is: units {quantity}='2 {base}' where a volt stands for 2 {base}"
+        )
+    if not unit:
+        return 1.0, f"column {title!r}: unit taken as {base}"
+    factor = UNITS[quantity][unit]
+    return factor, "" if factor == 1.0 else f"column {title!r}: converted to {base} (factor {factor:g})"
+
+
+def _stated_factor(quantity: str, text: str) -> tuple[float, str]:
+    """Factor of a unit that was given, such as ``nm`` or, for a sensor's volts, ``0.2 um``."""
+    match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)?\s*([^\W\d_]+)\s*", _plain(str(text)))
+    known = UNITS[quantity]
+    if match is None or match[2].lower() not in known:
+        raise ValueError(
+            f"units has {text!r} for {quantity}: known are {', '.join(known)}, with a number before it "
+            f"where the log counts in something else: '0.2 {next(iter(known))}'"
+        )
+    try:
+        scale = float(match[1] or 1.0)
+    except ValueError:
+        scale = math.nan
+    factor = scale * known[match[2].lower()]
+    if not math.isfinite(factor) or factor == 0.0 or (quantity == "time" and factor < 0.0):
+        raise ValueError(f"units has {text!r} for {quantity}: the number must be finite and not zero")
+    note = "" if factor == 1.0 else f"{quantity}: converted to {BASE_UNITS[quantity]} (factor {factor:g})"
+    return factor, note

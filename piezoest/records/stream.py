@@ -1,0 +1,219 @@
+"""A recorded log of any format and any length, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from piezoest._checks import WILDEST, FloatArray, integer, positive
+from piezoest.records.columns import BASE_UNITS, Column, choose, has_column
+from piezoest.records.source import ROWS, Rows, Source, open_source
+from piezoest.records.timing import Timing, placed, scan
+
+FEWEST_ROWS = 10
+
+
+class Block(NamedTuple):
+    """Consecutive samples of a log.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        [s].
+    voltage, displacement : ndarray, shape (n,)
+        [V], [µm]; NaN where a sample is missing.
+    """
+
+    time: FloatArray
+    voltage: FloatArray
+    displacement: FloatArray
+
+
+class RecordStream:
+    """A recorded log that is read in blocks, as often as it is iterated over.
+
+    Made by `stream_record`. The blocks together hold the same numbers, to the last bit, as the
+    `Record` that `read_record` makes of the file.
+
+    Parameters
+    ----------
+    path : str or Path
+        As for `read_record`.
+    columns, units : mapping of str to str, optional
+        As for `read_record`.
+    sample_rate : float, optional
+        [Hz], as for `read_record`.
+    rows : int
+        Rows of the file that are read at a time, at least 1; a block has about as many samples.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        As `read_record`.
+    """
+
+    __slots__ = ("_chosen", "_rows", "_source", "_timing", "notes", "sample_rate")
+
+    #: [Hz].
+    sample_rate: float
+    #: What had to be assumed or converted to read the log, in plain sentences.
+    notes: tuple[str, ...]
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        columns: Mapping[str, str] | None = None,
+        units: Mapping[str, str] | None = None,
+        sample_rate: float | None = None,
+        rows: int = ROWS,
+    ) -> None:
+        named, stated = dict(columns or {}), dict(units or {})
+        self._rows = integer("rows", rows, 1)
+        self._source = source = open_source(Path(path))
+        notes = []
+        if sample_rate is None and "time" not in named and _states_its_rate(source):
+            sample_rate = source.sample_rate
+            notes.append(f"sample rate of {sample_rate:g} Hz as the file states it")
+        timed = ("time",) if sample_rate is None else ()
+        self._chosen = choose(source, (*timed, "voltage", "displacement"), named, stated)
+        source.check([column.position for column in self._chosen.values()])
+        self._timing = None
+        if sample_rate is None:
+            self._timing = _scan(source, self._chosen["time"])
+            self.sample_rate = self._timing.sample_rate
+        else:
+            self.sample_rate = positive("sample_rate", sample_rate)
+        self.notes = (*notes, *_notes(source, self._chosen), *(self._timing.notes if self._timing else ()))
+
+    def __repr__(self) -> str:
+        return f"RecordStream({str(self.path)!r}, {self.sample_rate:g} Hz)"
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._source.path
+
+    @property
+    def whole(self) -> str:
+        """Why the file is held in memory as a whole while it is read; empty if it is not."""
+        return self._source.whole
+
+    def count(self) -> int:
+        """Return the number of samples; without a column of time this reads the file once."""
+        if self._timing is not None:
+            return self._timing.samples
+        return sum(block.voltage.size for block in self)
+
+    def __iter__(self) -> Iterator[Block]:
+        """Yield the log in blocks, from its start."""
+        first = usable = 0
+        for voltage, displacement in self._samples():
+            voltage, displacement = sane(voltage), sane(displacement)
+            time = (
+                np.arange(first, first + voltage.size) / self.sample_rate
+                if self._timing is None
+                else self._timing.times(first, voltage.size)
+            )
+            first += voltage.size
+            usable += int(np.sum(np.isfinite(voltage) & np.isfinite(displacement)))
+            yield Block(time, voltage, displacement)
+        if usable < FEWEST_ROWS:
+            raise ValueError(f"{self.path}: only {usable} usable rows, at least {FEWEST_ROWS} are needed")
+
+    def _samples(self) -> Iterator[list[FloatArray]]:
+        columns = list(self._chosen.values())
+        blocks = _converted(self._source, columns, self._rows)
+        if self._timing is None:
+            yield from (values for _, values in blocks)
+        else:
+            yield from placed(self._timing, ((values[0], values[1:]) for _, values in blocks))
+
+
+def stream_record(
+    path: str | Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    sample_rate: float | None = None,
+    rows: int = ROWS,
+) -> RecordStream:
+    """Open a log that may be larger than memory, to be read in blocks.
+
+    For the recursive estimators, whose ``run`` continues where it stopped::
+
+        log = pz.stream_record("log.parquet")
+        estimator = pz.HysteresisRLS(log.sample_rate)
+        for block in log:
+            estimator.run(block.voltage, block.displacement, every=block.voltage.size)
+
+    leaves the estimator in the same state, to the last bit, as one run over the whole record.
+
+    Parameters
+    ----------
+    path : str or Path
+        As for `read_record`. CSV, HDF5, MATLAB 7.3, Parquet and ``.npy`` are read in parts; ``.npz`` and
+        older ``.mat`` files are refused.
+    columns, units : mapping of str to str, optional
+        As for `read_record`.
+    sample_rate : float, optional
+        [Hz], as for `read_record`. Without it the column of time is read twice before the first block.
+    rows : int
+        Rows of the file that are read at a time, at least 1.
+
+    Returns
+    -------
+    RecordStream
+        Yields blocks of time [s], voltage [V] and displacement [µm], shape (n,).
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        As `read_record`; also if the format cannot be read in parts.
+    """
+    stream = RecordStream(path, columns=columns, units=units, sample_rate=sample_rate, rows=rows)
+    if stream.whole:
+        raise ValueError(
+            f"{path}: cannot be streamed: {stream.whole}; or use read_record, if it fits in memory"
+        )
+    return stream
+
+
+def _states_its_rate(source: Source) -> bool:
+    if source.sample_rate is None:
+        return False
+    return not has_column(source, "time") if source.titles else source.width == 2
+
+
+def _scan(source: Source, column: Column) -> Timing:
+    def times() -> Iterator[tuple[object, FloatArray]]:
+        return ((rows.numbers, values[0]) for rows, values in _converted(source, [column], ROWS))
+
+    return scan(str(source.path), source.place, times)
+
+
+def _converted(source: Source, columns: list[Column], rows: int) -> Iterator[tuple[Rows, list[FloatArray]]]:
+    """Blocks of columns in s, V and µm."""
+    for block in source.read([column.position for column in columns], rows):
+        yield block, [column.factor * values for column, values in zip(columns, block.values, strict=True)]
+
+
+def _notes(source: Source, chosen: dict[str, Column]) -> list[str]:
+    said = [column.note for column in chosen.values() if column.note]
+    if not source.titles:
+        names = ", ".join(f"{quantity} = {column.title}" for quantity, column in chosen.items())
+        units = ", ".join(BASE_UNITS[quantity] for quantity in chosen)
+        said.insert(0, f"columns without names: taken as {names}, in {units}")
+    return said
+
+
+def sane(values: FloatArray) -> FloatArray:
+    """Values with NaN for what no stage can have."""
+    return np.where(np.abs(values) < WILDEST, values, np.nan)

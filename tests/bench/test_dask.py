@@ -1,0 +1,160 @@
+"""Campaigns on Dask: a real scheduler and workers in processes of their own, on this machine only."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from piezoest.bench import campaign, executors
+from piezoest.bench.runner import Settings
+
+pytest.importorskip("distributed")
+
+SMALL = Settings(2000.0, before=1, after=3, after_long=2, rest=0.2, drift=0.4, updates=20)
+
+# Says which process ran it; a cluster's workers have the environment they were started with.
+OWN = """
+import os
+
+class Noted:
+    model = None
+
+    def __init__(self, sample_rate, initial_model):
+        self.model = initial_model
+        with open(os.environ["NOTES"], "a") as file:
+            file.write(f"{os.getpid()}\\n")
+
+    def step(self, u, x):
+        pass
+"""
+
+
+class Cluster:
+    """A scheduler and two workers."""
+
+    def __init__(self, folder: Path) -> None:
+        self.notes = folder / "notes.txt"
+        self._environment = {
+            **os.environ,
+            "NOTES": str(self.notes),
+            "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "info",
+        }
+        self._folder = folder
+        self.scheduler = self._start("scheduler", "--port", "0")
+        self.address = self._said(self.scheduler, "Scheduler at:")
+        self.workers = [
+            self._start("worker", self.address, "--no-nanny", "--nthreads", "1") for _ in range(2)
+        ]
+        for worker in self.workers:
+            self._said(worker, "Registered to:")
+
+    def _start(self, kind: str, *arguments: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *arguments]
+        command += ["--host", "127.0.0.1", "--no-dashboard"]
+        folder = self._folder / f"{kind}{len(getattr(self, 'workers', ''))}"
+        folder.mkdir(exist_ok=True)
+        return subprocess.Popen(command, env=self._environment, cwd=folder, stderr=subprocess.PIPE, text=True)
+
+    def _said(self, process: subprocess.Popen[str], words: str) -> str:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if words in line:
+                return line.split(words)[1].split()[0]
+        raise AssertionError(f"a process ended before it said {words!r}")
+
+    def close(self) -> None:
+        for process in (*self.workers, self.scheduler):
+            process.kill()
+            process.communicate()
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    cluster = Cluster(tmp_path)
+    yield cluster
+    cluster.close()
+
+
+def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
+    cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Where the workers do not look: the module has to be sent to them.
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.chdir(home)
+    monkeypatch.syspath_prepend(home)
+    monkeypatch.setenv("NOTES", str(home / "unused.txt"))
+    (home / "own_estimators_on_dask.py").write_text(OWN, encoding="utf-8")
+    estimators = ["own_estimators_on_dask:Noted", "HysteresisRLS"]
+    tasks = campaign.plan(["cold-start", "two-tone"], estimators, range(8), SMALL)
+    half = len(tasks) // 2
+    said = []
+    killed: list[subprocess.Popen[str]] = []
+
+    def kill_one_half_way(done: int, of: int) -> None:
+        said.append((done, of))
+        if done == half:
+            # One that has worked: the last to begin with an estimator.
+            last = int(cluster.notes.read_text().split()[-1])
+            killed.extend(worker for worker in cluster.workers if worker.pid == last)
+            killed[0].kill()
+
+    with campaign.store_in(home) as store:
+        execute = campaign.over_dask(cluster.address, estimators=estimators)
+        assert campaign.run(tasks, store, execute, kill_one_half_way) == len(tasks)
+        rows = list(store.rows(campaign.keys_of(tasks)))
+
+    assert said == [(k, len(tasks)) for k in range(len(tasks) + 1)]
+    assert [row["key"] for row in rows] == [task.key for task in tasks]
+    assert [row["failure"] for row in rows] == [None] * len(tasks)
+    lines = [
+        json.loads(line) for line in (home / "runs.jsonl").read_text(encoding="utf-8").splitlines() if line
+    ]
+    assert sorted(line["key"] for line in lines) == sorted(task.key for task in tasks)
+    assert killed[0].wait() == -9
+    # The other one has worked after it, or all along.
+    assert {int(line) for line in cluster.notes.read_text().split()} == {
+        worker.pid for worker in cluster.workers
+    }
+
+    with campaign.store_in(tmp_path / "here") as store:
+        campaign.run(tasks, store, campaign.over_cores(1))
+        here = list(store.rows(campaign.keys_of(tasks)))
+    times = {"microseconds": None}
+    assert [{**row, **times} for row in rows] == [{**row, **times} for row in here]
+
+
+def test_a_worker_with_another_package_ends_the_campaign(
+    cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(campaign, "fingerprint", lambda: "another")
+    tasks = campaign.plan(["cold-start"], [], range(1), SMALL)
+    with campaign.store_in(tmp_path) as store, pytest.raises(ValueError, match="install the same"):
+        campaign.run(tasks, store, campaign.over_dask(cluster.address))
+
+
+def test_local_by_default(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "piezoest", "bench", "--quick", "--only", "HysteresisRLS"]
+    command += ["-s", "noise", "--dask", "--jobs", "1", "--table", "csv", "-o", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "2 of 2 runs" in done.stderr
+    assert (tmp_path / "suite.json").exists()
+
+
+def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(executors, "PATIENCE", 0.2)
+    with pytest.raises(ValueError, match=r"scheduler tcp://127.0.0.1:9 does not answer"):
+        list(executors.on_dask(abs, [1], "tcp://127.0.0.1:9"))
+
+
+def test_without_dask(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ValueError, match=r"pip install 'piezoest\[dask\]'"):
+        list(executors.on_dask(abs, [1]))

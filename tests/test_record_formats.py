@@ -1,0 +1,322 @@
+"""Logs in formats other than text: what is found in them, and what is said of damaged ones."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from piezoest.records import Record, read_record, read_reference, stream_record
+
+N = 60
+RATE = 100.0
+TIME = np.arange(N) / RATE
+VOLTAGE = 10.0 * np.sin(0.5 * np.arange(N))
+DISPLACEMENT = 1.5 * VOLTAGE + 3.0
+DISPLACEMENT[7] = np.nan
+NAMES = {"time_s": TIME, "voltage_V": VOLTAGE, "displacement_um": DISPLACEMENT}
+
+
+def write_parquet(file: Path, columns: dict[str, Any], units: dict[str, str] | None = None) -> None:
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    fields = [
+        pa.field(
+            name,
+            pa.array(values).type,
+            metadata={"unit": units[name]} if units and name in units else None,
+        )
+        for name, values in columns.items()
+    ]
+    table = pa.table([pa.array(values) for values in columns.values()], schema=pa.schema(fields))
+    pq.write_table(table, file, row_group_size=16)
+
+
+def write_hdf5(file: Path, columns: dict[str, Any]) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(file, "w") as root:
+        for name, values in columns.items():
+            root[name] = values
+
+
+def write_mat(file: Path, columns: dict[str, Any]) -> None:
+    from scipy.io import savemat
+
+    savemat(file, columns)
+
+
+def write_mat_73(file: Path, columns: dict[str, Any]) -> None:
+    """As MATLAB does: HDF5 behind a block of text, row vectors as columns."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(file, "w", userblock_size=512) as root:
+        for name, values in columns.items():
+            root[name] = np.asarray(values)[:, None]
+        root["comment"] = np.frombuffer("made for a test".encode("utf-16-le"), np.uint16)
+        root["comment"].attrs["MATLAB_class"] = np.bytes_("char")
+    with file.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(116) + b"\0" * 8 + b"\x00\x02IM")
+
+
+def write_npy(file: Path, columns: dict[str, Any]) -> None:
+    rows = np.zeros(len(next(iter(columns.values()))), [(name, np.float64) for name in columns])
+    for name, values in columns.items():
+        rows[name] = values
+    np.save(file, rows)
+
+
+def write_npz(file: Path, columns: dict[str, Any]) -> None:
+    np.savez_compressed(file, **columns)
+
+
+WRITERS: dict[str, Callable[[Path, dict[str, Any]], None]] = {
+    "log.parquet": write_parquet,
+    "log.h5": write_hdf5,
+    "log.mat": write_mat,
+    "log73.mat": write_mat_73,
+    "log.npy": write_npy,
+    "log.npz": write_npz,
+}
+STREAMED = [name for name in WRITERS if name not in ("log.mat", "log.npz")]
+
+
+@pytest.fixture(params=WRITERS)
+def log(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    file = tmp_path / request.param
+    WRITERS[request.param](file, NAMES)
+    return file
+
+
+def check(record: Record) -> None:
+    np.testing.assert_allclose(record.time, TIME, atol=1e-12)
+    np.testing.assert_array_equal(record.voltage, VOLTAGE)
+    np.testing.assert_array_equal(record.displacement, DISPLACEMENT)
+    assert record.sample_rate == pytest.approx(RATE)
+
+
+def test_plain_log(log: Path) -> None:
+    record = read_record(log)
+    check(record)
+    assert record.skipped == 1
+    assert record.notes == ("1 sample is without usable numbers: skipped, the timing is kept",)
+
+
+def test_columns_and_units(log: Path) -> None:
+    named = {"time": "a", "voltage": "b", "displacement": "c"}
+    WRITERS[log.name](log, dict(zip("abc", (1e3 * TIME, VOLTAGE / 20.0, 1e3 * DISPLACEMENT), strict=True)))
+    units = {"time": "ms", "voltage": "20 V", "displacement": "nm"}
+    record = read_record(log, columns=named, units=units)
+    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
+    np.testing.assert_allclose(record.voltage, VOLTAGE, atol=1e-12)
+    np.testing.assert_allclose(record.displacement, DISPLACEMENT, atol=1e-12)
+    assert "displacement: converted to µm (factor 0.001)" in record.notes
+    # A sample rate stands in for the column of time.
+    record = read_record(log, columns={"voltage": "b", "displacement": "c"}, units=units, sample_rate=RATE)
+    np.testing.assert_allclose(record.time, TIME, atol=1e-12)
+
+
+def test_unknown_column_lists_those_that_exist(log: Path) -> None:
+    for named in ({"voltage": "nope"}, {"displacement": "4"}):
+        with pytest.raises(ValueError, match="no column") as caught:
+            read_record(log, columns=named)
+        for name in (log.name, *NAMES):
+            assert name in str(caught.value)
+
+
+def test_units_that_are_refused(log: Path) -> None:
+    for text in ("furlong", "V", "0 nm", "1e999 nm", "nm 3", ""):
+        with pytest.raises(ValueError, match=r"units has .* for displacement"):
+            read_record(log, units={"displacement": text})
+    with pytest.raises(ValueError, match=r"known are um, micron, .*nm"):
+        read_record(log, units={"displacement": "furlong"})
+    with pytest.raises(ValueError, match=r"units has .*'speed'"):
+        read_record(log, units={"speed": "m"})
+
+
+def test_time_that_does_not_increase_names_the_row(log: Path) -> None:
+    time = TIME.copy()
+    time[20] = time[19]
+    WRITERS[log.name](log, {**NAMES, "time_s": time})
+    with pytest.raises(ValueError, match="row 21: time does not increase"):
+        read_record(log)
+
+
+def test_truncated_file(log: Path) -> None:
+    raw = log.read_bytes()
+    for part in (0.3, 0.6, 0.95):
+        log.write_bytes(raw[: int(part * len(raw))])
+        with pytest.raises(ValueError, match=log.name):
+            read_record(log)
+
+
+def test_empty_file_and_file_of_another_format(log: Path) -> None:
+    log.write_bytes(b"")
+    with pytest.raises(ValueError, match="the file is empty"):
+        read_record(log)
+    log.write_text("time_s,voltage_V,displacement_um\n" * 40)
+    with pytest.raises(ValueError, match=rf"{log.name}.*(this is no|cannot be read)"):
+        read_record(log)
+    with pytest.raises(FileNotFoundError):
+        read_record(log.with_name("none" + log.suffix))
+
+
+def test_file_without_numbers_or_with_too_few(log: Path) -> None:
+    WRITERS[log.name](log, {key: values[:5] for key, values in NAMES.items()})
+    with pytest.raises(ValueError, match="only 5 usable rows"):
+        read_record(log)
+    if log.suffix == ".npy":
+        np.save(log, np.array(["a", "b"]))
+    else:
+        WRITERS[log.name](log, {"words": np.array([b"a", b"b"])})
+    with pytest.raises(ValueError, match=r"no .*of numbers"):
+        read_record(log)
+
+
+@pytest.mark.parametrize("name", [name for name in WRITERS if name != "log.npy"])
+def test_columns_of_different_lengths(tmp_path: Path, name: str) -> None:
+    if name == "log.parquet":
+        pytest.skip("Parquet has no such files")
+    WRITERS[name](tmp_path / name, {**NAMES, "voltage_V": VOLTAGE[:-1]})
+    with pytest.raises(ValueError, match=r"differ in length: .*voltage_V has 59"):
+        read_record(tmp_path / name)
+
+
+@pytest.mark.parametrize("key", ["fs", "Fs", "sample_rate"])
+@pytest.mark.parametrize("name", ["log.h5", "log.mat", "log73.mat", "log.npz"])
+def test_sample_rate_in_the_file(tmp_path: Path, name: str, key: str) -> None:
+    columns = {"u": VOLTAGE, "x": DISPLACEMENT, key: np.array([RATE])}
+    WRITERS[name](tmp_path / name, columns)
+    record = read_record(tmp_path / name)
+    check(record)
+    assert "sample rate of 100 Hz as the file states it" in record.notes
+    # One that is given comes first, and so does a column of time.
+    assert read_record(tmp_path / name, sample_rate=50.0).sample_rate == 50.0
+    WRITERS[name](tmp_path / name, {**columns, "t": 2.0 * TIME})
+    assert read_record(tmp_path / name).sample_rate == pytest.approx(50.0)
+
+
+def test_sample_rate_in_metadata(tmp_path: Path) -> None:
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    table = pa.table({"u": VOLTAGE, "x": DISPLACEMENT}).replace_schema_metadata({"sample_rate": "100"})
+    pq.write_table(table, tmp_path / "log.parquet")
+    check(read_record(tmp_path / "log.parquet"))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_matrix_without_names(tmp_path: Path, turned: bool) -> None:
+    matrix = np.column_stack([TIME, VOLTAGE, DISPLACEMENT])
+    matrix = np.ascontiguousarray(matrix.T) if turned else matrix
+    np.save(tmp_path / "log.npy", matrix)
+    record = read_record(tmp_path / "log.npy")
+    check(record)
+    assert "columns without names: taken as time = 1, voltage = 2, displacement = 3" in record.notes[0]
+    named = {"time": "1", "voltage": "3", "displacement": "2"}
+    np.testing.assert_array_equal(read_record(tmp_path / "log.npy", columns=named).voltage, DISPLACEMENT)
+    write_mat(tmp_path / "log.mat", {"data": matrix})
+    check(read_record(tmp_path / "log.mat"))
+    write_hdf5(tmp_path / "log.h5", {"data": matrix, "other": np.zeros(3)})
+    named = {"time": "data:1", "voltage": "data:2", "displacement": "data:3"}
+    check(read_record(tmp_path / "log.h5", columns=named))
+    with pytest.raises(ValueError, match=r"there are the columns data:1, data:2, data:3, other"):
+        read_record(tmp_path / "log.h5")
+    np.save(tmp_path / "two.npy", matrix[:2] if turned else matrix[:, :2])
+    with pytest.raises(ValueError, match="2 columns without a header, 3 are needed"):
+        read_record(tmp_path / "two.npy")
+
+
+def test_structures_groups_and_compound_types(tmp_path: Path) -> None:
+    named = {"time": "log.t", "voltage": "log.in.u", "displacement": "log.x"}
+    write_mat(tmp_path / "log.mat", {"log": {"t": TIME, "x": DISPLACEMENT, "in": {"u": VOLTAGE}}})
+    check(read_record(tmp_path / "log.mat"))
+    check(read_record(tmp_path / "log.mat", columns=named))
+    write_hdf5(tmp_path / "log.h5", {"log/t": TIME, "log/x": DISPLACEMENT, "log/in/u": VOLTAGE})
+    check(read_record(tmp_path / "log.h5"))
+    check(read_record(tmp_path / "log.h5", columns={k: v.replace(".", "/") for k, v in named.items()}))
+    rows = np.zeros(N, [("t", "f8"), ("u", "f4"), ("x", "f8")])
+    rows["t"], rows["u"], rows["x"] = TIME, VOLTAGE, DISPLACEMENT
+    write_hdf5(tmp_path / "rows.h5", {"rows": rows})
+    record = read_record(tmp_path / "rows.h5")
+    np.testing.assert_array_equal(record.voltage, VOLTAGE.astype(np.float32))
+    # The same names in two groups cannot be guessed.
+    write_hdf5(tmp_path / "two.h5", {f"{run}/{k}": v for run in "ab" for k, v in NAMES.items()})
+    with pytest.raises(ValueError, match="the columns a/time_s, b/time_s could all be the time"):
+        read_record(tmp_path / "two.h5")
+    check(read_record(tmp_path / "two.h5", columns={k.split("_")[0]: f"b/{k}" for k in NAMES}))
+
+
+def test_units_that_the_file_states(tmp_path: Path) -> None:
+    columns = {"t": 1e3 * TIME, "u": VOLTAGE, "x": 1e3 * DISPLACEMENT}
+    write_parquet(tmp_path / "log.parquet", columns, {"t": "ms", "u": "V", "x": "nm"})
+    h5py = pytest.importorskip("h5py")
+    write_hdf5(tmp_path / "log.h5", columns)
+    with h5py.File(tmp_path / "log.h5", "r+") as root:
+        for name, unit in (("t", "ms"), ("u", np.bytes_("V")), ("x", "nm")):
+            root[name].attrs["units"] = unit
+    for name in ("log.parquet", "log.h5"):
+        record = read_record(tmp_path / name)
+        np.testing.assert_allclose(record.time, TIME, atol=1e-9)
+        np.testing.assert_allclose(record.displacement, DISPLACEMENT, atol=1e-9)
+        assert "column 'x [nm]': converted to µm (factor 0.001)" in record.notes
+
+
+def test_times_of_day(tmp_path: Path) -> None:
+    start = np.datetime64("2026-03-01T12:00:00", "ns")
+    stamps = start + (1e9 * TIME).round().astype("timedelta64[ns]")
+    write_parquet(tmp_path / "log.parquet", {**NAMES, "time_s": stamps.astype("datetime64[ns]")})
+    # Nanoseconds since 1970 have no room in a float64.
+    np.testing.assert_allclose(read_record(tmp_path / "log.parquet").time, TIME, atol=1e-12)
+
+
+def test_integers_and_single_precision(tmp_path: Path) -> None:
+    counts = np.round(100.0 * VOLTAGE).astype(np.int16)
+    columns = {"t": TIME.astype(np.float32), "u": counts, "x": DISPLACEMENT.astype(np.float32)}
+    for name in ("log.parquet", "log.mat", "log.h5", "log.npz"):
+        WRITERS[name](tmp_path / name, columns)
+        record = read_record(tmp_path / name, units={"voltage": "0.01 V"})
+        np.testing.assert_allclose(record.voltage, 0.01 * counts, atol=1e-12)
+        assert record.voltage.dtype == np.float64
+
+
+def test_reference_from_any_format(log: Path) -> None:
+    WRITERS[log.name](log, {"time_s": TIME, "reference_um": VOLTAGE})
+    signal = read_reference(log)
+    np.testing.assert_array_equal(signal.values, VOLTAGE)
+    assert signal.sample_rate == pytest.approx(RATE)
+
+
+@pytest.mark.parametrize("name", ["log.mat", "log.npz"])
+def test_what_cannot_be_streamed_says_what_can(tmp_path: Path, name: str) -> None:
+    WRITERS[name](tmp_path / name, NAMES)
+    with pytest.raises(ValueError, match=r"cannot be streamed: .*(-v7\.3|\.npy)"):
+        stream_record(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", STREAMED)
+@pytest.mark.parametrize("rows", [1, 7, 16, 1000])
+def test_streamed_equals_read(tmp_path: Path, name: str, rows: int) -> None:
+    WRITERS[name](tmp_path / name, NAMES)
+    record = read_record(tmp_path / name)
+    stream = stream_record(tmp_path / name, rows=rows)
+    for attribute in ("time", "voltage", "displacement"):
+        together = np.concatenate([getattr(block, attribute) for block in stream])
+        np.testing.assert_array_equal(together, getattr(record, attribute))
+    assert stream.sample_rate == record.sample_rate
+    assert stream.count() == N
+    assert max(block.voltage.size for block in stream) <= rows
+
+
+@pytest.mark.parametrize(("file", "package"), [("log.parquet", "pyarrow"), ("log.h5", "h5py")])
+def test_missing_extra_is_named(tmp_path: Path, file: str, package: str) -> None:
+    WRITERS[file](tmp_path / file, NAMES)
+    code = (
+        f"import sys; sys.modules[{package!r}] = None\n"
+        f"sys.argv = ['piezoest', 'identify', {str(tmp_path / file)!r}]\n"
+        "from piezoest.cli import main; main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert f"needs {package}, which is not installed: pip install 'piezoest[formats]'" in done.stderr
+    assert "Traceback" not in done.stderr
