@@ -106,8 +106,11 @@ figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the docume
 
 # ---------------------------------------------------------------- benchmarks
 
-bench-smoke: $(VENV)/.installed  ## Time the kernels against a NumPy loop, in under a minute
+bench-smoke: $(VENV)/.installed-bench  ## Try the benchmarks: against a NumPy loop, and on a short record against C
 	$(BIN)/python benchmarks/smoke.py
+	@if command -v gcc >/dev/null; then \
+	  $(BIN)/python benchmarks/speed.py --samples 2000 --rounds 1 --slow 300 --turns 2000; \
+	else echo "gcc is absent: no comparison with C" >&2; fi
 
 bench: $(VENV)/.installed-bench  ## Speed against C, filterpy and padasip, with targets, in some minutes (needs gcc)
 	$(BIN)/python benchmarks/speed.py --json docs/data/speed.json --figure docs/figures/speed.png

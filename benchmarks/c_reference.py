@@ -1,4 +1,4 @@
-"""Build reference/reference.c and call it: the yardstick of speed.py."""
+"""C to compare with in speed.py: reference/reference.c by hand, and the library's own export."""
 
 from __future__ import annotations
 
@@ -11,11 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 import piezoest as pz
+from piezoest.estimators import recursive_least_squares as law
+from piezoest.estimators import rls_kernel
 
 FloatArray = NDArray[np.float64]
 
 SOURCE = Path(__file__).parent / "reference" / "reference.c"
 COMMAND = ("gcc", "-O3", "-march=native", "-shared", "-fPIC")
+
+_LOOP = """#include <stdint.h>
+#include "{source}"
+void run(int64_t N, const double *u, const double *x, const double *scale, double *theta) {{
+    {name}_state state;
+    {name}_init(&state);
+    for (int64_t k = 0; k < N; k++) {{
+        rls_kernel_sample(state.estimator, u[k], x[k]);
+        for (int i = 0; i < {n}; i++) theta[{n} * k + i] = state.estimator[{theta} + i] * scale[i];
+    }}
+}}
+"""
 
 
 class Reference:
@@ -63,6 +77,41 @@ class Reference:
         """History of the slopes and the level."""
         theta = np.empty((u.size, 14))
         self._call("plays", u.size, u, x, settings, theta)
+        return theta
+
+
+class Exported:
+    """What `piezoest export c` makes of a `HysteresisRLS`, without the controller round it.
+
+    The C has the estimator's duties but one: it leaves out the standard errors.
+    """
+
+    def __init__(self, estimator: pz.HysteresisRLS) -> None:
+        limits = pz.VoltageLimits(-100.0, 100.0)
+        start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+        code = pz.export.c(estimator, pz.InverseCompensator(start, limits))
+        self._scale = estimator._scale
+        with tempfile.TemporaryDirectory() as folder:
+            _, source = code.write(folder)
+            loop = Path(folder) / "loop.c"
+            loop.write_text(
+                _LOOP.format(
+                    source=source.name,
+                    name=code.name,
+                    theta=rls_kernel.FRONT + law.HEAD,
+                    n=self._scale.size,
+                ),
+                encoding="utf-8",
+            )
+            library = Path(folder) / "loop.so"
+            subprocess.run([*COMMAND, "-o", str(library), str(loop), "-lm"], check=True)
+            self._run = ctypes.CDLL(str(library)).run
+
+    def __call__(self, u: FloatArray, x: FloatArray) -> FloatArray:
+        """History of theta."""
+        theta = np.empty((u.size, self._scale.size))
+        pointers = (ctypes.c_void_p(values.ctypes.data) for values in (u, x, self._scale, theta))
+        self._run(ctypes.c_int64(u.size), *pointers)
         return theta
 
 

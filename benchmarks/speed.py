@@ -3,14 +3,13 @@
 All that is compared runs in the same rounds, one after the other; figures are medians over the rounds,
 ratios are medians of the ratios within a round. Beside each time stands the outcome. Needs gcc.
 
-    python benchmarks/speed.py [--samples N] [--rounds N] [--json FILE] [--figure FILE]
+    python benchmarks/speed.py [--samples N] [--rounds N] [--turns N] [--json FILE] [--figure FILE]
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -18,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from c_reference import COMMAND, FloatArray, Reference, ekf_settings, rls_settings
+from c_reference import COMMAND, Exported, FloatArray, Reference, ekf_settings, rls_settings
+from single_calls import calls, cold
 from smoke import SAMPLE_RATE, START, TRUE, machine
 
 import piezoest as pz
@@ -35,15 +35,21 @@ def record(samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     return r, u, TRUE.simulate(u) + np.random.default_rng(0).normal(scale=NOISE, size=r.size)
 
 
-def interleaved(work: dict[str, Work], rounds: int) -> dict[str, FloatArray]:
-    """Seconds of each in each round, each after a call to warm up: what ran before leaves no trace."""
+def interleaved(
+    work: dict[str, Work], rounds: int, clock: Callable[[], float] = time.thread_time
+) -> dict[str, FloatArray]:
+    """Seconds of each in each round, each after a call to warm up: what ran before leaves no trace.
+
+    The clock is the thread's own, which stands while others have the processor; work on several threads
+    needs the wall's.
+    """
     seconds: dict[str, list[float]] = {name: [] for name in work}
     for _ in range(rounds):
         for name, function in work.items():
             function()
-            began = time.perf_counter()
+            began = clock()
             function()
-            seconds[name].append(time.perf_counter() - began)
+            seconds[name].append(clock() - began)
     return {name: np.array(values) for name, values in seconds.items()}
 
 
@@ -71,46 +77,6 @@ def padasip_rls(u: FloatArray, x: FloatArray) -> FloatArray:
     return np.asarray(learner.w)
 
 
-def calls(function: Callable[..., Any], *columns: FloatArray) -> dict[str, float]:
-    """Median, 99.9 % and share within 20 µs of single calls [ns], the clock's own time taken off."""
-    clock = time.perf_counter_ns
-    rows = list(zip(*(column.tolist() for column in columns), strict=True))
-    empty = []
-    for _ in range(10_000):
-        began = clock()
-        empty.append(clock() - began)
-    taken = np.empty(len(rows))
-    for k, row in enumerate(rows):
-        began = clock()
-        function(*row)
-        taken[k] = clock() - began
-    taken -= np.median(empty)
-    return {
-        "calls": len(rows),
-        "median": float(np.median(taken)),
-        "p99.9": float(np.percentile(taken, 99.9)),
-        "within_20us": float(np.mean(taken <= 20_000)),
-    }
-
-
-def cold() -> dict[str, float]:
-    """Seconds of import, first step and warmup in new processes with a warm cache, medians of five."""
-    programs = {
-        "import": "import piezoest as pz; t = time.perf_counter()",
-        "first step": "import piezoest as pz; pz.HysteresisRLS(5e4).step(0.0, 0.0); t = time.perf_counter()",
-        "warmup": "import piezoest as pz; pz.warmup(); t = time.perf_counter()",
-    }
-    found = {}
-    for name, program in programs.items():
-        code = f"import time; s = time.perf_counter(); {program}; print(t - s)"
-        times = [
-            float(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout)
-            for _ in range(5)
-        ]
-        found[name] = float(np.median(times))
-    return found
-
-
 def bank_scaling(c: Reference, samples: int, rounds: int) -> list[dict[str, Any]]:
     """Nanoseconds per channel and sample against channels and threads, and the C bank's."""
     settings = rls_settings(SAMPLE_RATE, START, MEMORY, NOISE, CUTOFF, True)
@@ -132,7 +98,7 @@ def bank_scaling(c: Reference, samples: int, rounds: int) -> list[dict[str, Any]
 
         work: dict[str, Work] = {name: (lambda bank=bank: go(bank)) for name, bank in banks.items()}
         work["C"] = lambda u=u, x=x: c.bank(u, x, settings)
-        seconds = interleaved(work, rounds)
+        seconds = interleaved(work, rounds, time.perf_counter)
         apart = float(np.max(np.abs(banks["2"].theta / c.bank(u, x, settings) - 1.0)))
         found.append(
             {"channels": channels, "samples": K, "difference_from_C": apart}
@@ -148,7 +114,7 @@ def verdict(row: dict[str, Any]) -> dict[str, Any]:
     return {**row, "met": bool(met)}
 
 
-def measure(samples: int, rounds: int, slow: int) -> dict[str, Any]:
+def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
     """All figures."""
     c = Reference()
     r, u, x = record(samples)
@@ -158,12 +124,20 @@ def measure(samples: int, rounds: int, slow: int) -> dict[str, Any]:
     limits = pz.VoltageLimits(-100.0, 100.0)
     thresholds = np.linspace(1.0, 35.0, 12)
     plays = np.array([0.99995, NOISE**2, 0.01, 1.0, *thresholds, *np.ones(14)])
+    exported = {
+        "policies off": Exported(
+            pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, memory=MEMORY, policies=())
+        ),
+        "default": Exported(pz.HysteresisRLS(SAMPLE_RATE, initial_model=START)),
+    }
     work: dict[str, Work] = {
         "C, RLS": lambda: c.rls(u, x, off)[-1],
         "C, RLS, bound and dead zone": lambda: c.rls(u, x, on)[-1],
         "HysteresisRLS, policies off": lambda: rls(u, x, memory=MEMORY, policies=()),
         "HysteresisRLS, the paper's": lambda: rls(u, x, memory=MEMORY),
         "HysteresisRLS, default": lambda: rls(u, x),
+        "exported C, policies off": lambda: exported["policies off"](u, x)[-1, :3],
+        "exported C, default": lambda: exported["default"](u, x)[-1],
         "C, EKF": lambda: c.ekf(u, x, ekf_settings(SAMPLE_RATE, START))[-1],
         "HysteresisEKF": lambda: ekf(u, x, pz.HysteresisEKF(SAMPLE_RATE, initial_model=START)),
         "C, inverse": lambda: c.inverse(r, inverse)[-1:],
@@ -187,14 +161,11 @@ def measure(samples: int, rounds: int, slow: int) -> dict[str, Any]:
         {
             "filterpy EKF": lambda: ekf(u_slow, x_slow, pz.FilterPyEKF(SAMPLE_RATE, initial_model=START)),
             "padasip RLS": lambda: padasip_rls(u_slow, x_slow),
-            "HysteresisEKF": lambda: ekf(
-                u_slow, x_slow, pz.HysteresisEKF(SAMPLE_RATE, initial_model=START, project=False)
-            ),
         },
         max(1, min(rounds, 3)),
     )
     for name, values in peers.items():
-        times.setdefault(name, float(1e9 * np.median(values) / slow))
+        times[name] = float(1e9 * np.median(values) / slow)
     theirs = ekf(u_slow, x_slow, pz.FilterPyEKF(SAMPLE_RATE, initial_model=START))
     ours = ekf(u_slow, x_slow, pz.HysteresisEKF(SAMPLE_RATE, initial_model=START, project=False))
     outcome["filterpy EKF"], outcome["padasip RLS"] = theirs.tolist(), padasip_rls(u_slow, x_slow).tolist()
@@ -205,7 +176,8 @@ def measure(samples: int, rounds: int, slow: int) -> dict[str, Any]:
     def turn(reference: float, displacement: float) -> None:
         ring_estimator.step(ring_inverse.step(reference), displacement)
 
-    ring = calls(turn, r, x)
+    ring = calls(turn, r, x, count=turns)
+    uncollected = calls(turn, r, x, collect=False)
     signal = pz.signals.triangle(5.0, 5.0, 5, SAMPLE_RATE)
 
     def track() -> Any:
@@ -226,9 +198,13 @@ def measure(samples: int, rounds: int, slow: int) -> dict[str, Any]:
          "figure": against("HysteresisRLS, the paper's", "C, RLS, bound and dead zone")},
         {"what": "HysteresisRLS.run, default policies (memory='period'), times C", "target": 3.0,
          "figure": against("HysteresisRLS, default", "C, RLS, bound and dead zone")},
+        {"what": "HysteresisRLS.run, policies off, times the same estimator exported to C", "target": 1.3,
+         "figure": against("HysteresisRLS, policies off", "exported C, policies off")},
+        {"what": "HysteresisRLS.run, default policies, times the same estimator exported to C", "target": 1.3,
+         "figure": against("HysteresisRLS, default", "exported C, default")},
         {"what": "HysteresisEKF.run, times C", "target": 1.5, "figure": against("HysteresisEKF", "C, EKF")},
         {"what": "HysteresisEKF.run, times faster than filterpy", "target": 1000.0, "at_least": True,
-         "figure": float(np.median(peers["filterpy EKF"] / peers["HysteresisEKF"]))},
+         "figure": times["filterpy EKF"] / times["HysteresisEKF"]},
         {"what": "step(u, x) from Python, median [µs]", "target": 1.0, "figure": 1e-3 * single["median"]},
         {"what": "step(u, x) from Python, 99.9 % [µs]", "target": 5.0, "figure": 1e-3 * single["p99.9"]},
         {"what": "estimator and inverse, one turn, median [µs]", "target": 2.5,
@@ -249,11 +225,13 @@ def measure(samples: int, rounds: int, slow: int) -> dict[str, Any]:
     pairs = (
         ("HysteresisRLS, policies off", "C, RLS"),
         ("HysteresisRLS, the paper's", "C, RLS, bound and dead zone"),
+        ("HysteresisRLS, policies off", "exported C, policies off"),
+        ("HysteresisRLS, default", "exported C, default"),
         ("HysteresisEKF", "C, EKF"),
         ("InverseCompensator", "C, inverse"),
     )
     differences = {
-        one: float(np.max(np.abs(np.array(outcome[one]) / np.array(outcome[other]) - 1.0)))
+        f"{one} and {other}": float(np.max(np.abs(np.array(outcome[one]) / np.array(outcome[other]) - 1.0)))
         for one, other in pairs
     }
     differences["filterpy EKF"] = float(np.max(np.abs(ours / theirs - 1.0)))
@@ -269,6 +247,7 @@ def measure(samples: int, rounds: int, slow: int) -> dict[str, Any]:
         "relative_difference": differences,
         "step": single,
         "ring": ring,
+        "ring_without_gc": uncollected,
         "bank": bank,
         "cold": began,
         "scaling": scaling(rounds),
@@ -321,10 +300,13 @@ def main() -> int:
     parser.add_argument("--samples", type=int, default=100_000, help="length of the record (default 100000)")
     parser.add_argument("--rounds", type=int, default=15, help="rounds, of which the median counts")
     parser.add_argument("--slow", type=int, default=5_000, help="samples for filterpy and padasip")
+    parser.add_argument("--turns", type=int, default=10_000_000, help="turns of the ring from Python")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file too")
     parser.add_argument("--figure", type=Path, metavar="FILE", help="draw cost against size into this file")
     arguments = parser.parse_args()
-    document = measure(arguments.samples, arguments.rounds, min(arguments.slow, arguments.samples))
+    document = measure(
+        arguments.samples, arguments.rounds, min(arguments.slow, arguments.samples), arguments.turns
+    )
     print(*(f"{key:>10}: {value}" for key, value in document["machine"].items()), sep="\n")
     for name, value in document["nanoseconds_per_sample"].items():
         shown = ", ".join(f"{number:.4g}" for number in document["outcome"].get(name, [])[:4])

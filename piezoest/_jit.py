@@ -9,8 +9,8 @@ from numba.extending import overload
 
 # For `njit` of loops over given arrays: references to arrays are not counted, nor in what is called.
 # Each view of an array costs two atomic operations else, more than the arithmetic. Such functions make
-# no arrays of their own.
-UNCOUNTED: dict[str, Any] = {"_nrt": False}
+# no arrays of their own. A division by zero gives infinity, as in NumPy and C, and is not asked about.
+UNCOUNTED: dict[str, Any] = {"_nrt": False, "error_model": "numpy"}
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

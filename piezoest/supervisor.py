@@ -26,6 +26,8 @@ CLEARLY = 0.7
 # It is not tried again for this part of a window, and the line fallen back to stays until it misses
 # so many times what is allowed.
 AGAIN, STALE = 0.25, 1.05
+# While a period is not over, the line goes through the mean of so many points: the first alone is noisy.
+FIRST = 8
 # The line's gain must be known this well before anything is judged by it.
 GAIN_KNOWN = 0.05
 # b in parts of c in a Coleman-Hodgdon model that stands for a line.
@@ -246,14 +248,15 @@ class Supervisor:
 def _line(past: FloatArray, weights: FloatArray, *, whole: bool) -> tuple[float, float, float] | None:
     """Gain and offset of the best line, and its weighted error; None while the gain is not known.
 
-    Over less than a whole window the line goes through the first point: a part of a loop has
+    Over less than a whole window the line goes through the first points: a part of a loop has
     another centre than the loop.
     """
     size = past.shape[1]
     if size < 3:
         return None
     u, x = past[VOLTAGE], past[MEASURED]
-    u_mean, x_mean = (float(np.mean(u)), float(np.mean(x))) if whole else (float(u[0]), float(x[0]))
+    centre = slice(None) if whole else slice(FIRST)
+    u_mean, x_mean = float(np.mean(u[centre])), float(np.mean(x[centre]))
     u, x = u - u_mean, x - x_mean
     spread = float(u @ u)
     if spread <= 0.0:

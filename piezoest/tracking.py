@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, integer
+from piezoest.estimators.base import EstimatorBase
 from piezoest.signals import check_continuity
 from piezoest.supervisor import Supervisor
 
@@ -226,10 +227,20 @@ def track(
     if not allow_jumps:
         check_continuity(reference, rate, "r")
     interval = integer("update_interval", update_interval, 1)
+    period = getattr(r, "period", None)
+    period = None if period is None else round(period)
+    from piezoest import tracking_kernel  # which loads all that is compiled
+
+    if supervisor is None and tracking_kernel.can_run(stage, compensator, estimator):
+        record, parameters = tracking_kernel.run(reference, interval, stage, compensator, estimator)
+        names = compensator.model.parameter_names
+        return TrackingRecord(
+            reference, record[0], record[1], record[2], parameters, names, rate, period, interval
+        )
     N = reference.size
     voltage, measured, displacement = np.empty(N), np.empty(N), np.empty(N)
     history: list[FloatArray] = []
-    names: tuple[str, ...] = ()
+    names = ()
     for start in range(0, N, interval):
         part = slice(start, min(start + interval, N))
         _turn(part, stage, compensator, reference, voltage, measured, displacement)
@@ -244,11 +255,9 @@ def track(
                 model = supervisor.review(*parts, compensator.model, model)
             compensator.model = model
     parameters = _of_one_kind(history) if history else np.empty((-(-N // interval), 0))
-    period = getattr(r, "period", None)
     return TrackingRecord(
-        reference, voltage, measured, displacement, parameters, names, rate,
-        None if period is None else round(period), interval,
-    )  # fmt: skip
+        reference, voltage, measured, displacement, parameters, names, rate, period, interval
+    )
 
 
 def _turn(
@@ -283,6 +292,9 @@ def _of_one_kind(history: list[FloatArray]) -> FloatArray:
 
 
 def _feed(estimator: Any, u: FloatArray, x: FloatArray) -> None:
+    if isinstance(estimator, EstimatorBase):
+        estimator._absorb(u, x)
+        return
     if hasattr(estimator, "run"):
         estimator.run(u, x)
         return

@@ -126,3 +126,50 @@ def test_wrong_references() -> None:
         follow(np.repeat([0.0, 1.0, 0.0], 100))
     with pytest.raises(ValueError, match="last_periods is 5, the record has 2 periods"):
         ring(2).max_error(last_periods=5)
+
+
+LINE = pz.LinearGain(0.14, 0.2)
+
+
+class Driver:
+    """A stage of the user's own, by the same methods: the loop over it is Python's."""
+
+    def __init__(self, stage: Any) -> None:
+        self._stage = stage
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stage, name)
+
+
+@pytest.mark.parametrize(
+    ("model", "make"),
+    [
+        (START, lambda: pz.HysteresisRLS(FS, initial_model=START)),
+        (START, lambda: pz.HysteresisRLS(FS, initial_model=START, memory=0.2, offset=False, delay=1.5)),
+        (START, lambda: pz.HysteresisEKF(FS, initial_model=START, offset=True)),
+        (
+            pz.LinearGain(0.14),
+            lambda: pz.HysteresisRLS(FS, initial_model=pz.LinearGain(0.14, 0.2), memory=0.2),
+        ),
+        (pz.ColemanHodgdon(0.05, 0.01, 0.0009), lambda: pz.HysteresisRLS(FS, policies=(), memory=0.001)),
+    ],
+)
+@pytest.mark.parametrize("options", [{}, {"temperature": [[0.0, 20.0], [0.2, 60.0]], "seed": 3}])
+def test_the_compiled_ring_is_the_loop_over_its_parts(model: Any, make: Any, options: Any) -> None:
+    r = pz.signals.triangle(5.0, 20.0, 3, FS)
+    results = []
+    for wrap in (lambda stage: stage, Driver):
+        stage, estimator = pz.PaperStage(FS, **options), make()
+        estimator.predict(0.1)
+        compensator = pz.InverseCompensator(model, pz.VoltageLimits(-30.0, 30.0))
+        for interval in (70, 7):
+            record = pz.track(
+                r, stage=wrap(stage), compensator=compensator, estimator=estimator, update_interval=interval
+            )
+        parts = record.voltage, record.measured, record.displacement, record.parameters
+        moved = np.asarray(stage.displacement).tolist()
+        found = estimator.to_dict(), compensator.model, compensator.status, stage.time, moved
+        results.append((parts, found, record.parameter_names, compensator.step(1.0), stage.step(2.0)))
+    for one, other in zip(results[0][0], results[1][0], strict=True):
+        np.testing.assert_array_equal(one, other)
+    assert results[0][1:] == results[1][1:]

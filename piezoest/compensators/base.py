@@ -312,6 +312,10 @@ class Compensator:
         self._state[W_H] = b * recent_path.hysteresis(self._state, PATH, a) if b > 0.0 else 0.0
         self._state[OWED] = expected - self._expected()
 
+    def _handed_over(self, model: Model, projected: bool) -> None:
+        """Name the model that a compiled loop has handed over."""
+        self._model, self._projected = model, projected
+
     @property
     def limits(self) -> VoltageLimits:
         """Limits that the voltage never leaves."""

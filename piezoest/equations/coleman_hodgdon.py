@@ -14,6 +14,9 @@ from numba.extending import register_jitable
 # every admissible model, the third is the margin (tests/equations/test_coleman_hodgdon.py).
 _NEWTON_STEPS = 3
 
+# Up to here the next term of the series of `relative_decay` is lost in rounding.
+_SHORT = 1.0 / 64.0
+
 # Keeps 0/0 out of the start value where slope and travel are both zero.
 _TINY = 1e-300
 
@@ -45,7 +48,15 @@ def hysteresis_rate(w_h, u_dot, a, b):
 
 @register_jitable
 def relative_decay(travel):
-    """(1 - exp(-travel)) / travel, which is 1 at travel = 0."""
+    """(1 - exp(-travel)) / travel, which is 1 at travel = 0.
+
+    For a short travel, such as that of a sample, its series: as exact, at a fraction of the cost.
+    """
+    if isinstance(travel, float) and travel < _SHORT:
+        square = travel * travel
+        low = (1.0 - travel * (1.0 / 2.0)) + square * ((1.0 / 6.0) - travel * (1.0 / 24.0))
+        high = ((1.0 / 120.0) - travel * (1.0 / 720.0)) + square * (1.0 / 5040.0)
+        return low + square * square * high
     at_rest = (travel == 0.0) * 1.0
     return -np.expm1(-travel) / (travel + at_rest) + at_rest
 
@@ -157,7 +168,7 @@ def inverse_increment(w_h, dr, a, b, c):
     # The root is at most d + e; long travels cancel in the quotient.
     z = np.fmin(2.0 * d / (slope + np.sqrt(slope * slope + 2.0 * d) + _TINY), d + e)
     for _ in range(_NEWTON_STEPS):
-        decayed = np.expm1(-z)
+        decayed = -z * relative_decay(z)  # exp(-z) - 1
         z = z - (z + e * decayed - d) / (1.0 - e * (1.0 + decayed) + _TINY)
     return s * z / a
 

@@ -29,15 +29,15 @@ def bilinear_variance(P, du, a, n):
 
 
 @unrolled
-def predict_covariance(P, row, q, n, work):
-    """P = F P F' + diag(q), F the identity but for its first `row` (n,); `work` has n numbers."""
-    corner = 0.0
+def predict_covariance(P, row, m, q, n, work):
+    """P = F P F' + diag(q), F the identity but for the first m of its first `row`; `work` has n numbers."""
     for j in range(n):
-        total = 0.0
-        for i in range(n):
+        total = row[0] * P[j]
+        for i in range(1, m):
             total = total + row[i] * P[i * n + j]
         work[j] = total
-    for j in range(n):
+    corner = work[0] * row[0]
+    for j in range(1, m):
         corner = corner + work[j] * row[j]
     for j in range(1, n):
         P[j] = work[j]
@@ -50,8 +50,8 @@ def predict_covariance(P, row, q, n, work):
 @unrolled
 def measure(s, h, n):
     """h . s: the predicted measurement of a linear measurement."""
-    x = 0.0
-    for i in range(n):
+    x = h[0] * s[0]
+    for i in range(1, n):
         x = x + h[i] * s[i]
     return x
 
@@ -66,24 +66,24 @@ def update(s, P, h, y, R, n, gain, work):
     """
     S = R + 0.0
     for i in range(n):
-        total = 0.0
-        for j in range(n):
+        total = P[i * n] * h[0]
+        for j in range(1, n):
             total = total + P[i * n + j] * h[j]
         work[i] = total  # of P h', which is h P
         S = S + h[i] * total
+    each = 1.0 / S
     for i in range(n):
-        gain[i] = work[i] / S
-    for i in range(n):
+        gain[i] = work[i] * each
         s[i] = s[i] + gain[i] * y
-    # (I - K h) P h'
+    # (I - K h) P h' - R K
     for i in range(n):
-        total = 0.0
-        for j in range(n):
+        total = (P[i * n] - gain[i] * work[0]) * h[0]
+        for j in range(1, n):
             total = total + (P[i * n + j] - gain[i] * work[j]) * h[j]
-        work[n + i] = total
+        work[n + i] = total - R * gain[i]
     for i in range(n):
         for j in range(i, n):
-            entry = P[i * n + j] - gain[i] * work[j] - work[n + i] * gain[j] + R * gain[i] * gain[j]
+            entry = P[i * n + j] - gain[i] * work[j] - work[n + i] * gain[j]
             P[i * n + j] = entry
             P[j * n + i] = entry
     return S

@@ -19,8 +19,8 @@ from piezoest.equations.integrators import NODES, WEIGHTS
 @unrolled
 def predicted_output(theta, phi, n):
     """theta . phi (A2)."""
-    z = 0.0
-    for i in range(n):
+    z = theta[0] * phi[0]
+    for i in range(1, n):
         z = z + theta[i] * phi[i]
     return z
 
@@ -30,8 +30,8 @@ def covariance_times(P, phi, n, out):
     """Write P phi into `out` (n,) and return phi' P phi, the n_s² of (A7)."""
     quadratic = 0.0
     for i in range(n):
-        total = 0.0
-        for j in range(n):
+        total = P[i * n] * phi[0]
+        for j in range(1, n):
             total = total + P[i * n + j] * phi[j]
         out[i] = total
         quadratic = quadratic + phi[i] * total
@@ -193,38 +193,29 @@ def random_walk(variance, growth, ceiling):
 
 
 @unrolled
-def propagate_error(C, phi, gain, filtered, n, pole, ratio, differenced):
+def propagate_error(C, phi, gain, filtered, n, pole, ratio, differenced, work):
     """Covariance C of the estimate's error after an update, under white noise before the filters.
 
     The error obeys d = (I - K phi') d + K e. White noise v of standard deviation `ratio` reaches e
     through a first-order low-pass of `pole`, which the gain K is passed through here instead
     (`filtered`, in place), and, where `differenced` is 1.0, as v_k - v_(k-1): of two
-    successive gains only G = K_k - (I - K_k phi') K_(k-1) then counts. `gain` is used up.
+    successive gains only G = K_k - (I - K_k phi') K_(k-1) then counts. `work` has 3 n numbers.
     """
-    reach = 0.0
+    product = work[:n]
+    rest = work[n : 2 * n]
+    fresh = work[2 * n : 3 * n]
+    quadratic = covariance_times(C, phi, n, product)
+    reach = predicted_output(filtered, phi, n)
     for i in range(n):
-        reach = reach + phi[i] * filtered[i]
-    # (I - K phi') C (I - K phi')' in two halves, to need no further storage.
-    for j in range(n):
-        total = 0.0
-        for i in range(n):
-            total = total + phi[i] * C[i * n + j]
-        for i in range(n):
-            C[i * n + j] = C[i * n + j] - gain[i] * total
-    for i in range(n):
-        total = 0.0
-        for j in range(n):
-            total = total + C[i * n + j] * phi[j]
-        for j in range(n):
-            C[i * n + j] = C[i * n + j] - total * gain[j]
-    for i in range(n):
+        rest[i] = product[i] - quadratic * gain[i]
         before = filtered[i]
         now = gain[i] + pole * (before - gain[i])
         filtered[i] = now
-        gain[i] = (now - differenced * (before - gain[i] * reach)) * ratio
+        fresh[i] = (now - differenced * (before - gain[i] * reach)) * ratio
+    # (I - K phi') C (I - K phi')' + G G'
     for i in range(n):
         for j in range(i, n):
-            entry = 0.5 * (C[i * n + j] + C[j * n + i]) + gain[i] * gain[j]
+            entry = C[i * n + j] - gain[i] * product[j] - rest[i] * gain[j] + fresh[i] * fresh[j]
             C[i * n + j] = entry
             C[j * n + i] = entry
 

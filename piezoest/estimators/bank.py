@@ -10,8 +10,13 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray, integer
-from piezoest.estimators.base import EstimatorBase, Status
+from piezoest.estimators import bank_kernel
+from piezoest.estimators.base import Status
+from piezoest.estimators.ekf import HysteresisEKF
+from piezoest.estimators.rls import HysteresisRLS
 from piezoest.models import Model
+
+_LOOPS: dict[type, Any] = {HysteresisRLS: bank_kernel.rls, HysteresisEKF: bank_kernel.kalman}
 
 # Samples (of all channels) below which a second core costs more than it brings.
 WORTH_A_CORE = 4096
@@ -52,15 +57,14 @@ class EstimatorBank:
     _reader: Any
 
     def __init__(self, estimator: Any, channels: int, *, threads: int | None = None) -> None:
-        compiled = getattr(type(estimator), "_compiled", None)
-        if not isinstance(estimator, EstimatorBase) or compiled is None or compiled.bank is None:
+        if type(estimator) not in _LOOPS:
             raise ValueError(
                 f"estimator must be a HysteresisRLS or a HysteresisEKF, got {type(estimator).__name__}: "
                 "keep a list of estimators instead"
             )
         channels = integer("channels", channels, 1)
         self._threads = integer("threads", os.cpu_count() or 1 if threads is None else threads, 1)
-        self._bank = compiled.bank
+        self._bank = _LOOPS[type(estimator)]
         reader: Any = estimator.copy()
         self._reader = reader
         self._start = estimator._state.copy()

@@ -12,6 +12,9 @@ import numpy as np
 from piezoest._checks import FloatArray, array_1d, integer
 from piezoest.models import Model
 
+# For the histories that a compiled loop is not asked for.
+NONE, NO_ROWS = np.empty(0), np.empty((0, 0))
+
 _FORMAT = 1
 
 
@@ -113,15 +116,12 @@ class Compiled(NamedTuple):
         Position in the state of a flag that holds the estimate; None if there is none.
     unneeded : tuple of callable
         Functions within `sample` that no model depends on: a controller leaves them out.
-    bank : callable or None
-        ``bank(states, config, u, x, start, stop, every, theta)``: many channels at once.
     """
 
     sample: Any
     proposed: Any
     frozen: int | None
     unneeded: tuple[Any, ...] = ()
-    bank: Any = None
 
 
 class EstimatorBase(ABC):
@@ -249,6 +249,14 @@ class EstimatorBase(ABC):
         ValueError
             If the shapes do not match or a name in `record` is unknown.
         """
+        u, x = self._records(u, x)
+        if record and (unknown := sorted(set(record) - {"y", "S", "P"})):
+            raise ValueError(f"record holds unknown names {unknown}: choose of 'y', 'S', 'P'")
+        every = integer("every", every, 1)
+        return self._run(u, x, every, frozenset(record))
+
+    def _records(self, u: Any, x: Any) -> tuple[FloatArray, FloatArray]:
+        """Check records, and take what `predict` has left over."""
         # The compiled loops take writeable arrays only, though they write into none.
         u = array_1d("u", u, allow_nan=True)
         x = array_1d("x", x, allow_nan=True)
@@ -256,13 +264,14 @@ class EstimatorBase(ABC):
             u, x = u.copy(), x.copy()
         if u.size != x.size:
             raise ValueError(f"u and x must have the same length, got {u.size} and {x.size}")
-        if record and (unknown := sorted(set(record) - {"y", "S", "P"})):
-            raise ValueError(f"record holds unknown names {unknown}: choose of 'y', 'S', 'P'")
-        every = integer("every", every, 1)
         if self._pending is not None:
             self._sample(self._pending, np.nan)
             self._pending = None
-        return self._run(u, x, every, frozenset(record))
+        return u, x
+
+    def _absorb(self, u: FloatArray, x: FloatArray) -> None:
+        """Do as `run`, but keep nothing."""
+        self.run(u, x, every=max(1, u.size))
 
     def reset(self) -> None:
         """Return to the state after construction."""

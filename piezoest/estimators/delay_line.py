@@ -25,12 +25,16 @@ def delayed(line: Any, fraction: float, u: Any) -> Any:
     Before the first voltages have passed through, the first one counts.
     """
     length = line.size - 1
+    if length == 1 and fraction == 0.0:
+        return u
     if line[0] < 0.0:
         for i in range(length):
             line[1 + i] = u
         line[0] = 0.0
     position = int(line[0])
-    following = (position + 1) % length
+    following = position + 1
+    if following == length:  # a division would take longer than all the rest
+        following = 0
     older = line[1 + position]
     line[1 + position] = u
     line[0] = following

@@ -12,7 +12,7 @@ from piezoest._checks import WILDEST, FloatArray, non_negative, positive
 from piezoest._jit import UNCOUNTED, unrolled
 from piezoest.equations import admissible, kalman
 from piezoest.equations import coleman_hodgdon as equations
-from piezoest.estimators.base import Compiled, EstimatorBase, Status, Trace
+from piezoest.estimators.base import NO_ROWS, NONE, Compiled, EstimatorBase, Status, Trace
 from piezoest.estimators.delay_line import delay_line, delayed
 from piezoest.models import ColemanHodgdon, LinearGain, Model, model_from_dict
 
@@ -24,8 +24,6 @@ U_CENTRE, X_CENTRE, CENTRED, HEAD = 9, 10, 11, 12
 N, HYSTERETIC, NOISE, FRACTION, OFFSET, PROJECT, LEAST_A, LEAST_B, MARGIN, CONFIG = range(10)
 
 WAITING, UPDATED, MISSING = 0.0, 1.0, 2.0
-
-BLOCK = 16  # channels of a bank that share the first-level cache
 
 
 @unrolled
@@ -54,9 +52,10 @@ def _time_update(s: Any, P: Any, du: Any, config: Any, n: int, work: Any) -> Non
         q[0] += kalman.bilinear_variance(P, du, s[1], n)
         s[0] = w_h
         row[0], row[1], row[2] = kept, by_a, by_b
+        kalman.predict_covariance(P, row, 3, q, n, work[2 * n :])
     else:
         row[0] = 1.0
-    kalman.predict_covariance(P, row, q, n, work[2 * n :])
+        kalman.predict_covariance(P, row, 1, q, n, work[2 * n :])
 
 
 @unrolled
@@ -76,6 +75,8 @@ def measurement_row(h: Any, u: Any, config: Any, n: int) -> None:
 @unrolled
 def _onto_admissible(s: Any, P: Any, config: Any, n: int, work: Any) -> Any:
     """Project onto a >= least, b >= least, c - 2b >= margin: flat faces in this form."""
+    if s[1] >= config[LEAST_A] and s[2] >= config[LEAST_B] and s[3] - 2.0 * s[2] >= config[MARGIN]:
+        return 0.0
     g = work[:n]
     rest = work[n:]
     moved = 0.0
@@ -87,8 +88,7 @@ def _onto_admissible(s: Any, P: Any, config: Any, n: int, work: Any) -> Any:
             g[1 + face] = 1.0
         else:
             g[2], g[3] = -2.0, 1.0
-        if kalman.measure(s, g, n) < least:
-            moved = max(moved, kalman.project(s, P, g, least, n, rest))
+        moved = max(moved, kalman.project(s, P, g, least, n, rest))
     # The faces meet at an angle: whatever is left over is clamped.
     s[1] = max(s[1], config[LEAST_A])
     s[2] = max(s[2], config[LEAST_B])
@@ -173,24 +173,52 @@ def _propose(state: Any, config: Any, terms: Any, model: Any) -> None:
     proposed(state, config, terms, model)
 
 
-@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, **UNCOUNTED)
+@unrolled
+def _checked(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
+    if len(state) < HEAD + 5 * n + 2 * n * n or len(config) < CONFIG + n:
+        return  # never so; said here, it saves the compiler to ask at each slice
+    _take(state, config, u, x, n)
+
+
+@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, nogil=True, **UNCOUNTED)
 def _step(state: Any, config: Any, u: float, x: float) -> None:
-    _sample(state, config, u, x)
+    n = int(config[N])
+    if n == 4:
+        _checked(state, config, u, x, 4)
+    elif n == 5:
+        _checked(state, config, u, x, 5)
+    else:
+        _checked(state, config, u, x, n)
+
+
+@unrolled
+def _write_parameters(s: Any, config: Any, n: int, theta: Any, row: int) -> None:
+    """Parameters of the state s into a row of theta."""
+    if config[HYSTERETIC] == 0.0:
+        for i in range(n):
+            theta[row, i] = s[i]
+        return
+    theta[row, 0], theta[row, 1], theta[row, 2] = equations.rate_parameters(s[1], s[2], s[3])
+    if n == 5:
+        theta[row, 3] = s[4]
 
 
 @unrolled
 def _loop(
-    state: Any, config: Any, u: Any, x: Any, every: int, s: Any, y: Any, S: Any, P: Any, n: int
+    state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, s: Any, y: Any, S: Any, P: Any, n: int
 ) -> None:
     """Take a record; with `n` a constant the compiler unrolls the loops over states."""
-    if state.size < HEAD + 5 * n + 2 * n * n or config.size < CONFIG + n:
-        return
+    if len(state) < HEAD + 5 * n + 2 * n * n or len(config) < CONFIG + n:
+        return  # never so; said here, it saves the compiler to ask at each slice
+    row, due = 0, every
     for k in range(u.size):
         _take(state, config, u[k], x[k], n)
-        if (k + 1) % every == 0:
-            row = k // every
-            for i in range(n):
-                s[row, i] = state[HEAD + i]
+        due -= 1
+        if due == 0:
+            _write_parameters(state[HEAD : HEAD + n], config, n, theta, row)
+            if s.size > 0:
+                for i in range(n):
+                    s[row, i] = state[HEAD + i]
             if y.size > 0:
                 y[row] = state[INNOVATION]
             if S.size > 0:
@@ -198,41 +226,24 @@ def _loop(
             if P.size > 0:
                 for i in range(n * n):
                     P[row, i] = state[HEAD + n + i]
+            row, due = row + 1, every
 
 
 @njit(
-    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
+    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
     cache=True,
     **UNCOUNTED,
 )
-def _run(state: Any, config: Any, u: Any, x: Any, every: int, s: Any, y: Any, S: Any, P: Any) -> None:
+def _run(
+    state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, s: Any, y: Any, S: Any, P: Any
+) -> None:
     n = int(config[N])
     if n == 4:
-        _loop(state, config, u, x, every, s, y, S, P, 4)
+        _loop(state, config, u, x, every, theta, s, y, S, P, 4)
     elif n == 5:
-        _loop(state, config, u, x, every, s, y, S, P, 5)
+        _loop(state, config, u, x, every, theta, s, y, S, P, 5)
     else:
-        _loop(state, config, u, x, every, s, y, S, P, n)
-
-
-@njit(
-    "void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8, i8, f8[:, :, ::1])",
-    cache=True,
-    nogil=True,
-    **UNCOUNTED,
-)
-def _bank(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, theta: Any) -> None:
-    """Take samples (K, N) of channels `start` to `stop`, each with a row of `states`."""
-    n = int(config[N])
-    for first in range(start, stop, BLOCK):
-        last = min(first + BLOCK, stop)
-        for k in range(u.shape[0]):
-            for c in range(first, last):
-                _sample(states[c], config, u[k, c], x[k, c])
-            if (k + 1) % every == 0:
-                for c in range(first, last):
-                    for i in range(n):
-                        theta[k // every, c, i] = states[c, HEAD + i]
+        _loop(state, config, u, x, every, theta, s, y, S, P, n)
 
 
 class HysteresisEKF(EstimatorBase):
@@ -287,7 +298,7 @@ class HysteresisEKF(EstimatorBase):
 
     __slots__ = ("_config", "_initial", "_n", "_terms")
 
-    _compiled = Compiled(_sample, proposed, None, bank=_bank)
+    _compiled = Compiled(_sample, proposed, None)
 
     conformance_exceptions: ClassVar[dict[str, str]] = {}
 
@@ -356,21 +367,33 @@ class HysteresisEKF(EstimatorBase):
     def _sample(self, u: float, x: float) -> None:
         _step(self._state, self._config, u, x)
 
+    def _absorb(self, u: FloatArray, x: FloatArray) -> None:
+        u, x = self._records(u, x)
+        _run(self._state, self._config, u, x, u.size + 1, NO_ROWS, NO_ROWS, NONE, NONE, NO_ROWS)
+
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
         rows, n = u.size // every, self._n
-        s = np.empty((rows, n))
+        theta = np.empty((rows, len(self.parameter_names)))
+        s = np.empty((rows if "P" in want else 0, n))
         y = np.empty(rows if "y" in want else 0)
         S = np.empty(rows if "S" in want else 0)
         P = np.empty((rows if "P" in want else 0, n * n))
-        _run(self._state, self._config, u, x, every, s, y, S, P)
-        return self._trace(s, y, S, P.reshape(-1, n, n), every, want)
+        _run(self._state, self._config, u, x, every, theta, s, y, S, P)
+        return self._trace(theta, s, y, S, P.reshape(-1, n, n), every, want)
 
     def _trace(
-        self, s: FloatArray, y: FloatArray, S: FloatArray, P: FloatArray, every: int, want: frozenset[str]
+        self,
+        theta: FloatArray,
+        s: FloatArray,
+        y: FloatArray,
+        S: FloatArray,
+        P: FloatArray,
+        every: int,
+        want: frozenset[str],
     ) -> Trace:
         return Trace(
-            index=np.arange(1, len(s) + 1) * every - 1,
-            theta=self._theta_of(s),
+            index=np.arange(1, len(theta) + 1) * every - 1,
+            theta=theta,
             parameter_names=self.parameter_names,
             y=y if "y" in want else None,
             S=S if "S" in want else None,

@@ -164,7 +164,7 @@ class _FilterPyBaseline(ekf.HysteresisEKF):
                 row = k // every
                 s[row], P[row] = self._filter.x, self._filter.P
                 y[row], S[row] = self._flat[ekf.INNOVATION], self._flat[ekf.INNOVATION_VARIANCE]
-        return self._trace(s, y, S, P, every, want)
+        return self._trace(self._theta_of(s), s, y, S, P, every, want)
 
 
 class FilterPyEKF(_FilterPyBaseline):

@@ -174,14 +174,14 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
 
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
         rows, n, size = u.size // every, self._scale.size, self._scale.size + 1
-        theta = np.empty((rows, size))
+        theta = np.empty((rows, n))
         y = np.empty(rows if "y" in want else 0)
         S = np.empty(rows if "S" in want else 0)
         P = np.empty((rows if "P" in want else 0, size * size))
-        kernel.run(self._state, self._config, u, x, every, theta, y, S, P)
+        kernel.run(self._state, self._config, u, x, every, self._scale, theta, y, S, P)
         return Trace(
             index=np.arange(1, rows + 1) * every - 1,
-            theta=theta[:, :n] * self._scale,
+            theta=theta,
             parameter_names=self.parameter_names,
             y=y if "y" in want else None,
             S=S if "S" in want else None,

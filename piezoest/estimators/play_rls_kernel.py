@@ -181,31 +181,39 @@ def _output(state: Any, config: Any) -> Any:
 @register_jitable
 def _regressor(state: Any, config: Any, counted: Any) -> None:
     """Regressor of the present plays and creep; its travel is added where `counted` is 1.0."""
-    n, columns = int(config[PLAYS]), int(config[BENDS]) + 1
-    phi, way, segments, edges = int(config[PHI]), int(config[WAY]), int(config[SEGMENTS]), int(config[EDGES])
-    p = state[U_LAST]
+    n, columns, size = int(config[PLAYS]), int(config[BENDS]) + 1, int(config[N])
+    slopes = (n + 1) * columns
+    # Parts of the state by names of their own: each entry by its place in the whole takes twice as long.
+    plays = state[int(config[Y]) : int(config[Y]) + n]
+    phi = state[int(config[PHI]) : int(config[PHI]) + size]
+    way = state[int(config[WAY]) : int(config[WAY]) + slopes]
+    segments = state[int(config[SEGMENTS]) : int(config[SEGMENTS]) + slopes]
+    edges = state[int(config[EDGES]) : int(config[EDGES]) + columns + 1]
+    creep = state[int(config[Z]) : int(config[Z]) + int(config[TERMS])]
+    gain, p = config[GAIN], state[U_LAST]
     for i in range(n + 1):
         if i > 0:
-            p = state[int(config[Y]) + i - 1]
+            p = plays[i - 1]
         for s in range(columns):
-            part = segment(p, state[edges + s], state[edges + s + 1])
+            part = segment(p, edges[s], edges[s + 1])
             place = i * columns + s
-            state[way + place] += counted * abs(part - state[segments + place])
-            state[segments + place] = part
-            state[phi + place] = config[GAIN] * part
-    slopes = (n + 1) * columns
+            way[place] += counted * abs(part - segments[place])
+            segments[place] = part
+            phi[place] = gain * part
     for i in range(int(config[TERMS])):
-        state[phi + slopes + i] = state[int(config[Z]) + i]
-    state[phi + int(config[N]) - 1] = 1.0
+        phi[slopes + i] = creep[i]
+    phi[size - 1] = 1.0
 
 
 @register_jitable
 def _advance(state: Any, config: Any, u: Any) -> None:
     """Plays, creep and regressor after the next voltage."""
     n = int(config[PLAYS])
-    y, thresholds, used = int(config[Y]), int(config[THRESHOLDS]), int(config[USED])
+    used = int(config[USED])
+    plays = state[int(config[Y]) : int(config[Y]) + n]
+    thresholds = state[int(config[THRESHOLDS]) : int(config[THRESHOLDS]) + n]
     for i in range(n):
-        state[y + i] = play(state[y + i], u, state[thresholds + i])
+        plays[i] = play(plays[i], u, thresholds[i])
     state[TRAVEL] += abs(u - state[U_LAST])
     state[U_LAST] = u
     _regressor(state, config, 1.0)
@@ -264,6 +272,12 @@ def _walk(state: Any, config: Any, half: Any) -> None:
 
 
 @register_jitable
+def _add_row(total: Any, row: Any, factor: Any, size: int) -> None:
+    for j in range(size):
+        total[j] += row[j] * factor
+
+
+@register_jitable
 def _constrain(state: Any, config: Any) -> None:
     """Parameters to use: the estimate's nearest in the metric of P with nothing below its least.
 
@@ -273,13 +287,15 @@ def _constrain(state: Any, config: Any) -> None:
     """
     size = int(config[N])
     columns = int(config[BENDS]) + 1
-    theta, P0, used, force = int(config[THETA]), int(config[P]), int(config[USED]), int(config[FORCE])
+    theta = state[int(config[THETA]) : int(config[THETA]) + size]
+    used = state[int(config[USED]) : int(config[USED]) + size]
+    force = state[int(config[FORCE]) : int(config[FORCE]) + size]
+    P0 = int(config[P])
     for i in range(size):
-        state[used + i] = state[theta + i]
+        used[i] = theta[i]
     for i in range(size - 1):
-        if state[force + i] > 0.0:
-            for j in range(size):
-                state[used + j] += state[P0 + i * size + j] * state[force + i]
+        if force[i] > 0.0:
+            _add_row(used, state[P0 + i * size : P0 + i * size + size], force[i], size)
     for _ in range(SWEEPS):
         moved = 0.0
         for i in range(size - 1):
@@ -287,17 +303,16 @@ def _constrain(state: Any, config: Any) -> None:
             variance = state[P0 + i * size + i]
             if variance <= SMALLEST:
                 continue
-            change = (least - state[used + i]) / variance
-            change = max(change, -state[force + i])
+            change = (least - used[i]) / variance
+            change = max(change, -force[i])
             if change != 0.0:
-                state[force + i] += change
+                force[i] += change
                 moved = max(moved, abs(change) * np.sqrt(variance))
-                for j in range(size):
-                    state[used + j] += state[P0 + i * size + j] * change
+                _add_row(used, state[P0 + i * size : P0 + i * size + size], change, size)
         if moved < 1e-3:
             break
     for i in range(size - 1):
-        state[used + i] = max(state[used + i], config[LEAST] if i < columns else 0.0)
+        used[i] = max(used[i], config[LEAST] if i < columns else 0.0)
 
 
 @register_jitable
@@ -308,20 +323,22 @@ def _update(state: Any, config: Any, half: Any, first: int) -> None:
     consider filter): at a dwell the slopes say nothing.
     """
     size = int(config[N])
-    theta, P0, mean, work = int(config[THETA]), int(config[P]), int(config[SUM]), int(config[WORK])
+    P0 = int(config[P])
+    theta = state[int(config[THETA]) : int(config[THETA]) + size]
+    mean = state[int(config[SUM]) : int(config[SUM]) + size]
+    work = state[int(config[WORK]) : int(config[WORK]) + size]
     _walk(state, config, half)
     y = state[X_SUM] / state[COUNT]
     for i in range(size):
-        state[mean + i] /= state[COUNT]
-        y -= state[theta + i] * state[mean + i]
+        mean[i] /= state[COUNT]
+        y -= theta[i] * mean[i]
+        work[i] = 0.0
     R = (config[SLACK] * config[GAIN] * state[RANGE]) ** 2 + config[NOISE] ** 2 / state[COUNT]
     S = R
+    for i in range(size):  # P is symmetric: row by row, no sum has to wait for its last product
+        _add_row(work, state[P0 + i * size : P0 + i * size + size], mean[i], size)
     for i in range(size):
-        total = 0.0
-        for j in range(size):
-            total += state[P0 + i * size + j] * state[mean + j]
-        state[work + i] = total
-        S += state[mean + i] * total
+        S += mean[i] * work[i]
     if not (S >= R and abs(y) < WILDEST):
         # Rounding has spoilt the covariance, as voltages of another order of magnitude can.
         for i in range(size * size):
@@ -331,13 +348,12 @@ def _update(state: Any, config: Any, half: Any, first: int) -> None:
     state[INNOVATION], state[VARIANCE] = y, S
     y = max(min(y, WILD * np.sqrt(S)), -WILD * np.sqrt(S))
     for i in range(first, size):
-        gain = state[work + i] / S
-        state[theta + i] += gain * y
+        gain = work[i] / S
+        theta[i] += gain * y
         # Rows and columns before `first` lose their share once, the rest once for both.
-        for j in range(i + 1):
-            entry = state[P0 + i * size + j] - gain * state[work + j]
-            state[P0 + i * size + j] = entry
-            state[P0 + j * size + i] = entry
+        _add_row(state[P0 + i * size : P0 + i * size + i + 1], work, -gain, i + 1)
+        for j in range(i):
+            state[P0 + j * size + i] = state[P0 + i * size + j]
     for i in range(size):
         state[P0 + i * size + i] = max(state[P0 + i * size + i], SMALLEST)
     _constrain(state, config)
@@ -427,8 +443,8 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
         return
     state[X_SUM] += x
     state[COUNT] += 1.0
-    for i in range(size):
-        state[int(config[SUM]) + i] += state[int(config[PHI]) + i]
+    total = state[int(config[SUM]) : int(config[SUM]) + size]
+    _add_row(total, state[int(config[PHI]) : int(config[PHI]) + size], 1.0, size)
     half = swing.half_period(state[SWING : SWING + swing.STATE], config[FIRST_HALF])
     moved = state[TRAVEL] * config[WINDOWS]
     if moved < state[RANGE] and state[ELAPSED] * config[WINDOWS] < 2.0 * half:
@@ -453,21 +469,32 @@ def step(state: Any, config: Any, u: float, x: float) -> None:
 
 
 @njit(
-    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
+    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
     cache=True,
     **UNCOUNTED,
 )
 def run(
-    state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, y: Any, S: Any, covariance: Any
+    state: Any,
+    config: Any,
+    u: Any,
+    x: Any,
+    every: int,
+    scale: Any,
+    theta: Any,
+    y: Any,
+    S: Any,
+    covariance: Any,
 ) -> None:
-    """Take whole records; every `every`-th sample into the histories that have room."""
+    """Take whole records; every `every`-th sample into the histories that have room, slopes times `scale`."""
     size = int(config[N])
+    now = state[int(config[THETA]) : int(config[THETA]) + size]
+    row, due = 0, every
     for k in range(u.size):
-        _sample(state, config, u[k], x[k])
-        if (k + 1) % every == 0:
-            row = k // every
-            for i in range(size):
-                theta[row, i] = state[int(config[THETA]) + i]
+        step(state, config, u[k], x[k])
+        due -= 1
+        if due == 0:
+            for i in range(size - 1):
+                theta[row, i] = now[i] * scale[i]
             if y.size > 0:
                 y[row] = state[INNOVATION]
             if S.size > 0:
@@ -475,6 +502,7 @@ def run(
             if covariance.size > 0:
                 for i in range(size * size):
                     covariance[row, i] = state[int(config[P]) + i]
+            row, due = row + 1, every
 
 
 @njit("void(f8[::1], f8[::1])", cache=True)

@@ -11,7 +11,7 @@ from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
 from piezoest.estimators import rls_model, rls_profile
 from piezoest.estimators import rls_settings as settings
-from piezoest.estimators.base import Compiled, EstimatorBase, Status, Trace
+from piezoest.estimators.base import NO_ROWS, NONE, Compiled, EstimatorBase, Status, Trace
 from piezoest.estimators.delay_line import delay_line
 from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain, Model, model_from_dict
 from piezoest.policies import Forgetting, Policy, policy_from_dict, policy_to_dict
@@ -88,7 +88,6 @@ class HysteresisRLS(EstimatorBase):
         rls_model.proposed,
         kernel.FROZEN,
         unneeded=(kernel._propagate_error,),
-        bank=kernel.bank,
     )
 
     conformance_exceptions: ClassVar[dict[str, str]] = {}
@@ -181,14 +180,17 @@ class HysteresisRLS(EstimatorBase):
     def _sample(self, u: float, x: float) -> None:
         kernel.step(self._state, self._config, u, x)
 
+    def _absorb(self, u: FloatArray, x: FloatArray) -> None:
+        u, x = self._records(u, x)
+        kernel.run(self._state, self._config, u, x, u.size + 1, self._scale, NO_ROWS, NONE, NONE, NO_ROWS)
+
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
         rows, n = u.size // every, self._n
         theta = np.empty((rows, n))
         y = np.empty(rows if "y" in want else 0)
         S = np.empty(rows if "S" in want else 0)
         P = np.empty((rows if "P" in want else 0, n * n))
-        kernel.run(self._state, self._config, u, x, every, theta, y, S, P)
-        theta = self._theta_of(theta)
+        kernel.run(self._state, self._config, u, x, every, self._scale, theta, y, S, P)
         return Trace(
             index=np.arange(1, rows + 1) * every - 1,
             theta=theta,

@@ -40,13 +40,13 @@ SCALE = 16  # four scales of the parameters, one of the output
 # threshold and drift of the detection, least excitation, shortest memory of variable forgetting in
 # parts of it, places of the memory of amplitudes, its tolerance, its variance.
 EXTRA, MARGIN, THRESHOLD, RISEN, EXCITED, SHORTEST, PLACES, TOLERANCE, RECALLED = range(21, 30)
-CONFIG = 30
+# Slope [µm/V] of a beta of one, and variance of the sensor's noise to that of a slope.
+SLOPE, NOISE_FACTOR = 30, 31
+CONFIG = 32
 
 # Slower than so many swings a sample the voltage is at rest; slower than this part of its usual
 # pace it counts as going at that.
 SLOWEST, SLOW = 1e-12, 0.2
-# Channels of a bank that share the first-level cache.
-BLOCK = 16
 # Positions in theta; the offset may be off by this part of a swing, a parameter walks at least
 # so much (squared), and no variance grows beyond so many times its start.
 GAMMA, OFFSET_SLOPE = 2, 3
@@ -88,7 +88,7 @@ def _believable(state: Any, config: Any, x: Any) -> Any:
     dx = x - state[X_CENTRE] - state[X_LAST]
     if believing.stands_still(memory, dx, state[TRAVEL], state[SWING + swing.SIZE]):
         return False
-    slope = abs(state[FRONT + law.HEAD + 1]) * config[SCALE + 1] / config[SCALE + 4]
+    slope = abs(state[FRONT + law.HEAD + 1]) * config[SLOPE]
     return believing.believable(memory, dx, slope, state[TRAVEL], config[WARM_UP])
 
 
@@ -97,7 +97,8 @@ def _regression(state: Any, config: Any, x: Any, phi: Any, n: int) -> Any:
     """Regressor into `phi` and output, from the last good sample to this one; starts the next."""
     if config[HYSTERETIC] != 0.0:
         z = x - state[X_LAST]
-        _measure_noise(state, z)
+        if config[WALK] > 0.0:
+            _measure_noise(state, z)
         phi[0] = -0.5 * (x + state[X_LAST]) * state[TRAVEL]
         phi[1] = state[RISE]
         phi[2] = state[MOMENT]
@@ -135,13 +136,8 @@ def _noise_memory(state: Any, config: Any) -> Any:
     """
     if state[SWING + swing.USUAL] == 0.0:
         return 0.0  # nobody knows yet how far a swing goes
-    swing_of_x = (
-        state[SWING + swing.SIZE] * state[FRONT + law.HEAD + 1] * config[SCALE + 1] / config[SCALE + 4]
-    )
-    pole = config[LOW_POLE]
-    noise = 2.0 * state[NOISE] * (1.0 - pole) / (1.0 + pole)
-    allowed = PRECISION * swing_of_x
-    return noise / max(allowed * allowed, SLOWEST)
+    swing_of_x = state[SWING + swing.SIZE] * state[FRONT + law.HEAD + 1] * config[SLOPE]
+    return state[NOISE] * config[NOISE_FACTOR] / max(swing_of_x * swing_of_x, SLOWEST)
 
 
 @unrolled
@@ -169,22 +165,33 @@ def _square_step(state: Any, config: Any, i: int) -> Any:
 
 
 @unrolled
-def _walk(state: Any, config: Any, phi: Any, n: int, part: Any, half: Any) -> Any:
+def _excite(state: Any, config: Any, phi: Any, n: int, part: Any) -> None:
+    """Take the regressor into its mean square over a swing."""
+    state[MOTION] = part = filters.low_pass_step(state[MOTION], part, config[LOW_POLE])
+    way = state[WAY] + part
+    if way < SLOWEST:
+        return
+    state[WAY] = way = min(way, 1.0)
+    fresh, old = 1.0 / (max(part, SLOWEST) * way), part / way
+    for i in range(n):
+        for j in range(i, n):
+            mean = state[EXCITATION + i * n + j]
+            mean += fresh * phi[i] * phi[j] - old * mean
+            state[EXCITATION + i * n + j] = mean
+            state[EXCITATION + j * n + i] = mean
+
+
+@unrolled
+def _walk(state: Any, config: Any, n: int, half: Any) -> Any:
     """Let P grow, and return the noise variance of a sample that gives the memory wanted.
 
     Everything is counted in swings of the voltage. With P growing by q a swing, the best
     excited direction forgets within sqrt(rho/(q phi²)) swings, where phi is the regressor and rho
     the noise variance of a whole swing: rho follows from the memory wanted and the mean of phi².
     """
-    state[MOTION] = part = filters.low_pass_step(state[MOTION], part, config[LOW_POLE])
-    if state[WAY] + part < SLOWEST:
-        return 1.0
-    state[WAY] = min(state[WAY] + part, 1.0)
+    part = state[MOTION]
     rho = 0.0
     for i in range(n):
-        for j in range(n):
-            k = EXCITATION + i * n + j
-            state[k] += (phi[i] * phi[j] / max(part, SLOWEST) - part * state[k]) / state[WAY]
         q = _square_step(state, config, i)
         rho += q * state[EXCITATION + i * n + i]
         k = FRONT + law.HEAD + n + i * n + i
@@ -202,15 +209,16 @@ def _propagate_error(state: Any, config: Any, phi: Any, n: int, forgetting: Any,
     C = state[ERROR : ERROR + n * n]
     start = FRONT + law.HEAD + n + n * n
     gain = state[start + n * n : start + n * n + n]  # the law's work space: P phi
+    work = state[start + n * n + n : start + n * n + 4 * n]
     if restart:
         for i in range(n * n):
             C[i] = state[start + i]
     scale = 1.0 / (forgetting * state[FRONT + law.INNOVATION_VARIANCE])
     for i in range(n):
         gain[i] *= scale
-    least_squares.propagate_error(
-        C, phi, gain, state[GAIN : GAIN + n], n, config[LOW_POLE], config[NOISE_RATIO], config[HYSTERETIC]
-    )
+    filtered = state[GAIN : GAIN + n]
+    ratio, differenced = config[NOISE_RATIO], config[HYSTERETIC]
+    least_squares.propagate_error(C, phi, gain, filtered, n, config[LOW_POLE], ratio, differenced, work)
 
 
 @register_jitable
@@ -299,8 +307,13 @@ def _take(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
         return
     if config[PLACES] > 0.0:
         _visit(state, config, n, part)
-    half = swing.half_period(state[SWING : SWING + swing.STATE], config[FIRST_HALF])
-    R = _walk(state, config, phi, n, part, half)
+    half = 0.0  # nobody asks for it
+    if config[WALK] > 0.0 or config[PERIODS] > 0.0:
+        half = swing.half_period(state[SWING : SWING + swing.STATE], config[FIRST_HALF])
+    _excite(state, config, phi, n, part)
+    R = 1.0
+    if config[WALK] > 0.0 and state[WAY] >= SLOWEST:
+        R = _walk(state, config, n, half)
     forgetting = config[CONFIG + law.FORGETTING]
     if config[PERIODS] > 0.0:
         samples = 2.0 * half * config[PERIODS]
@@ -350,18 +363,42 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
 
 
 @unrolled
-def _loop(
-    state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, y: Any, S: Any, P: Any, n: int
-) -> None:
-    head = FRONT + law.HEAD
-    if state.size < FRONT + law.state_size(n) or config.size < CONFIG + law.CONFIG_SIZE:
+def _checked(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
+    if len(state) < FRONT + law.state_size(n) or len(config) < CONFIG + law.CONFIG_SIZE:
         return  # never so; said here, it saves the compiler to ask at each slice
+    _take(state, config, u, x, n)
+
+
+@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, nogil=True, **UNCOUNTED)
+def step(state: Any, config: Any, u: float, x: float) -> None:
+    """Take one sample."""
+    n = int(config[N])
+    if n == 3:
+        _checked(state, config, u, x, 3)
+    elif n == 4:
+        _checked(state, config, u, x, 4)
+    else:
+        _checked(state, config, u, x, n)
+
+
+@njit(
+    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
+    cache=True,
+    **UNCOUNTED,
+)
+def run(
+    state: Any, config: Any, u: Any, x: Any, every: int, scale: Any, theta: Any, y: Any, S: Any, P: Any
+) -> None:
+    """Take whole records; every `every`-th sample into the histories that have room, theta times `scale`."""
+    n = int(config[N])
+    head = FRONT + law.HEAD
+    row, due = 0, every
     for k in range(u.size):
-        _take(state, config, u[k], x[k], n)
-        if (k + 1) % every == 0:
-            row = k // every
+        step(state, config, u[k], x[k])
+        due -= 1
+        if due == 0:
             for i in range(n):
-                theta[row, i] = state[head + i]
+                theta[row, i] = state[head + i] * scale[i]
             if y.size > 0:
                 y[row] = state[FRONT + law.INNOVATION]
             if S.size > 0:
@@ -369,45 +406,4 @@ def _loop(
             if P.size > 0:
                 for i in range(n * n):
                     P[row, i] = state[head + n + i]
-
-
-@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, **UNCOUNTED)
-def step(state: Any, config: Any, u: float, x: float) -> None:
-    """Take one sample."""
-    _sample(state, config, u, x)
-
-
-@njit(
-    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
-    cache=True,
-    **UNCOUNTED,
-)
-def run(state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, y: Any, S: Any, P: Any) -> None:
-    """Take whole records; every `every`-th sample into the histories that have room."""
-    n = int(config[N])
-    if n == 3:
-        _loop(state, config, u, x, every, theta, y, S, P, 3)
-    elif n == 4:
-        _loop(state, config, u, x, every, theta, y, S, P, 4)
-    else:
-        _loop(state, config, u, x, every, theta, y, S, P, n)
-
-
-@njit(
-    "void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8, i8, f8[:, :, ::1])",
-    cache=True,
-    nogil=True,
-    **UNCOUNTED,
-)
-def bank(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, theta: Any) -> None:
-    """Take samples (K, N) of channels `start` to `stop`, each with a row of `states`."""
-    n = int(config[N])
-    for first in range(start, stop, BLOCK):
-        last = min(first + BLOCK, stop)
-        for k in range(u.shape[0]):
-            for c in range(first, last):
-                _sample(states[c], config, u[k, c], x[k, c])
-            if (k + 1) % every == 0:
-                for c in range(first, last):
-                    for i in range(n):
-                        theta[k // every, c, i] = states[c, FRONT + law.HEAD + i]
+            row, due = row + 1, every

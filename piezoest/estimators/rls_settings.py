@@ -154,4 +154,6 @@ def front_end(
     config[kernel.DECAY_SCALE] = scale[0]
     config[kernel.SCALE : kernel.SCALE + n] = scale / (noise * gain) * unit
     config[kernel.SCALE + 4] = unit / (noise * gain)
+    config[kernel.SLOPE] = config[kernel.SCALE + 1] / config[kernel.SCALE + 4]
+    config[kernel.NOISE_FACTOR] = 2.0 * white / kernel.PRECISION**2
     return config

@@ -32,6 +32,8 @@ class Calls(Expressions):
         called, arguments = self.called(node), self.arguments(node)
         if called in (np.empty, np.zeros):
             raise self.source.error(node, "give a new array a name of its own")
+        if called is isinstance:  # what is calculated with in C is a number
+            return Known(not isinstance(arguments[0], Array))
         if called is bool:
             return self.truth(arguments[0], node)
         if called in (int, float):

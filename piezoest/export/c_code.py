@@ -12,6 +12,7 @@ import numpy as np
 from piezoest._checks import integer
 from piezoest._version import __version__
 from piezoest.compensators import Compensator
+from piezoest.compensators.adoption import adopt
 from piezoest.compensators.layout import OFFSET
 from piezoest.equations import turning_points
 from piezoest.estimators.base import Compiled
@@ -216,10 +217,10 @@ class _Generator:
         return self.call(ring.give, [*arguments, Expr("r", "real")])
 
     def entry_adopt(self) -> str:
-        """Call of `ring.adopt`."""
+        """Call of `adoption.adopt`."""
         model = Array("model", Root(), size=4)
         flags: list[Value] = [Known(self.hysteretic), Known(self.change)]
-        return self.call(ring.adopt, [*self.compensator_arrays(), model, *flags])
+        return self.call(adopt, [*self.compensator_arrays(), model, *flags])
 
     def entry_learn(self) -> str:
         """Call of `ring.learn`."""

@@ -56,6 +56,9 @@ _RESERVED = frozenset(
 )
 
 
+_BUILTIN = {function.__name__: function for function in (abs, min, max, int, float, bool, isinstance)}
+
+
 class Expressions:
     """What a function's names stand for, and expressions of them."""
 
@@ -139,9 +142,8 @@ class Expressions:
         names = self.source.function.__globals__
         if node.id in names:
             return self.outside(names[node.id], node.id, self.source.function.__module__)
-        builtin = {"abs": abs, "min": min, "max": max, "int": int, "float": float, "bool": bool}
-        if node.id in builtin:
-            return Known(builtin[node.id])
+        if node.id in _BUILTIN:
+            return Known(_BUILTIN[node.id])
         raise self.source.error(node, f"{node.id} is not known here")
 
     def outside(self, value: Any, name: str, module: str) -> Known:

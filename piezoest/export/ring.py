@@ -8,32 +8,12 @@ import numpy as np
 
 from piezoest._checks import WILDEST, FloatArray, array_1d, integer
 from piezoest.compensators import Compensator
-from piezoest.equations import admissible
-from piezoest.equations import coleman_hodgdon as equations
+from piezoest.compensators.adoption import adopt
 from piezoest.models import Model
 
 # State of the ring: voltage given out last, whether there is one, samples since the last
 # change of model, whether the model is held, and the model: alpha, beta, gamma, offset.
 PREVIOUS, STARTED, WAITED, FROZEN, MODEL, STATE = 0, 1, 2, 3, 4, 8
-
-
-def adopt(compensator: Any, settings: Any, model: Any, hysteretic: bool, change: Any) -> bool:
-    """Hand (alpha, beta, gamma, offset) or (gain, -, -, offset) to the compensator; False if it cannot be."""
-    for i in range(4):
-        if not abs(model[i]) < WILDEST:
-            return False
-    if not hysteretic:
-        if model[0] == 0.0:
-            return False
-        # No hysteresis: b = 0, and any a.
-        change(compensator, settings, 1.0, 0.0, model[0], model[3])
-        return True
-    if not admissible.has_inverse(model[0], model[1], model[2]):
-        work = np.empty(9)
-        admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
-    a, b, c = equations.loop_parameters(model[0], model[1], model[2])
-    change(compensator, settings, a, b, c, model[3])
-    return True
 
 
 def learn(

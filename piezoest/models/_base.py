@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, finite
+
+
+@functools.cache
+def _field_names(kind: Any) -> tuple[str, ...]:
+    return tuple(field.name for field in dataclasses.fields(kind))
 
 
 class Model(ABC):
@@ -57,8 +63,11 @@ class Model(ABC):
         return cls(*(float(value) for value in values), offset=float(offset))  # type: ignore[call-arg]
 
     def _check_finite(self) -> None:
-        for field in dataclasses.fields(self):  # type: ignore[arg-type]
-            object.__setattr__(self, field.name, finite(field.name, getattr(self, field.name)))
+        for name in _field_names(type(self)):
+            given = getattr(self, name)
+            value = finite(name, given)
+            if value is not given:  # a live loop makes a model now and then, of plain numbers
+                object.__setattr__(self, name, value)
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe dictionary with the class name under ``"model"``."""

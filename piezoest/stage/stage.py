@@ -238,12 +238,17 @@ class SimulatedStage:
         """
         x = array_1d("u", u, allow_nan=True).copy()  # voltage, which the kernel turns into displacement
         measured = np.empty_like(x)
-        factor, shape = self._factors(x.size)
-        noise = self._generator.standard_normal(x.size) if self._noisy else np.zeros(1)
-        kernel.run(self._state, self._settings, self._plays, self._terms, x, noise, factor, shape, measured)
-        self._count += x.size
+        disturbances = self._disturbances(x.size)
+        kernel.run(self._state, self._settings, self._plays, self._terms, x, *disturbances, measured)
         self._displacement = x
         return measured
+
+    def _disturbances(self, n: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Noise and factors of the next n samples, each of shape (n,), or (1,) for the same; time goes on."""
+        factor, shape = self._factors(n)
+        noise = self._generator.standard_normal(n) if self._noisy else np.zeros(1)
+        self._count += n
+        return noise, factor, shape
 
     def reset(self) -> None:
         """Go back to the start: at rest at 0 V, time zero, the same random numbers."""

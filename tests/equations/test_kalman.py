@@ -32,7 +32,7 @@ def test_predict_covariance_is_the_textbook(n: int) -> None:
     F = np.eye(n)
     F[0] = row
     flat = P.ravel().copy()
-    kalman.predict_covariance(flat, row, q, n, np.empty(n))
+    kalman.predict_covariance(flat, row, n, q, n, np.empty(n))
     np.testing.assert_allclose(
         flat.reshape(n, n), reference.predict_covariance(P, F, np.diag(q)), rtol=1e-13, atol=1e-14
     )
@@ -71,7 +71,7 @@ def test_a_whole_record_is_the_textbook() -> None:
         x = float(h @ plant) + 1e-3 * rng.standard_normal()
         row[:3] = hysteresis.hysteresis_jacobian(s[0], du, s[1], s[2])
         s[0] = hysteresis.hysteresis_step(s[0], du, s[1], s[2])
-        kalman.predict_covariance(flat, row, q, n, work)
+        kalman.predict_covariance(flat, row, n, q, n, work)
         kalman.update(s, flat, h, x - kalman.measure(s, h, n), R, n, gain, work)
         expected, F = reference.transition(expected, du)
         P = reference.predict_covariance(P, F, np.diag(q))
@@ -128,7 +128,7 @@ def filtered(P: Any, q: Any, R: float, samples: int) -> float:
         u_last = u
         row[0], row[1], row[2] = hysteresis.hysteresis_jacobian(s[0], du, s[1], s[2])
         s[0] = hysteresis.hysteresis_step(s[0], du, s[1], s[2])
-        kalman.predict_covariance(P, row, q, n, work)
+        kalman.predict_covariance(P, row, n, q, n, work)
         h[0], h[3] = 1.0, u
         kalman.update(s, P, h, 0.0, R, n, gain, work)
         for i in range(n):
@@ -154,7 +154,7 @@ def test_stays_symmetric_positive_definite_over_a_million_samples(noise: float, 
 
 
 def predicted(P: Any, row: Any, q: Any) -> Any:
-    kalman.predict_covariance(P, row, q, 4, row * 0.0)
+    kalman.predict_covariance(P, row, 4, q, 4, row * 0.0)
     return P
 
 
