@@ -128,6 +128,8 @@ class OutputErrorRLS(EstimatorBase):
             config[front.WARM_UP] = rejection.warm_up
         config[front.SCALE : front.SCALE + 4] = initial.c
         config[front.SCALE + 4] = 1.0
+        config[front.SLOPE] = initial.c
+        config[front.NOISE_FACTOR] = 2.0 / front.PRECISION**2
         config[kernel.SLACK] = slack**2
         config[kernel.LASTING] = LASTING
         config[kernel.VARIANCE] = positive("noise", noise) ** 2
