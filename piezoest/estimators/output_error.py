@@ -46,7 +46,7 @@ class OutputErrorRLS(EstimatorBase):
     noise : float
         Least standard deviation of the displacement's noise [µm]; what is measured comes on top.
     span : float
-        The bank reaches from the initial decay divided by this to the decay times this.
+        Factor: the bank reaches from the initial decay divided by it to the decay times it.
     members : int
         Decays in the bank, 3 or more.
     delay : float
