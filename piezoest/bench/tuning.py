@@ -145,6 +145,17 @@ SPACES: dict[str, tuple[str, Space]] = {
             "offset": OneOf((False, True)),
         },
     ),
+    "OutputErrorRLS": (
+        "OutputErrorRLS(noise={noise}, uncertainty={uncertainty}, policies=("
+        "RandomWalk(memory={memory}, drift={drift}), "
+        "OutlierRejection()))",
+        {
+            "memory": Between(0.05, 1.0),
+            "drift": Between(0.1, 2.0),
+            "uncertainty": Between(0.1, 1.0),
+            "noise": Between(5e-4, 1e-2),
+        },
+    ),
     "HysteresisEKF": ("", FILTER),
     "FilterPyEKF": ("", FILTER),
     "FilterPyUKF": ("", FILTER),
