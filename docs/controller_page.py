@@ -106,7 +106,7 @@ def draw() -> None:
     )
     axes.barh(names, [100.0 * row["load_mean"] for row in rows], color="C0", height=0.4, label="mean")
     axes.axvline(50.0, color="0.4", ls="--", lw=1)
-    axes.set(xlabel="part of a sample at 50 kHz and 168 MHz [%]", xlim=(0, 100))
+    axes.set(xlabel="part of a sample at 50 kHz and 168 MHz [%]", xlim=(0, None))
     axes.invert_yaxis()
     axes.legend(loc="lower right")
     FIGURE.parent.mkdir(parents=True, exist_ok=True)

@@ -292,7 +292,7 @@ def _of_one_kind(history: list[FloatArray]) -> FloatArray:
 
 
 def _feed(estimator: Any, u: FloatArray, x: FloatArray) -> None:
-    if isinstance(estimator, EstimatorBase):
+    if isinstance(estimator, EstimatorBase) and type(estimator).run is EstimatorBase.run:
         estimator._absorb(u, x)
         return
     if hasattr(estimator, "run"):

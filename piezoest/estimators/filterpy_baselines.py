@@ -16,7 +16,7 @@ from piezoest._checks import WILDEST, FloatArray
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations import kalman
 from piezoest.estimators import ekf
-from piezoest.estimators.base import Trace
+from piezoest.estimators.base import EstimatorBase, Trace
 from piezoest.estimators.delay_line import delayed
 from piezoest.models import ColemanHodgdon, LinearGain
 
@@ -154,6 +154,9 @@ class _FilterPyBaseline(ekf.HysteresisEKF):
             self._filter.x, self._filter.P = x, P
             return False
         return True
+
+    def _absorb(self, u: FloatArray, x: FloatArray) -> None:
+        EstimatorBase._absorb(self, u, x)  # not the compiled loop of `HysteresisEKF`
 
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
         rows, n = u.size // every, self._n

@@ -473,6 +473,11 @@ def test_works_in_the_ring(kind: Any) -> None:
     assert np.all(np.isfinite(record.voltage))
     assert record.max_error() < 2.0
     assert_sound(estimator)
+    # The ring teaches it what the record does.
+    alone = kind(RATE)
+    for k in range(0, len(reference), 25):
+        alone.run(record.voltage[k : k + 25], record.measured[k : k + 25])
+    assert face(estimator) == face(alone)
 
 
 # ---------------------------------------------------------------- copies of itself
