@@ -8,13 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from piezoest._checks import FloatArray, positive
+from piezoest.estimators.believing import STANDS_STILL
 from piezoest.models import ColemanHodgdon, LinearGain, Model
 
 # An interval whose voltage moves by no more than this part of its size is one at rest.
 AT_REST = 1e-4
-# A reading that is the same to the last bit over this part of the voltage's range is that of a
-# saturated or dead sensor.
-STANDS_STILL = 5e-3
 # Points that are kept of an interval, at most of a window, and windows that are kept.
 POINTS, MOST, WINDOWS = 4, 800, 4
 # What happened this part of a window ago counts for half.

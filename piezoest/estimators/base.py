@@ -10,7 +10,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self, runtime_checkable
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, integer
-from piezoest.models import Model
+from piezoest.models import Model, model_from_dict
+from piezoest.policies import policy_from_dict
 
 # For the histories that a compiled loop is not asked for.
 NONE, NO_ROWS = np.empty(0), np.empty((0, 0))
@@ -161,6 +162,11 @@ class EstimatorBase(ABC):
         """Take checked records."""
 
     @property
+    def sample_rate(self) -> float:
+        """[Hz]."""
+        return float(self._arguments["sample_rate"])
+
+    @property
     @abstractmethod
     def model(self) -> Model:
         """Admissible model as known now, ready for a compensator."""
@@ -297,8 +303,13 @@ class EstimatorBase(ABC):
 
     @classmethod
     def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        """Constructor's arguments from their JSON-safe form."""
-        return arguments
+        """Constructor's arguments from their JSON-safe form: the initial model and the policies, if any."""
+        revived = dict(arguments)
+        if revived.get("initial_model") is not None:
+            revived["initial_model"] = model_from_dict(revived["initial_model"])
+        if "policies" in revived:
+            revived["policies"] = tuple(policy_from_dict(item) for item in revived["policies"])
+        return revived
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
@@ -328,3 +339,21 @@ class EstimatorBase(ABC):
         pending = data.get("pending")
         estimator._pending = np.nan if pending == "missing" else pending
         return estimator
+
+
+class Freezable(EstimatorBase):
+    """An estimator whose estimate can be held, by a flag in its state."""
+
+    __slots__ = ()
+
+    #: Position of the flag in the state.
+    _frozen_at: ClassVar[int]
+
+    @property
+    def frozen(self) -> bool:
+        """Whether the estimate is held; settable. Samples are then counted as held."""
+        return bool(self._state[self._frozen_at])
+
+    @frozen.setter
+    def frozen(self, frozen: bool) -> None:
+        self._state[self._frozen_at] = float(bool(frozen))

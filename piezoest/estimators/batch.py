@@ -15,7 +15,7 @@ from piezoest.estimators.coordinates import Coordinates, coordinates
 from piezoest.estimators.multiple_shooting import multiple_shooting
 from piezoest.estimators.shooting import TUNING, Problem, Solution, single_shooting, spread
 from piezoest.estimators.starts import DEFAULT_MODEL, best_start
-from piezoest.models import ColemanHodgdon, Creep, LinearGain, model_from_dict
+from piezoest.models import ColemanHodgdon, Creep, LinearGain
 
 Method = Literal["single-shooting", "multiple-shooting"]
 Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
@@ -326,11 +326,6 @@ class BatchFit(EstimatorBase):
     # ------------------------------------------------------------ the face
 
     @property
-    def sample_rate(self) -> float:
-        """[Hz]."""
-        return float(self._arguments["sample_rate"])
-
-    @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the entries of `theta`; a last one, ``offset``, where it is fitted."""
         names = self._initial.parameter_names
@@ -410,12 +405,8 @@ class BatchFit(EstimatorBase):
 
     @classmethod
     def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        model, creep = arguments["initial_model"], arguments["creep"]
-        return {
-            **arguments,
-            "initial_model": None if model is None else model_from_dict(model),
-            "creep": None if creep is None else Creep.from_dict(creep),
-        }
+        creep = arguments["creep"]
+        return {**super()._revive(arguments), "creep": None if creep is None else Creep.from_dict(creep)}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:

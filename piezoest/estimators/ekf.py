@@ -14,7 +14,7 @@ from piezoest.equations import admissible, kalman
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators.base import NO_ROWS, NONE, Compiled, EstimatorBase, Status, Trace
 from piezoest.estimators.delay_line import delay_line, delayed
-from piezoest.models import ColemanHodgdon, LinearGain, Model, model_from_dict
+from piezoest.models import ColemanHodgdon, LinearGain, Model
 
 # State: bookkeeping, then vectors of n or n*n numbers, the delay line last.
 U_LAST, PRIMED, SAMPLES, MISSED, UPDATES, MOVED, LAST, INNOVATION, INNOVATION_VARIANCE = range(9)
@@ -360,10 +360,6 @@ class HysteresisEKF(EstimatorBase):
             np.concatenate([state, line]),
         )
 
-    @classmethod
-    def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        return {**arguments, "initial_model": model_from_dict(arguments["initial_model"])}
-
     def _sample(self, u: float, x: float) -> None:
         _step(self._state, self._config, u, x)
 
@@ -421,11 +417,6 @@ class HysteresisEKF(EstimatorBase):
         if n == 5:
             jacobian[..., 3, 4] = 1.0
         return jacobian @ P @ np.swapaxes(jacobian, -1, -2)
-
-    @property
-    def sample_rate(self) -> float:
-        """[Hz]."""
-        return float(self._arguments["sample_rate"])
 
     @property
     def state(self) -> FloatArray:

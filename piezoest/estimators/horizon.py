@@ -17,7 +17,7 @@ from piezoest.estimators.base import EstimatorBase, Status, Trace
 from piezoest.estimators.coordinates import Coordinates, coordinates
 from piezoest.estimators.shooting import Prior, Problem, Solution, inverse_information, single_shooting
 from piezoest.estimators.thinning import thinned
-from piezoest.models import ColemanHodgdon, LinearGain, model_from_dict
+from piezoest.models import ColemanHodgdon, LinearGain
 
 # The state: counters, the held model with its w_h, the last innovation, then the blocks of `_Layout`.
 SAMPLES, MISSING, SOLVES, FAILURES, UPDATES, LAST, KNOWN, U_LAST = range(8)
@@ -349,11 +349,6 @@ class MovingHorizon(EstimatorBase):
     # ------------------------------------------------------------ the face
 
     @property
-    def sample_rate(self) -> float:
-        """[Hz]."""
-        return float(self._arguments["sample_rate"])
-
-    @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the entries of `theta`; a last one, ``offset``, where it is estimated."""
         names = self._initial.parameter_names
@@ -432,7 +427,3 @@ class MovingHorizon(EstimatorBase):
         """Return to the state after construction."""
         super().reset()
         self._message, self._seconds = "", float("nan")
-
-    @classmethod
-    def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        return {**arguments, "initial_model": model_from_dict(arguments["initial_model"])}

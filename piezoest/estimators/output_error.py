@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from piezoest.equations import coleman_hodgdon, output_error
 from piezoest.estimators import output_error_kernel as kernel
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as front
-from piezoest.estimators.base import Compiled, EstimatorBase, Status, Trace
+from piezoest.estimators.base import Compiled, Freezable, Status, Trace
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.rls_settings import FIRST_HALF, LONGEST_GAP
-from piezoest.models import ColemanHodgdon, model_from_dict
-from piezoest.policies import OutlierRejection, Policy, RandomWalk, policy_from_dict, policy_to_dict, select
+from piezoest.models import ColemanHodgdon
+from piezoest.policies import OutlierRejection, Policy, RandomWalk, policy_to_dict, select
 
 # Seconds within which the disturbance may pass for noise of a single sample.
 SLACK = 1e-4
@@ -25,7 +25,7 @@ LASTING = 0.3
 POLICIES = (RandomWalk(), OutlierRejection())
 
 
-class OutputErrorRLS(EstimatorBase):
+class OutputErrorRLS(Freezable):
     """Recursive least squares of a Coleman-Hodgdon model in output-error form.
 
     For a fixed decay a the displacement x = c u + b h_a(u) + offset (2)-(3) is linear in
@@ -76,6 +76,8 @@ class OutputErrorRLS(EstimatorBase):
     """
 
     __slots__ = ("_config", "_initial", "_terms")
+
+    _frozen_at = front.FROZEN
 
     _compiled = Compiled(kernel._sample, kernel.proposed, front.FROZEN)
 
@@ -162,15 +164,6 @@ class OutputErrorRLS(EstimatorBase):
             np.concatenate([state, line]),
         )
 
-    @classmethod
-    def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        policies = tuple(policy_from_dict(item) for item in arguments["policies"])
-        return {
-            **arguments,
-            "initial_model": model_from_dict(arguments["initial_model"]),
-            "policies": policies,
-        }
-
     def _sample(self, u: float, x: float) -> None:
         kernel.step(self._state, self._config, u, x)
 
@@ -233,20 +226,6 @@ class OutputErrorRLS(EstimatorBase):
     def _row(self) -> FloatArray:
         """The filter's state and the member in use, shape (6,)."""
         return np.append(self._state[kernel.S : kernel.S + kernel.SIZE], self._state[kernel.MEMBER])
-
-    @property
-    def frozen(self) -> bool:
-        """Whether the estimate is held; settable. Samples are then counted as held."""
-        return bool(self._state[front.FROZEN])
-
-    @frozen.setter
-    def frozen(self, frozen: bool) -> None:
-        self._state[front.FROZEN] = float(bool(frozen))
-
-    @property
-    def sample_rate(self) -> float:
-        """[Hz]."""
-        return float(self._arguments["sample_rate"])
 
     @property
     def parameter_names(self) -> tuple[str, ...]:

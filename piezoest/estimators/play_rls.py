@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from piezoest._checks import FloatArray, array_1d, integer, non_negative, positive
 from piezoest.estimators import play_rls_kernel as kernel
 from piezoest.estimators import play_rls_settings as settings
-from piezoest.estimators.base import EstimatorBase, Status, Trace
+from piezoest.estimators.base import Freezable, Status, Trace
 from piezoest.estimators.delay_line import delay_line
 from piezoest.models import (
     ColemanHodgdon,
@@ -20,11 +20,10 @@ from piezoest.models import (
     MassSpringDamper,
     Model,
     PrandtlIshlinskii,
-    model_from_dict,
 )
 
 
-class PrandtlIshlinskiiRLS(EstimatorBase):
+class PrandtlIshlinskiiRLS(Freezable):
     """Recursive least squares of a Prandtl-Ishlinskii model with creep, asymmetry and offset.
 
     x = K u + sum_i rho_i play_i(u) + sum_j c_j creep_j + level is linear in its parameters, with
@@ -84,6 +83,8 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
     """
 
     __slots__ = ("_config", "_creep", "_initial", "_scale")
+
+    _frozen_at = kernel.FROZEN
 
     conformance_exceptions: ClassVar[dict[str, str]] = {
         "learns_the_parameters": "Its parameters are slopes of plays, not those of the Coleman-Hodgdon "
@@ -164,7 +165,7 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
 
     @classmethod
     def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        given = {**arguments, "initial_model": model_from_dict(arguments["initial_model"])}
+        given = super()._revive(arguments)
         if given.get("mechanics") is not None:
             given["mechanics"] = MassSpringDamper.from_dict(given["mechanics"])
         return given
@@ -193,20 +194,6 @@ class PrandtlIshlinskiiRLS(EstimatorBase):
     def _part(self, name: int, size: int) -> FloatArray:
         place = int(self._config[name])
         return self._state[place : place + size]
-
-    @property
-    def frozen(self) -> bool:
-        """Whether the estimate is held; settable. Samples are then counted as held."""
-        return bool(self._state[kernel.FROZEN])
-
-    @frozen.setter
-    def frozen(self, frozen: bool) -> None:
-        self._state[kernel.FROZEN] = float(bool(frozen))
-
-    @property
-    def sample_rate(self) -> float:
-        """[Hz]."""
-        return float(self._arguments["sample_rate"])
 
     @property
     def parameter_names(self) -> tuple[str, ...]:

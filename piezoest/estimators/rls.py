@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -11,16 +11,16 @@ from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
 from piezoest.estimators import rls_model, rls_profile
 from piezoest.estimators import rls_settings as settings
-from piezoest.estimators.base import NO_ROWS, NONE, Compiled, EstimatorBase, Status, Trace
+from piezoest.estimators.base import NO_ROWS, NONE, Compiled, Freezable, Status, Trace
 from piezoest.estimators.delay_line import delay_line
-from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain, Model, model_from_dict
-from piezoest.policies import Forgetting, Policy, policy_from_dict, policy_to_dict
+from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain, Model
+from piezoest.policies import Forgetting, Policy, policy_to_dict
 
 # Seconds of memory where the paper's law is asked for without one.
 PAPER_MEMORY = 0.4
 
 
-class HysteresisRLS(EstimatorBase):
+class HysteresisRLS(Freezable):
     """Recursive least squares on the derivative form of a model, from raw (u, x).
 
     The paper's estimator: z = dx/dt against the regressor (20) of the Coleman-Hodgdon model
@@ -82,6 +82,8 @@ class HysteresisRLS(EstimatorBase):
     """
 
     __slots__ = ("_config", "_initial", "_n", "_scale", "_terms")
+
+    _frozen_at = kernel.FROZEN
 
     _compiled = Compiled(
         kernel._sample,
@@ -168,15 +170,6 @@ class HysteresisRLS(EstimatorBase):
             state,
         )
 
-    @classmethod
-    def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        policies = tuple(policy_from_dict(item) for item in arguments["policies"])
-        return {
-            **arguments,
-            "initial_model": model_from_dict(arguments["initial_model"]),
-            "policies": policies,
-        }
-
     def _sample(self, u: float, x: float) -> None:
         kernel.step(self._state, self._config, u, x)
 
@@ -244,15 +237,6 @@ class HysteresisRLS(EstimatorBase):
         rls_profile.write(self._state, self._config, self._scale, profile)
 
     @property
-    def frozen(self) -> bool:
-        """Whether the estimate is held; settable. Samples are then counted as held."""
-        return bool(self._state[kernel.FROZEN])
-
-    @frozen.setter
-    def frozen(self, frozen: bool) -> None:
-        self._state[kernel.FROZEN] = float(bool(frozen))
-
-    @property
     def excitation(self) -> float:
         """Least eigenvalue of the regressor's mean square over a swing, in parts of the mean one.
 
@@ -263,11 +247,6 @@ class HysteresisRLS(EstimatorBase):
         mean = self._state[kernel.EXCITATION : kernel.EXCITATION + n * n].reshape(n, n)
         total = float(np.trace(mean))
         return max(0.0, float(np.linalg.eigvalsh(mean)[0]) * n / total) if total > 0.0 else 0.0
-
-    @property
-    def sample_rate(self) -> float:
-        """[Hz]."""
-        return float(self._arguments["sample_rate"])
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
