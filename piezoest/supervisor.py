@@ -30,6 +30,8 @@ FIRST = 8
 GAIN_KNOWN = 0.05
 # b in parts of c in a Coleman-Hodgdon model that stands for a line.
 NO_LOOP = 1e-9
+# An error's largest value counts like a root mean square this many times smaller.
+PEAK = 2.0
 # Rows of what is kept of the past.
 TIME, VOLTAGE, MEASURED, ROWS = range(4)
 
@@ -63,7 +65,9 @@ class Supervisor:
     compensator keeps its present model if that one passes, else gets the last one that had passed if it
     still does, else the line itself. What linear feed-forward would miss of a reference is
     what a line misses of the displacement, so that adaptation is never worse than that
-    for longer than it takes to see it. Errors are root mean squares; the recent past weighs more.
+    for longer than it takes to see it. Errors are root mean squares, or half the
+    largest value where that is more; the recent past weighs more.
+    At the start, until the line's gain is known, a model must be clearly better than the one in use.
 
     Parameters
     ----------
@@ -86,8 +90,9 @@ class Supervisor:
     """
 
     __slots__ = (
-        "_count", "_elapsed", "_events", "_good", "_held", "_kept",
-        "_limit", "_moved", "_past", "_read_at", "_reading", "_sample_rate", "_still", "_until", "_window",
+        "_count", "_elapsed", "_events", "_first", "_good", "_held", "_kept",
+        "_limit", "_line_at", "_moved", "_past", "_read_at", "_reading", "_sample_rate", "_still", "_until",
+        "_window",
     )  # fmt: skip
 
     def __init__(self, sample_rate: float, *, window: float = 0.2, limit: float = 1.0) -> None:
@@ -99,10 +104,11 @@ class Supervisor:
     def reset(self) -> None:
         """Return to the state after construction."""
         self._elapsed = self._moved = 0.0  # s, the second without what was at rest
-        self._until = 0.0
+        self._until, self._line_at = 0.0, 0.0
         self._past = np.empty((ROWS, 2 * WINDOWS * MOST))
         self._count = 0
         self._reading, self._read_at, self._still = math.nan, 0.0, False
+        self._first: Model | None = None
         self._good: Model | None = None
         self._held: Model | None = None
         self._kept = False
@@ -138,8 +144,8 @@ class Supervisor:
         """
         self._elapsed += u.size / self._sample_rate
         if self._is_at_rest(u):
-            # Creep alone moves the stage: nothing to judge a model by.
-            return proposed if self._held is None else self._held
+            # Creep alone moves the stage: nothing to judge a model by. Full voltage is such a rest, too.
+            return present if self._held is None else self._held
         if not self._take(u, x):
             # Nothing was measured: nothing to judge a model by, and nothing new for it to go by.
             return present
@@ -148,7 +154,7 @@ class Supervisor:
         weights = 0.5 ** (ages / (HALF_LIFE * self._window)) * (ages <= self._window)
         line = _line(past[:, weights > 0.0], weights[weights > 0.0], whole=self._moved >= self._window)
         if line is None:
-            return proposed
+            return self._while_there_is_no_line(past, weights, present, proposed)
         gain, offset, unexplained = line
         span = float(np.ptp(past[MEASURED, weights > 0.0]))
         limit = allowed = max(self._limit * unexplained, NEGLIGIBLE * span)
@@ -167,6 +173,18 @@ class Supervisor:
             self._kept = True
             return present
         return self._fall_back(past, weights, limit, gain, offset, present, reason)
+
+    def _while_there_is_no_line(
+        self, past: FloatArray, weights: FloatArray, present: Model, proposed: Model
+    ) -> Model:
+        """The proposed model or the first one, if that is clearly better than the one in use."""
+        if self._first is None:
+            self._first = present
+        error = _error(present, past, weights)
+        for other in (proposed, self._first):
+            if _error(other, past, weights) <= CLEARLY * error:
+                return other
+        return present
 
     def _is_at_rest(self, u: FloatArray) -> bool:
         largest = max(
@@ -226,8 +244,11 @@ class Supervisor:
         present: Model,
         reason: str,
     ) -> Model:
-        if self._held is not None and _error(self._held, past, weights) <= STALE * allowed:
+        # A line of less than a whole window becomes better with every point.
+        settled = self._line_at >= self._window
+        if self._held is not None and settled and _error(self._held, past, weights) <= STALE * allowed:
             return self._held
+        self._line_at = self._moved
         fallen = self._held is not None
         good = self._good
         if good is not None and _error(good, past, weights) <= allowed:
@@ -263,13 +284,12 @@ def _line(past: FloatArray, weights: FloatArray, *, whole: bool) -> tuple[float,
     missed = x - gain * u
     if not math.sqrt(float(missed @ missed) / size) < GAIN_KNOWN * abs(gain) * math.sqrt(spread):
         return None
-    return gain, x_mean - gain * u_mean, math.sqrt(float(weights @ missed**2) / float(weights.sum()))
+    return gain, x_mean - gain * u_mean, _size(missed, weights)
 
 
 def _error(model: Model, past: FloatArray, weights: FloatArray) -> float:
-    """Root mean square of what a model misses of the past [µm], by the weights of its points."""
+    """How much a model misses of the past [µm], by the weights of its points."""
     u = np.ascontiguousarray(past[VOLTAGE])
-    total = float(weights.sum())
     with np.errstate(all="ignore"):
         if isinstance(model, ColemanHodgdon):
             # Somewhere within the loop, which is soon forgotten: the middle between its branches.
@@ -280,9 +300,15 @@ def _error(model: Model, past: FloatArray, weights: FloatArray) -> float:
             missed = past[MEASURED] - model.simulate(u)
         else:
             missed = past[MEASURED] - model.simulate(u)  # type: ignore[attr-defined]
-            missed = missed - float(weights @ missed) / total
-        error = math.sqrt(float(weights @ missed**2) / total)
+            missed = missed - float(weights @ missed) / float(weights.sum())
+        error = _size(missed, weights)
     return error if math.isfinite(error) else math.inf
+
+
+def _size(missed: FloatArray, weights: FloatArray) -> float:
+    """Root mean square of an error by weights [µm], or a part of the largest if that is more."""
+    mean = math.sqrt(float(weights @ missed**2) / float(weights.sum()))
+    return max(mean, float(np.max(np.abs(missed[weights > 0.0]))) / PEAK)
 
 
 def _as_model(gain: float, offset: float, present: Model) -> Model:

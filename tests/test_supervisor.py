@@ -6,11 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import piezoest as pz
-from piezoest.equations.coleman_hodgdon import stationary_gain
 
 FS = 20_000.0
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
@@ -101,17 +98,6 @@ def test_short_memory_is_guarded() -> None:
     plain, guarded = ring(estimators[0]), ring(estimators[1], pz.Supervisor(FS, window=0.2))
     assert guarded.rms_error() < 0.5 * plain.rms_error()
     assert np.median(guarded.max_error_per_period()[1:]) < 1.2 * 0.55
-
-
-@given(st.floats(1e-3, 0.5), st.floats(0.1, 100.0), st.floats(0.05, 0.5))
-def test_stationary_gain_is_that_of_the_simulated_loop(a: float, amplitude: float, part: float) -> None:
-    model = pz.ColemanHodgdon.from_loop(a, part * 0.2, 0.2)
-    turns = np.tile([1.0, -1.0], 200) * amplitude
-    u = np.interp(np.arange(0, turns.size - 1, 0.05), np.arange(turns.size), turns)
-    x = model.simulate(u, initial_state=-np.tanh(a * amplitude) * model.b / a)
-    peak = np.argmax(u[-60:])
-    expected = x[-60:][peak] / u[-60:][peak]
-    assert stationary_gain(amplitude, model.a, model.b, model.c) == pytest.approx(expected, rel=1e-6)
 
 
 def test_wrong_arguments() -> None:

@@ -85,11 +85,13 @@ def change_model(state: Any, config: Any, a: Any, b: Any, c: Any, offset: Any) -
     """Take another model without a bump: its w_h is found, the difference owed."""
     expected = config[C] * state[VOLTAGE] + state[W_H] + config[OFFSET] + state[OWED]
     if config[BY_PATH] != 0.0:
-        h = recent_path.hysteresis(state, PATH, a)
+        # What the path does not tell stays: the same model changes nothing.
+        untold = 0.0
         if config[B] > 0.0:
-            # What the path does not tell stays: the same model changes nothing.
-            h += state[W_H] / config[B] - recent_path.hysteresis(state, PATH, config[A])
-        place = h * a
+            untold = state[W_H] / config[B] - recent_path.hysteresis(state, PATH)
+        if b > 0.0:
+            recent_path.take_up(state, PATH, a)
+        place = a * (recent_path.hysteresis(state, PATH) + untold)
     else:
         place = state[W_H] * config[A] / config[B] if config[B] > 0.0 else 0.0
     place = min(max(place, -1.0), 1.0)
@@ -224,7 +226,7 @@ class Compensator:
         self._model = model
         self._state = np.zeros(STATE)
         self._state[VOLTAGE] = self._limits.rest
-        recent_path.begin(self._state, PATH, self._limits.rest)
+        recent_path.begin(self._state, PATH, self._limits.rest, self._config[A])
         remember(self._state, MEMORY, self._limits.rest)
         self._place(model, model)
 
@@ -309,7 +311,9 @@ class Compensator:
         self._place(model, before)
         self._model = model
         a, b = self._config[A], self._config[B]
-        self._state[W_H] = b * recent_path.hysteresis(self._state, PATH, a) if b > 0.0 else 0.0
+        if b > 0.0:
+            recent_path.take_up(self._state, PATH, a)
+        self._state[W_H] = b * recent_path.hysteresis(self._state, PATH)
         self._state[OWED] = expected - self._expected()
 
     def _handed_over(self, model: Model, projected: bool) -> None:

@@ -98,17 +98,6 @@ def hysteresis_jacobian(w_h, du, a, b):
 
 
 @register_jitable
-def stationary_gain(amplitude, a, b, c):
-    """Gain x/u at the turning points of a stationary symmetric loop of `amplitude` [V].
-
-    From (B12), (B14) with w_h(-U) = -w_h(U): w_h = -(b/a) tanh(a U) at +U.
-    """
-    travel = a * np.abs(amplitude)
-    decay = relative_decay(2.0 * travel)
-    return c - 2.0 * b * decay / (2.0 - 2.0 * travel * decay)
-
-
-@register_jitable
 def branch(u, u_0, w_0, alpha, beta, gamma):
     """w at voltage u on the branch through (u_0, w_0): (B5)-(B8), the exact solution of (1)."""
     s = np.sign(u - u_0)

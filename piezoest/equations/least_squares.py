@@ -258,33 +258,3 @@ def restore_covariance(P, P_0, n, reset):
     """Covariance resetting: P = P_0 where `reset` is 1.0 (Ioannou and Sun, sec. 4.3.6)."""
     for i in range(n * n):
         P[i] = P[i] + reset * (P_0[i] - P[i])
-
-
-@register_jitable
-def solve_positive(A, b, n, x, work):
-    """Solve A x = b for a symmetric positive definite A (n*n,) by Cholesky; `work` has n*n numbers.
-
-    A pivot that rounding made negative counts as a very small one: x stays finite.
-    """
-    for j in range(n):
-        pivot = A[j * n + j]
-        for k in range(j):
-            pivot = pivot - work[j * n + k] * work[j * n + k]
-        root = np.sqrt(np.fmax(pivot, 1e-300))
-        work[j * n + j] = root
-        for i in range(j + 1, n):
-            entry = A[i * n + j]
-            for k in range(j):
-                entry = entry - work[i * n + k] * work[j * n + k]
-            work[i * n + j] = entry / root
-    for i in range(n):
-        total = b[i]
-        for k in range(i):
-            total = total - work[i * n + k] * x[k]
-        x[i] = total / work[i * n + i]
-    for m in range(n):
-        i = n - 1 - m
-        total = x[i]
-        for k in range(i + 1, n):
-            total = total - work[k * n + i] * x[k]
-        x[i] = total / work[i * n + i]

@@ -5,7 +5,8 @@ from the last few swings, so that a compensator can take up a new one as if it h
 Like `turning_points` this is bookkeeping, with branches, for numbers alone.
 
 Flat memory within a larger array, from `start` on: direction of travel, furthest voltage in it, present
-voltage, whether swings were dropped, count, then the turning points, oldest first.
+voltage, decay a of the model in use, its w_h/b at the oldest and at the last turning point, largest swing
+of late, how many turning points there are, the place of the last one, then the places, used in turns.
 """
 
 from __future__ import annotations
@@ -15,35 +16,25 @@ from numba.extending import register_jitable
 
 from piezoest.equations.coleman_hodgdon import hysteresis_step
 
-DIRECTION, FURTHEST, PRESENT, DROPPED, COUNT, POINTS = range(6)
-MOST = 33  # sixteen periods and the turn before
+DIRECTION, FURTHEST, PRESENT, DECAY, AT_OLDEST, AT_LAST, LARGEST, COUNT, NEWEST, POINTS = range(10)
+MOST = 33  # sixteen periods and the turn before; odd
 SIZE = POINTS + MOST
 
 # What is left of a swing this long ago no longer counts.
-FORGOTTEN = 1e-4
+FORGOTTEN = 1e-3
 
-# A way back is a turn from this part of the largest swing on.
-TURN = 0.01
+# A way back is a turn from this part of the largest swing on, which fades by this part from one to the next.
+TURN, FADES = 0.01, 0.03
 
 
 @register_jitable
-def begin(path, start, u):
-    """Begin at rest at u, without any memory."""
+def begin(path, start, u, a):
+    """Begin at rest at u, without any memory; a [1/V] is the decay of the model in use."""
     for k in range(SIZE):
         path[start + k] = 0.0
     path[start + FURTHEST] = path[start + PRESENT] = path[start + POINTS] = u
+    path[start + DECAY] = a
     path[start + COUNT] = 1.0
-
-
-@register_jitable
-def largest_swing(path, start):
-    """Size of the largest swing that is remembered, the present one included [V]."""
-    points = start + POINTS
-    count = int(path[start + COUNT])
-    largest = np.abs(path[start + FURTHEST] - path[points + count - 1])
-    for k in range(1, count):
-        largest = max(largest, np.abs(path[points + k] - path[points + k - 1]))
-    return largest
 
 
 @register_jitable
@@ -55,53 +46,74 @@ def follow(path, start, u):
         if path[start + DIRECTION] == 0.0:
             path[start + DIRECTION] = np.sign(way)
         path[start + FURTHEST] = u
-    elif np.abs(way) > TURN * largest_swing(path, start):
-        points = start + POINTS
-        count = int(path[start + COUNT])
-        if count == MOST:
-            for k in range(MOST - 1):
-                path[points + k] = path[points + k + 1]
-            count -= 1
-            path[start + DROPPED] = 1.0
-        path[points + count] = path[start + FURTHEST]
-        path[start + COUNT] = count + 1
+        return
+    swing = path[start + FURTHEST] - path[start + POINTS + int(path[start + NEWEST])]
+    largest = max(path[start + LARGEST], np.abs(swing))
+    if np.abs(way) > TURN * largest:
+        path[start + LARGEST] = largest - FADES * largest
+        path[start + AT_LAST] = hysteresis_step(path[start + AT_LAST], swing, path[start + DECAY], 1.0)
+        _add(path, start, path[start + FURTHEST])
         path[start + DIRECTION] = -path[start + DIRECTION]
         path[start + FURTHEST] = u
 
 
 @register_jitable
-def middle(path, start):
-    """Middle between the lowest and the highest turning point that is remembered [V]."""
+def _add(path, start, u):
+    """Add a turning point; where all places are taken the oldest goes: the model goes on from the next."""
     points = start + POINTS
-    lowest = highest = path[points]
-    for k in range(1, int(path[start + COUNT])):
-        lowest = min(lowest, path[points + k])
-        highest = max(highest, path[points + k])
-    return 0.5 * (lowest + highest)
+    free = int(_later(int(path[start + NEWEST])))
+    if path[start + COUNT] < MOST:
+        path[start + COUNT] += 1.0
+    else:
+        swing = path[points + int(_later(free))] - path[points + free]
+        path[start + AT_OLDEST] = hysteresis_step(path[start + AT_OLDEST], swing, path[start + DECAY], 1.0)
+    path[points + free] = u
+    path[start + NEWEST] = free
 
 
 @register_jitable
-def hysteresis(path, start, a):
-    """w_h/b of a Coleman-Hodgdon model with decay a at the present voltage [V], by (3).
+def _later(place):
+    """The place after this one, in turns."""
+    return place + 1 if place < MOST - 1 else 0
 
-    A memory that still holds its beginning starts from zero. Else the oldest point is taken for the turning
-    point of a steady loop around the middle of all that is remembered: at a voltage A above the
-    middle that is -tanh(a A)/a.
+
+@register_jitable
+def _earlier(place):
+    """The place before this one, in turns."""
+    return place - 1 if place > 0 else MOST - 1
+
+
+@register_jitable
+def hysteresis(path, start):
+    """w_h/b of the model in use at the present voltage [V], by (3) from its last turning point."""
+    last = path[start + POINTS + int(path[start + NEWEST])]
+    a, furthest = path[start + DECAY], path[start + FURTHEST]
+    h = hysteresis_step(path[start + AT_LAST], furthest - last, a, 1.0)
+    return hysteresis_step(h, path[start + PRESENT] - furthest, a, 1.0)
+
+
+@register_jitable
+def take_up(path, start, a):
+    """Bring another decay a [1/V] into use, as if it had been from the oldest turning point on.
+
+    Where that one still counts after so many swings, they are small, a times a swing well below one. The
+    model then stands at minus half the swing in a steady loop, whatever a is: it keeps the place there.
+    Where the walk back ends before, what little is left counts as that of a steady loop: the same place, on
+    either side in turns.
     """
     points = start + POINTS
-    count = int(path[start + COUNT])
-    later = path[start + FURTHEST]
-    h = hysteresis_step(0.0, path[start + PRESENT] - later, a, 1.0)
-    kept = np.exp(-a * np.abs(path[start + PRESENT] - later))
-    k = count - 1
-    while k >= 0 and kept > FORGOTTEN:
-        du = later - path[points + k]
-        h += kept * hysteresis_step(0.0, du, a, 1.0)
-        kept *= np.exp(-a * np.abs(du))
-        later = path[points + k]
-        k -= 1
-    if k < 0 and path[start + DROPPED] != 0.0:
-        twice = 2.0 * (later - middle(path, start))
-        left = np.exp(-a * np.abs(twice))
-        h -= kept * np.sign(twice) * (1.0 - left) / (1.0 + left) / a
-    return h
+    level, kept = 0.0, 1.0  # a w_h/b that comes of the swings, and what is left of an earlier one
+    earlier = path[start + AT_OLDEST]  # on the last one's side: it is zero while the number of points is even
+    at = int(path[start + NEWEST])
+    more = int(path[start + COUNT]) - 1
+    while more > 0 and kept > FORGOTTEN:
+        before = int(_earlier(at))
+        swing = path[points + at] - path[points + before]
+        faded = kept * np.expm1(-a * np.abs(swing))  # (B12)-(B15)
+        level += faded if swing > 0.0 else -faded
+        kept += faded
+        earlier = -earlier
+        at = before
+        more -= 1
+    path[start + AT_LAST] = level / a + kept * earlier
+    path[start + DECAY] = a

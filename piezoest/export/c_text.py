@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -34,8 +35,8 @@ _HELPERS = {
 }
 # exp(x) - 1 loses its digits near zero. In double it is math.h's expm1, the one that the library runs:
 # with exponential forgetting the ring makes 1e-10 of a difference in the last digit. In float a power
-# series does, and is several times faster on a small target.
-_SERIES_LIMIT, _SERIES_TERMS = 0.35, 7
+# series does, and is several times faster on a small target; from the end on nothing is left of exp(-x).
+_SERIES_LIMIT, _SERIES_TERMS, _SERIES_END = 0.35, 7, 20.0
 
 
 def header(made: _Generator) -> str:
@@ -240,22 +241,32 @@ static double exp_minus_one(double x)
     return expm1(x);
 }
 """
-    return f"""/* exp(x) - 1, by its power series where the difference would cancel. */
+    return f"""/* exp(x) - 1: by the power series of a half, a quarter, ... of x, doubled as often. */
 static float exp_minus_one(float x)
 {{
-    if (fabsf(x) > {_SERIES_LIMIT}f) {{
+    if (!(fabsf(x) < {_SERIES_END}f)) {{
         return expf(x) - 1.0f;
     }}
-    return x * {_series()};
+    int halved = 0;
+    while (fabsf(x) > {_SERIES_LIMIT}f) {{
+        x *= 0.5f;
+        ++halved;
+    }}
+    float found = x * {_series()};
+    while (halved > 0) {{
+        found *= 2.0f + found;
+        --halved;
+    }}
+    return found;
 }}
 """
 
 
 def _series() -> str:
     """Horner's form of (exp(x) - 1) / x."""
-    text = "1.0f"
-    for n in range(_SERIES_TERMS, 1, -1):
-        text = f"(1.0f + x * {literal(1.0 / n, True)}{'' if n == _SERIES_TERMS else f' * {text}'})"
+    text = literal(1.0 / math.factorial(_SERIES_TERMS), True)
+    for n in range(_SERIES_TERMS - 1, 0, -1):
+        text = f"({literal(1.0 / math.factorial(n), True)} + x * {text})"
     return text
 
 
