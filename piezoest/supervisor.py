@@ -25,7 +25,7 @@ CLEARLY = 0.7
 # so many times what is allowed.
 AGAIN, STALE = 0.25, 1.05
 # While a period is not over, the line goes through the mean of so many points: the first alone is noisy.
-FIRST = 8
+FIRST = 16
 # The line's gain must be known this well before anything is judged by it.
 GAIN_KNOWN = 0.05
 # b in parts of c in a Coleman-Hodgdon model that stands for a line.
