@@ -6,33 +6,33 @@ into intervals, and hand the estimator's model over.
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba.extending import register_jitable
 
 from piezoest._checks import FloatArray
 from piezoest.compensators import Compensator, InverseCompensator, LinearCompensator
 from piezoest.compensators import base as compensators
 from piezoest.compensators.adoption import adopt
 from piezoest.equations import admissible
-from piezoest.estimators import ekf, rls_kernel, rls_model
-from piezoest.estimators.base import NO_ROWS, NONE
-from piezoest.estimators.ekf import HysteresisEKF
-from piezoest.estimators.rls import HysteresisRLS
+from piezoest.estimators.base import NO_ROWS, NONE, EstimatorBase
 from piezoest.models import ColemanHodgdon, LinearGain
 from piezoest.stage import SimulatedStage
 from piezoest.stage import kernel as stages
 
-
-@njit(
-    "b1(i8, b1, b1, f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8, i8, f8[::1], f8[::1], f8[::1],"
-    " f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])",
-    cache=True,
+SIGNATURE = (
+    "b1(i8, b1, f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8, i8, f8[::1], f8[::1], f8[::1],"
+    " f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])"
 )
-def _run(
+
+
+@register_jitable
+def ring(
+    learn: Any,
+    propose: Any,
     interval: int,
-    squares: bool,
     hysteretic: bool,
     estimator: Any,
     estimator_settings: Any,
@@ -56,16 +56,19 @@ def _run(
 ) -> bool:
     """Run the ring; rows of `record` are u, x and the true x, of `models` the model in use in each interval.
 
-    `squares` says which estimator it is. Returns whether the last model was not taken as it was proposed.
+    `learn` and `propose` are the estimator's. Returns whether the last model was not taken as proposed.
     """
     projected = False
     u, x, true = record[0], record[1], record[2]
     proposed = np.zeros(4)
     for start in range(0, r.size, interval):
         stop = min(start + interval, r.size)
-        models[start // interval, :] = model
+        for i in range(4):
+            models[start // interval, i] = model[i]
+            proposed[i] = 0.0
         compensators._run(compensator, settings, r[start:stop], u[start:stop])
-        true[start:stop] = u[start:stop]
+        for k in range(start, stop):
+            true[k] = u[k]
         stages.run(
             stage,
             stage_settings,
@@ -77,25 +80,20 @@ def _run(
             shape[start:stop] if shape.size > 1 else shape,
             x[start:stop],
         )
-        proposed[:] = 0.0
-        never = stop - start + 1
-        u_now, x_now = u[start:stop], x[start:stop]
-        if squares:
-            rls_kernel.run(
-                estimator, estimator_settings, u_now, x_now, never, scale, no_rows, none, none, no_rows
-            )
-            rls_model.propose(estimator, estimator_settings, terms, proposed)
-        else:
-            ekf._run(
-                estimator, estimator_settings, u_now, x_now, never, no_rows, no_rows, none, none, no_rows
-            )
-            ekf._propose(estimator, estimator_settings, terms, proposed)
+        learn(estimator, estimator_settings, u[start:stop], x[start:stop], scale, none, no_rows)
+        propose(estimator, estimator_settings, terms, proposed)
         projected = hysteretic and not admissible.has_inverse(proposed[0], proposed[1], proposed[2])
         if adopt(compensator, settings, proposed, hysteretic, compensators.change_model):
-            model[:] = proposed
+            for i in range(4):
+                model[i] = proposed[i]
         else:
             projected = True
     return projected
+
+
+def _loop_of(estimator: Any) -> str | None:
+    """Module with the compiled ring of this very class; what inherits from it may learn otherwise."""
+    return vars(type(estimator)).get("_ring") if isinstance(estimator, EstimatorBase) else None
 
 
 def can_run(stage: Any, compensator: Any, estimator: Any) -> bool:
@@ -104,7 +102,7 @@ def can_run(stage: Any, compensator: Any, estimator: Any) -> bool:
         isinstance(stage, SimulatedStage)
         and type(stage).run is SimulatedStage.run
         and type(compensator) in (InverseCompensator, LinearCompensator)
-        and type(estimator) in (HysteresisRLS, HysteresisEKF)
+        and _loop_of(estimator) is not None
         and type(compensator.model) in (ColemanHodgdon, LinearGain)
         and type(estimator._initial) is type(compensator.model)
     )
@@ -121,10 +119,11 @@ def run(
     record, models = np.empty((3, r.size)), np.empty((-(-r.size // interval), 4))
     estimator._records(NONE, NONE)
     noise, factor, shape = stage._disturbances(r.size)
-    squares = isinstance(estimator, HysteresisRLS)
-    projected = _run(
-        interval, squares, kind is ColemanHodgdon,
-        estimator._state, estimator._config, estimator._scale if squares else NONE, estimator._terms,
+    # Each estimator's ring takes its time to compile: only the one that is needed is loaded.
+    loop = import_module(str(_loop_of(estimator)))
+    projected = loop.run(
+        interval, kind is ColemanHodgdon,
+        estimator._state, estimator._config, getattr(estimator, "_scale", NONE), estimator._terms,
         compensator._state, compensator._config,
         stage._plays, stage._terms, stage._state, stage._settings, noise, factor, shape,
         r, model, record, models, NONE, NO_ROWS,

@@ -12,7 +12,6 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST, FloatArray, array_1d, integer, positive
 from piezoest._jit import UNCOUNTED
-from piezoest.compensators import play_inverse
 from piezoest.compensators.layout import (
     BY_PATH,
     CONFIG,
@@ -158,6 +157,13 @@ def _loop(model: Model) -> tuple[float, float, float, float]:
     return 1.0, 0.0, model.gain, model.offset
 
 
+def _plays() -> Any:
+    """Loops of a Prandtl-Ishlinskii model: loaded with the first one, for they take time to compile."""
+    from piezoest.compensators import play_inverse
+
+    return play_inverse
+
+
 class Compensator:
     """Feed-forward through the inverse of a model.
 
@@ -210,7 +216,7 @@ class Compensator:
     def _compiled(self) -> tuple[Any, Any]:
         """Functions that a controller's code is generated from: voltage; change of model, or None."""
         if isinstance(self._model, PrandtlIshlinskii):
-            return play_inverse.step, None
+            return _plays().step, None
         return _voltage, change_model
 
     @property
@@ -256,7 +262,7 @@ class Compensator:
         """Displacement that the model in use expects of the last sample [µm]."""
         config, state = self._config, self._state
         if isinstance(self._model, PrandtlIshlinskii):
-            return float(play_inverse.expected(state, config))
+            return float(_plays().expected(state, config))
         return float(config[C] * state[VOLTAGE] + state[W_H] + config[OFFSET])
 
     def _place(self, model: Model, before: Model) -> None:
@@ -361,7 +367,7 @@ class Compensator:
             Voltage [V], within the limits.
         """
         if isinstance(self._model, PrandtlIshlinskii):
-            return play_inverse.step(self._state, self._config, np.nan if r is None else r)
+            return float(_plays().step(self._state, self._config, np.nan if r is None else r))
         return _step(self._state, self._config, np.nan if r is None else r)
 
     def run(self, r: Any) -> FloatArray:
@@ -384,7 +390,7 @@ class Compensator:
         """
         r = array_1d("r", r, allow_nan=True)
         u = np.empty_like(r)
-        run = play_inverse.run if isinstance(self._model, PrandtlIshlinskii) else _run
+        run = _plays().run if isinstance(self._model, PrandtlIshlinskii) else _run
         run(self._state, self._config, r, u)
         return u
 

@@ -298,6 +298,8 @@ class HysteresisEKF(EstimatorBase):
 
     __slots__ = ("_config", "_initial", "_n", "_terms")
 
+    # Module with the compiled ring of `track`.
+    _ring = "piezoest.tracking_ekf"
     _compiled = Compiled(_sample, proposed, None)
 
     conformance_exceptions: ClassVar[dict[str, str]] = {}

@@ -134,7 +134,8 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting:
     state[LAST] = UPDATED
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8, i8)", cache=True, **UNCOUNTED)
+# Compiled when it is first called: few need it by itself.
+@njit(cache=True, **UNCOUNTED)
 def _update(state: Any, config: Any, phi: Any, z: float, n: int) -> None:
     forgetting = config[FORGETTING]
     if config[LEAST_FACTOR] > 0.0:

@@ -85,6 +85,8 @@ class HysteresisRLS(Freezable):
 
     _frozen_at = kernel.FROZEN
 
+    # Module with the compiled ring of `track`.
+    _ring = "piezoest.tracking_rls"
     _compiled = Compiled(
         kernel._sample,
         rls_model.proposed,
