@@ -22,7 +22,7 @@ def write_columns(path: str | Path, columns: Mapping[str, Any]) -> None:
     Parameters
     ----------
     path : str or Path
-        File to write; an existing one is replaced. ``.csv``, ``.txt``, ``.dat`` and ``.tsv`` are text
+        File to write; an existing one is replaced. ``.csv``, ``.txt``, ``.dat``, ``.tsv`` and none are text
         with a header, to nine significant digits and time to twelve; ``.parquet``, ``.h5``, ``.mat`` (of
         version 5, which every MATLAB reads), ``.npy`` (named fields) and ``.npz`` hold every bit.
     columns : mapping of str to array_like, each of shape (N,)
@@ -62,6 +62,8 @@ def writer_for(path: str | Path) -> Callable[[Path, Columns], None]:
     ending = Path(path).suffix.lower()
     formats = {each: name for name, _, endings in FORMATS for each in endings}
     formats |= dict.fromkeys(TEXT_ENDINGS, "text")
+    if not ending:  # such as /dev/stdout
+        return _write_text
     if ending not in formats:
         raise ValueError(
             f"{path}: the ending of its name stands for no format: use one of {', '.join(formats)}"
@@ -113,13 +115,14 @@ def _write_npy(path: Path, columns: Columns) -> None:
     rows = np.zeros(size, [(name, np.float64) for name in columns])
     for name, values in columns.items():
         rows[name] = values
-    with path.open("wb") as file:  # of a name NumPy would make another one, where the ending is .NPY
+    with path.open("wb") as file:  # a name in capitals NumPy would lengthen
         np.save(file, rows)
 
 
 def _write_npz(path: Path, columns: Columns) -> None:
+    arrays: dict[str, Any] = dict(columns)
     with path.open("wb") as file:
-        np.savez(file, **columns)
+        np.savez(file, **arrays)
 
 
 WRITERS: dict[str, Callable[[Path, Columns], None]] = {
