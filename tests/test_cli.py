@@ -127,6 +127,22 @@ def test_identified_model_goes_into_compensate(log: Path, reference: Path) -> No
     np.testing.assert_allclose(x, u.displacement, atol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["voltage.mat", "voltage.npy"])
+def test_compensate_writes_what_the_ending_says(reference: Path, name: str) -> None:
+    assert run("compensate", reference, *THETA, "-o", "voltage.csv").exit_code == 0
+    assert run("compensate", reference, *THETA, "-o", name).exit_code == 0
+    named = {"voltage": "voltage_V", "displacement": "reference_um"}
+    text, other = (read_record(file, columns=named).voltage for file in ("voltage.csv", name))
+    np.testing.assert_allclose(other, text, atol=1e-7)
+
+
+def test_compensate_refuses_an_ending_before_the_work(reference: Path) -> None:
+    result = run("compensate", reference, *THETA, "-o", "voltage.xlsx")
+    assert result.exit_code == 1
+    assert "voltage.xlsx: the ending of its name stands for no format" in result.stderr
+    assert not Path("voltage.xlsx").exists()
+
+
 def test_compensate_keeps_within_limits_and_says_so(reference: Path) -> None:
     result = run("compensate", reference, *THETA, "--maximum", 10, "--minimum", -8, "-o", "voltage.csv")
     assert result.exit_code == 0

@@ -307,6 +307,47 @@ def test_streamed_equals_read(tmp_path: Path, name: str, rows: int) -> None:
     assert max(block.voltage.size for block in stream) <= rows
 
 
+@pytest.mark.parametrize(
+    "name", ["a.parquet", "a.pq", "a.h5", "a.hdf5", "a.mat", "a.npy", "a.npz", "A.MAT", "A.NPY", "A.NPZ"]
+)
+def test_written_and_read_again_to_the_bit(tmp_path: Path, name: str) -> None:
+    record = Record.from_arrays(VOLTAGE / 3.0, DISPLACEMENT / 7.0, RATE)
+    record.write(tmp_path / name)
+    assert [file.name for file in tmp_path.iterdir()] == [name]
+    again = read_record(tmp_path / name)
+    for attribute in ("voltage", "displacement"):
+        np.testing.assert_array_equal(getattr(again, attribute), getattr(record, attribute))
+    np.testing.assert_allclose(again.time, TIME, atol=1e-12)
+    assert again.sample_rate == pytest.approx(RATE)
+    assert again.skipped == 1
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.txt", "a.tsv", "a.dat", "a"])
+def test_written_as_text_and_read_again(tmp_path: Path, name: str) -> None:
+    Record.from_arrays(VOLTAGE, DISPLACEMENT, RATE).write(tmp_path / name)
+    again = read_record(tmp_path / name)
+    np.testing.assert_allclose(again.voltage, VOLTAGE, rtol=1e-8)
+    np.testing.assert_allclose(again.displacement, DISPLACEMENT, rtol=1e-8)
+    assert ("\t" in (tmp_path / name).read_text()) == (name == "a.tsv")
+
+
+@pytest.mark.parametrize("name", ["a.xlsx", "a.csv.gz"])
+def test_an_ending_that_stands_for_no_format(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ValueError, match=rf"{name}: the ending .* \.parquet, .*\.csv"):
+        Record.from_arrays(VOLTAGE, DISPLACEMENT, RATE).write(tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("file", "package"), [("log.parquet", "pyarrow"), ("log.h5", "h5py")])
+def test_missing_extra_of_writing_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str, package: str
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ImportError, match=rf"needs {package}, .* pip install 'piezoest\[formats\]'"):
+        Record.from_arrays(VOLTAGE, DISPLACEMENT, RATE).write(tmp_path / file)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(("file", "package"), [("log.parquet", "pyarrow"), ("log.h5", "h5py")])
 def test_missing_extra_is_named(tmp_path: Path, file: str, package: str) -> None:
     WRITERS[file](tmp_path / file, NAMES)

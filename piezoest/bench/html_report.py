@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from piezoest import _extras
-from piezoest.bench import adaptation_report, paper_report
+from piezoest.bench import adaptation_report, paper_report, suite_report
 from piezoest.bench.adaptation import SOON
 from piezoest.report import Page
 
@@ -42,7 +42,7 @@ def write_html(document: Document, path: str | Path) -> None:
     suite = document.get("suite")
     if not isinstance(suite, str):
         raise ValueError("document has no suite: pass what piezoest bench writes with --json")
-    page = Page(f"piezoest bench {suite}", _origin(document))
+    page = Page(TITLES.get(suite, f"piezoest bench {suite}"), _origin(document))
     PAGES.get(suite, _any)(page, document)
     versions = ", ".join(f"{name} {version}" for name, version in document.get("versions", {}).items())
     page.footer(f"{_origin(document)} {versions}")
@@ -50,13 +50,13 @@ def write_html(document: Document, path: str | Path) -> None:
 
 
 def _origin(document: Document) -> str:
-    machine = document.get("machine", {})
+    machine, seeds = document.get("machine", {}), document.get("seeds")
     parts = [
         str(document.get("date", ""))[:10],
         str(machine.get("cpu", "")),
         f"{machine['cores']} cores" if "cores" in machine else "",
         str(machine.get("python", "")),
-        f"seeds: {document['seeds']}" if "seeds" in document else "",
+        "" if seeds is None else f"seeds: {len(seeds) if isinstance(seeds, list) else seeds}",
         f"{document['seconds']:.0f} s" if "seconds" in document else "",
     ]
     return ", ".join(part for part in parts if part) + "."
@@ -154,13 +154,61 @@ def _transients(rows: Sequence[Row], colours: dict[str, str]) -> Any:
             line={"color": colours[row["estimator"]], "width": 2, "dash": row.get("dash", "solid")},
             name=row["estimator"],
         )
-    figure.update_xaxes(title_text="period", tickformat="d")
+    longest = max((len(row.get("transient") or []) for row in rows), default=0)
+    figure.update_xaxes(title_text="period", tickformat="d", dtick=1 if longest <= 20 else None)
     _logarithmic(figure.update_yaxes, "largest error [µm]")
     return figure
 
 
 def _logarithmic(update: Callable[..., Any], title: str) -> None:
-    update(type="log", title_text=title, dtick="D2", exponentformat="none")
+    # With a format of its own a tick between decades shows its number, not its first digit alone.
+    update(type="log", title_text=title, dtick="D2", tickformat="~g")
+
+
+# ---------------------------------------------------------------- the suite
+
+
+def _campaign(page: Page, document: Document) -> None:
+    rows = document["summary"]
+    page.text(
+        f"{document['runs']} runs at {document['settings']['sample_rate']:g} Hz on the "
+        f"{document['settings']['stage']} stage."
+    )
+    page.table(*suite_report.overview_table(document))
+    page.text(suite_report.KEY)
+    page.advice(f"Failed: {failure}" for failure in document["failures"])
+    colours = _colours(row["estimator"] for row in rows)
+    page.heading("Error against cost")
+    page.text(
+        "Medians over scenarios and seeds: farther left is cheaper, farther down is better once settled."
+    )
+    page.plot(_costs(document["overview"], colours), 460)
+    page.heading("Error settled against error in transients")
+    page.text("Of each estimator and scenario the medians over the seeds. A click on a name hides it.")
+    page.plot(
+        _scatter(rows, colours, "settled_max", "worst_error", "settled error [µm]", "worst error [µm]"), 460
+    )
+    for name in dict.fromkeys(row["scenario"] for row in rows):
+        mine = [row for row in rows if row["scenario"] == name]
+        page.heading(name)
+        page.text(suite_report.described(document, name))
+        if any(row["transient"] for row in mine):
+            page.plot(_transients(mine, colours), 420)
+        page.table(*suite_report.scenario_table(mine))
+
+
+def _costs(overview: Sequence[Row], colours: dict[str, str]) -> Any:
+    """Of each estimator whose cost and error are known; linear feed-forward has none."""
+    figure = _go().Figure()
+    for row in overview:
+        if row["microseconds"] and row["settled_max"]:
+            figure.add_scatter(
+                x=[row["microseconds"]], y=[100.0 * row["settled_max"]], mode="markers",
+                name=row["estimator"], marker={"size": 12, "color": colours[row["estimator"]]},
+            )  # fmt: skip
+    _logarithmic(figure.update_xaxes, "a sample [µs]")
+    _logarithmic(figure.update_yaxes, "settled error [% of the amplitude]")
+    return figure
 
 
 # ---------------------------------------------------------------- estimators
@@ -317,6 +365,8 @@ def _short(value: float | None) -> str:
 
 PAGES: dict[str, Callable[[Page, Document], None]] = {
     "adaptation": _adaptation,
+    "campaign": _campaign,
     "estimators": _estimators,
     "paper": _paper,
 }
+TITLES = {"campaign": "piezoest bench"}

@@ -75,6 +75,9 @@ def suite(
     figures: Annotated[
         Path | None, typer.Option("--figures", metavar="DIR", help="Draw how fast each adapts, as PNG.")
     ] = None,
+    html: Annotated[
+        Path | None, typer.Option("--html", metavar="FILE", help="Write a page with interactive plots.")
+    ] = None,
     jobs: Jobs = None,
     dask: Dask = False,
     scheduler: Scheduler = None,
@@ -106,9 +109,17 @@ def suite(
                 "if it has them, or leave it out"
             )
         return
-    from piezoest.bench.commands import INTERRUPTED, _json_target, _origin, _progress
+    from piezoest.bench.commands import (
+        INTERRUPTED,
+        _check_html,
+        _json_target,
+        _origin,
+        _progress,
+        _write_html,
+    )
 
     target = _json_target(json_to)
+    _check_html(html)
     folder = output or (QUICK_FOLDER if quick else FOLDER)
     began = time.perf_counter()
     with usage():
@@ -140,6 +151,7 @@ def suite(
             Console(stderr=True).print(f"stopped: the same command goes on from {folder}")
             raise typer.Exit(INTERRUPTED) from None
     suite.write(document, folder / suite.DOCUMENT)
+    _write_html(document, html)
     if figures is not None:
         from piezoest.bench.ranking_figures import write_adaptation
 

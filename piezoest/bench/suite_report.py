@@ -48,6 +48,49 @@ def print_overview(document: dict[str, Any], console: Any, *, scenarios: bool = 
         console.print(f"failed: {failure}", style="red", highlight=False, markup=False, soft_wrap=True)
 
 
+Table = tuple[list[str], list[list[str]]]
+
+
+def overview_table(document: dict[str, Any]) -> Table:
+    """Heading and a row for each estimator.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.suite.describe`.
+    """
+    return _table([(row["estimator"], _overview_cells(row)) for row in document["overview"]])
+
+
+def scenario_table(rows: list[Row]) -> Table:
+    """Heading and a row for each estimator in one scenario.
+
+    Parameters
+    ----------
+    rows : list of dict
+        Those of the scenario, from `piezoest.bench.campaign.summarise`.
+    """
+    return _table([(row["estimator"], _scenario_cells(row)) for row in rows])
+
+
+def described(document: dict[str, Any], scenario: str) -> str:
+    """What a scenario of the summary is, on whichever stage.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.suite.describe`.
+    scenario : str
+        As the summary's rows name it.
+    """
+    return str(document["scenarios"].get(scenario.removesuffix(OTHER_STAGE), ""))
+
+
+def _table(rows: list[tuple[str, list[str]]]) -> Table:
+    units = [f"{title}\n[{unit}]" if unit else title for title, unit in zip(HEADINGS, UNITS, strict=True)]
+    return ["estimator", *units], [[name, *cells] for name, cells in rows]
+
+
 def _print(console: Any, title: str, rows: list[tuple[str, list[str]]]) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table

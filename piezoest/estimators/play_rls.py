@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, integer, non_negative, positive
 from piezoest.estimators import play_rls_kernel as kernel
+from piezoest.estimators import play_rls_layout as layout
 from piezoest.estimators import play_rls_settings as settings
 from piezoest.estimators.base import Freezable, Status, Trace
 from piezoest.estimators.delay_line import delay_line
@@ -84,7 +85,7 @@ class PrandtlIshlinskiiRLS(Freezable):
 
     __slots__ = ("_config", "_creep", "_initial", "_scale")
 
-    _frozen_at = kernel.FROZEN
+    _frozen_at = layout.FROZEN
 
     conformance_exceptions: ClassVar[dict[str, str]] = {
         "learns_the_parameters": "Its parameters are slopes of plays, not those of the Coleman-Hodgdon "
@@ -121,29 +122,29 @@ class PrandtlIshlinskiiRLS(Freezable):
         fraction, line = delay_line(delay)
         self._initial = initial
         self._creep = plan.times
-        config = np.zeros(kernel.CONFIG)
+        config = np.zeros(layout.CONFIG)
         n, k, m = plan.relative.size, plan.bends.size, plan.times.size
-        size = kernel.layout(config, n, k, m, line.size)
-        config[kernel.GAIN] = plan.unit
-        config[kernel.NOISE] = non_negative("noise", noise)
-        config[kernel.FRACTION] = fraction
-        config[kernel.FIXED] = plan.fixed
-        config[kernel.FIRST_HALF] = max(1.0, settings.FIRST_HALF * sample_rate)
-        config[kernel.LONGEST_GAP] = max(1, int(settings.LONGEST_GAP * sample_rate))
+        size = layout.lay_out(config, n, k, m, line.size)
+        config[layout.GAIN] = plan.unit
+        config[layout.NOISE] = non_negative("noise", noise)
+        config[layout.FRACTION] = fraction
+        config[layout.FIXED] = plan.fixed
+        config[layout.FIRST_HALF] = max(1.0, settings.FIRST_HALF * sample_rate)
+        config[layout.LONGEST_GAP] = max(1, int(settings.LONGEST_GAP * sample_rate))
         settings.tune(config)
         theta, spread, P = settings.prior(plan, positive("uncertainty", uncertainty), config)
         decays = np.exp(-1.0 / (sample_rate * plan.times))
         if mechanics is not None and not isinstance(mechanics, MassSpringDamper):
             raise ValueError(f"mechanics must be a MassSpringDamper, got {mechanics!r}")
-        config[kernel.INERT] = mechanics is not None
+        config[layout.INERT] = mechanics is not None
         motion = np.zeros(6) if mechanics is None else mechanics.coefficients(sample_rate)
         self._config = np.concatenate([config, plan.relative, plan.bends, decays, P.ravel(), spread, motion])
         state = np.zeros(size)
-        state[kernel.CENTRE], state[kernel.RANGE] = plan.centre, plan.half
-        for name, values in ((kernel.THETA, theta), (kernel.P, P.ravel()), (kernel.LINE, line)):
+        state[layout.CENTRE], state[layout.RANGE] = plan.centre, plan.half
+        for name, values in ((layout.THETA, theta), (layout.P, P.ravel()), (layout.LINE, line)):
             place = int(config[name])
             state[place : place + values.size] = values
-        state[kernel.OFFSET] = theta[-1]
+        state[layout.OFFSET] = theta[-1]
         kernel.start(state, self._config)
         slopes = (n + 1) * (k + 1)
         self._scale = np.append(np.full(slopes, plan.unit), np.ones(m))
@@ -201,7 +202,7 @@ class PrandtlIshlinskiiRLS(Freezable):
 
         With bends each slope has an entry for each segment of the voltage, from the lowest.
         """
-        n, columns = int(self._config[kernel.PLAYS]), int(self._config[kernel.BENDS]) + 1
+        n, columns = int(self._config[layout.PLAYS]), int(self._config[layout.BENDS]) + 1
         slopes = ["gain", *(f"weights[{i}]" for i in range(n))]
         if columns > 1:
             slopes = [f"{name} in segment {s}" for name in slopes for s in range(columns)]
@@ -210,23 +211,23 @@ class PrandtlIshlinskiiRLS(Freezable):
     @property
     def thresholds(self) -> FloatArray:
         """Thresholds of the plays in use [V], shape (n,)."""
-        return self._part(kernel.THRESHOLDS, int(self._config[kernel.PLAYS])).copy()
+        return self._part(layout.THRESHOLDS, int(self._config[layout.PLAYS])).copy()
 
     @property
     def theta(self) -> FloatArray:
         """Slopes [µm/V] and creep gains [1] as estimated, shape (n,), in the order of `parameter_names`."""
-        return self._part(kernel.THETA, self._scale.size) * self._scale
+        return self._part(layout.THETA, self._scale.size) * self._scale
 
     @property
     def _usable(self) -> FloatArray:
         """`theta`, or its nearest point in the metric of P where nothing is below its least."""
-        return self._part(kernel.USED, self._scale.size) * self._scale
+        return self._part(layout.USED, self._scale.size) * self._scale
 
     @property
     def P(self) -> FloatArray:
         """Covariance of `theta` as the law sees it, shape (n, n)."""
         n, size = self._scale.size, self._scale.size + 1
-        P = self._part(kernel.P, size * size).reshape(size, size)[:n, :n]
+        P = self._part(layout.P, size * size).reshape(size, size)[:n, :n]
         return P * np.outer(self._scale, self._scale)
 
     @property
@@ -237,25 +238,25 @@ class PrandtlIshlinskiiRLS(Freezable):
     @property
     def y(self) -> float:
         """Last innovation [µm], of the mean over a window of travel."""
-        return float(self._state[kernel.INNOVATION])
+        return float(self._state[layout.INNOVATION])
 
     @property
     def S(self) -> float:
         """Variance of the last innovation as the law saw it [µm²]."""
-        return float(self._state[kernel.VARIANCE])
+        return float(self._state[layout.VARIANCE])
 
     @property
     def K(self) -> FloatArray:
         """Gain that the present covariance gives the last regressor, shape (n,)."""
         size = self._scale.size + 1
-        P = self._part(kernel.P, size * size).reshape(size, size)
-        phi = self._part(kernel.PHI, size)
+        P = self._part(layout.P, size * size).reshape(size, size)
+        phi = self._part(layout.PHI, size)
         product = P @ phi
-        stroke = self._config[kernel.GAIN] * self._state[kernel.RANGE]
+        stroke = self._config[layout.GAIN] * self._state[layout.RANGE]
         return (
             product[:-1]
             * self._scale
-            / (phi @ product + (self._config[kernel.SLACK] * stroke) ** 2 + self._config[kernel.NOISE] ** 2)
+            / (phi @ product + (self._config[layout.SLACK] * stroke) ** 2 + self._config[layout.NOISE] ** 2)
         )
 
     @property
@@ -263,26 +264,26 @@ class PrandtlIshlinskiiRLS(Freezable):
         """What happened to the samples so far."""
         state = self._state
         return Status(
-            samples=int(state[kernel.SAMPLES]),
-            updates=int(state[kernel.UPDATES]),
-            missing=int(state[kernel.MISSED]),
-            held=int(state[kernel.HELD]),
-            outliers=int(state[kernel.OUTLIERS]),
-            resets=int(state[kernel.RESETS]),
-            projected=bool(np.any(self._part(kernel.FORCE, self._scale.size) > 0.0)),
-            last=("waiting", "updated", "missing", "held", "rejected")[int(state[kernel.LAST])],
+            samples=int(state[layout.SAMPLES]),
+            updates=int(state[layout.UPDATES]),
+            missing=int(state[layout.MISSED]),
+            held=int(state[layout.HELD]),
+            outliers=int(state[layout.OUTLIERS]),
+            resets=int(state[layout.RESETS]),
+            projected=bool(np.any(self._part(layout.FORCE, self._scale.size) > 0.0)),
+            last=("waiting", "updated", "missing", "held", "rejected")[int(state[layout.LAST])],
         )
 
     @property
     def model(self) -> Model:
         """Model as known now, always admissible: a `LinearGain` if it began as one."""
-        offset = float(self._state[kernel.OFFSET])
+        offset = float(self._state[layout.OFFSET])
         if isinstance(self._initial, LinearGain):
             return LinearGain(float(self._usable[0]), offset)
-        n, k, m = (int(self._config[name]) for name in (kernel.PLAYS, kernel.BENDS, kernel.TERMS))
+        n, k, m = (int(self._config[name]) for name in (layout.PLAYS, layout.BENDS, layout.TERMS))
         theta = self._usable
         slopes = theta[: (n + 1) * (k + 1)].reshape(n + 1, k + 1)
-        bends = self._part(kernel.EDGES, k + 2)[1:-1]
+        bends = self._part(layout.EDGES, k + 2)[1:-1]
         return PrandtlIshlinskii(
             float(slopes[0, 0]),
             self.thresholds,

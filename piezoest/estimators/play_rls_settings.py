@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray, finite
-from piezoest.estimators import play_rls_kernel as kernel
+from piezoest.estimators import play_rls_layout as layout
+from piezoest.estimators.play_rls_grid import LEVEL_START
 from piezoest.models import ColemanHodgdon, LinearGain, PrandtlIshlinskii
 
 # Half-width of the first grid of a Coleman-Hodgdon model, in parts of 1/alpha.
@@ -116,13 +117,13 @@ def _with_the_loop_of(model: ColemanHodgdon, thresholds: FloatArray, amplitude: 
 def tune(config: FloatArray) -> None:
     """Write the tuning into the configuration."""
     for place, value in (
-        (kernel.SLACK, SLACK),
-        (kernel.LEVEL_TRAVEL, LEVEL_TRAVEL),
-        (kernel.LEVEL_TIME, LEVEL_TIME),
-        (kernel.COMMON_WALK, COMMON_WALK),
-        (kernel.SINGLE_WALK, SINGLE_WALK),
-        (kernel.WINDOWS, WINDOWS),
-        (kernel.LEAST, LEAST_GAIN),
+        (layout.SLACK, SLACK),
+        (layout.LEVEL_TRAVEL, LEVEL_TRAVEL),
+        (layout.LEVEL_TIME, LEVEL_TIME),
+        (layout.COMMON_WALK, COMMON_WALK),
+        (layout.SINGLE_WALK, SINGLE_WALK),
+        (layout.WINDOWS, WINDOWS),
+        (layout.LEAST, LEAST_GAIN),
     ):
         config[place] = value
 
@@ -146,6 +147,6 @@ def prior(plan: Plan, uncertainty: float, config: FloatArray) -> tuple[FloatArra
     P[: flat.size, : flat.size] = shape + uncertainty**2 * np.outer(flat, flat)
     place = np.arange(flat.size, flat.size + m)
     P[place, place] = CREEP_DEVIATION**2
-    P[-1, -1] = (kernel.LEVEL_START * plan.unit * plan.half) ** 2
+    P[-1, -1] = (LEVEL_START * plan.unit * plan.half) ** 2
     spread = np.concatenate([np.repeat(deviation, columns), np.full(m, CREEP_DEVIATION), [0.0]])
     return np.concatenate([flat, plan.gains, [plan.offset]]), spread, P

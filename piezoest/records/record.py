@@ -1,4 +1,4 @@
-"""A recorded log in memory: read from a file of any format, written as CSV."""
+"""A recorded log in memory: read from a file of any format, and written to one."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from piezoest.records.columns import choose
 from piezoest.records.source import ROWS, open_source
 from piezoest.records.stream import FEWEST_ROWS, RecordStream, sane
 from piezoest.records.timing import scan
+from piezoest.records.writing import write_columns
 
 if TYPE_CHECKING:
     from piezoest.signals import Signal
@@ -133,17 +134,22 @@ class Record:
         )
 
     def write(self, path: str | Path) -> None:
-        """Write as CSV with the columns time_s, voltage_V, displacement_um.
+        """Write the columns time_s, voltage_V, displacement_um in any format that `read_record` reads.
 
         Parameters
         ----------
         path : str or Path
-            File to write; an existing one is replaced.
+            File to write; an existing one is replaced. Its ending says the format: ``.csv``, ``.txt``,
+            ``.dat``, ``.tsv``, ``.parquet``, ``.h5``, ``.mat``, ``.npy`` or ``.npz``.
 
         Raises
         ------
         OSError
             If the file cannot be written.
+        ValueError
+            If the ending stands for no format.
+        ImportError
+            If writing the format needs a package of the extra ``formats`` that is not installed.
         """
         columns = {"time_s": self.time, "voltage_V": self.voltage, "displacement_um": self.displacement}
         write_columns(path, columns)
@@ -264,30 +270,3 @@ def read_reference(
             )
         sample_rate = timing.sample_rate
     return Signal(values[-1], sample_rate, None, Path(path).stem)
-
-
-def write_columns(path: str | Path, columns: Mapping[str, Any]) -> None:
-    """Write columns as CSV with a header, to nine significant digits and time to twelve.
-
-    Parameters
-    ----------
-    path : str or Path
-        File to write; an existing one is replaced.
-    columns : mapping of str to array_like, each of shape (N,)
-        Header and values.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    ValueError
-        If the columns differ in length.
-    """
-    arrays = [array_1d(name, values, allow_nan=True) for name, values in columns.items()]
-    if len({array.size for array in arrays}) > 1:
-        raise ValueError(f"columns must be of one length, got {[array.size for array in arrays]}")
-    formats = ["%.12g" if name.startswith("time") else "%.9g" for name in columns]
-    with Path(path).open("w", encoding="utf-8", newline="") as file:
-        np.savetxt(
-            file, np.column_stack(arrays), fmt=formats, delimiter=",", header=",".join(columns), comments=""
-        )

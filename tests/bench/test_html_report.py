@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from piezoest.bench.html_report import write_html
+from piezoest.bench.suite_report import percent
 from piezoest.cli import app
 from tests.browser import check_report
 
@@ -64,6 +65,39 @@ def test_paper_in_a_browser(tmp_path: Path) -> None:
         assert sentence in text
 
 
+def test_suite_in_a_browser(tmp_path: Path) -> None:
+    page = tmp_path / "report_bench_suite.html"
+    arguments = ["bench", "--quick", "--output", str(tmp_path / "runs"), "--table", "csv", "--jobs", "1"]
+    arguments += ["--only", "HysteresisRLS", "--only", "OutputErrorRLS"]
+    arguments += ["--scenario", "gain-step", "--scenario", "two-tone", "--stage", "preisach"]
+    result = CliRunner().invoke(app, [*arguments, "--html", str(page)])
+    assert result.exit_code == 0, result.output
+    assert f"Report: {page}" in " ".join(result.stderr.split())
+    document = json.loads((tmp_path / "runs" / "suite.json").read_text(encoding="utf-8"))
+    plots, text = check_report(page, plots=4)
+    # Linear feed-forward costs nothing, and is in all plots but that of the costs.
+    assert [plot["traces"] for plot in plots] == [2, 3, 3, 3]
+    for name, description in document["scenarios"].items():
+        assert f"{name}, other stage" in text
+        assert description in text
+    for row in document["overview"]:
+        cells = [percent(row[name]) for name in ("settled_max", "worst_error")]
+        assert " ".join([row["estimator"], *cells]) in text
+    assert "6 runs at 2000 Hz on the preisach stage" in text
+
+
+def test_suite_of_the_documentation_in_a_browser(tmp_path: Path) -> None:
+    document = read("suite")
+    write_html(document, tmp_path / "report_bench_campaign.html")
+    plots, text = check_report(
+        tmp_path / "report_bench_campaign.html",
+        plots=2 + len({row["scenario"] for row in document["summary"]}),
+    )
+    assert plots[1]["traces"] == len(document["estimators"])
+    for row in document["overview"]:
+        assert row["estimator"] in text
+
+
 def test_a_suite_without_a_page_of_its_own(tmp_path: Path) -> None:
     rows = [
         {"scenario": f"s{i}", "estimator": "E", "error_um": 0.1 * i, "ok": True, "deep": {}} for i in range(4)
@@ -75,9 +109,9 @@ def test_a_suite_without_a_page_of_its_own(tmp_path: Path) -> None:
         write_html({}, tmp_path / "none.html")
 
 
-@pytest.mark.parametrize("command", ["adaptation", "estimators", "paper"])
-def test_a_report_that_cannot_be_written_is_refused_at_once(command: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", [[], ["adaptation"], ["estimators"], ["paper"]])
+def test_a_report_that_cannot_be_written_is_refused_at_once(command: list[str], tmp_path: Path) -> None:
     for name in ("report.pdf", str(tmp_path / "no" / "report.html")):
-        result = CliRunner().invoke(app, ["bench", command, "--html", name])
+        result = CliRunner().invoke(app, ["bench", *command, "--html", name])
         assert result.exit_code == 2
         assert "--html" in result.output

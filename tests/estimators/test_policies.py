@@ -213,7 +213,7 @@ def test_amplitudes_are_remembered(tmp_path: Path) -> None:
 
 
 def test_commands_take_a_profile(tmp_path: Path) -> None:
-    from piezoest.cli import _model
+    from piezoest.cli.compensate_command import _model
     from piezoest.export.commands import _read
 
     path = tmp_path / "profile.json"

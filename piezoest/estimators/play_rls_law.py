@@ -1,0 +1,158 @@
+"""The law of `PrandtlIshlinskiiRLS`: what may have changed, what a window tells, what is admissible."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST
+from piezoest.estimators.play_rls_layout import (
+    BENDS,
+    COMMON_WALK,
+    COUNT,
+    ELAPSED,
+    FORCE,
+    GAIN,
+    INNOVATION,
+    LEAST,
+    LEVEL_TIME,
+    LEVEL_TRAVEL,
+    NOISE,
+    PLAYS,
+    PRIOR,
+    RANGE,
+    RESETS,
+    SINGLE_WALK,
+    SLACK,
+    SPREAD,
+    SUM,
+    THETA,
+    TRAVEL,
+    USED,
+    VARIANCE,
+    WAY,
+    WORK,
+    X_SUM,
+    N,
+    P,
+)
+from piezoest.estimators.play_rls_regressors import add_row
+
+SWEEPS = 10
+SMALLEST = 1e-18
+WILD = 100.0  # standard deviations beyond which an innovation counts no more
+
+
+@register_jitable
+def _walk(state: Any, config: Any, half: Any) -> None:
+    """What may have changed since the last update: only what has moved, and the level."""
+    size = int(config[N])
+    slopes = (int(config[PLAYS]) + 1) * (int(config[BENDS]) + 1)
+    P0, theta, way, spread = int(config[P]), int(config[THETA]), int(config[WAY]), int(config[SPREAD])
+    prior = int(config[PRIOR])
+    travel = state[TRAVEL]
+    if travel > 0.0:
+        common = config[COMMON_WALK] ** 2 * travel / state[RANGE]
+        single = config[SINGLE_WALK] ** 2 / state[RANGE]
+        for i in range(slopes):
+            if state[P0 + i * size + i] < config[prior + i * size + i]:
+                moved = state[way + i] / travel
+                for j in range(slopes):
+                    if state[P0 + j * size + j] < config[prior + j * size + j]:
+                        both = moved * state[way + j] / travel
+                        state[P0 + i * size + j] += common * both * state[theta + i] * state[theta + j]
+        for i in range(slopes):
+            if state[P0 + i * size + i] < config[prior + i * size + i]:
+                state[P0 + i * size + i] += single * state[way + i] * config[spread + i] ** 2
+        for i in range(slopes, size - 1):
+            if state[P0 + i * size + i] < config[prior + i * size + i]:
+                state[P0 + i * size + i] += single * travel * config[spread + i] ** 2
+    stroke = config[GAIN] * state[RANGE]
+    level = (
+        config[LEVEL_TRAVEL] ** 2 * travel / state[RANGE] + config[LEVEL_TIME] ** 2 * state[ELAPSED] / half
+    )
+    state[P0 + size * size - 1] = min(state[P0 + size * size - 1] + level * stroke**2, stroke**2)
+
+
+@register_jitable
+def constrain(state: Any, config: Any) -> None:
+    """Parameters to use: the estimate's nearest in the metric of P with nothing below its least.
+
+    The estimate and its covariance are left alone: what is told against a constraint stays
+    known. C. Hildreth, Naval Research Logistics Quarterly 4 (1957) 79-85: each force lifts one
+    parameter to its bound, and they are kept from update to update.
+    """
+    size = int(config[N])
+    columns = int(config[BENDS]) + 1
+    theta = state[int(config[THETA]) : int(config[THETA]) + size]
+    used = state[int(config[USED]) : int(config[USED]) + size]
+    force = state[int(config[FORCE]) : int(config[FORCE]) + size]
+    P0 = int(config[P])
+    for i in range(size):
+        used[i] = theta[i]
+    for i in range(size - 1):
+        if force[i] > 0.0:
+            add_row(used, state[P0 + i * size : P0 + i * size + size], force[i], size)
+    for _ in range(SWEEPS):
+        moved = 0.0
+        for i in range(size - 1):
+            least = config[LEAST] if i < columns else 0.0
+            variance = state[P0 + i * size + i]
+            if variance <= SMALLEST:
+                continue
+            change = (least - used[i]) / variance
+            change = max(change, -force[i])
+            if change != 0.0:
+                force[i] += change
+                moved = max(moved, abs(change) * np.sqrt(variance))
+                add_row(used, state[P0 + i * size : P0 + i * size + size], change, size)
+        if moved < 1e-3:
+            break
+    for i in range(size - 1):
+        used[i] = max(used[i], config[LEAST] if i < columns else 0.0)
+
+
+@register_jitable
+def update(state: Any, config: Any, half: Any, first: int) -> None:
+    """One step of the law, on the means over the window that ends here.
+
+    Parameters before `first` are left alone, but what is unknown of them counts (S. F. Schmidt's
+    consider filter): at a dwell the slopes say nothing.
+    """
+    size = int(config[N])
+    P0 = int(config[P])
+    theta = state[int(config[THETA]) : int(config[THETA]) + size]
+    mean = state[int(config[SUM]) : int(config[SUM]) + size]
+    work = state[int(config[WORK]) : int(config[WORK]) + size]
+    _walk(state, config, half)
+    y = state[X_SUM] / state[COUNT]
+    for i in range(size):
+        mean[i] /= state[COUNT]
+        y -= theta[i] * mean[i]
+        work[i] = 0.0
+    R = (config[SLACK] * config[GAIN] * state[RANGE]) ** 2 + config[NOISE] ** 2 / state[COUNT]
+    S = R
+    for i in range(size):  # P is symmetric: row by row, no sum has to wait for its last product
+        add_row(work, state[P0 + i * size : P0 + i * size + size], mean[i], size)
+    for i in range(size):
+        S += mean[i] * work[i]
+    if not (S >= R and abs(y) < WILDEST):
+        # Rounding has spoilt the covariance, as voltages of another order of magnitude can.
+        for i in range(size * size):
+            state[P0 + i] = config[int(config[PRIOR]) + i]
+        state[RESETS] += 1.0
+        return
+    state[INNOVATION], state[VARIANCE] = y, S
+    y = max(min(y, WILD * np.sqrt(S)), -WILD * np.sqrt(S))
+    for i in range(first, size):
+        gain = work[i] / S
+        theta[i] += gain * y
+        # Rows and columns before `first` lose their share once, the rest once for both.
+        add_row(state[P0 + i * size : P0 + i * size + i + 1], work, -gain, i + 1)
+        for j in range(i):
+            state[P0 + j * size + i] = state[P0 + i * size + j]
+    for i in range(size):
+        state[P0 + i * size + i] = max(state[P0 + i * size + i], SMALLEST)
+    constrain(state, config)

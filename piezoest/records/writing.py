@@ -1,0 +1,135 @@
+"""Columns into a file: CSV, Parquet, HDF5, MATLAB or NumPy, by the ending of its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from piezoest import _extras
+from piezoest._checks import FloatArray, array_1d
+from piezoest.records.binary import EXTRA
+from piezoest.records.source import FORMATS, TEXT_ENDINGS
+
+Columns = Mapping[str, FloatArray]
+
+
+def write_columns(path: str | Path, columns: Mapping[str, Any]) -> None:
+    """Write columns in the format that the ending of the file's name stands for.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write; an existing one is replaced. ``.csv``, ``.txt``, ``.dat``, ``.tsv`` and none are text
+        with a header, to nine significant digits and time to twelve; ``.parquet``, ``.h5``, ``.mat`` (of
+        version 5, which every MATLAB reads), ``.npy`` (named fields) and ``.npz`` hold every bit.
+    columns : mapping of str to array_like, each of shape (N,)
+        Names and values.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    ValueError
+        If the columns differ in length, or the ending stands for no format.
+    ImportError
+        If writing the format needs a package of the extra ``formats`` that is not installed.
+    """
+    writer = writer_for(path)
+    arrays = {name: array_1d(name, values, allow_nan=True) for name, values in columns.items()}
+    if len({array.size for array in arrays.values()}) > 1:
+        raise ValueError(f"columns must be of one length, got {[array.size for array in arrays.values()]}")
+    writer(Path(path), arrays)
+
+
+def writer_for(path: str | Path) -> Callable[[Path, Columns], None]:
+    """Function that writes a file of this name, with the package that it needs loaded.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write.
+
+    Raises
+    ------
+    ValueError
+        If its ending stands for no format.
+    ImportError
+        If the format needs a package that is not installed.
+    """
+    ending = Path(path).suffix.lower()
+    formats = {each: name for name, _, endings in FORMATS for each in endings}
+    formats |= dict.fromkeys(TEXT_ENDINGS, "text")
+    if not ending:  # such as /dev/stdout
+        return _write_text
+    if ending not in formats:
+        raise ValueError(
+            f"{path}: the ending of its name stands for no format: use one of {', '.join(formats)}"
+        )
+    if formats[ending] == "parquet":
+        _extras.load("pyarrow.parquet", EXTRA, "writing Parquet")
+    if formats[ending] == "hdf5":
+        _extras.load("h5py", EXTRA, "writing HDF5")
+    return WRITERS[formats[ending]]
+
+
+def _write_text(path: Path, columns: Columns) -> None:
+    delimiter = "\t" if path.suffix.lower() == ".tsv" else ","
+    with path.open("w", encoding="utf-8", newline="") as file:
+        np.savetxt(
+            file,
+            np.column_stack(list(columns.values())),
+            fmt=["%.12g" if name.startswith("time") else "%.9g" for name in columns],
+            delimiter=delimiter,
+            header=delimiter.join(columns),
+            comments="",
+        )
+
+
+def _write_parquet(path: Path, columns: Columns) -> None:
+    import pyarrow
+    import pyarrow.parquet
+
+    pyarrow.parquet.write_table(pyarrow.table(dict(columns)), path)
+
+
+def _write_hdf5(path: Path, columns: Columns) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        for name, values in columns.items():
+            file[name] = values
+
+
+def _write_mat(path: Path, columns: Columns) -> None:
+    from scipy.io import savemat
+
+    # Without appendmat=False it would be log.MAT.mat.
+    savemat(path, dict(columns), appendmat=False, oned_as="column")
+
+
+def _write_npy(path: Path, columns: Columns) -> None:
+    size = next((values.size for values in columns.values()), 0)
+    rows = np.zeros(size, [(name, np.float64) for name in columns])
+    for name, values in columns.items():
+        rows[name] = values
+    with path.open("wb") as file:  # a name in capitals NumPy would lengthen
+        np.save(file, rows)
+
+
+def _write_npz(path: Path, columns: Columns) -> None:
+    arrays: dict[str, Any] = dict(columns)
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+WRITERS: dict[str, Callable[[Path, Columns], None]] = {
+    "text": _write_text,
+    "parquet": _write_parquet,
+    "hdf5": _write_hdf5,
+    "mat": _write_mat,
+    "npy": _write_npy,
+    "npz": _write_npz,
+}
