@@ -329,6 +329,8 @@ class Fault:
         What the reference is multiplied by, where it is the reference that is wrong.
     ends : float or None
         Time after which all is well again [s]; None if it stays.
+    carried : float
+        Error that no ring can know of, since its gauge is off by it [µm].
     """
 
     name: str
@@ -336,6 +338,7 @@ class Fault:
     stage: Callable[[Callable[[float], Any], float, int], Any]
     reference_factor: float = 1.0
     ends: float | None = None
+    carried: float = 0.0
 
     def build(self, make: Callable[[float], Any], sample_rate: float, *, seed: int = 0) -> Any:
         """Make the faulty stage.
@@ -377,6 +380,8 @@ def _wrong_rate(make: Callable[[float], Any], sample_rate: float, seed: int) -> 
     return WrongRate(make(sample_rate / 1.1), 1.1, seed=seed)
 
 
+NONE = Fault("none", "Nothing is wrong.", _around(FaultyStage))
+
 BEGINS = 1.0  # s: five periods at 5 Hz, most of what there is to learn
 
 # Sizes are for a reference of 5 µm.
@@ -395,7 +400,10 @@ FAULTS: dict[str, Fault] = {
             _around(WeakAmplifier, limit=100.0, factor=-1.0),
         ),
         Fault("wrong-unit", "Readings in nm, taken for µm.", _around(Factor, factor=1000.0)),
-        Fault("offset-step", "The gauge's zero moves by 0.5 µm.", _around(OffsetStep, start=BEGINS)),
+        Fault(
+            "offset-step", "The gauge's zero moves by 0.5 µm.", _around(OffsetStep, start=BEGINS),
+            carried=0.5,
+        ),
         Fault(
             "voltage-saturation", "The amplifier ends at 25 V and does not say so.",
             _around(WeakAmplifier, limit=25.0),

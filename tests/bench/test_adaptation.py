@@ -15,7 +15,7 @@ from typer.testing import CliRunner, Result
 
 import piezoest as pz
 from piezoest.bench import adaptation as bench
-from piezoest.bench.adaptation_report import criteria
+from piezoest.bench.asked import criteria
 from piezoest.bench.candidates import candidate
 from piezoest.bench.scenarios import RIGHT_MODEL, SCENARIOS
 from piezoest.cli import app
@@ -100,12 +100,7 @@ def test_refuses_what_is_no_candidate(text: str, words: str) -> None:
 
 def test_default_estimators() -> None:
     names = bench.default_estimators()
-    assert names[:4] == (
-        "HysteresisRLS",
-        "HysteresisRLS(memory=0.1)",
-        "HysteresisRLS(memory=0.4)",
-        "HysteresisRLS(memory=1)",
-    )
+    assert names[:6] == ("HysteresisRLS", *(f"HysteresisRLS(memory={m})" for m in (0.05, 0.1, 0.2, 0.4, 1)))
     assert "HysteresisEKF" in names
     assert ("OutputErrorRLS" in names) == hasattr(pz, "OutputErrorRLS")
 
