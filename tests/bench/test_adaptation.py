@@ -260,7 +260,9 @@ def test_soak_judges() -> None:
     assert first["samples"] == 50_000
     n = estimator.theta.size
     scatter = np.full(n, 1e-3)
-    assert script.verdict([first, first], scatter)["within_noise"]
+    start = estimator.theta
+    assert script.verdict([first, first], start, scatter)["within_noise"]
+    assert not script.verdict([first, first], start + 9e-3, scatter)["within_noise"]
     drifted = [{**first, "theta": (estimator.theta + k * 1e-3).tolist()} for k in range(20)]
-    assert not script.verdict(drifted, scatter)["within_noise"]
-    assert not script.verdict([first, {**first, "sound": False}], scatter)["sound"]
+    assert not script.verdict(drifted, start, scatter)["within_noise"]
+    assert not script.verdict([first, {**first, "sound": False}], start, scatter)["sound"]
