@@ -170,13 +170,13 @@ FAULTS: dict[str, Fault] = {
         Fault(
             "voltage-saturation", "The amplifier ends at 25 V and does not say so.",
             "The stage does not get where the reference is, and a model of voltages that never came is "
-            "wrong; the guard does not let it make more of that than a line does.",
+            "wrong; once the guard sees that, a line takes its place.",
             _around(WeakAmplifier, limit=25.0),
         ),
         Fault(
             "out-of-range", "A reference four times as large, which the stage cannot reach.",
-            "The voltage stays at its limits, the compensator says so, and the error is what is out of "
-            "reach.",
+            "The voltage stays at its limits, the compensator says so, and the error is at least what "
+            "is out of reach.",
             _around(FaultyStage), reference_factor=4.0,
         ),
         Fault(
