@@ -102,7 +102,7 @@ def _name(axes: Axes, one: Combination) -> None:
     for each in axes.figure.axes:
         each.tick_params(labelsize=7)
         each.yaxis.set_tick_params(which="minor", left=False)
-        each.xaxis.get_major_locator().set_params(integer=True)
+        each.locator_params(axis="x", integer=True)
     axes.set_ylabel(
         "\n".join([one.name, *textwrap.wrap(one.said, WIDTH)]),
         rotation=0, ha="right", va="center", fontsize=8,

@@ -295,7 +295,7 @@ def test_policies_are_drawn(own: str) -> None:
     assert len(figure.axes) == 4
     assert [axes.get_title() for axes in figure.axes[:2]] == ["cold-start", "gain-step"]
     assert "else the default" in figure.axes[2].get_ylabel()
-    drawn = figure.axes[0].lines[0].get_ydata()
+    drawn = np.asarray(figure.axes[0].lines[0].get_ydata())
     assert drawn[0] == pytest.approx(100.0 * rows[0]["transient"][0] / rows[0]["amplitude"])
     (path,) = policy_figures.write_policies(document, Path("there"))
     assert path == Path("there/changes.png")
