@@ -10,9 +10,11 @@ from typing import Any
 import piezoest
 
 sys.path.insert(0, str(Path(__file__).parent))
+import adaptation_page
 import beyond_page
 import controller_page
 import estimators_page
+import faults_page
 import paper_page
 import performance_page
 import real_data_page
@@ -122,5 +124,7 @@ def setup(app: Any) -> None:
     app.connect("builder-inited", which_estimator_page.write)
     app.connect("builder-inited", tuning_page.write)
     app.connect("builder-inited", real_data_page.write)
+    app.connect("builder-inited", adaptation_page.write)
+    app.connect("builder-inited", faults_page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

@@ -24,7 +24,7 @@ LIMITS = VoltageLimits(-100.0, 100.0)  # V, the stage's
 TRANSFER = 0.01  # s, of a bumpless change of model: the compensators' default at 50 kHz
 # Linear feed-forward learns its gain from whole loops, at any frequency; 0.4 s at 5 Hz.
 LINEAR_MEMORY = 2.0  # periods
-FIXED_MEMORIES = (0.1, 0.4, 1.0)  # s
+FIXED_MEMORIES = (0.05, 0.1, 0.2, 0.4, 1.0)  # s
 SOON = 2  # periods, within which a change should be over
 
 
@@ -44,6 +44,8 @@ class Job:
         Fields of `piezoest.bench.scenarios.Conditions`.
     guard : bool
         Whether the supervisor of the ring is on.
+    title : str, optional
+        What the runs are said to be of, where the overrides make it more than the scenario.
     """
 
     scenario: str
@@ -51,6 +53,7 @@ class Job:
     estimators: tuple[str, ...]
     overrides: dict[str, Any] = field(default_factory=dict)
     guard: bool = False
+    title: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +63,7 @@ class Run:
     Parameters
     ----------
     scenario : str
-        Name in `SCENARIOS`.
+        Name in `SCENARIOS`, or the title of the job.
     seed : int
         Start of the random numbers.
     estimator : str
@@ -157,15 +160,15 @@ def play(job: Job) -> list[Run]:
         Linear feed-forward first.
     """
     case = SCENARIOS[job.scenario].build(job.seed, **job.overrides)
-    linear = follow(case, None)
-    runs = [Run(job.scenario, job.seed, REFERENCE, case.amplitude, measure(linear, linear, case))]
+    linear, title = follow(case, None), job.title or job.scenario
+    runs = [Run(title, job.seed, REFERENCE, case.amplitude, measure(linear, linear, case))]
     for estimator in job.estimators:
         metrics, failure = None, None
         try:
             metrics = measure(follow(case, estimator, guard=job.guard), linear, case)
         except Exception as error:
             failure = f"{type(error).__name__}: {error}"
-        runs.append(Run(job.scenario, job.seed, estimator, case.amplitude, metrics, failure))
+        runs.append(Run(title, job.seed, estimator, case.amplitude, metrics, failure))
     return runs
 
 
@@ -231,6 +234,7 @@ QUANTITIES = (
     "run_ratio",
     "worst_ratio",
     "rest_excursion",
+    "rest_excursion_later",
     "first_after_rest",
 )
 
@@ -246,15 +250,26 @@ def summarise(runs: Iterable[Run]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        Sorted by scenario; a run that failed or did not settle counts as infinite, which
-        stands as null.
+        Sorted by scenario, those with a title of their own last; a run that failed or did not
+        settle counts as infinite, which stands as null.
     """
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in runs:
         groups.setdefault((run.scenario, run.estimator), []).append(run)
-    order = list(SCENARIOS)
-    rows = [_summary(key, groups[key]) for key in sorted(groups, key=lambda key: order.index(key[0]))]
+    rows = [_summary(key, groups[key]) for key in sorted(groups, key=lambda key: place(key[0]))]
     return [dict(json_safe(row)) for row in rows]
+
+
+def place(title: str) -> tuple[int, str]:
+    """Where a scenario stands in a report; those with a title of their own last.
+
+    Parameters
+    ----------
+    title : str
+        Name of a scenario, or title of a job.
+    """
+    order = list(SCENARIOS)
+    return (order.index(title), "") if title in SCENARIOS else (len(order), title)
 
 
 def _summary(key: tuple[str, str], runs: list[Run]) -> dict[str, Any]:
@@ -263,6 +278,7 @@ def _summary(key: tuple[str, str], runs: list[Run]) -> dict[str, Any]:
         "scenario": key[0],
         "estimator": key[1],
         "runs": len(runs),
+        "amplitude": runs[0].amplitude,
         "failures": sum(run.metrics is None for run in runs),
         "settled_soon": float(np.mean(soon)),
         "diverged": sum(run.metrics is None or run.metrics.diverged for run in runs),

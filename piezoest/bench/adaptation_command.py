@@ -13,7 +13,7 @@ from rich.console import Console
 EPILOG = (
     "Examples: piezoest bench adaptation --scenario gain-step --seeds 20; "
     'piezoest bench adaptation --estimator "HysteresisRLS(memory=0.2)" --estimator my_module:MyEstimator '
-    "--json adaptation.json"
+    "--json adaptation.json; piezoest bench adaptation --asked --seeds 200 --sample-rate 10000"
 )
 
 
@@ -43,6 +43,23 @@ def adaptation(
     html: Annotated[
         Path | None, typer.Option("--html", metavar="FILE", help="Write a page with interactive plots.")
     ] = None,
+    asked: Annotated[
+        bool,
+        typer.Option(
+            "--asked", help="All that is asked of the default estimator, on the scenarios that tell."
+        ),
+    ] = False,
+    policies: Annotated[
+        bool,
+        typer.Option("--policies", help="Each policy of HysteresisRLS in a combination that makes sense."),
+    ] = False,
+    figures: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Draw the transients there; with --policies.")
+    ] = None,
+    single: Annotated[
+        bool,
+        typer.Option("--runs/--no-runs", help="Every single run in the JSON, or medians and shares only."),
+    ] = True,
 ) -> None:
     """How fast estimators adapt: scenarios × estimators × seeds, beside linear feed-forward.
 
@@ -58,6 +75,12 @@ def adaptation(
         _write_html,
     )
 
+    if asked and (scenario or estimator or policies):
+        raise typer.BadParameter("goes without --scenario, --estimator and --policies", param_hint="--asked")
+    if policies and estimator:
+        raise typer.BadParameter("goes without --estimator", param_hint="--policies")
+    if figures is not None and not policies:
+        raise typer.BadParameter("goes with --policies", param_hint="--figures")
     target = _json_target(json_to)
     _check_html(html)
     began = time.perf_counter()
@@ -65,15 +88,9 @@ def adaptation(
     try:
         with _progress() as say:
             say("loading (compiles once after the installation)")
-            from piezoest.bench.adaptation import default_estimators, in_parallel, jobs_for
-            from piezoest.bench.scenarios import SCENARIOS
+            from piezoest.bench.adaptation import in_parallel
 
-            names = scenario or list(SCENARIOS)
-            chosen = estimator or default_estimators()
-            try:
-                work = jobs_for(names, chosen, range(seeds), overrides)
-            except ValueError as error:
-                raise typer.BadParameter(str(error)) from None
+            work = _work(scenario, estimator, seeds, overrides, asked=asked, policies=policies)
             runs: list[Any] = []
             for done, some in enumerate(in_parallel(work, jobs), 1):
                 runs += some
@@ -83,9 +100,14 @@ def adaptation(
     except KeyboardInterrupt:
         raise typer.Exit(INTERRUPTED) from None
     origin = {**_origin(), "seconds": round(time.perf_counter() - began, 1), "seeds": seeds}
-    document = _document(runs, origin, overrides, list(chosen))
+    document = _document(runs, origin, overrides, single=single)
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     _write_html(document, html)
+    if figures is not None:
+        from piezoest.bench.policy_figures import write_policies
+
+        for path in write_policies(document, figures):
+            typer.echo(f"Figure: {path}", err=json_to == "-")
     if json_to == "-":
         typer.echo(text)
         return
@@ -97,27 +119,53 @@ def adaptation(
         typer.echo(f"JSON: {target}")
 
 
-def _document(
-    runs: list[Any], origin: dict[str, Any], overrides: dict[str, Any], chosen: list[str]
-) -> dict[str, Any]:
-    from piezoest.bench.adaptation import summarise
-    from piezoest.bench.adaptation_report import criteria
+def _work(
+    scenario: list[str] | None,
+    estimator: list[str] | None,
+    seeds: int,
+    overrides: dict[str, Any],
+    *,
+    asked: bool,
+    policies: bool,
+) -> list[Any]:
+    """Jobs for what was asked for."""
+    from piezoest.bench.adaptation import default_estimators, jobs_for
+    from piezoest.bench.asked import jobs_asked
+    from piezoest.bench.combinations import COMBINATIONS
     from piezoest.bench.scenarios import SCENARIOS
 
-    runs = sorted(runs, key=lambda run: (list(SCENARIOS).index(run.scenario), run.seed))
+    if asked:
+        return list(jobs_asked(seeds, overrides))
+    chosen = estimator or default_estimators()
+    if policies:
+        chosen = [one.estimator for one in COMBINATIONS]
+    try:
+        return list(jobs_for(scenario or list(SCENARIOS), chosen, range(seeds), overrides))
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+def _document(
+    runs: list[Any], origin: dict[str, Any], overrides: dict[str, Any], *, single: bool
+) -> dict[str, Any]:
+    from piezoest.bench.adaptation import place, summarise
+    from piezoest.bench.asked import criteria, describe
+    from piezoest.bench.estimators import REFERENCE
+
+    runs = sorted(runs, key=lambda run: (place(run.scenario), run.seed))
     summary = summarise(runs)
-    names = dict.fromkeys(run.scenario for run in runs)
     failures = [
         f"{run.scenario}, seed {run.seed}, {run.estimator}: {run.failure}" for run in runs if run.failure
     ]
+    names = dict.fromkeys(run.estimator for run in runs if run.estimator != REFERENCE)
     return {
         "suite": "adaptation",
         **origin,
         "conditions": overrides,
-        "scenarios": {name: SCENARIOS[name].description for name in names},
-        "estimators": chosen,
+        "scenarios": describe(run.scenario for run in runs),
+        "estimators": list(names),
         "summary": summary,
         "criteria": criteria(summary),
         "failures": failures,
-        "runs": [run.to_dict() for run in runs],
+        "runs": [run.to_dict() for run in runs] if single else [],
     }

@@ -1,67 +1,12 @@
-"""The benchmark of adaptation for the terminal, and what is asked of the default estimator."""
+"""The benchmark of adaptation for the terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
-from piezoest.bench.adaptation import FIXED_MEMORIES, SOON
-
-DEFAULT, OUTPUT_ERROR = "HysteresisRLS", "OutputErrorRLS"
-CHANGES = ("cold-start", "amplitude-switch", "amplitude-drop", "gain-step")
-# What an adaptation that needs no tuning has to reach.
-LEAST_SETTLED = 0.95
-LARGEST_OVER_BEST = 1.2
-LARGEST_RATIO = 0.03
-LARGEST_REST_EXCURSION = 1e-3
-LARGEST_AFTER_REST = 1.1  # noise makes two equal periods differ by a few per cent
+from piezoest.bench.adaptation import SOON
 
 Row = dict[str, Any]
-
-
-def criteria(rows: Iterable[Row]) -> list[Row]:
-    """Check what the rows allow to check.
-
-    Parameters
-    ----------
-    rows : iterable of dict
-        From `piezoest.bench.adaptation.summarise`.
-
-    Returns
-    -------
-    list of dict
-        ``what``, ``value``, ``bound`` and whether it is ``met``.
-    """
-    table = {(row["scenario"], row["estimator"]): row for row in rows}
-    found: list[Row] = []
-
-    def check(what: str, value: float | None, bound: float, *, least: bool = False) -> None:
-        met = value is not None and (value >= bound if least else value <= bound)
-        found.append({"what": what, "value": value, "bound": bound, "least": least, "met": met})
-
-    for name in CHANGES:
-        row = table.get((name, DEFAULT))
-        if row is None:
-            continue
-        check(f"{name}: part settled within {SOON} periods", row["settled_soon"], LEAST_SETTLED, least=True)
-        fixed = [table.get((name, f"{DEFAULT}(memory={memory:g})")) for memory in FIXED_MEMORIES]
-        best = [each["settled_max"]["median"] for each in fixed if each is not None]
-        if known := [value for value in best if value]:
-            settled = row["settled_max"]["median"]
-            over = None if settled is None else settled / min(known)
-            check(f"{name}: settled error over the best fixed memory's", over, LARGEST_OVER_BEST)
-    if row := table.get(("cold-start", OUTPUT_ERROR)):
-        what = f"cold-start, {OUTPUT_ERROR}: settled error over linear feed-forward's"
-        check(what, row["ratio"]["median"], LARGEST_RATIO)
-    if row := table.get(("dwell", DEFAULT)):
-        check("dwell: parameters' excursion", row["rest_excursion"]["q95"], LARGEST_REST_EXCURSION)
-        what = "dwell: first error after over last before"
-        check(what, row["first_after_rest"]["q95"], LARGEST_AFTER_REST)
-    mine = [row for row in table.values() if row["estimator"] == DEFAULT]
-    if mine:
-        check("runs that diverged", float(sum(row["diverged"] for row in mine)), 0.0)
-    return found
-
 
 COLUMNS = (
     ("settles", "settling_periods", 0),

@@ -14,6 +14,7 @@ SETTLED = 0.012  # of the amplitude: the level at which the paper's own method s
 NEAR_FINAL = 1.5  # times the settled error
 LAST_PERIODS = 3
 DIVERGED = 1.5  # times linear feed-forward's error
+CAUGHT_UP = 0.05  # periods
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +54,9 @@ class Metrics:
     rest_excursion : float or None
         Largest deviation of a parameter during the rest from its value before it, in parts
         of that.
+    rest_excursion_later : float or None
+        The same, from a twentieth of a period into the rest, by when the stage has followed the last
+        of the motion.
     errors : tuple of float
         Largest error of each period after the change [µm].
     """
@@ -71,6 +75,7 @@ class Metrics:
     diverged_in_a_period: bool
     before_max: float | None
     rest_excursion: float | None
+    rest_excursion_later: float | None
     errors: tuple[float, ...] = field(repr=False)
 
 
@@ -129,6 +134,7 @@ def measure(record: TrackingRecord, linear: TrackingRecord, case: Case) -> Metri
         diverged_in_a_period=not worst_ratio <= DIVERGED,
         before_max=float(largest(error, calm)[-1]) if calm.size > 1 else None,
         rest_excursion=_rest_excursion(record.theta, case),
+        rest_excursion_later=_rest_excursion(record.theta, case, round(CAUGHT_UP * case.period)),
         errors=tuple(errors.tolist()),
     )
 
@@ -215,10 +221,13 @@ def deviation(theta: FloatArray, level: FloatArray) -> float:
     return float(np.max(parts))
 
 
-def _rest_excursion(theta: FloatArray, case: Case) -> float | None:
+def _rest_excursion(theta: FloatArray, case: Case, skipped: int = 0) -> float | None:
+    """Excursion during the rest without its first samples; None if there is no such rest."""
     if case.rest is None or theta.size == 0:
         return None
-    first, end = case.rest
+    first, end = case.rest[0] + skipped, case.rest[1]
+    if first >= end:
+        return None
     return deviation(theta[first:end], theta[first])
 
 

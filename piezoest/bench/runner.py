@@ -245,6 +245,7 @@ COLUMNS: dict[str, type] = {
     "diverged_in_a_period": bool,
     "before_max": float,
     "rest_excursion": float,
+    "rest_excursion_later": float,
     "microseconds": float,
 }
 

@@ -56,6 +56,8 @@ class Conditions:
     updates : int
         Updates of the compensator's model in a period of the wave; the default is one a
         millisecond at 5 Hz.
+    creep : bool
+        Whether the stage creeps.
 
     Raises
     ------
@@ -72,6 +74,7 @@ class Conditions:
     rest: float = 60.0
     drift: float = 30.0
     updates: int = 200
+    creep: bool = True
 
     def __post_init__(self) -> None:
         for name in ("sample_rate", "frequency", "rest", "drift"):
@@ -120,6 +123,8 @@ class Case:
         Standard deviation of the gauge's noise [µm]; None for the stage's own.
     gain_schedule : tuple, optional
         Time [s] and factor of the stage's hysteresis, see `PaperStage`.
+    creep : bool
+        Whether the stage creeps.
     stage : type
         `PaperStage` or `PreisachStage`; ``dataclasses.replace(case, stage=...)`` plays it on the other.
     """
@@ -136,6 +141,7 @@ class Case:
     rest: tuple[int, int] | None = None
     noise: float | None = None
     gain_schedule: tuple[tuple[float, float], ...] | None = None
+    creep: bool = True
     stage: type[PaperStage] | type[PreisachStage] = PaperStage
 
     @property
@@ -146,7 +152,11 @@ class Case:
     def new_stage(self) -> PaperStage | PreisachStage:
         """Stage at rest; every one of the same case is identical, its noise included."""
         return self.stage(
-            self.sample_rate, seed=self.seed, noise=self.noise, gain_schedule=self.gain_schedule
+            self.sample_rate,
+            seed=self.seed,
+            noise=self.noise,
+            gain_schedule=self.gain_schedule,
+            creep=self.creep,
         )
 
 
@@ -219,7 +229,7 @@ def _case(
     period: float | None = None,
     **rest: Any,
 ) -> Case:
-    options = {"change": 0, "noise": given.noise, **rest}
+    options = {"change": 0, "noise": given.noise, "creep": given.creep, **rest}
     return Case(
         scenario=name,
         seed=seed,

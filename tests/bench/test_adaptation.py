@@ -15,8 +15,10 @@ from typer.testing import CliRunner, Result
 
 import piezoest as pz
 from piezoest.bench import adaptation as bench
-from piezoest.bench.adaptation_report import criteria
+from piezoest.bench import asked, policy_figures
+from piezoest.bench.asked import criteria
 from piezoest.bench.candidates import candidate
+from piezoest.bench.combinations import COMBINATIONS, Combination
 from piezoest.bench.scenarios import RIGHT_MODEL, SCENARIOS
 from piezoest.cli import app
 from piezoest.policies import DeadZone, NormBound
@@ -100,12 +102,7 @@ def test_refuses_what_is_no_candidate(text: str, words: str) -> None:
 
 def test_default_estimators() -> None:
     names = bench.default_estimators()
-    assert names[:4] == (
-        "HysteresisRLS",
-        "HysteresisRLS(memory=0.1)",
-        "HysteresisRLS(memory=0.4)",
-        "HysteresisRLS(memory=1)",
-    )
+    assert names[:6] == ("HysteresisRLS", *(f"HysteresisRLS(memory={m})" for m in (0.05, 0.1, 0.2, 0.4, 1)))
     assert "HysteresisEKF" in names
     assert ("OutputErrorRLS" in names) == hasattr(pz, "OutputErrorRLS")
 
@@ -189,6 +186,80 @@ def test_criteria() -> None:
     assert criteria([]) == []
 
 
+def test_what_is_asked_is_planned_and_its_rows_are_found() -> None:
+    jobs = asked.jobs_asked(30, {"sample_rate": FS})
+    titles = [job.title or "" for job in jobs]
+    assert {title: titles.count(title) for title in titles} == {
+        one.title: one.seeds or 30 for one in asked.SITUATIONS
+    }
+    assert list(asked.describe(titles)) == [one.title for one in asked.SITUATIONS]
+    # At the paper's rate and amplitudes, whatever is chosen for the rest.
+    triangles = [job for job in jobs if (job.title or "").startswith("triangle")]
+    assert {job.overrides["sample_rate"] for job in triangles} == {50_000.0}
+    assert {(job.overrides["amplitude"], job.overrides["frequency"]) for job in triangles} == set(
+        asked.TRIANGLES
+    )
+    creepless = next(job for job in jobs if job.title == asked.WITHOUT_CREEP)
+    assert (creepless.scenario, creepless.overrides) == ("dwell", {"sample_rate": FS, "creep": False})
+    rows = [
+        row(title, name) for title in dict.fromkeys(titles) for name in (asked.DEFAULT, asked.OUTPUT_ERROR)
+    ]
+    rows += [row(name, fixed) for name in asked.CHANGES for fixed in asked.FIXED]
+    found = criteria(rows)
+    assert [each["kind"] for each in found] == [
+        *["settling"] * 4, *["hindsight"] * 4, *["linear"] * 5, *["rest"] * 4, "divergence",
+    ]  # fmt: skip
+    assert all(each["met"] for each in found)
+
+
+def test_the_best_fixed_memory_is_that_with_the_least_settled_error() -> None:
+    names = asked.FIXED
+    rows = {
+        ("cold-start", names[0]): row("cold-start", names[0], settled_max=0.03),
+        ("cold-start", names[1]): row("cold-start", names[1], settled_max=0.01),
+        ("cold-start", names[2]): row("cold-start", names[2], settled_max=None),
+    }
+    best = asked.best_fixed(rows, "cold-start")
+    assert best is not None
+    assert best["estimator"] == names[1]
+    assert asked.best_fixed(rows, "gain-step") is None
+
+
+def test_a_dwell_without_creep_moves_the_parameters_less() -> None:
+    moved = []
+    for creep in (True, False):
+        job = bench.Job("dwell", 0, ("HysteresisRLS",), {**SMALL, "rest": 4.0, "creep": creep}, title="rest")
+        runs = bench.play(job)
+        assert {each.scenario for each in runs} == {"rest"}
+        metrics = runs[1].metrics
+        assert metrics is not None
+        assert metrics.rest_excursion is not None
+        assert metrics.rest_excursion_later is not None
+        assert metrics.rest_excursion_later < metrics.rest_excursion
+        moved.append(metrics.rest_excursion_later)
+    assert moved[1] < moved[0]
+
+
+@pytest.mark.parametrize("one", COMBINATIONS, ids=lambda one: f"{one.name}, {one.said}")
+def test_combinations_hold_the_policy_they_are_named_by(one: Combination) -> None:
+    made = candidate(one.estimator)(FS, RIGHT_MODEL).to_dict()["arguments"]
+    kinds = {policy["policy"] for policy in made["policies"]}
+    if one.name.startswith("no "):
+        assert one.name.removeprefix("no ") not in kinds
+    elif one.name in public_policies():
+        # An exponential forgetting is said by its memory.
+        assert one.name in kinds or (one.name == "Forgetting" and made["memory"] == 0.4)
+
+
+def public_policies() -> set[str]:
+    return set(pz.policies.__all__)
+
+
+def test_every_policy_is_in_a_combination() -> None:
+    said = " ".join(f"{one.name} {one.estimator}" for one in COMBINATIONS)
+    assert [name for name in public_policies() if name not in said] == []
+
+
 SHORT = ("--scenario", "cold-start", "--sample-rate", 4000, "--periods", 4, "--jobs", 1)
 
 
@@ -214,6 +285,31 @@ def test_command_end_to_end(own: str) -> None:
     assert len(document["summary"]) == 3
 
 
+def test_policies_are_drawn(own: str) -> None:
+    names = [one.estimator for one in COMBINATIONS[:2]]
+    jobs = [bench.Job(name, 0, tuple(names), SMALL) for name in ("cold-start", "gain-step")]
+    rows = bench.summarise([each for job in jobs for each in bench.play(job)])
+    rows[1]["transient"][0] = None
+    document = {"summary": rows, "scenarios": {"cold-start": "", "gain-step": ""}}
+    figure = policy_figures.transients(document, ["cold-start", "gain-step"])
+    assert len(figure.axes) == 4
+    assert [axes.get_title() for axes in figure.axes[:2]] == ["cold-start", "gain-step"]
+    assert "else the default" in figure.axes[2].get_ylabel()
+    drawn = np.asarray(figure.axes[0].lines[0].get_ydata())
+    assert drawn[0] == pytest.approx(100.0 * rows[0]["transient"][0] / rows[0]["amplitude"])
+    (path,) = policy_figures.write_policies(document, Path("there"))
+    assert path == Path("there/changes.png")
+    assert path.stat().st_size > 10_000
+
+
+def test_command_leaves_single_runs_out(own: str) -> None:
+    result = run(*SHORT, "--seeds", 1, "--estimator", "HysteresisEKF", "--no-runs", "--json", "-")
+    assert result.exit_code == 0, result.output
+    document = json.loads(result.stdout)
+    assert document["runs"] == []
+    assert {each["runs"] for each in document["summary"]} == {1}
+
+
 def test_command_prints_json_alone() -> None:
     result = run(*SHORT, "--seeds", 1, "--estimator", "HysteresisRLS", "--json", "-")
     assert result.exit_code == 0
@@ -229,6 +325,10 @@ def test_command_refuses_wrong_words(tmp_path: Path) -> None:
         ("--scenario", "nowhere"),
         ("--estimator", "NoSuch"),
         ("--seeds", 0),
+        ("--asked", "--policies"),
+        ("--asked", "--scenario", "dwell"),
+        ("--policies", "--estimator", "HysteresisRLS"),
+        ("--figures", tmp_path),
         ("--json", tmp_path / "nowhere" / "a.json"),
     ):
         assert run(*arguments).exit_code == 2, arguments
@@ -265,7 +365,9 @@ def test_soak_judges() -> None:
     assert first["samples"] == 50_000
     n = estimator.theta.size
     scatter = np.full(n, 1e-3)
-    assert script.verdict([first, first], scatter)["within_noise"]
+    start = estimator.theta
+    assert script.verdict([first, first], start, scatter)["within_noise"]
+    assert not script.verdict([first, first], start + 9e-3, scatter)["within_noise"]
     drifted = [{**first, "theta": (estimator.theta + k * 1e-3).tolist()} for k in range(20)]
-    assert not script.verdict(drifted, scatter)["within_noise"]
-    assert not script.verdict([first, {**first, "sound": False}], scatter)["sound"]
+    assert not script.verdict(drifted, start, scatter)["within_noise"]
+    assert not script.verdict([first, {**first, "sound": False}], start, scatter)["sound"]

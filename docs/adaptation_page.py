@@ -1,0 +1,355 @@
+"""Tables and sentences of the pages `adaptation_asked` and `adaptation_policies`, from docs/data.
+
+No number is typed by hand. Runs at the start of every Sphinx build; by itself:
+python docs/adaptation_page.py
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from paper_page import table, write_pieces
+from which_estimator_page import listed, percent, replacements, short
+
+from piezoest.bench import asked
+from piezoest.bench.combinations import COMBINATIONS
+from piezoest.bench.scenarios import SCENARIOS
+
+DOCS = Path(__file__).resolve().parent
+DATA = DOCS / "data"
+ASKED, POLICIES = DOCS / "generated" / "adaptation_asked", DOCS / "generated" / "adaptation_policies"
+WORST = 5  # runs of the Monte Carlo that are shown
+
+Document = dict[str, Any]
+
+
+def read(name: str) -> Document:
+    found: Document = json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
+    return found
+
+
+def write(app: Any = None) -> None:
+    """Write what the pages include."""
+    pieces = {
+        **criteria_pieces(read("adaptation"), read("best_fixed_model")),
+        **monte_carlo_pieces(read("monte_carlo")),
+        **soak_pieces(read("soak")),
+    }
+    write_pieces(ASKED, pieces)
+    write_pieces(POLICIES, policies_pieces(read("policies")))
+
+
+# ---------------------------------------------------------------- asked, measured, verdict
+
+
+def criteria_pieces(document: Document, fixed: Document) -> dict[str, str]:
+    """Texts by the name of their file."""
+    rows = {(row["scenario"], row["estimator"]): row for row in document["summary"]}
+    body = []
+    for one in document["criteria"]:
+        side = "≥" if one["least"] else "≤"
+        body.append(
+            [
+                one["what"], f"{side} {figure(one, one['bound'])}", figure(one, one["value"]),
+                "✓" if one["met"] else "✗",
+            ]
+        )  # fmt: skip
+    return {
+        "criteria": table("Asked and measured", ["", "asked", "measured", "verdict"], body),
+        "reasons": "".join(f"- {sentence}\n" for sentence in reasons(document, rows, fixed)),
+        "spread": spread_table(document, rows),
+        "hindsight": hindsight_table(rows),
+        "paper_rate": paper_rate(rows),
+        "numbers": replacements(
+            {
+                **origin(document, "asked"),
+                "asked seeds": document["seeds"],
+                "asked few": min(document["seeds"], asked.FEW),
+                "asked rate": f"{document['conditions']['sample_rate']:g} Hz",
+                "asked paper rate": f"{asked.PAPER_RATE:g} Hz",
+                "asked memories": listed([f"{memory:g}" for memory in asked.FIXED_MEMORIES]),
+            }
+        ),
+    }
+
+
+def figure(one: Document, value: float | None) -> str:
+    """A number as its criterion has it: a share in per cent, a ratio as such."""
+    return (
+        short(value)
+        if one["kind"] in ("hindsight", "divergence") or "over last" in one["what"]
+        else percent(value)
+    )
+
+
+def origin(document: Document, of: str) -> dict[str, str]:
+    """When and on what."""
+    machine = document["machine"]
+    return {
+        f"{of} date": document["date"][:10],
+        f"{of} machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
+    }
+
+
+def reasons(document: Document, rows: dict[tuple[str, str], Document], fixed: Document) -> list[str]:
+    """Why what is not met is not."""
+    missed = {one["kind"] for one in document["criteria"] if not one["met"]}
+    sentences = []
+    if "settling" in missed or "hindsight" in missed:
+        for name in asked.CHANGES:
+            row = rows[name, asked.DEFAULT]
+            best = asked.best_fixed(rows, name)
+            said = "" if best is None else (
+                f", with the best fixed memory, ``{best['estimator']}``, {percent(best['settled_soon'])}"
+            )  # fmt: skip
+            sentences.append(f"*{name}*: {percent(row['settled_soon'])} of the runs settle in time{said}.")
+    if "linear" in missed:
+        sentences.append(below_linear(fixed))
+    if "rest" in missed:
+        sentences += at_rest(rows)
+    return sentences
+
+
+def below_linear(fixed: Document) -> str:
+    """How far a Coleman-Hodgdon model can get at all."""
+    reached = listed([percent(row["reduction"]) for row in fixed["rows"]])
+    rows = listed([f"{row['amplitude']:g} µm at {row['frequency']:g} Hz" for row in fixed["rows"]])
+    return (
+        "That far below linear feed-forward is beyond this model on this stage: the best fixed one, found by "
+        f"direct search over its parameters with no estimator in between, is {reached} below for {rows}."
+    )
+
+
+def at_rest(rows: dict[tuple[str, str], Document]) -> list[str]:
+    """What moves the parameters during a rest, and the error after it."""
+    with_it, without = (rows[name, asked.DEFAULT] for name in ("dwell", asked.WITHOUT_CREEP))
+    linear = rows["dwell", "linear feed-forward"]
+    later = [percent(row["rest_excursion_later"]["q95"]) for row in (with_it, without)]
+    first = [short(row["first_after_rest"]["median"]) for row in (with_it, without)]
+    errors = [nm(row["worst_error"]["median"]) for row in (with_it, linear)]
+    return [
+        "In the first hundredth of a second of the rest the stage still follows the last of the motion, and "
+        f"the parameters with it. From then on they move by {later[0]} in the sixty seconds, and by "
+        f"{later[1]} on a stage that does not creep.",
+        "Creep moves the stage itself during the rest, by what no model without creep can know: the first "
+        f"error after it is {first[0]} times the last before, {first[1]} times on a stage that does not "
+        f"creep (medians). Linear feed-forward's is larger still, {errors[1]} where this one is {errors[0]}.",
+    ]
+
+
+def paper_rate(rows: dict[tuple[str, str], Document]) -> str:
+    """How many runs settle in time where the stage has its filters, in a sentence."""
+    shares = []
+    for triangle in asked.TRIANGLES:
+        row = rows[asked.triangle_title(*triangle), asked.DEFAULT]
+        shares.append(f"{percent(row['settled_soon'])} ({triangle[0]:g} µm at {triangle[1]:g} Hz)")
+    return (
+        f"At {asked.PAPER_RATE:g} Hz the stage has the paper's filters, and their delay costs: from "
+        f"a cold start the default settles within {asked.SOON} periods in {listed(shares)} of the runs.\n"
+    )
+
+
+def nm(value: float | None) -> str:
+    return "—" if value is None else f"{1e3 * value:.3g} nm"
+
+
+def pair(values: Document, say: Any) -> str:
+    return f"{say(values['median'])} ({say(values['q95'])})"
+
+
+def spread_table(document: Document, rows: dict[tuple[str, str], Document]) -> str:
+    """What the runs were like, with the defaults and linear feed-forward."""
+    heading = [
+        "scenario", "estimator", "runs", f"settled within {asked.SOON}", "settles, periods", "worst",
+        "settled", "over linear", "diverged",
+    ]  # fmt: skip
+    body = []
+    for name in document["scenarios"]:
+        for estimator in ("linear feed-forward", asked.DEFAULT, asked.OUTPUT_ERROR):
+            row = rows.get((name, estimator))
+            if row is None:
+                continue
+            body.append(
+                [
+                    name, estimator, str(row["runs"]), percent(row["settled_soon"]),
+                    pair(row["settling_periods"], short), pair(row["worst_error"], nm),
+                    pair(row["settled_max"], nm), pair(row["ratio"], percent), str(row["diverged"]),
+                ]
+            )  # fmt: skip
+    return table("Median, and in parentheses the 95 % quantile over the seeds", heading, body)
+
+
+def hindsight_table(rows: dict[tuple[str, str], Document]) -> str:
+    """Settled error of each fixed memory, beside the default's."""
+    body = [
+        [
+            estimator.removeprefix(asked.DEFAULT).strip("()") or "default",
+            *(
+                f"{nm(rows[name, estimator]['settled_max']['median'])}; "
+                f"{percent(rows[name, estimator]['settled_soon'])}"
+                for name in asked.CHANGES
+            ),
+        ]
+        for estimator in (asked.DEFAULT, *asked.FIXED)
+    ]
+    title = f"Settled error (median); part of the runs that settle within {asked.SOON} periods"
+    return table(title, ["HysteresisRLS", *asked.CHANGES], body)
+
+
+# ---------------------------------------------------------------- Monte Carlo
+
+
+def monte_carlo_pieces(document: Document) -> dict[str, str]:
+    """Texts by the name of their file."""
+    plain, guarded = document["unguarded"], document["guarded"]
+    counts = [["all", str(plain["diverged"]), str(guarded["diverged"])]]
+    counts += [
+        [name, str(count), str(guarded["by_scenario"][name])] for name, count in plain["by_scenario"].items()
+    ]
+    worst = [
+        worst_run(run, key) for key in ("unguarded", "guarded") for run in document[key]["worst"][:WORST]
+    ]
+    spans = document["spans"]
+    return {
+        "monte_carlo": table("Runs that diverged", ["scenario", "without the guard", "with it"], counts),
+        "monte_carlo_worst": table(
+            "The worst runs: largest error after the first period, over linear feed-forward's",
+            [
+                "guard",
+                "scenario",
+                "run",
+                "memory, s",
+                "amplitude, µm",
+                "frequency, Hz",
+                "noise, nm",
+                "without",
+                "with",
+            ],
+            worst,
+        ),
+        "monte_carlo_verdict": monte_carlo_verdict(document),
+        "monte_carlo_numbers": replacements(
+            {
+                **origin(document, "monte"),
+                "monte runs": document["runs"],
+                "monte bound": short(document["diverged_above"]),
+                "monte estimator": f"``{document['estimator'].replace('{memory:.4g}', 'T')}``",
+                "monte memory": "{:g} to {:g} s".format(*spans["memory"]),
+                "monte amplitude": "{:g} to {:g} µm".format(*spans["amplitude"]),
+                "monte frequency": "{:g} to {:g} Hz".format(*spans["frequency"]),
+                "monte noise": "{:g} to {:g} nm".format(*(1e3 * noise for noise in spans["noise"])),
+            }
+        ),
+    }
+
+
+def worst_run(run: Document, key: str) -> list[str]:
+    """One line about a run."""
+    given = run["conditions"]
+    return [
+        "off" if key == "unguarded" else "on", run["scenario"], str(run["number"]), short(run["memory"]),
+        short(given["amplitude"]), short(given["frequency"]), f"{1e3 * given['noise']:.3g}",
+        *(short(run[each].get("run_ratio")) for each in ("unguarded", "guarded")),
+    ]  # fmt: skip
+
+
+def monte_carlo_verdict(document: Document) -> str:
+    """Whether any run with the guard diverged, in a sentence."""
+    plain, guarded, runs = document["unguarded"], document["guarded"], document["runs"]
+    held = (
+        "none diverges with the guard on" if guarded["diverged"] == 0
+        else f"{guarded['diverged']} diverge with the guard on"
+    )  # fmt: skip
+    largest = guarded["worst"][0]["guarded"].get("run_ratio")
+    failed = plain["failures"] + guarded["failures"]
+    return (
+        f"Of {runs} runs {held}, {plain['diverged']} without it. The largest ratio with the guard is "
+        f"{short(largest)}. {'No run failed.' if failed == 0 else f'{failed} runs failed.'}\n"
+    )
+
+
+# ---------------------------------------------------------------- soak
+
+
+def soak_pieces(document: Document) -> dict[str, str]:
+    """Texts by the name of their file."""
+    checks, names = document["checks"], ("α", "β", "γ", "offset's slope")
+    last, starts, noises = checks[-1], document["theta_at_the_start"], document["noise_of_theta"]
+    body = []
+    for name, start, noise, end, trend in zip(
+        names, starts, noises, last["theta"], document["trend"], strict=True
+    ):
+        off = (end - start) / noise
+        body.append([name, f"{start:.6g}", f"{noise:.2g}", f"{end:.6g}", f"{off:+.1f}", f"{trend:+.1f}"])
+    heading = ["", "mean at the start", "its standard deviation", "at the end", "off by", "trend"]
+    unsound = sum(not each["sound"] for each in checks)
+    sound = (
+        f"At all {len(checks)} checks P is symmetric and positive definite"
+        if unsound == 0
+        else f"At {unsound} of {len(checks)} checks P is not symmetric and positive definite"
+    )
+    smallest = min(each["smallest_eigenvalue"] for each in checks)
+    within = "within" if document["within_noise"] else "beyond"
+    return {
+        "soak": table("Parameters; the last two columns in standard deviations of the start", heading, body),
+        "soak_verdict": (
+            f"{sound}; its least eigenvalue, scaled to a unit diagonal, is {short(smallest)}. The largest "
+            f"deviation of a parameter at a check is {short(document['largest_deviation'])} standard "
+            f"deviations of the start, {within} the {short(document['within'])} that are allowed.\n"
+        ),
+        "soak_numbers": replacements(
+            {
+                **origin(document, "soak"),
+                "soak samples": power_of_ten(last["samples"]),
+                "soak hours": short(last["samples"] / document["sample_rate"] / 3600.0),
+                "soak rate": f"{document['sample_rate']:g} Hz",
+                "soak seconds": f"{document['seconds']:.0f} s",
+                "soak run in": f"{document['run_in_samples'] / document['sample_rate']:g} s",
+            }
+        ),
+    }  # fmt: skip
+
+
+def power_of_ten(count: int) -> str:
+    return f"{count / 1e6:g} million"
+
+
+# ---------------------------------------------------------------- policies
+
+
+def policies_pieces(document: Document) -> dict[str, str]:
+    """Texts by the name of their file."""
+    rows = {(row["scenario"], row["estimator"]): row for row in document["summary"]}
+    scenarios = list(document["scenarios"])
+    body = []
+    for one in COMBINATIONS:
+        for said, quantity, say in (
+            ("settles", "settling_periods", short), ("worst", "worst_error", nm_alone),
+            ("settled", "settled_max", nm_alone),
+        ):  # fmt: skip
+            name = f"{one.name}: {one.said}" if said == "settles" else ""
+            values = [rows[scenario, one.estimator][quantity]["median"] for scenario in scenarios]
+            body.append([name, said, *(say(value) for value in values)])
+    written = [[one.name, one.said, f"``{one.estimator}``"] for one in COMBINATIONS]
+    return {
+        "table": table("Settles: periods; worst and settled error: nm; medians", ["", "", *scenarios], body),
+        "combinations": table("As they were written", ["policy", "with", "estimator"], written),
+        "scenarios": "".join(f"- *{name}*. {SCENARIOS[name].description}\n" for name in scenarios),
+        "numbers": replacements(
+            {
+                **origin(document, "policies"),
+                "policies seeds": document["seeds"],
+                "policies rate": f"{document['conditions']['sample_rate']:g} Hz",
+            }
+        ),
+    }
+
+
+def nm_alone(value: float | None) -> str:
+    return "—" if value is None else short(1e3 * value) if value < 100.0 else f"{1e3 * value:.0e}"
+
+
+if __name__ == "__main__":
+    write()
