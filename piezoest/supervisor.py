@@ -19,6 +19,8 @@ POINTS, MOST, WINDOWS = 4, 800, 4
 HALF_LIFE = 0.5
 # A model that is right to this part of the displacement's range is good enough anyway.
 NEGLIGIBLE = 0.005
+# A model in use that is about as good, to this part, makes room for the next one.
+ABOUT = 1.1
 # After a fall a model must be better than the line by this, or the two would take turns.
 CLEARLY = 0.7
 # It is not tried again for this part of a window, and the line fallen back to stays until it misses
@@ -63,7 +65,7 @@ class Supervisor:
     measured displacement compared with that of the straight line x = K u + offset that fits
     the window best. A model whose error is above `limit` times the line's is not handed on: the
     compensator keeps its present model if that one passes, else gets the last one that had passed if it
-    still does, else the line itself. What linear feed-forward would miss of a reference is
+    still does, else the line itself. Nor is a model handed on that is worse than the present one. What linear feed-forward would miss of a reference is
     what a line misses of the displacement, so that adaptation is never worse than that
     for longer than it takes to see it. Errors are root mean squares, or half the
     largest value where that is more; the recent past weighs more.
@@ -164,6 +166,10 @@ class Supervisor:
             if self._moved < self._until:
                 allowed = 0.0
         if error <= allowed:
+            good_enough = self._held is not None or error <= NEGLIGIBLE * span
+            if not good_enough and error > ABOUT * _error(present, past, weights):
+                # One lucky model after another is worse than any of them: the better one stays.
+                return present
             self._pass(proposed, error, unexplained)
             return proposed
         reason = f"{proposed} misses {error:.3g} µm, a line {unexplained:.3g} µm"
