@@ -63,13 +63,13 @@ class Supervisor:
 
     Every proposed model is run over the voltages of the last window, and its error against the
     measured displacement compared with that of the straight line x = K u + offset that fits
-    the window best. A model whose error is above `limit` times the line's is not handed on: the
-    compensator keeps its present model if that one passes, else gets the last one that had passed if it
-    still does, else the line itself. Nor is a model handed on that is worse than the present one. What linear feed-forward would miss of a reference is
-    what a line misses of the displacement, so that adaptation is never worse than that
-    for longer than it takes to see it. Errors are root mean squares, or half the
-    largest value where that is more; the recent past weighs more.
-    At the start, until the line's gain is known, a model must be clearly better than the one in use.
+    the window best. A model whose error is above `limit` times the line's, or above that of the present
+    model, is not handed on: the compensator keeps its present model if that one passes, else gets the
+    last one that had passed if it still does, else the line itself. What linear feed-forward would
+    miss of a reference is what a line misses of the displacement, so that adaptation is never worse
+    than that for longer than it takes to see it. Errors are root mean squares, or half the largest
+    value where that is more; the recent past weighs more. At the start, until the line's gain is
+    known, a model must be clearly better than the one in use.
 
     Parameters
     ----------
