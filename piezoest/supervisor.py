@@ -32,8 +32,8 @@ FIRST = 16
 GAIN_KNOWN = 0.05
 # b in parts of c in a Coleman-Hodgdon model that stands for a line.
 NO_LOOP = 1e-9
-# An error's largest value counts like a root mean square this many times smaller.
-PEAK = 2.0
+# An error's largest value, but for this part of all, counts like a root mean square so many times smaller.
+SPIKES, PEAK = 0.02, 2.0
 # Rows of what is kept of the past.
 TIME, VOLTAGE, MEASURED, ROWS = range(4)
 
@@ -312,9 +312,14 @@ def _error(model: Model, past: FloatArray, weights: FloatArray) -> float:
 
 
 def _size(missed: FloatArray, weights: FloatArray) -> float:
-    """Root mean square of an error by weights [µm], or a part of the largest if that is more."""
+    """Root mean square of an error by weights [µm], or a part of the largest if that is more.
+
+    The very largest do not count: a spike of the sensor would excuse any model.
+    """
     mean = math.sqrt(float(weights @ missed**2) / float(weights.sum()))
-    return max(mean, float(np.max(np.abs(missed[weights > 0.0]))) / PEAK)
+    recent = np.abs(missed[weights > 0.0])
+    place = recent.size - 1 - int(SPIKES * recent.size)
+    return max(mean, float(np.partition(recent, place)[place]) / PEAK)
 
 
 def _as_model(gain: float, offset: float, present: Model) -> Model:
