@@ -87,7 +87,9 @@ def bank_scaling(c: Reference, samples: int, rounds: int) -> list[dict[str, Any]
         u, x = (np.ascontiguousarray(np.tile(v[:, None], (1, channels))) for v in (u, x))
         banks = {
             str(threads): pz.EstimatorBank(
-                pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, memory=MEMORY), channels, threads=threads
+                pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, memory=MEMORY, errors=False),
+                channels,
+                threads=threads,
             )
             for threads in (1, 2)
         }
@@ -133,9 +135,11 @@ def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
     work: dict[str, Work] = {
         "C, RLS": lambda: c.rls(u, x, off)[-1],
         "C, RLS, bound and dead zone": lambda: c.rls(u, x, on)[-1],
-        "HysteresisRLS, policies off": lambda: rls(u, x, memory=MEMORY, policies=()),
-        "HysteresisRLS, the paper's": lambda: rls(u, x, memory=MEMORY),
-        "HysteresisRLS, default": lambda: rls(u, x),
+        "HysteresisRLS, policies off": lambda: rls(u, x, memory=MEMORY, policies=(), errors=False),
+        "HysteresisRLS, the paper's": lambda: rls(u, x, memory=MEMORY, errors=False),
+        "HysteresisRLS, default": lambda: rls(u, x, errors=False),
+        "HysteresisRLS, policies off, standard errors": lambda: rls(u, x, memory=MEMORY, policies=()),
+        "HysteresisRLS, default, standard errors": lambda: rls(u, x),
         "exported C, policies off": lambda: exported["policies off"](u, x)[-1, :3],
         "exported C, default": lambda: exported["default"](u, x)[-1],
         "C, EKF": lambda: c.ekf(u, x, ekf_settings(SAMPLE_RATE, START))[-1],
@@ -202,6 +206,10 @@ def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
          "figure": against("HysteresisRLS, policies off", "exported C, policies off")},
         {"what": "HysteresisRLS.run, default policies, times the same estimator exported to C", "target": 1.3,
          "figure": against("HysteresisRLS, default", "exported C, default")},
+        {"what": "HysteresisRLS.run, policies off, standard errors too, times C", "target": 1.3,
+         "figure": against("HysteresisRLS, policies off, standard errors", "C, RLS")},
+        {"what": "HysteresisRLS.run, default policies, standard errors too, times C", "target": 3.0,
+         "figure": against("HysteresisRLS, default, standard errors", "C, RLS, bound and dead zone")},
         {"what": "HysteresisEKF.run, times C", "target": 1.5, "figure": against("HysteresisEKF", "C, EKF")},
         {"what": "HysteresisEKF.run, times faster than filterpy", "target": 1000.0, "at_least": True,
          "figure": times["filterpy EKF"] / times["HysteresisEKF"]},

@@ -60,6 +60,9 @@ class HysteresisRLS(Freezable):
     time_base : {"discrete", "continuous"}
         Time base of the law, see `RecursiveLeastSquares`; ``"continuous"`` is the paper's,
         in seconds.
+    errors : bool
+        Follow the covariance of the estimate's error, for `standard_errors`. It costs about as much as
+        the law itself: :doc:`/performance`.
     policies : tuple of policies, optional
         Policies beside `memory`. Default with ``memory="period"``: ``(RandomWalk(), DeadZone(),
         OutlierRejection())``, for a `LinearGain` with `PeriodicForgetting` for
@@ -109,6 +112,7 @@ class HysteresisRLS(Freezable):
         offset: bool | None = None,
         delay: float = 0.0,
         time_base: law.TimeBase = "discrete",
+        errors: bool = True,
         policies: tuple[Policy, ...] | None = None,
     ) -> None:
         sample_rate = positive("sample_rate", sample_rate)
@@ -147,6 +151,8 @@ class HysteresisRLS(Freezable):
             noise=positive("noise", noise),
             per_second=time_base == "continuous",
         )
+        # The continuous law's P is the covariance already.
+        config[kernel.ERRORS] = bool(errors) and time_base == "discrete"
         settings.policy_settings(config, policies, sample_rate)
         P_0 = np.diag(np.full(n, positive("uncertainty", uncertainty) ** 2))
         forgetting = Forgetting(memory if isinstance(memory, float) else np.inf)
@@ -167,6 +173,7 @@ class HysteresisRLS(Freezable):
                 "offset": bool(offset),
                 "delay": float(delay),
                 "time_base": time_base,
+                "errors": bool(errors),
                 "policies": [policy_to_dict(policy) for policy in policies],
             },
             state,
@@ -277,9 +284,9 @@ class HysteresisRLS(Freezable):
         Differencing and W_p colour that noise, so that P is not the covariance of `theta`:
         these follow the noise through the filters and the law (see
         `least_squares.propagate_error`), for parameters that are constant: the model's own
-        mismatch is not in them. With the continuous time base they are those of `P`.
+        mismatch is not in them. With the continuous time base, or ``errors=False``, they are those of `P`.
         """
-        if self._config[kernel.CONFIG + law.CONTINUOUS] or self._state[kernel.FRONT + law.UPDATES] == 0.0:
+        if self._config[kernel.ERRORS] == 0.0 or self._state[kernel.FRONT + law.UPDATES] == 0.0:
             return np.sqrt(np.diag(self.P))
         n = self._n
         C = self._state[kernel.ERROR : kernel.ERROR + n * n].reshape(n, n)

@@ -40,9 +40,10 @@ SCALE = 16  # four scales of the parameters, one of the output
 # threshold and drift of the detection, least excitation, shortest memory of variable forgetting in
 # parts of it, places of the memory of amplitudes, its tolerance, its variance.
 EXTRA, MARGIN, THRESHOLD, RISEN, EXCITED, SHORTEST, PLACES, TOLERANCE, RECALLED = range(21, 30)
-# Slope [µm/V] of a beta of one, and variance of the sensor's noise to that of a slope.
-SLOPE, NOISE_FACTOR = 30, 31
-CONFIG = 32
+# Slope [µm/V] of a beta of one, variance of the sensor's noise to that of a slope, whether the covariance of
+# the estimate's error is followed.
+SLOPE, NOISE_FACTOR, ERRORS = 30, 31, 32
+CONFIG = 33
 
 # Slower than so many swings a sample the voltage is at rest; slower than this part of its usual
 # pace it counts as going at that.
@@ -343,7 +344,7 @@ def _take(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
             config[MARGIN],
             law_state[head + 2 * n + 2 * n * n :],  # of the work space what the law's gain is not in
         )
-    if law_state[law.LAST] == law.UPDATED and config[CONFIG + law.CONTINUOUS] == 0.0:
+    if law_state[law.LAST] == law.UPDATED and config[ERRORS] != 0.0:
         restart = updates == 0.0 or law_state[law.RESETS] != resets
         if config[CONFIG + law.DIRECTIONAL] != 0.0:
             forgetting = 1.0  # it is not in that law's gain

@@ -238,6 +238,19 @@ def test_gain_of_the_last_sample() -> None:
     assert estimator.standard_errors.shape == (4,)
 
 
+@pytest.mark.parametrize("options", [{}, {"memory": 0.4}], ids=["default", "the paper's"])
+def test_without_errors_nothing_else_changes(options: dict[str, Any]) -> None:
+    u, x = record(0.5, 1e-3)
+    estimator = pz.HysteresisRLS(FS, **options)
+    lean = pz.HysteresisRLS(FS, errors=False, **options)
+    assert np.array_equal(lean.run(u, x).theta, estimator.run(u, x).theta)
+    assert lean.excitation == estimator.excitation
+    assert np.array_equal(lean.standard_errors, np.sqrt(np.diag(lean.P)))
+    assert not np.allclose(lean.standard_errors, estimator.standard_errors, rtol=0.01)
+    again = pz.HysteresisRLS.from_dict(json.loads(json.dumps(lean.to_dict())))
+    assert np.array_equal(again.standard_errors, lean.standard_errors)
+
+
 def test_wrong_arguments() -> None:
     with pytest.raises(ValueError, match="sample_rate must be above zero"):
         pz.HysteresisRLS(0.0)
