@@ -7,13 +7,13 @@ from typing import Any
 from numba import njit
 from numba.extending import register_jitable
 
-from piezoest.estimators import ekf
+from piezoest.estimators import ekf_kernel
 from piezoest.tracking_kernel import SIGNATURE, ring
 
 
 @register_jitable
 def _learn(estimator: Any, settings: Any, u: Any, x: Any, scale: Any, none: Any, no_rows: Any) -> None:
-    ekf._run(estimator, settings, u, x, u.size + 1, no_rows, no_rows, none, none, no_rows)
+    ekf_kernel.run(estimator, settings, u, x, u.size + 1, no_rows, no_rows, none, none, no_rows)
 
 
 @njit(SIGNATURE, cache=True)
@@ -42,7 +42,7 @@ def run(
 ) -> bool:
     """Run the ring, see `piezoest.tracking_kernel.ring`."""
     return ring(
-        _learn, ekf._propose, interval, hysteretic, estimator, estimator_settings, scale, terms,
+        _learn, ekf_kernel.propose, interval, hysteretic, estimator, estimator_settings, scale, terms,
         compensator, settings, plays, creep_terms, stage, stage_settings, noise, factor, shape,
         r, model, record, models, none, no_rows,
     )  # fmt: skip

@@ -8,7 +8,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._jit import UNCOUNTED
-from piezoest.estimators import ekf, rls_kernel
+from piezoest.estimators import ekf_kernel, rls_kernel
 from piezoest.estimators import recursive_least_squares as law
 
 # Channels that share the first-level cache.
@@ -55,4 +55,16 @@ def rls(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: 
 @njit(_SIGNATURE, cache=True, nogil=True, **UNCOUNTED)
 def kalman(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, theta: Any) -> None:
     """The same for `HysteresisEKF`."""
-    _bank(ekf._step, ekf.HEAD, int(config[ekf.N]), states, config, u, x, start, stop, every, theta)
+    _bank(
+        ekf_kernel.step,
+        ekf_kernel.HEAD,
+        int(config[ekf_kernel.N]),
+        states,
+        config,
+        u,
+        x,
+        start,
+        stop,
+        every,
+        theta,
+    )

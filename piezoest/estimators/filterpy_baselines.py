@@ -15,9 +15,10 @@ from filterpy.kalman import ExtendedKalmanFilter, MerweScaledSigmaPoints, Unscen
 from piezoest._checks import WILDEST, FloatArray
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations import kalman
-from piezoest.estimators import ekf
+from piezoest.estimators import ekf_kernel as kernel
 from piezoest.estimators.base import EstimatorBase, Trace
 from piezoest.estimators.delay_line import delayed
+from piezoest.estimators.ekf import HysteresisEKF
 from piezoest.models import ColemanHodgdon, LinearGain
 
 
@@ -32,7 +33,7 @@ class _HysteresisFilter(ExtendedKalmanFilter):  # type: ignore[misc]
             self.x[0] = equations.hysteresis_step(self.x[0], u, self.x[1], self.x[2])
 
 
-class _FilterPyBaseline(ekf.HysteresisEKF):
+class _FilterPyBaseline(HysteresisEKF):
     """What the two baselines share: bookkeeping around a filterpy object."""
 
     __slots__ = ("_filter", "_flat")
@@ -66,8 +67,8 @@ class _FilterPyBaseline(ekf.HysteresisEKF):
         )
         del self._arguments["project"]
         self._filter = self._make_filter()
-        self._filter.Q = np.diag(self._config[ekf.CONFIG :])
-        self._filter.R = np.array([[self._config[ekf.NOISE]]])
+        self._filter.Q = np.diag(self._config[kernel.CONFIG :])
+        self._filter.R = np.array([[self._config[kernel.NOISE]]])
         self._load(self._start)
 
     def _make_filter(self) -> Any:
@@ -81,8 +82,8 @@ class _FilterPyBaseline(ekf.HysteresisEKF):
 
     def _process_noise(self, du: float) -> FloatArray:
         """Covariance that the process adds over du, the second-order variance of a w_h with it."""
-        Q = np.diag(self._config[ekf.CONFIG :])
-        if self._config[ekf.HYSTERETIC]:
+        Q = np.diag(self._config[kernel.CONFIG :])
+        if self._config[kernel.HYSTERETIC]:
             s, P = self._filter.x, self._filter.P
             Q[0, 0] += kalman.bilinear_variance(P.ravel(), du, s[1], self._n)
         return Q
@@ -96,7 +97,7 @@ class _FilterPyBaseline(ekf.HysteresisEKF):
     def _state(self) -> FloatArray:
         """The flat state, brought up to date from the filterpy object."""
         if self._filter is not None:
-            n, head = self._n, ekf.HEAD
+            n, head = self._n, kernel.HEAD
             self._flat[head : head + n] = self._filter.x
             self._flat[head + n : head + n + n * n] = self._filter.P.ravel()
             self._flat[head + n + n * n : head + 2 * n + n * n] = np.ravel(self._filter.K)
@@ -107,7 +108,7 @@ class _FilterPyBaseline(ekf.HysteresisEKF):
         self._flat = state
 
     def _load(self, state: FloatArray) -> None:
-        n, head = self._n, ekf.HEAD
+        n, head = self._n, kernel.HEAD
         self._flat[:] = state
         self._filter.x = state[head : head + n].copy()
         self._filter.P = state[head + n : head + n + n * n].reshape(n, n).copy()
@@ -115,35 +116,35 @@ class _FilterPyBaseline(ekf.HysteresisEKF):
 
     def _sample(self, u: float, x: float) -> None:
         state, config, n = self._flat, self._config, self._n
-        state[ekf.SAMPLES] += 1.0
+        state[kernel.SAMPLES] += 1.0
         if abs(u) < WILDEST:
-            u = delayed(state[ekf.HEAD + 5 * n + 2 * n * n :], config[ekf.FRACTION], u)
-            if state[ekf.PRIMED] == 0.0:
-                state[ekf.PRIMED] = 1.0
-                state[ekf.U_CENTRE] = u * config[ekf.OFFSET]
-                state[ekf.U_LAST] = u - state[ekf.U_CENTRE]
-            u -= state[ekf.U_CENTRE]
-            self._guarded(self._predict, u - state[ekf.U_LAST])
-            state[ekf.U_LAST] = u
+            u = delayed(state[kernel.HEAD + 5 * n + 2 * n * n :], config[kernel.FRACTION], u)
+            if state[kernel.PRIMED] == 0.0:
+                state[kernel.PRIMED] = 1.0
+                state[kernel.U_CENTRE] = u * config[kernel.OFFSET]
+                state[kernel.U_LAST] = u - state[kernel.U_CENTRE]
+            u -= state[kernel.U_CENTRE]
+            self._guarded(self._predict, u - state[kernel.U_LAST])
+            state[kernel.U_LAST] = u
         else:
             x = np.nan
         if not abs(x) < WILDEST:
-            state[ekf.MISSED] += 1.0
-            state[ekf.LAST] = ekf.MISSING
+            state[kernel.MISSED] += 1.0
+            state[kernel.LAST] = kernel.MISSING
             return
-        if state[ekf.CENTRED] == 0.0:
-            state[ekf.CENTRED] = 1.0
-            state[ekf.X_CENTRE] = x * config[ekf.OFFSET]
+        if state[kernel.CENTRED] == 0.0:
+            state[kernel.CENTRED] = 1.0
+            state[kernel.X_CENTRE] = x * config[kernel.OFFSET]
         h = np.zeros(n)
-        ekf.measurement_row(h, u, config, n)
-        if not self._guarded(self._update, x - state[ekf.X_CENTRE], h):
-            state[ekf.MISSED] += 1.0
-            state[ekf.LAST] = ekf.MISSING
+        kernel.measurement_row(h, u, config, n)
+        if not self._guarded(self._update, x - state[kernel.X_CENTRE], h):
+            state[kernel.MISSED] += 1.0
+            state[kernel.LAST] = kernel.MISSING
             return
-        state[ekf.INNOVATION] = np.ravel(self._filter.y)[0]
-        state[ekf.INNOVATION_VARIANCE] = np.ravel(self._filter.S)[0]
-        state[ekf.UPDATES] += 1.0
-        state[ekf.LAST] = ekf.UPDATED
+        state[kernel.INNOVATION] = np.ravel(self._filter.y)[0]
+        state[kernel.INNOVATION_VARIANCE] = np.ravel(self._filter.S)[0]
+        state[kernel.UPDATES] += 1.0
+        state[kernel.LAST] = kernel.UPDATED
 
     def _guarded(self, part: Any, *arguments: Any) -> bool:
         """Run a part of the filter; where it breaks, put back what was before: a stream must not stop."""
@@ -166,7 +167,7 @@ class _FilterPyBaseline(ekf.HysteresisEKF):
             if (k + 1) % every == 0:
                 row = k // every
                 s[row], P[row] = self._filter.x, self._filter.P
-                y[row], S[row] = self._flat[ekf.INNOVATION], self._flat[ekf.INNOVATION_VARIANCE]
+                y[row], S[row] = self._flat[kernel.INNOVATION], self._flat[kernel.INNOVATION_VARIANCE]
         return self._trace(self._theta_of(s), s, y, S, P, every, want)
 
 
@@ -207,12 +208,12 @@ class FilterPyEKF(_FilterPyBaseline):
 
     def _make_filter(self) -> Any:
         made = _HysteresisFilter(dim_x=self._n, dim_z=1)
-        made.hysteretic = bool(self._config[ekf.HYSTERETIC])
+        made.hysteretic = bool(self._config[kernel.HYSTERETIC])
         return made
 
     def _predict(self, du: float) -> None:
         F = np.eye(self._n)
-        if self._config[ekf.HYSTERETIC]:
+        if self._config[kernel.HYSTERETIC]:
             s = self._filter.x
             F[0, :3] = equations.hysteresis_jacobian(s[0], du, s[1], s[2])
         self._filter.F, self._filter.Q = F, self._process_noise(du)
@@ -268,7 +269,7 @@ class FilterPyUKF(_FilterPyBaseline):
     def _make_filter(self) -> Any:
         n = self._n
         points = MerweScaledSigmaPoints(n, alpha=0.1, beta=2.0, kappa=3.0 - n)
-        step = _advance if self._config[ekf.HYSTERETIC] else _stay
+        step = _advance if self._config[kernel.HYSTERETIC] else _stay
         return UnscentedKalmanFilter(
             dim_x=n, dim_z=1, dt=1.0 / self.sample_rate, hx=_read, fx=step, points=points
         )

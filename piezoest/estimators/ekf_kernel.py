@@ -1,0 +1,247 @@
+"""The compiled inside of `HysteresisEKF`: time update, measurement update, projection."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST
+from piezoest._jit import UNCOUNTED, unrolled
+from piezoest.equations import admissible, kalman
+from piezoest.equations import coleman_hodgdon as equations
+from piezoest.estimators.delay_line import delayed
+
+# State: bookkeeping, then vectors of n or n*n numbers, the delay line last.
+U_LAST, PRIMED, SAMPLES, MISSED, UPDATES, MOVED, LAST, INNOVATION, INNOVATION_VARIANCE = range(9)
+U_CENTRE, X_CENTRE, CENTRED, HEAD = 9, 10, 11, 12
+
+# Configuration: scalars, then n process noises and the parameters' least values.
+N, HYSTERETIC, NOISE, FRACTION, OFFSET, PROJECT, LEAST_A, LEAST_B, MARGIN, CONFIG = range(10)
+
+WAITING, UPDATED, MISSING = 0.0, 1.0, 2.0
+
+
+@unrolled
+def _views(state: Any, n: int) -> Any:
+    """State vector s, its covariance P, last gain K, workspace, delay line."""
+    i = HEAD
+    m = n * n
+    return (
+        state[i : i + n],
+        state[i + n : i + n + m],
+        state[i + n + m : i + 2 * n + m],
+        state[i + 2 * n + m : i + 5 * n + 2 * m],
+        state[i + 5 * n + 2 * m :],
+    )
+
+
+@unrolled
+def _time_update(s: Any, P: Any, du: Any, config: Any, n: int, work: Any) -> None:
+    """Exact sample map of the state, its Jacobian for the covariance, process noise."""
+    row, q = work[:n], work[n : 2 * n]
+    for i in range(n):
+        row[i] = 0.0
+        q[i] = config[CONFIG + i]
+    if config[HYSTERETIC] != 0.0:
+        w_h, kept, by_a, by_b = equations.hysteresis_linearised(s[0], du, s[1], s[2])
+        q[0] += kalman.bilinear_variance(P, du, s[1], n)
+        s[0] = w_h
+        row[0], row[1], row[2] = kept, by_a, by_b
+        kalman.predict_covariance(P, row, 3, q, n, work[2 * n :])
+    else:
+        row[0] = 1.0
+        kalman.predict_covariance(P, row, 1, q, n, work[2 * n :])
+
+
+@unrolled
+def measurement_row(h: Any, u: Any, config: Any, n: int) -> None:
+    """dx/ds: x = w_h + c u (+ offset), or x = K u (+ offset)."""
+    for i in range(n):
+        h[i] = 0.0
+    if config[HYSTERETIC] != 0.0:
+        h[0] = 1.0
+        h[3] = u
+    else:
+        h[0] = u
+    if config[OFFSET] != 0.0:
+        h[n - 1] = 1.0
+
+
+@unrolled
+def _onto_admissible(s: Any, P: Any, config: Any, n: int, work: Any) -> Any:
+    """Project onto a >= least, b >= least, c - 2b >= margin: flat faces in this form."""
+    if s[1] >= config[LEAST_A] and s[2] >= config[LEAST_B] and s[3] - 2.0 * s[2] >= config[MARGIN]:
+        return 0.0
+    g = work[:n]
+    rest = work[n:]
+    moved = 0.0
+    for face in range(3):
+        for i in range(n):
+            g[i] = 0.0
+        least = config[LEAST_A + face]
+        if face < 2:
+            g[1 + face] = 1.0
+        else:
+            g[2], g[3] = -2.0, 1.0
+        moved = max(moved, kalman.project(s, P, g, least, n, rest))
+    # The faces meet at an angle: whatever is left over is clamped.
+    s[1] = max(s[1], config[LEAST_A])
+    s[2] = max(s[2], config[LEAST_B])
+    s[3] = max(s[3], 2.0 * s[2] + config[MARGIN])
+    return moved
+
+
+@unrolled
+def _take(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
+    """One sample of a filter of `n` states."""
+    s, P, gain, work, line = _views(state, n)
+    state[SAMPLES] += 1.0
+    if np.abs(u) < WILDEST:
+        u = delayed(line, config[FRACTION], u)
+        if state[PRIMED] == 0.0:
+            state[PRIMED] = 1.0
+            state[U_CENTRE] = u * config[OFFSET]
+            state[U_LAST] = u - state[U_CENTRE]
+        u -= state[U_CENTRE]
+        _time_update(s, P, u - state[U_LAST], config, n, work)
+        state[U_LAST] = u
+    else:
+        x = np.nan
+    if not np.abs(x) < WILDEST:
+        state[MISSED] += 1.0
+        state[LAST] = MISSING
+        return
+    if state[CENTRED] == 0.0:
+        state[CENTRED] = 1.0
+        state[X_CENTRE] = x * config[OFFSET]
+    measurement_row(work[:n], u, config, n)
+    y = x - state[X_CENTRE] - kalman.measure(s, work[:n], n)
+    S = kalman.update(s, P, work[:n], y, config[NOISE], n, gain, work[n:])
+    state[MOVED] = 0.0
+    if config[PROJECT] != 0.0:
+        state[MOVED] = _onto_admissible(s, P, config, n, work)
+    state[INNOVATION] = y
+    state[INNOVATION_VARIANCE] = S
+    state[UPDATES] += 1.0
+    state[LAST] = UPDATED
+
+
+@register_jitable
+def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
+    """One sample."""
+    n = int(config[N])
+    if n == 4:
+        _take(state, config, u, x, 4)
+    elif n == 5:
+        _take(state, config, u, x, 5)
+    else:
+        _take(state, config, u, x, n)
+
+
+@register_jitable
+def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
+    """(alpha, beta, gamma, offset) or (gain, -, -, offset) into `model`, admissible; `terms` = start's."""
+    s = state[HEAD : HEAD + int(config[N])]
+    offset = terms[1]
+    if config[HYSTERETIC] == 0.0:
+        gain = s[0] if s[0] * terms[0] > 0.0 else 1e-2 * terms[0]
+        if config[OFFSET] != 0.0:
+            offset = s[1] + state[X_CENTRE] - gain * state[U_CENTRE]
+        model[0] = gain
+        model[3] = offset
+        return
+    if config[OFFSET] != 0.0:
+        offset = s[4] + state[X_CENTRE] - s[3] * state[U_CENTRE]
+    a = s[1] if s[1] != 0.0 else config[LEAST_A]
+    alpha, beta, gamma = equations.rate_parameters(a, s[2], s[3])
+    model[0] = alpha
+    model[1] = beta
+    model[2] = gamma
+    model[3] = offset
+    if not admissible.has_inverse(alpha, beta, gamma):
+        work = np.empty(9)
+        admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
+
+
+@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True)
+def propose(state: Any, config: Any, terms: Any, model: Any) -> None:
+    """Compiled `proposed`."""
+    proposed(state, config, terms, model)
+
+
+@unrolled
+def _checked(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
+    if len(state) < HEAD + 5 * n + 2 * n * n or len(config) < CONFIG + n:
+        return  # never so; said here, it saves the compiler to ask at each slice
+    _take(state, config, u, x, n)
+
+
+@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, nogil=True, **UNCOUNTED)
+def step(state: Any, config: Any, u: float, x: float) -> None:
+    """Take one sample."""
+    n = int(config[N])
+    if n == 4:
+        _checked(state, config, u, x, 4)
+    elif n == 5:
+        _checked(state, config, u, x, 5)
+    else:
+        _checked(state, config, u, x, n)
+
+
+@unrolled
+def _write_parameters(s: Any, config: Any, n: int, theta: Any, row: int) -> None:
+    """Parameters of the state s into a row of theta."""
+    if config[HYSTERETIC] == 0.0:
+        for i in range(n):
+            theta[row, i] = s[i]
+        return
+    theta[row, 0], theta[row, 1], theta[row, 2] = equations.rate_parameters(s[1], s[2], s[3])
+    if n == 5:
+        theta[row, 3] = s[4]
+
+
+@unrolled
+def _loop(
+    state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, s: Any, y: Any, S: Any, P: Any, n: int
+) -> None:
+    """Take a record; with `n` a constant the compiler unrolls the loops over states."""
+    if len(state) < HEAD + 5 * n + 2 * n * n or len(config) < CONFIG + n:
+        return  # never so; said here, it saves the compiler to ask at each slice
+    row, due = 0, every
+    for k in range(u.size):
+        _take(state, config, u[k], x[k], n)
+        due -= 1
+        if due == 0:
+            _write_parameters(state[HEAD : HEAD + n], config, n, theta, row)
+            if s.size > 0:
+                for i in range(n):
+                    s[row, i] = state[HEAD + i]
+            if y.size > 0:
+                y[row] = state[INNOVATION]
+            if S.size > 0:
+                S[row] = state[INNOVATION_VARIANCE]
+            if P.size > 0:
+                for i in range(n * n):
+                    P[row, i] = state[HEAD + n + i]
+            row, due = row + 1, every
+
+
+@njit(
+    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
+    cache=True,
+    **UNCOUNTED,
+)
+def run(
+    state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, s: Any, y: Any, S: Any, P: Any
+) -> None:
+    """Take whole records; every `every`-th sample into the histories that have room."""
+    n = int(config[N])
+    if n == 4:
+        _loop(state, config, u, x, every, theta, s, y, S, P, 4)
+    elif n == 5:
+        _loop(state, config, u, x, every, theta, s, y, S, P, 5)
+    else:
+        _loop(state, config, u, x, every, theta, s, y, S, P, n)
