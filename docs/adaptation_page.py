@@ -109,7 +109,23 @@ def reasons(document: Document, rows: dict[tuple[str, str], Document], fixed: Do
         sentences.append(below_linear(fixed))
     if "rest" in missed:
         sentences += at_rest(rows)
+    if "divergence" in missed:
+        sentences.append(diverged(document, rows))
     return sentences
+
+
+def diverged(document: Document, rows: dict[tuple[str, str], Document]) -> str:
+    """Where the default did worse than linear feed-forward after the first period, with nobody to watch."""
+    mine = {name: row for (name, estimator), row in rows.items() if estimator == asked.DEFAULT}
+    counts = listed(
+        [f"{row['diverged']} of {row['runs']} runs of *{n}*" for n, row in mine.items() if row["diverged"]]
+    )
+    return (
+        f"Without the guard {counts} are worse than linear feed-forward by more than half in the period "
+        "after the change, and settle all the same. A gain that falls at once makes the reading "
+        "jump, which is first taken for a fault of the sensor, and then for an offset. What the guard "
+        "makes of such runs is said below."
+    )
 
 
 def below_linear(fixed: Document) -> str:

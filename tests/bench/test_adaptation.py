@@ -181,7 +181,7 @@ def test_criteria() -> None:
         "cold-start, OutputErrorRLS: settled error over linear feed-forward's": (0.04, False),
         "dwell: parameters' excursion": (1e-4, True),
         "dwell: first error after over last before": (2.0, False),
-        "runs that diverged": (0.0, True),
+        "runs that diverged, without the guard": (0.0, True),
     }
     assert criteria([]) == []
 
@@ -316,7 +316,7 @@ def test_command_prints_json_alone() -> None:
     document = json.loads(result.stdout)
     assert {each["what"] for each in document["criteria"]} == {
         "cold-start: part settled within 2 periods",
-        "runs that diverged",
+        "runs that diverged, without the guard",
     }
 
 
