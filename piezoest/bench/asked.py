@@ -177,7 +177,12 @@ def criteria(rows: Iterable[Row]) -> list[Row]:
             check("rest", what, row["first_after_rest"]["q95"], LARGEST_AFTER_REST)
     mine = [row for row in table.values() if row["estimator"] == DEFAULT]
     if mine:
-        check("divergence", "runs that diverged, without the guard", float(sum(row["diverged"] for row in mine)), 0.0)
+        check(
+            "divergence",
+            "runs that diverged, without the guard",
+            float(sum(row["diverged"] for row in mine)),
+            0.0,
+        )
     return found
 
 

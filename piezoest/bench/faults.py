@@ -128,13 +128,13 @@ FAULTS: dict[str, Fault] = {
         Fault(
             "spikes", "Five spikes of 10 µm a second.",
             "What the stage cannot have made is left out. An estimator that takes it is misled; the "
-            "guard falls back to a line.",
+            "guard keeps the model in use, or a line.",
             _around(Spikes), recovers=True,
         ),
         Fault(
             "stuck", "The reading stands still for 1 s.",
             "A reading that does not change while the voltage moves is left out. An estimator that "
-            "takes it is misled; the guard falls back to a line.",
+            "takes it is misled; the guard keeps the model in use, or a line.",
             _around(Stuck, start=BEGINS), ends=BEGINS + 1.0, recovers=True,
         ),
         Fault(
