@@ -96,7 +96,7 @@ figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the docume
 	$(BIN)/python benchmarks/best_fixed_model.py --json docs/data/best_fixed_model.json
 	$(BIN)/python benchmarks/faults.py --json docs/data/faults.json
 	mkdir -p docs/_build
-	# `-`: these end with 1 where something diverged, drifted or is apart, which the page says.
+	# `-`: these two end with 1 where something diverged or drifted, which the page says.
 	-$(BIN)/python benchmarks/monte_carlo.py --file docs/_build/monte_carlo.jsonl --json docs/data/monte_carlo.json
 	-$(BIN)/python benchmarks/soak.py --json docs/data/soak.json
 	$(BIN)/piezoest bench estimators --json docs/data/estimators.json
@@ -104,7 +104,7 @@ figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the docume
 	$(BIN)/python benchmarks/filterpy_parity.py --json docs/data/filterpy_parity.json
 	$(BIN)/python docs/consistency.py --json docs/data/consistency.json
 	$(BIN)/python benchmarks/beyond_the_paper.py --json docs/data/beyond.json
-	-$(BIN)/python benchmarks/controller.py --json docs/data/controller.json
+	$(BIN)/python benchmarks/controller.py --json docs/data/controller.json
 	$(BIN)/python benchmarks/target/target.py --json docs/data/target.json
 	$(BIN)/python docs/controller_page.py --figure
 	$(BIN)/python benchmarks/speed.py --json docs/data/speed.json --figure docs/figures/speed.png

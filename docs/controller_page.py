@@ -59,6 +59,11 @@ def pieces(parity: dict[str, Any], target: dict[str, Any]) -> dict[str, str]:
     }
 
 
+def moved_by_rounding(row: dict[str, Any]) -> float:
+    """How far the library's settled error moves when its reference is rounded to float."""
+    return float(abs(row["settled_error_of_rounded_reference_um"] / row["settled_error_um"] - 1.0))
+
+
 def verdict(parity: dict[str, Any], target: dict[str, Any]) -> list[str]:
     """What the figures say, in sentences."""
     largest = max(row["double_difference"] for row in parity["rows"])
@@ -69,7 +74,9 @@ def verdict(parity: dict[str, Any], target: dict[str, Any]) -> list[str]:
         f"In double the controller {said}, in all {len(parity['rows'])} runs.",
         f"In float {inside} of {len(parity['rows'])} runs settle within 1 % of the library's error"
         + "".join(
-            f"; {row['scenario']} with {row['estimator']} does not: {100.0 * row['float_difference']:.1f} %"
+            f"; {row['scenario']} with {row['estimator']} does not: {100.0 * row['float_difference']:.1f} %, "
+            f"where the library itself, in double, moves by {100.0 * moved_by_rounding(row):.1f} % if "
+            "only its reference is rounded to float"
             for row in beyond
         )
         + ".",
