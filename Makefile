@@ -90,7 +90,7 @@ docs-live: $(VENV)/.installed-docs-live  ## Serve the documentation and rebuild 
 figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the documentation anew, in some hours
 	$(BIN)/piezoest bench paper --json docs/data/paper.json --figures docs/figures/paper
 	$(BIN)/piezoest bench --quick --seeds 3 --output docs/_build/suite --json docs/data/suite.json --figures docs/figures/suite
-	$(BIN)/piezoest bench rank --output docs/_build/ranking --json docs/data/ranking.json --figures docs/figures/ranking
+	$(BIN)/piezoest bench rank --draws 8 --training-seeds 1 --seeds 4 --slow-seeds 2 --output docs/_build/ranking --json docs/data/ranking.json --figures docs/figures/ranking
 	$(BIN)/piezoest bench adaptation --asked --seeds 200 --sample-rate 10000 --no-runs --json docs/data/adaptation.json
 	$(BIN)/piezoest bench adaptation --policies --sample-rate 10000 --no-runs --json docs/data/policies.json --figures docs/figures/adaptation
 	$(BIN)/python benchmarks/best_fixed_model.py --json docs/data/best_fixed_model.json
