@@ -47,8 +47,8 @@ class Event:
     time : float
         Seconds since its start.
     action : str
-        ``"kept"`` (a proposed model was not taken, the present one stays), ``"fell back"`` (to
-        the last good model or to a line) or ``"resumed"``.
+        ``"kept"`` (a proposed model that misses more than is allowed was not taken, the present one
+        stays), ``"fell back"`` (to the last good model or to a line) or ``"resumed"``.
     reason : str
         Why, with the figures.
     """

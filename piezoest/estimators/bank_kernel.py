@@ -55,16 +55,5 @@ def rls(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: 
 @njit(_SIGNATURE, cache=True, nogil=True, **UNCOUNTED)
 def kalman(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, theta: Any) -> None:
     """The same for `HysteresisEKF`."""
-    _bank(
-        ekf_kernel.step,
-        ekf_kernel.HEAD,
-        int(config[ekf_kernel.N]),
-        states,
-        config,
-        u,
-        x,
-        start,
-        stop,
-        every,
-        theta,
-    )
+    head, n = ekf_kernel.HEAD, int(config[ekf_kernel.N])
+    _bank(ekf_kernel.step, head, n, states, config, u, x, start, stop, every, theta)
