@@ -6,13 +6,13 @@ into intervals, and hand the estimator's model over.
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
+from numba import njit
 
 from piezoest._checks import FloatArray
+from piezoest._jit import PROPOSE_TYPES, RUN_TYPES, taking
 from piezoest.compensators import Compensator, InverseCompensator, LinearCompensator
 from piezoest.compensators import base as compensators
 from piezoest.compensators.adoption import adopt
@@ -22,13 +22,13 @@ from piezoest.models import ColemanHodgdon, LinearGain
 from piezoest.stage import SimulatedStage
 from piezoest.stage import kernel as stages
 
-SIGNATURE = (
+_SIGNATURE = (
     "b1(i8, b1, f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8, i8, f8[::1], f8[::1], f8[::1],"
     " f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])"
 )
 
 
-@register_jitable
+@njit(taking((RUN_TYPES, PROPOSE_TYPES), _SIGNATURE), cache=True)
 def ring(
     learn: Any,
     propose: Any,
@@ -80,7 +80,10 @@ def ring(
             shape[start:stop] if shape.size > 1 else shape,
             x[start:stop],
         )
-        learn(estimator, estimator_settings, u[start:stop], x[start:stop], scale, none, no_rows)
+        learn(
+            estimator, estimator_settings, u[start:stop], x[start:stop], stop - start + 1, scale,
+            no_rows, no_rows, none, none, no_rows,
+        )  # fmt: skip
         propose(estimator, estimator_settings, terms, proposed)
         projected = hysteretic and not admissible.has_inverse(proposed[0], proposed[1], proposed[2])
         if adopt(compensator, settings, proposed, hysteretic, compensators.change_model):
@@ -91,20 +94,16 @@ def ring(
     return projected
 
 
-def _loop_of(estimator: Any) -> str | None:
-    """Module with the compiled ring of this very class; what inherits from it may learn otherwise."""
-    return vars(type(estimator)).get("_ring") if isinstance(estimator, EstimatorBase) else None
-
-
 def can_run(stage: Any, compensator: Any, estimator: Any) -> bool:
     """Whether the compiled ring does what a loop over these three would."""
     return (
         isinstance(stage, SimulatedStage)
         and type(stage).run is SimulatedStage.run
         and type(compensator) in (InverseCompensator, LinearCompensator)
-        and _loop_of(estimator) is not None
+        and isinstance(estimator, EstimatorBase)
+        and "_loops" in vars(type(estimator))  # of this very class: what inherits may learn otherwise
         and type(compensator.model) in (ColemanHodgdon, LinearGain)
-        and type(estimator._initial) is type(compensator.model)
+        and type(getattr(estimator, "_initial", None)) is type(compensator.model)
     )
 
 
@@ -119,10 +118,8 @@ def run(
     record, models = np.empty((3, r.size)), np.empty((-(-r.size // interval), 4))
     estimator._records(NONE, NONE)
     noise, factor, shape = stage._disturbances(r.size)
-    # Each estimator's ring takes its time to compile: only the one that is needed is loaded.
-    loop = import_module(str(_loop_of(estimator)))
-    projected = loop.run(
-        interval, kind is ColemanHodgdon,
+    projected = ring(
+        *estimator._loops(), interval, kind is ColemanHodgdon,
         estimator._state, estimator._config, getattr(estimator, "_scale", NONE), estimator._terms,
         compensator._state, compensator._config,
         stage._plays, stage._terms, stage._state, stage._settings, noise, factor, shape,

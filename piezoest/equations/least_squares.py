@@ -28,14 +28,12 @@ def predicted_output(theta, phi, n):
 @unrolled
 def covariance_times(P, phi, n, out):
     """Write P phi into `out` (n,) and return phi' P phi, the n_s² of (A7)."""
-    quadratic = 0.0
     for i in range(n):
         total = P[i * n] * phi[0]
         for j in range(1, n):
             total = total + P[i * n + j] * phi[j]
         out[i] = total
-        quadratic = quadratic + phi[i] * total
-    return quadratic
+    return predicted_output(out, phi, n)
 
 
 @unrolled
@@ -66,12 +64,11 @@ def discrete_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
         theta[i] = theta[i] + work[i] * gain * y
         size = size + P[i * n + i]
         removed = removed + work[i] * work[i]
-    within = ((size - removed * gain) <= bound * forgetting) * enable
-    shrink = within * gain
+    within = (size - removed * gain <= bound * forgetting) * enable
     grow = 1.0 + within * (1.0 / forgetting - 1.0)
     for i in range(n):
         for j in range(i, n):
-            entry = (P[i * n + j] - shrink * work[i] * work[j]) * grow
+            entry = (P[i * n + j] - within * (gain * (work[i] * work[j]))) * grow
             P[i * n + j] = entry
             P[j * n + i] = entry
     return y, quadratic / forgetting + R

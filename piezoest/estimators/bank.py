@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -10,16 +11,22 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray, integer
-from piezoest.estimators import bank_kernel
+from piezoest.estimators import bank_kernel, ekf_kernel, ekf_loops, rls_loops
 from piezoest.estimators.base import Status
 from piezoest.estimators.ekf import HysteresisEKF
 from piezoest.estimators.rls import HysteresisRLS
 from piezoest.models import Model
 
-_LOOPS: dict[type, Any] = {HysteresisRLS: bank_kernel.rls, HysteresisEKF: bank_kernel.kalman}
+# The loop over a sample of one channel and over records of many, and where the estimator's vector begins.
+_LOOPS: dict[type, Any] = {
+    HysteresisRLS: (rls_loops.step, bank_kernel.rls, rls_loops.HEAD),
+    HysteresisEKF: (ekf_loops.step, bank_kernel.kalman, ekf_kernel.HEAD),
+}
 
 # Samples (of all channels) below which a second core costs more than it brings.
 WORTH_A_CORE = 4096
+# Samples of a channel from which on it is worth to bring its state into registers.
+WORTH_MOVING = 8
 
 
 class EstimatorBank:
@@ -52,7 +59,7 @@ class EstimatorBank:
     (64, 4)
     """
 
-    __slots__ = ("_bank", "_none", "_reader", "_start", "_states", "_threads")
+    __slots__ = ("_kind", "_none", "_reader", "_start", "_states", "_threads")
 
     _reader: Any
 
@@ -64,7 +71,7 @@ class EstimatorBank:
             )
         channels = integer("channels", channels, 1)
         self._threads = integer("threads", os.cpu_count() or 1 if threads is None else threads, 1)
-        self._bank = _LOOPS[type(estimator)]
+        self._kind = estimator._kind
         reader: Any = estimator.copy()
         self._reader = reader
         self._start = estimator._state.copy()
@@ -88,18 +95,25 @@ class EstimatorBank:
     def _take(self, u: FloatArray, x: FloatArray, every: int, theta: FloatArray) -> None:
         channels = len(self)
         parts = min(self._threads, max(1, u.size // WORTH_A_CORE), channels)
-        reader = self._reader
+        loop, reader = self._loop(len(u)), self._reader
         if parts == 1:
-            self._bank(self._states, reader._config, u, x, 0, channels, every, theta)
+            loop(self._states, reader._config, u, x, 0, channels, every, theta)
             return
         edges = [channels * part // parts for part in range(parts + 1)]
         with ThreadPoolExecutor(parts) as pool:
             tasks = [
-                pool.submit(self._bank, self._states, reader._config, u, x, start, stop, every, theta)
+                pool.submit(loop, self._states, reader._config, u, x, start, stop, every, theta)
                 for start, stop in itertools.pairwise(edges)
             ]
         for task in tasks:
             task.result()
+
+    def _loop(self, samples: int) -> Any:
+        """Compiled loop for so many samples of every channel."""
+        single, records, head = _LOOPS[type(self._reader)]
+        if samples < WORTH_MOVING or self._kind[0] == 0:
+            return functools.partial(bank_kernel.in_turn, single[self._kind], head, self._reader._n)
+        return records[self._kind]
 
     def step(self, u: Any, x: Any) -> None:
         """Take one sample of every channel.

@@ -1,4 +1,9 @@
-"""The compiled loops of `EstimatorBank`: in a module of their own, for few need to load them."""
+"""The compiled loops of `EstimatorBank`: in a module of their own, for few need to load them.
+
+All take samples (K, N) of channels `start` to `stop`, each with a row of `states`, and write what stands in
+the estimator's vector at every `every`-th sample into `rows`. `rls` and `kalman` are compiled for the same
+as the loops of a single estimator, and are worth it for whole records.
+"""
 
 from __future__ import annotations
 
@@ -7,53 +12,130 @@ from typing import Any
 from numba import njit
 from numba.extending import register_jitable
 
-from piezoest._jit import UNCOUNTED
-from piezoest.estimators import ekf_kernel, rls_kernel
-from piezoest.estimators import recursive_least_squares as law
+from piezoest._jit import STEP_TYPES, UNCOUNTED, Family, in_lanes, local, local_rows, taking, unrolled
+from piezoest.estimators import ekf_kernel, rls_kernel, rls_loops
 
-# Channels that share the first-level cache.
-BLOCK = 16
+# Channels that share vector instructions, channels that share cache lines, and samples that a channel takes
+# before it is the next one's turn.
+LANES, BLOCK, CHUNK = 16, 8, 64
 
 _SIGNATURE = "void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8, i8, f8[:, :, ::1])"
 
 
+@Family
+def rls(n: int, duties: int) -> Any:
+    """Of `HysteresisRLS`."""
+    if duties == rls_loops.BARE:
+        return _in_lanes(n)
+    size = rls_loops.size(n)
+
+    @register_jitable
+    def take(state: Any, config: Any, u: Any, x: Any) -> None:
+        rls_loops._take(state, config, u, x, n, True)
+
+    return _channel_by_channel(take, size, rls_loops.CONFIG, rls_loops.HEAD, n)
+
+
+@Family
+def kalman(n: int) -> Any:
+    """Of `HysteresisEKF`."""
+
+    @register_jitable
+    def take(state: Any, config: Any, u: Any, x: Any) -> None:
+        ekf_kernel._take(state, config, None, u, x, n)
+
+    return _channel_by_channel(take, ekf_kernel.state_size(n), ekf_kernel.CONFIG + n, ekf_kernel.HEAD, n)
+
+
 @register_jitable
-def _bank(
-    step: Any,
-    head: int,
-    n: int,
-    states: Any,
-    config: Any,
-    u: Any,
-    x: Any,
-    start: int,
-    stop: int,
-    every: int,
-    theta: Any,
-) -> None:
-    for first in range(start, stop, BLOCK):
-        last = min(first + BLOCK, stop)
-        row, due = 0, every
-        for k in range(u.shape[0]):
-            for c in range(first, last):
-                step(states[c], config, u[k, c], x[k, c])
-            due -= 1
+def _keep(state: Any, head: int, n: int, row: Any) -> None:
+    for i in range(n):
+        row[i] = state[head + i]
+
+
+@njit(taking((STEP_TYPES,), _SIGNATURE.replace("void(", "void(i8, i8, ")), cache=True, nogil=True)
+def in_turn(
+    step: Any, head: int, n: int, states: Any, config: Any, u: Any, x: Any,
+    start: int, stop: int, every: int, rows: Any,
+) -> None:  # fmt: skip
+    """All channels take a sample, by the function for a single one, before any takes the next."""
+    row, due = 0, every
+    for k in range(u.shape[0]):
+        due -= 1
+        for c in range(start, stop):
+            step(states[c], config, u[k, c], x[k, c])
             if due == 0:
-                for c in range(first, last):
-                    for i in range(n):
-                        theta[row, c, i] = states[c, head + i]
-                row, due = row + 1, every
+                _keep(states[c], head, n, rows[row, c])
+        if due == 0:
+            row, due = row + 1, every
 
 
-@njit(_SIGNATURE, cache=True, nogil=True, **UNCOUNTED)
-def rls(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, theta: Any) -> None:
-    """Take samples (K, N) of channels `start` to `stop`, each with a row of `states`."""
-    head, n = rls_kernel.FRONT + law.HEAD, int(config[rls_kernel.N])
-    _bank(rls_kernel.step, head, n, states, config, u, x, start, stop, every, theta)
+def _channel_by_channel(take: Any, size: int, settings_size: int, head: int, n: int) -> Any:
+    """A channel takes many samples with its state in registers before it is the next one's turn."""
+
+    @njit(_SIGNATURE, cache=True, nogil=True, **UNCOUNTED)
+    def bank(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, rows: Any) -> None:
+        now, settings = local(size), local(settings_size)
+        for i in range(settings_size):
+            settings[i] = config[i]
+        for block in range(start, stop, BLOCK):
+            for first in range(0, u.shape[0], CHUNK):
+                last = min(first + CHUNK, u.shape[0])
+                for c in range(block, min(block + BLOCK, stop)):
+                    for i in range(size):
+                        now[i] = states[c, i]
+                    row, due = first // every, every - first % every
+                    for k in range(first, last):
+                        take(now, settings, u[k, c], x[k, c])
+                        due -= 1
+                        if due == 0:
+                            _keep(now, head, n, rows[row, c])
+                            row, due = row + 1, every
+                    for i in range(size):
+                        states[c, i] = now[i]
+
+    return bank
 
 
-@njit(_SIGNATURE, cache=True, nogil=True, **UNCOUNTED)
-def kalman(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, theta: Any) -> None:
-    """The same for `HysteresisEKF`."""
-    head, n = ekf_kernel.HEAD, int(config[ekf_kernel.N])
-    _bank(ekf_kernel.step, head, n, states, config, u, x, start, stop, every, theta)
+def _in_lanes(n: int) -> Any:
+    """The bare law for many channels in the same vector instructions; its branches become masks."""
+    size, settings_size, head = rls_loops.size(n), rls_loops.CONFIG, rls_loops.HEAD
+
+    @unrolled
+    def take(lane: int, states: Any, config: Any, u: Any, x: Any) -> None:
+        rls_loops._take(states[:, lane], config, u[lane], x[lane], n, None)
+
+    @njit(_SIGNATURE, cache=True, nogil=True, **UNCOUNTED)
+    def bank(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, rows: Any) -> None:
+        settings = local(settings_size)
+        for i in range(settings_size):
+            settings[i] = config[i]
+        now = local_rows(size, LANES)
+        u_now, x_now = local(LANES), local(LANES)
+        for first in range(start, stop, LANES):
+            used = min(LANES, stop - first)
+            # The lanes that are left over repeat the last channel, and are forgotten.
+            for lane in range(LANES):
+                c = first + min(lane, used - 1)
+                for i in range(rls_kernel.SWING):
+                    now[i, lane] = states[c, i]
+                for i in range(rls_kernel.FRONT, size):
+                    now[i, lane] = states[c, i]
+            row, due = 0, every
+            for k in range(u.shape[0]):
+                for lane in range(LANES):
+                    c = first + min(lane, used - 1)
+                    u_now[lane], x_now[lane] = u[k, c], x[k, c]
+                in_lanes(take, LANES, (now, settings, u_now, x_now))
+                due -= 1
+                if due == 0:
+                    for lane in range(used):
+                        _keep(now[:, lane], head, n, rows[row, first + lane])
+                    row, due = row + 1, every
+            for lane in range(used):
+                for i in range(rls_kernel.SWING):
+                    states[first + lane, i] = now[i, lane]
+                for i in range(rls_kernel.FRONT, size):
+                    states[first + lane, i] = now[i, lane]
+
+    return bank

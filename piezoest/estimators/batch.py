@@ -194,7 +194,7 @@ class BatchFit(EstimatorBase):
                         kept[name][part] = getattr(self, name)
             done = end
         return Trace(
-            index=np.arange(1, rows + 1) * every - 1,
+            index=np.arange(every - 1, rows * every, every),
             parameter_names=self.parameter_names,
             theta=kept["theta"],
             **{name: kept[name] for name in want},

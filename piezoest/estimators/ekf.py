@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from piezoest._checks import FloatArray, non_negative, positive
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import ekf_kernel as kernel
+from piezoest.estimators import ekf_loops
 from piezoest.estimators.base import NO_ROWS, NONE, Compiled, EstimatorBase, Status, Trace
 from piezoest.estimators.delay_line import delay_line
 from piezoest.models import ColemanHodgdon, LinearGain, Model
@@ -64,10 +65,8 @@ class HysteresisEKF(EstimatorBase):
     and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), (2)-(4).
     """
 
-    __slots__ = ("_config", "_initial", "_n", "_terms")
+    __slots__ = ("_config", "_initial", "_kind", "_n", "_terms")
 
-    # Module with the compiled ring of `track`.
-    _ring = "piezoest.tracking_ekf"
     _compiled = Compiled(kernel._sample, kernel.proposed, None)
 
     conformance_exceptions: ClassVar[dict[str, str]] = {}
@@ -116,7 +115,8 @@ class HysteresisEKF(EstimatorBase):
                 1e-3 * start[3],
             )
         self._config[kernel.CONFIG :] = walk**2 / sample_rate
-        state = np.zeros(kernel.HEAD + 5 * n + 2 * n * n)
+        self._kind = (0,) if delay > 0.0 or not hysteretic else (n,)
+        state = np.zeros(kernel.state_size(n))
         state[kernel.HEAD : kernel.HEAD + n] = start
         state[kernel.HEAD + n : kernel.HEAD + n + n * n] = np.diag(spread**2).ravel()
         self._begin(
@@ -134,12 +134,17 @@ class HysteresisEKF(EstimatorBase):
             np.concatenate([state, line]),
         )
 
+    def _loops(self) -> tuple[Any, Any]:
+        """Compiled functions that take a record, and propose a model, for the compiled ring of `track`."""
+        return ekf_loops.run[self._kind], kernel.propose
+
     def _sample(self, u: float, x: float) -> None:
-        kernel.step(self._state, self._config, u, x)
+        ekf_loops.step[self._kind](self._state, self._config, u, x)
 
     def _absorb(self, u: FloatArray, x: FloatArray) -> None:
         u, x = self._records(u, x)
-        kernel.run(self._state, self._config, u, x, u.size + 1, NO_ROWS, NO_ROWS, NONE, NONE, NO_ROWS)
+        run, _ = self._loops()
+        run(self._state, self._config, u, x, u.size + 1, NONE, NO_ROWS, NO_ROWS, NONE, NONE, NO_ROWS)
 
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
         rows, n = u.size // every, self._n
@@ -148,7 +153,8 @@ class HysteresisEKF(EstimatorBase):
         y = np.empty(rows if "y" in want else 0)
         S = np.empty(rows if "S" in want else 0)
         P = np.empty((rows if "P" in want else 0, n * n))
-        kernel.run(self._state, self._config, u, x, every, theta, s, y, S, P)
+        run, _ = self._loops()
+        run(self._state, self._config, u, x, every, NONE, theta, s, y, S, P)
         return self._trace(theta, s, y, S, P.reshape(-1, n, n), every, want)
 
     def _trace(
@@ -162,7 +168,7 @@ class HysteresisEKF(EstimatorBase):
         want: frozenset[str],
     ) -> Trace:
         return Trace(
-            index=np.arange(1, len(theta) + 1) * every - 1,
+            index=np.arange(every - 1, len(theta) * every, every),
             theta=theta,
             parameter_names=self.parameter_names,
             y=y if "y" in want else None,

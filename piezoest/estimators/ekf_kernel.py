@@ -9,7 +9,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import UNCOUNTED, unrolled
+from piezoest._jit import PROPOSE_TYPES, unrolled
 from piezoest.equations import admissible, kalman
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators.delay_line import delayed
@@ -24,9 +24,15 @@ N, HYSTERETIC, NOISE, FRACTION, OFFSET, PROJECT, LEAST_A, LEAST_B, MARGIN, CONFI
 WAITING, UPDATED, MISSING = 0.0, 1.0, 2.0
 
 
+@register_jitable
+def state_size(n: int) -> int:
+    """Numbers that the state needs for n states of the filter; the delay line follows."""
+    return HEAD + 5 * n + 2 * n * n
+
+
 @unrolled
 def _views(state: Any, n: int) -> Any:
-    """State vector s, its covariance P, last gain K, workspace, delay line."""
+    """State vector s, its covariance P, last gain K, workspace."""
     i = HEAD
     m = n * n
     return (
@@ -34,7 +40,6 @@ def _views(state: Any, n: int) -> Any:
         state[i + n : i + n + m],
         state[i + n + m : i + 2 * n + m],
         state[i + 2 * n + m : i + 5 * n + 2 * m],
-        state[i + 5 * n + 2 * m :],
     )
 
 
@@ -95,12 +100,13 @@ def _onto_admissible(s: Any, P: Any, config: Any, n: int, work: Any) -> Any:
 
 
 @unrolled
-def _take(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
-    """One sample of a filter of `n` states."""
-    s, P, gain, work, line = _views(state, n)
+def _take(state: Any, config: Any, line: Any, u: Any, x: Any, n: int) -> None:
+    """One sample of a filter of `n` states; `line` is None where nothing is delayed."""
+    s, P, gain, work = _views(state, n)
     state[SAMPLES] += 1.0
     if np.abs(u) < WILDEST:
-        u = delayed(line, config[FRACTION], u)
+        if line is not None:
+            u = delayed(line, config[FRACTION], u)
         if state[PRIMED] == 0.0:
             state[PRIMED] = 1.0
             state[U_CENTRE] = u * config[OFFSET]
@@ -131,14 +137,9 @@ def _take(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
 
 @register_jitable
 def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
-    """One sample."""
+    """One sample, with whatever was asked for."""
     n = int(config[N])
-    if n == 4:
-        _take(state, config, u, x, 4)
-    elif n == 5:
-        _take(state, config, u, x, 5)
-    else:
-        _take(state, config, u, x, n)
+    _take(state, config, state[state_size(n) :], u, x, n)
 
 
 @register_jitable
@@ -166,82 +167,7 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
         admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True)
+@njit(PROPOSE_TYPES, cache=True)
 def propose(state: Any, config: Any, terms: Any, model: Any) -> None:
     """Compiled `proposed`."""
     proposed(state, config, terms, model)
-
-
-@unrolled
-def _checked(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
-    if len(state) < HEAD + 5 * n + 2 * n * n or len(config) < CONFIG + n:
-        return  # never so; said here, it saves the compiler to ask at each slice
-    _take(state, config, u, x, n)
-
-
-@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, nogil=True, **UNCOUNTED)
-def step(state: Any, config: Any, u: float, x: float) -> None:
-    """Take one sample."""
-    n = int(config[N])
-    if n == 4:
-        _checked(state, config, u, x, 4)
-    elif n == 5:
-        _checked(state, config, u, x, 5)
-    else:
-        _checked(state, config, u, x, n)
-
-
-@unrolled
-def _write_parameters(s: Any, config: Any, n: int, theta: Any, row: int) -> None:
-    """Parameters of the state s into a row of theta."""
-    if config[HYSTERETIC] == 0.0:
-        for i in range(n):
-            theta[row, i] = s[i]
-        return
-    theta[row, 0], theta[row, 1], theta[row, 2] = equations.rate_parameters(s[1], s[2], s[3])
-    if n == 5:
-        theta[row, 3] = s[4]
-
-
-@unrolled
-def _loop(
-    state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, s: Any, y: Any, S: Any, P: Any, n: int
-) -> None:
-    """Take a record; with `n` a constant the compiler unrolls the loops over states."""
-    if len(state) < HEAD + 5 * n + 2 * n * n or len(config) < CONFIG + n:
-        return  # never so; said here, it saves the compiler to ask at each slice
-    row, due = 0, every
-    for k in range(u.size):
-        _take(state, config, u[k], x[k], n)
-        due -= 1
-        if due == 0:
-            _write_parameters(state[HEAD : HEAD + n], config, n, theta, row)
-            if s.size > 0:
-                for i in range(n):
-                    s[row, i] = state[HEAD + i]
-            if y.size > 0:
-                y[row] = state[INNOVATION]
-            if S.size > 0:
-                S[row] = state[INNOVATION_VARIANCE]
-            if P.size > 0:
-                for i in range(n * n):
-                    P[row, i] = state[HEAD + n + i]
-            row, due = row + 1, every
-
-
-@njit(
-    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
-    cache=True,
-    **UNCOUNTED,
-)
-def run(
-    state: Any, config: Any, u: Any, x: Any, every: int, theta: Any, s: Any, y: Any, S: Any, P: Any
-) -> None:
-    """Take whole records; every `every`-th sample into the histories that have room."""
-    n = int(config[N])
-    if n == 4:
-        _loop(state, config, u, x, every, theta, s, y, S, P, 4)
-    elif n == 5:
-        _loop(state, config, u, x, every, theta, s, y, S, P, 5)
-    else:
-        _loop(state, config, u, x, every, theta, s, y, S, P, n)

@@ -118,7 +118,7 @@ class _FilterPyBaseline(HysteresisEKF):
         state, config, n = self._flat, self._config, self._n
         state[kernel.SAMPLES] += 1.0
         if abs(u) < WILDEST:
-            u = delayed(state[kernel.HEAD + 5 * n + 2 * n * n :], config[kernel.FRACTION], u)
+            u = delayed(state[kernel.state_size(n) :], config[kernel.FRACTION], u)
             if state[kernel.PRIMED] == 0.0:
                 state[kernel.PRIMED] = 1.0
                 state[kernel.U_CENTRE] = u * config[kernel.OFFSET]

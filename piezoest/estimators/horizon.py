@@ -260,7 +260,7 @@ class MovingHorizon(EstimatorBase):
                 S[part] = self._state[VARIANCE]
             done = end
         return Trace(
-            index=np.arange(1, rows + 1) * every - 1,
+            index=np.arange(every - 1, rows * every, every),
             theta=theta,
             parameter_names=self.parameter_names,
             y=y[every - 1 :: every].copy() if "y" in want else None,

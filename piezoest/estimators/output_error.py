@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from piezoest.equations import coleman_hodgdon, output_error
 from piezoest.estimators import output_error_kernel as kernel
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as front
-from piezoest.estimators.base import Compiled, Freezable, Status, Trace
+from piezoest.estimators.base import NO_ROWS, NONE, Compiled, Freezable, Status, Trace
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.rls_settings import FIRST_HALF, LONGEST_GAP
 from piezoest.models import ColemanHodgdon
@@ -164,6 +164,10 @@ class OutputErrorRLS(Freezable):
             np.concatenate([state, line]),
         )
 
+    def _loops(self) -> tuple[Any, Any]:
+        """Compiled functions that take a record, and propose a model, for the compiled ring of `track`."""
+        return kernel.run, kernel.propose
+
     def _sample(self, u: float, x: float) -> None:
         kernel.step(self._state, self._config, u, x)
 
@@ -173,10 +177,10 @@ class OutputErrorRLS(Freezable):
         y = np.empty(rows if "y" in want else 0)
         S = np.empty(rows if "S" in want else 0)
         P = np.empty((rows if "P" in want else 0, n * n))
-        kernel.run(self._state, self._config, u, x, every, s, y, S, P)
+        kernel.run(self._state, self._config, u, x, every, NONE, NO_ROWS, s, y, S, P)
         unit = self._initial.c
         return Trace(
-            index=np.arange(1, rows + 1) * every - 1,
+            index=np.arange(every - 1, rows * every, every),
             theta=self._theta_of(s),
             parameter_names=self.parameter_names,
             y=y * unit if "y" in want else None,

@@ -13,7 +13,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import UNCOUNTED
+from piezoest._jit import PROPOSE_TYPES, RUN_TYPES, STEP_TYPES, UNCOUNTED
 from piezoest.equations import kalman, least_squares
 from piezoest.equations import output_error as equations
 from piezoest.estimators import believing, swing
@@ -259,35 +259,36 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
         model[3] = terms[0]
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True)
+@njit(PROPOSE_TYPES, cache=True)
 def propose(state: Any, config: Any, terms: Any, model: Any) -> None:
     """Compiled `proposed`."""
     proposed(state, config, terms, model)
 
 
-@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, **UNCOUNTED)
+@njit(STEP_TYPES, cache=True, **UNCOUNTED)
 def step(state: Any, config: Any, u: float, x: float) -> None:
     """Take one sample."""
     _sample(state, config, u, x)
 
 
-@njit(
-    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
-    cache=True,
-    **UNCOUNTED,
-)
-def run(state: Any, config: Any, u: Any, x: Any, every: int, s: Any, y: Any, S_: Any, P_: Any) -> None:
-    """Take whole records; every `every`-th sample into the histories that have room.
+@njit(RUN_TYPES, cache=True, **UNCOUNTED)
+def run(
+    state: Any, config: Any, u: Any, x: Any, every: int, scale: Any,
+    theta: Any, s: Any, y: Any, S_: Any, P_: Any,
+) -> None:  # fmt: skip
+    """Take whole records, see `piezoest._jit.RUN_TYPES`.
 
     A row of `s` is the state of the filter and the member in use.
     """
+    row, due = 0, every
     for k in range(u.size):
         _sample(state, config, u[k], x[k])
-        if (k + 1) % every == 0:
-            row = k // every
-            for i in range(SIZE):
-                s[row, i] = state[S + i]
-            s[row, SIZE] = state[MEMBER]
+        due -= 1
+        if due == 0:
+            if s.size > 0:
+                for i in range(SIZE):
+                    s[row, i] = state[S + i]
+                s[row, SIZE] = state[MEMBER]
             if y.size > 0:
                 y[row] = state[front.FRONT + law.INNOVATION]
             if S_.size > 0:
@@ -295,3 +296,4 @@ def run(state: Any, config: Any, u: Any, x: Any, every: int, s: Any, y: Any, S_:
             if P_.size > 0:
                 for i in range(SIZE * SIZE):
                     P_[row, i] = state[P + i]
+            row, due = row + 1, every

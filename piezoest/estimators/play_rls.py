@@ -182,7 +182,7 @@ class PrandtlIshlinskiiRLS(Freezable):
         P = np.empty((rows if "P" in want else 0, size * size))
         kernel.run(self._state, self._config, u, x, every, self._scale, theta, y, S, P)
         return Trace(
-            index=np.arange(1, rows + 1) * every - 1,
+            index=np.arange(every - 1, rows * every, every),
             theta=theta,
             parameter_names=self.parameter_names,
             y=y if "y" in want else None,

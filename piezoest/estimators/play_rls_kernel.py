@@ -9,7 +9,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import UNCOUNTED
+from piezoest._jit import STEP_TYPES, UNCOUNTED
 from piezoest.equations.mechanics import mechanics_step
 from piezoest.equations.turning_points import remember
 from piezoest.estimators import believing, swing
@@ -153,7 +153,7 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     new_window(state, config)
 
 
-@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, **UNCOUNTED)
+@njit(STEP_TYPES, cache=True, **UNCOUNTED)
 def step(state: Any, config: Any, u: float, x: float) -> None:
     """Take one sample."""
     _sample(state, config, u, x)

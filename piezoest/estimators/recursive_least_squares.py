@@ -104,19 +104,49 @@ def varied(state: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any, least:
 
 
 @unrolled
+def _informs(state: Any, config: Any, phi: Any, n: Any) -> Any:
+    """Whether the regressor is outside the dead zone; counts where it is not."""
+    P_0 = state[HEAD + n + n * n : HEAD + n + 2 * n * n]
+    information = 0.0
+    for i in range(n):
+        information += phi[i] * phi[i] * P_0[i * n + i]
+    if information > config[DEAD_ZONE] * config[NOISE]:
+        return True
+    state[LAST] = HOLDING
+    state[HELD] += 1.0
+    return False
+
+
+@unrolled
+def _note(state: Any, y: Any, S: Any) -> None:
+    """Keep the innovation and its variance, and count the update."""
+    state[INNOVATION] = y
+    state[INNOVATION_VARIANCE] = S
+    state[UPDATES] += 1.0
+    state[LAST] = UPDATED
+
+
+@unrolled
+def adapt_discretely(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
+    """One sample of the ordinary law: gate, update with noise variance R."""
+    if not _informs(state, config, phi, n):
+        return
+    theta = state[HEAD : HEAD + n]
+    P = state[HEAD + n : HEAD + n + n * n]
+    work = state[HEAD + n + 2 * n * n :]
+    y, S = equations.discrete_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
+    _note(state, y, S)
+
+
+@unrolled
 def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
-    """One sample of the law: gate, resetting, update with noise variance R."""
+    """One sample of the law as configured: gate, resetting, update with noise variance R."""
+    if not _informs(state, config, phi, n):
+        return
     theta = state[HEAD : HEAD + n]
     P = state[HEAD + n : HEAD + n + n * n]
     P_0 = state[HEAD + n + n * n : HEAD + n + 2 * n * n]
     work = state[HEAD + n + 2 * n * n :]
-    information = 0.0
-    for i in range(n):
-        information += phi[i] * phi[i] * P_0[i * n + i]
-    if information <= config[DEAD_ZONE] * config[NOISE]:
-        state[LAST] = HOLDING
-        state[HELD] += 1.0
-        return
     if config[FLOOR] > 0.0 and equations.above_floor(P, n, config[FLOOR], work) == 0.0:
         equations.restore_covariance(P, P_0, n, 1.0)
         state[RESETS] += 1.0
@@ -128,10 +158,7 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting:
         y, S = equations.directional_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
     else:
         y, S = equations.discrete_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
-    state[INNOVATION] = y
-    state[INNOVATION_VARIANCE] = S
-    state[UPDATES] += 1.0
-    state[LAST] = UPDATED
+    _note(state, y, S)
 
 
 # Compiled when it is first called: few need it by itself.

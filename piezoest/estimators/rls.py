@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from piezoest._checks import FloatArray, positive
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
-from piezoest.estimators import rls_model, rls_profile
+from piezoest.estimators import rls_loops, rls_model, rls_profile
 from piezoest.estimators import rls_settings as settings
 from piezoest.estimators.base import NO_ROWS, NONE, Compiled, Freezable, Status, Trace
 from piezoest.estimators.delay_line import delay_line
@@ -61,8 +61,8 @@ class HysteresisRLS(Freezable):
         Time base of the law, see `RecursiveLeastSquares`; ``"continuous"`` is the paper's,
         in seconds.
     errors : bool
-        Follow the covariance of the estimate's error, for `standard_errors`. It costs about as much as
-        the law itself: :doc:`/performance`.
+        Follow the covariance of the estimate's error, for `standard_errors`, and the mean square of the
+        regressor, for `excitation`. They cost about as much as the law itself: :doc:`/performance`.
     policies : tuple of policies, optional
         Policies beside `memory`. Default with ``memory="period"``: ``(RandomWalk(), DeadZone(),
         OutlierRejection())``, for a `LinearGain` with `PeriodicForgetting` for
@@ -84,12 +84,10 @@ class HysteresisRLS(Freezable):
     and App. A.
     """
 
-    __slots__ = ("_config", "_initial", "_n", "_scale", "_terms")
+    __slots__ = ("_config", "_initial", "_kind", "_n", "_scale", "_terms")
 
     _frozen_at = kernel.FROZEN
 
-    # Module with the compiled ring of `track`.
-    _ring = "piezoest.tracking_rls"
     _compiled = Compiled(
         kernel._sample,
         rls_model.proposed,
@@ -154,10 +152,12 @@ class HysteresisRLS(Freezable):
         # The continuous law's P is the covariance already.
         config[kernel.ERRORS] = bool(errors) and time_base == "discrete"
         settings.policy_settings(config, policies, sample_rate)
+        settings.note_duties(config, errors)
         P_0 = np.diag(np.full(n, positive("uncertainty", uncertainty) ** 2))
         forgetting = Forgetting(memory if isinstance(memory, float) else np.inf)
         law_config = law.configure((forgetting, *policies), 1.0 / sample_rate, time_base, 1.0, P_0)
         self._config = np.concatenate([config, law_config])
+        self._kind = settings.kind(self._config, delay)
         start = np.append(np.sign(initial.theta), np.zeros(int(offset)))
         extra = np.zeros(int(config[kernel.EXTRA]))
         state = np.concatenate([np.zeros(kernel.FRONT), law.new_state(start, P_0), extra, line])
@@ -179,12 +179,17 @@ class HysteresisRLS(Freezable):
             state,
         )
 
+    def _loops(self) -> tuple[Any, Any]:
+        """Compiled functions that take a record, and propose a model, for the compiled ring of `track`."""
+        return rls_loops.run[self._kind], rls_model.propose
+
     def _sample(self, u: float, x: float) -> None:
-        kernel.step(self._state, self._config, u, x)
+        rls_loops.step[self._kind](self._state, self._config, u, x)
 
     def _absorb(self, u: FloatArray, x: FloatArray) -> None:
         u, x = self._records(u, x)
-        kernel.run(self._state, self._config, u, x, u.size + 1, self._scale, NO_ROWS, NONE, NONE, NO_ROWS)
+        run, _ = self._loops()
+        run(self._state, self._config, u, x, u.size + 1, self._scale, NO_ROWS, NO_ROWS, NONE, NONE, NO_ROWS)
 
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
         rows, n = u.size // every, self._n
@@ -192,9 +197,10 @@ class HysteresisRLS(Freezable):
         y = np.empty(rows if "y" in want else 0)
         S = np.empty(rows if "S" in want else 0)
         P = np.empty((rows if "P" in want else 0, n * n))
-        kernel.run(self._state, self._config, u, x, every, self._scale, theta, y, S, P)
+        run, _ = self._loops()
+        run(self._state, self._config, u, x, every, self._scale, theta, NO_ROWS, y, S, P)
         return Trace(
-            index=np.arange(1, rows + 1) * every - 1,
+            index=np.arange(every - 1, rows * every, every),
             theta=theta,
             parameter_names=self.parameter_names,
             y=y / self._config[kernel.SCALE + 4] if "y" in want else None,
@@ -250,8 +256,11 @@ class HysteresisRLS(Freezable):
         """Least eigenvalue of the regressor's mean square over a swing, in parts of the mean one.
 
         The alpha_0 of (A8) for the scaled regressor, normalised: 1 if every direction is
-        excited alike, 0 if one is not excited at all.
+        excited alike, 0 if one is not excited at all. NaN with ``errors=False``, where nobody follows it (but
+        `policies.ExcitationGate` does).
         """
+        if self._config[kernel.WHOLE] == 0.0:
+            return np.nan
         n = self._n
         mean = self._state[kernel.EXCITATION : kernel.EXCITATION + n * n].reshape(n, n)
         total = float(np.trace(mean))

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import UNCOUNTED, unrolled
+from piezoest._jit import unrolled
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations import filters, least_squares
 from piezoest.estimators import believing, level, swing
@@ -41,9 +40,10 @@ SCALE = 16  # four scales of the parameters, one of the output
 # parts of it, places of the memory of amplitudes, its tolerance, its variance.
 EXTRA, MARGIN, THRESHOLD, RISEN, EXCITED, SHORTEST, PLACES, TOLERANCE, RECALLED = range(21, 30)
 # Slope [µm/V] of a beta of one, variance of the sensor's noise to that of a slope, whether the covariance of
-# the estimate's error is followed.
-SLOPE, NOISE_FACTOR, ERRORS = 30, 31, 32
-CONFIG = 33
+# the estimate's error is followed, whether the regressor's mean square is as a whole or its diagonal alone,
+# and whether anybody asks for the voltage's swings.
+SLOPE, NOISE_FACTOR, ERRORS, WHOLE, PACED = 30, 31, 32, 33, 34
+CONFIG = 35
 
 # Slower than so many swings a sample the voltage is at rest; slower than this part of its usual
 # pace it counts as going at that.
@@ -58,19 +58,20 @@ OFF_CENTRE, LEAST_STEP, CEILING = 0.3, 1e-6, 1e4
 
 
 @unrolled
-def _filtered(state: Any, config: Any, i: int, value: Any) -> Any:
+def _filtered(state: Any, config: Any, extra: Any, i: int, value: Any) -> Any:
     """Low-pass (W_p of App. A), then the optional high-pass."""
     state[LOW + i] = filters.low_pass_step(state[LOW + i], value, config[LOW_POLE])
     value = state[LOW + i]
-    if config[HIGH_PASS] != 0.0:
+    if extra is not None and config[HIGH_PASS] != 0.0:
         state[HIGH + i], value = filters.high_pass_step(state[HIGH + i], value, config[HIGH_POLE])
     return value
 
 
 @unrolled
-def _prime(state: Any, config: Any, u: Any, x: Any) -> None:
+def _prime(state: Any, config: Any, clock: Any, u: Any, x: Any) -> None:
     """Start from (u, x) as the last good sample; what is usual is learnt anew."""
-    state[BELIEF + believing.SEEN] = 0.0
+    if clock is not None:
+        state[BELIEF + believing.SEEN] = 0.0
     if state[PRIMED] == 0.0 and config[OFFSET] != 0.0:
         state[U_CENTRE] = u
         state[X_CENTRE] = x
@@ -94,11 +95,11 @@ def _believable(state: Any, config: Any, x: Any) -> Any:
 
 
 @unrolled
-def _regression(state: Any, config: Any, x: Any, phi: Any, n: int) -> Any:
+def _regression(state: Any, config: Any, clock: Any, extra: Any, x: Any, phi: Any, n: int) -> Any:
     """Regressor into `phi` and output, from the last good sample to this one; starts the next."""
-    if config[HYSTERETIC] != 0.0:
+    if extra is None or config[HYSTERETIC] != 0.0:
         z = x - state[X_LAST]
-        if config[WALK] > 0.0:
+        if clock is not None and config[WALK] > 0.0:
             _measure_noise(state, z)
         phi[0] = -0.5 * (x + state[X_LAST]) * state[TRAVEL]
         phi[1] = state[RISE]
@@ -113,8 +114,8 @@ def _regression(state: Any, config: Any, x: Any, phi: Any, n: int) -> Any:
     state[X_LAST] = x
     state[TRAVEL] = state[MOMENT] = state[RISE] = state[GAP] = 0.0
     for i in range(n):
-        phi[i] = _filtered(state, config, i, phi[i] * config[SCALE + i])
-    return _filtered(state, config, 4, z * config[SCALE + 4])
+        phi[i] = _filtered(state, config, extra, i, phi[i] * config[SCALE + i])
+    return _filtered(state, config, extra, 4, z * config[SCALE + 4])
 
 
 @unrolled
@@ -175,7 +176,12 @@ def _excite(state: Any, config: Any, phi: Any, n: int, part: Any) -> None:
     state[WAY] = way = min(way, 1.0)
     fresh, old = 1.0 / (max(part, SLOWEST) * way), part / way
     for i in range(n):
-        for j in range(i, n):
+        mean = state[EXCITATION + i * n + i]
+        state[EXCITATION + i * n + i] = mean + (fresh * phi[i] * phi[i] - old * mean)
+    if config[WHOLE] == 0.0:
+        return
+    for i in range(n):
+        for j in range(i + 1, n):
             mean = state[EXCITATION + i * n + j]
             mean += fresh * phi[i] * phi[j] - old * mean
             state[EXCITATION + i * n + j] = mean
@@ -183,7 +189,7 @@ def _excite(state: Any, config: Any, phi: Any, n: int, part: Any) -> None:
 
 
 @unrolled
-def _walk(state: Any, config: Any, n: int, half: Any) -> Any:
+def _walk(state: Any, config: Any, extra: Any, n: int, half: Any) -> Any:
     """Let P grow, and return the noise variance of a sample that gives the memory wanted.
 
     Everything is counted in swings of the voltage. With P growing by q a swing, the best
@@ -196,8 +202,8 @@ def _walk(state: Any, config: Any, n: int, half: Any) -> Any:
         q = _square_step(state, config, i)
         rho += q * state[EXCITATION + i * n + i]
         k = FRONT + law.HEAD + n + i * n + i
-        if config[EXCITED] > 0.0:
-            q *= 1.0 - state[FRONT + law.state_size(n) + policies.SHUT]
+        if extra is not None and config[EXCITED] > 0.0:
+            q *= 1.0 - extra[policies.SHUT]
         state[k] = least_squares.random_walk(state[k], q * part, CEILING * max(q, state[k + n * n]))
     # Near a standstill the mechanics still move, which says nothing of the hysteresis.
     memory_squared = config[WALK_MEMORY] * config[WALK_MEMORY] + _noise_memory(state, config)
@@ -223,11 +229,10 @@ def _propagate_error(state: Any, config: Any, phi: Any, n: int, forgetting: Any,
 
 
 @register_jitable
-def _visit(state: Any, config: Any, n: int, part: Any) -> None:
+def _visit(state: Any, config: Any, extra: Any, n: int, part: Any) -> None:
     """Let the memory of amplitudes look at the swing."""
     start = FRONT + law.HEAD
     clock = state[SWING : SWING + swing.STATE]
-    extra = state[FRONT + law.state_size(n) :]
     theta = state[start : start + n]
     if policies.visit(extra, clock, theta, n, part, int(config[PLACES]), config[TOLERANCE]):
         policies.enlarge(state[start + n : start + n + n * n], n, config[RECALLED])
@@ -236,20 +241,21 @@ def _visit(state: Any, config: Any, n: int, part: Any) -> None:
 
 
 @register_jitable
-def _varied(state: Any, config: Any, phi: Any, z: Any, n: int, R: Any, forgetting: Any, half: Any) -> Any:
+def _varied(
+    state: Any, config: Any, extra: Any, phi: Any, z: Any, n: int, R: Any, forgetting: Any, half: Any
+) -> Any:
     """Factor of variable forgetting, against the innovation's usual energy."""
     least = config[CONFIG + law.LEAST_FACTOR]
     if config[PERIODS] > 0.0:
         samples = 2.0 * half * config[PERIODS] * config[SHORTEST]
         least = samples / (samples + 1.0)
-    forgetting = policies.nominal(state[FRONT + law.state_size(n) :], forgetting)
+    forgetting = policies.nominal(extra, forgetting)
     return law.varied(state[FRONT:], phi, z, n, R, forgetting, least)
 
 
 @register_jitable
-def _watch(state: Any, config: Any, n: int, part: Any) -> None:
+def _watch(state: Any, config: Any, extra: Any, n: int, part: Any) -> None:
     """Learn the innovation's usual energy, and add P_0 where it says that something changed."""
-    extra = state[FRONT + law.state_size(n) :]
     y, S = state[FRONT + law.INNOVATION], state[FRONT + law.INNOVATION_VARIANCE]
     if policies.changed(extra, y, S, part, config[THRESHOLD], config[RISEN]):
         start = FRONT + law.HEAD + n
@@ -259,82 +265,46 @@ def _watch(state: Any, config: Any, n: int, part: Any) -> None:
 
 
 @unrolled
-def _take(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
-    """One raw sample: a regression of n parameters for the law, or a note of why there is none."""
+def _move(state: Any, config: Any, clock: Any, u: Any, n: int) -> None:
+    """Take a voltage into the regressor's integrals, and into the clock where anybody asks for it."""
+    du = u - state[U_LAST]
+    rise, moment, travel = equations.sample_regressor(state[U_LAST], u)
+    state[RISE] += rise
+    state[MOMENT] += moment
+    state[TRAVEL] += travel
+    state[U_LAST] = u
+    if clock is not None and config[PACED] != 0.0 and rise != 0.0:
+        swing.follow(clock, u)
+        if n == 4:
+            level.move(state[LEVEL:FRONT], du, _decay(state, config))
+            if clock[swing.SINCE] == 0.0:
+                level.turn(state[LEVEL:FRONT])
+
+
+@unrolled
+def _adapt(
+    state: Any, config: Any, extra: Any, phi: Any, z: Any, n: int, R: Any, half: Any, part: Any
+) -> Any:
+    """The law, with what is off by default around it; returns the factor by which it forgot."""
     law_state = state[FRONT:]
-    if np.abs(u) < WILDEST:
-        u = delayed(state[FRONT + law.state_size(n) + int(config[EXTRA]) :], config[FRACTION], u)
-    state[SAMPLES] += 1.0
-    known = np.abs(u) < WILDEST
-    measured = known and np.abs(x) < WILDEST
-    if not measured:
-        state[MISSED] += 1.0
-        law_state[law.LAST] = law.MISSING
-    if state[PRIMED] == 0.0 or state[GAP] > config[LONGEST_GAP]:
-        if measured:
-            _prime(state, config, u, x)
-            law_state[law.LAST] = law.WAITING
-        return
-    if known:
-        # A short gap is bridged: the voltage's integrals go on, the displacement's mean
-        # is taken between the good samples on its two sides.
-        u -= state[U_CENTRE]
-        du = u - state[U_LAST]
-        rise, moment, travel = equations.sample_regressor(state[U_LAST], u)
-        state[RISE] += rise
-        state[MOMENT] += moment
-        state[TRAVEL] += travel
-        state[U_LAST] = u
-        if rise != 0.0:
-            swing.follow(state[SWING : SWING + swing.STATE], u)
-            if n == 4:
-                level.move(state[LEVEL:FRONT], du, _decay(state, config))
-                if state[SWING + swing.SINCE] == 0.0:
-                    level.turn(state[LEVEL:FRONT])
-    if measured and not _believable(state, config, x):
-        state[OUTLIERS] += 1.0
-        law_state[law.LAST] = law.REJECTED
-        measured = False
-    if not measured:
-        state[GAP] += 1.0
-        return
-    if n == 4:
-        level.measure(state[LEVEL:FRONT], u, x - state[X_CENTRE])
-    phi = state[PHI : PHI + n]
-    part = swing.part_of_swing(state[SWING : SWING + swing.STATE], state[TRAVEL], config[FIRST_HALF])
-    z = _regression(state, config, x - state[X_CENTRE], phi, n)
-    if state[FROZEN] != 0.0:
-        law_state[law.LAST] = law.HOLDING
-        return
-    if config[PLACES] > 0.0:
-        _visit(state, config, n, part)
-    half = 0.0  # nobody asks for it
-    if config[WALK] > 0.0 or config[PERIODS] > 0.0:
-        half = swing.half_period(state[SWING : SWING + swing.STATE], config[FIRST_HALF])
-    _excite(state, config, phi, n, part)
-    R = 1.0
-    if config[WALK] > 0.0 and state[WAY] >= SLOWEST:
-        R = _walk(state, config, n, half)
+    head = law.HEAD
     forgetting = config[CONFIG + law.FORGETTING]
     if config[PERIODS] > 0.0:
         samples = 2.0 * half * config[PERIODS]
         forgetting = samples / (samples + 1.0)
     if config[EXCITED] > 0.0:
-        extra = law_state[law.state_size(n) :]
-        work = law_state[law.HEAD + n + 2 * n * n :]
+        work = law_state[head + n + 2 * n * n :]
         policies.gate(extra, state[EXCITATION : EXCITATION + n * n], n, config[EXCITED], work)
         if extra[policies.SHUT] != 0.0:
             law_state[law.LAST] = law.HOLDING
             law_state[law.HELD] += 1.0
-            return
+            return forgetting
     if config[CONFIG + law.LEAST_FACTOR] > 0.0:
-        forgetting = _varied(state, config, phi, z, n, R, forgetting, half)
-    resets, updates = law_state[law.RESETS], law_state[law.UPDATES]
+        forgetting = _varied(state, config, extra, phi, z, n, R, forgetting, half)
     law.adapt(law_state, config[CONFIG:], phi, z, n, R, forgetting)
     if config[EXTRA] > 0.0 and law_state[law.LAST] == law.UPDATED:
-        _watch(state, config, n, part)
+        _watch(state, config, extra, n, part)
     if config[MARGIN] > 0.0:
-        head = law.HEAD
         policies.project(
             law_state[head : head + n],
             law_state[head + n : head + n + n * n],
@@ -344,6 +314,71 @@ def _take(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
             config[MARGIN],
             law_state[head + 2 * n + 2 * n * n :],  # of the work space what the law's gain is not in
         )
+    return forgetting
+
+
+@unrolled
+def _take(state: Any, config: Any, clock: Any, extra: Any, u: Any, x: Any, n: int) -> None:
+    """One raw sample: a regression of n parameters for the law, or a note of why there is none.
+
+    `clock` is the state of `swing`, `extra` what stands behind the law's state: the policies' that are off by
+    default, and the delay line. Each may be None where nobody asks for it, and nothing is compiled for it.
+    """
+    law_state = state[FRONT:]
+    if extra is not None and np.abs(u) < WILDEST:
+        u = delayed(extra[int(config[EXTRA]) :], config[FRACTION], u)
+    state[SAMPLES] += 1.0
+    known = np.abs(u) < WILDEST
+    measured = known and np.abs(x) < WILDEST
+    if not measured:
+        state[MISSED] += 1.0
+        law_state[law.LAST] = law.MISSING
+    if state[PRIMED] == 0.0 or state[GAP] > config[LONGEST_GAP]:
+        if measured:
+            _prime(state, config, clock, u, x)
+            law_state[law.LAST] = law.WAITING
+        return
+    if known:
+        # A short gap is bridged: the voltage's integrals go on, the displacement's mean
+        # is taken between the good samples on its two sides.
+        u -= state[U_CENTRE]
+        _move(state, config, clock, u, n)
+    if clock is not None and measured and not _believable(state, config, x):
+        state[OUTLIERS] += 1.0
+        law_state[law.LAST] = law.REJECTED
+        measured = False
+    if not measured:
+        state[GAP] += 1.0
+        return
+    if n == 4:
+        level.measure(state[LEVEL:FRONT], u, x - state[X_CENTRE])
+    phi = state[PHI : PHI + n]
+    part = 0.0  # nobody asks for it
+    if clock is not None and config[PACED] != 0.0:
+        part = swing.part_of_swing(clock, state[TRAVEL], config[FIRST_HALF])
+    z = _regression(state, config, clock, extra, x - state[X_CENTRE], phi, n)
+    if state[FROZEN] != 0.0:
+        law_state[law.LAST] = law.HOLDING
+        return
+    forgetting = config[CONFIG + law.FORGETTING]
+    if clock is None:
+        law.adapt_discretely(law_state, config[CONFIG:], phi, z, n, 1.0, forgetting)
+        return
+    if extra is not None and config[PLACES] > 0.0:
+        _visit(state, config, extra, n, part)
+    half = 0.0  # nobody asks for it
+    if config[WALK] > 0.0 or (extra is not None and config[PERIODS] > 0.0):
+        half = swing.half_period(clock, config[FIRST_HALF])
+    if config[PACED] != 0.0:
+        _excite(state, config, phi, n, part)
+    R = 1.0
+    if config[WALK] > 0.0 and state[WAY] >= SLOWEST:
+        R = _walk(state, config, extra, n, half)
+    resets, updates = law_state[law.RESETS], law_state[law.UPDATES]
+    if extra is None:
+        law.adapt_discretely(law_state, config[CONFIG:], phi, z, n, R, forgetting)
+    else:
+        forgetting = _adapt(state, config, extra, phi, z, n, R, half, part)
     if law_state[law.LAST] == law.UPDATED and config[ERRORS] != 0.0:
         restart = updates == 0.0 or law_state[law.RESETS] != resets
         if config[CONFIG + law.DIRECTIONAL] != 0.0:
@@ -353,58 +388,6 @@ def _take(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
 
 @register_jitable
 def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
-    """One raw sample; where n is a constant its loops are unrolled."""
+    """One raw sample, with whatever was asked for."""
     n = int(config[N])
-    if n == 3:
-        _take(state, config, u, x, 3)
-    elif n == 4:
-        _take(state, config, u, x, 4)
-    else:
-        _take(state, config, u, x, n)
-
-
-@unrolled
-def _checked(state: Any, config: Any, u: Any, x: Any, n: int) -> None:
-    if len(state) < FRONT + law.state_size(n) or len(config) < CONFIG + law.CONFIG_SIZE:
-        return  # never so; said here, it saves the compiler to ask at each slice
-    _take(state, config, u, x, n)
-
-
-@njit("void(f8[::1], f8[::1], f8, f8)", cache=True, nogil=True, **UNCOUNTED)
-def step(state: Any, config: Any, u: float, x: float) -> None:
-    """Take one sample."""
-    n = int(config[N])
-    if n == 3:
-        _checked(state, config, u, x, 3)
-    elif n == 4:
-        _checked(state, config, u, x, 4)
-    else:
-        _checked(state, config, u, x, n)
-
-
-@njit(
-    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
-    cache=True,
-    **UNCOUNTED,
-)
-def run(
-    state: Any, config: Any, u: Any, x: Any, every: int, scale: Any, theta: Any, y: Any, S: Any, P: Any
-) -> None:
-    """Take whole records; every `every`-th sample into the histories that have room, theta times `scale`."""
-    n = int(config[N])
-    head = FRONT + law.HEAD
-    row, due = 0, every
-    for k in range(u.size):
-        step(state, config, u[k], x[k])
-        due -= 1
-        if due == 0:
-            for i in range(n):
-                theta[row, i] = state[head + i] * scale[i]
-            if y.size > 0:
-                y[row] = state[FRONT + law.INNOVATION]
-            if S.size > 0:
-                S[row] = state[FRONT + law.INNOVATION_VARIANCE]
-            if P.size > 0:
-                for i in range(n * n):
-                    P[row, i] = state[head + n + i]
-            row, due = row + 1, every
+    _take(state, config, state[SWING:EXCITATION], state[FRONT + law.state_size(n) :], u, x, n)

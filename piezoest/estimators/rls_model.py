@@ -9,6 +9,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import FloatArray
+from piezoest._jit import PROPOSE_TYPES
 from piezoest.equations import admissible
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import level
@@ -77,7 +78,7 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
     model[3] = offset
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True)
+@njit(PROPOSE_TYPES, cache=True)
 def propose(state: Any, config: Any, terms: Any, model: Any) -> None:
     """Compiled `proposed`."""
     proposed(state, config, terms, model)

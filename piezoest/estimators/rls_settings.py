@@ -8,7 +8,9 @@ import numpy as np
 
 from piezoest._checks import FloatArray, positive
 from piezoest.equations import filters
+from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
+from piezoest.estimators import rls_loops as loops
 from piezoest.estimators import rls_policies as extra
 from piezoest.models import ColemanHodgdon, LinearGain, Model
 from piezoest.policies import (
@@ -117,6 +119,23 @@ def _switched_settings(config: FloatArray, policies: tuple[Policy, ...]) -> None
         config[kernel.RECALLED] = amplitudes.uncertainty**2
     if detection or gate or variable or amplitudes:
         config[kernel.EXTRA] = extra.HEAD + extra.PLACE * config[kernel.PLACES]
+
+
+def note_duties(config: FloatArray, errors: bool) -> None:
+    """Write what is asked of the front end beside the regression: by policies, the offset, or a reader."""
+    config[kernel.WHOLE] = errors or config[kernel.EXCITED] > 0.0
+    asking = (kernel.WHOLE, kernel.WALK, kernel.OUTLIER, kernel.PERIODS, kernel.EXCITED, kernel.EXTRA)
+    config[kernel.PACED] = config[kernel.N] == 4 or np.any(config[list(asking)])
+
+
+def kind(config: FloatArray, delay: float) -> tuple[int, int]:
+    """Key of the compiled loop in `rls_loops` that does no more than it has to."""
+    front = (kernel.HIGH_PASS, kernel.PERIODS, kernel.EXCITED, kernel.EXTRA, kernel.MARGIN)
+    own = (law.CONTINUOUS, law.DIRECTIONAL, law.LEAST_FACTOR, law.FLOOR)
+    rare = [*front, *(kernel.CONFIG + place for place in own)]
+    if delay > 0.0 or not config[kernel.HYSTERETIC] or np.any(config[rare]):
+        return 0, loops.ALL
+    return int(config[kernel.N]), loops.USUAL if config[kernel.PACED] else loops.BARE
 
 
 def front_end(
