@@ -12,11 +12,9 @@ It takes about a minute.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +25,8 @@ from piezoest.bench.adaptation import LIMITS, TRANSFER, json_safe
 from piezoest.bench.candidates import candidate
 from piezoest.bench.executors import in_processes
 from piezoest.bench.faults import FAULTS, NONE
-from piezoest.bench.machine import describe_machine, versions
 from piezoest.bench.metrics import LAST_PERIODS, SETTLED
+from piezoest.bench.origin import origin, put
 
 SAMPLE_RATE = 10_000.0
 AMPLITUDE, FREQUENCY, PERIODS = 5.0, 5.0, 15  # µm, Hz
@@ -117,20 +115,13 @@ def main() -> int:
     rows = [found[case.fault, case.estimator, case.guard] for case in todo]
     document = {
         "suite": "faults",
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": describe_machine(),
-        "versions": versions(),
-        "seconds": round(time.perf_counter() - began, 1),
+        **origin(began),
         "seed": arguments.seed,
         "sample_rate": SAMPLE_RATE,
         "limits": [LIMITS.minimum, LIMITS.maximum],
         "rows": json_safe(rows),
     }
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    if arguments.json:
-        arguments.json.write_text(text + "\n", encoding="utf-8")
-    else:
-        print(text)
+    put(document, arguments.json)
     broken = [row for row in rows if row["failure"] or not (row["finite"] and row["admissible"])]
     for row in broken:
         print(f"out of bounds: {row['fault']}, {row['estimator']}, guard {row['guard']}", file=sys.stderr)

@@ -20,7 +20,6 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from datetime import UTC, datetime
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -28,8 +27,8 @@ from typing import Any
 import numpy as np
 
 from piezoest.bench.adaptation import follow
-from piezoest.bench.machine import describe_machine, versions
 from piezoest.bench.metrics import DIVERGED, measure
+from piezoest.bench.origin import origin, put
 from piezoest.bench.scenarios import SCENARIOS
 
 MEMORY = (0.02, 5.0)  # s
@@ -179,20 +178,13 @@ def main() -> int:
             log.close()
     document = {
         "suite": "monte-carlo",
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": describe_machine(),
-        "versions": versions(),
-        "seconds": round(time.perf_counter() - began, 1),
+        **origin(began),
         "estimator": arguments.estimator,
         "diverged_above": DIVERGED,
         "spans": {"memory": MEMORY, "amplitude": AMPLITUDE, "frequency": FREQUENCY, "noise": NOISE},
         **summary([runs[number] for number in sorted(runs)]),
     }
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    if arguments.json:
-        arguments.json.write_text(text + "\n", encoding="utf-8")
-    else:
-        print(text)
+    put(document, arguments.json)
     return 1 if document["guarded"]["diverged"] else 0
 
 

@@ -14,10 +14,8 @@ It takes some twenty minutes; a tenth of it (--samples 1e8) says nearly as much.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import piezoest as pz
-from piezoest.bench.machine import describe_machine, versions
+from piezoest.bench.origin import origin, put
 
 FloatArray = NDArray[np.float64]
 
@@ -109,10 +107,7 @@ def main() -> int:
     start, scatter = np.mean(first, axis=0), np.std(first, axis=0, ddof=1)
     document = {
         "suite": "soak",
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": describe_machine(),
-        "versions": versions(),
-        "seconds": round(time.perf_counter() - began, 1),
+        **origin(began),
         "sample_rate": SAMPLE_RATE,
         "true": TRUE.theta.tolist(),
         "run_in_samples": RUN_IN * u.size,
@@ -122,11 +117,7 @@ def main() -> int:
         **verdict(checks, start, scatter),
         "checks": checks,
     }
-    text = json.dumps(document, indent=1, ensure_ascii=False)
-    if arguments.json:
-        arguments.json.write_text(text + "\n", encoding="utf-8")
-    else:
-        print(text)
+    put(document, arguments.json)
     return 0 if document["sound"] and document["within_noise"] else 1
 
 

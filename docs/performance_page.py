@@ -32,7 +32,12 @@ def pieces(document: dict[str, Any]) -> dict[str, str]:
         for name, value in document["nanoseconds_per_sample"].items()
     ]
     bank = [
-        [str(row["channels"]), *(f"{row[name]:.1f}" for name in ("1", "2", "C"))] for row in document["bank"]
+        [
+            str(row["channels"]),
+            str(row["samples"]),
+            *(f"{row[name]:.1f}" for name in ("1", "2", "C", "default, 2")),
+        ]
+        for row in document["bank"]
     ]
     ring = [
         [
@@ -60,7 +65,9 @@ def pieces(document: dict[str, Any]) -> dict[str, str]:
         "targets": table("Figures and targets", ["what", "figure", "target", "met"], targets),
         "times": table("Time per sample, and what came out", ["what", "ns", "first numbers"], times),
         "bank": table(
-            "A bank: ns per channel and sample", ["channels", "one core", "two cores", "C, one core"], bank
+            "A bank of the paper's law: ns per channel and sample",
+            ["channels", "samples", "one thread", "two threads", "C, one thread", "the default, two threads"],
+            bank,
         ),
         "conditions": (
             f"{machine['cpu']}, {machine['cores']} cores, Python {machine['python']}, "
@@ -81,25 +88,29 @@ def reasons(document: dict[str, Any]) -> str:
         f"- *HysteresisRLS.* The C written by hand is the bare law, {times['C, RLS']:.0f} ns. The same "
         "estimator, exported to C and compiled by the same compiler, takes "
         f"{times['exported C, policies off']:.0f} ns with policies off and "
-        f"{times['exported C, default']:.0f} ns by default, though it leaves out the standard errors: it "
-        "looks for missing samples, gaps and outliers, finds the turns of the voltage, keeps the mean "
-        "excitation, and by default measures the sensor's noise, lets P grow and follows the loop's "
-        "level. Numba takes "
-        f"{times['HysteresisRLS, policies off']:.0f} ns and {times['HysteresisRLS, default']:.0f} ns without "
-        f"standard errors (``errors=False``), {times['HysteresisRLS, policies off, standard errors']:.0f} ns "
-        f"and {times['HysteresisRLS, default, standard errors']:.0f} ns with them. What "
-        "is above the bare law are these duties, each of which a user can see; they are not traded for "
-        "speed. The law's state lives in memory, where it can be read, stopped and saved at any sample; the "
-        "C written by hand keeps it in registers.\n"
+        f"{times['exported C, default']:.0f} ns by default; Numba "
+        f"{times['HysteresisRLS, policies off']:.0f} ns and {times['HysteresisRLS, default']:.0f} ns "
+        "(``errors=False``). With policies off it is the look for missing samples and gaps, the counts of "
+        "`status` and the innovation that come on top of the law: a sample has some 190 instructions for the "
+        "110 of the C, so that the processor can begin fewer of them before the last is done. By default it "
+        "finds the turns of the voltage, looks for outliers, measures the sensor's noise, lets P grow, "
+        "follows the loop's level and learns a fourth parameter; each of these a user can see, and they are "
+        "not traded for speed. Standard errors and `excitation` take it to "
+        f"{times['HysteresisRLS, policies off, standard errors']:.0f} ns and "
+        f"{times['HysteresisRLS, default, standard errors']:.0f} ns.\n"
         "- *HysteresisEKF.* Each sample waits for the one before, in C as here; Joseph's form, the "
         f"projection and the checks are the difference between {times['C, EKF']:.0f} and "
         f"{times['HysteresisEKF']:.0f} ns.\n"
         f"- *PrandtlIshlinskiiRLS* learns {learnt[0]} parameters with 12 thresholds, the C loop {learnt[1]}: "
-        "each play has a slope for each part of the voltage's range, and none may fall below its least.\n"
-        "- *EstimatorBank.* The bare law runs on vector instructions over channels in C, "
-        f"{bank[0]['C']:.0f} ns per channel and sample. The estimator branches, at gaps, outliers, turns and "
-        "policies, differently in each channel, and LLVM refuses to make vector instructions of that. Two "
-        f"cores bring it to {bank[0]['2']:.0f} ns from {bank[0]['1']:.0f}.\n"
+        "each play has a slope for each part of the voltage's range, there is creep, and no slope may fall "
+        "below its least. Without bends and creep it learns the same "
+        f"{learnt[1]}, in {times['PrandtlIshlinskiiRLS, no bends, no creep']:.0f} ns for "
+        f"{times['C, 12 plays']:.0f}.\n"
+        "- *EstimatorBank.* The bare law runs on vector instructions over the channels, here as in C "
+        f"({bank[0]['1']:.1f} and {bank[0]['C']:.1f} ns on one thread); what a branch would skip is "
+        "computed and masked. The default's branches are too many for that, and its exponential is a call: "
+        f"its channels go one by one, {bank[0]['default, 2']:.0f} ns on two threads. The two threads of this "
+        "machine share one core's arithmetic.\n"
         "- *Late turns.* Beside them stands how often the system took the processor away. The garbage "
         f"collector changes nothing: a turn takes {turns[0]:.2f} µs with it and {turns[1]:.2f} µs without.\n"
     )

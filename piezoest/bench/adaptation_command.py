@@ -10,6 +10,9 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from piezoest.bench.origin import origin
+from piezoest.bench.shared import INTERRUPTED, Html, check_html, json_target, progress, write_html
+
 EPILOG = (
     "Examples: piezoest bench adaptation --scenario gain-step --seeds 20; "
     'piezoest bench adaptation --estimator "HysteresisRLS(memory=0.2)" --estimator my_module:MyEstimator '
@@ -40,9 +43,7 @@ def adaptation(
         typer.Option("--json", metavar="FILE", help="Write JSON; - prints it instead of the tables."),
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default one for each core.")] = None,
-    html: Annotated[
-        Path | None, typer.Option("--html", metavar="FILE", help="Write a page with interactive plots.")
-    ] = None,
+    html: Html = None,
     asked: Annotated[
         bool,
         typer.Option(
@@ -66,27 +67,18 @@ def adaptation(
     Errors are those of the true displacement in the ring of the simulated stage and the inverse
     compensator, 5 µm at 5 Hz where nothing else is said.
     """
-    from piezoest.bench.commands import (
-        INTERRUPTED,
-        _check_html,
-        _json_target,
-        _origin,
-        _progress,
-        _write_html,
-    )
-
     if asked and (scenario or estimator or policies):
         raise typer.BadParameter("goes without --scenario, --estimator and --policies", param_hint="--asked")
     if policies and estimator:
         raise typer.BadParameter("goes without --estimator", param_hint="--policies")
     if figures is not None and not policies:
         raise typer.BadParameter("goes with --policies", param_hint="--figures")
-    target = _json_target(json_to)
-    _check_html(html)
+    target = json_target(json_to)
+    check_html(html)
     began = time.perf_counter()
     overrides = {"sample_rate": sample_rate, "after": periods}
     try:
-        with _progress() as say:
+        with progress() as say:
             say("loading (compiles once after the installation)")
             from piezoest.bench.adaptation import in_parallel
 
@@ -99,10 +91,10 @@ def adaptation(
                     say(f"{done} of {len(work)} cases, {time.perf_counter() - began:.0f} s")
     except KeyboardInterrupt:
         raise typer.Exit(INTERRUPTED) from None
-    origin = {**_origin(), "seconds": round(time.perf_counter() - began, 1), "seeds": seeds}
-    document = _document(runs, origin, overrides, single=single)
+    head = {**origin(began), "seeds": seeds}
+    document = _document(runs, head, overrides, single=single)
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    _write_html(document, html)
+    write_html(document, html)
     if figures is not None:
         from piezoest.bench.policy_figures import write_policies
 

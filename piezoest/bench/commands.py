@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
-import sys
 import time
-from collections.abc import Callable, Iterator
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 
-from piezoest import _extras
 from piezoest.bench import adaptation_command, rank_command, suite_command
+from piezoest.bench.origin import origin
+from piezoest.bench.shared import INTERRUPTED, Html, check_html, json_target, progress, write_html
 
 if TYPE_CHECKING:
     from piezoest.bench.estimators import Row, Scenario
@@ -25,12 +22,6 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-INTERRUPTED = 130
-
-Html = Annotated[
-    Path | None, typer.Option("--html", metavar="FILE", help="Write a page with interactive plots.")
-]
 
 app.callback(invoke_without_command=True)(suite_command.suite)
 app.command(epilog=suite_command.COMPARE_EPILOG)(suite_command.compare)
@@ -68,10 +59,10 @@ def estimators(
     Each starts from the same wrong parameters and drives the inverse compensator of the simulated
     stage: a smoothed triangle of 5 µm at 5 Hz, noise and quantisation on.
     """
-    target = _json_target(json_to)
-    _check_html(html)
+    target = json_target(json_to)
+    check_html(html)
     try:
-        with _progress() as say:
+        with progress() as say:
             say("loading (compiles once after the installation)")
             from piezoest.bench.estimators import Scenario, compare
 
@@ -81,7 +72,7 @@ def estimators(
         raise typer.Exit(INTERRUPTED) from None
     document = _document(scenario, rows)
     text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
-    _write_html(document, html)
+    write_html(document, html)
     if json_to == "-":
         typer.echo(text)
         return
@@ -121,13 +112,13 @@ def paper(
     The paper's procedure at 50 kHz: each row adapts while it runs, until it is stationary. The stage was
     calibrated to the rows marked calibration; it has never seen those marked held out.
     """
-    target = _json_target(json_to)
-    _check_html(html)
+    target = json_target(json_to)
+    check_html(html)
     if figures is not None and (figures.exists() and not figures.is_dir()):
         raise typer.BadParameter(f"{figures} is not a folder", param_hint="--figures")
     began = time.perf_counter()
     try:
-        with _progress() as say:
+        with progress() as say:
             say("loading (compiles once after the installation)")
             from piezoest.bench.paper import MEMORIES, run_paper
             from piezoest.bench.paper_experiment import MEMORY
@@ -143,12 +134,11 @@ def paper(
         raise typer.Exit(INTERRUPTED) from None
     document = {
         "suite": "paper",
-        **_origin(),
-        "seconds": round(time.perf_counter() - began, 1),
+        **origin(began),
         **result.to_dict(),
     }
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    _write_html(document, html)
+    write_html(document, html)
     if figures is not None:
         from piezoest.bench.paper_figures import write_figures
 
@@ -163,48 +153,6 @@ def paper(
     if target is not None:
         target.write_text(text + "\n", encoding="utf-8")
         typer.echo(f"JSON: {target}")
-
-
-def _json_target(json_to: str | None) -> Path | None:
-    """File to write JSON to, if any; refused before the work is done, not after."""
-    target = None if json_to in (None, "-") else Path(str(json_to))
-    if target is not None and (target.is_dir() or not target.resolve().parent.is_dir()):
-        raise typer.BadParameter(f"{target} is no file that can be written", param_hint="--json")
-    return target
-
-
-def _check_html(html: Path | None) -> None:
-    """Refuse a report that cannot be written before the work is done, not after."""
-    if html is None:
-        return
-    if html.suffix.lower() not in (".html", ".htm"):
-        raise typer.BadParameter(f"{html}: a report's name must end in .html", param_hint="--html")
-    if html.is_dir() or not html.resolve().parent.is_dir():
-        raise typer.BadParameter(f"{html} is no file that can be written", param_hint="--html")
-    try:
-        _extras.load("plotly", "report", "an HTML report")
-    except _extras.MissingExtraError as error:
-        raise typer.BadParameter(str(error), param_hint="--html") from None
-
-
-def _write_html(document: dict[str, Any], html: Path | None) -> None:
-    """Write the report, if one is wanted, and say so on stderr, for stdout may be JSON."""
-    if html is not None:
-        from piezoest.bench.html_report import write_html
-
-        write_html(document, html)
-        typer.echo(f"Report: {html}", err=True)
-
-
-def _origin() -> dict[str, Any]:
-    """When and on what, as all results say it."""
-    from piezoest.bench.machine import describe_machine, versions
-
-    return {
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": describe_machine(),
-        "versions": versions(),
-    }
 
 
 def _chosen(own: list[str], only: list[str]) -> dict[str, type]:
@@ -226,24 +174,13 @@ def _chosen(own: list[str], only: list[str]) -> dict[str, type]:
     return chosen
 
 
-@contextlib.contextmanager
-def _progress() -> Iterator[Callable[[str], None]]:
-    """A function that says on stderr what is being done: beside a spinner, or else as lines."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield lambda said: print(said, file=sys.stderr, flush=True)
-        return
-    with console.status("") as status:
-        yield status.update
-
-
 def _document(scenario: Scenario, rows: list[Row]) -> dict[str, Any]:
     from piezoest.bench.estimators import SETTLED, UPDATE_INTERVAL
     from piezoest.demo import AMPLITUDE, FREQUENCY, WRONG_GAIN, WRONG_MODEL
 
     return {
         "suite": "estimators",
-        **_origin(),
+        **origin(),
         "scenario": {
             **dataclasses.asdict(scenario),
             "stage": "PaperStage",

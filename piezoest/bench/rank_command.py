@@ -10,6 +10,8 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from piezoest.bench.origin import origin
+from piezoest.bench.shared import INTERRUPTED, json_target, progress
 from piezoest.bench.suite_command import Dask, Jobs, Json, Scheduler
 
 FOLDER = Path("bench-results-ranking")
@@ -53,13 +55,12 @@ def rank(
 
     Stopped and started again, it goes on where it was.
     """
-    from piezoest.bench.commands import INTERRUPTED, _json_target, _origin, _progress
     from piezoest.bench.suite_command import counting, executor, usage
 
-    target = _json_target(json_to)
+    target = json_target(json_to)
     began = time.perf_counter()
     with usage():
-        with _progress() as say:
+        with progress() as say:
             say("loading (compiles once after the installation)")
             from piezoest.bench import campaign, ranking, tuning
 
@@ -83,10 +84,9 @@ def rank(
         except KeyboardInterrupt:
             Console(stderr=True).print(f"stopped: the same command goes on from {output}")
             raise typer.Exit(INTERRUPTED) from None
-        with _progress() as say:
+        with progress() as say:
             times = ranking.costs(tuned, budget, say)
-    origin = {**_origin(), "seconds": round(time.perf_counter() - began, 1)}
-    document = ranking.describe(tuned, rows, times, budget, origin)
+    document = ranking.describe(tuned, rows, times, budget, origin(began))
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     if figures is not None:
         from piezoest.bench.ranking_figures import write_figures

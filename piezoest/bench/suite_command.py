@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
+from piezoest.bench.origin import origin
+from piezoest.bench.shared import INTERRUPTED, Html, check_html, json_target, progress, write_html
+
 if TYPE_CHECKING:
     from piezoest.bench.campaign import Execute
 
@@ -75,9 +78,7 @@ def suite(
     figures: Annotated[
         Path | None, typer.Option("--figures", metavar="DIR", help="Draw how fast each adapts, as PNG.")
     ] = None,
-    html: Annotated[
-        Path | None, typer.Option("--html", metavar="FILE", help="Write a page with interactive plots.")
-    ] = None,
+    html: Html = None,
     jobs: Jobs = None,
     dask: Dask = False,
     scheduler: Scheduler = None,
@@ -109,21 +110,13 @@ def suite(
                 "if it has them, or leave it out"
             )
         return
-    from piezoest.bench.commands import (
-        INTERRUPTED,
-        _check_html,
-        _json_target,
-        _origin,
-        _progress,
-        _write_html,
-    )
 
-    target = _json_target(json_to)
-    _check_html(html)
+    target = json_target(json_to)
+    check_html(html)
     folder = output or (QUICK_FOLDER if quick else FOLDER)
     began = time.perf_counter()
     with usage():
-        with _progress() as say:
+        with progress() as say:
             say("loading (compiles once after the installation)")
             import dataclasses
 
@@ -145,13 +138,12 @@ def suite(
             with campaign.store_in(folder) as store, counting("runs") as count:
                 campaign.run(tasks, store, execute, count)
                 tables.write_tables(store.rows(campaign.keys_of(tasks)), folder, format)
-                origin = {**_origin(), "seconds": round(time.perf_counter() - began, 1)}
-                document = suite.describe(tasks, store, settings, origin)
+                document = suite.describe(tasks, store, settings, origin(began))
         except KeyboardInterrupt:
             Console(stderr=True).print(f"stopped: the same command goes on from {folder}")
             raise typer.Exit(INTERRUPTED) from None
     suite.write(document, folder / suite.DOCUMENT)
-    _write_html(document, html)
+    write_html(document, html)
     if figures is not None:
         from piezoest.bench.ranking_figures import write_adaptation
 
@@ -187,9 +179,7 @@ def compare(
     Runs are paired by scenario, estimator and seed; each number is put to a Wilcoxon signed-rank test, and
     the number of comparisons is allowed for by the false discovery rate.
     """
-    from piezoest.bench.commands import _json_target
-
-    target = _json_target(json_to)
+    target = json_target(json_to)
     with usage():
         from piezoest.bench import changes, suite, tables
 
@@ -250,8 +240,6 @@ def counting(what: str) -> Iterator[Callable[[int, int], None]]:
 @contextlib.contextmanager
 def usage() -> Iterator[None]:
     """Turn a wrong name or value into a message, exit code 2, and an interruption into 130."""
-    from piezoest.bench.commands import INTERRUPTED
-
     try:
         yield
     except ValueError as error:
