@@ -60,6 +60,9 @@ def cold() -> dict[str, float]:
     programs = {
         "import": "import piezoest as pz; t = time.perf_counter()",
         "first step": "import piezoest as pz; pz.HysteresisRLS(5e4).step(0.0, 0.0); t = time.perf_counter()",
+        # What loading any compiled function from a cache takes, before the function itself.
+        "Numba alone": "from numba.core.registry import cpu_target as c; c.typing_context.refresh(); "
+        "c.target_context.refresh(); t = time.perf_counter()",
         "warmup": "import piezoest as pz; pz.warmup(); t = time.perf_counter()",
     }
     found = {}

@@ -16,13 +16,15 @@ TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 
 
 def records(K: int, N: int) -> tuple[Any, Any]:
-    """Voltages and displacements of N stages, one of them with gaps."""
+    """Voltages and displacements of N stages; some miss one or the other now and then, or for long."""
     rng = np.random.default_rng(0)
     t = np.arange(K)[:, None] / SAMPLE_RATE
     u = np.ascontiguousarray(20.0 * np.sin(2 * np.pi * (40.0 + np.arange(N)) * t))
     x = np.column_stack([TRUE.simulate(u[:, c].copy()) for c in range(N)])
     x += 1e-3 * rng.standard_normal(x.shape)
     x[rng.random(K) < 0.05, 1] = np.nan
+    u[rng.random(K) < 0.02, 2 % N] = np.inf
+    x[K // 3 : K // 2, 3 % N] = np.nan
     return u, x
 
 
@@ -31,18 +33,22 @@ def records(K: int, N: int) -> tuple[Any, Any]:
     [
         pz.HysteresisRLS(SAMPLE_RATE),
         pz.HysteresisRLS(SAMPLE_RATE, memory=0.4),
+        pz.HysteresisRLS(SAMPLE_RATE, memory=0.4, errors=False),
+        pz.HysteresisRLS(SAMPLE_RATE, delay=0.5),
         pz.HysteresisRLS(SAMPLE_RATE, initial_model=pz.LinearGain(0.15)),
+        pz.HysteresisEKF(SAMPLE_RATE),
         pz.HysteresisEKF(SAMPLE_RATE, offset=True, delay=1.5),
     ],
 )
 @pytest.mark.parametrize("threads", [1, 3])
 def test_each_channel_is_a_single_estimator(estimator: Any, threads: int) -> None:
-    u, x = records(4000, 5)
-    bank = pz.EstimatorBank(estimator, 5, threads=threads)
+    N = 21  # more than go side by side through vector instructions, and not a multiple of them
+    u, x = records(1500, N)
+    bank = pz.EstimatorBank(estimator, N, threads=threads)
     theta = bank.run(u[:-3], x[:-3], every=7)
     for k in (-3, -2, -1):
         bank.step(u[k], x[k])
-    for c in range(5):
+    for c in range(N):
         single = estimator.copy()
         trace = single.run(u[:-3, c].copy(), x[:-3, c].copy(), every=7)
         np.testing.assert_array_equal(theta[:, c], trace.theta)
@@ -67,7 +73,7 @@ def test_wrong_arguments_are_named() -> None:
 
 @pytest.mark.parametrize("make", [pz.HysteresisRLS, pz.HysteresisEKF])
 def test_streaming_keeps_nothing_and_needs_no_collector(make: Any) -> None:
-    u, x = (values[:, 0].tolist() for values in records(3000, 2))
+    u, x = (values[:, 0].tolist() for values in records(3000, 4))
     estimator, other = make(SAMPLE_RATE), make(SAMPLE_RATE)
     for u_k, x_k in zip(u, x, strict=True):
         estimator.step(u_k, x_k)

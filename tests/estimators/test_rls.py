@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import piezoest as pz
+from piezoest.estimators import rls_loops
 from tests.reference import hysteresis_rls as reference
 
 FS = 50_000.0
@@ -250,6 +251,55 @@ def test_without_errors_nothing_else_changes(options: dict[str, Any]) -> None:
     assert not np.allclose(lean.standard_errors, estimator.standard_errors, rtol=0.01)
     again = pz.HysteresisRLS.from_dict(json.loads(json.dumps(lean.to_dict())))
     assert np.array_equal(again.standard_errors, lean.standard_errors)
+
+
+@pytest.mark.parametrize(
+    ("options", "kind"),
+    [
+        ({}, (4, rls_loops.USUAL)),
+        ({"errors": False}, (4, rls_loops.USUAL)),
+        ({"memory": 0.4}, (3, rls_loops.USUAL)),
+        ({"memory": 0.4, "errors": False}, (3, rls_loops.BARE)),
+    ],
+)
+def test_loops_compiled_for_less_give_the_same(options: dict[str, Any], kind: tuple[int, int]) -> None:
+    u, x = record(0.2, 1e-3)
+    x[500:510] = np.nan
+    x[2000:2300] = np.inf
+    u[3000:3005] = np.nan
+    states = []
+    for chosen, by_step in ((kind, False), (kind, True), ((0, rls_loops.ALL), False)):
+        estimator = pz.HysteresisRLS(FS, **options)
+        assert estimator._kind == kind
+        estimator._kind = chosen
+        if by_step:
+            for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+                estimator.step(u_k, x_k)
+        else:
+            estimator.run(u, x)
+        states.append(estimator.to_dict()["state"])
+    assert states[0] == states[1] == states[2]
+    assert estimator.status.updates > 5000
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"delay": 1.0},
+        {"high_pass": 0.5},
+        {"time_base": "continuous"},
+        {"initial_model": pz.LinearGain(0.15)},
+        {"policies": (pz.policies.RandomWalk(), pz.policies.Projection())},
+        {"policies": (pz.policies.RandomWalk(), pz.policies.ExcitationGate())},
+        {"policies": (pz.policies.RandomWalk(), pz.policies.ChangeDetection())},
+        {"policies": (pz.policies.RandomWalk(), pz.policies.AmplitudeMemory())},
+        {"memory": None, "policies": (pz.policies.DirectionalForgetting(0.4, unit="second"),)},
+        {"memory": None, "policies": (pz.policies.VariableForgetting(0.4, unit="second"),)},
+        {"memory": 0.4, "policies": (pz.policies.CovarianceResetting(1e-6),)},
+    ],
+)
+def test_what_is_off_by_default_gets_the_loop_that_has_it(options: dict[str, Any]) -> None:
+    assert pz.HysteresisRLS(FS, **options)._kind == (0, rls_loops.ALL)
 
 
 def test_wrong_arguments() -> None:
