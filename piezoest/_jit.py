@@ -122,8 +122,8 @@ def local_rows(typingctx: Any, rows: Any, columns: Any) -> Any:
 def in_lanes(typingctx: Any, body: Any, count: Any, arguments: Any) -> Any:
     """Call ``body(lane, *arguments)`` for lanes 0 to `count` - 1, which know nothing of each other.
 
-    LLVM is told to make vector instructions of it, eight lanes at a time: its estimate of what that
-    saves takes every branch for one that is seldom gone.
+    LLVM is told to make vector instructions of it, twice eight lanes at a time: its estimate of what
+    that saves takes every branch for one that is seldom gone.
     """
     takes = typingctx.resolve_function_type(body, (types.intp, *arguments), {})
 
@@ -142,10 +142,14 @@ def in_lanes(typingctx: Any, body: Any, count: Any, arguments: Any) -> Any:
         lane.add_incoming(following, builder.basic_block)
         jump = builder.cbranch(builder.icmp_signed("<", following, values[1]), loop, after)
         module = builder.module
-        width = ir.MetaDataString(module, "llvm.loop.vectorize.width")
-        hint = module.add_metadata([width, ir.Constant(ir.IntType(32), 8)])
-        identity = module.add_metadata([hint])
-        identity.operands = (identity, hint)  # a loop's hints are known by naming themselves
+        hints = [
+            module.add_metadata(
+                [ir.MetaDataString(module, f"llvm.loop.{name}"), ir.Constant(ir.IntType(32), value)]
+            )
+            for name, value in (("vectorize.width", 8), ("interleave.count", 2))
+        ]
+        identity = module.add_metadata(hints)
+        identity.operands = (identity, *hints)  # LLVM knows a loop's hints by their naming themselves
         jump.set_metadata("llvm.loop", identity)
         builder.position_at_end(after)
         return context.get_dummy_value()

@@ -111,7 +111,8 @@ class EstimatorBank:
     def _loop(self, samples: int) -> Any:
         """Compiled loop for so many samples of every channel."""
         single, records, head = _LOOPS[type(self._reader)]
-        if samples < WORTH_MOVING or self._kind[0] == 0:
+        *_, delayed = self._kind
+        if samples < WORTH_MOVING or delayed:
             return functools.partial(bank_kernel.in_turn, single[self._kind], head, self._reader._n)
         return records[self._kind]
 

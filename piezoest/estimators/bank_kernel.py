@@ -2,7 +2,7 @@
 
 All take samples (K, N) of channels `start` to `stop`, each with a row of `states`, and write what stands in
 the estimator's vector at every `every`-th sample into `rows`. `rls` and `kalman` are compiled for the same
-as the loops of a single estimator, and are worth it for whole records.
+as the loops of a single estimator without a delay, and are worth it for whole records.
 """
 
 from __future__ import annotations
@@ -15,15 +15,16 @@ from numba.extending import register_jitable
 from piezoest._jit import STEP_TYPES, UNCOUNTED, Family, in_lanes, local, local_rows, taking, unrolled
 from piezoest.estimators import ekf_kernel, rls_kernel, rls_loops
 
-# Channels that share vector instructions, channels that share cache lines, and samples that a channel takes
-# before it is the next one's turn.
-LANES, BLOCK, CHUNK = 16, 8, 64
+# Channels side by side in vector instructions, and samples of theirs that are read ahead.
+LANES, AHEAD = 32, 16
+# Channels that share cache lines, and samples that each takes before it is the next one's turn.
+BLOCK, CHUNK = 8, 64
 
 _SIGNATURE = "void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8, i8, f8[:, :, ::1])"
 
 
 @Family
-def rls(n: int, duties: int) -> Any:
+def rls(n: int, duties: int, _: bool) -> Any:
     """Of `HysteresisRLS`."""
     if duties == rls_loops.BARE:
         return _in_lanes(n)
@@ -31,13 +32,13 @@ def rls(n: int, duties: int) -> Any:
 
     @register_jitable
     def take(state: Any, config: Any, u: Any, x: Any) -> None:
-        rls_loops._take(state, config, u, x, n, True)
+        rls_loops._take(state, config, None, u, x, n, True)
 
     return _channel_by_channel(take, size, rls_loops.CONFIG, rls_loops.HEAD, n)
 
 
 @Family
-def kalman(n: int) -> Any:
+def kalman(n: int, _: bool) -> Any:
     """Of `HysteresisEKF`."""
 
     @register_jitable
@@ -97,21 +98,31 @@ def _channel_by_channel(take: Any, size: int, settings_size: int, head: int, n: 
     return bank
 
 
+@register_jitable
+def _copy_row(source: Any, target: Any) -> None:
+    """Fill all lanes, if need be with the last channel's."""
+    if source.size == LANES:
+        for lane in range(LANES):
+            target[lane] = source[lane]
+    else:
+        for lane in range(LANES):
+            target[lane] = source[min(lane, source.size - 1)]
+
+
 def _in_lanes(n: int) -> Any:
     """The bare law for many channels in the same vector instructions; its branches become masks."""
     size, settings_size, head = rls_loops.size(n), rls_loops.CONFIG, rls_loops.HEAD
 
     @unrolled
     def take(lane: int, states: Any, config: Any, u: Any, x: Any) -> None:
-        rls_loops._take(states[:, lane], config, u[lane], x[lane], n, None)
+        rls_loops._take(states[:, lane], config, None, u[lane], x[lane], n, None)
 
     @njit(_SIGNATURE, cache=True, nogil=True, **UNCOUNTED)
     def bank(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, rows: Any) -> None:
         settings = local(settings_size)
         for i in range(settings_size):
             settings[i] = config[i]
-        now = local_rows(size, LANES)
-        u_now, x_now = local(LANES), local(LANES)
+        now, u_now, x_now = local_rows(size, LANES), local_rows(AHEAD, LANES), local_rows(AHEAD, LANES)
         for first in range(start, stop, LANES):
             used = min(LANES, stop - first)
             # The lanes that are left over repeat the last channel, and are forgotten.
@@ -122,16 +133,19 @@ def _in_lanes(n: int) -> Any:
                 for i in range(rls_kernel.FRONT, size):
                     now[i, lane] = states[c, i]
             row, due = 0, every
-            for k in range(u.shape[0]):
-                for lane in range(LANES):
-                    c = first + min(lane, used - 1)
-                    u_now[lane], x_now[lane] = u[k, c], x[k, c]
-                in_lanes(take, LANES, (now, settings, u_now, x_now))
-                due -= 1
-                if due == 0:
-                    for lane in range(used):
-                        _keep(now[:, lane], head, n, rows[row, first + lane])
-                    row, due = row + 1, every
+            for begin in range(0, u.shape[0], AHEAD):
+                samples = min(AHEAD, u.shape[0] - begin)
+                # Rows are far apart: read one after the other, the next does not wait for the arithmetic.
+                for k in range(samples):
+                    _copy_row(u[begin + k, first : first + used], u_now[k])
+                    _copy_row(x[begin + k, first : first + used], x_now[k])
+                for k in range(samples):
+                    in_lanes(take, LANES, (now, settings, u_now[k], x_now[k]))
+                    due -= 1
+                    if due == 0:
+                        for lane in range(used):
+                            _keep(now[:, lane], head, n, rows[row, first + lane])
+                        row, due = row + 1, every
             for lane in range(used):
                 for i in range(rls_kernel.SWING):
                     states[first + lane, i] = now[i, lane]

@@ -40,13 +40,16 @@ def _keep(state: Any, hysteretic: Any, n: int, row: int, theta: Any, s: Any, y: 
 
 
 @Family
-def step(n: int) -> Any:
-    """``step[n](state, config, u, x)`` takes one sample; n is 0 where it stands in the configuration."""
+def step(n: int, delayed: bool) -> Any:
+    """``step[n, delayed](state, config, u, x)`` takes a sample; n is 0 if only `config` knows it."""
+    length = kernel.state_size(n)
 
     @njit(STEP_TYPES, cache=True, nogil=True, **UNCOUNTED)
     def step(state: Any, config: Any, u: float, x: float) -> None:
         if n == 0:
             kernel._sample(state, config, u, x)
+        elif delayed:
+            kernel._take(state, config, state[length:], u, x, n)
         else:
             kernel._take(state, config, None, u, x, n)
 
@@ -54,9 +57,9 @@ def step(n: int) -> Any:
 
 
 @Family
-def run(n: int) -> Any:
-    """``run[n]`` takes records, see `piezoest._jit.RUN_TYPES`; n as in `step`."""
-    return _run_any() if n == 0 else _run_of(n)
+def run(n: int, delayed: bool) -> Any:
+    """``run[n, delayed]`` takes records, see `piezoest._jit.RUN_TYPES`; n as in `step`."""
+    return _run_any() if n == 0 else _run_of(n, delayed)
 
 
 def _run_any() -> Any:
@@ -77,7 +80,7 @@ def _run_any() -> Any:
     return run
 
 
-def _run_of(n: int) -> Any:
+def _run_of(n: int, delayed: bool) -> Any:
     size, settings_size = kernel.state_size(n), kernel.CONFIG + n
 
     @njit(RUN_TYPES, cache=True, nogil=True, **UNCOUNTED)
@@ -93,7 +96,10 @@ def _run_of(n: int) -> Any:
             settings[i] = config[i]
         row, due = 0, every
         for k in range(u.size):
-            kernel._take(now, settings, None, u[k], x[k], n)
+            if delayed:
+                kernel._take(now, settings, state[size:], u[k], x[k], n)
+            else:
+                kernel._take(now, settings, None, u[k], x[k], n)
             due -= 1
             if due == 0:
                 _keep(now, settings[kernel.HYSTERETIC], n, row, theta, s, y, S, P)

@@ -318,15 +318,15 @@ def _adapt(
 
 
 @unrolled
-def _take(state: Any, config: Any, clock: Any, extra: Any, u: Any, x: Any, n: int) -> None:
+def _take(state: Any, config: Any, clock: Any, line: Any, extra: Any, u: Any, x: Any, n: int) -> None:
     """One raw sample: a regression of n parameters for the law, or a note of why there is none.
 
-    `clock` is the state of `swing`, `extra` what stands behind the law's state: the policies' that are off by
-    default, and the delay line. Each may be None where nobody asks for it, and nothing is compiled for it.
+    `clock` is the state of `swing`, `line` the delay line, `extra` the state of the policies that are off by
+    default. Each may be None where nobody asks for it, and nothing is compiled for it.
     """
     law_state = state[FRONT:]
-    if extra is not None and np.abs(u) < WILDEST:
-        u = delayed(extra[int(config[EXTRA]) :], config[FRACTION], u)
+    if line is not None and np.abs(u) < WILDEST:
+        u = delayed(line, config[FRACTION], u)
     state[SAMPLES] += 1.0
     known = np.abs(u) < WILDEST
     measured = known and np.abs(x) < WILDEST
@@ -390,4 +390,5 @@ def _take(state: Any, config: Any, clock: Any, extra: Any, u: Any, x: Any, n: in
 def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     """One raw sample, with whatever was asked for."""
     n = int(config[N])
-    _take(state, config, state[SWING:EXCITATION], state[FRONT + law.state_size(n) :], u, x, n)
+    extra = state[FRONT + law.state_size(n) :]
+    _take(state, config, state[SWING:EXCITATION], extra[int(config[EXTRA]) :], extra, u, x, n)

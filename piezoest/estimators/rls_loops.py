@@ -24,12 +24,12 @@ def size(n: int) -> int:
 
 
 @unrolled
-def _take(state: Any, config: Any, u: Any, x: Any, n: int, paced: Any) -> None:
+def _take(state: Any, config: Any, line: Any, u: Any, x: Any, n: int, paced: Any) -> None:
     """One sample with none of the policies that are off by default; `paced` is None for the bare law."""
     if paced is None:
-        kernel._take(state, config, None, None, u, x, n)
+        kernel._take(state, config, None, line, None, u, x, n)
     else:
-        kernel._take(state, config, state[kernel.SWING : kernel.EXCITATION], None, u, x, n)
+        kernel._take(state, config, state[kernel.SWING : kernel.EXCITATION], line, None, u, x, n)
 
 
 @unrolled
@@ -47,24 +47,27 @@ def _keep(state: Any, n: int, row: int, scale: Any, theta: Any, y: Any, S: Any, 
 
 
 @Family
-def step(n: int, duties: int) -> Any:
-    """``step[n, duties](state, config, u, x)`` takes one sample."""
+def step(n: int, duties: int, delayed: bool) -> Any:
+    """``step[n, duties, delayed](state, config, u, x)`` takes one sample."""
     paced = None if duties == BARE else True
+    length = size(n)
 
     @njit(STEP_TYPES, cache=True, nogil=True, **UNCOUNTED)
     def step(state: Any, config: Any, u: float, x: float) -> None:
         if n == 0:
             kernel._sample(state, config, u, x)
+        elif delayed:
+            _take(state, config, state[length:], u, x, n, paced)
         else:
-            _take(state, config, u, x, n, paced)
+            _take(state, config, None, u, x, n, paced)
 
     return step
 
 
 @Family
-def run(n: int, duties: int) -> Any:
-    """``run[n, duties]`` takes records, see `piezoest._jit.RUN_TYPES`."""
-    return _run_any() if n == 0 else _run_of(n, None if duties == BARE else True)
+def run(n: int, duties: int, delayed: bool) -> Any:
+    """``run[n, duties, delayed]`` takes records, see `piezoest._jit.RUN_TYPES`."""
+    return _run_any() if n == 0 else _run_of(n, None if duties == BARE else True, delayed)
 
 
 def _run_any() -> Any:
@@ -85,7 +88,7 @@ def _run_any() -> Any:
     return run
 
 
-def _run_of(n: int, paced: bool | None) -> Any:
+def _run_of(n: int, paced: bool | None, delayed: bool) -> Any:
     length = size(n)
 
     @njit(RUN_TYPES, cache=True, nogil=True, **UNCOUNTED)
@@ -101,7 +104,10 @@ def _run_of(n: int, paced: bool | None) -> Any:
             settings[i] = config[i]
         row, due = 0, every
         for k in range(u.size):
-            _take(now, settings, u[k], x[k], n, paced)
+            if delayed:
+                _take(now, settings, state[length:], u[k], x[k], n, paced)
+            else:
+                _take(now, settings, None, u[k], x[k], n, paced)
             due -= 1
             if due == 0:
                 _keep(now, n, row, scale, theta, y, S, P)

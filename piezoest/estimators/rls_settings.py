@@ -128,14 +128,14 @@ def note_duties(config: FloatArray, errors: bool) -> None:
     config[kernel.PACED] = config[kernel.N] == 4 or np.any(config[list(asking)])
 
 
-def kind(config: FloatArray, delay: float) -> tuple[int, int]:
+def kind(config: FloatArray, delay: float) -> tuple[int, int, bool]:
     """Key of the compiled loop in `rls_loops` that does no more than it has to."""
     front = (kernel.HIGH_PASS, kernel.PERIODS, kernel.EXCITED, kernel.EXTRA, kernel.MARGIN)
     own = (law.CONTINUOUS, law.DIRECTIONAL, law.LEAST_FACTOR, law.FLOOR)
     rare = [*front, *(kernel.CONFIG + place for place in own)]
-    if delay > 0.0 or not config[kernel.HYSTERETIC] or np.any(config[rare]):
-        return 0, loops.ALL
-    return int(config[kernel.N]), loops.USUAL if config[kernel.PACED] else loops.BARE
+    if not config[kernel.HYSTERETIC] or np.any(config[rare]):
+        return 0, loops.ALL, True
+    return int(config[kernel.N]), loops.USUAL if config[kernel.PACED] else loops.BARE, delay > 0.0
 
 
 def front_end(

@@ -256,19 +256,19 @@ def test_without_errors_nothing_else_changes(options: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("options", "kind"),
     [
-        ({}, (4, rls_loops.USUAL)),
-        ({"errors": False}, (4, rls_loops.USUAL)),
-        ({"memory": 0.4}, (3, rls_loops.USUAL)),
-        ({"memory": 0.4, "errors": False}, (3, rls_loops.BARE)),
+        ({}, (4, rls_loops.USUAL, False)),
+        ({"errors": False, "delay": 1.5}, (4, rls_loops.USUAL, True)),
+        ({"memory": 0.4}, (3, rls_loops.USUAL, False)),
+        ({"memory": 0.4, "errors": False}, (3, rls_loops.BARE, False)),
     ],
 )
-def test_loops_compiled_for_less_give_the_same(options: dict[str, Any], kind: tuple[int, int]) -> None:
+def test_loops_compiled_for_less_give_the_same(options: dict[str, Any], kind: tuple[int, int, bool]) -> None:
     u, x = record(0.2, 1e-3)
     x[500:510] = np.nan
     x[2000:2300] = np.inf
     u[3000:3005] = np.nan
     states = []
-    for chosen, by_step in ((kind, False), (kind, True), ((0, rls_loops.ALL), False)):
+    for chosen, by_step in ((kind, False), (kind, True), ((0, rls_loops.ALL, True), False)):
         estimator = pz.HysteresisRLS(FS, **options)
         assert estimator._kind == kind
         estimator._kind = chosen
@@ -285,7 +285,6 @@ def test_loops_compiled_for_less_give_the_same(options: dict[str, Any], kind: tu
 @pytest.mark.parametrize(
     "options",
     [
-        {"delay": 1.0},
         {"high_pass": 0.5},
         {"time_base": "continuous"},
         {"initial_model": pz.LinearGain(0.15)},
@@ -299,7 +298,7 @@ def test_loops_compiled_for_less_give_the_same(options: dict[str, Any], kind: tu
     ],
 )
 def test_what_is_off_by_default_gets_the_loop_that_has_it(options: dict[str, Any]) -> None:
-    assert pz.HysteresisRLS(FS, **options)._kind == (0, rls_loops.ALL)
+    assert pz.HysteresisRLS(FS, **options)._kind == (0, rls_loops.ALL, True)
 
 
 def test_wrong_arguments() -> None:
