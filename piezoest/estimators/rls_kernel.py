@@ -97,7 +97,7 @@ def _believable(state: Any, config: Any, x: Any) -> Any:
 @unrolled
 def _regression(state: Any, config: Any, clock: Any, extra: Any, x: Any, phi: Any, n: int) -> Any:
     """Regressor into `phi` and output, from the last good sample to this one; starts the next."""
-    if extra is None or config[HYSTERETIC] != 0.0:
+    if clock is None or config[HYSTERETIC] != 0.0:
         z = x - state[X_LAST]
         if clock is not None and config[WALK] > 0.0:
             _measure_noise(state, z)
@@ -283,22 +283,28 @@ def _move(state: Any, config: Any, clock: Any, u: Any, n: int) -> None:
 
 @unrolled
 def _adapt(
-    state: Any, config: Any, extra: Any, phi: Any, z: Any, n: int, R: Any, half: Any, part: Any
-) -> Any:
-    """The law, with what is off by default around it; returns the factor by which it forgot."""
+    state: Any,
+    config: Any,
+    extra: Any,
+    phi: Any,
+    z: Any,
+    n: int,
+    R: Any,
+    forgetting: Any,
+    half: Any,
+    part: Any,
+) -> None:
+    """The law, with what is off by default around it."""
     law_state = state[FRONT:]
     head = law.HEAD
-    forgetting = config[CONFIG + law.FORGETTING]
-    if config[PERIODS] > 0.0:
-        samples = 2.0 * half * config[PERIODS]
-        forgetting = samples / (samples + 1.0)
+    resets, updates = law_state[law.RESETS], law_state[law.UPDATES]
     if config[EXCITED] > 0.0:
         work = law_state[head + n + 2 * n * n :]
         policies.gate(extra, state[EXCITATION : EXCITATION + n * n], n, config[EXCITED], work)
         if extra[policies.SHUT] != 0.0:
             law_state[law.LAST] = law.HOLDING
             law_state[law.HELD] += 1.0
-            return forgetting
+            return
     if config[CONFIG + law.LEAST_FACTOR] > 0.0:
         forgetting = _varied(state, config, extra, phi, z, n, R, forgetting, half)
     law.adapt(law_state, config[CONFIG:], phi, z, n, R, forgetting)
@@ -314,7 +320,11 @@ def _adapt(
             config[MARGIN],
             law_state[head + 2 * n + 2 * n * n :],  # of the work space what the law's gain is not in
         )
-    return forgetting
+    if law_state[law.LAST] == law.UPDATED and config[ERRORS] != 0.0:
+        restart = updates == 0.0 or law_state[law.RESETS] != resets
+        if config[CONFIG + law.DIRECTIONAL] != 0.0:
+            forgetting = 1.0  # it is not in that law's gain
+        _propagate_error(state, config, phi, n, forgetting, restart)
 
 
 @unrolled
@@ -367,23 +377,23 @@ def _take(state: Any, config: Any, clock: Any, line: Any, extra: Any, u: Any, x:
     if extra is not None and config[PLACES] > 0.0:
         _visit(state, config, extra, n, part)
     half = 0.0  # nobody asks for it
-    if config[WALK] > 0.0 or (extra is not None and config[PERIODS] > 0.0):
+    if config[WALK] > 0.0 or config[PERIODS] > 0.0:
         half = swing.half_period(clock, config[FIRST_HALF])
+    if config[PERIODS] > 0.0:
+        samples = 2.0 * half * config[PERIODS]
+        forgetting = samples / (samples + 1.0)
     if config[PACED] != 0.0:
         _excite(state, config, phi, n, part)
     R = 1.0
     if config[WALK] > 0.0 and state[WAY] >= SLOWEST:
         R = _walk(state, config, extra, n, half)
-    resets, updates = law_state[law.RESETS], law_state[law.UPDATES]
-    if extra is None:
-        law.adapt_discretely(law_state, config[CONFIG:], phi, z, n, R, forgetting)
-    else:
-        forgetting = _adapt(state, config, extra, phi, z, n, R, half, part)
+    if extra is not None:
+        _adapt(state, config, extra, phi, z, n, R, forgetting, half, part)
+        return
+    first = law_state[law.UPDATES] == 0.0
+    law.adapt_discretely(law_state, config[CONFIG:], phi, z, n, R, forgetting)
     if law_state[law.LAST] == law.UPDATED and config[ERRORS] != 0.0:
-        restart = updates == 0.0 or law_state[law.RESETS] != resets
-        if config[CONFIG + law.DIRECTIONAL] != 0.0:
-            forgetting = 1.0  # it is not in that law's gain
-        _propagate_error(state, config, phi, n, forgetting, restart)
+        _propagate_error(state, config, phi, n, forgetting, first)
 
 
 @register_jitable

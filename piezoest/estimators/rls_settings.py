@@ -130,12 +130,13 @@ def note_duties(config: FloatArray, errors: bool) -> None:
 
 def kind(config: FloatArray, delay: float) -> tuple[int, int, bool]:
     """Key of the compiled loop in `rls_loops` that does no more than it has to."""
-    front = (kernel.HIGH_PASS, kernel.PERIODS, kernel.EXCITED, kernel.EXTRA, kernel.MARGIN)
+    front = (kernel.HIGH_PASS, kernel.EXCITED, kernel.EXTRA, kernel.MARGIN)
     own = (law.CONTINUOUS, law.DIRECTIONAL, law.LEAST_FACTOR, law.FLOOR)
     rare = [*front, *(kernel.CONFIG + place for place in own)]
-    if not config[kernel.HYSTERETIC] or np.any(config[rare]):
+    if np.any(config[rare]):
         return 0, loops.ALL, True
-    return int(config[kernel.N]), loops.USUAL if config[kernel.PACED] else loops.BARE, delay > 0.0
+    bare = config[kernel.HYSTERETIC] and not config[kernel.PACED]
+    return int(config[kernel.N]), loops.BARE if bare else loops.USUAL, delay > 0.0
 
 
 def front_end(

@@ -260,6 +260,11 @@ def test_without_errors_nothing_else_changes(options: dict[str, Any]) -> None:
         ({"errors": False, "delay": 1.5}, (4, rls_loops.USUAL, True)),
         ({"memory": 0.4}, (3, rls_loops.USUAL, False)),
         ({"memory": 0.4, "errors": False}, (3, rls_loops.BARE, False)),
+        ({"initial_model": pz.LinearGain(0.15), "offset": True}, (2, rls_loops.USUAL, False)),
+        (
+            {"initial_model": pz.LinearGain(0.15), "memory": 0.4, "errors": False, "policies": ()},
+            (1, rls_loops.USUAL, False),
+        ),
     ],
 )
 def test_loops_compiled_for_less_give_the_same(options: dict[str, Any], kind: tuple[int, int, bool]) -> None:
@@ -287,7 +292,6 @@ def test_loops_compiled_for_less_give_the_same(options: dict[str, Any], kind: tu
     [
         {"high_pass": 0.5},
         {"time_base": "continuous"},
-        {"initial_model": pz.LinearGain(0.15)},
         {"policies": (pz.policies.RandomWalk(), pz.policies.Projection())},
         {"policies": (pz.policies.RandomWalk(), pz.policies.ExcitationGate())},
         {"policies": (pz.policies.RandomWalk(), pz.policies.ChangeDetection())},
