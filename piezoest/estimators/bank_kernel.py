@@ -15,10 +15,9 @@ from numba.extending import register_jitable
 from piezoest._jit import STEP_TYPES, UNCOUNTED, Family, in_lanes, local, local_rows, taking, unrolled
 from piezoest.estimators import ekf_kernel, rls_kernel, rls_loops
 
-# Channels side by side in vector instructions, and samples of theirs that are read ahead.
-LANES, AHEAD = 32, 16
-# Channels that share cache lines, and samples that each takes before it is the next one's turn.
-BLOCK, CHUNK = 8, 64
+# Channels side by side in vector instructions; channels that share cache lines; samples read ahead, or
+# taken by a channel before it is the next one's turn.
+LANES, BLOCK, CHUNK = 32, 8, 64
 
 _SIGNATURE = "void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8, i8, f8[:, :, ::1])"
 
@@ -122,7 +121,7 @@ def _in_lanes(n: int) -> Any:
         settings = local(settings_size)
         for i in range(settings_size):
             settings[i] = config[i]
-        now, u_now, x_now = local_rows(size, LANES), local_rows(AHEAD, LANES), local_rows(AHEAD, LANES)
+        now, u_now, x_now = local_rows(size, LANES), local_rows(CHUNK, LANES), local_rows(CHUNK, LANES)
         for first in range(start, stop, LANES):
             used = min(LANES, stop - first)
             # The lanes that are left over repeat the last channel, and are forgotten.
@@ -133,8 +132,8 @@ def _in_lanes(n: int) -> Any:
                 for i in range(rls_kernel.FRONT, size):
                     now[i, lane] = states[c, i]
             row, due = 0, every
-            for begin in range(0, u.shape[0], AHEAD):
-                samples = min(AHEAD, u.shape[0] - begin)
+            for begin in range(0, u.shape[0], CHUNK):
+                samples = min(CHUNK, u.shape[0] - begin)
                 # Rows are far apart: read one after the other, the next does not wait for the arithmetic.
                 for k in range(samples):
                     _copy_row(u[begin + k, first : first + used], u_now[k])
