@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import piezoest as pz
+from piezoest.bench.adaptation import json_safe
 from piezoest.bench.origin import origin, put
 
 FloatArray = NDArray[np.float64]
@@ -117,7 +118,7 @@ def main() -> int:
         **verdict(checks, start, scatter),
         "checks": checks,
     }
-    put(document, arguments.json)
+    put(json_safe(document), arguments.json)
     return 0 if document["sound"] and document["within_noise"] else 1
 
 

@@ -175,6 +175,7 @@ def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
     ours = ekf(u_slow, x_slow, pz.HysteresisEKF(SAMPLE_RATE, initial_model=START, project=False))
     outcome["filterpy EKF"], outcome["padasip RLS"] = theirs.tolist(), padasip_rls(u_slow, x_slow).tolist()
     estimator = pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, memory=MEMORY)
+    estimator.step(0.0, 0.0)
     single = calls(estimator.step, u, x)
     ring_estimator, ring_inverse = estimator.copy(), pz.InverseCompensator(TRUE)
 
@@ -294,8 +295,11 @@ def draw(document: dict[str, Any], path: Path) -> None:
     for place, name, label in ((0, "samples", "samples of a run"), (1, "parameters", "parameters, update()")):
         axes[place].loglog(*np.array(document["scaling"][name]).T, "o-")
         axes[place].set(xlabel=label, ylabel="ns per sample")
+    axes[1].set_xscale("linear")  # too few to need decades
+    axes[1].set_yscale("linear")
+    axes[1].set_ylim(bottom=0.0)
     channels = [entry["channels"] for entry in document["bank"]]
-    for name, label in (("1", "one core"), ("2", "two cores"), ("C", "C, one core")):
+    for name, label in (("1", "one thread"), ("2", "two threads"), ("C", "C, one thread")):
         axes[2].loglog(channels, [entry[name] for entry in document["bank"]], "o-", label=label)
     axes[2].set(xlabel="channels of a bank", ylabel="ns per channel and sample")
     axes[2].legend()

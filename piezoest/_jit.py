@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 from llvmlite import ir
@@ -29,7 +32,7 @@ RUN_TYPES = (
     " f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])"
 )
 
-# As Numba knows it, not as its class looks to a type checker.
+# Untyped: it takes options that its class does not show to a type checker.
 _intrinsic: Any = intrinsic
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -59,6 +62,20 @@ def taking(functions: tuple[str, ...], types: str) -> Any:
     first = [FunctionType(result(*takes)) for takes, result in map(parse, functions)]
     takes, result = parse(types)
     return result(*first, *takes)
+
+
+@functools.cache
+def version() -> int:
+    """Number that changes with the source of what loops are compiled from.
+
+    Numba's cache on the disk goes by the file that a loop stands in, and by the constants it refers to:
+    a loop made elsewhere than its kernel refers to this one.
+    """
+    root = Path(__file__).parent
+    found = hashlib.sha256()
+    for path in (*sorted(root.glob("equations/*.py")), *sorted(root.glob("estimators/*.py")), Path(__file__)):
+        found.update(path.read_bytes())
+    return int.from_bytes(found.digest()[:7], "big") + 1
 
 
 class Family(dict[Any, Any]):
@@ -122,8 +139,8 @@ def local_rows(typingctx: Any, rows: Any, columns: Any) -> Any:
 def in_lanes(typingctx: Any, body: Any, count: Any, arguments: Any) -> Any:
     """Call ``body(lane, *arguments)`` for lanes 0 to `count` - 1, which know nothing of each other.
 
-    LLVM is told to make vector instructions of it, twice eight lanes at a time: its estimate of what
-    that saves takes every branch for one that is seldom gone.
+    LLVM is told to make vector instructions of it, two times eight lanes in a turn: its own estimate
+    takes every branch for one that is rarely gone, and would leave it.
     """
     takes = typingctx.resolve_function_type(body, (types.intp, *arguments), {})
 

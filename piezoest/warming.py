@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 
+from piezoest._checks import FloatArray
 from piezoest.compensators import InverseCompensator, LinearCompensator
 from piezoest.estimators.bank import EstimatorBank
 from piezoest.estimators.ekf import HysteresisEKF
@@ -16,11 +18,17 @@ from piezoest.models import ColemanHodgdon, LinearGain, PrandtlIshlinskii
 from piezoest.stage import PaperStage
 
 
-def warmup() -> float:
+def warmup(*used: Any) -> float:
     """Compile and load the kernels of estimators, compensators and stages.
 
-    The first process after an installation compiles, which takes a minute or two; every later one
+    The first process after an installation compiles, which takes about a minute; every later one
     loads from the disk in a second. Call it before a live loop starts.
+
+    Parameters
+    ----------
+    *used : estimator or EstimatorBank
+        Those that the loop will use: what is compiled goes by their settings. They are left as they
+        are. Estimators as they are by default are warmed up in any case.
 
     Returns
     -------
@@ -30,7 +38,7 @@ def warmup() -> float:
     Examples
     --------
     >>> import piezoest as pz
-    >>> seconds = pz.warmup()
+    >>> seconds = pz.warmup(pz.HysteresisRLS(50_000.0, delay=1.0))
     """
     began = time.perf_counter()
     sample_rate = 50_000.0
@@ -45,10 +53,9 @@ def warmup() -> float:
         HysteresisRLS(sample_rate),
         HysteresisEKF(sample_rate),
         PrandtlIshlinskiiRLS(sample_rate),
+        *used,
     ):
-        learner.step(0.0, 0.0)
-        learner.run(u, x)
-        _ = learner.model
+        _use(learner, u, x)
     RecursiveLeastSquares(2).update(1.0, np.ones(2))
     for compensator in (
         LinearCompensator(LinearGain(0.15)),
@@ -64,3 +71,16 @@ def warmup() -> float:
     for model in (loop, plays):
         model.simulate(u)
     return time.perf_counter() - began
+
+
+def _use(learner: Any, u: FloatArray, x: FloatArray) -> None:
+    """Do with a copy what a loop may do."""
+    if isinstance(learner, EstimatorBank):
+        bank = EstimatorBank(learner.channel(0), 2)
+        bank.step(u[:2], x[:2])
+        bank.run(np.column_stack([u, u]), np.column_stack([x, x]))
+        return
+    copy = learner.copy()
+    copy.step(0.0, 0.0)
+    copy.run(u, x)
+    _ = copy.model

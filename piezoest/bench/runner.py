@@ -311,15 +311,17 @@ class _Watched(_Stepped):
         self._clock.seconds += time.thread_time() - began
 
 
-_WARMED: set[str] = set()
+_WARMED: set[tuple[str, Any]] = set()
 
 
 def _warm(estimator: str, sample_rate: float) -> None:
     """Let an estimator load what it compiled before one of its kind is timed."""
-    kind = estimator.partition("(")[0]
-    if estimator == REFERENCE or kind in _WARMED:
+    if estimator == REFERENCE:
         return
     made = candidate(estimator)(sample_rate, RIGHT_MODEL)
+    kind = (estimator.partition("(")[0], getattr(made, "_kind", None))  # loops are compiled for settings, too
+    if kind in _WARMED:
+        return
     u = 30.0 * np.sin(np.linspace(0.0, 6.0, round(WARM_UP * sample_rate)))
     x = RIGHT_MODEL.simulate(u)
     for k in range(u.size):

@@ -12,7 +12,17 @@ from typing import Any
 from numba import njit
 from numba.extending import register_jitable
 
-from piezoest._jit import STEP_TYPES, UNCOUNTED, Family, in_lanes, local, local_rows, taking, unrolled
+from piezoest._jit import (
+    STEP_TYPES,
+    UNCOUNTED,
+    Family,
+    in_lanes,
+    local,
+    local_rows,
+    taking,
+    unrolled,
+    version,
+)
 from piezoest.estimators import ekf_kernel, rls_kernel, rls_loops
 
 # Channels side by side in vector instructions; channels that share cache lines; samples read ahead, or
@@ -24,12 +34,12 @@ _SIGNATURE = "void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8, i8, f8[:
 
 @Family
 def rls(n: int, duties: int, _: bool) -> Any:
-    """Of `HysteresisRLS`."""
+    """``rls[n, duties, False]``: the loop over records of many `HysteresisRLS`."""
     if duties == rls_loops.BARE:
         return _in_lanes(n)
     size = rls_loops.size(n)
 
-    @register_jitable
+    @unrolled
     def take(state: Any, config: Any, u: Any, x: Any) -> None:
         rls_loops._take(state, config, None, u, x, n, True)
 
@@ -38,9 +48,9 @@ def rls(n: int, duties: int, _: bool) -> Any:
 
 @Family
 def kalman(n: int, _: bool) -> Any:
-    """Of `HysteresisEKF`."""
+    """``kalman[n, False]``: the loop over records of many `HysteresisEKF`."""
 
-    @register_jitable
+    @unrolled
     def take(state: Any, config: Any, u: Any, x: Any) -> None:
         ekf_kernel._take(state, config, None, u, x, n)
 
@@ -58,23 +68,29 @@ def in_turn(
     step: Any, head: int, n: int, states: Any, config: Any, u: Any, x: Any,
     start: int, stop: int, every: int, rows: Any,
 ) -> None:  # fmt: skip
-    """All channels take a sample, by the function for a single one, before any takes the next."""
-    row, due = 0, every
-    for k in range(u.shape[0]):
-        due -= 1
-        for c in range(start, stop):
-            step(states[c], config, u[k, c], x[k, c])
+    """Channels take samples by the function for a single one, some channels at a time.
+
+    References to arrays are counted here: a function that is handed over is called with its own.
+    """
+    for first in range(start, stop, BLOCK):
+        row, due = 0, every
+        for k in range(u.shape[0]):
+            due -= 1
+            for c in range(first, min(first + BLOCK, stop)):
+                step(states[c], config, u[k, c], x[k, c])
+                if due == 0:
+                    _keep(states[c], head, n, rows[row, c])
             if due == 0:
-                _keep(states[c], head, n, rows[row, c])
-        if due == 0:
-            row, due = row + 1, every
+                row, due = row + 1, every
 
 
 def _channel_by_channel(take: Any, size: int, settings_size: int, head: int, n: int) -> Any:
     """A channel takes many samples with its state in registers before it is the next one's turn."""
+    source = version()
 
     @njit(_SIGNATURE, cache=True, nogil=True, **UNCOUNTED)
     def bank(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, rows: Any) -> None:
+        _ = source  # part of the cache's key
         now, settings = local(size), local(settings_size)
         for i in range(settings_size):
             settings[i] = config[i]
@@ -110,7 +126,7 @@ def _copy_row(source: Any, target: Any) -> None:
 
 def _in_lanes(n: int) -> Any:
     """The bare law for many channels in the same vector instructions; its branches become masks."""
-    size, settings_size, head = rls_loops.size(n), rls_loops.CONFIG, rls_loops.HEAD
+    size, settings_size, head, source = rls_loops.size(n), rls_loops.CONFIG, rls_loops.HEAD, version()
 
     @unrolled
     def take(lane: int, states: Any, config: Any, u: Any, x: Any) -> None:
@@ -118,6 +134,7 @@ def _in_lanes(n: int) -> Any:
 
     @njit(_SIGNATURE, cache=True, nogil=True, **UNCOUNTED)
     def bank(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, rows: Any) -> None:
+        _ = source  # part of the cache's key
         settings = local(settings_size)
         for i in range(settings_size):
             settings[i] = config[i]

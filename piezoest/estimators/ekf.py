@@ -115,7 +115,7 @@ class HysteresisEKF(EstimatorBase):
                 1e-3 * start[3],
             )
         self._config[kernel.CONFIG :] = walk**2 / sample_rate
-        self._kind = (n, delay > 0.0) if hysteretic else (0, True)
+        self._kind = (n, bool(delay > 0.0)) if hysteretic else (0, True)
         state = np.zeros(kernel.state_size(n))
         state[kernel.HEAD : kernel.HEAD + n] = start
         state[kernel.HEAD + n : kernel.HEAD + n + n * n] = np.diag(spread**2).ravel()

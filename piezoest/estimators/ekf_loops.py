@@ -6,9 +6,10 @@ from typing import Any
 
 from numba import njit
 
-from piezoest._jit import RUN_TYPES, STEP_TYPES, UNCOUNTED, Family, local, unrolled
+from piezoest._jit import STEP_TYPES, UNCOUNTED, Family, unrolled, version
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import ekf_kernel as kernel
+from piezoest.estimators.record_loops import in_place, in_registers
 
 
 @unrolled
@@ -43,9 +44,11 @@ def _keep(state: Any, hysteretic: Any, n: int, row: int, theta: Any, s: Any, y: 
 def step(n: int, delayed: bool) -> Any:
     """``step[n, delayed](state, config, u, x)`` takes a sample; n is 0 if only `config` knows it."""
     length = kernel.state_size(n)
+    source = version()
 
     @njit(STEP_TYPES, cache=True, nogil=True, **UNCOUNTED)
     def step(state: Any, config: Any, u: float, x: float) -> None:
+        _ = source  # part of the cache's key
         if n == 0:
             kernel._sample(state, config, u, x)
         elif delayed:
@@ -58,53 +61,21 @@ def step(n: int, delayed: bool) -> Any:
 
 @Family
 def run(n: int, delayed: bool) -> Any:
-    """``run[n, delayed]`` takes records, see `piezoest._jit.RUN_TYPES`; n as in `step`."""
-    return _run_any() if n == 0 else _run_of(n, delayed)
+    """``run[n, delayed]`` takes records, see `piezoest.estimators.record_loops`; n as in `step`."""
 
+    @unrolled
+    def take(state: Any, config: Any, line: Any, u: Any, x: Any) -> None:
+        kernel._take(state, config, line, u, x, n)
 
-def _run_any() -> Any:
-    @njit(RUN_TYPES, cache=True, nogil=True, **UNCOUNTED)
-    def run(
-        state: Any, config: Any, u: Any, x: Any, every: int, scale: Any,
-        theta: Any, s: Any, y: Any, S: Any, P: Any,
-    ) -> None:  # fmt: skip
-        n, hysteretic = int(config[kernel.N]), config[kernel.HYSTERETIC]
-        row, due = 0, every
-        for k in range(u.size):
-            kernel._sample(state, config, u[k], x[k])
-            due -= 1
-            if due == 0:
-                _keep(state, hysteretic, n, row, theta, s, y, S, P)
-                row, due = row + 1, every
+    @unrolled
+    def keep(
+        state: Any, config: Any, row: int, scale: Any, theta: Any, s: Any, y: Any, S: Any, P: Any
+    ) -> None:
+        if n == 0:
+            _keep(state, config[kernel.HYSTERETIC], int(config[kernel.N]), row, theta, s, y, S, P)
+        else:
+            _keep(state, config[kernel.HYSTERETIC], n, row, theta, s, y, S, P)
 
-    return run
-
-
-def _run_of(n: int, delayed: bool) -> Any:
-    size, settings_size = kernel.state_size(n), kernel.CONFIG + n
-
-    @njit(RUN_TYPES, cache=True, nogil=True, **UNCOUNTED)
-    def run(
-        state: Any, config: Any, u: Any, x: Any, every: int, scale: Any,
-        theta: Any, s: Any, y: Any, S: Any, P: Any,
-    ) -> None:  # fmt: skip
-        # In arrays of the loop's own, its state stays in registers.
-        now, settings = local(size), local(settings_size)
-        for i in range(size):
-            now[i] = state[i]
-        for i in range(settings_size):
-            settings[i] = config[i]
-        row, due = 0, every
-        for k in range(u.size):
-            if delayed:
-                kernel._take(now, settings, state[size:], u[k], x[k], n)
-            else:
-                kernel._take(now, settings, None, u[k], x[k], n)
-            due -= 1
-            if due == 0:
-                _keep(now, settings[kernel.HYSTERETIC], n, row, theta, s, y, S, P)
-                row, due = row + 1, every
-        for i in range(size):
-            state[i] = now[i]
-
-    return run
+    if n == 0:
+        return in_place(kernel._sample, keep)
+    return in_registers(take, keep, kernel.state_size(n), kernel.CONFIG + n, delayed)

@@ -13,13 +13,14 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import PROPOSE_TYPES, RUN_TYPES, STEP_TYPES, UNCOUNTED
+from piezoest._jit import PROPOSE_TYPES, STEP_TYPES, UNCOUNTED
 from piezoest.equations import kalman, least_squares
 from piezoest.equations import output_error as equations
 from piezoest.estimators import believing, swing
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as front
 from piezoest.estimators.delay_line import delayed
+from piezoest.estimators.record_loops import in_place
 
 # The filter's state: b, c and d in parts of the initial c, the loop's centre and the disturbance in
 # that times a volt.
@@ -271,29 +272,22 @@ def step(state: Any, config: Any, u: float, x: float) -> None:
     _sample(state, config, u, x)
 
 
-@njit(RUN_TYPES, cache=True, **UNCOUNTED)
-def run(
-    state: Any, config: Any, u: Any, x: Any, every: int, scale: Any,
-    theta: Any, s: Any, y: Any, S_: Any, P_: Any,
-) -> None:  # fmt: skip
-    """Take whole records, see `piezoest._jit.RUN_TYPES`.
+@register_jitable
+def _keep(
+    state: Any, config: Any, row: int, scale: Any, theta: Any, s: Any, y: Any, variance: Any, covariance: Any
+) -> None:
+    """Write a sample's outcome into the histories that have room; `s`: the filter's state, the member."""
+    if s.size > 0:
+        for i in range(SIZE):
+            s[row, i] = state[S + i]
+        s[row, SIZE] = state[MEMBER]
+    if y.size > 0:
+        y[row] = state[front.FRONT + law.INNOVATION]
+    if variance.size > 0:
+        variance[row] = state[front.FRONT + law.INNOVATION_VARIANCE]
+    if covariance.size > 0:
+        for i in range(SIZE * SIZE):
+            covariance[row, i] = state[P + i]
 
-    A row of `s` is the state of the filter and the member in use.
-    """
-    row, due = 0, every
-    for k in range(u.size):
-        _sample(state, config, u[k], x[k])
-        due -= 1
-        if due == 0:
-            if s.size > 0:
-                for i in range(SIZE):
-                    s[row, i] = state[S + i]
-                s[row, SIZE] = state[MEMBER]
-            if y.size > 0:
-                y[row] = state[front.FRONT + law.INNOVATION]
-            if S_.size > 0:
-                S_[row] = state[front.FRONT + law.INNOVATION_VARIANCE]
-            if P_.size > 0:
-                for i in range(SIZE * SIZE):
-                    P_[row, i] = state[P + i]
-            row, due = row + 1, every
+
+run = in_place(_sample, _keep)

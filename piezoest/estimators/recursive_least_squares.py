@@ -164,6 +164,12 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting:
 # Compiled when it is first called: few need it by itself.
 @njit(cache=True, **UNCOUNTED)
 def _update(state: Any, config: Any, phi: Any, z: float, n: int) -> None:
+    within = np.abs(z) < LARGEST
+    for i in range(n):
+        within = within and np.abs(phi[i]) < LARGEST
+    if not within:
+        state[LAST] = MISSING
+        return
     forgetting = config[FORGETTING]
     if config[LEAST_FACTOR] > 0.0:
         forgetting = varied(state, phi, z, n, config[NOISE], forgetting, config[LEAST_FACTOR])
@@ -265,9 +271,6 @@ class RecursiveLeastSquares:
         phi = array_1d("phi", phi, allow_nan=True)
         if phi.size != self._n:
             raise ValueError(f"phi must have shape ({self._n},), got {phi.shape}")
-        if not (abs(z) < LARGEST and np.all(np.abs(phi) < LARGEST)):
-            self._state[LAST] = MISSING
-            return
         _update(self._state, self._config, phi, float(z), self._n)
 
     def reset_covariance(self) -> None:

@@ -256,8 +256,8 @@ class HysteresisRLS(Freezable):
         """Least eigenvalue of the regressor's mean square over a swing, in parts of the mean one.
 
         The alpha_0 of (A8) for the scaled regressor, normalised: 1 if every direction is
-        excited alike, 0 if one is not excited at all. NaN with ``errors=False``, where nobody follows it (but
-        `policies.ExcitationGate` does).
+        excited alike, 0 if one is not excited at all. NaN with ``errors=False``, unless
+        `policies.ExcitationGate` is on: nobody follows it then.
         """
         if self._config[kernel.WHOLE] == 0.0:
             return np.nan

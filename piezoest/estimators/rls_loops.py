@@ -6,9 +6,10 @@ from typing import Any
 
 from numba import njit
 
-from piezoest._jit import RUN_TYPES, STEP_TYPES, UNCOUNTED, Family, local, unrolled
+from piezoest._jit import STEP_TYPES, UNCOUNTED, Family, unrolled, version
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
+from piezoest.estimators.record_loops import in_place, in_registers
 
 CONFIG = kernel.CONFIG + law.CONFIG_SIZE
 HEAD = kernel.FRONT + law.HEAD
@@ -51,9 +52,11 @@ def step(n: int, duties: int, delayed: bool) -> Any:
     """``step[n, duties, delayed](state, config, u, x)`` takes one sample."""
     paced = None if duties == BARE else True
     length = size(n)
+    source = version()
 
     @njit(STEP_TYPES, cache=True, nogil=True, **UNCOUNTED)
     def step(state: Any, config: Any, u: float, x: float) -> None:
+        _ = source  # part of the cache's key
         if n == 0:
             kernel._sample(state, config, u, x)
         elif delayed:
@@ -66,53 +69,22 @@ def step(n: int, duties: int, delayed: bool) -> Any:
 
 @Family
 def run(n: int, duties: int, delayed: bool) -> Any:
-    """``run[n, duties, delayed]`` takes records, see `piezoest._jit.RUN_TYPES`."""
-    return _run_any() if n == 0 else _run_of(n, None if duties == BARE else True, delayed)
+    """``run[n, duties, delayed]`` takes records, see `piezoest.estimators.record_loops`."""
+    paced = None if duties == BARE else True
 
+    @unrolled
+    def take(state: Any, config: Any, line: Any, u: Any, x: Any) -> None:
+        _take(state, config, line, u, x, n, paced)
 
-def _run_any() -> Any:
-    @njit(RUN_TYPES, cache=True, nogil=True, **UNCOUNTED)
-    def run(
-        state: Any, config: Any, u: Any, x: Any, every: int, scale: Any,
-        theta: Any, s: Any, y: Any, S: Any, P: Any,
-    ) -> None:  # fmt: skip
-        n = int(config[kernel.N])
-        row, due = 0, every
-        for k in range(u.size):
-            kernel._sample(state, config, u[k], x[k])
-            due -= 1
-            if due == 0:
-                _keep(state, n, row, scale, theta, y, S, P)
-                row, due = row + 1, every
+    @unrolled
+    def keep(
+        state: Any, config: Any, row: int, scale: Any, theta: Any, s: Any, y: Any, S: Any, P: Any
+    ) -> None:
+        if n == 0:
+            _keep(state, int(config[kernel.N]), row, scale, theta, y, S, P)
+        else:
+            _keep(state, n, row, scale, theta, y, S, P)
 
-    return run
-
-
-def _run_of(n: int, paced: bool | None, delayed: bool) -> Any:
-    length = size(n)
-
-    @njit(RUN_TYPES, cache=True, nogil=True, **UNCOUNTED)
-    def run(
-        state: Any, config: Any, u: Any, x: Any, every: int, scale: Any,
-        theta: Any, s: Any, y: Any, S: Any, P: Any,
-    ) -> None:  # fmt: skip
-        # In arrays of the loop's own, its state stays in registers.
-        now, settings = local(length), local(CONFIG)
-        for i in range(length):
-            now[i] = state[i]
-        for i in range(CONFIG):
-            settings[i] = config[i]
-        row, due = 0, every
-        for k in range(u.size):
-            if delayed:
-                _take(now, settings, state[length:], u[k], x[k], n, paced)
-            else:
-                _take(now, settings, None, u[k], x[k], n, paced)
-            due -= 1
-            if due == 0:
-                _keep(now, n, row, scale, theta, y, S, P)
-                row, due = row + 1, every
-        for i in range(length):
-            state[i] = now[i]
-
-    return run
+    if n == 0:
+        return in_place(kernel._sample, keep)
+    return in_registers(take, keep, size(n), CONFIG, delayed)

@@ -136,7 +136,7 @@ def kind(config: FloatArray, delay: float) -> tuple[int, int, bool]:
     if np.any(config[rare]):
         return 0, loops.ALL, True
     bare = config[kernel.HYSTERETIC] and not config[kernel.PACED]
-    return int(config[kernel.N]), loops.BARE if bare else loops.USUAL, delay > 0.0
+    return int(config[kernel.N]), loops.BARE if bare else loops.USUAL, bool(delay > 0.0)
 
 
 def front_end(

@@ -308,20 +308,18 @@ class Expressions:
             return joined(f"-{wrap(value, UNARY + 1)}", value.kind, UNARY, value)
         raise self.source.error(node, f"{type(node.op).__name__} cannot be translated to C")
 
-    @staticmethod
-    def asks_for_none(node: ast.Compare) -> bool:
-        """Whether it asks if something was handed over at all."""
+    def is_none(self, node: ast.Compare) -> bool:
+        """Whether what is compared with None is None: known when the code is generated."""
         other = node.comparators[0]
-        return (
-            isinstance(node.ops[0], ast.Is | ast.IsNot)
-            and isinstance(other, ast.Constant)
-            and other.value is None
-        )
+        if not (isinstance(other, ast.Constant) and other.value is None and isinstance(node.left, ast.Name)):
+            raise self.source.error(node, "`is` asks for None, of a name")
+        value = self.name(node.left)
+        return isinstance(value, Known) and value.value is None
 
     def compare(self, node: ast.Compare) -> Known | Expr:
         """One comparison."""
-        if self.asks_for_none(node):
-            return Known(isinstance(node.ops[0], ast.IsNot))  # the code hands everything on
+        if len(node.ops) == 1 and isinstance(node.ops[0], ast.Is | ast.IsNot):
+            return Known(self.is_none(node) == isinstance(node.ops[0], ast.Is))
         if len(node.ops) != 1 or type(node.ops[0]) not in _COMPARE:
             raise self.source.error(node, "write one comparison at a time")
         sign, strength, compute = _COMPARE[type(node.ops[0])]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import piezoest as pz
+from piezoest.estimators import bank_kernel, rls_loops
 
 SAMPLE_RATE = 50_000.0
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
@@ -96,5 +97,11 @@ def test_streaming_keeps_nothing_and_needs_no_collector(make: Any) -> None:
 
 
 def test_warmup_says_how_long_it_took() -> None:
-    pz.warmup()
-    assert 0.0 < pz.warmup() < 10.0
+    estimator = pz.HysteresisRLS(SAMPLE_RATE, memory=0.4, errors=False)
+    bank = pz.EstimatorBank(pz.HysteresisEKF(SAMPLE_RATE), 3)
+    pz.warmup(estimator, bank)
+    assert 0.0 < pz.warmup(estimator, bank) < 10.0
+    assert estimator.status.samples == bank.status[0].samples == 0
+    assert estimator._kind in rls_loops.step
+    assert estimator._kind in rls_loops.run
+    assert bank._kind in bank_kernel.kalman

@@ -160,6 +160,21 @@ def test_functions_and_tuples_are_passed_through() -> None:
     assert text.count("coleman_hodgdon_inverse_rate(") == 4
 
 
+def where_there_is_one(x: Any, line: Any) -> Any:
+    if line is not None and x > 0.0:
+        x += line[0]
+    return x if line is None else 2.0 * x
+
+
+def test_what_is_not_handed_over_is_left_out() -> None:
+    without, _, _ = translate(where_there_is_one, Expr("x", "real"), Known(None))
+    assert "return x;" in without
+    assert "line" not in without
+    with_one, _, _ = translate(where_there_is_one, Expr("x", "real"), array("line"))
+    assert "line[0]" in with_one
+    assert "2.0 * x" in with_one
+
+
 def test_same_function_is_translated_once_for_each_size() -> None:
     translator = Translator(real="double", single=False)
     for n in (3, 4, 3):
