@@ -73,8 +73,9 @@ def version() -> int:
     """
     root = Path(__file__).parent
     found = hashlib.sha256()
-    for path in (*sorted(root.glob("equations/*.py")), *sorted(root.glob("estimators/*.py")), Path(__file__)):
-        found.update(path.read_bytes())
+    for pattern in ("_*.py", "equations/*.py", "estimators/*.py"):
+        for path in sorted(root.glob(pattern)):
+            found.update(path.read_bytes())
     return int.from_bytes(found.digest()[:7], "big") + 1
 
 

@@ -43,7 +43,7 @@ def records(K: int, N: int) -> tuple[Any, Any]:
 )
 @pytest.mark.parametrize("threads", [1, 3])
 def test_each_channel_is_a_single_estimator(estimator: Any, threads: int) -> None:
-    N = 21  # more than go side by side through vector instructions, and not a multiple of them
+    N = bank_kernel.LANES + 5  # a block that is full, and one that is not
     u, x = records(1500, N)
     bank = pz.EstimatorBank(estimator, N, threads=threads)
     theta = bank.run(u[:-3], x[:-3], every=7)
