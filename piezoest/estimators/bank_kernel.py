@@ -23,7 +23,7 @@ from piezoest._jit import (
     unrolled,
     version,
 )
-from piezoest.estimators import ekf_kernel, rls_kernel, rls_loops
+from piezoest.estimators import ekf_kernel, ekf_loops, rls_kernel, rls_loops
 
 # Channels side by side in vector instructions; channels that share cache lines; samples read ahead, or
 # taken by a channel before it is the next one's turn.
@@ -37,24 +37,15 @@ def rls(n: int, duties: int, _: bool) -> Any:
     """``rls[n, duties, False]``: the loop over records of many `HysteresisRLS`."""
     if duties == rls_loops.BARE:
         return _in_lanes(n)
-    size = rls_loops.size(n)
-
-    @unrolled
-    def take(state: Any, config: Any, u: Any, x: Any) -> None:
-        rls_loops._take(state, config, None, u, x, n, True)
-
+    take, size = rls_loops.taken(n, duties), rls_loops.size(n)
     return _channel_by_channel(take, size, rls_loops.CONFIG, rls_loops.HEAD, n)
 
 
 @Family
 def kalman(n: int, _: bool) -> Any:
     """``kalman[n, False]``: the loop over records of many `HysteresisEKF`."""
-
-    @unrolled
-    def take(state: Any, config: Any, u: Any, x: Any) -> None:
-        ekf_kernel._take(state, config, None, u, x, n)
-
-    return _channel_by_channel(take, ekf_kernel.state_size(n), ekf_kernel.CONFIG + n, ekf_kernel.HEAD, n)
+    take, size = ekf_loops.taken(n), ekf_kernel.state_size(n)
+    return _channel_by_channel(take, size, ekf_kernel.CONFIG + n, ekf_kernel.HEAD, n)
 
 
 @register_jitable
@@ -102,7 +93,7 @@ def _channel_by_channel(take: Any, size: int, settings_size: int, head: int, n: 
                         now[i] = states[c, i]
                     row, due = first // every, every - first % every
                     for k in range(first, last):
-                        take(now, settings, u[k, c], x[k, c])
+                        take(now, settings, None, u[k, c], x[k, c])
                         due -= 1
                         if due == 0:
                             _keep(now, head, n, rows[row, c])
@@ -128,9 +119,11 @@ def _in_lanes(n: int) -> Any:
     """The bare law for many channels in the same vector instructions; its branches become masks."""
     size, settings_size, head, source = rls_loops.size(n), rls_loops.CONFIG, rls_loops.HEAD, version()
 
+    single = rls_loops.taken(n, rls_loops.BARE)
+
     @unrolled
     def take(lane: int, states: Any, config: Any, u: Any, x: Any) -> None:
-        rls_loops._take(states[:, lane], config, None, u[lane], x[lane], n, None)
+        single(states[:, lane], config, None, u[lane], x[lane])
 
     @njit(_SIGNATURE, cache=True, nogil=True, **UNCOUNTED)
     def bank(states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, rows: Any) -> None:

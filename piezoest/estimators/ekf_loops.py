@@ -9,7 +9,7 @@ from numba import njit
 from piezoest._jit import STEP_TYPES, UNCOUNTED, Family, unrolled, version
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import ekf_kernel as kernel
-from piezoest.estimators.record_loops import in_place, in_registers
+from piezoest.estimators.record_loops import in_place, in_registers, keep_outcome
 
 
 @unrolled
@@ -31,13 +31,18 @@ def _keep(state: Any, hysteretic: Any, n: int, row: int, theta: Any, s: Any, y: 
     if s.size > 0:
         for i in range(n):
             s[row, i] = state[kernel.HEAD + i]
-    if y.size > 0:
-        y[row] = state[kernel.INNOVATION]
-    if S.size > 0:
-        S[row] = state[kernel.INNOVATION_VARIANCE]
-    if P.size > 0:
-        for i in range(n * n):
-            P[row, i] = state[kernel.HEAD + n + i]
+    covariance = state[kernel.HEAD + n : kernel.HEAD + n + n * n]
+    keep_outcome(row, state[kernel.INNOVATION], state[kernel.INNOVATION_VARIANCE], covariance, n, y, S, P)
+
+
+def taken(n: int) -> Any:
+    """``take(state, config, line, u, x)``: one sample; `line` is None where nothing is delayed."""
+
+    @unrolled
+    def take(state: Any, config: Any, line: Any, u: Any, x: Any) -> None:
+        kernel._take(state, config, line, u, x, n)
+
+    return take
 
 
 @Family
@@ -64,10 +69,6 @@ def run(n: int, delayed: bool) -> Any:
     """``run[n, delayed]`` takes records, see `piezoest.estimators.record_loops`; n as in `step`."""
 
     @unrolled
-    def take(state: Any, config: Any, line: Any, u: Any, x: Any) -> None:
-        kernel._take(state, config, line, u, x, n)
-
-    @unrolled
     def keep(
         state: Any, config: Any, row: int, scale: Any, theta: Any, s: Any, y: Any, S: Any, P: Any
     ) -> None:
@@ -78,4 +79,4 @@ def run(n: int, delayed: bool) -> Any:
 
     if n == 0:
         return in_place(kernel._sample, keep)
-    return in_registers(take, keep, kernel.state_size(n), kernel.CONFIG + n, delayed)
+    return in_registers(taken(n), keep, kernel.state_size(n), kernel.CONFIG + n, delayed)

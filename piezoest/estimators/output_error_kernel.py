@@ -20,7 +20,7 @@ from piezoest.estimators import believing, swing
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as front
 from piezoest.estimators.delay_line import delayed
-from piezoest.estimators.record_loops import in_place
+from piezoest.estimators.record_loops import in_place, keep_outcome
 
 # The filter's state: b, c and d in parts of the initial c, the loop's centre and the disturbance in
 # that times a volt.
@@ -281,13 +281,9 @@ def _keep(
         for i in range(SIZE):
             s[row, i] = state[S + i]
         s[row, SIZE] = state[MEMBER]
-    if y.size > 0:
-        y[row] = state[front.FRONT + law.INNOVATION]
-    if variance.size > 0:
-        variance[row] = state[front.FRONT + law.INNOVATION_VARIANCE]
-    if covariance.size > 0:
-        for i in range(SIZE * SIZE):
-            covariance[row, i] = state[P + i]
+    now = state[front.FRONT :]
+    innovation, S_now = now[law.INNOVATION], now[law.INNOVATION_VARIANCE]
+    keep_outcome(row, innovation, S_now, state[P : P + SIZE * SIZE], SIZE, y, variance, covariance)
 
 
 run = in_place(_sample, _keep)

@@ -9,7 +9,21 @@ from typing import Any
 
 from numba import njit
 
-from piezoest._jit import RUN_TYPES, UNCOUNTED, local, version
+from piezoest._jit import RUN_TYPES, UNCOUNTED, local, unrolled, version
+
+
+@unrolled
+def keep_outcome(
+    row: int, innovation: Any, variance: Any, covariance: Any, n: int, y: Any, S: Any, P: Any
+) -> None:
+    """Write what an update says into the histories that have room; `covariance` is flat, of n by n."""
+    if y.size > 0:
+        y[row] = innovation
+    if S.size > 0:
+        S[row] = variance
+    if P.size > 0:
+        for i in range(n * n):
+            P[row, i] = covariance[i]
 
 
 def in_place(sample: Any, keep: Any) -> Any:

@@ -9,7 +9,7 @@ from numba import njit
 from piezoest._jit import STEP_TYPES, UNCOUNTED, Family, unrolled, version
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
-from piezoest.estimators.record_loops import in_place, in_registers
+from piezoest.estimators.record_loops import in_place, in_registers, keep_outcome
 
 CONFIG = kernel.CONFIG + law.CONFIG_SIZE
 HEAD = kernel.FRONT + law.HEAD
@@ -24,35 +24,34 @@ def size(n: int) -> int:
     return kernel.FRONT + law.state_size(n)
 
 
-@unrolled
-def _take(state: Any, config: Any, line: Any, u: Any, x: Any, n: int, paced: Any) -> None:
-    """One sample with none of the policies that are off by default; `paced` is None for the bare law."""
-    if paced is None:
-        kernel._take(state, config, None, line, None, u, x, n)
-    else:
-        kernel._take(state, config, state[kernel.SWING : kernel.EXCITATION], line, None, u, x, n)
+def taken(n: int, duties: int) -> Any:
+    """``take(state, config, line, u, x)``: one sample; `line` is None where nothing is delayed."""
+
+    @unrolled
+    def take(state: Any, config: Any, line: Any, u: Any, x: Any) -> None:
+        if duties == BARE:
+            kernel._take(state, config, None, line, None, u, x, n)
+        else:
+            kernel._take(state, config, state[kernel.SWING : kernel.EXCITATION], line, None, u, x, n)
+
+    return take
 
 
 @unrolled
 def _keep(state: Any, n: int, row: int, scale: Any, theta: Any, y: Any, S: Any, P: Any) -> None:
-    """Write a sample's outcome into the histories that have room."""
     for i in range(n):
         theta[row, i] = state[HEAD + i] * scale[i]
-    if y.size > 0:
-        y[row] = state[kernel.FRONT + law.INNOVATION]
-    if S.size > 0:
-        S[row] = state[kernel.FRONT + law.INNOVATION_VARIANCE]
-    if P.size > 0:
-        for i in range(n * n):
-            P[row, i] = state[HEAD + n + i]
+    head = kernel.FRONT
+    covariance = state[HEAD + n : HEAD + n + n * n]
+    keep_outcome(
+        row, state[head + law.INNOVATION], state[head + law.INNOVATION_VARIANCE], covariance, n, y, S, P
+    )
 
 
 @Family
 def step(n: int, duties: int, delayed: bool) -> Any:
     """``step[n, duties, delayed](state, config, u, x)`` takes one sample."""
-    paced = None if duties == BARE else True
-    length = size(n)
-    source = version()
+    take, length, source = taken(n, duties), size(n), version()
 
     @njit(STEP_TYPES, cache=True, nogil=True, **UNCOUNTED)
     def step(state: Any, config: Any, u: float, x: float) -> None:
@@ -60,9 +59,9 @@ def step(n: int, duties: int, delayed: bool) -> Any:
         if n == 0:
             kernel._sample(state, config, u, x)
         elif delayed:
-            _take(state, config, state[length:], u, x, n, paced)
+            take(state, config, state[length:], u, x)
         else:
-            _take(state, config, None, u, x, n, paced)
+            take(state, config, None, u, x)
 
     return step
 
@@ -70,11 +69,6 @@ def step(n: int, duties: int, delayed: bool) -> Any:
 @Family
 def run(n: int, duties: int, delayed: bool) -> Any:
     """``run[n, duties, delayed]`` takes records, see `piezoest.estimators.record_loops`."""
-    paced = None if duties == BARE else True
-
-    @unrolled
-    def take(state: Any, config: Any, line: Any, u: Any, x: Any) -> None:
-        _take(state, config, line, u, x, n, paced)
 
     @unrolled
     def keep(
@@ -87,4 +81,4 @@ def run(n: int, duties: int, delayed: bool) -> Any:
 
     if n == 0:
         return in_place(kernel._sample, keep)
-    return in_registers(take, keep, size(n), CONFIG, delayed)
+    return in_registers(taken(n, duties), keep, size(n), CONFIG, delayed)
