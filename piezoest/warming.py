@@ -10,6 +10,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.compensators import InverseCompensator, LinearCompensator
 from piezoest.estimators.bank import EstimatorBank
+from piezoest.estimators.base import EstimatorBase
 from piezoest.estimators.ekf import HysteresisEKF
 from piezoest.estimators.play_rls import PrandtlIshlinskiiRLS
 from piezoest.estimators.recursive_least_squares import RecursiveLeastSquares
@@ -35,11 +36,22 @@ def warmup(*used: Any) -> float:
     float
         Seconds it took.
 
+    Raises
+    ------
+    ValueError
+        If one of them is neither.
+
     Examples
     --------
     >>> import piezoest as pz
     >>> seconds = pz.warmup(pz.HysteresisRLS(50_000.0, delay=1.0))
     """
+    for learner in used:
+        if not isinstance(learner, EstimatorBase | EstimatorBank):
+            raise ValueError(
+                f"used must be estimators of piezoest or an EstimatorBank, got {type(learner).__name__}: "
+                "warm up one of your own by a step of it"
+            )
     began = time.perf_counter()
     sample_rate = 50_000.0
     u = np.linspace(0.0, 1.0, 8)

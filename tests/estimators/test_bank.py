@@ -105,3 +105,5 @@ def test_warmup_says_how_long_it_took() -> None:
     assert estimator._kind in rls_loops.step
     assert estimator._kind in rls_loops.run
     assert bank._kind in bank_kernel.kalman
+    with pytest.raises(ValueError, match="used must be estimators of piezoest or an EstimatorBank, got int"):
+        pz.warmup(3)
