@@ -39,8 +39,8 @@ def covariance_times(P, phi, n, out):
 @unrolled
 def trace(P, n):
     """Trace of P: the norm ||P|| of (A6) here (for P > 0 at least the spectral norm)."""
-    total = 0.0
-    for i in range(n):
+    total = P[0]
+    for i in range(1, n):
         total = total + P[i * n + i]
     return total
 
@@ -57,18 +57,16 @@ def discrete_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
     """
     y = z - predicted_output(theta, phi, n)
     quadratic = covariance_times(P, phi, n, work)
-    gain = enable / (quadratic + forgetting * R)
-    size = 0.0
-    removed = 0.0
-    for i in range(n):
-        theta[i] = theta[i] + work[i] * gain * y
-        size = size + P[i * n + i]
-        removed = removed + work[i] * work[i]
-    within = (size - removed * gain <= bound * forgetting) * enable
+    spread = quadratic + forgetting * R
+    gain = enable / spread
+    # trace(P) - |P phi|^2 / spread <= bound mu, without waiting for the division
+    within = ((trace(P, n) - bound * forgetting) * spread <= predicted_output(work, work, n)) * enable
     grow = 1.0 + within * (1.0 / forgetting - 1.0)
     for i in range(n):
+        share = gain * work[i]
+        theta[i] = theta[i] + share * y
         for j in range(i, n):
-            entry = (P[i * n + j] - within * (gain * (work[i] * work[j]))) * grow
+            entry = (P[i * n + j] - share * (within * work[j])) * grow
             P[i * n + j] = entry
             P[j * n + i] = entry
     return y, quadratic / forgetting + R
