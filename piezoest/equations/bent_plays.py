@@ -26,9 +26,15 @@ def dead_zone(p, d):
 
 
 @register_jitable
+def between(p, low, high):
+    """p, or the nearer of two bends where it is outside."""
+    return np.fmin(np.fmax(p, low), high)
+
+
+@register_jitable
 def segment(p, low, high):
     """What p has between two bends, counted from zero: segments add up to p."""
-    return np.fmin(np.fmax(p, low), high) - np.fmin(np.fmax(0.0, low), high)
+    return between(p, low, high) - between(0.0, low, high)
 
 
 @register_jitable

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
-from piezoest._jit import STEP_TYPES, UNCOUNTED, Family, unrolled, version
+from piezoest._jit import Family, unrolled
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import ekf_kernel as kernel
-from piezoest.estimators.record_loops import in_place, in_registers, keep_outcome
+from piezoest.estimators.record_loops import by_itself, in_place, in_registers, keep_outcome, one_by_one
 
 
 @unrolled
@@ -48,20 +46,7 @@ def taken(n: int) -> Any:
 @Family
 def step(n: int, delayed: bool) -> Any:
     """``step[n, delayed](state, config, u, x)`` takes a sample; n is 0 if only `config` knows it."""
-    length = kernel.state_size(n)
-    source = version()
-
-    @njit(STEP_TYPES, cache=True, nogil=True, **UNCOUNTED)
-    def step(state: Any, config: Any, u: float, x: float) -> None:
-        _ = source  # part of the cache's key
-        if n == 0:
-            kernel._sample(state, config, u, x)
-        elif delayed:
-            kernel._take(state, config, state[length:], u, x, n)
-        else:
-            kernel._take(state, config, None, u, x, n)
-
-    return step
+    return one_by_one(kernel._sample if n == 0 else by_itself(taken(n), kernel.state_size(n), delayed))
 
 
 @Family

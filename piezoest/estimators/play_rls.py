@@ -12,7 +12,7 @@ from piezoest._checks import FloatArray, array_1d, integer, non_negative, positi
 from piezoest.estimators import play_rls_kernel as kernel
 from piezoest.estimators import play_rls_layout as layout
 from piezoest.estimators import play_rls_settings as settings
-from piezoest.estimators.base import Freezable, Status, Trace
+from piezoest.estimators.base import NO_ROWS, Freezable, Status, Trace
 from piezoest.estimators.delay_line import delay_line
 from piezoest.models import (
     ColemanHodgdon,
@@ -180,7 +180,7 @@ class PrandtlIshlinskiiRLS(Freezable):
         y = np.empty(rows if "y" in want else 0)
         S = np.empty(rows if "S" in want else 0)
         P = np.empty((rows if "P" in want else 0, size * size))
-        kernel.run(self._state, self._config, u, x, every, self._scale, theta, y, S, P)
+        kernel.run(self._state, self._config, u, x, every, self._scale, theta, NO_ROWS, y, S, P)
         return Trace(
             index=np.arange(every - 1, rows * every, every),
             theta=theta,

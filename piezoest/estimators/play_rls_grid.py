@@ -6,6 +6,7 @@ from typing import Any
 
 from numba.extending import register_jitable
 
+from piezoest.equations.bent_plays import between
 from piezoest.equations.turning_points import recall
 from piezoest.estimators.play_rls_law import constrain
 from piezoest.estimators.play_rls_layout import (
@@ -17,17 +18,22 @@ from piezoest.estimators.play_rls_layout import (
     GAIN,
     HIGH,
     LOW,
+    LOWER,
     MEMORY,
     OLD,
     PLAYS,
     PRIOR,
     RANGE,
+    REACH,
     RELATIVE,
     RELATIVE_BENDS,
     RESETS,
     THETA,
     THRESHOLDS,
     TURNS,
+    U_LAST,
+    UPPER,
+    ZERO,
     N,
     P,
     Y,
@@ -40,7 +46,7 @@ FAR = 1e30
 
 @register_jitable
 def lay_grid(state: Any, config: Any) -> None:
-    """Thresholds and edges of the segments for the grid's middle and half-width."""
+    """Thresholds and edges of the segments for the grid's middle and half-width, for each slope too."""
     n, k = int(config[PLAYS]), int(config[BENDS])
     thresholds, edges = int(config[THRESHOLDS]), int(config[EDGES])
     for i in range(n):
@@ -49,6 +55,13 @@ def lay_grid(state: Any, config: Any) -> None:
     for j in range(k):
         state[edges + 1 + j] = state[CENTRE] + state[RANGE] * config[int(config[RELATIVE_BENDS]) + j]
     state[edges + 1 + k] = FAR
+    reach, lower = int(config[REACH]), int(config[LOWER])
+    upper, zero = int(config[UPPER]), int(config[ZERO])
+    for place in range((n + 1) * (k + 1)):
+        i, s = place // (k + 1), place % (k + 1)
+        low, high = state[edges + s], state[edges + s + 1]
+        state[reach + place] = state[thresholds + i - 1] if i > 0 else 0.0
+        state[lower + place], state[upper + place], state[zero + place] = low, high, between(0.0, low, high)
 
 
 @register_jitable
@@ -108,8 +121,10 @@ def regrid(state: Any, config: Any, centre: Any, half: Any) -> None:
                 total += state[old + c * columns + o] * max(0.0, min(high, b) - max(low, a))
             state[theta + c * columns + s] = total / (high - low)
     lay_grid(state, config)
-    for i in range(n):
-        state[int(config[Y]) + i] = recall(state, MEMORY, state[thresholds + i])
+    for i in range(n + 1):
+        play = recall(state, MEMORY, state[thresholds + i - 1]) if i > 0 else state[U_LAST]
+        for s in range(columns):
+            state[int(config[Y]) + i * columns + s] = play
     size = int(config[N])
     for i in range(size * size):
         state[int(config[P]) + i] = config[int(config[PRIOR]) + i]

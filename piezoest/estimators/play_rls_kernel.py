@@ -9,7 +9,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import STEP_TYPES, UNCOUNTED
+from piezoest._jit import unrolled
 from piezoest.equations.mechanics import mechanics_step
 from piezoest.equations.turning_points import remember
 from piezoest.estimators import believing, swing
@@ -56,9 +56,10 @@ from piezoest.estimators.play_rls_layout import (
     X_LAST,
     X_SUM,
     N,
-    P,
 )
+from piezoest.estimators.play_rls_layout import P as COVARIANCE
 from piezoest.estimators.play_rls_regressors import add_row, advance, new_window, output, regressor
+from piezoest.estimators.record_loops import in_place, keep_outcome, one_by_one
 
 AT_REST = 8.0  # a window with less than this part of its travel is a dwell
 WAITING, UPDATED, MISSING, HOLDING, REJECTED = range(5)
@@ -153,47 +154,19 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     new_window(state, config)
 
 
-@njit(STEP_TYPES, cache=True, **UNCOUNTED)
-def step(state: Any, config: Any, u: float, x: float) -> None:
-    """Take one sample."""
-    _sample(state, config, u, x)
-
-
-@njit(
-    "void(f8[::1], f8[::1], f8[::1], f8[::1], i8, f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])",
-    cache=True,
-    **UNCOUNTED,
-)
-def run(
-    state: Any,
-    config: Any,
-    u: Any,
-    x: Any,
-    every: int,
-    scale: Any,
-    theta: Any,
-    y: Any,
-    S: Any,
-    covariance: Any,
-) -> None:
-    """Take whole records; every `every`-th sample into the histories that have room, slopes times `scale`."""
+@unrolled
+def _keep(state: Any, config: Any, row: int, scale: Any, theta: Any, s: Any, y: Any, S: Any, P: Any) -> None:
     size = int(config[N])
     now = state[int(config[THETA]) : int(config[THETA]) + size]
-    row, due = 0, every
-    for k in range(u.size):
-        step(state, config, u[k], x[k])
-        due -= 1
-        if due == 0:
-            for i in range(size - 1):
-                theta[row, i] = now[i] * scale[i]
-            if y.size > 0:
-                y[row] = state[INNOVATION]
-            if S.size > 0:
-                S[row] = state[VARIANCE]
-            if covariance.size > 0:
-                for i in range(size * size):
-                    covariance[row, i] = state[int(config[P]) + i]
-            row, due = row + 1, every
+    kept = theta[row]
+    for i in range(size - 1):
+        kept[i] = now[i] * scale[i]
+    covariance = state[int(config[COVARIANCE]) : int(config[COVARIANCE]) + size * size]
+    keep_outcome(row, state[INNOVATION], state[VARIANCE], covariance, size, y, S, P)
+
+
+step = one_by_one(_sample)
+run = in_place(_sample, _keep)
 
 
 @njit("void(f8[::1], f8[::1])", cache=True)

@@ -20,7 +20,6 @@ from piezoest.estimators.play_rls_layout import (
     LEVEL_TIME,
     LEVEL_TRAVEL,
     NOISE,
-    PLAYS,
     PRIOR,
     RANGE,
     RESETS,
@@ -38,7 +37,7 @@ from piezoest.estimators.play_rls_layout import (
     N,
     P,
 )
-from piezoest.estimators.play_rls_regressors import add_row
+from piezoest.estimators.play_rls_regressors import add_row, slopes_of
 
 SWEEPS = 10
 SMALLEST = 1e-18
@@ -49,20 +48,21 @@ WILD = 100.0  # standard deviations beyond which an innovation counts no more
 def _walk(state: Any, config: Any, half: Any) -> None:
     """What may have changed since the last update: only what has moved, and the level."""
     size = int(config[N])
-    slopes = (int(config[PLAYS]) + 1) * (int(config[BENDS]) + 1)
+    slopes = slopes_of(config)
     P0, theta, way, spread = int(config[P]), int(config[THETA]), int(config[WAY]), int(config[SPREAD])
     prior = int(config[PRIOR])
     travel = state[TRAVEL]
     if travel > 0.0:
-        common = config[COMMON_WALK] ** 2 * travel / state[RANGE]
+        common = np.sqrt(config[COMMON_WALK] ** 2 * travel / state[RANGE])
         single = config[SINGLE_WALK] ** 2 / state[RANGE]
+        work = int(config[WORK])
+        step = state[work : work + slopes]  # of each slope, if all walk by the same part of themselves
         for i in range(slopes):
-            if state[P0 + i * size + i] < config[prior + i * size + i]:
-                moved = state[way + i] / travel
-                for j in range(slopes):
-                    if state[P0 + j * size + j] < config[prior + j * size + j]:
-                        both = moved * state[way + j] / travel
-                        state[P0 + i * size + j] += common * both * state[theta + i] * state[theta + j]
+            grows = state[P0 + i * size + i] < config[prior + i * size + i]
+            step[i] = common * state[way + i] / travel * state[theta + i] if grows else 0.0
+        for i in range(slopes):
+            if step[i] != 0.0:
+                add_row(state[P0 + i * size : P0 + i * size + slopes], step, step[i], slopes)
         for i in range(slopes):
             if state[P0 + i * size + i] < config[prior + i * size + i]:
                 state[P0 + i * size + i] += single * state[way + i] * config[spread + i] ** 2
@@ -100,7 +100,7 @@ def constrain(state: Any, config: Any) -> None:
         for i in range(size - 1):
             least = config[LEAST] if i < columns else 0.0
             variance = state[P0 + i * size + i]
-            if variance <= SMALLEST:
+            if variance <= SMALLEST or (force[i] == 0.0 and used[i] >= least):
                 continue
             change = (least - used[i]) / variance
             change = max(change, -force[i])
@@ -146,13 +146,15 @@ def update(state: Any, config: Any, half: Any, first: int) -> None:
         return
     state[INNOVATION], state[VARIANCE] = y, S
     y = max(min(y, WILD * np.sqrt(S)), -WILD * np.sqrt(S))
+    share = 1.0 / S
+    for i in range(size):
+        start = 0 if i >= first else first
+        row = state[P0 + i * size + start : P0 + i * size + size]
+        rest = work[start:]
+        for j in range(size - start):
+            row[j] -= work[i] * rest[j] * share
     for i in range(first, size):
-        gain = work[i] / S
-        theta[i] += gain * y
-        # Rows and columns before `first` lose their share once, the rest once for both.
-        add_row(state[P0 + i * size : P0 + i * size + i + 1], work, -gain, i + 1)
-        for j in range(i):
-            state[P0 + j * size + i] = state[P0 + i * size + j]
+        theta[i] += work[i] * share * y
     for i in range(size):
         state[P0 + i * size + i] = max(state[P0 + i * size + i], SMALLEST)
     constrain(state, config)

@@ -22,11 +22,13 @@ N, PLAYS, BENDS, TERMS, GAIN, NOISE, FRACTION, FIRST_HALF, FIXED, LONGEST_GAP = 
 SLACK, LEVEL_TRAVEL, LEVEL_TIME, COMMON_WALK, SINGLE_WALK, WINDOWS, LEAST, INERT = range(10, 18)
 AT = 18  # first of each array of the state
 Y, Z, PHI, SUM, WAY, SEGMENTS, THETA, P, WORK, OLD, THRESHOLDS, EDGES = range(AT, AT + 12)
-USED, FORCE, MOTION, LINE = range(AT + 12, AT + 16)
+USED, FORCE, MOTION = range(AT + 12, AT + 15)
+# By slope, beside its play in Y: the play's threshold, the ends of its segment, what zero has of it.
+REACH, LOWER, UPPER, ZERO, LINE = range(AT + 15, AT + 20)
 # The first of each array of the configuration: relative thresholds and bends, creep decays, prior,
 # and the mechanics' coefficients.
-RELATIVE, RELATIVE_BENDS, DECAYS, PRIOR, SPREAD, MECHANICS = range(AT + 16, AT + 22)
-CONFIG = AT + 22
+RELATIVE, RELATIVE_BENDS, DECAYS, PRIOR, SPREAD, MECHANICS = range(AT + 20, AT + 26)
+CONFIG = AT + 26
 
 
 def lay_out(config: Any, n: int, k: int, m: int, line: int) -> int:
@@ -34,28 +36,12 @@ def lay_out(config: Any, n: int, k: int, m: int, line: int) -> int:
     slopes = (n + 1) * (k + 1)
     total = slopes + m + 1
     config[N], config[PLAYS], config[BENDS], config[TERMS] = total, n, k, m
-    sizes = (
-        n,
-        m,
-        total,
-        total,
-        slopes,
-        slopes,
-        total,
-        total * total,
-        total,
-        slopes,
-        n,
-        k + 2,
-        total,
-        total,
-        2,
-        line,
-    )
+    sizes = {Z: m, P: total * total, THRESHOLDS: n, EDGES: k + 2, MOTION: 2, LINE: line}
+    sizes |= dict.fromkeys((PHI, SUM, THETA, WORK, USED, FORCE), total)
     place = ARRAYS
-    for name, size in zip(range(Y, LINE + 1), sizes, strict=True):
+    for name in range(Y, LINE + 1):
         config[name] = place
-        place += size
+        place += sizes.get(name, slopes)
     place_in_config = CONFIG
     for name, size in zip(range(RELATIVE, MECHANICS + 1), (n, k, m, total * total, total, 6), strict=True):
         config[name] = place_in_config

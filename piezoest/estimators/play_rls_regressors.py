@@ -6,31 +6,39 @@ from typing import Any
 
 from numba.extending import register_jitable
 
-from piezoest.equations.bent_plays import segment
+from piezoest.equations.bent_plays import between
 from piezoest.equations.play import play
 from piezoest.estimators.play_rls_layout import (
     BENDS,
     COUNT,
     DECAYS,
-    EDGES,
     ELAPSED,
     GAIN,
+    LOWER,
     PHI,
     PLAYS,
+    REACH,
     SEGMENTS,
     SUM,
     TERMS,
     THETA,
-    THRESHOLDS,
     TRAVEL,
     U_LAST,
+    UPPER,
     USED,
     WAY,
     X_SUM,
+    ZERO,
     N,
     Y,
     Z,
 )
+
+
+@register_jitable
+def slopes_of(config: Any) -> int:
+    """Number of slopes: of the voltage and of each play, in each segment."""
+    return (int(config[PLAYS]) + 1) * (int(config[BENDS]) + 1)
 
 
 @register_jitable
@@ -45,25 +53,25 @@ def output(state: Any, config: Any) -> Any:
 @register_jitable
 def regressor(state: Any, config: Any, counted: Any) -> None:
     """Regressor of the present plays and creep; its travel is added where `counted` is 1.0."""
-    n, columns, size = int(config[PLAYS]), int(config[BENDS]) + 1, int(config[N])
-    slopes = (n + 1) * columns
-    # Parts of the state by names of their own: each entry by its place in the whole takes twice as long.
-    plays = state[int(config[Y]) : int(config[Y]) + n]
-    phi = state[int(config[PHI]) : int(config[PHI]) + size]
-    way = state[int(config[WAY]) : int(config[WAY]) + slopes]
+    slopes, size = slopes_of(config), int(config[N])
+    plays = state[int(config[Y]) : int(config[Y]) + slopes]
     segments = state[int(config[SEGMENTS]) : int(config[SEGMENTS]) + slopes]
-    edges = state[int(config[EDGES]) : int(config[EDGES]) + columns + 1]
+    way = state[int(config[WAY]) : int(config[WAY]) + slopes]
+    lower = state[int(config[LOWER]) : int(config[LOWER]) + slopes]
+    upper = state[int(config[UPPER]) : int(config[UPPER]) + slopes]
+    zero = state[int(config[ZERO]) : int(config[ZERO]) + slopes]
+    phi = state[int(config[PHI]) : int(config[PHI]) + size]
     creep = state[int(config[Z]) : int(config[Z]) + int(config[TERMS])]
-    gain, p = config[GAIN], state[U_LAST]
-    for i in range(n + 1):
-        if i > 0:
-            p = plays[i - 1]
-        for s in range(columns):
-            part = segment(p, edges[s], edges[s + 1])
-            place = i * columns + s
-            way[place] += counted * abs(part - segments[place])
-            segments[place] = part
-            phi[place] = gain * part
+    # Short loops over few arrays: the compiler makes vector instructions of them.
+    for i in range(slopes):
+        phi[i] = between(plays[i], lower[i], upper[i]) - zero[i]
+    for i in range(slopes):
+        way[i] += counted * abs(phi[i] - segments[i])
+    for i in range(slopes):
+        segments[i] = phi[i]
+    gain = config[GAIN]
+    for i in range(slopes):
+        phi[i] *= gain
     for i in range(int(config[TERMS])):
         phi[slopes + i] = creep[i]
     phi[size - 1] = 1.0
@@ -72,23 +80,19 @@ def regressor(state: Any, config: Any, counted: Any) -> None:
 @register_jitable
 def advance(state: Any, config: Any, u: Any) -> None:
     """Plays, creep and regressor after the next voltage."""
-    n = int(config[PLAYS])
-    used = int(config[USED])
-    plays = state[int(config[Y]) : int(config[Y]) + n]
-    thresholds = state[int(config[THRESHOLDS]) : int(config[THRESHOLDS]) + n]
-    for i in range(n):
-        plays[i] = play(plays[i], u, thresholds[i])
+    slopes = slopes_of(config)
+    plays = state[int(config[Y]) : int(config[Y]) + slopes]
+    reach = state[int(config[REACH]) : int(config[REACH]) + slopes]
+    for i in range(slopes):
+        plays[i] = play(plays[i], u, reach[i])
     state[TRAVEL] += abs(u - state[U_LAST])
     state[U_LAST] = u
     regressor(state, config, 1.0)
     terms = int(config[TERMS])
     if terms == 0:
         return
-    slopes = (n + 1) * (int(config[BENDS]) + 1)
-    phi = int(config[PHI])
-    w = 0.0
-    for i in range(slopes):
-        w += state[used + i] * state[phi + i]
+    phi, used = int(config[PHI]), int(config[USED])
+    w = dot(state[used : used + slopes], state[phi : phi + slopes], slopes)
     for i in range(terms):
         place = int(config[Z]) + i
         state[place] += (1.0 - config[int(config[DECAYS]) + i]) * (w - state[place])
@@ -101,8 +105,23 @@ def new_window(state: Any, config: Any) -> None:
     state[ELAPSED] = state[COUNT] = state[TRAVEL] = state[X_SUM] = 0.0
     for i in range(int(config[N])):
         state[int(config[SUM]) + i] = 0.0
-    for i in range((int(config[PLAYS]) + 1) * (int(config[BENDS]) + 1)):
+    for i in range(slopes_of(config)):
         state[int(config[WAY]) + i] = 0.0
+
+
+@register_jitable
+def dot(a: Any, b: Any, size: int) -> Any:
+    """Scalar product in four sums, of which none has to wait for another."""
+    one = two = three = four = 0.0
+    whole = size - size % 4
+    for i in range(0, whole, 4):
+        one += a[i] * b[i]
+        two += a[i + 1] * b[i + 1]
+        three += a[i + 2] * b[i + 2]
+        four += a[i + 3] * b[i + 3]
+    for i in range(whole, size):
+        one += a[i] * b[i]
+    return (one + two) + (three + four)
 
 
 @register_jitable

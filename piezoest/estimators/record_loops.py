@@ -1,6 +1,6 @@
-"""How a compiled loop over records is made: of what an estimator does with a sample, and what it keeps of it.
+"""How compiled loops are made: of what an estimator does with a sample, and what it keeps of it.
 
-Its signature is `piezoest._jit.RUN_TYPES`.
+A loop over records has the signature `piezoest._jit.RUN_TYPES`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import Any
 
 from numba import njit
 
-from piezoest._jit import RUN_TYPES, UNCOUNTED, local, unrolled, version
+from piezoest._jit import RUN_TYPES, STEP_TYPES, UNCOUNTED, local, unrolled, version
 
 
 @unrolled
@@ -24,6 +24,34 @@ def keep_outcome(
     if P.size > 0:
         for i in range(n * n):
             P[row, i] = covariance[i]
+
+
+def by_itself(take: Any, length: int, delayed: bool) -> Any:
+    """``sample(state, config, u, x)`` of a ``take(state, config, line, u, x)``.
+
+    The delay line begins behind `length` numbers of the state; it is None if not `delayed`.
+    """
+
+    @unrolled
+    def sample(state: Any, config: Any, u: Any, x: Any) -> None:
+        if delayed:
+            take(state, config, state[length:], u, x)
+        else:
+            take(state, config, None, u, x)
+
+    return sample
+
+
+def one_by_one(sample: Any) -> Any:
+    """Compiled ``sample(state, config, u, x)``, of `piezoest._jit.STEP_TYPES`."""
+    source = version()
+
+    @njit(STEP_TYPES, cache=True, nogil=True, **UNCOUNTED)
+    def step(state: Any, config: Any, u: float, x: float) -> None:
+        _ = source  # part of the cache's key
+        sample(state, config, u, x)
+
+    return step
 
 
 def in_place(sample: Any, keep: Any) -> Any:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
-from piezoest._jit import STEP_TYPES, UNCOUNTED, Family, unrolled, version
+from piezoest._jit import Family, unrolled
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
-from piezoest.estimators.record_loops import in_place, in_registers, keep_outcome
+from piezoest.estimators.record_loops import by_itself, in_place, in_registers, keep_outcome, one_by_one
 
 CONFIG = kernel.CONFIG + law.CONFIG_SIZE
 HEAD = kernel.FRONT + law.HEAD
@@ -51,19 +49,7 @@ def _keep(state: Any, n: int, row: int, scale: Any, theta: Any, y: Any, S: Any, 
 @Family
 def step(n: int, duties: int, delayed: bool) -> Any:
     """``step[n, duties, delayed](state, config, u, x)`` takes one sample."""
-    take, length, source = taken(n, duties), size(n), version()
-
-    @njit(STEP_TYPES, cache=True, nogil=True, **UNCOUNTED)
-    def step(state: Any, config: Any, u: float, x: float) -> None:
-        _ = source  # part of the cache's key
-        if n == 0:
-            kernel._sample(state, config, u, x)
-        elif delayed:
-            take(state, config, state[length:], u, x)
-        else:
-            take(state, config, None, u, x)
-
-    return step
+    return one_by_one(kernel._sample if n == 0 else by_itself(taken(n, duties), size(n), delayed))
 
 
 @Family
