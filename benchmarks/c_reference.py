@@ -79,6 +79,12 @@ class Reference:
         self._call("plays", u.size, u, x, settings, theta)
         return theta
 
+    def bent_plays(self, u: FloatArray, x: FloatArray, settings: FloatArray) -> FloatArray:
+        """History of the slopes in each part of the range, of creep and the level."""
+        theta = np.empty((u.size, 43))
+        self._call("bent_plays", u.size, u, x, settings, theta)
+        return theta
+
 
 class Exported:
     """What `piezoest export c` makes of a `HysteresisRLS`, without the controller round it.

@@ -139,6 +139,23 @@ void inverse(int64_t N, const double *r, const double *par, double *out) {
     }
 }
 
+/* One sample of recursive least squares of n parameters with forgetting; n is a constant where it is put in
+ * place. P is symmetric. */
+static inline __attribute__((always_inline)) void learn(int n, double mu, double R, double inverse_mu, double x,
+                                                        const double *phi, double *t, double (*P)[n], double *w) {
+    double quadratic = 0, innovation = x;
+    for (int i = 0; i < n; i++) w[i] = 0;
+    for (int j = 0; j < n; j++)
+        for (int i = 0; i < n; i++) w[i] += P[j][i] * phi[j];
+    for (int i = 0; i < n; i++) { quadratic += phi[i] * w[i]; innovation -= phi[i] * t[i]; }
+    const double g = 1.0 / (quadratic + mu * R);
+    for (int i = 0; i < n; i++) t[i] += w[i] * g * innovation;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) P[i][j] = (P[i][j] - g * w[i] * w[j]) * inverse_mu;
+}
+
+static inline double between(double p, double low, double high) { return p > high ? high : p < low ? low : p; }
+
 /* Recursive least squares of a gain, M slopes of plays and a level, on each sample, with forgetting.
  * par: forgetting, R, initial variance, level's variance; then M thresholds and M + 2 scales. */
 #define M 12
@@ -151,20 +168,38 @@ void plays(int64_t N, const double *u, const double *x, const double *par, doubl
     for (int64_t k = 0; k < N; k++) {
         phi[0] = u[k] * scale[0];
         for (int i = 0; i < M; i++) {
-            const double low = u[k] - threshold[i], high = u[k] + threshold[i];
-            y[i] = y[i] > high ? high : y[i] < low ? low : y[i];
+            y[i] = between(y[i], u[k] - threshold[i], u[k] + threshold[i]);
             phi[i + 1] = y[i] * scale[i + 1];
         }
         phi[S - 1] = 1.0;
-        double quadratic = 0, innovation = x[k];
-        for (int i = 0; i < S; i++) w[i] = 0;
-        for (int j = 0; j < S; j++)
-            for (int i = 0; i < S; i++) w[i] += P[j][i] * phi[j];
-        for (int i = 0; i < S; i++) { quadratic += phi[i] * w[i]; innovation -= phi[i] * t[i]; }
-        const double g = 1.0 / (quadratic + mu * R);
-        for (int i = 0; i < S; i++) t[i] += w[i] * g * innovation;
-        for (int i = 0; i < S; i++)
-            for (int j = 0; j < S; j++) P[i][j] = (P[i][j] - g * w[i] * w[j]) * inverse_mu;
+        learn(S, mu, R, inverse_mu, x[k], phi, t, P, w);
         for (int i = 0; i < S; i++) out[S * k + i] = t[i] * scale[i];
+    }
+}
+
+/* The same with three slopes for each play and for the voltage, one for each part of the range, and C terms of
+ * creep of what the slopes give. par as above, with S scales replaced by the two bends and C decays. */
+#define C 3
+#define SLOPES (3 * (M + 1))
+#define B (SLOPES + C + 1)
+void bent_plays(int64_t N, const double *u, const double *x, const double *par, double *out) {
+    const double mu = par[0], R = par[1], inverse_mu = 1.0 / mu;
+    const double *threshold = par + 4, *bend = threshold + M, *decay = bend + 2;
+    const double edge[4] = {-1e30, bend[0], bend[1], 1e30};
+    double y[M] = {0}, t[B] = {0}, P[B][B] = {{0}}, phi[B], w[B], z[C] = {0}, zero[3];
+    for (int i = 0; i < B; i++) P[i][i] = i < B - 1 ? par[2] : par[3];
+    for (int s = 0; s < 3; s++) zero[s] = between(0.0, edge[s], edge[s + 1]);
+    for (int64_t k = 0; k < N; k++) {
+        double slow = 0;
+        for (int i = 0; i <= M; i++) {
+            if (i > 0) y[i - 1] = between(y[i - 1], u[k] - threshold[i - 1], u[k] + threshold[i - 1]);
+            const double p = i > 0 ? y[i - 1] : u[k];
+            for (int s = 0; s < 3; s++) phi[3 * i + s] = between(p, edge[s], edge[s + 1]) - zero[s];
+        }
+        for (int i = 0; i < SLOPES; i++) slow += t[i] * phi[i];
+        for (int j = 0; j < C; j++) phi[SLOPES + j] = z[j] += (1.0 - decay[j]) * (slow - z[j]);
+        phi[B - 1] = 1.0;
+        learn(B, mu, R, inverse_mu, x[k], phi, t, P, w);
+        for (int i = 0; i < B; i++) out[B * k + i] = t[i];
     }
 }
