@@ -18,6 +18,21 @@ def play(y, u, r):
     return np.fmax(u - r, np.fmin(u + r, y))
 
 
+@register_jitable(inline="always")
+def weighted_sum(weights, y):
+    """sum_i weights[i] y[i], in four sums of which none waits for another's last product."""
+    first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
+    whole = y.shape[0] - y.shape[0] % 4
+    for i in range(0, whole, 4):
+        first = first + weights[i] * y[i]
+        second = second + weights[i + 1] * y[i + 1]
+        third = third + weights[i + 2] * y[i + 2]
+        fourth = fourth + weights[i + 3] * y[i + 3]
+    for i in range(whole, y.shape[0]):
+        first = first + weights[i] * y[i]
+    return (first + second) + (third + fourth)
+
+
 # Inlined, because a call counts references to each array: 50 ns per sample otherwise.
 @register_jitable(inline="always")
 def prandtl_ishlinskii_step(y, u, gain, thresholds, weights):
@@ -26,10 +41,7 @@ def prandtl_ishlinskii_step(y, u, gain, thresholds, weights):
     # instructions, which a sum in the same loop would forbid (276 ns become 122 for n = 70).
     for i in range(y.shape[0]):
         y[i] = play(y[i], u, thresholds[i])
-    w = gain * u
-    for i in range(y.shape[0]):
-        w = w + weights[i] * y[i]
-    return w
+    return gain * u + weighted_sum(weights, y)
 
 
 @register_jitable(inline="always")

@@ -7,7 +7,7 @@ from typing import Any
 from numba.extending import register_jitable
 
 from piezoest.equations.bent_plays import between
-from piezoest.equations.play import play
+from piezoest.equations.play import play, weighted_sum
 from piezoest.estimators.play_rls_layout import (
     BENDS,
     COUNT,
@@ -92,7 +92,7 @@ def advance(state: Any, config: Any, u: Any) -> None:
     if terms == 0:
         return
     phi, used = int(config[PHI]), int(config[USED])
-    w = dot(state[used : used + slopes], state[phi : phi + slopes], slopes)
+    w = weighted_sum(state[used : used + slopes], state[phi : phi + slopes])
     for i in range(terms):
         place = int(config[Z]) + i
         state[place] += (1.0 - config[int(config[DECAYS]) + i]) * (w - state[place])
@@ -107,21 +107,6 @@ def new_window(state: Any, config: Any) -> None:
         state[int(config[SUM]) + i] = 0.0
     for i in range(slopes_of(config)):
         state[int(config[WAY]) + i] = 0.0
-
-
-@register_jitable
-def dot(a: Any, b: Any, size: int) -> Any:
-    """Scalar product in four sums, of which none has to wait for another."""
-    one = two = three = four = 0.0
-    whole = size - size % 4
-    for i in range(0, whole, 4):
-        one += a[i] * b[i]
-        two += a[i + 1] * b[i + 1]
-        three += a[i + 2] * b[i + 2]
-        four += a[i + 3] * b[i + 3]
-    for i in range(whole, size):
-        one += a[i] * b[i]
-    return (one + two) + (three + four)
 
 
 @register_jitable
