@@ -78,13 +78,17 @@ def padasip_rls(u: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def bank_scaling(c: Reference, samples: int, rounds: int) -> list[dict[str, Any]]:
-    """Nanoseconds per channel and sample against channels and threads, the C bank's, and the default's."""
+    """Nanoseconds per channel and sample against channels and threads, the C bank's, and the default's.
+
+    All take about `samples` between them, but none less than 20 ms, or what there is.
+    """
+    shortest = min(samples // 64, int(0.02 * SAMPLE_RATE))
     settings = rls_settings(SAMPLE_RATE, START, MEMORY, NOISE, CUTOFF, True)
     paper = pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, memory=MEMORY, errors=False)
     usual = pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, errors=False)
     found = []
     for channels in (64, 256, 1024, 8192):
-        K = max(50, samples // channels)
+        K = max(shortest, samples // channels)
         _, u, x = record(K)
         u, x = (np.ascontiguousarray(np.tile(v[:, None], (1, channels))) for v in (u, x))
         banks = {

@@ -136,6 +136,32 @@ def local_rows(typingctx: Any, rows: Any, columns: Any) -> Any:
     return array(rows, columns), generate
 
 
+@_intrinsic
+def read_ahead(typingctx: Any, row: Any) -> Any:
+    """Ask for the row of an array before it is needed; the processor does not wait for it.
+
+    It does so by itself where samples follow one another, but not from row to row.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        array = context.make_array(row)(context, builder, values[0])
+        byte, number = ir.IntType(8), ir.IntType(32)
+        to = ir.PointerType(byte)
+        take = ir.FunctionType(ir.VoidType(), [to, number, number, number])
+        prefetch = cgutils.get_or_insert_function(  # type: ignore[no-untyped-call]
+            builder.module, take, "llvm.prefetch.p0"
+        )
+        start = builder.bitcast(array.data, to)
+        shape = cgutils.unpack_tuple(builder, array.shape, 1)  # type: ignore[no-untyped-call]
+        size = builder.mul(shape[0], array.itemsize)
+        with cgutils.for_range_slice(builder, size.type(0), size, size.type(64)) as (offset, _):
+            place = builder.gep(start, [offset])
+            builder.call(prefetch, [place, number(0), number(3), number(1)])
+        return context.get_dummy_value()
+
+    return types.none(row), generate
+
+
 @_intrinsic(prefer_literal=True)
 def in_lanes(typingctx: Any, body: Any, count: Any, arguments: Any) -> Any:
     """Call ``body(lane, *arguments)`` for lanes 0 to `count` - 1, which know nothing of each other.

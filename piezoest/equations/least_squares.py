@@ -61,7 +61,8 @@ def discrete_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
     gain = enable / spread
     # trace(P) - |P phi|^2 / spread <= bound mu, without waiting for the division
     within = ((trace(P, n) - bound * forgetting) * spread <= predicted_output(work, work, n)) * enable
-    grow = 1.0 + within * (1.0 / forgetting - 1.0)
+    inverse = 1.0 / forgetting
+    grow = 1.0 + within * (inverse - 1.0)
     for i in range(n):
         share = gain * work[i]
         theta[i] = theta[i] + share * y
@@ -69,7 +70,7 @@ def discrete_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
             entry = (P[i * n + j] - share * (within * work[j])) * grow
             P[i * n + j] = entry
             P[j * n + i] = entry
-    return y, quadratic / forgetting + R
+    return y, quadratic * inverse + R
 
 
 @register_jitable

@@ -19,15 +19,16 @@ from piezoest._jit import (
     in_lanes,
     local,
     local_rows,
+    read_ahead,
     taking,
     unrolled,
     version,
 )
 from piezoest.estimators import ekf_kernel, ekf_loops, rls_kernel, rls_loops
 
-# Channels side by side in vector instructions; channels that share cache lines; samples read ahead, or
-# taken by a channel before it is the next one's turn.
-LANES, BLOCK, CHUNK = 32, 8, 64
+# Channels side by side in vector instructions; channels that share cache lines; samples taken by a channel
+# before it is the next one's turn; rows of samples asked for ahead.
+LANES, BLOCK, CHUNK, AHEAD = 32, 8, 64, 16
 
 _SIGNATURE = "void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], i8, i8, i8, f8[:, :, ::1])"
 
@@ -105,20 +106,16 @@ def _channel_by_channel(take: Any, size: int, settings_size: int, head: int, n: 
 
 
 @register_jitable
-def _copy_row(source: Any, target: Any) -> None:
-    """Fill all lanes, if need be with the last channel's."""
-    if source.size == LANES:
-        for lane in range(LANES):
-            target[lane] = source[lane]
-    else:
-        for lane in range(LANES):
-            target[lane] = source[min(lane, source.size - 1)]
+def _fill(source: Any, target: Any) -> None:
+    """Fill all lanes, those that are left over with the last channel's."""
+    for lane in range(LANES):
+        target[lane] = source[min(lane, source.size - 1)]
 
 
 def _in_lanes(n: int) -> Any:
     """The bare law for many channels in the same vector instructions; its branches become masks."""
     size, settings_size, head, source = rls_loops.size(n), rls_loops.CONFIG, rls_loops.HEAD, version()
-
+    scratch = head + n + 2 * n * n  # from here on nothing lasts from sample to sample
     single = rls_loops.taken(n, rls_loops.BARE)
 
     @unrolled
@@ -131,7 +128,7 @@ def _in_lanes(n: int) -> Any:
         settings = local(settings_size)
         for i in range(settings_size):
             settings[i] = config[i]
-        now, u_now, x_now = local_rows(size, LANES), local_rows(CHUNK, LANES), local_rows(CHUNK, LANES)
+        now, u_filled, x_filled = local_rows(size, LANES), local(LANES), local(LANES)
         for first in range(start, stop, LANES):
             used = min(LANES, stop - first)
             # The lanes that are left over repeat the last channel, and are forgotten.
@@ -139,26 +136,31 @@ def _in_lanes(n: int) -> Any:
                 c = first + min(lane, used - 1)
                 for i in range(rls_kernel.SWING):
                     now[i, lane] = states[c, i]
-                for i in range(rls_kernel.FRONT, size):
+                for i in range(rls_kernel.FRONT, scratch):
                     now[i, lane] = states[c, i]
             row, due = 0, every
-            for begin in range(0, u.shape[0], CHUNK):
-                samples = min(CHUNK, u.shape[0] - begin)
-                # Rows are far apart: read one after the other, the next does not wait for the arithmetic.
-                for k in range(samples):
-                    _copy_row(u[begin + k, first : first + used], u_now[k])
-                    _copy_row(x[begin + k, first : first + used], x_now[k])
-                for k in range(samples):
-                    in_lanes(take, LANES, (now, settings, u_now[k], x_now[k]))
-                    due -= 1
-                    if due == 0:
-                        for lane in range(used):
-                            _keep(now[:, lane], head, n, rows[row, first + lane])
-                        row, due = row + 1, every
+            for k in range(min(AHEAD, u.shape[0])):
+                read_ahead(u[k, first : first + used])
+                read_ahead(x[k, first : first + used])
+            for k in range(u.shape[0]):
+                if k + AHEAD < u.shape[0]:
+                    read_ahead(u[k + AHEAD, first : first + used])
+                    read_ahead(x[k + AHEAD, first : first + used])
+                u_now, x_now = u[k, first : first + used], x[k, first : first + used]
+                if used < LANES:
+                    _fill(u_now, u_filled)
+                    _fill(x_now, x_filled)
+                    u_now, x_now = u_filled, x_filled
+                in_lanes(take, LANES, (now, settings, u_now, x_now))
+                due -= 1
+                if due == 0:
+                    for lane in range(used):
+                        _keep(now[:, lane], head, n, rows[row, first + lane])
+                    row, due = row + 1, every
             for lane in range(used):
                 for i in range(rls_kernel.SWING):
                     states[first + lane, i] = now[i, lane]
-                for i in range(rls_kernel.FRONT, size):
+                for i in range(rls_kernel.FRONT, scratch):
                     states[first + lane, i] = now[i, lane]
 
     return bank

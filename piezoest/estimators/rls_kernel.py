@@ -338,12 +338,14 @@ def _take(state: Any, config: Any, clock: Any, line: Any, extra: Any, u: Any, x:
     if line is not None and np.abs(u) < WILDEST:
         u = delayed(line, config[FRACTION], u)
     state[SAMPLES] += 1.0
+    # Asked once and early: the compiler would ask twice, and lose the bank's vector instructions.
+    waiting = state[PRIMED] == 0.0 or state[GAP] > config[LONGEST_GAP]
     known = np.abs(u) < WILDEST
     measured = known and np.abs(x) < WILDEST
     if not measured:
         state[MISSED] += 1.0
         law_state[law.LAST] = law.MISSING
-    if state[PRIMED] == 0.0 or state[GAP] > config[LONGEST_GAP]:
+    if waiting:
         if measured:
             _prime(state, config, clock, u, x)
             law_state[law.LAST] = law.WAITING
