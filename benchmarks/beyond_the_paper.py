@@ -15,7 +15,6 @@ import os
 import sys
 import time
 from collections.abc import Iterable
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ from beyond_runs import CASES, RATE, START, Job, Numbers, jobs, play
 import piezoest as pz
 from piezoest.bench.adaptation import json_safe
 from piezoest.bench.executors import in_processes
-from piezoest.bench.machine import describe_machine, versions
+from piezoest.bench.origin import origin, put
 
 SEEDS = 5
 RECORDING_START = pz.ColemanHodgdon(0.5, 8.0, 6.0)
@@ -135,13 +134,8 @@ def main() -> None:
     if given.json and given.json.is_file():
         # Without the recordings, too, what was measured on them stays.
         document = json.loads(given.json.read_text(encoding="utf-8"))
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    document |= {
-        "date": now,
-        "machine": describe_machine(),
-        "versions": versions(),
-        "conditions": {"sample_rate_Hz": RATE, "start": START.to_dict()},
-    }
+    head = origin()
+    document |= {**head, "conditions": {"sample_rate_Hz": RATE, "start": START.to_dict()}}
     parts = document.setdefault("parts", {})
     for name in given.only or names:
         began = time.perf_counter()
@@ -153,7 +147,7 @@ def main() -> None:
         else:
             document[name] = json_safe(runs(name, given.seeds, given.jobs))
         parts[name] = {
-            "date": now,
+            "date": head["date"],
             "seeds": 1 if name == "recording" else len({job.seed for job in jobs(name, given.seeds)}),
             "seconds": round(time.perf_counter() - began, 1),
         }
@@ -161,7 +155,7 @@ def main() -> None:
     for criterion in document["criteria"]:
         print(said(criterion))
     if given.json:
-        given.json.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        put(document, given.json)
 
 
 if __name__ == "__main__":

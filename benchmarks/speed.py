@@ -13,6 +13,7 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -259,6 +260,7 @@ def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
     differences["filterpy EKF"] = float(np.max(np.abs(ours / theirs - 1.0)))
     differences["EstimatorBank"] = max(entry["difference_from_C"] for entry in bank)
     return {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "machine": machine(),
         "compiler": " ".join(COMMAND),
         "samples": samples,

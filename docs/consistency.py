@@ -12,7 +12,6 @@ import argparse
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import piezoest as pz
-from piezoest.bench.machine import describe_machine, versions
+from piezoest.bench.origin import origin, put
 
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 NOISE, RUNS, SECONDS = 1e-3, 200, 2.0
@@ -103,15 +102,13 @@ def main() -> None:
         print(json.dumps(asdict(rows[-1])), flush=True)
     if arguments.json is not None:
         document = {
-            "date": datetime.now(UTC).isoformat(timespec="seconds"),
-            "machine": describe_machine(),
-            "versions": versions(),
+            **origin(),
             "runs": arguments.runs,
             "seconds": SECONDS,
             "noise_um": NOISE,
             "rows": [asdict(row) for row in rows],
         }
-        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        put(document, arguments.json)
 
 
 if __name__ == "__main__":

@@ -70,7 +70,8 @@ def pieces(document: dict[str, Any]) -> dict[str, str]:
             bank,
         ),
         "conditions": (
-            f"{machine['cpu']}, {machine['cores']} cores, Python {machine['python']}, "
+            f"{document['date'][:10]}, {machine['cpu']}, {machine['cores']} cores, "
+            f"Python {machine['python']}, "
             f"Numba {machine['numba']}; "
             f"C by ``{document['compiler']}``; medians of {document['rounds']} interleaved rounds of "
             f"{document['samples']} samples. ``warmup()`` took {document['cold']['warmup']:.2f} s with a "
@@ -101,8 +102,8 @@ def reasons(document: dict[str, Any]) -> str:
         "- *HysteresisEKF.* Each sample waits for the one before, in C as here; Joseph's form, the "
         f"projection and the checks are the difference between {times['C, EKF']:.0f} and "
         f"{times['HysteresisEKF']:.0f} ns.\n"
-        f"- *PrandtlIshlinskiiRLS* learns {learnt[0]} parameters with 12 thresholds: each play has a slope for "
-        "each part of the voltage's range, and there is creep. A C loop that learns as many takes "
+        f"- *PrandtlIshlinskiiRLS* learns {learnt[0]} parameters with 12 thresholds: each play has a slope "
+        "for each part of the voltage's range, and there is creep. A C loop that learns as many takes "
         f"{times['C, 12 plays, bends, creep']:.0f} ns, this one {times['PrandtlIshlinskiiRLS']:.0f}: it "
         "gathers what it sees and learns once a window of travel. Without bends and creep both learn "
         f"{learnt[1]}, in {times['PrandtlIshlinskiiRLS, no bends, no creep']:.0f} ns here and "

@@ -9,17 +9,15 @@ files stay as they are.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import piezoest as pz
-from piezoest.bench.machine import describe_machine, versions
+from piezoest.bench.origin import origin, put
 
 FILE = Path("discrete_backlash_operator") / "test_1hz.csv"
 
@@ -30,9 +28,7 @@ def figures_of(file: Path) -> tuple[dict[str, Any], pz.Identification, pz.ModelC
     found, choice = pz.identify(record), pz.choose_model(record)
     streamed = pz.identify_stream(pz.stream_record(file, rows=1000))
     document = {
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": describe_machine(),
-        "versions": versions(),
+        **origin(),
         "samples": len(record),
         "sample_rate_Hz": record.sample_rate,
         "voltage_V": [float(np.nanmin(record.voltage)), float(np.nanmax(record.voltage))],
@@ -75,7 +71,7 @@ def main() -> None:
         print(f"no recordings in {given.data}: {given.json.name} stays as it is", file=sys.stderr)
         return
     document, found, choice = figures_of(given.data / FILE)
-    given.json.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    put(document, given.json)
     found.plot().savefig(given.figures / "real_data.png", dpi=90)
     choice.plot().savefig(given.figures / "real_data_choice.png", dpi=90)
 

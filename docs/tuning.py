@@ -8,9 +8,7 @@ Writes docs/data/tuning.json and docs/figures/tuning.png, in about a minute.
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +16,7 @@ import numpy as np
 
 import piezoest as pz
 from piezoest.bench.adaptation import in_parallel, jobs_for, summarise
-from piezoest.bench.machine import describe_machine, versions
+from piezoest.bench.origin import origin, put
 
 RATE, FREQUENCY, AMPLITUDE = 10_000.0, 5.0, 5.0  # Hz, Hz, µm
 SEEDS = 3
@@ -201,16 +199,14 @@ def main() -> None:
     parser.add_argument("--figure", type=Path, default=docs / "figures" / "tuning.png")
     given = parser.parse_args()
     document = {
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": describe_machine(),
-        "versions": versions(),
+        **origin(),
         "conditions": {"sample_rate_Hz": RATE, "amplitude_um": AMPLITUDE, "frequency_Hz": FREQUENCY},
         "memories": memories(),
         "noises": noises(),
         "excitation": excitation(),
         "delays": delays(),
     }
-    given.json.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    put(document, given.json)
     draw(document, given.figure)
 
 

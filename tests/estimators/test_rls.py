@@ -287,6 +287,38 @@ def test_loops_compiled_for_less_give_the_same(options: dict[str, Any], kind: tu
     assert estimator.status.updates > 5000
 
 
+@pytest.mark.parametrize("errors", [False, True])
+@pytest.mark.parametrize("name", sorted({*pz.policies.__all__} - {"Forgetting"}))
+def test_no_policy_is_lost_to_a_loop_compiled_for_less(name: str, errors: bool) -> None:
+    """Also for policies to come: the loop chosen does what the one that has everything does.
+
+    `Forgetting` comes by `memory`, as in the test above.
+    """
+    in_seconds = {"memory": 0.4, "unit": "second"}
+    told: dict[str, dict[str, Any]] = {
+        "CovarianceResetting": {"floor": 1e-6},
+        "DirectionalForgetting": in_seconds,
+        "VariableForgetting": in_seconds,
+    }
+    policy = getattr(pz.policies, name)(**told.get(name, {}))
+    u, x = record(0.2, 1e-3)
+    x[2000:2300] = np.nan
+    states = []
+    for everything in (False, True):
+        estimator = pz.HysteresisRLS(
+            FS,
+            memory="period" if "Walk" in name or "Periodic" in name else None,
+            policies=(policy,),
+            errors=errors,
+        )
+        if everything:
+            estimator._kind = (0, rls_loops.ALL, True)
+        estimator.run(u, x)
+        states.append(estimator.to_dict()["state"])
+    assert states[0] == states[1]
+    assert estimator.status.updates > 1000
+
+
 @pytest.mark.parametrize(
     "options",
     [
