@@ -46,12 +46,33 @@ def calls(
     return {
         "calls": count,
         "median": float(np.median(own)),
+        "p99": float(np.percentile(own, 99.0)),
         "p99.9": float(np.percentile(own, 99.9)),
         "longest": float(own.max()),
         "within_20us": float(np.mean(own <= LATE)),
         "late": int(np.sum(own > LATE)),
         "preempted": after.ru_nivcsw - before.ru_nivcsw,
         "page_faults": after.ru_minflt - before.ru_minflt,
+    }
+
+
+def disturbances(seconds: float = 1.0, least: int = 5_000) -> dict[str, float]:
+    """How often a second the clock, read again and again, jumps by more than `least` [ns]; the median jump.
+
+    Nothing of the library runs: what takes the processor away here takes it from any call.
+    """
+    clock = time.perf_counter_ns
+    began = last = clock()
+    jumps = []
+    while last - began < 1e9 * seconds:
+        now = clock()
+        if now - last > least:
+            jumps.append(now - last)
+        last = now
+    return {
+        "per_second": len(jumps) / seconds,
+        "late_per_second": sum(jump > LATE for jump in jumps) / seconds,
+        "median": float(np.median(jumps)) if jumps else 0.0,
     }
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from c_reference import COMMAND, Exported, FloatArray, Reference, ekf_settings, rls_settings
-from single_calls import calls, cold
+from single_calls import calls, cold, disturbances
 from smoke import SAMPLE_RATE, START, TRUE, machine
 
 import piezoest as pz
@@ -186,6 +186,7 @@ def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
     estimator = pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, memory=MEMORY)
     estimator.step(0.0, 0.0)
     single = calls(estimator.step, u, x)
+    disturbed = disturbances()
     ring_estimator, ring_inverse = estimator.copy(), pz.InverseCompensator(TRUE)
 
     def turn(reference: float, displacement: float) -> None:
@@ -270,6 +271,7 @@ def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
         "outcome": outcome,
         "relative_difference": differences,
         "step": single,
+        "disturbances": disturbed,
         "ring": ring,
         "ring_without_gc": uncollected,
         "bank": bank,
