@@ -148,15 +148,13 @@ def read_ahead(typingctx: Any, row: Any) -> Any:
         byte, number = ir.IntType(8), ir.IntType(32)
         to = ir.PointerType(byte)
         take = ir.FunctionType(ir.VoidType(), [to, number, number, number])
-        prefetch = cgutils.get_or_insert_function(  # type: ignore[no-untyped-call]
-            builder.module, take, "llvm.prefetch.p0"
-        )
+        prefetch = builder.module.declare_intrinsic("llvm.prefetch", (to,), take)
         start = builder.bitcast(array.data, to)
         shape = cgutils.unpack_tuple(builder, array.shape, 1)  # type: ignore[no-untyped-call]
         size = builder.mul(shape[0], array.itemsize)
         with cgutils.for_range_slice(builder, size.type(0), size, size.type(64)) as (offset, _):
             place = builder.gep(start, [offset])
-            builder.call(prefetch, [place, number(0), number(3), number(1)])
+            builder.call(prefetch, [place, number(0), number(3), number(1)])  # to read, to keep, data
         return context.get_dummy_value()
 
     return types.none(row), generate
