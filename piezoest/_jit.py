@@ -142,6 +142,8 @@ def read_ahead(typingctx: Any, row: Any) -> Any:
 
     It does so by itself where samples follow one another, but not from row to row.
     """
+    if row.layout != "C":
+        return None
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         array = context.make_array(row)(context, builder, values[0])
@@ -149,12 +151,16 @@ def read_ahead(typingctx: Any, row: Any) -> Any:
         to = ir.PointerType(byte)
         take = ir.FunctionType(ir.VoidType(), [to, number, number, number])
         prefetch = builder.module.declare_intrinsic("llvm.prefetch", (to,), take)
+        how = (number(0), number(3), number(1))  # to read, to keep, data
         start = builder.bitcast(array.data, to)
         shape = cgutils.unpack_tuple(builder, array.shape, 1)  # type: ignore[no-untyped-call]
         size = builder.mul(shape[0], array.itemsize)
+        ends = builder.sub(
+            size, size.type(1)
+        )  # the row may begin within a line of the cache, and end in one more
         with cgutils.for_range_slice(builder, size.type(0), size, size.type(64)) as (offset, _):
-            place = builder.gep(start, [offset])
-            builder.call(prefetch, [place, number(0), number(3), number(1)])  # to read, to keep, data
+            builder.call(prefetch, [builder.gep(start, [offset]), *how])
+        builder.call(prefetch, [builder.gep(start, [ends]), *how])
         return context.get_dummy_value()
 
     return types.none(row), generate

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.equations.play import play, prandtl_ishlinskii_inverse
+from piezoest.equations.play import play, prandtl_ishlinskii_inverse, weighted_sum
 
 # Breakpoints nearer than this, in parts of the voltages about, are one: below rounding's reach.
 SAME = 1e-13
@@ -33,7 +33,10 @@ def between(p, low, high):
 
 @register_jitable
 def segment(p, low, high):
-    """What p has between two bends, counted from zero: segments add up to p."""
+    """What p has between two bends, counted from zero: segments add up to p.
+
+    `PrandtlIshlinskiiRLS` keeps what zero has.
+    """
     return between(p, low, high) - between(0.0, low, high)
 
 
@@ -49,6 +52,8 @@ def bent(p, slope, bends, changes, column, columns):
 @register_jitable
 def bent_plays_output(y, u, gain, weights, bends, changes):
     """w of the voltage u and the play states y (n,), which are left alone."""
+    if bends.shape[0] == 0:
+        return gain * u + weighted_sum(weights, y)
     columns = y.shape[0] + 1
     w = bent(u, gain, bends, changes, 0, columns)
     for i in range(y.shape[0]):

@@ -59,8 +59,10 @@ def discrete_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
     quadratic = covariance_times(P, phi, n, work)
     spread = quadratic + forgetting * R
     gain = enable / spread
-    # trace(P) - |P phi|^2 / spread <= bound mu, without waiting for the division
-    within = ((trace(P, n) - bound * forgetting) * spread <= predicted_output(work, work, n)) * enable
+    # trace(P) - |P phi|^2 / spread <= bound mu times spread^2: without waiting for the division, and with the
+    # sign that rounding may have given a covariance, which then heals.
+    excess = trace(P, n) - bound * forgetting
+    within = (excess * spread * spread <= predicted_output(work, work, n) * spread) * enable
     inverse = 1.0 / forgetting
     grow = 1.0 + within * (inverse - 1.0)
     for i in range(n):

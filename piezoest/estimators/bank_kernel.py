@@ -115,7 +115,7 @@ def _fill(source: Any, target: Any) -> None:
 def _in_lanes(n: int) -> Any:
     """The bare law for many channels in the same vector instructions; its branches become masks."""
     size, settings_size, head, source = rls_loops.size(n), rls_loops.CONFIG, rls_loops.HEAD, version()
-    scratch = head + n + 2 * n * n  # from here on nothing lasts from sample to sample
+    lasting = head + n + 2 * n * n + n  # up to P phi; what follows is work space of other laws
     single = rls_loops.taken(n, rls_loops.BARE)
 
     @unrolled
@@ -136,7 +136,7 @@ def _in_lanes(n: int) -> Any:
                 c = first + min(lane, used - 1)
                 for i in range(rls_kernel.SWING):
                     now[i, lane] = states[c, i]
-                for i in range(rls_kernel.FRONT, scratch):
+                for i in range(rls_kernel.FRONT, lasting):
                     now[i, lane] = states[c, i]
             row, due = 0, every
             for k in range(min(AHEAD, u.shape[0])):
@@ -160,7 +160,7 @@ def _in_lanes(n: int) -> Any:
             for lane in range(used):
                 for i in range(rls_kernel.SWING):
                     states[first + lane, i] = now[i, lane]
-                for i in range(rls_kernel.FRONT, scratch):
+                for i in range(rls_kernel.FRONT, lasting):
                     states[first + lane, i] = now[i, lane]
 
     return bank

@@ -146,15 +146,17 @@ def update(state: Any, config: Any, half: Any, first: int) -> None:
         return
     state[INNOVATION], state[VARIANCE] = y, S
     y = max(min(y, WILD * np.sqrt(S)), -WILD * np.sqrt(S))
-    share = 1.0 / S
+    for i in range(first, size):
+        theta[i] += work[i] / S * y
+    root = np.sqrt(S)
+    for i in range(size):
+        work[i] /= root
     for i in range(size):
         start = 0 if i >= first else first
         row = state[P0 + i * size + start : P0 + i * size + size]
         rest = work[start:]
         for j in range(size - start):
-            row[j] -= work[i] * rest[j] * share
-    for i in range(first, size):
-        theta[i] += work[i] * share * y
+            row[j] -= work[i] * rest[j]
     for i in range(size):
         state[P0 + i * size + i] = max(state[P0 + i * size + i], SMALLEST)
     constrain(state, config)

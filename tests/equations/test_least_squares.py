@@ -126,6 +126,20 @@ def test_bound_holds_and_does_not_freeze(law: str) -> None:
     assert ls.trace(flat, N) < full
 
 
+@pytest.mark.parametrize("mu", [1.0, 0.99])
+def test_a_covariance_spoilt_by_rounding_heals(mu: float) -> None:
+    """A regressor far beyond the noise leaves P - K phi' P to rounding, which can make phi' P phi negative."""
+    rng = np.random.default_rng(3)
+    theta, flat, work = np.zeros(N), (1e6 * np.eye(N)).ravel(), np.zeros(N)
+    true, negative = rng.normal(size=N), 0
+    for _ in range(3000):
+        phi = 1e5 * rng.normal(size=N)
+        _, S = ls.discrete_update(theta, flat, phi, phi @ true, N, mu, 1.0, np.inf, 1.0, work)
+        negative += S < 0.0
+    assert negative < 30
+    np.testing.assert_allclose(theta, true, atol=1e-5)
+
+
 def test_disabled_changes_nothing() -> None:
     theta, P = start()
     flat, before = P.ravel().copy(), theta.copy()

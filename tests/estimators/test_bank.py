@@ -47,12 +47,14 @@ def test_each_channel_is_a_single_estimator(estimator: Any, threads: int) -> Non
     u, x = records(1500, N)
     bank = pz.EstimatorBank(estimator, N, threads=threads)
     theta = bank.run(u[:-3], x[:-3], every=7)
+    after_run = [bank.channel(c).to_dict() for c in range(N)]
     for k in (-3, -2, -1):
         bank.step(u[k], x[k])
     for c in range(N):
         single = estimator.copy()
         trace = single.run(u[:-3, c].copy(), x[:-3, c].copy(), every=7)
         np.testing.assert_array_equal(theta[:, c], trace.theta)
+        assert after_run[c] == single.to_dict()
         single.run(u[-3:, c].copy(), x[-3:, c].copy())
         np.testing.assert_array_equal(bank.theta[c], single.theta)
         assert bank.models[c] == single.model
