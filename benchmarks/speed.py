@@ -13,16 +13,16 @@ import json
 import sys
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from c_reference import COMMAND, Exported, FloatArray, Reference, ekf_settings, rls_settings
-from single_calls import calls, cold, disturbances
-from smoke import SAMPLE_RATE, START, TRUE, machine
+from single_calls import Calls, calls, cold, disturbances
+from smoke import SAMPLE_RATE, START, TRUE
 
 import piezoest as pz
+from piezoest.bench.origin import origin
 
 NOISE, MEMORY, CUTOFF = 1.5e-3, 0.4, 2500.0
 LARGEST_DIFFERENCE = 1e-6
@@ -81,7 +81,8 @@ def padasip_rls(u: FloatArray, x: FloatArray) -> FloatArray:
 def bank_scaling(c: Reference, samples: int, rounds: int) -> list[dict[str, Any]]:
     """Nanoseconds per channel and sample against channels and threads, the C bank's, and the default's.
 
-    All take about `samples` between them, but none less than 20 ms, or what there is.
+    K rows for N channels, so that K N is about `samples`; but at least 20 ms of signal: what a bank does once
+    for every channel, whatever the number of rows, would be a tenth of 4 ms.
     """
     shortest = min(samples // 64, int(0.02 * SAMPLE_RATE))
     settings = rls_settings(SAMPLE_RATE, START, MEMORY, NOISE, CUTOFF, True)
@@ -185,15 +186,20 @@ def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
     outcome["filterpy EKF"], outcome["padasip RLS"] = theirs.tolist(), padasip_rls(u_slow, x_slow).tolist()
     estimator = pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, memory=MEMORY)
     estimator.step(0.0, 0.0)
-    single = calls(estimator.step, u, x)
     disturbed = disturbances()
     ring_estimator, ring_inverse = estimator.copy(), pz.InverseCompensator(TRUE)
 
     def turn(reference: float, displacement: float) -> None:
         ring_estimator.step(ring_inverse.step(reference), displacement)
 
-    ring = calls(turn, r, x, count=turns)
-    uncollected = calls(turn, r, x, collect=False)
+    live = calls(
+        {
+            "step": Calls(estimator.step, (u, x), max(samples, turns // 10)),
+            "ring": Calls(turn, (r, x), turns),
+            "ring_without_gc": Calls(turn, (r, x), max(samples, turns // 10), collect=False),
+        }
+    )
+    single, ring = live["step"], live["ring"]
     signal = pz.signals.triangle(5.0, 5.0, 5, SAMPLE_RATE)
 
     def track() -> Any:
@@ -237,7 +243,7 @@ def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
          "figure": len(signal) / SAMPLE_RATE / float(np.median(tracked))},
         {"what": "EstimatorBank, slowest of 64-8192 channels [ns per channel and sample]", "target": 10.0,
          "figure": max(entry["2"] for entry in bank)},
-        {"what": "PrandtlIshlinskiiRLS.run, 12 thresholds, times C with as many parameters", "target": 2.0,
+        {"what": "PrandtlIshlinskiiRLS.run, 12 thresholds, times C that learns as much", "target": 2.0,
          "figure": against("PrandtlIshlinskiiRLS", "C, 12 plays, bends, creep")},
         {"what": "the same without bends and creep, times C without them", "target": 2.0,
          "figure": against("PrandtlIshlinskiiRLS, no bends, no creep", "C, 12 plays")},
@@ -261,8 +267,7 @@ def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
     differences["filterpy EKF"] = float(np.max(np.abs(ours / theirs - 1.0)))
     differences["EstimatorBank"] = max(entry["difference_from_C"] for entry in bank)
     return {
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": machine(),
+        **origin(),
         "compiler": " ".join(COMMAND),
         "samples": samples,
         "rounds": rounds,
@@ -270,10 +275,8 @@ def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
         "nanoseconds_per_sample": times,
         "outcome": outcome,
         "relative_difference": differences,
-        "step": single,
+        **live,
         "disturbances": disturbed,
-        "ring": ring,
-        "ring_without_gc": uncollected,
         "bank": bank,
         "cold": began,
         "scaling": scaling(rounds),
@@ -336,7 +339,8 @@ def main() -> int:
     document = measure(
         arguments.samples, arguments.rounds, min(arguments.slow, arguments.samples), arguments.turns
     )
-    print(*(f"{key:>10}: {value}" for key, value in document["machine"].items()), sep="\n")
+    about = {**document["machine"], **document["versions"]}
+    print(*(f"{key:>10}: {value}" for key, value in about.items()), sep="\n")
     for name, value in document["nanoseconds_per_sample"].items():
         shown = ", ".join(f"{number:.4g}" for number in document["outcome"].get(name, [])[:4])
         print(f"{name:<40}{value:12.1f} ns   {shown}")

@@ -190,13 +190,16 @@ void bent_plays(int64_t N, const double *u, const double *x, const double *par, 
     for (int i = 0; i < B; i++) P[i][i] = i < B - 1 ? par[2] : par[3];
     for (int s = 0; s < 3; s++) zero[s] = between(0.0, edge[s], edge[s + 1]);
     for (int64_t k = 0; k < N; k++) {
-        double slow = 0;
+        double slow = 0, sums[4] = {0};
         for (int i = 0; i <= M; i++) {
             if (i > 0) y[i - 1] = between(y[i - 1], u[k] - threshold[i - 1], u[k] + threshold[i - 1]);
             const double p = i > 0 ? y[i - 1] : u[k];
             for (int s = 0; s < 3; s++) phi[3 * i + s] = between(p, edge[s], edge[s + 1]) - zero[s];
         }
-        for (int i = 0; i < SLOPES; i++) slow += t[i] * phi[i];
+        for (int i = 0; i + 3 < SLOPES; i += 4) // no sum waits for another's last product
+            for (int j = 0; j < 4; j++) sums[j] += t[i + j] * phi[i + j];
+        for (int i = SLOPES - SLOPES % 4; i < SLOPES; i++) slow += t[i] * phi[i];
+        slow += (sums[0] + sums[1]) + (sums[2] + sums[3]);
         for (int j = 0; j < C; j++) phi[SLOPES + j] = z[j] += (1.0 - decay[j]) * (slow - z[j]);
         phi[B - 1] = 1.0;
         learn(B, mu, R, inverse_mu, x[k], phi, t, P, w);

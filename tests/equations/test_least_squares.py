@@ -128,7 +128,7 @@ def test_bound_holds_and_does_not_freeze(law: str) -> None:
 
 @pytest.mark.parametrize("mu", [1.0, 0.99])
 def test_a_covariance_spoilt_by_rounding_heals(mu: float) -> None:
-    """A regressor far beyond the noise leaves P - K phi' P to rounding, which can make phi' P phi negative."""
+    """A regressor far beyond the noise leaves P - K phi' P to rounding: phi' P phi may be negative."""
     rng = np.random.default_rng(3)
     theta, flat, work = np.zeros(N), (1e6 * np.eye(N)).ravel(), np.zeros(N)
     true, negative = rng.normal(size=N), 0
