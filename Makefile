@@ -7,9 +7,10 @@ BIN := $(VENV)/bin
 
 # No window is opened and no display is needed.
 export MPLBACKEND ?= Agg
-# What is measured is compiled from the sources as they are: Numba looks only at a function's own file.
+# What is measured is compiled from the sources as they are (Numba looks only at a function's own file), once
+# for tests and benchmarks.
 bench bench-smoke figures: export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba_cache/$(shell \
-  find piezoest -name '*.py' | LC_ALL=C sort | xargs cat | cksum | tr -d ' ')
+  find piezoest -name '*.py' | LC_ALL=C sort | xargs cat | (sha256sum || cksum) 2>/dev/null | tr -d ' ' | cut -c1-16)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
