@@ -317,9 +317,10 @@ def draw(document: dict[str, Any], path: Path) -> None:
     axes[1].set_ylim(bottom=0.0)
     channels = [entry["channels"] for entry in document["bank"]]
     for name, label in (("1", "one thread"), ("2", "two threads"), ("C", "C, one thread")):
-        axes[2].loglog(channels, [entry[name] for entry in document["bank"]], "o-", label=label)
+        axes[2].semilogx(channels, [entry[name] for entry in document["bank"]], "o-", label=label)
     axes[2].set(xlabel="channels of a bank", ylabel="ns per channel and sample")
-    axes[2].legend()
+    axes[2].set_ylim(bottom=0.0)
+    axes[2].legend(loc="lower left")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
 
