@@ -155,12 +155,11 @@ def read_ahead(typingctx: Any, row: Any) -> Any:
         start = builder.bitcast(array.data, to)
         shape = cgutils.unpack_tuple(builder, array.shape, 1)  # type: ignore[no-untyped-call]
         size = builder.mul(shape[0], array.itemsize)
-        ends = builder.sub(
-            size, size.type(1)
-        )  # the row may begin within a line of the cache, and end in one more
+        # A row that begins within a line of the cache has one line more than its size says: its last byte's.
+        last = builder.sub(size, size.type(1))
         with cgutils.for_range_slice(builder, size.type(0), size, size.type(64)) as (offset, _):
             builder.call(prefetch, [builder.gep(start, [offset]), *how])
-        builder.call(prefetch, [builder.gep(start, [ends]), *how])
+        builder.call(prefetch, [builder.gep(start, [last]), *how])
         return context.get_dummy_value()
 
     return types.none(row), generate
