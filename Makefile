@@ -7,11 +7,6 @@ BIN := $(VENV)/bin
 
 # No window is opened and no display is needed.
 export MPLBACKEND ?= Agg
-# What is measured is compiled from the sources as they are (Numba looks only at a function's own file), once
-# for tests and benchmarks.
-bench bench-smoke figures: export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba_cache/$(shell \
-  find piezoest -name '*.py' | LC_ALL=C sort | xargs cat | (sha256sum || cksum) 2>/dev/null | tr -d ' ' | cut -c1-16)
-
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help venv tools demo calibrate target test lint format types layers docs docs-live figures bench-smoke bench clean
@@ -129,5 +124,5 @@ bench: $(VENV)/.installed-bench  ## Speed against C, filterpy and padasip, with 
 
 clean:  ## Remove builds, caches and generated pages, keep .venv
 	rm -rf build dist docs/_build docs/gallery docs/generated docs/sg_execution_times.rst
-	rm -rf .numba_cache .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	rm -rf .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find piezoest tests benchmarks calibration -type d -name __pycache__ -prune -exec rm -rf {} +

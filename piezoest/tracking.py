@@ -229,14 +229,6 @@ def track(
     interval = integer("update_interval", update_interval, 1)
     period = getattr(r, "period", None)
     period = None if period is None else round(period)
-    from piezoest import tracking_kernel  # which loads all that is compiled
-
-    if supervisor is None and tracking_kernel.can_run(stage, compensator, estimator):
-        record, parameters = tracking_kernel.run(reference, interval, stage, compensator, estimator)
-        names = compensator.model.parameter_names
-        return TrackingRecord(
-            reference, record[0], record[1], record[2], parameters, names, rate, period, interval
-        )
     N = reference.size
     voltage, measured, displacement = np.empty(N), np.empty(N), np.empty(N)
     history: list[FloatArray] = []
@@ -292,6 +284,7 @@ def _of_one_kind(history: list[FloatArray]) -> FloatArray:
 
 
 def _feed(estimator: Any, u: FloatArray, x: FloatArray) -> None:
+    """Give an interval to the estimator; what a run would return is not needed."""
     if isinstance(estimator, EstimatorBase) and type(estimator).run is EstimatorBase.run:
         estimator._absorb(u, x)
         return

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from pathlib import Path
 
@@ -11,21 +10,6 @@ from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parents[1]
 
-
-def _fresh_numba_cache() -> Path:
-    """Folder of compiled code for just these sources.
-
-    Numba looks only at the file of the function it compiled, not at those it calls into:
-    after an edit of an equation its own cache would be stale.
-    """
-    digest = hashlib.sha256()
-    for source in sorted((ROOT / "piezoest").rglob("*.py")):
-        digest.update(source.read_bytes())
-    return ROOT / ".numba_cache" / digest.hexdigest()[:16]
-
-
-# Before anything imports Numba; subprocesses of tests inherit it.
-os.environ.setdefault("NUMBA_CACHE_DIR", str(_fresh_numba_cache()))
 
 settings.register_profile("deterministic", derandomize=True, deadline=None)
 settings.load_profile("deterministic")

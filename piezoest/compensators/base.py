@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST, FloatArray, array_1d, integer, positive
-from piezoest._jit import UNCOUNTED
+from piezoest._jit import UNCOUNTED, compiled
 from piezoest.compensators.layout import (
     BY_PATH,
     CONFIG,
@@ -102,18 +101,18 @@ def change_model(state: Any, config: Any, a: Any, b: Any, c: Any, offset: Any) -
     state[OWED] = expected - (c * state[VOLTAGE] + state[W_H] + offset)
 
 
-@njit("f8(f8[::1], f8[::1], f8)", cache=True, **UNCOUNTED)
+@compiled("f8(f8[::1], f8[::1], f8)", **UNCOUNTED)
 def _step(state: Any, config: Any, r: float) -> Any:
     return _voltage(state, config, r)
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True, **UNCOUNTED)
+@compiled("void(f8[::1], f8[::1], f8[::1], f8[::1])", **UNCOUNTED)
 def _run(state: Any, config: Any, r: Any, u: Any) -> None:
     for k in range(r.size):
         u[k] = _voltage(state, config, r[k])
 
 
-@njit("void(f8[::1], f8[::1], f8, f8, f8, f8)", cache=True)
+@compiled("void(f8[::1], f8[::1], f8, f8, f8, f8)")
 def _change_model(state: Any, config: Any, a: float, b: float, c: float, offset: float) -> None:
     change_model(state, config, a, b, c, offset)
 
@@ -321,10 +320,6 @@ class Compensator:
             recent_path.take_up(self._state, PATH, a)
         self._state[W_H] = b * recent_path.hysteresis(self._state, PATH)
         self._state[OWED] = expected - self._expected()
-
-    def _handed_over(self, model: Model, projected: bool) -> None:
-        """Name the model that a compiled loop has handed over."""
-        self._model, self._projected = model, projected
 
     @property
     def limits(self) -> VoltageLimits:

@@ -6,10 +6,10 @@ import copy
 from typing import Any, Self
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST, FloatArray, array_1d, finite, positive
+from piezoest._jit import compiled
 from piezoest.compensators.base import Compensator, CompensatorStatus
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.equations.lead import lead_coefficients, lead_step
@@ -32,12 +32,12 @@ def _lead(state: Any, coefficients: Any, r: Any) -> Any:
     return lead_step(state, r, coefficients)
 
 
-@njit("f8(f8[::1], f8[::1], f8)", cache=True)
+@compiled("f8(f8[::1], f8[::1], f8)")
 def _step(state: Any, coefficients: Any, r: float) -> Any:
     return _lead(state, coefficients, r)
 
 
-@njit("void(f8[::1], f8[::1], f8[::1])", cache=True)
+@compiled("void(f8[::1], f8[::1], f8[::1])")
 def _run(state: Any, coefficients: Any, r: Any) -> None:
     for k in range(r.size):
         r[k] = _lead(state, coefficients, r[k])

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import UNCOUNTED
+from piezoest._jit import UNCOUNTED, compiled
 from piezoest.compensators.layout import (
     CONFIG,
     DECAY,
@@ -93,7 +92,7 @@ def _parts(state: Any, config: Any) -> Any:
     )
 
 
-@njit("void(f8[::1], f8[::1], f8[::1], f8[::1])", cache=True, **UNCOUNTED)
+@compiled("void(f8[::1], f8[::1], f8[::1], f8[::1])", **UNCOUNTED)
 def run(state: Any, config: Any, r: Any, u: Any) -> None:
     """Voltages `u` for a whole reference `r`."""
     y, z, thresholds, weights, gains, decays, bends, changes = _parts(state, config)
@@ -101,13 +100,13 @@ def run(state: Any, config: Any, r: Any, u: Any) -> None:
         u[k] = _voltage(state, config, r[k], y, z, thresholds, weights, gains, decays, bends, changes)
 
 
-@njit("f8(f8[::1], f8[::1], f8)", cache=True, **UNCOUNTED)
+@compiled("f8(f8[::1], f8[::1], f8)", **UNCOUNTED)
 def step(state: Any, config: Any, r: float) -> Any:
     """Voltage for one sample of the reference."""
     return _voltage(state, config, r, *_parts(state, config))
 
 
-@njit("f8(f8[::1], f8[::1])", cache=True, **UNCOUNTED)
+@compiled("f8(f8[::1], f8[::1])", **UNCOUNTED)
 def expected(state: Any, config: Any) -> Any:
     """Displacement that the model expects of the last sample [µm]."""
     n, m, b = int(config[PLAYS]), int(config[TERMS]), int(config[BENDS])

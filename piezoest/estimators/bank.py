@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -11,22 +10,16 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray, integer
-from piezoest.estimators import bank_kernel, ekf_kernel, ekf_loops, rls_loops
+from piezoest.estimators import bank_kernel
 from piezoest.estimators.base import Status
 from piezoest.estimators.ekf import HysteresisEKF
 from piezoest.estimators.rls import HysteresisRLS
 from piezoest.models import Model
 
-# The loop over a sample of one channel and over records of many, and where the estimator's vector begins.
-_LOOPS: dict[type, Any] = {
-    HysteresisRLS: (rls_loops.step, bank_kernel.rls, rls_loops.HEAD),
-    HysteresisEKF: (ekf_loops.step, bank_kernel.kalman, ekf_kernel.HEAD),
-}
+_LOOPS: dict[type, Any] = {HysteresisRLS: bank_kernel.rls, HysteresisEKF: bank_kernel.kalman}
 
 # Samples (of all channels) below which a second core costs more than it brings.
 WORTH_A_CORE = 4096
-# Samples of a channel from which on it is worth to bring its state into registers.
-WORTH_MOVING = 8
 
 
 class EstimatorBank:
@@ -95,7 +88,8 @@ class EstimatorBank:
     def _take(self, u: FloatArray, x: FloatArray, every: int, theta: FloatArray) -> None:
         channels = len(self)
         parts = min(self._threads, max(1, u.size // WORTH_A_CORE), channels)
-        loop, reader = self._loop(len(u)), self._reader
+        reader = self._reader
+        loop = _LOOPS[type(reader)][*self._kind, len(u) < bank_kernel.WORTH_MOVING]
         if parts == 1:
             loop(self._states, reader._config, u, x, 0, channels, every, theta)
             return
@@ -107,14 +101,6 @@ class EstimatorBank:
             ]
         for task in tasks:
             task.result()
-
-    def _loop(self, samples: int) -> Any:
-        """Compiled loop for so many samples of every channel."""
-        single, records, head = _LOOPS[type(self._reader)]
-        *_, delayed = self._kind
-        if samples < WORTH_MOVING or delayed:
-            return functools.partial(bank_kernel.in_turn, single[self._kind], head, self._reader._n)
-        return records[self._kind]
 
     def step(self, u: Any, x: Any) -> None:
         """Take one sample of every channel.

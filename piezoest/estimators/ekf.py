@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -134,16 +134,12 @@ class HysteresisEKF(EstimatorBase):
             np.concatenate([state, line]),
         )
 
-    def _loops(self) -> tuple[Any, Any]:
-        """Compiled functions that take a record, and propose a model, for the compiled ring of `track`."""
-        return ekf_loops.run[self._kind], kernel.propose
-
     def _sample(self, u: float, x: float) -> None:
-        ekf_loops.step[self._kind](self._state, self._config, u, x)
+        ekf_loops.steps[self._kind](self._state, self._config, u, x)
 
     def _absorb(self, u: FloatArray, x: FloatArray) -> None:
         u, x = self._records(u, x)
-        run, _ = self._loops()
+        run = ekf_loops.runs[self._kind]
         run(self._state, self._config, u, x, u.size + 1, NONE, NO_ROWS, NO_ROWS, NONE, NONE, NO_ROWS)
 
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
@@ -153,7 +149,7 @@ class HysteresisEKF(EstimatorBase):
         y = np.empty(rows if "y" in want else 0)
         S = np.empty(rows if "S" in want else 0)
         P = np.empty((rows if "P" in want else 0, n * n))
-        run, _ = self._loops()
+        run = ekf_loops.runs[self._kind]
         run(self._state, self._config, u, x, every, NONE, theta, s, y, S, P)
         return self._trace(theta, s, y, S, P.reshape(-1, n, n), every, want)
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import PROPOSE_TYPES, unrolled
+from piezoest._jit import PROPOSE_TYPES, compiled, unrolled
 from piezoest.equations import admissible, kalman
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators.delay_line import delayed
@@ -167,7 +166,7 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
         admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
 
 
-@njit(PROPOSE_TYPES, cache=True)
+@compiled(PROPOSE_TYPES)
 def propose(state: Any, config: Any, terms: Any, model: Any) -> None:
     """Compiled `proposed`."""
     proposed(state, config, terms, model)

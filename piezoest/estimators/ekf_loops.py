@@ -4,10 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from piezoest._jit import Family, unrolled
+from piezoest._jit import (
+    RUN_TYPES,
+    STEP_TYPES,
+    UNCOUNTED,
+    OnDemand,
+    compiled,
+    local,
+    specialised,
+    unrolled,
+)
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import ekf_kernel as kernel
-from piezoest.estimators.record_loops import by_itself, in_place, in_registers, keep_outcome, one_by_one
+from piezoest.estimators.record_loops import keep_outcome
 
 
 @unrolled
@@ -23,7 +32,7 @@ def _write_parameters(s: Any, hysteretic: Any, n: int, theta: Any, row: int) -> 
 
 
 @unrolled
-def _keep(state: Any, hysteretic: Any, n: int, row: int, theta: Any, s: Any, y: Any, S: Any, P: Any) -> None:
+def _keep(n: int, state: Any, hysteretic: Any, row: int, theta: Any, s: Any, y: Any, S: Any, P: Any) -> None:
     """Write a sample's outcome into the histories that have room."""
     _write_parameters(state[kernel.HEAD : kernel.HEAD + n], hysteretic, n, theta, row)
     if s.size > 0:
@@ -33,35 +42,81 @@ def _keep(state: Any, hysteretic: Any, n: int, row: int, theta: Any, s: Any, y: 
     keep_outcome(row, state[kernel.INNOVATION], state[kernel.INNOVATION_VARIANCE], covariance, n, y, S, P)
 
 
-def taken(n: int) -> Any:
-    """``take(state, config, line, u, x)``: one sample; `line` is None where nothing is delayed."""
-
-    @unrolled
-    def take(state: Any, config: Any, line: Any, u: Any, x: Any) -> None:
-        kernel._take(state, config, line, u, x, n)
-
-    return take
+@compiled(nogil=True, **UNCOUNTED)
+def step_with_all(state: Any, config: Any, u: float, x: float) -> None:
+    """Take one sample of as many states as the configuration says."""
+    kernel._sample(state, config, u, x)
 
 
-@Family
-def step(n: int, delayed: bool) -> Any:
-    """``step[n, delayed](state, config, u, x)`` takes a sample; n is 0 if only `config` knows it."""
-    return one_by_one(kernel._sample if n == 0 else by_itself(taken(n), kernel.state_size(n), delayed))
+@compiled(nogil=True, **UNCOUNTED)
+def run_with_all(
+    state: Any, config: Any, u: Any, x: Any, every: int, scale: Any,
+    theta: Any, s: Any, y: Any, S: Any, P: Any,
+) -> None:  # fmt: skip
+    """Take records of as many states as the configuration says."""
+    row, due = 0, every
+    for k in range(u.size):
+        kernel._sample(state, config, u[k], x[k])
+        due -= 1
+        if due == 0:
+            _keep(int(config[kernel.N]), state, config[kernel.HYSTERETIC], row, theta, s, y, S, P)
+            row, due = row + 1, every
 
 
-@Family
-def run(n: int, delayed: bool) -> Any:
-    """``run[n, delayed]`` takes records, see `piezoest.estimators.record_loops`; n as in `step`."""
+@compiled(nogil=True, **UNCOUNTED)
+def step(n: int, delayed: Any, length: int, state: Any, config: Any, u: float, x: float) -> None:
+    """Take one sample of n states; `length` numbers of the state stand before the delay line."""
+    if delayed is None:
+        kernel._take(state, config, None, u, x, n)
+    else:
+        kernel._take(state, config, state[length:], u, x, n)
 
-    @unrolled
-    def keep(
-        state: Any, config: Any, row: int, scale: Any, theta: Any, s: Any, y: Any, S: Any, P: Any
-    ) -> None:
-        if n == 0:
-            _keep(state, config[kernel.HYSTERETIC], int(config[kernel.N]), row, theta, s, y, S, P)
+
+@compiled(nogil=True, **UNCOUNTED)
+def run(
+    n: int, delayed: Any, length: int, told: int,
+    state: Any, config: Any, u: Any, x: Any, every: int, scale: Any,
+    theta: Any, s: Any, y: Any, S: Any, P: Any,
+) -> None:  # fmt: skip
+    """Take records, on copies that nobody else can see: what is indexed by constants stays in registers.
+
+    The settings are `told` numbers.
+    """
+    now, settings = local(length), local(told)
+    for i in range(length):
+        now[i] = state[i]
+    for i in range(told):
+        settings[i] = config[i]
+    row, due = 0, every
+    for k in range(u.size):
+        if delayed is None:
+            kernel._take(now, settings, None, u[k], x[k], n)
         else:
-            _keep(state, config[kernel.HYSTERETIC], n, row, theta, s, y, S, P)
+            kernel._take(now, settings, state[length:], u[k], x[k], n)
+        due -= 1
+        if due == 0:
+            _keep(n, now, settings[kernel.HYSTERETIC], row, theta, s, y, S, P)
+            row, due = row + 1, every
+    for i in range(length):
+        state[i] = now[i]
 
+
+def constants(n: int, delayed: bool) -> tuple[Any, ...]:
+    """What a loop is specialised for: n, whether voltages are delayed, and where their line begins."""
+    return n, 1 if delayed else None, kernel.state_size(n)
+
+
+@OnDemand
+def steps(n: int, delayed: bool) -> Any:
+    """``steps[n, delayed](state, config, u, x)``: `step` for these; n is 0 if only `config` knows it."""
     if n == 0:
-        return in_place(kernel._sample, keep)
-    return in_registers(taken(n), keep, kernel.state_size(n), kernel.CONFIG + n, delayed)
+        return specialised(step_with_all, STEP_TYPES)
+    return specialised(step, STEP_TYPES, *constants(n, delayed))
+
+
+@OnDemand
+def runs(n: int, delayed: bool) -> Any:
+    """``runs[n, delayed]``: `run` for these, of `piezoest._jit.RUN_TYPES`."""
+    if n == 0:
+        return specialised(run_with_all, RUN_TYPES)
+    return specialised(run, RUN_TYPES, *constants(n, delayed), kernel.CONFIG + n)

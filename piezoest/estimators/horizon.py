@@ -7,10 +7,10 @@ from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST, FloatArray, integer, non_negative, positive
+from piezoest._jit import compiled
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators.arrival import moved_on
 from piezoest.estimators.base import EstimatorBase, Status, Trace
@@ -58,12 +58,12 @@ def _take(state: Any, u: float, x: float, ring_u: Any, ring_x: Any) -> None:
         state[LAST] = MISSED
 
 
-@njit("void(f8[::1], f8, f8, i8, i8)", cache=True)
+@compiled("void(f8[::1], f8, f8, i8, i8)")
 def _step(state: Any, u: float, x: float, start: int, length: int) -> None:
     _take(state, u, x, state[start : start + length], state[start + length : start + 2 * length])
 
 
-@njit(cache=True)
+@compiled()
 def _chunk(state: Any, u: Any, x: Any, start: int, length: int, y: Any) -> None:
     for k in range(u.size):
         _take(state, u[k], x[k], state[start : start + length], state[start + length : start + 2 * length])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -163,10 +163,6 @@ class OutputErrorRLS(Freezable):
             },
             np.concatenate([state, line]),
         )
-
-    def _loops(self) -> tuple[Any, Any]:
-        """Compiled functions that take a record, and propose a model, for the compiled ring of `track`."""
-        return kernel.run, kernel.propose
 
     def _sample(self, u: float, x: float) -> None:
         kernel.step(self._state, self._config, u, x)

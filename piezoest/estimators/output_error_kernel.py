@@ -9,18 +9,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import PROPOSE_TYPES, STEP_TYPES, UNCOUNTED
+from piezoest._jit import PROPOSE_TYPES, RUN_TYPES, STEP_TYPES, UNCOUNTED, compiled
 from piezoest.equations import kalman, least_squares
 from piezoest.equations import output_error as equations
 from piezoest.estimators import believing, swing
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as front
 from piezoest.estimators.delay_line import delayed
-from piezoest.estimators.record_loops import in_place, keep_outcome
+from piezoest.estimators.record_loops import keep_outcome
 
 # The filter's state: b, c and d in parts of the initial c, the loop's centre and the disturbance in
 # that times a volt.
@@ -260,22 +259,20 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
         model[3] = terms[0]
 
 
-@njit(PROPOSE_TYPES, cache=True)
+@compiled(PROPOSE_TYPES)
 def propose(state: Any, config: Any, terms: Any, model: Any) -> None:
     """Compiled `proposed`."""
     proposed(state, config, terms, model)
 
 
-@njit(STEP_TYPES, cache=True, **UNCOUNTED)
+@compiled(STEP_TYPES, nogil=True, **UNCOUNTED)
 def step(state: Any, config: Any, u: float, x: float) -> None:
     """Take one sample."""
     _sample(state, config, u, x)
 
 
 @register_jitable
-def _keep(
-    state: Any, config: Any, row: int, scale: Any, theta: Any, s: Any, y: Any, variance: Any, covariance: Any
-) -> None:
+def _keep(state: Any, row: int, s: Any, y: Any, variance: Any, covariance: Any) -> None:
     """Write a sample's outcome into the histories that have room; `s`: the filter's state, the member."""
     if s.size > 0:
         for i in range(SIZE):
@@ -286,4 +283,16 @@ def _keep(
     keep_outcome(row, innovation, S_now, state[P : P + SIZE * SIZE], SIZE, y, variance, covariance)
 
 
-run = in_place(_sample, _keep)
+@compiled(RUN_TYPES, nogil=True, **UNCOUNTED)
+def run(
+    state: Any, config: Any, u: Any, x: Any, every: int, scale: Any,
+    theta: Any, s: Any, y: Any, S: Any, P: Any,
+) -> None:  # fmt: skip
+    """Take records."""
+    row, due = 0, every
+    for k in range(u.size):
+        _sample(state, config, u[k], x[k])
+        due -= 1
+        if due == 0:
+            _keep(state, row, s, y, S, P)
+            row, due = row + 1, every

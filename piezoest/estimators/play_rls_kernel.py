@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import unrolled
+from piezoest._jit import RUN_TYPES, STEP_TYPES, UNCOUNTED, compiled, unrolled
 from piezoest.equations.mechanics import mechanics_step
 from piezoest.equations.turning_points import remember
 from piezoest.estimators import believing, swing
@@ -59,7 +58,7 @@ from piezoest.estimators.play_rls_layout import (
 )
 from piezoest.estimators.play_rls_layout import P as COVARIANCE
 from piezoest.estimators.play_rls_regressors import add_row, advance, new_window, output, regressor
-from piezoest.estimators.record_loops import in_place, keep_outcome, one_by_one
+from piezoest.estimators.record_loops import keep_outcome
 
 AT_REST = 8.0  # a window with less than this part of its travel is a dwell
 WAITING, UPDATED, MISSING, HOLDING, REJECTED = range(5)
@@ -155,7 +154,8 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
 
 
 @unrolled
-def _keep(state: Any, config: Any, row: int, scale: Any, theta: Any, s: Any, y: Any, S: Any, P: Any) -> None:
+def _keep(state: Any, config: Any, row: int, scale: Any, theta: Any, y: Any, S: Any, P: Any) -> None:
+    """Write a sample's outcome into the histories that have room."""
     size = int(config[N])
     now = state[int(config[THETA]) : int(config[THETA]) + size]
     kept = theta[row]
@@ -165,11 +165,28 @@ def _keep(state: Any, config: Any, row: int, scale: Any, theta: Any, s: Any, y: 
     keep_outcome(row, state[INNOVATION], state[VARIANCE], covariance, size, y, S, P)
 
 
-step = one_by_one(_sample)
-run = in_place(_sample, _keep)
+@compiled(STEP_TYPES, nogil=True, **UNCOUNTED)
+def step(state: Any, config: Any, u: float, x: float) -> None:
+    """Take one sample."""
+    _sample(state, config, u, x)
 
 
-@njit("void(f8[::1], f8[::1])", cache=True)
+@compiled(RUN_TYPES, nogil=True, **UNCOUNTED)
+def run(
+    state: Any, config: Any, u: Any, x: Any, every: int, scale: Any,
+    theta: Any, s: Any, y: Any, S: Any, P: Any,
+) -> None:  # fmt: skip
+    """Take records."""
+    row, due = 0, every
+    for k in range(u.size):
+        _sample(state, config, u[k], x[k])
+        due -= 1
+        if due == 0:
+            _keep(state, config, row, scale, theta, y, S, P)
+            row, due = row + 1, every
+
+
+@compiled("void(f8[::1], f8[::1])")
 def start(state: Any, config: Any) -> None:
     """Grid of a state that is all zero but for the grid's middle and half-width."""
     lay_grid(state, config)

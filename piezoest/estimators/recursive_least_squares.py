@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import FloatArray, array_1d, finite, integer, positive
-from piezoest._jit import UNCOUNTED, unrolled
+from piezoest._jit import UNCOUNTED, compiled, unrolled
 from piezoest.equations import least_squares as equations
 from piezoest.policies import (
     CovarianceResetting,
@@ -162,7 +161,7 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting:
 
 
 # Compiled when it is first called: few need it by itself.
-@njit(cache=True, **UNCOUNTED)
+@compiled(**UNCOUNTED)
 def _update(state: Any, config: Any, phi: Any, z: float, n: int) -> None:
     within = np.abs(z) < LARGEST
     for i in range(n):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -179,16 +179,12 @@ class HysteresisRLS(Freezable):
             state,
         )
 
-    def _loops(self) -> tuple[Any, Any]:
-        """Compiled functions that take a record, and propose a model, for the compiled ring of `track`."""
-        return rls_loops.run[self._kind], rls_model.propose
-
     def _sample(self, u: float, x: float) -> None:
-        rls_loops.step[self._kind](self._state, self._config, u, x)
+        rls_loops.steps[self._kind](self._state, self._config, u, x)
 
     def _absorb(self, u: FloatArray, x: FloatArray) -> None:
         u, x = self._records(u, x)
-        run, _ = self._loops()
+        run = rls_loops.runs[self._kind]
         run(self._state, self._config, u, x, u.size + 1, self._scale, NO_ROWS, NO_ROWS, NONE, NONE, NO_ROWS)
 
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
@@ -197,7 +193,7 @@ class HysteresisRLS(Freezable):
         y = np.empty(rows if "y" in want else 0)
         S = np.empty(rows if "S" in want else 0)
         P = np.empty((rows if "P" in want else 0, n * n))
-        run, _ = self._loops()
+        run = rls_loops.runs[self._kind]
         run(self._state, self._config, u, x, every, self._scale, theta, NO_ROWS, y, S, P)
         return Trace(
             index=np.arange(every - 1, rows * every, every),

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from piezoest._checks import FloatArray
-from piezoest._jit import PROPOSE_TYPES
+from piezoest._jit import PROPOSE_TYPES, compiled
 from piezoest.equations import admissible
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import level
@@ -78,7 +77,7 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
     model[3] = offset
 
 
-@njit(PROPOSE_TYPES, cache=True)
+@compiled(PROPOSE_TYPES)
 def propose(state: Any, config: Any, terms: Any, model: Any) -> None:
     """Compiled `proposed`."""
     proposed(state, config, terms, model)

@@ -6,9 +6,9 @@ import dataclasses
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 
 from piezoest._checks import FloatArray, finite, fraction
+from piezoest._jit import compiled
 from piezoest.identification import fit as fitting
 from piezoest.identification.result import Identification, Misfit, Whiteness
 from piezoest.models import LinearGain
@@ -185,7 +185,7 @@ def turning_voltages(data: fitting.Data) -> FloatArray:
     return turns[: _turns(data.u, TURN * data.extent, turns)]
 
 
-@njit(cache=True)
+@compiled()
 def _turns(u: Any, threshold: float, turns: Any) -> int:
     """Voltages at which u turns and then runs back by more than a threshold, into `turns`."""
     count, direction, extreme = 0, 0.0, u[0]

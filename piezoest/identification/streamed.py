@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 
 from piezoest._checks import FloatArray, fraction
+from piezoest._jit import compiled
 from piezoest.equations.coleman_hodgdon import hysteresis_step
 from piezoest.estimators.delay_line import delay_line, delayed
 from piezoest.identification import fit as fitting
@@ -259,7 +259,7 @@ class _Judge:
         return np.asarray(np.concatenate(self._points, axis=1)[3])
 
 
-@njit(cache=True)
+@compiled()
 def _run_free(
     u: Any, x: Any, numbers: Any, part: float, line: Any, state: Any, sums: Any, predicted: Any
 ) -> None:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numba import njit
 
 from piezoest._checks import FloatArray, array_1d, finite
+from piezoest._jit import compiled
 from piezoest.equations import admissible
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.models._base import Model
@@ -179,7 +179,7 @@ class ColemanHodgdon(Model):
         return u
 
 
-@njit(cache=True)
+@compiled()
 def _simulate(u: Any, w_h: float, a: float, b: float, c: float, offset: float, x: Any) -> None:
     for k in range(u.size):
         if k > 0:
@@ -187,7 +187,7 @@ def _simulate(u: Any, w_h: float, a: float, b: float, c: float, offset: float, x
         x[k] = c * u[k] + w_h + offset
 
 
-@njit(cache=True)
+@compiled()
 def _invert(r: Any, w_h: float, a: float, b: float, c: float, offset: float, u: Any) -> None:
     for k in range(r.size):
         if k == 0:

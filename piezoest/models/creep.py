@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, finite, integer, positive
+from piezoest._jit import compiled
 from piezoest.equations.creep import creep_step
 
 
@@ -158,7 +158,7 @@ class Creep:
         return x
 
 
-@njit(cache=True)
+@compiled()
 def _simulate(x: Any, z: Any, gains: Any, decays: Any) -> None:
     """`x` comes as w and goes as what creep adds to it; `z` is updated."""
     for k in range(x.size):

@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass
 from typing import Any, Self
 
 import numpy as np
-from numba import njit
 
 from piezoest._checks import FloatArray, array_1d, non_negative, positive
+from piezoest._jit import compiled
 from piezoest.equations.mechanics import mechanics_coefficients, mechanics_step
 
 
@@ -103,7 +103,7 @@ class MassSpringDamper:
         return x
 
 
-@njit(cache=True)
+@compiled()
 def _simulate(x: Any, state: Any, coefficients: Any) -> None:
     """`x` comes as f and goes as displacement; `state` is updated."""
     for k in range(x.size):

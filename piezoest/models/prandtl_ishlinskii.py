@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, finite, positive
+from piezoest._jit import compiled
 from piezoest.equations.bent_plays import bent_plays_step, prandtl_ishlinskii_voltage
 from piezoest.equations.creep import creep_to_come, unit_creep_step
 from piezoest.models._base import Model
@@ -363,7 +363,7 @@ def _bends(bends: Any, weights: Any, plays: int) -> tuple[FloatArray, FloatArray
     return bends, changes
 
 
-@njit(cache=True)
+@compiled()
 def _simulate(
     x: Any, y: Any, z: Any, gain: float, offset: float, thresholds: Any, weights: Any, gains: Any,
     decays: Any, bends: Any, changes: Any,
@@ -377,7 +377,7 @@ def _simulate(
         x[k] = w + offset
 
 
-@njit(cache=True)
+@compiled()
 def _invert(
     u: Any, y: Any, z: Any, gain: float, offset: float, thresholds: Any, weights: Any, gains: Any,
     decays: Any, bends: Any, changes: Any,

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, finite, positive
+from piezoest._jit import compiled
 from piezoest.equations.preisach import preisach_step
 from piezoest.models._base import Model
 from piezoest.models.prandtl_ishlinskii import rising_pair
@@ -149,7 +149,7 @@ class Preisach(Model):
         return x
 
 
-@njit(cache=True)
+@compiled()
 def _simulate(
     x: Any, y: Any, gain: float, thresholds: Any, weights: Any, centre: float, width: float, offset: float
 ) -> None:

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
 from numba.extending import register_jitable
 
-from piezoest._jit import UNCOUNTED
+from piezoest._jit import UNCOUNTED, compiled
 from piezoest.equations.coleman_hodgdon import hysteresis_step
 from piezoest.equations.creep import creep_step
 from piezoest.equations.mechanics import mechanics_step
@@ -93,7 +92,7 @@ def _measure(
         measured[k] = gauge_step(filter_state, line, x[k], noise[k * every], settings, coefficients)
 
 
-@njit("void(f8[::1], f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])", cache=True, **UNCOUNTED)
+@compiled("void(f8[::1], f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])", **UNCOUNTED)
 def run(
     state: Any,
     settings: Any,
@@ -146,7 +145,7 @@ def run(
     )
 
 
-@njit("UniTuple(f8, 2)(f8[::1], f8[::1], i8, i8, f8, f8, f8, f8)", cache=True, **UNCOUNTED)
+@compiled("UniTuple(f8, 2)(f8[::1], f8[::1], i8, i8, f8, f8, f8, f8)", **UNCOUNTED)
 def step(
     state: Any, settings: Any, plays: int, terms: int, u: float, noise: float, factor: float, shape: float
 ) -> tuple[float, float]:

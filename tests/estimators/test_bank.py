@@ -104,8 +104,8 @@ def test_warmup_says_how_long_it_took() -> None:
     pz.warmup(estimator, bank)
     assert 0.0 < pz.warmup(estimator, bank) < 10.0
     assert estimator.status.samples == bank.status[0].samples == 0
-    assert estimator._kind in rls_loops.step
-    assert estimator._kind in rls_loops.run
-    assert bank._kind in bank_kernel.kalman
+    assert estimator._kind in rls_loops.steps
+    assert estimator._kind in rls_loops.runs
+    assert (*bank._kind, True) in bank_kernel.kalman
     with pytest.raises(ValueError, match="used must be estimators of piezoest or an EstimatorBank, got int"):
         pz.warmup(3)

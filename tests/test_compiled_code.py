@@ -1,0 +1,301 @@
+"""Machine code that is kept on the disk is that of the function, of the present sources, or not run."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import os
+import pkgutil
+import shutil
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from numba import types
+from numba.core.dispatcher import Dispatcher
+
+import piezoest
+from piezoest import _jit
+
+PACKAGE = Path(piezoest.__file__).parent
+
+
+@_jit.compiled()
+def tripled(x: float) -> float:
+    return 3.0 * x
+
+
+def run(program: str, root: Path = PACKAGE.parent, **environment: str) -> str:
+    """What a program prints in a process of its own, with the package in `root`."""
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=root,
+        env={**os.environ, "PYTHONPATH": str(root), **environment},
+    )
+    assert done.returncode == 0, f"exit {done.returncode}\n{done.stderr}"
+    return done.stdout
+
+
+def modules() -> list[ModuleType]:
+    found = pkgutil.walk_packages([str(PACKAGE)], "piezoest.")
+    return [importlib.import_module(each.name) for each in found if not each.name.endswith("__main__")]
+
+
+def dispatchers() -> dict[str, Any]:
+    """Every compiled function of the package."""
+    found: dict[str, Any] = {}
+    for module in modules():
+        for value in vars(module).values():
+            if isinstance(value, Dispatcher):
+                found[f"{value.py_func.__module__}.{value.py_func.__qualname__}"] = value
+    return found
+
+
+def test_what_is_compiled_stands_at_module_level_and_takes_no_function() -> None:
+    found = dispatchers()
+    assert len(found) > 30
+    for name, dispatcher in found.items():
+        assert "<locals>" not in name
+        assert isinstance(dispatcher._cache, _jit._MachineCode), f"{name}: use piezoest._jit.compiled"
+        for signature in dispatcher.overloads:
+            assert not any(isinstance(kind, types.FunctionType | types.Dispatcher) for kind in signature), (
+                name
+            )
+
+    def inner(x: float) -> float:
+        return x
+
+    with pytest.raises(TypeError, match="inner must stand at module level"):
+        _jit.compiled()(inner)
+
+
+def functions_of(function: Any, found: set[Any]) -> set[Any]:
+    """Functions of the package that a compiled one can call, by the names in its code."""
+    function = inspect.unwrap(getattr(function, "py_func", function))
+    if function in found:
+        return found
+    found.add(function)
+    known, codes = function.__globals__, [function.__code__]
+    while codes:
+        code = codes.pop()
+        codes += [constant for constant in code.co_consts if inspect.iscode(constant)]
+        values = [known.get(name) for name in code.co_names]
+        owners = [value for value in values if isinstance(value, ModuleType)]
+        values += [getattr(owner, name, None) for owner in owners for name in code.co_names]
+        for value in values:
+            inner = getattr(value, "py_func", value)
+            if inspect.isfunction(inner) and inner.__module__.startswith("piezoest"):
+                functions_of(inner, found)
+    return found
+
+
+def test_sources_are_all_that_compiled_functions_are_made_of() -> None:
+    known = set(_jit.sources())
+    reached: set[Any] = set()
+    for dispatcher in dispatchers().values():
+        functions_of(dispatcher, reached)
+    assert len(reached) > 100
+    missing = {f"{Path(inspect.getfile(f)).name}: {f.__name__}" for f in reached} - {
+        f"{Path(inspect.getfile(f)).name}: {f.__name__}" for f in reached if Path(inspect.getfile(f)) in known
+    }
+    assert not missing
+    # ... and no more: files without any compiled function, but for constants.
+    for elsewhere in (
+        "bench/runner.py",
+        "cli/__init__.py",
+        "estimators/rls.py",
+        "estimators/base.py",
+        "tracking.py",
+    ):
+        assert PACKAGE / elsewhere not in known
+
+
+@pytest.fixture(scope="module")
+def copy_of_the_package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("copy")
+    shutil.copytree(PACKAGE, root / "piezoest", ignore=shutil.ignore_patterns("__pycache__"))
+    return root
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "changes"),
+    [
+        ("equations/coleman_hodgdon.py", "def inverse_increment", "# edited\ndef inverse_increment", True),
+        ("_checks.py", "WILDEST = 1e9", "WILDEST = 1e8", True),
+        ("compensators/layout.py", "VOLTAGE, W_H", "W_H, VOLTAGE", True),
+        ("estimators/rls_kernel.py", "LEAST = 1e-2", "LEAST = 2e-2", True),
+        ("bench/runner.py", "import", "# edited\nimport", False),
+        ("estimators/rls.py", "PAPER_MEMORY = 0.4", "PAPER_MEMORY = 0.5", False),
+        ("cli/__init__.py", "import", "# edited\nimport", False),
+    ],
+)
+def test_only_an_edit_of_a_source_makes_machine_code_anew(
+    copy_of_the_package: Path, file: str, old: str, new: str, changes: bool
+) -> None:
+    program = "from piezoest import _jit; print(_jit.digest())"
+    before = run(program, copy_of_the_package)
+    path = copy_of_the_package / "piezoest" / file
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    try:
+        assert (run(program, copy_of_the_package) != before) is changes
+    finally:
+        path.write_text(text, encoding="utf-8")
+
+
+@pytest.fixture
+def kept_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(_jit, "folder", lambda: tmp_path)
+    return tmp_path
+
+
+def compiled_anew() -> Any:
+    return _jit.compiled()(tripled.py_func)
+
+
+def test_a_damaged_file_is_compiled_anew(kept_in: Path) -> None:
+    assert compiled_anew()(2.0) == 6.0
+    (file,) = kept_in.iterdir()
+    whole = file.read_bytes()
+    for damaged in (b"", whole[:40], whole[:-1], whole[:200] + bytes([whole[200] ^ 1]) + whole[201:]):
+        file.write_bytes(damaged)
+        again = compiled_anew()
+        assert again(2.0) == 6.0
+        assert sum(again.stats.cache_hits.values()) == 0
+        assert file.read_bytes()[:32] != damaged[:32] or len(damaged) != len(whole)
+    again = compiled_anew()
+    assert again(2.0) == 6.0
+    assert sum(again.stats.cache_hits.values()) == 1
+    assert [path.name for path in kept_in.iterdir()] == [file.name]
+
+
+def test_other_sources_options_or_versions_are_compiled_anew(
+    kept_in: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled_anew()(2.0)
+    for name, value in (("digest", lambda: "another"), ("_own_source", lambda path: "another")):
+        with monkeypatch.context() as changed:
+            changed.setattr(_jit, name, value)
+            again = compiled_anew()
+            assert again(2.0) == 6.0
+            assert sum(again.stats.cache_hits.values()) == 0
+    other = _jit.compiled(error_model="numpy")(tripled.py_func)
+    assert other(2.0) == 6.0
+    assert sum(other.stats.cache_hits.values()) == 0
+
+
+def test_without_a_folder_that_can_be_written_all_works_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr("tempfile.TemporaryFile", refuse)
+    find: Any = inspect.unwrap(_jit.folder)
+    with pytest.warns(RuntimeWarning, match="name one in NUMBA_CACHE_DIR"):
+        assert find() is None
+    monkeypatch.setattr(_jit, "folder", lambda: None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert compiled_anew()(2.0) == 6.0
+
+
+def test_a_full_disk_leaves_nothing_behind(kept_in: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: Path, data: bytes) -> int:
+        with self.open("wb") as file:
+            file.write(data[:10])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert compiled_anew()(2.0) == 6.0
+    assert list(kept_in.iterdir()) == []
+
+
+MAKE = """
+import numpy as np
+import piezoest as pz
+FS, N = 20_000.0, 4
+MAKE = {
+    "RLS": lambda: pz.HysteresisRLS(FS),
+    "p": lambda: pz.HysteresisRLS(FS, memory=0.4),
+    "d": lambda: pz.HysteresisRLS(FS, delay=0.5),
+    "l": lambda: pz.HysteresisRLS(FS, initial_model=pz.LinearGain(0.15)),
+    "EKF": lambda: pz.HysteresisEKF(FS),
+}
+u = 20.0 * np.sin(2 * np.pi * (40.0 + np.arange(N)) * np.arange(60)[:, None] / FS)
+x = 0.15 * u + 0.2 * np.sin(0.3 * u)
+"""
+FILL = (
+    MAKE
+    + """
+single, bank = MAKE[{kind!r}](), pz.EstimatorBank(MAKE[{kind!r}](), N)
+single.step(0.0, 0.0); single.run(u[:, 0].copy(), x[:, 0].copy())
+bank.step(u[0], x[0]); bank.run(u, x)
+"""
+)
+COMPARE = (
+    MAKE
+    + """
+banks = {{kind: pz.EstimatorBank(MAKE[kind](), N) for kind in {order!r}}}
+singles = {{kind: [MAKE[kind]() for _ in range(N)] for kind in {order!r}}}
+for kind in {order!r}:
+    bank, single = banks[kind], singles[kind]
+    bank.step(u[0], x[0])
+    bank.run(u, x)
+    bank.step(u[1], x[1])
+    for c in range(N):
+        single[c].step(u[0, c], x[0, c])
+        single[c].run(u[:, c].copy(), x[:, c].copy())
+        single[c].step(u[1, c], x[1, c])
+        assert bank.channel(c).to_dict() == single[c].to_dict(), (kind, c)
+    track = pz.track(
+        pz.signals.triangle(5.0, 50.0, 1, FS), stage=pz.PaperStage(FS), estimator=MAKE[kind](),
+        compensator=pz.InverseCompensator(singles[kind][0].model),
+    )
+    assert np.all(np.isfinite(track.voltage))
+"""
+)
+
+
+@pytest.mark.slow
+def test_caches_of_many_processes_make_no_estimator_run_another_ones_code(tmp_path: Path) -> None:
+    kinds = ["RLS", "p", "d", "l", "EKF"]
+    for kind in kinds:
+        run(FILL.format(kind=kind), NUMBA_CACHE_DIR=str(tmp_path))
+    orders = [
+        ["EKF", "RLS", "EKF", "RLS"],
+        ["RLS", "p", "d", "l", "EKF", "RLS", "p", "d", "l", "EKF"],
+        ["EKF", "l", "d", "p", "RLS", "EKF"],
+        ["d", "EKF", "d", "RLS", "p"],
+        ["l", "RLS", "l", "EKF", "p", "d"],
+    ]
+    for order in orders:
+        run(COMPARE.format(order=order), NUMBA_CACHE_DIR=str(tmp_path))
+
+
+@pytest.mark.slow
+def test_an_edited_equation_is_run_by_a_plain_script(copy_of_the_package: Path) -> None:
+    program = (
+        "import numba; import piezoest as pz;"
+        "c = pz.InverseCompensator(pz.ColemanHodgdon(0.02, 0.12, 0.0036));"
+        "print([c.step(r) for r in (0.5, 1.0, 0.7)][-1])"
+    )
+    first = float(run(program, copy_of_the_package, NUMBA_CACHE_DIR=""))
+    assert float(run(program, copy_of_the_package, NUMBA_CACHE_DIR="")) == first
+    path = copy_of_the_package / "piezoest" / "equations" / "coleman_hodgdon.py"
+    text = path.read_text(encoding="utf-8")
+    body = text[text.index("def inverse_increment") :]
+    result = body[body.index("    return ") :].split("\n")[0]
+    path.write_text(
+        text.replace(result, result.replace("return ", "return 1.01 * (") + ")"), encoding="utf-8"
+    )
+    try:
+        assert float(run(program, copy_of_the_package, NUMBA_CACHE_DIR="")) != first
+    finally:
+        path.write_text(text, encoding="utf-8")
