@@ -241,6 +241,8 @@ def track(
             history.append(present.theta)
             names = present.parameter_names
             _feed(estimator, voltage[part], measured[part])
+            if not getattr(compensator, "hand_over_due", True):
+                continue
             model = estimator.model
             if supervisor is not None:
                 parts = reference[part], voltage[part], measured[part]

@@ -234,7 +234,7 @@ x = 0.15 * u + 0.2 * np.sin(0.3 * u)
 FILL = (
     MAKE
     + """
-single, bank = MAKE[{kind!r}](), pz.EstimatorBank(MAKE[{kind!r}](), N)
+single, bank = MAKE[KIND](), pz.EstimatorBank(MAKE[KIND](), N)
 single.step(0.0, 0.0); single.run(u[:, 0].copy(), x[:, 0].copy())
 bank.step(u[0], x[0]); bank.run(u, x)
 """
@@ -242,9 +242,9 @@ bank.step(u[0], x[0]); bank.run(u, x)
 COMPARE = (
     MAKE
     + """
-banks = {{kind: pz.EstimatorBank(MAKE[kind](), N) for kind in {order!r}}}
-singles = {{kind: [MAKE[kind]() for _ in range(N)] for kind in {order!r}}}
-for kind in {order!r}:
+banks = {kind: pz.EstimatorBank(MAKE[kind](), N) for kind in ORDER}
+singles = {kind: [MAKE[kind]() for _ in range(N)] for kind in ORDER}
+for kind in ORDER:
     bank, single = banks[kind], singles[kind]
     bank.step(u[0], x[0])
     bank.run(u, x)
@@ -267,7 +267,7 @@ for kind in {order!r}:
 def test_caches_of_many_processes_make_no_estimator_run_another_ones_code(tmp_path: Path) -> None:
     kinds = ["RLS", "p", "d", "l", "EKF"]
     for kind in kinds:
-        run(FILL.format(kind=kind), NUMBA_CACHE_DIR=str(tmp_path))
+        run(FILL.replace("KIND", repr(kind)), NUMBA_CACHE_DIR=str(tmp_path))
     orders = [
         ["EKF", "RLS", "EKF", "RLS"],
         ["RLS", "p", "d", "l", "EKF", "RLS", "p", "d", "l", "EKF"],
@@ -276,7 +276,7 @@ def test_caches_of_many_processes_make_no_estimator_run_another_ones_code(tmp_pa
         ["l", "RLS", "l", "EKF", "p", "d"],
     ]
     for order in orders:
-        run(COMPARE.format(order=order), NUMBA_CACHE_DIR=str(tmp_path))
+        run(COMPARE.replace("ORDER", repr(order)), NUMBA_CACHE_DIR=str(tmp_path))
 
 
 @pytest.mark.slow

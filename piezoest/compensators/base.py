@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any, Literal, Self
 
 import numpy as np
-from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST, FloatArray, array_1d, integer, positive
-from piezoest._jit import UNCOUNTED, compiled
+from piezoest.compensators import corridor, loop_inverse
 from piezoest.compensators.layout import (
     BY_PATH,
     CONFIG,
+    CORRIDOR,
     DECAY,
     INTEGRATED,
     LARGEST_STEP,
@@ -36,85 +36,14 @@ from piezoest.compensators.layout import (
     C,
 )
 from piezoest.compensators.limits import VoltageLimits
-from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations import recent_path
-from piezoest.equations.integrators import bogacki_shampine
 from piezoest.equations.turning_points import recall, remember
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
 
+DUE = CORRIDOR + corridor.DUE
+
 Method = Literal["closed-form", "bogacki-shampine"]
 HandOver = Literal["path", "place"]
-
-
-@register_jitable
-def _voltage(state: Any, config: Any, r: Any) -> Any:
-    """Voltage for the next reference sample; the state follows the voltage really given out."""
-    state[SAMPLES] += 1.0
-    u = state[VOLTAGE]
-    if not np.abs(r) < WILDEST:
-        state[MISSED] += 1.0
-        return u
-    a, b, c = config[A], config[B], config[C]
-    w_h = state[W_H]
-    state[OWED] *= config[DECAY]
-    dr = r - state[OWED] - (c * u + w_h + config[OFFSET])
-    if config[INTEGRATED] != 0.0:
-        w_next = bogacki_shampine(equations.inverse_rate, w_h, 1.0, (dr, a, b, c))
-        wanted = u + (dr - (w_next - w_h)) / c
-    else:
-        wanted = u + equations.inverse_increment(w_h, dr, a, b, c)
-        w_next = equations.hysteresis_step(w_h, wanted - u, a, b)
-    slewed = min(max(wanted, u - config[LARGEST_STEP]), u + config[LARGEST_STEP])
-    given = min(max(slewed, config[MINIMUM]), config[MAXIMUM])
-    state[SLEWED] += slewed != wanted
-    state[SATURATED] += given != slewed
-    state[LIMITED_NOW] = np.sign(wanted - given)
-    if given != wanted:
-        w_next = equations.hysteresis_step(w_h, given - u, a, b)
-    state[W_H] = w_next
-    state[VOLTAGE] = given
-    recent_path.follow(state, PATH, given)
-    remember(state, MEMORY, given)
-    return given
-
-
-@register_jitable
-def change_model(state: Any, config: Any, a: Any, b: Any, c: Any, offset: Any) -> None:
-    """Take another model without a bump: its w_h is found, the difference owed."""
-    expected = config[C] * state[VOLTAGE] + state[W_H] + config[OFFSET] + state[OWED]
-    if config[BY_PATH] != 0.0:
-        # What the path does not tell stays: the same model changes nothing.
-        untold = 0.0
-        if config[B] > 0.0:
-            untold = state[W_H] / config[B] - recent_path.hysteresis(state, PATH)
-        if b > 0.0:
-            recent_path.take_up(state, PATH, a)
-        place = a * (recent_path.hysteresis(state, PATH) + untold)
-    else:
-        place = state[W_H] * config[A] / config[B] if config[B] > 0.0 else 0.0
-    place = min(max(place, -1.0), 1.0)
-    config[A] = a
-    config[B] = b
-    config[C] = c
-    config[OFFSET] = offset
-    state[W_H] = place * b / a
-    state[OWED] = expected - (c * state[VOLTAGE] + state[W_H] + offset)
-
-
-@compiled("f8(f8[::1], f8[::1], f8)", **UNCOUNTED)
-def _step(state: Any, config: Any, r: float) -> Any:
-    return _voltage(state, config, r)
-
-
-@compiled("void(f8[::1], f8[::1], f8[::1], f8[::1])", **UNCOUNTED)
-def _run(state: Any, config: Any, r: Any, u: Any) -> None:
-    for k in range(r.size):
-        u[k] = _voltage(state, config, r[k])
-
-
-@compiled("void(f8[::1], f8[::1], f8, f8, f8, f8)")
-def _change_model(state: Any, config: Any, a: float, b: float, c: float, offset: float) -> None:
-    change_model(state, config, a, b, c, offset)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +85,14 @@ def _loop(model: Model) -> tuple[float, float, float, float]:
     return 1.0, 0.0, model.gain, model.offset
 
 
+def _slope(model: Model) -> float:
+    """Slope of a model from rest [µm/V], about."""
+    if isinstance(model, ColemanHodgdon):
+        return model.beta
+    assert isinstance(model, LinearGain | PrandtlIshlinskii)
+    return model.gain
+
+
 def _plays() -> Any:
     """Loops of a Prandtl-Ishlinskii model: loaded with the first one, for they take time to compile."""
     from piezoest.compensators import play_inverse
@@ -169,7 +106,7 @@ class Compensator:
     See `LinearCompensator` and `InverseCompensator`.
     """
 
-    __slots__ = ("_config", "_limits", "_model", "_projected", "_sample_rate", "_start", "_state")
+    __slots__ = ("_config", "_limits", "_model", "_projected", "_sample_rate", "_start", "_state", "_waiting")
 
     def __init__(
         self,
@@ -216,7 +153,7 @@ class Compensator:
         """Functions that a controller's code is generated from: voltage; change of model, or None."""
         if isinstance(self._model, PrandtlIshlinskii):
             return _plays().step, None
-        return _voltage, change_model
+        return loop_inverse.voltage, loop_inverse.change_model
 
     @property
     def _fixed(self) -> tuple[int, ...]:
@@ -234,6 +171,8 @@ class Compensator:
         recent_path.begin(self._state, PATH, self._limits.rest, self._config[A])
         remember(self._state, MEMORY, self._limits.rest)
         self._place(model, model)
+        self._waiting: Model | None = None
+        corridor.begin(self._state, CORRIDOR, self._limits.rest, self._expected(), _slope(model))
 
     def _accepts(self, model: Model) -> Model:
         """Return the model if it is of a kind this compensator can invert."""
@@ -285,6 +224,11 @@ class Compensator:
     def model(self) -> Model:
         """Model whose inverse is used. Setting it is bumpless.
 
+        It takes effect by travel: when the reference has moved by 1/64 of its recent swing since the last one
+        did, at once if it has, or has not moved at all; until then the model in use drives on, and of several
+        that are set the last one waits. Where models follow one another soon, the voltage stays in a corridor
+        around linear feed-forward (`piezoest.compensators.corridor`).
+
         The new model's w_h is found as `hand_over` says, and plays as the voltage's turning
         points have left them. What the new model makes of the present voltage differs
         from what the old one made of it; that difference is paid back exponentially over
@@ -296,7 +240,19 @@ class Compensator:
 
     @model.setter
     def model(self, model: Model) -> None:
-        model = self._accepts(model)
+        self._waiting = self._accepts(model)
+        if self.hand_over_due:
+            self._take_up_waiting()
+
+    @property
+    def hand_over_due(self) -> bool:
+        """Whether a model that is set now takes effect at once."""
+        return bool(self._state[DUE] != 0.0)
+
+    def _take_up_waiting(self) -> None:
+        """Use the model that was set last."""
+        model, self._waiting = self._waiting, None
+        assert model is not None
         if not _is_tame(model):
             # An estimator that ran away: what its model's inverse gives is no number.
             self._projected = True
@@ -308,7 +264,7 @@ class Compensator:
             model = model.nearest_admissible()
         before, self._model = self._model, model
         if not isinstance(model, PrandtlIshlinskii) and not isinstance(before, PrandtlIshlinskii):
-            _change_model(self._state, self._config, *_loop(model))
+            loop_inverse.change(self._state, self._config, *_loop(model))
             return
         self._model = before
         expected = self._expected() + self._state[OWED]
@@ -320,6 +276,7 @@ class Compensator:
             recent_path.take_up(self._state, PATH, a)
         self._state[W_H] = b * recent_path.hysteresis(self._state, PATH)
         self._state[OWED] = expected - self._expected()
+        corridor.hand_over(self._state, CORRIDOR)
 
     @property
     def limits(self) -> VoltageLimits:
@@ -361,9 +318,11 @@ class Compensator:
         float
             Voltage [V], within the limits.
         """
+        if self._waiting is not None and self._state[DUE] != 0.0:
+            self._take_up_waiting()
         if isinstance(self._model, PrandtlIshlinskii):
             return float(_plays().step(self._state, self._config, np.nan if r is None else r))
-        return _step(self._state, self._config, np.nan if r is None else r)
+        return loop_inverse.step(self._state, self._config, np.nan if r is None else r)
 
     def run(self, r: Any) -> FloatArray:
         """Voltages for a whole reference; continues from the current state, as a loop of `step`.
@@ -385,8 +344,12 @@ class Compensator:
         """
         r = array_1d("r", r, allow_nan=True)
         u = np.empty_like(r)
-        run = _plays().run if isinstance(self._model, PrandtlIshlinskii) else _run
-        run(self._state, self._config, r, u)
+        start = 0
+        while self._waiting is not None and start < r.size:
+            u[start] = self.step(float(r[start]))
+            start += 1
+        run = _plays().run if isinstance(self._model, PrandtlIshlinskii) else loop_inverse.run
+        run(self._state, self._config, r[start:], u[start:])
         return u
 
     def reset(self) -> None:

@@ -9,33 +9,14 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest._jit import UNCOUNTED, compiled
-from piezoest.compensators.layout import (
-    CONFIG,
-    DECAY,
-    LARGEST_STEP,
-    LIMITED_NOW,
-    MAXIMUM,
-    MEMORY,
-    MINIMUM,
-    MISSED,
-    OFFSET,
-    OWED,
-    PATH,
-    SAMPLES,
-    SATURATED,
-    SLEWED,
-    STATE,
-    VOLTAGE,
-    C,
-)
-from piezoest.equations import recent_path
+from piezoest.compensators.layout import CONFIG, DECAY, MISSED, OFFSET, OWED, SAMPLES, STATE, VOLTAGE, C
+from piezoest.compensators.voltage import limited, remember_voltage
 from piezoest.equations.bent_plays import (
     bent_plays_output,
     bent_plays_step,
     prandtl_ishlinskii_voltage,
 )
 from piezoest.equations.creep import creep_to_come, unit_creep_step
-from piezoest.equations.turning_points import remember
 
 # After the configuration that all models share: how many plays, creep terms and bends, then
 # thresholds, weights, creep gains, decays, bends and their weights.
@@ -50,25 +31,22 @@ def _voltage(
     """Voltage for the next reference sample; plays and creep follow the voltage really given out."""
     state[SAMPLES] += 1.0
     u = state[VOLTAGE]
-    if np.abs(r) < WILDEST:
+    known = np.abs(r) < WILDEST
+    held = share = 0.0
+    if known:
         state[OWED] *= config[DECAY]
         held, share = creep_to_come(z, gains, decays)
         w = (r - state[OWED] - config[OFFSET] - held) / (1.0 + share)
         wanted = prandtl_ishlinskii_voltage(y, u, w, config[C], thresholds, weights, bends, changes)
-        slewed = min(max(wanted, u - config[LARGEST_STEP]), u + config[LARGEST_STEP])
-        given = min(max(slewed, config[MINIMUM]), config[MAXIMUM])
-        state[SLEWED] += slewed != wanted
-        state[SATURATED] += given != slewed
-        state[LIMITED_NOW] = np.sign(wanted - given)
-        state[VOLTAGE] = given
-        recent_path.follow(state, PATH, given)
-        remember(state, MEMORY, given)
+        u = limited(state, config, r, wanted)
     else:
         state[MISSED] += 1.0
-    w = bent_plays_step(y, state[VOLTAGE], config[C], thresholds, weights, bends, changes)
+    w = bent_plays_step(y, u, config[C], thresholds, weights, bends, changes)
+    if known:
+        remember_voltage(state, u, w * (1.0 + share) + held + config[OFFSET])
     # Creep goes on while the voltage is held, too.
     unit_creep_step(z, w, decays)
-    return state[VOLTAGE]
+    return u
 
 
 @register_jitable

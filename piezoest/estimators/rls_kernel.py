@@ -55,6 +55,8 @@ NOISE_SAMPLES, PRECISION = 2000.0, 3e-3
 # Least alpha and beta of the model handed out, in parts of their initial values.
 LEAST = 1e-2
 OFF_CENTRE, LEAST_STEP, CEILING = 0.3, 1e-6, 1e4
+# What the slopes up and down differ by without an offset, as a fraction of them, and a level, of half a swing.
+SLOPES_DIFFER, LEVELS_DIFFER = 3e-3, 2e-2
 
 
 @unrolled
@@ -144,9 +146,17 @@ def _noise_memory(state: Any, config: Any) -> Any:
 
 @unrolled
 def trust_in_levels(state: Any, config: Any) -> Any:
-    """Part of the offset to take from levels: 0 with a good sensor, 1 where noise covers the changes of x."""
-    noise = _noise_memory(state, config) * (config[WALK] > 0.0) * level.is_known(state[LEVEL:FRONT])
-    return noise / (noise + config[WALK_MEMORY] * config[WALK_MEMORY] + SLOWEST)
+    """Fraction of the offset to take from levels: 0 where the derivative tells it well, 1 where it cannot.
+
+    It cannot where noise covers the changes of x, nor where the swing is small: the offset is then told by a
+    difference of the slopes up and down that is smaller than what the loop's shape differs from the model's.
+    """
+    if config[WALK] == 0.0:
+        return 0.0
+    memory_squared = config[WALK_MEMORY] * config[WALK_MEMORY]
+    by_slopes = SLOPES_DIFFER / (_decay(state, config) * LEVELS_DIFFER * 0.5 * state[SWING + swing.SIZE] + SLOWEST)
+    unknown = _noise_memory(state, config) + memory_squared * by_slopes * by_slopes
+    return unknown / (unknown + memory_squared + SLOWEST)
 
 
 @unrolled

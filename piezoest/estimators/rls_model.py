@@ -71,7 +71,9 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
         offset = equations.offset_from_rate_parameters(theta[0], theta[3])
         trust = kernel.trust_in_levels(state, config)
         if trust > 0.0:
-            levels = level.offset(state[kernel.LEVEL : kernel.FRONT], c - theta[1], c)
+            levels = 0.0  # the start's, until a whole period is known
+            if level.is_known(state[kernel.LEVEL : kernel.FRONT]):
+                levels = level.offset(state[kernel.LEVEL : kernel.FRONT], c - theta[1], c)
             offset = offset + trust * (levels - offset)
         offset = offset + centre
     model[3] = offset

@@ -9,6 +9,7 @@ import numpy as np
 from piezoest._checks import WILDEST, FloatArray, array_1d, integer
 from piezoest.compensators import Compensator
 from piezoest.compensators.adoption import adopt
+from piezoest.compensators.base import DUE
 from piezoest.models import Model
 
 # State of the ring: voltage given out last, whether there is one, samples since the last
@@ -40,7 +41,7 @@ def learn(
     ring[WAITED] += 1.0
     if ring[WAITED] >= interval:
         ring[WAITED] = 0.0
-        if ring[FROZEN] == 0.0:
+        if ring[FROZEN] == 0.0 and compensator[DUE] != 0.0:
             model = np.zeros(4)
             proposed(estimator, estimator_settings, terms, model)
             if adopt(compensator, settings, model, hysteretic, change):
@@ -134,7 +135,7 @@ class Controller:
             self._waited += 1
             if self._waited == self._interval:
                 self._waited = 0
-                if not self._frozen:
+                if not self._frozen and self._compensator.hand_over_due:
                     self._compensator.model = self._estimator.model
         self._voltage = self._compensator.step(r)
         return self._voltage

@@ -1,0 +1,131 @@
+"""The corridor that an adaptive voltage stays in, and when a model may be handed over.
+
+A model that is learnt from what its own inverse commands closes a loop, which can run away. Two things keep
+it from that. A model takes effect by travel: when the reference has moved by a fraction of its recent swing
+since the last one did. And since the hysteresis of a piezo stage is 10 to 20 % of its stroke, the voltage
+stays within a fraction of half the recent swing around a straight line, linear feed-forward, whose gain and
+centre follow the models' own from one turn of the reference to the next, but only so fast. A model that has
+driven for two turns or more was not learnt in such a loop: the line then goes through what it makes of them.
+
+Flat memory within a larger array, from `start` on: how often the reference has turned since the last
+hand-over, whether one came soon after another, direction of travel, furthest reference in it, where the
+present leg began, recent swing, present reference [µm], reference at the last hand-over, whether it is time
+for the next; the voltage at the furthest reference and at the turn before, and the displacement that the
+model had for them; gain and centre of the line, samples at which the corridor was in the way.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+(
+    TURNS, SOON, DIRECTION, FURTHEST, TURNED, SWING, PRESENT, HANDED, DUE,
+    U_FURTHEST, U_TURNED, X_FURTHEST, X_TURNED, GAIN, CENTRE, USED, SIZE,
+) = range(17)  # fmt: skip
+
+# Half-width, as a fraction of half the recent swing of the reference.
+WIDTH = 0.3
+# A model takes effect from this fraction of the recent swing on.
+HAND_OVER = 1.0 / 32.0
+# A way back is a turn from this fraction of the recent swing on; a leg takes this fraction of itself from it.
+TURN, FADES = 0.02, 0.5
+# How much the line's gain may change in a turn, and its centre, as a fraction of half the swing.
+LARGEST_RATIO, LARGEST_SHIFT = 1.25, 0.25
+
+
+@register_jitable
+def begin(path: Any, start: int, u: Any, x: Any, gain: Any) -> None:
+    """Begin at rest at voltage u, where the model has displacement x, with a line of this gain through it."""
+    for k in range(SIZE):
+        path[start + k] = 0.0
+    path[start + FURTHEST] = path[start + TURNED] = path[start + PRESENT] = path[start + HANDED] = x
+    path[start + U_FURTHEST] = path[start + U_TURNED] = u
+    path[start + X_FURTHEST] = path[start + X_TURNED] = x
+    path[start + GAIN] = gain
+    path[start + CENTRE] = x - gain * u
+    path[start + DUE] = 1.0
+
+
+@register_jitable
+def swing(path: Any, start: int) -> Any:
+    """Recent swing of the reference [µm]; before its first turn, twice the way so far."""
+    leg = np.abs(path[start + FURTHEST] - path[start + TURNED])
+    return max(path[start + SWING], leg) if path[start + SWING] > 0.0 else 2.0 * leg
+
+
+@register_jitable
+def kept(path: Any, start: int, r: Any, wanted: Any) -> Any:
+    """`wanted` kept within the corridor, where models follow one another soon; r is the next reference."""
+    path[start + PRESENT] = r
+    way = np.abs(r - path[start + HANDED])
+    recent = max(swing(path, start), np.abs(r - path[start + TURNED]))
+    # Before the first turn nobody knows how far a swing goes.
+    path[start + DUE] = max(path[start + DUE], (way >= HAND_OVER * recent) * 1.0)
+    if path[start + SOON] == 0.0:
+        return wanted
+    gain = path[start + GAIN]
+    line = (r - path[start + CENTRE]) / gain
+    half = np.abs(0.5 * WIDTH * recent / gain)
+    inside = min(max(wanted, line - half), line + half)
+    path[start + USED] += inside != wanted
+    return inside
+
+
+@register_jitable
+def follow(path: Any, start: int, u: Any, x: Any) -> None:
+    """Take the voltage given out, and the displacement x that the model expects of it."""
+    r = path[start + PRESENT]
+    way = r - path[start + FURTHEST]
+    if path[start + DIRECTION] * way >= 0.0:
+        if path[start + DIRECTION] == 0.0:
+            path[start + DIRECTION] = np.sign(way)
+        path[start + FURTHEST] = r
+        path[start + U_FURTHEST] = u
+        path[start + X_FURTHEST] = x
+    elif np.abs(way) > TURN * swing(path, start):
+        _turn(path, start)
+        path[start + DIRECTION] = -path[start + DIRECTION]
+        path[start + FURTHEST] = r
+        path[start + U_FURTHEST] = u
+        path[start + X_FURTHEST] = x
+
+
+@register_jitable
+def _turn(path: Any, start: int) -> None:
+    """Note the recent swing, and let the line follow what the model made of it."""
+    leg = np.abs(path[start + FURTHEST] - path[start + TURNED])
+    path[start + SWING] = max(leg, path[start + SWING] - FADES * leg)
+    u_0, u_1 = path[start + U_TURNED], path[start + U_FURTHEST]
+    x_0, x_1 = path[start + X_TURNED], path[start + X_FURTHEST]
+    gain = path[start + GAIN]
+    slope = (x_1 - x_0) / (u_1 - u_0) if u_1 != u_0 else gain
+    free = path[start + TURNS] >= 2.0 or path[start + SOON] == 0.0
+    if slope * gain > 0.0 and np.abs(slope) < 1e9:
+        ratio = slope / gain
+        if not free:
+            ratio = min(max(ratio, 1.0 / LARGEST_RATIO), LARGEST_RATIO)
+        gain = gain * ratio
+    shift = 0.5 * (x_0 + x_1 - gain * (u_0 + u_1)) - path[start + CENTRE]
+    if not free:
+        most = LARGEST_SHIFT * 0.5 * path[start + SWING]
+        shift = min(max(shift, -most), most)
+    path[start + GAIN] = gain
+    path[start + CENTRE] += shift
+    path[start + TURNS] += 1.0
+    path[start + TURNED] = path[start + FURTHEST]
+    path[start + U_TURNED] = u_1
+    path[start + X_TURNED] = x_1
+
+
+@register_jitable
+def hand_over(path: Any, start: int) -> None:
+    """Note that another model was handed over."""
+    moved = path[start + PRESENT] != path[start + HANDED] or path[start + TURNS] > 0.0
+    if moved:
+        path[start + SOON] = path[start + TURNS] < 2.0
+    path[start + TURNS] = 0.0
+    path[start + HANDED] = path[start + PRESENT]
+    path[start + DUE] = 0.0
