@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from piezoest._files import read_json, write_text
 from piezoest.bench.adaptation import json_safe
 from piezoest.bench.campaign import failures, keys_of, summarise
 from piezoest.bench.machine import fingerprint
@@ -109,7 +110,7 @@ def write(document: dict[str, Any], path: Path) -> None:
         To write to.
     """
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
+    write_text(path, text + "\n")
 
 
 def read(folder: Path) -> dict[str, Any]:
@@ -128,4 +129,7 @@ def read(folder: Path) -> dict[str, Any]:
     path = folder / DOCUMENT
     if not path.exists():
         raise ValueError(f"{folder} holds no {DOCUMENT}: no campaign of piezoest bench was finished there")
-    return dict(json.loads(path.read_text(encoding="utf-8")))
+    document = read_json(path)
+    if not isinstance(document, dict):
+        raise ValueError(f"{path} is no document of piezoest bench")
+    return document

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from piezoest._files import replacing
 from piezoest.bench.runner import COLUMNS, Row
 
 RUNS, PERIODS = "runs", "periods"
@@ -124,7 +125,7 @@ def _value(kind: type, text: str) -> Any:
 
 @contextlib.contextmanager
 def _csv(path: Path, columns: Mapping[str, type]) -> Iterator[Callable[[Row], None]]:
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(columns), extrasaction="ignore", lineterminator="\n")
         writer.writeheader()
         yield lambda row: writer.writerow(row)
@@ -138,7 +139,7 @@ def _parquet(path: Path, columns: Mapping[str, type]) -> Iterator[Callable[[Row]
     kinds = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_()}
     schema = pyarrow.schema([(name, kinds[kind]) for name, kind in columns.items()])
     batch: list[Row] = []
-    with parquet.ParquetWriter(path, schema) as writer:
+    with replacing(path) as temporary, parquet.ParquetWriter(temporary, schema) as writer:
 
         def flush() -> None:
             if batch:
