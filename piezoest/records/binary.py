@@ -15,7 +15,7 @@ import numpy as np
 
 from piezoest import _extras
 from piezoest._checks import FloatArray
-from piezoest.records.source import Rows, Source, check_size
+from piezoest.records.source import Rows, Source, check_size, shown
 
 EXTRA = "formats"
 COMPRESSED = 15  # mark of a compressed variable in a MATLAB file
@@ -30,7 +30,8 @@ def damaged(path: Path, format_: str) -> Iterator[None]:
         yield
     except Exception as error:
         # None of them keeps to exceptions of its own: IndexError, TypeError and MemoryError happen too.
-        raise ValueError(f"{path}: cannot be read as {format_}, it may be truncated: {error}") from None
+        reason = shown(str(error), 200)
+        raise ValueError(f"{path}: cannot be read as {format_}, it may be truncated: {reason}") from None
 
 
 def column(values: Any) -> FloatArray:
@@ -40,12 +41,13 @@ def column(values: Any) -> FloatArray:
     return numbers
 
 
-def one_number(value: Any) -> float | None:
-    """Sample rate that a file states [Hz]; None if it is not one number."""
+def stated_rate(value: Any) -> float | None:
+    """Sample rate that a file states [Hz]; None if it is not one number above zero."""
     try:
-        return float(np.asarray(value).reshape(()))
+        number = float(np.asarray(value).reshape(()))
     except (TypeError, ValueError, OverflowError):
         return None
+    return number if 0.0 < number < np.inf else None
 
 
 def row_numbers(start: int, count: int) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -82,7 +84,7 @@ class Table:
         shape = array.shape
         size = int(np.prod(shape))
         if size == 1 and self._leaf(name).lower() in RATES:
-            self.sample_rate = one_number(array[()])
+            self.sample_rate = stated_rate(array[()])
         elif len(shape) == 1 and size > 1:
             self._append(name, unit, array, None, 0)
         elif len(shape) == 2 and size > 1:
@@ -250,7 +252,7 @@ def open_parquet(path: Path) -> Source:
                     yield Rows(row_numbers(start, batch.num_rows), values)
                     start += batch.num_rows
             except (pyarrow.ArrowException, OSError, ValueError) as error:
-                raise ValueError(f"{path}: damaged behind row {start}: {error}") from None
+                raise ValueError(f"{path}: damaged behind row {start}: {shown(str(error), 200)}") from None
 
     return Source(path, names, with_units(names, units), len(names), read, sample_rate=_rate(schema.metadata))
 
@@ -282,5 +284,5 @@ def _rate(metadata: Mapping[bytes, bytes] | None) -> float | None:
     items: Iterable[tuple[bytes, bytes]] = (metadata or {}).items()
     for key, value in items:
         if key.decode(errors="replace").lower() in RATES:
-            return one_number(value)
+            return stated_rate(value)
     return None

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from piezoest import _extras
-from piezoest.records.binary import EXTRA, RATES, Table, one_number
+from piezoest.records.binary import EXTRA, RATES, Table, stated_rate
 from piezoest.records.source import Rows, Source, check_size, shown
 
 ONE_FILE = "save all columns in one file, for no other is opened"
@@ -41,12 +41,21 @@ def _table(h5py: Any, path: Path, file: Any) -> Table:
     table = Table(path, "/")
     for name, value in file.attrs.items():
         if name.lower() in RATES:
-            table.sample_rate = one_number(value)
-    file.visititems_links(lambda name, link: _check_link(h5py, path, name, link))
+            table.sample_rate = stated_rate(value)
+    # A link is followed by nobody here, but a column that is not found for it would be a riddle.
+    if outside := file.visititems_links(
+        lambda name, link: name if isinstance(link, h5py.ExternalLink) else None
+    ):
+        raise ValueError(f"{path}: {shown(outside)} lies in another file: {ONE_FILE}")
 
     def visit(name: str, item: Any) -> None:
         # MATLAB keeps what cells and objects refer to in these; its text is an array of numbers.
-        if name.startswith(("#refs#", "#subsystem#")) or not isinstance(item, h5py.Dataset):
+        # An array may also have no shape, and no values.
+        if (
+            name.startswith(("#refs#", "#subsystem#"))
+            or not isinstance(item, h5py.Dataset)
+            or item.shape is None
+        ):
             return
         _check_storage(path, name, item)
         if item.dtype.names:
@@ -59,11 +68,6 @@ def _table(h5py: Any, path: Path, file: Any) -> Table:
 
     file.visititems(visit)
     return table
-
-
-def _check_link(h5py: Any, path: Path, name: str, link: Any) -> None:
-    if isinstance(link, h5py.ExternalLink):
-        raise ValueError(f"{path}: {shown(name)} lies in another file, {shown(link.filename)}: {ONE_FILE}")
 
 
 def _check_storage(path: Path, name: str, dataset: Any) -> None:

@@ -77,14 +77,14 @@ def check_size(path: Path, size: int) -> None:
     held = path.stat().st_size
     if size > max(PLENTY, MOST_PACKED * held):
         raise ValueError(
-            f"{path}: a file of {held / 1e6:.3g} MB that declares {size / 1e6:.3g} MB of numbers is damaged, or "
-            "no log"
+            f"{path}: a file of {held / 1e6:.3g} MB that declares {size / 1e6:.3g} MB of numbers is damaged "
+            "or no log"
         )
 
 
-def shown(text: str) -> str:
-    """Text of a file for a message: its beginning, if it is long, and no control characters."""
-    text = text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 1]}…"
+def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
+    """Text of a file for a message: its beginning, if it is long, on one line, and nothing but signs."""
+    text = " ".join(text[:longest].split()) + ("…" if len(text) > longest else "")
     return "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text)
 
 

@@ -22,6 +22,8 @@ MISSING = frozenset({"", "nan", "-", "--", "na", "n/a", "#n/a", "null", "none", 
 HEAD_BYTES, HEAD_LINES = 1 << 16, 10_000
 # Characters of a line; more are no row of a log, and would fill the memory.
 LONGEST_LINE = 1 << 20
+# Characters that no text has, unless as UTF-16.
+CONTROL = frozenset(range(32)) - frozenset(b"\t\n\v\f\r\x1a\x1b")
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -77,7 +79,7 @@ def _encoding(path: Path) -> str:
         raw = file.read(HEAD_BYTES)
     if raw.startswith(UTF_16):
         return "utf-16"
-    if b"\0" in raw[:4096]:
+    if CONTROL.intersection(raw[:4096]):
         raise ValueError(
             f"{path}: this is not a text file: save the log as CSV, or name it by its format "
             "(.mat, .h5, .parquet, .npy, .npz)"
