@@ -19,6 +19,7 @@ from piezoest.bench.scenarios import SCENARIOS
 from piezoest.bench.store import Store
 
 DOCUMENT = "suite.json"
+HEAD = ("date", "machine", "versions", "code", "runs")
 # What is asked of the three numbers in the overview, each the median of its scenarios' medians.
 OVERVIEW = ("settled_max", "worst_error", "settling_time", "microseconds")
 
@@ -124,12 +125,14 @@ def read(folder: Path) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If there is none: the campaign is not finished.
+        If there is none, for the campaign is not finished, or if it holds something else.
     """
     path = folder / DOCUMENT
     if not path.exists():
         raise ValueError(f"{folder} holds no {DOCUMENT}: no campaign of piezoest bench was finished there")
     document = read_json(path)
-    if not isinstance(document, dict):
-        raise ValueError(f"{path} is no document of piezoest bench")
-    return document
+    if not isinstance(document, dict) or not isinstance(document.get("settings"), dict):
+        document = {}
+    if missing := [name for name in (*HEAD, "settings") if name not in document]:
+        raise ValueError(f"{path} is not what piezoest bench writes: it lacks {', '.join(missing)}")
+    return dict(document)

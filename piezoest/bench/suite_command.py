@@ -261,4 +261,6 @@ def _given(context: typer.Context) -> list[str]:
 
 
 def _side(document: dict[str, Any]) -> dict[str, Any]:
-    return {name: document[name] for name in ("date", "machine", "versions", "code", "runs")}
+    from piezoest.bench.suite import HEAD
+
+    return {name: document[name] for name in HEAD}

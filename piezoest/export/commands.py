@@ -141,7 +141,7 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
             )
         try:
             estimator = kind.from_dict(learnt)
-        except (KeyError, TypeError, AttributeError, ValueError) as error:
+        except (KeyError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
             reason = f"it lacks {error}" if isinstance(error, KeyError) else error
             raise ValueError(f"{path}: its estimator is not what to_dict() gave: {reason}") from None
     limits = data.get("limits") or {}
