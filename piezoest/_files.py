@@ -36,7 +36,9 @@ def replacing(path: str | Path) -> Iterator[Path]:
                 os.fsync(file.fileno())
             temporary.replace(target)
     except OSError as error:
-        if error.errno is not None and error.filename in (None, str(temporary)):
+        if error.errno is None:  # NumPy counts what it wrote
+            raise OSError(f"{path} cannot be written whole: {error}") from error
+        if error.filename in (None, str(temporary)):
             raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
         raise
     finally:
