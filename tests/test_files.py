@@ -93,7 +93,7 @@ OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
     ).write(path.parent),
     "waveform.csv": table,
     "suite.json": lambda path, seed: suite.write(columns(seed)["voltage_V"].tolist(), path),
-    "put.json": lambda path, seed: origin.put(columns(seed)["voltage_V"].tolist(), path),  # type: ignore[arg-type]
+    "put.json": lambda path, seed: origin.put(columns(seed)["voltage_V"].tolist(), path),
     "periods.csv": lambda path, seed: rows(path, seed, "csv"),
     "periods.parquet": lambda path, seed: rows(path, seed, "parquet"),
 }  # fmt: skip

@@ -39,14 +39,16 @@ class Store:
         return self
 
     def _look(self) -> None:
-        """Find the places of all rows."""
-        self._places.clear()
+        """Find the places of all rows that are there."""
+        places: dict[str, int] = {}
+        self._file.seek(0, os.SEEK_END)  # drops what was read before
         self._file.seek(0)
         place = 0
         for line in self._file:
             if (row := _read(line)) is not None:
-                self._places.setdefault(row["key"], place)
+                places.setdefault(row["key"], place)
             place += len(line)
+        self._places |= places
 
     def __exit__(
         self,
@@ -121,8 +123,6 @@ class Store:
 
     def _at(self, key: str) -> Row | None:
         """Row at the place of a key, if it is the key's."""
-        if key not in self._places:
-            return None
         self._file.seek(self._places[key])
         row = _read(self._file.readline())
         return row if row is not None and row["key"] == key else None
