@@ -191,7 +191,7 @@ def _pair(
         limits["sample_rate"] = rate
     try:
         voltage = VoltageLimits(**{name: value for name, value in limits.items() if value is not None})
-    except TypeError as error:
+    except (TypeError, OverflowError) as error:
         raise ValueError(f"{path}: limits: {error}") from None
     if isinstance(model, LinearGain):
         return estimator, LinearCompensator(model, voltage)
