@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from smoke import SAMPLE_RATE, TRUE, machine
 
 import piezoest as pz
+from piezoest._files import write_text
 from piezoest.estimators.batch import BatchFit
 from piezoest.estimators.horizon import MovingHorizon
 from piezoest.models.coleman_hodgdon import _simulate
@@ -203,7 +204,7 @@ def main() -> None:
             "rows": [asdict(row) for row in rows],
             "memory": [asdict(row) for row in memory],
         }
-        arguments.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+        write_text(arguments.json, json.dumps(document, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from scipy.optimize import minimize, minimize_scalar
 from smoke import machine
 
 import piezoest as pz
+from piezoest._files import write_text
 from piezoest.bench.adaptation import LIMITS
 
 FloatArray = NDArray[np.float64]
@@ -113,7 +114,7 @@ def main() -> None:
                 "periods": PERIODS,
                 "rows": [asdict(row) for row in rows],
             }
-            arguments.json.write_text(json.dumps(document, indent=1) + "\n")
+            write_text(arguments.json, json.dumps(document, indent=1) + "\n")
 
 
 if __name__ == "__main__":

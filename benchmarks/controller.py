@@ -18,6 +18,7 @@ import numpy as np
 from smoke import machine
 
 import piezoest as pz
+from piezoest._files import write_text
 from piezoest.bench.scenarios import SCENARIOS
 
 SAMPLES = 1_000_000
@@ -124,7 +125,7 @@ def main() -> int:
             )
     if arguments.json is not None:
         document = {"machine": machine(), "rows": rows}
-        arguments.json.write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        write_text(arguments.json, json.dumps(document, indent=2, ensure_ascii=False) + "\n")
     wrong = [
         row for row in rows
         if not (row["double_difference"] <= LARGEST_DIFFERENCE and within(row))

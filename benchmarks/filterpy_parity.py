@@ -18,6 +18,7 @@ import numpy as np
 from smoke import machine
 
 import piezoest as pz
+from piezoest._files import write_text
 
 SAMPLE_RATE = 50_000.0
 TRUE = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
@@ -78,7 +79,7 @@ def main() -> int:
     if arguments.json is not None:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
         document = {"machine": about, "seed": SEED, **figures}
-        arguments.json.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+        write_text(arguments.json, json.dumps(document, indent=2) + "\n")
     apart = [name for name, value in differences.items() if not value <= LARGEST_DIFFERENCE]
     if apart:
         print(f"\ndiffers from filterpy: {', '.join(apart)}", file=sys.stderr)

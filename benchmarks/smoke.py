@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from scipy.special import lambertw
 
 import piezoest as pz
+from piezoest._files import write_text
 
 FloatArray = NDArray[np.float64]
 
@@ -214,7 +215,7 @@ def main() -> int:
     if arguments.json is not None:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
         document = {"machine": about, "rows": [asdict(row) for row in rows]}
-        arguments.json.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+        write_text(arguments.json, json.dumps(document, indent=2) + "\n")
     apart = [row.name for row in rows if not row.relative_difference <= LARGEST_DIFFERENCE]
     if apart:
         print(f"\nnot the result of the NumPy loop: {', '.join(apart)}", file=sys.stderr)

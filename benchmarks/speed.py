@@ -22,6 +22,7 @@ from single_calls import Calls, calls, cold, disturbances
 from smoke import SAMPLE_RATE, START, TRUE
 
 import piezoest as pz
+from piezoest._files import save_figure, write_text
 from piezoest.bench.origin import origin
 
 NOISE, MEMORY, CUTOFF = 1.5e-3, 0.4, 2500.0
@@ -322,7 +323,7 @@ def draw(document: dict[str, Any], path: Path) -> None:
     axes[2].set_ylim(bottom=0.0)
     axes[2].legend(loc="lower left")
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
+    save_figure(figure, path, dpi=110)
 
 
 def main() -> int:
@@ -353,7 +354,7 @@ def main() -> int:
         )
     if arguments.json is not None:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
-        arguments.json.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+        write_text(arguments.json, json.dumps(document, indent=2) + "\n")
     if arguments.figure is not None:
         draw(document, arguments.figure)
     differences = document["relative_difference"]

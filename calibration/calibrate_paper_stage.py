@@ -31,6 +31,7 @@ import surrogate
 import targets
 
 import piezoest as pz
+from piezoest._files import write_text
 
 FOLDER = Path(__file__).parent
 STAGE = FOLDER.parent / "piezoest" / "stage" / "paper_stage.json"
@@ -155,7 +156,7 @@ def write_stage(chosen: dict[str, Any]) -> None:
             )
         },
     }
-    STAGE.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_text(STAGE, json.dumps(data, indent=1, ensure_ascii=False) + "\n")
 
 
 def write_report(steps: list[dict[str, Any]], chosen: dict[str, Any]) -> None:
@@ -181,10 +182,8 @@ def write_report(steps: list[dict[str, Any]], chosen: dict[str, Any]) -> None:
         "memory": ring.MEMORY,
         "steps": table,
     }
-    (FOLDER / "trade_off.json").write_text(
-        json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
-    (FOLDER / "trade_off.md").write_text(held_out.report(table), encoding="utf-8")
+    write_text(FOLDER / "trade_off.json", json.dumps(data, indent=1, ensure_ascii=False) + "\n")
+    write_text(FOLDER / "trade_off.md", held_out.report(table))
 
 
 if __name__ == "__main__":

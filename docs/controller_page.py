@@ -12,6 +12,8 @@ from typing import Any
 
 from paper_page import table, write_pieces
 
+from piezoest._files import save_figure
+
 DOCS = Path(__file__).resolve().parent
 TARGET = DOCS / "generated" / "controller"
 FIGURE = DOCS / "figures" / "controller" / "load.png"
@@ -117,7 +119,7 @@ def draw() -> None:
     axes.invert_yaxis()
     axes.legend(loc="lower right")
     FIGURE.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(FIGURE, dpi=130)
+    save_figure(figure, FIGURE, dpi=130)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from piezoest._files import write_text
 from piezoest.bench import paper_report as report
 
 DOCS = Path(__file__).resolve().parent
@@ -30,7 +31,7 @@ def write_pieces(target: Path, texts: dict[str, str]) -> None:
     for name, text in texts.items():
         path = target / f"{name}.inc"
         if not path.exists() or path.read_text(encoding="utf-8") != text:
-            path.write_text(text, encoding="utf-8")
+            write_text(path, text)
 
 
 def pieces(document: dict[str, Any]) -> dict[str, str]:

@@ -12,6 +12,8 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
+from piezoest._files import save_figure, write_text
+
 DOCS = Path(__file__).resolve().parent
 README = DOCS.parent / "README.md"
 FIGURE = DOCS / "figures" / "effect.png"
@@ -112,7 +114,7 @@ def draw(path: Path) -> None:
     for axes in (loop, series):
         axes.grid(alpha=0.3)
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
+    save_figure(figure, path, dpi=110)
 
 
 def main() -> None:
@@ -124,7 +126,7 @@ def main() -> None:
     if given.figure:
         draw(FIGURE)
     before, _, behind = parts(README.read_text(encoding="utf-8"))
-    README.write_text(before + figures() + behind, encoding="utf-8")
+    write_text(README, before + figures() + behind)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 import piezoest as pz
+from piezoest._files import save_figure
 from piezoest.bench.origin import origin, put
 
 FILE = Path("discrete_backlash_operator") / "test_1hz.csv"
@@ -72,8 +73,8 @@ def main() -> None:
         return
     document, found, choice = figures_of(given.data / FILE)
     put(document, given.json)
-    found.plot().savefig(given.figures / "real_data.png", dpi=90)
-    choice.plot().savefig(given.figures / "real_data_choice.png", dpi=90)
+    for name, drawn in (("real_data", found), ("real_data_choice", choice)):
+        save_figure(drawn.plot(), given.figures / f"{name}.png", dpi=90)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 import piezoest as pz
+from piezoest._files import save_figure
 from piezoest.bench.adaptation import in_parallel, jobs_for, summarise
 from piezoest.bench.origin import origin, put
 
@@ -187,7 +188,7 @@ def draw(document: dict[str, Any], path: Path) -> None:
         axes.grid(alpha=0.3, which="both")
         axes.legend(fontsize="small")
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
+    save_figure(figure, path, dpi=110)
 
 
 def main() -> None:

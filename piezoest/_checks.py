@@ -28,6 +28,8 @@ def finite(name: str, value: Any) -> float:
         raise ValueError(f"{name} must be one number, got {value!r}: pass a plain float")
     try:
         number = float(value)
+    except OverflowError:
+        raise ValueError(f"{name} must be a number of at most 1.8e308: check where it comes from") from None
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be one number, got {value!r}: pass a plain float") from None
     if not math.isfinite(number):
@@ -87,7 +89,7 @@ def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: 
         return value
     try:
         array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} must be numbers in shape (N,), got {type(value).__name__}") from None
     if np.ndim(value) == 0 or array.ndim != 1:
         shape = np.shape(value)

@@ -195,6 +195,8 @@ def test_mistakes_in_compensate(reference: Path) -> None:
         '{"model": ["a"]}': "no model",
         '{"model": "Foo"}': "Foo",
         '{"alpha": 1}': "describe",
+        "[" * 100_000: "nested too deeply",
+        json.dumps({**TRUE.to_dict(), "alpha": 10**400}): "alpha must be a number of at most",
     }
     for text, word in contents.items():
         Path("model.json").write_text(text)
@@ -203,6 +205,27 @@ def test_mistakes_in_compensate(reference: Path) -> None:
     write_columns("jump.csv", {"time_s": np.arange(40.0), "r_um": np.repeat([0.0, 1.0], 20)})
     refused(run("compensate", "jump.csv", *THETA, *out), "the reference jumps")
     assert not Path("voltage.csv").exists()
+
+
+def test_voltages_that_are_no_numbers_are_not_written(reference: Path) -> None:
+    Path("model.json").write_text(json.dumps({"model": "LinearGain", "gain": 5e-324}))
+    with np.errstate(all="ignore"):
+        result = run("compensate", reference, "-p", "model.json", "-o", "voltage.csv")
+    refused(result, "voltage.csv is not written: voltage_V has", "no finite numbers")
+    assert not Path("voltage.csv").exists()
+
+
+def test_a_disk_that_is_full_and_a_record_that_is_too_long(
+    log: Path, reference: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if Path("/dev/full").exists():
+        refused(run("compensate", reference, *THETA, "-o", "/dev/full"), "/dev/full: No space left")
+
+    def too_long(*_: object, **__: object) -> None:
+        raise MemoryError("Unable to allocate 8 TiB")
+
+    monkeypatch.setattr("piezoest.records.read_record", too_long)
+    refused(run("identify", log, "--no-plot"), "not enough memory: Unable to allocate 8 TiB")
 
 
 def test_nothing_is_written_over_what_was_read(log: Path, reference: Path) -> None:

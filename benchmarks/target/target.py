@@ -22,6 +22,7 @@ import numpy as np
 from cycles import count_cycles
 
 import piezoest as pz
+from piezoest._files import write_text
 from piezoest.bench.scenarios import SCENARIOS
 
 HERE = Path(__file__).resolve().parent
@@ -233,7 +234,7 @@ def main() -> int:
         )
     if arguments.json is not None:
         document = {"clock_Hz": CLOCK, "sample_rate_Hz": SAMPLE_RATE, "tools": tools(), "rows": rows}
-        arguments.json.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+        write_text(arguments.json, json.dumps(document, indent=2) + "\n")
     apart = [row for row in rows if not row["largest_difference_from_host"] < 1e-5]
     return 1 if apart else 0
 

@@ -10,8 +10,10 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from piezoest._errors import INTERRUPTED
+from piezoest._files import write_text
 from piezoest.bench.origin import origin
-from piezoest.bench.shared import INTERRUPTED, Html, check_html, json_target, progress, write_html
+from piezoest.bench.shared import Html, check_html, json_target, progress, write_html
 
 EPILOG = (
     "Examples: piezoest bench adaptation --scenario gain-step --seeds 20; "
@@ -107,7 +109,7 @@ def adaptation(
 
     print_report(document, Console())
     if target is not None:
-        target.write_text(text + "\n", encoding="utf-8")
+        write_text(target, text + "\n")
         typer.echo(f"JSON: {target}")
 
 

@@ -11,14 +11,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
+from piezoest._errors import INTERRUPTED, Group
+from piezoest._files import write_text
 from piezoest.bench import adaptation_command, rank_command, suite_command
 from piezoest.bench.origin import origin
-from piezoest.bench.shared import INTERRUPTED, Html, check_html, json_target, progress, write_html
+from piezoest.bench.shared import Html, check_html, json_target, progress, write_html
 
 if TYPE_CHECKING:
     from piezoest.bench.estimators import Row, Scenario
 
 app = typer.Typer(
+    cls=Group,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -78,7 +81,7 @@ def estimators(
         return
     _print(scenario, rows)
     if target is not None:
-        target.write_text(text + "\n", encoding="utf-8")
+        write_text(target, text + "\n")
         typer.echo(f"JSON: {target}")
 
 
@@ -151,7 +154,7 @@ def paper(
 
     print_report(document, Console())
     if target is not None:
-        target.write_text(text + "\n", encoding="utf-8")
+        write_text(target, text + "\n")
         typer.echo(f"JSON: {target}")
 
 

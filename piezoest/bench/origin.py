@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from piezoest._files import write_text
 from piezoest.bench.machine import describe_machine, versions
 
 
@@ -27,4 +28,4 @@ def put(document: dict[str, Any], path: Path | None) -> None:
     if path is None:
         print(text)
     else:
-        path.write_text(text + "\n", encoding="utf-8")
+        write_text(path, text + "\n")

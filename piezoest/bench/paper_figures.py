@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from piezoest._files import save_figure
 from piezoest.bench.paper import SWEPT, PaperResult
 from piezoest.bench.paper_experiment import PRBS, SETTLED, Run, last_periods
 from piezoest.models import ColemanHodgdon
@@ -39,7 +40,7 @@ def write_figures(result: PaperResult, folder: Path) -> list[Path]:
     written = []
     for name, figure in _figures(result):
         path = folder / f"{name}.png"
-        figure.savefig(path, dpi=DPI)
+        save_figure(figure, path, dpi=DPI)
         written.append(path)
     return written
 

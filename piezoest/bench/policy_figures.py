@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from piezoest._files import save_figure
 from piezoest.bench.combinations import COMBINATIONS, Combination
 from piezoest.bench.estimators import REFERENCE
 from piezoest.bench.metrics import SETTLED
@@ -49,7 +50,7 @@ def write_policies(document: Document, folder: Path) -> list[Path]:
         if there := [scenario for scenario in scenarios if scenario in document["scenarios"]]:
             paths.append(folder / f"{name}.png")
             # No version within, so that the same numbers give the same file.
-            transients(document, there).savefig(paths[-1], dpi=DPI, metadata={"Software": None})
+            save_figure(transients(document, there), paths[-1], dpi=DPI, metadata={"Software": None})
     return paths
 
 

@@ -10,8 +10,10 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from piezoest._errors import INTERRUPTED
+from piezoest._files import write_text
 from piezoest.bench.origin import origin
-from piezoest.bench.shared import INTERRUPTED, json_target, progress
+from piezoest.bench.shared import json_target, progress
 from piezoest.bench.suite_command import Dask, Jobs, Json, Scheduler
 
 FOLDER = Path("bench-results-ranking")
@@ -98,7 +100,7 @@ def rank(
         return
     _print(document, Console())
     if target is not None:
-        target.write_text(text + "\n", encoding="utf-8")
+        write_text(target, text + "\n")
         typer.echo(f"JSON: {target}")
 
 

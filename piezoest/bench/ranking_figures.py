@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from piezoest._files import save_figure
 from piezoest.bench.estimators import REFERENCE
 from piezoest.bench.recorded import file_of
 
@@ -65,7 +66,7 @@ def _write(drawings: dict[str, Callable[[Document], Figure]], document: Document
     for name, draw in drawings.items():
         paths.append(folder / f"{name}.png")
         # No date nor version within, so that the same numbers give the same file.
-        draw(document).savefig(paths[-1], dpi=DPI, metadata={"Software": None})
+        save_figure(draw(document), paths[-1], dpi=DPI, metadata={"Software": None})
     return paths
 
 

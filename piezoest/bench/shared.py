@@ -13,8 +13,6 @@ from rich.console import Console
 
 from piezoest import _extras
 
-INTERRUPTED = 130
-
 Html = Annotated[
     Path | None, typer.Option("--html", metavar="FILE", help="Write a page with interactive plots.")
 ]

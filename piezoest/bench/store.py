@@ -1,12 +1,14 @@
 """Where the rows of runs are kept: one JSON line each, appended as it comes, and found by its key.
 
-A process that is killed leaves at most its last line torn; the next one to open the file goes on
-from there. A key that comes twice counts once.
+A process that is killed leaves at most its last line torn; the next to append goes on below. Several
+processes may append to one file. A key that comes twice counts once.
 """
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import TracebackType
@@ -30,16 +32,23 @@ class Store:
 
     def __enter__(self) -> Self:
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        self._file: BinaryIO = self._path.open("a+b")
+        # Unbuffered: what is written comes to the end of the file in one piece, whoever else appends to it.
+        self._end = self._path.open("ab", buffering=0)
+        self._file: BinaryIO = self._path.open("rb")
+        self._look()
+        return self
+
+    def _look(self) -> None:
+        """Find the places of all rows that are there."""
+        places: dict[str, int] = {}
+        self._file.seek(0, os.SEEK_END)  # drops what was read before
         self._file.seek(0)
-        line, place = b"\n", 0
+        place = 0
         for line in self._file:
             if (row := _read(line)) is not None:
-                self._places.setdefault(row["key"], place)
+                places.setdefault(row["key"], place)
             place += len(line)
-        if not line.endswith(b"\n"):
-            self._file.write(b"\n")  # after a torn line
-        return self
+        self._places |= places
 
     def __exit__(
         self,
@@ -48,6 +57,7 @@ class Store:
         traceback: TracebackType | None,
     ) -> None:
         self._file.close()
+        self._end.close()
 
     def __contains__(self, key: str) -> bool:
         return key in self._places
@@ -62,14 +72,30 @@ class Store:
         ----------
         row : dict
             JSON-safe, with a ``"key"``.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written whole; what of it was written counts for nothing.
         """
         if row["key"] in self._places:
             return False
-        self._file.seek(0, 2)
-        self._places[row["key"]] = self._file.tell()
-        self._file.write(json.dumps(row, allow_nan=False, ensure_ascii=False).encode() + b"\n")
-        self._file.flush()
+        line = json.dumps(row, allow_nan=False, ensure_ascii=False).encode() + b"\n"
+        whole = b"\n" + line if self._torn() else line
+        try:
+            if self._end.write(whole) < len(whole):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self._path)) from None
+        # Where the writing ended, not where the file ended before: another process may have appended then.
+        self._places[row["key"]] = self._end.tell() - len(line)
         return True
+
+    def _torn(self) -> bool:
+        """Whether the last line is not whole: of a process that was killed, or that is writing just now."""
+        size = self._file.seek(0, os.SEEK_END)
+        self._file.seek(max(size - 1, 0))
+        return self._file.read(1) not in (b"", b"\n")
 
     def rows(self, keys: Iterable[str]) -> Iterator[Row]:
         """Rows of these keys, in their order; a key without one is left out.
@@ -78,19 +104,34 @@ class Store:
         ----------
         keys : iterable of str
             From `piezoest.bench.runner.Task.key`.
+
+        Raises
+        ------
+        ValueError
+            If a row that was there is no longer.
         """
         for key in keys:
-            if key in self._places:
-                self._file.seek(self._places[key])
-                row = _read(self._file.readline())
-                if row is not None:
-                    yield row
+            if key not in self._places:
+                continue
+            if (row := self._at(key)) is None:
+                # Lines have moved, as by an editor.
+                self._look()
+                row = self._at(key)
+            if row is None:
+                raise ValueError(f"{self._path}: the run {key} is gone from it: start the command again")
+            yield row
+
+    def _at(self, key: str) -> Row | None:
+        """Row at the place of a key, if it is the key's."""
+        self._file.seek(self._places[key])
+        row = _read(self._file.readline())
+        return row if row is not None and row["key"] == key else None
 
 
 def _read(line: bytes) -> dict[str, Any] | None:
     """Row of a whole line; None of a torn one."""
     try:
         row = json.loads(line)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
-    return row if isinstance(row, dict) and "key" in row else None
+    return row if isinstance(row, dict) and isinstance(row.get("key"), str) else None

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from piezoest._files import read_json, write_text
 from piezoest.bench.adaptation import json_safe
 from piezoest.bench.campaign import failures, keys_of, summarise
 from piezoest.bench.machine import fingerprint
@@ -18,6 +19,7 @@ from piezoest.bench.scenarios import SCENARIOS
 from piezoest.bench.store import Store
 
 DOCUMENT = "suite.json"
+HEAD = ("date", "machine", "versions", "code", "runs")
 # What is asked of the three numbers in the overview, each the median of its scenarios' medians.
 OVERVIEW = ("settled_max", "worst_error", "settling_time", "microseconds")
 
@@ -109,7 +111,7 @@ def write(document: dict[str, Any], path: Path) -> None:
         To write to.
     """
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8")
+    write_text(path, text + "\n")
 
 
 def read(folder: Path) -> dict[str, Any]:
@@ -123,9 +125,14 @@ def read(folder: Path) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If there is none: the campaign is not finished.
+        If there is none, for the campaign is not finished, or if it holds something else.
     """
     path = folder / DOCUMENT
     if not path.exists():
         raise ValueError(f"{folder} holds no {DOCUMENT}: no campaign of piezoest bench was finished there")
-    return dict(json.loads(path.read_text(encoding="utf-8")))
+    document = read_json(path)
+    if not isinstance(document, dict) or not isinstance(document.get("settings"), dict):
+        document = {}
+    if missing := [name for name in (*HEAD, "settings") if name not in document]:
+        raise ValueError(f"{path} is not what piezoest bench writes: it lacks {', '.join(missing)}")
+    return dict(document)

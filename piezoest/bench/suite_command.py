@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
+from piezoest._errors import INTERRUPTED
+from piezoest._files import write_text
 from piezoest.bench.origin import origin
-from piezoest.bench.shared import INTERRUPTED, Html, check_html, json_target, progress, write_html
+from piezoest.bench.shared import Html, check_html, json_target, progress, write_html
 
 if TYPE_CHECKING:
     from piezoest.bench.campaign import Execute
@@ -197,7 +199,7 @@ def compare(
 
         print_changes(document, Console(), everything=everything)
         if target is not None:
-            target.write_text(text + "\n", encoding="utf-8")
+            write_text(target, text + "\n")
             typer.echo(f"JSON: {target}")
     if fail_if_worse and document["counts"].get("worse"):
         raise typer.Exit(WORSE)
@@ -259,4 +261,6 @@ def _given(context: typer.Context) -> list[str]:
 
 
 def _side(document: dict[str, Any]) -> dict[str, Any]:
-    return {name: document[name] for name in ("date", "machine", "versions", "code", "runs")}
+    from piezoest.bench.suite import HEAD
+
+    return {name: document[name] for name in HEAD}

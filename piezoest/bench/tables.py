@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from piezoest._files import replacing
 from piezoest.bench.runner import COLUMNS, Row
 
 RUNS, PERIODS = "runs", "periods"
@@ -96,7 +97,7 @@ def read_runs(folder: Path) -> list[Row]:
     Raises
     ------
     ValueError
-        If there is none.
+        If there is none, or it is damaged.
     """
     found = [path for format in FORMATS if (path := folder / f"{RUNS}.{format}").exists()]
     if not found:
@@ -104,14 +105,26 @@ def read_runs(folder: Path) -> list[Row]:
             f"{folder} holds no {RUNS}.{' or .'.join(FORMATS)}: is it a folder of piezoest bench?"
         )
     newest = max(found, key=lambda path: path.stat().st_mtime_ns)
-    if newest.suffix == ".csv":
-        with newest.open(newline="", encoding="utf-8") as file:
-            return [_typed(row) for row in csv.DictReader(file)]
+    if newest.suffix == ".parquet" and default_format() == "csv":
+        raise ValueError(f"{newest}: reading it needs pyarrow, pip install 'piezoest[formats]'")
     try:
-        import pyarrow.parquet as parquet
-    except ImportError:
-        raise ValueError(f"{newest}: reading it needs pyarrow, pip install 'piezoest[formats]'") from None
-    return list(parquet.read_table(newest).to_pylist())
+        rows = (_read_csv if newest.suffix == ".csv" else _read_parquet)(newest)
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
+        raise ValueError(f"{newest} is damaged: {error}") from None
+    if missing := sorted(set(COLUMNS).difference(*rows[:1])):
+        raise ValueError(f"{newest} lacks {', '.join(missing)}: let the same command write it again")
+    return rows
+
+
+def _read_csv(path: Path) -> list[Row]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return [_typed(row) for row in csv.DictReader(file)]
+
+
+def _read_parquet(path: Path) -> list[Row]:
+    import pyarrow.parquet as parquet
+
+    return list(parquet.read_table(path).to_pylist())
 
 
 def _typed(cells: Mapping[str, str]) -> Row:
@@ -124,7 +137,7 @@ def _value(kind: type, text: str) -> Any:
 
 @contextlib.contextmanager
 def _csv(path: Path, columns: Mapping[str, type]) -> Iterator[Callable[[Row], None]]:
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(columns), extrasaction="ignore", lineterminator="\n")
         writer.writeheader()
         yield lambda row: writer.writerow(row)
@@ -138,7 +151,7 @@ def _parquet(path: Path, columns: Mapping[str, type]) -> Iterator[Callable[[Row]
     kinds = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_()}
     schema = pyarrow.schema([(name, kinds[kind]) for name, kind in columns.items()])
     batch: list[Row] = []
-    with parquet.ParquetWriter(path, schema) as writer:
+    with replacing(path) as temporary, parquet.ParquetWriter(temporary, schema) as writer:
 
         def flush() -> None:
             if batch:

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
+from piezoest._errors import INTERRUPTED
 from piezoest.bench.commands import app as bench
 from piezoest.cli import compensate_command, demo_command, identify_command
-from piezoest.cli.shared import INTERRUPTED
 from piezoest.export.commands import app as export
 
 __all__ = ["app", "main"]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from piezoest.cli.shared import Debug, check_writable, errors, progress
+from piezoest._errors import errors
+from piezoest._files import read_json
+from piezoest.cli.shared import Debug, check_writable, progress
 
 if TYPE_CHECKING:
     from piezoest.models import Model
@@ -70,7 +71,7 @@ def compensate(
             check_continuity(signal.values, signal.sample_rate, "the reference")
             voltage = compensator.run(signal.values)
             columns = {"time_s": signal.time, "voltage_V": voltage, "reference_um": signal.values}
-            write_columns(output, columns)
+            write_columns(output, columns, allow_nan=False)
         typer.echo(
             f"{output}: {voltage.size} samples at {signal.sample_rate:.6g} Hz, "
             f"{voltage.min():.4g} to {voltage.max():.4g} V"
@@ -96,10 +97,7 @@ def _model(path: Path | None, given: dict[str, float | None], offset: float | No
         return ColemanHodgdon(**stated, offset=offset or 0.0)
     if stated:
         raise ValueError(f"two models: leave out --parameters or --{' --'.join(stated)}")
-    try:
-        data: Any = json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path} is not JSON: {error}") from None
+    data = read_json(path)
     if isinstance(data, dict) and isinstance(data.get("model"), dict):
         data = data["model"]
     if not isinstance(data, dict) or not isinstance(data.get("model", ""), str):

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from piezoest.cli.shared import Debug, check_figure, errors, progress
+from piezoest._errors import errors
+from piezoest._files import save_figure
+from piezoest.cli.shared import Debug, check_figure, progress
 
 if TYPE_CHECKING:
     from piezoest.demo import Demo
@@ -35,7 +37,7 @@ def demo(
 
             result = run_demo(periods, seed, say)
             say("drawing")
-            result.plot().savefig(output, dpi=130)
+            save_figure(result.plot(), output, dpi=130)
         _print_demo(result)
         typer.echo(f"Figure: {output}")
 

@@ -9,7 +9,9 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from piezoest.cli.shared import Debug, check_figure, check_outputs, errors, progress
+from piezoest._errors import errors
+from piezoest._files import save_figure, write_text
+from piezoest.cli.shared import Debug, check_figure, check_outputs, progress
 
 EPILOG = "Example: piezoest identify log.csv --columns voltage=drive_mV,displacement=3 --output model.json"
 
@@ -102,16 +104,14 @@ def identify(
             found = fit(record, train=train, delay=lag)
             if figure is not None:
                 say("drawing")
-                found.plot().savefig(figure, dpi=130)
+                save_figure(found.plot(), figure, dpi=130)
             if html is not None:
                 say("drawing")
                 from piezoest.report import write_report
 
                 write_report(found, html)
         if output is not None:
-            output.write_text(
-                json.dumps(found.to_dict(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
-            )
+            write_text(output, json.dumps(found.to_dict(), indent=2, ensure_ascii=False) + "\n")
         if as_json:
             typer.echo(json.dumps(found.to_dict(), indent=2, allow_nan=False))
             return

@@ -1,10 +1,8 @@
-"""What the commands share: errors on one line, progress, and checks of what is to be written."""
+"""What the commands share: progress, and checks of what is to be written."""
 
 from __future__ import annotations
 
 import contextlib
-import os
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated
@@ -12,36 +10,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from piezoest._extras import MissingExtraError
-
-USER_ERROR, INTERRUPTED = 1, 130
 FIGURE_FORMATS = (".png", ".pdf", ".svg", ".jpg", ".jpeg")
 
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
-
-
-@contextlib.contextmanager
-def errors(debug: bool) -> Iterator[None]:
-    """Turn a user's mistake into one line on stderr and exit code 1."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        raise typer.Exit(INTERRUPTED) from None
-    except BrokenPipeError:
-        # Whoever read us has seen enough; Python must not complain about it at its end either.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise typer.Exit(0) from None
-    except (ValueError, OSError, MissingExtraError) as error:
-        if debug:
-            raise
-        text = (
-            f"{error.filename}: {error.strerror}"
-            if isinstance(error, OSError) and error.filename
-            else str(error)
-        )
-        console = Console(stderr=True)
-        console.print(f"error: {text}", style="red", markup=False, highlight=False, soft_wrap=True)
-        raise typer.Exit(USER_ERROR) from None
 
 
 @contextlib.contextmanager

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from piezoest._checks import integer
+from piezoest._files import write_text
 from piezoest._version import __version__
 from piezoest.compensators import Compensator
 from piezoest.compensators.adoption import adopt
@@ -68,7 +69,7 @@ class CCode:
         folder.mkdir(parents=True, exist_ok=True)
         paths = folder / f"{self.name}.h", folder / f"{self.name}.c"
         for path, content in zip(paths, (self.header, self.source), strict=True):
-            path.write_text(content, encoding="utf-8")
+            write_text(path, content)
         return paths
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
 from piezoest._checks import positive
+from piezoest._files import replacing
 from piezoest._version import __version__
 from piezoest.compensators import Compensator
 from piezoest.export.c_code import CCode, Precision, c
@@ -93,7 +94,7 @@ def fmu(
         binary = folder / f"{name}{suffix}"
         build_shared(folder, [f"{name}.c", "fmi2.c"], binary, "-fvisibility=hidden")
         files[f"binaries/{platform_folder}/{name}{suffix}"] = binary.read_bytes()
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with replacing(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         for inside, content in files.items():
             entry = zipfile.ZipInfo(inside, _DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED

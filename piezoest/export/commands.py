@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
+
+from piezoest._errors import errors
+from piezoest._files import read_json
 
 if TYPE_CHECKING:
     from piezoest.models import Model
@@ -41,21 +40,6 @@ Precision = Annotated[str, typer.Option(help="double or float.")]
 Interval = Annotated[int, typer.Option(min=1, help="Samples between two changes of the model.")]
 
 
-@contextlib.contextmanager
-def _errors() -> Iterator[None]:
-    """A user's mistake as one line on stderr and exit code 1."""
-    try:
-        yield
-    except (ValueError, OSError) as error:
-        text = str(error)
-        if isinstance(error, OSError) and error.filename:
-            text = f"{error.filename}: {error.strerror}"
-        Console(stderr=True).print(
-            f"error: {text}", style="red", markup=False, highlight=False, soft_wrap=True
-        )
-        raise typer.Exit(1) from None
-
-
 @app.callback()
 def _export() -> None:
     """Take a model or an estimator to a controller: C, co-simulation unit, tables."""
@@ -78,7 +62,7 @@ def c(
     update_interval: Interval = 50,
 ) -> None:
     """Write a controller in C99: one header, one source, no allocation."""
-    with _errors():
+    with errors():
         from piezoest.export.c_code import c as generate
 
         pair = _pair(source, estimator, sample_rate, minimum, maximum, slew_rate)
@@ -104,7 +88,7 @@ def fmu(
     update_interval: Interval = 50,
 ) -> None:
     """Write a co-simulation unit (FMI 2.0), with sources and the binary for this computer."""
-    with _errors():
+    with errors():
         from piezoest.export.co_simulation import fmu as generate
 
         pair = _pair(source, estimator, sample_rate, minimum, maximum, slew_rate)
@@ -127,7 +111,7 @@ def table(
     sample_rate: Annotated[float | None, typer.Option(help="Hz, if there is no column of time.")] = None,
 ) -> None:
     """Write the settled voltage of a periodic reference and the branches of its loop as CSV."""
-    with _errors():
+    with errors():
         from piezoest.export.tables import table as generate
         from piezoest.records import read_reference
 
@@ -143,10 +127,7 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
     from piezoest.estimators.rls import HysteresisRLS
     from piezoest.models import model_from_dict
 
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path} is not JSON: {error}") from None
+    data = read_json(path)
     if not isinstance(data, dict):
         raise ValueError(f"{path} holds no model: write it with identify --output")
     learnt = data if isinstance(data.get("estimator"), str) else data.get("estimator")
@@ -158,18 +139,25 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
             raise ValueError(
                 f"{path}: estimator must be one of {sorted(kinds)}, got {learnt.get('estimator')!r}"
             )
-        estimator = kind.from_dict(learnt)
+        try:
+            estimator = kind.from_dict(learnt)
+        except (KeyError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
+            reason = f"it lacks {error}" if isinstance(error, KeyError) else error
+            raise ValueError(f"{path}: its estimator is not what to_dict() gave: {reason}") from None
+    limits = data.get("limits") or {}
+    if not isinstance(limits, dict):
+        raise ValueError(f'{path}: limits must be names with numbers, such as {{"maximum": 150}}')
     inner = data.get("model")
     described: dict[str, Any] = inner if isinstance(inner, dict) else data
     if estimator is not None and described is data:
-        return estimator.model, estimator, dict(data.get("limits") or {})
+        return estimator.model, estimator, dict(limits)
     try:
         model = model_from_dict(
             {key: v for key, v in described.items() if key not in ("estimator", "limits")}
         )
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    return model, estimator, dict(data.get("limits") or {})
+    return model, estimator, dict(limits)
 
 
 def _pair(
@@ -203,7 +191,7 @@ def _pair(
         limits["sample_rate"] = rate
     try:
         voltage = VoltageLimits(**{name: value for name, value in limits.items() if value is not None})
-    except TypeError as error:
+    except (TypeError, OverflowError) as error:
         raise ValueError(f"{path}: limits: {error}") from None
     if isinstance(model, LinearGain):
         return estimator, LinearCompensator(model, voltage)

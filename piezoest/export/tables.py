@@ -52,15 +52,24 @@ class Table:
         -------
         tuple of Path
             The two files.
+
+        Raises
+        ------
+        OSError
+            If a file cannot be written; one that was there is then as it was.
+        ValueError
+            If a number is not finite.
         """
         folder = Path(directory)
         folder.mkdir(parents=True, exist_ok=True)
         waveform, branches = folder / "waveform.csv", folder / "branches.csv"
         time = np.arange(self.reference.size) / self.sample_rate
-        write_columns(waveform, {"time_s": time, "reference_um": self.reference, "voltage_V": self.voltage})
+        period = {"time_s": time, "reference_um": self.reference, "voltage_V": self.voltage}
         rows = np.concatenate(self.branches) if self.branches else np.empty((0, 2))
         number = np.repeat(np.arange(1.0, len(self.branches) + 1.0), [len(b) for b in self.branches])
-        write_columns(branches, {"branch": number, "displacement_um": rows[:, 0], "voltage_V": rows[:, 1]})
+        ways = {"branch": number, "displacement_um": rows[:, 0], "voltage_V": rows[:, 1]}
+        for path, columns in ((waveform, period), (branches, ways)):
+            write_columns(path, columns, allow_nan=False)
         return waveform, branches
 
 

@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, positive
+from piezoest._files import read_json, write_text
 from piezoest.models.coleman_hodgdon import ColemanHodgdon
 
 _FORMAT = 1
@@ -42,8 +43,12 @@ class AmplitudeProfile:
 
     def __post_init__(self) -> None:
         swings = array_1d("swings", self.swings)
-        theta = np.array(self.theta, dtype=np.float64).reshape(-1, 3) if swings.size == 0 else self.theta
-        theta = np.array(theta, dtype=np.float64)
+        try:
+            theta = np.array(self.theta, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ValueError(f"theta must be numbers in shape ({swings.size}, 3): {error}") from None
+        if theta.size == swings.size == 0:
+            theta = theta.reshape(-1, 3)
         if theta.shape != (swings.size, 3) or not np.all(np.isfinite(theta)):
             raise ValueError(f"theta must be finite with shape ({swings.size}, 3), got {theta.shape}")
         if np.any(np.diff(swings, prepend=0.0) <= 0.0):
@@ -129,7 +134,7 @@ class AmplitudeProfile:
             File to write. `piezoest compensate` and `piezoest export` take it for the model of its largest
             swing.
         """
-        Path(path).write_text(json.dumps(self.to_dict(), indent=2) + "\n", encoding="utf-8")
+        write_text(path, json.dumps(self.to_dict(), indent=2) + "\n")
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -145,10 +150,7 @@ class AmplitudeProfile:
         ValueError
             If the file holds no profile.
         """
-        try:
-            data = json.loads(Path(path).read_text(encoding="utf-8"))
-        except (json.JSONDecodeError, UnicodeDecodeError) as error:
-            raise ValueError(f"{path} is not JSON: {error}") from None
+        data = read_json(path)
         if not isinstance(data, dict):
             raise ValueError(f"{path} holds no profile")
         return cls.from_dict(data)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import struct
 import zipfile
+import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,11 +15,23 @@ import numpy as np
 
 from piezoest import _extras
 from piezoest._checks import FloatArray
-from piezoest.records.source import Rows, Source
+from piezoest.records.source import Rows, Source, check_size, shown
 
 EXTRA = "formats"
+COMPRESSED = 15  # mark of a compressed variable in a MATLAB file
 # Names under which a file may state its sample rate [Hz], in lower case.
 RATES = ("fs", "f_s", "sample_rate", "samplerate", "sampling_rate", "sample_rate_hz")
+
+
+@contextlib.contextmanager
+def damaged(path: Path, format_: str) -> Iterator[None]:
+    """Turn whatever a library raises about a damaged file into one sentence."""
+    try:
+        yield
+    except Exception as error:
+        # None of them keeps to exceptions of its own: IndexError, TypeError and MemoryError happen too.
+        reason = shown(str(error), 200)
+        raise ValueError(f"{path}: cannot be read as {format_}, it may be truncated: {reason}") from None
 
 
 def column(values: Any) -> FloatArray:
@@ -23,6 +39,15 @@ def column(values: Any) -> FloatArray:
     numbers = np.array(values, dtype=np.float64)
     numbers[~np.isfinite(numbers)] = np.nan
     return numbers
+
+
+def stated_rate(value: Any) -> float | None:
+    """Sample rate that a file states [Hz]; None if it is not one number above zero."""
+    try:
+        number = float(np.asarray(value).reshape(()))
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return number if 0.0 < number < np.inf else None
 
 
 def row_numbers(start: int, count: int) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -59,7 +84,7 @@ class Table:
         shape = array.shape
         size = int(np.prod(shape))
         if size == 1 and self._leaf(name).lower() in RATES:
-            self.sample_rate = float(np.asarray(array[()]).reshape(-1)[0])
+            self.sample_rate = stated_rate(array[()])
         elif len(shape) == 1 and size > 1:
             self._append(name, unit, array, None, 0)
         elif len(shape) == 2 and size > 1:
@@ -119,10 +144,8 @@ class Table:
 
 def open_npy(path: Path) -> Source:
     """Open an array of shape (N, k) or (k, N), or one with named fields; it stays on disk."""
-    try:
+    with damaged(path, "NumPy"):
         array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
-        raise ValueError(f"{path}: cannot be read as NumPy, it may be truncated: {error}") from None
     table = Table(path)
     _add_array(table, "array", array)
     return table.source()
@@ -130,12 +153,16 @@ def open_npy(path: Path) -> Source:
 
 def open_npz(path: Path) -> Source:
     """Open an archive of arrays, which is read as a whole."""
-    try:
-        # NumPy leaves a file that it opened open where the archive is damaged.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
-        raise ValueError(f"{path}: cannot be read as NumPy, it may be truncated: {error}") from None
+    with damaged(path, "NumPy"), zipfile.ZipFile(path) as packed:
+        parts = packed.infolist()
+    if any(not part.filename.endswith(".npy") for part in parts):
+        raise ValueError(
+            f"{path}: this is no NumPy file but another archive, such as a spreadsheet: save the log as CSV"
+        )
+    check_size(path, sum(part.file_size for part in parts))
+    # NumPy leaves a file that it opened open where the archive is damaged.
+    with damaged(path, "NumPy"), path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        arrays = {name: archive[name] for name in archive.files}
     table = Table(path)
     for name, array in arrays.items():
         _add_array(table, name, array)
@@ -158,15 +185,32 @@ def open_mat(path: Path) -> Source:
     """Open a MATLAB file of version 4 to 7.2, which is read as a whole; structures have dotted names."""
     from scipy.io import loadmat
 
-    try:
+    check_size(path, _unpacked(path))
+    with damaged(path, "a MATLAB file"):
         variables = loadmat(path)
-    except Exception as error:
-        # scipy.io has no exception of its own for a damaged file: IndexError and TypeError happen too.
-        raise ValueError(f"{path}: cannot be read as a MATLAB file, it may be truncated: {error}") from None
     table = Table(path, ".")
     for name, value in _flat({name: value for name, value in variables.items() if not name.startswith("__")}):
         table.add(name, value)
     return table.source("MATLAB files before version 7.3 are read as a whole: save with '-v7.3'")
+
+
+def _unpacked(path: Path) -> int:
+    """Bytes that the compressed variables of a version 5 file declare."""
+    size = 0
+    with path.open("rb") as file:
+        start = file.read(128)
+        order = ">" if start[126:128] == b"MI" else "<"
+        while start.startswith(b"MATLAB 5.0") and len(tag := file.read(8)) == 8:
+            kind, length = struct.unpack(f"{order}2I", tag)
+            if kind == COMPRESSED:
+                try:
+                    inner = zlib.decompressobj().decompress(file.read(min(length, 512)), 8)
+                except zlib.error:
+                    break  # the reader says so
+                size += struct.unpack(f"{order}2I", inner)[1] if len(inner) == 8 else 0
+                length -= min(length, 512)
+            file.seek(length, os.SEEK_CUR)
+    return size
 
 
 def _flat(variables: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
@@ -187,10 +231,10 @@ def open_parquet(path: Path) -> Source:
     parquet = _extras.load("pyarrow.parquet", EXTRA, "reading Parquet")
     import pyarrow
 
-    try:
-        schema = parquet.read_schema(path)
-    except pyarrow.ArrowInvalid as error:
-        raise ValueError(f"{path}: cannot be read as Parquet, it may be truncated: {error}") from None
+    with damaged(path, "Parquet"):
+        contents = parquet.read_metadata(path)
+        schema = contents.schema.to_arrow_schema()
+    check_size(path, contents.num_rows * np.dtype(float).itemsize)
     fields = [field for field in schema if _is_numeric(pyarrow.types, field.type)]
     if not fields:
         raise ValueError(f"{path}: no columns of numbers in it; there are {', '.join(schema.names)}")
@@ -207,8 +251,8 @@ def open_parquet(path: Path) -> Source:
                     values = [_parquet_column(pyarrow, batch.column(names[i]), i, origins) for i in positions]
                     yield Rows(row_numbers(start, batch.num_rows), values)
                     start += batch.num_rows
-            except (pyarrow.ArrowException, OSError) as error:
-                raise ValueError(f"{path}: damaged behind row {start}: {error}") from None
+            except (pyarrow.ArrowException, OSError, ValueError) as error:
+                raise ValueError(f"{path}: damaged behind row {start}: {shown(str(error), 200)}") from None
 
     return Source(path, names, with_units(names, units), len(names), read, sample_rate=_rate(schema.metadata))
 
@@ -223,7 +267,7 @@ def _unit_of(types: Any, field: Any) -> str:
     if types.is_timestamp(field.type) or types.is_duration(field.type):
         return str(field.type.unit)
     stated = {key.lower(): value for key, value in (field.metadata or {}).items()}
-    return next((stated[key].decode() for key in (b"unit", b"units") if key in stated), "")
+    return next((stated[key].decode(errors="replace") for key in (b"unit", b"units") if key in stated), "")
 
 
 def _parquet_column(pyarrow: Any, values: Any, position: int, origins: dict[int, int]) -> FloatArray:
@@ -240,8 +284,5 @@ def _rate(metadata: Mapping[bytes, bytes] | None) -> float | None:
     items: Iterable[tuple[bytes, bytes]] = (metadata or {}).items()
     for key, value in items:
         if key.decode(errors="replace").lower() in RATES:
-            try:
-                return float(value)
-            except ValueError:
-                return None
+            return stated_rate(value)
     return None

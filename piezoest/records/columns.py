@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from piezoest.records.source import Source
+from piezoest.records.source import Source, shown
 
 # Names by which logs call the quantities, in lower case; the unit stands beside them.
 NAMES = {
@@ -122,7 +122,7 @@ def _guess(source: Source, quantity: str) -> int:
     if len(found) == 1:
         return found[0]
     if found:
-        titles = ", ".join(source.names[i] for i in found)
+        titles = ", ".join(shown(source.names[i]) for i in found[:MOST_LISTED])
         raise ValueError(
             f"{source.path}: the columns {titles} could all be the {quantity}: name the one that is"
         )
@@ -135,7 +135,7 @@ def _listed(source: Source) -> str:
         return f"are {source.width} columns without names"
     more = len(source.names) - MOST_LISTED
     ending = f" and {more} more" if more > 0 else ""
-    return f"are the columns {', '.join(source.names[:MOST_LISTED])}{ending}"
+    return f"are the columns {', '.join(map(shown, source.names[:MOST_LISTED]))}{ending}"
 
 
 def split_unit(title: str) -> tuple[str, str]:

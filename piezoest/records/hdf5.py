@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from piezoest import _extras
-from piezoest.records.binary import EXTRA, RATES, Table
-from piezoest.records.source import Rows, Source
+from piezoest.records.binary import EXTRA, RATES, Table, stated_rate
+from piezoest.records.source import Rows, Source, check_size, shown
+
+ONE_FILE = "save all columns in one file, for no other is opened"
 
 
 def open_hdf5(path: Path) -> Source:
@@ -39,22 +41,43 @@ def _table(h5py: Any, path: Path, file: Any) -> Table:
     table = Table(path, "/")
     for name, value in file.attrs.items():
         if name.lower() in RATES:
-            table.sample_rate = float(value)
+            table.sample_rate = stated_rate(value)
+    # A link is followed by nobody here, but a column that is not found for it would be a riddle.
+    if outside := file.visititems_links(
+        lambda name, link: name if isinstance(link, h5py.ExternalLink) else None
+    ):
+        raise ValueError(f"{path}: {shown(outside)} lies in another file: {ONE_FILE}")
 
     def visit(name: str, item: Any) -> None:
         # MATLAB keeps what cells and objects refer to in these; its text is an array of numbers.
-        if name.startswith(("#refs#", "#subsystem#")) or not isinstance(item, h5py.Dataset):
+        # An array may also have no shape, and no values.
+        if (
+            name.startswith(("#refs#", "#subsystem#"))
+            or not isinstance(item, h5py.Dataset)
+            or item.shape is None
+        ):
             return
+        _check_storage(path, name, item)
         if item.dtype.names:
             for field in item.dtype.names:
                 if item.dtype[field].kind in "fiu":
                     table.add(f"{name}/{field}", _Field(item, field))
         elif item.dtype.kind in "fiu" and item.attrs.get("MATLAB_class") not in (b"char", "char"):
             unit = next((item.attrs[key] for key in ("unit", "units") if key in item.attrs), "")
-            table.add(name, item, unit.decode() if isinstance(unit, bytes) else str(unit))
+            table.add(name, item, unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit))
 
     file.visititems(visit)
     return table
+
+
+def _check_storage(path: Path, name: str, dataset: Any) -> None:
+    """Refuse numbers that lie in other files, and more of them than this one can hold."""
+    others = [entry[0] for entry in dataset.external or ()]
+    if dataset.is_virtual:
+        others = [source.file_name for source in dataset.virtual_sources() if source.file_name != "."]
+    if others:
+        raise ValueError(f"{path}: {shown(name)} lies in another file, {shown(others[0])}: {ONE_FILE}")
+    check_size(path, int(dataset.nbytes))
 
 
 class _Field:

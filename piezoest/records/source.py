@@ -15,6 +15,12 @@ from piezoest._checks import FloatArray
 ROWS = 1 << 17
 
 
+# A file may declare numbers for some 30 million rows, or for so many times its own size: what compresses
+# better is no log, and would fill the memory.
+PLENTY, MOST_PACKED = 1 << 28, 200
+LONGEST_SHOWN = 60
+
+
 class Rows(NamedTuple):
     """Some rows of the columns that were asked for, and the number of each row in its file."""
 
@@ -58,6 +64,28 @@ class Source:
     whole: str = ""
     sample_rate: float | None = None
     check: Callable[[Sequence[int]], None] = lambda positions: None
+
+
+def check_size(path: Path, size: int) -> None:
+    """Refuse a file that declares more bytes of numbers than a log of its size can hold.
+
+    Raises
+    ------
+    ValueError
+        If so.
+    """
+    held = path.stat().st_size
+    if size > max(PLENTY, MOST_PACKED * held):
+        raise ValueError(
+            f"{path}: a file of {held / 1e6:.3g} MB that declares {size / 1e6:.3g} MB of numbers is damaged "
+            "or no log"
+        )
+
+
+def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
+    """Text of a file for a message: its beginning, if it is long, on one line, and nothing but signs."""
+    text = " ".join(text[:longest].split()) + ("…" if len(text) > longest else "")
+    return "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text)
 
 
 def open_source(path: Path) -> Source:

@@ -7,18 +7,23 @@ import csv
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.records.source import Rows, Source
+from piezoest.records.source import Rows, Source, shown
 
 MOST_BLANK = 0.1
 MISSING = frozenset({"", "nan", "-", "--", "na", "n/a", "#n/a", "null", "none", "missing"})
 # What the layout of a file is recognised by: bytes for the encoding, lines for the rest.
 HEAD_BYTES, HEAD_LINES = 1 << 16, 10_000
+# Characters of a line; more are no row of a log, and would fill the memory.
+LONGEST_LINE = 1 << 20
+# Characters that no text has, unless as UTF-16.
+CONTROL = frozenset(range(32)) - frozenset(b"\t\n\v\f\r\x1a\x1b")
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -52,7 +57,7 @@ def _layout(path: Path) -> _Layout:
     with path.open(encoding=encoding, errors="replace") as file:
         head = [
             (number, line)
-            for number, line in enumerate(itertools.islice(file, HEAD_LINES), 1)
+            for number, line in itertools.islice(_numbered(path, file), HEAD_LINES)
             if not line.lstrip().startswith("#")
         ]
     filled = [(number, line) for number, line in head if line.strip()]
@@ -74,7 +79,7 @@ def _encoding(path: Path) -> str:
         raw = file.read(HEAD_BYTES)
     if raw.startswith(UTF_16):
         return "utf-16"
-    if b"\0" in raw[:4096]:
+    if CONTROL.intersection(raw[:4096]):
         raise ValueError(
             f"{path}: this is not a text file: save the log as CSV, or name it by its format "
             "(.mat, .h5, .parquet, .npy, .npz)"
@@ -91,7 +96,7 @@ def _lines(layout: _Layout) -> Iterator[tuple[int, str]]:
     """Lines with samples and their numbers; a blank one is a sample if another follows it."""
     blank: list[tuple[int, str]] = []
     with layout.path.open(encoding=layout.encoding, errors="replace") as file:
-        for number, line in enumerate(file, 1):
+        for number, line in _numbered(layout.path, file):
             if number < layout.begins or line.lstrip().startswith("#"):
                 continue
             if not line.strip():
@@ -103,6 +108,14 @@ def _lines(layout: _Layout) -> Iterator[tuple[int, str]]:
             yield number, _decimal(line.rstrip("\r\n"), layout.delimiter)
 
 
+def _numbered(path: Path, file: TextIO) -> Iterator[tuple[int, str]]:
+    """Lines and their numbers from 1."""
+    for number, line in enumerate(iter(partial(file.readline, LONGEST_LINE), ""), 1):
+        if len(line) == LONGEST_LINE:
+            raise ValueError(f"{path}, line {number}: more than {LONGEST_LINE} characters: this is no log")
+        yield number, line
+
+
 def _decimal(line: str, delimiter: str) -> str:
     """A decimal comma as a point; in a header it would only be part of a name."""
     return line if delimiter == "," else line.replace(",", ".")
@@ -111,7 +124,10 @@ def _decimal(line: str, delimiter: str) -> str:
 def _split(path: Path, lines: list[str], delimiter: str) -> list[list[str]]:
     if delimiter == " ":
         return [line.split() for line in lines]
-    rows = list(csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=False))
+    try:
+        rows = list(csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=False))
+    except csv.Error as error:
+        raise ValueError(f"{path}: cannot be read as a table: {error}") from None
     if len(rows) != len(lines) or (len(lines) == 1 and lines[0].count('"') % 2):
         raise ValueError(f"{path}: a quotation mark is left open")
     return rows
@@ -177,7 +193,8 @@ def _numbers(
             if cell.lower() not in MISSING:
                 title = layout.header[position] if layout.header else str(position + 1)
                 raise ValueError(
-                    f"{layout.path}, line {numbers[k]}, column {title!r}: {cell!r} is not a number"
+                    f"{layout.path}, line {numbers[k]}, column {shown(title)!r}: {shown(cell)!r} is "
+                    "not a number"
                 ) from None
             continue
         if math.isfinite(value):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,14 @@ import numpy as np
 
 from piezoest import _extras
 from piezoest._checks import FloatArray, array_1d
+from piezoest._files import replacing
 from piezoest.records.binary import EXTRA
 from piezoest.records.source import FORMATS, TEXT_ENDINGS
 
 Columns = Mapping[str, FloatArray]
 
 
-def write_columns(path: str | Path, columns: Mapping[str, Any]) -> None:
+def write_columns(path: str | Path, columns: Mapping[str, Any], *, allow_nan: bool = True) -> None:
     """Write columns in the format that the ending of the file's name stands for.
 
     Parameters
@@ -27,13 +29,16 @@ def write_columns(path: str | Path, columns: Mapping[str, Any]) -> None:
         version 5, which every MATLAB reads), ``.npy`` (named fields) and ``.npz`` hold every bit.
     columns : mapping of str to array_like, each of shape (N,)
         Names and values.
+    allow_nan : bool
+        Whether values may be NaN or infinite. A voltage for a stage may not.
 
     Raises
     ------
     OSError
-        If the file cannot be written.
+        If the file cannot be written; one that was there is then as it was.
     ValueError
-        If the columns differ in length, or the ending stands for no format.
+        If the columns differ in length, the ending stands for no format, or a value is not finite where it
+        must be.
     ImportError
         If writing the format needs a package of the extra ``formats`` that is not installed.
     """
@@ -41,7 +46,15 @@ def write_columns(path: str | Path, columns: Mapping[str, Any]) -> None:
     arrays = {name: array_1d(name, values, allow_nan=True) for name, values in columns.items()}
     if len({array.size for array in arrays.values()}) > 1:
         raise ValueError(f"columns must be of one length, got {[array.size for array in arrays.values()]}")
-    writer(Path(path), arrays)
+    for name, array in () if allow_nan else arrays.items():
+        bad = np.flatnonzero(~np.isfinite(array))
+        if bad.size:
+            raise ValueError(
+                f"{path} is not written: {name} has {bad.size} values of {array.size} that are no finite "
+                f"numbers, the first in row {bad[0] + 1}: check the model and the reference"
+            )
+    with replacing(path) as temporary:
+        writer(temporary, arrays)
 
 
 def writer_for(path: str | Path) -> Callable[[Path, Columns], None]:
@@ -98,9 +111,12 @@ def _write_parquet(path: Path, columns: Columns) -> None:
 def _write_hdf5(path: Path, columns: Columns) -> None:
     import h5py
 
-    with h5py.File(path, "w") as file:
+    # In memory, for the library does not recover from a disk that is full.
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
         for name, values in columns.items():
             file[name] = values
+    path.write_bytes(image.getbuffer())
 
 
 def _write_mat(path: Path, columns: Columns) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from piezoest import _extras
 from piezoest._checks import FloatArray
+from piezoest._files import write_text
 
 # A plot is some thousand dots wide: more points only make the page large and slow.
 MOST_POINTS = 4000
@@ -205,7 +206,7 @@ class Page:
         path : str or Path
             File to write; an existing one is replaced.
         """
-        Path(path).write_text(self.html(), encoding="utf-8")
+        write_text(path, self.html())
 
 
 def _table(heading: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
 import math
 import os
@@ -146,25 +147,7 @@ def test_what_an_estimator_raises_is_its_own_failure(own: str, name: str, failur
     assert row["errors"] == []
 
 
-# ---------------------------------------------------------------- where rows are kept
-
-
-def test_store_keeps_each_key_once_and_goes_on_after_a_torn_line(tmp_path: Path) -> None:
-    path = tmp_path / "new" / "runs.jsonl"
-    with Store(path) as store:
-        assert store.append({"key": "a", "value": 1})
-        assert not store.append({"key": "a", "value": 2})
-        assert store.append({"key": "b", "value": 3})
-    with path.open("ab") as file:
-        file.write(b'{"key": "c", "val')
-    with Store(path) as store:
-        assert len(store) == 2
-        assert "c" not in store
-        assert store.append({"key": "c", "value": 4})
-    with path.open("ab") as file:
-        file.write(b'{"key": "a", "value": 5}\n[]\n')
-    with Store(path) as store:
-        assert [row["value"] for row in store.rows(["c", "no", "a", "b"])] == [4, 1, 3]
+# ---------------------------------------------------------------- tables
 
 
 @pytest.mark.parametrize("format", tables.FORMATS)
@@ -408,6 +391,36 @@ def test_command_refuses_wrong_words(own: str, arguments: tuple[str, ...], words
     assert result.exit_code == 2
     assert words in " ".join(result.stderr.replace("│", " ").split())
     assert not Path("bench-results").exists()
+
+
+def test_what_cannot_be_written_or_read_is_one_sentence(own: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(result: Result, *words: str) -> None:
+        assert result.exit_code == 1, result.output
+        assert result.stderr.splitlines()[-1].startswith("error: ")
+        assert "Traceback" not in result.stderr
+        assert all(word in result.stderr.splitlines()[-1] for word in words)
+
+    Path("plain").touch()
+    refused(bench(*SHORT, "--jobs", 1, "-o", "plain/folder"), "plain/folder", "Not a directory")
+
+    def full(store: Store, row: Row) -> bool:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "runs.jsonl")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Store, "append", full)
+        patched.setattr(campaign, "over_cores", lambda jobs: lambda tasks: iter([{}]))
+        refused(bench(*SHORT, "-o", "one"), "runs.jsonl: No space left on device")
+
+    Path("two").mkdir()
+    for text in ("{", "[]", "{}", "[" * 100_000, '{"settings": {}}'):
+        Path("two", "suite.json").write_text(text, encoding="utf-8")
+        result = bench("compare", "two", "two")
+        assert result.exit_code == 2, text
+        assert "two/suite.json is not" in " ".join(result.stderr.replace("│", " ").split())
+    for text in ("a,b\n1,2\n", "key,seed\nx,y\n", "key\n1,2\n", 'key\n"' + "x" * 200_000):
+        Path("two", "runs.csv").write_text(text, encoding="utf-8")
+        with pytest.raises(ValueError, match=r"runs\.csv (is damaged|lacks)"):
+            tables.read_runs(Path("two"))
 
 
 def test_a_killed_campaign_goes_on(tmp_path: Path) -> None:

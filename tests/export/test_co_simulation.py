@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -126,3 +128,16 @@ def test_wrong_arguments_are_refused(tmp_path: Path) -> None:
         pz.export.fmu(None, pz.LinearCompensator(pz.LinearGain(0.15)), tmp_path / "a.fmu")
     with pytest.raises(ValueError, match="sample_rate"):
         pz.export.fmu(*pair(), tmp_path / "a.fmu", sample_rate=1e3)
+
+
+def test_a_full_disk_leaves_the_old_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "stage.fmu"
+    path.write_bytes(b"as it was")
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(zipfile.ZipFile, "writestr", full)
+    with pytest.raises(OSError, match=r"stage\.fmu"):
+        pz.export.fmu(*pair("line"), path)
+    assert [each.read_bytes() for each in tmp_path.iterdir()] == [b"as it was"]

@@ -55,6 +55,38 @@ def test_model_learns_on(model: Path, kind: str) -> None:
     assert f"Hysteresis{kind.upper()}" in Path("out/stage.c").read_text()
 
 
+@pytest.mark.parametrize(
+    ("part", "value", "words"),
+    [
+        ("arguments", None, "not what to_dict"),
+        ("arguments", {"no": 1}, "not what to_dict"),
+        ("arguments", {"sample_rate": 10**400}, "not what to_dict"),
+        ("arguments", "missing", "it lacks 'arguments'"),
+        ("state", "missing", "it lacks 'state'"),
+        ("state", {}, "not what to_dict"),
+    ],
+)
+def test_an_estimator_that_is_none(model: Path, part: str, value: object, words: str) -> None:
+    saved = {**pz.HysteresisRLS(50_000.0).to_dict(), part: value}
+    if value == "missing":
+        del saved[part]
+    model.write_text(json.dumps(saved))
+    refused = run("c", model, "-o", "out")
+    assert refused.exit_code == 1
+    assert refused.stderr.startswith("error: ")
+    assert "model.json: its estimator" in refused.stderr
+    assert words in refused.stderr
+    assert len(refused.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("limits", [[1], "x", 5, {"maximum": 10**400}, {"no": 1}])
+def test_limits_that_are_none(model: Path, limits: object) -> None:
+    model.write_text(json.dumps({"model": MODEL, "limits": limits}))
+    refused = run("c", model, "-o", "out")
+    assert refused.exit_code == 1
+    assert len(refused.stderr.splitlines()) == 1
+
+
 def test_profile_is_the_same_as_the_objects(model: Path) -> None:
     estimator = pz.HysteresisRLS(50_000.0)
     profile = {

@@ -1,0 +1,212 @@
+"""Logs that are damaged, or not what they say: one sentence that names the file, and no memory taken."""
+
+from __future__ import annotations
+
+import random
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from piezoest.records import read_record, write_columns
+
+N = 60
+TIME = np.arange(N) / 100.0
+VOLTAGE = 10.0 * np.sin(0.5 * np.arange(N))
+LOG = {"time_s": TIME, "voltage_V": VOLTAGE, "displacement_um": 1.5 * VOLTAGE}
+
+
+def hdf5(path: Path, columns: dict[str, Any] = LOG) -> Any:
+    file = pytest.importorskip("h5py").File(path, "w")
+    for name, values in columns.items():
+        file[name] = values
+    return file
+
+
+# ---------------------------------------------------------------- more than there is room for
+
+
+def hdf5_that_declares_much(path: Path) -> None:
+    with hdf5(path, {}) as file:
+        for name in LOG:
+            file.create_dataset(name, shape=(2**36,), dtype="f8", chunks=(1024,))
+
+
+def npz_that_expands(path: Path) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("x.npy", "w") as inside:
+        np.lib.format.write_array_header_1_0(
+            inside, {"descr": "<f8", "fortran_order": False, "shape": (2**26,)}
+        )
+        for _ in range(512):
+            inside.write(bytes(1 << 20))
+
+
+def npz_that_lies(path: Path) -> None:
+    with zipfile.ZipFile(path, "w") as archive, archive.open("x.npy", "w") as inside:
+        np.lib.format.write_array_header_1_0(
+            inside, {"descr": "<f8", "fortran_order": False, "shape": (2**50,)}
+        )
+
+
+def npy_that_declares_much(path: Path) -> None:
+    with path.open("wb") as file:
+        np.lib.format.write_array_header_1_0(
+            file, {"descr": "<f8", "fortran_order": False, "shape": (3, 2**40)}
+        )
+
+
+def mat_that_declares_much(path: Path) -> None:
+    packed = zlib.compress(struct.pack("<2I", 14, 0xF0000000) + bytes(1000))
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+    path.write_bytes(head + struct.pack("<2I", 15, len(packed)) + packed)
+
+
+def parquet_of_nothing_but_zeros(path: Path) -> None:
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    zeros = pa.array(np.zeros(2**26))
+    pq.write_table(pa.table(dict.fromkeys(LOG, zeros)), path, compression="zstd")
+
+
+@pytest.mark.parametrize(
+    ("name", "make", "words"),
+    [
+        ("log.h5", hdf5_that_declares_much, "declares 5.5e[+]05 MB of numbers"),
+        ("log.npz", npz_that_expands, "declares 537 MB of numbers"),
+        ("log.npz", npz_that_lies, "cannot be read as NumPy"),
+        ("log.npy", npy_that_declares_much, "cannot be read as NumPy"),
+        ("log.mat", mat_that_declares_much, "declares 4.03e[+]03 MB of numbers"),
+        ("log.parquet", parquet_of_nothing_but_zeros, "declares 537 MB of numbers"),
+    ],
+)
+def test_what_a_file_declares_is_checked(
+    tmp_path: Path, name: str, make: Callable[[Path], None], words: str
+) -> None:
+    make(tmp_path / name)
+    with pytest.raises(ValueError, match=rf"log\.\w+: .*{words}"):
+        read_record(tmp_path / name)
+
+
+# ---------------------------------------------------------------- numbers that lie elsewhere
+
+
+def external_storage(file: Any, folder: Path) -> None:
+    del file["displacement_um"]
+    file.create_dataset("displacement_um", shape=(N,), dtype="f8", external=[(folder / "raw", 0, 8 * N)])
+
+
+def external_link(file: Any, folder: Path) -> None:
+    del file["displacement_um"]
+    file["displacement_um"] = pytest.importorskip("h5py").ExternalLink("other.h5", "/displacement_um")
+
+
+def virtual(file: Any, folder: Path, other: str = "other.h5") -> None:
+    h5py = pytest.importorskip("h5py")
+    layout = h5py.VirtualLayout((N,), "f8")
+    layout[:] = h5py.VirtualSource(other, "displacement_um", shape=(N,))
+    file.create_virtual_dataset("position_um", layout)
+
+
+@pytest.mark.parametrize("elsewhere", [external_storage, external_link, virtual])
+def test_other_files_are_not_opened(tmp_path: Path, elsewhere: Callable[[Any, Path], None]) -> None:
+    hdf5(tmp_path / "other.h5").close()
+    (tmp_path / "raw").write_bytes(LOG["displacement_um"].tobytes())
+    with hdf5(tmp_path / "log.h5") as file:
+        elsewhere(file, tmp_path)
+    with pytest.raises(ValueError, match=r"log\.h5: \w+ lies in another file"):
+        read_record(tmp_path / "log.h5")
+
+
+def test_what_lies_in_the_file_is_read(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with hdf5(tmp_path / "log.h5") as file:
+        file["above"] = file["/"]
+        file["nowhere"] = h5py.SoftLink("/nothing")
+        file["none"] = h5py.Empty("f8")
+        virtual(file, tmp_path, other=".")
+    assert len(read_record(tmp_path / "log.h5", columns={"displacement": "position_um"})) == N
+
+
+# ---------------------------------------------------------------- not a log
+
+
+TEXT = "time_s,voltage_V,displacement_um\n" + "".join(f"{k},{k},{k}\n" for k in range(N))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("log.csv", TEXT + '1,2,"' + "a" * 20_000_000 + '"\n', "line 62: more than 1048576 characters"),
+        ("log.csv", TEXT + '1,2,"' + "a" * 200_000 + '"\n', "field larger than"),
+        ("log.csv", "a" * 20_000_000, "line 1: more than"),
+        ("log.csv", TEXT.replace("time_s", "q" * 1000), "are the columns q{60}…, voltage_V, displ"),
+        ("log.dat", "\x02\x05" * 200, "not a text file"),
+        ("log.csv", TEXT + "60,2," + "a" * 500 + "\n", "column 'displacement_um': 'a{59}.*' is not a number"),
+    ],
+)
+def test_text_that_is_no_log(tmp_path: Path, name: str, content: str, words: str) -> None:
+    path = tmp_path / name
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises(ValueError, match=words) as refusal:
+        read_record(path)
+    assert str(path) in str(refusal.value)
+    assert len(str(refusal.value)) < 400 + len(str(path))
+
+
+def test_a_spreadsheet_is_called_one(tmp_path: Path) -> None:
+    path = tmp_path / "log.xlsx"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("[Content_Types].xml", "<Types/>")
+        archive.writestr("xl/workbook.xml", "<workbook/>")
+    with pytest.raises(ValueError, match=r"log\.xlsx: .* spreadsheet: save the log as CSV"):
+        read_record(path)
+
+
+@pytest.mark.parametrize("rate", [[1e3, 1e3], "fast", np.nan, -5.0])
+def test_a_sample_rate_that_is_none_is_not_taken(tmp_path: Path, rate: Any) -> None:
+    columns = {name: values for name, values in LOG.items() if name != "time_s"}
+    with hdf5(tmp_path / "log.h5", columns) as file:
+        file.attrs["sample_rate"] = rate
+    with pytest.raises(ValueError, match=r"log\.h5: no column for time found"):
+        read_record(tmp_path / "log.h5")
+    assert read_record(tmp_path / "log.h5", sample_rate=50.0).sample_rate == 50.0
+
+
+def test_a_sample_rate_in_an_array_of_one_is_taken(tmp_path: Path) -> None:
+    with hdf5(tmp_path / "log.h5", {"voltage_V": VOLTAGE, "displacement_um": VOLTAGE}) as file:
+        file.attrs["sample_rate"] = [100.0]
+    assert read_record(tmp_path / "log.h5").sample_rate == 100.0
+
+
+@pytest.mark.parametrize("ending", ["csv", "npy", "npz", "h5", "parquet"])
+def test_any_damage_ends_in_one_sentence(tmp_path: Path, ending: str) -> None:
+    if ending in ("h5", "parquet"):
+        pytest.importorskip("h5py" if ending == "h5" else "pyarrow")
+    path = tmp_path / f"log.{ending}"
+    write_columns(path, LOG)
+    if ending == "npz":
+        np.savez_compressed(path, **LOG)
+    good, chance = path.read_bytes(), random.Random(0)
+    said: list[str] = []
+    for _ in range(150):
+        damaged = bytearray(good)
+        for _ in range(chance.choice([1, 1, 2, 5])):
+            at = chance.randrange(min(len(damaged), chance.choice([500, len(damaged)])))
+            if chance.random() < 0.3:
+                damaged[at : at + 4] = chance.choice([b"\xff\xff\xff\x7f", b"\xff\xff\xff\xff", b"\0\0\0\0"])
+            elif chance.random() < 0.3:
+                del damaged[at : at + chance.randrange(1, 50)]
+            else:
+                damaged[at] = chance.randrange(256)
+        path.write_bytes(damaged)
+        try:
+            read_record(path)
+        except ValueError as error:
+            said.append(str(error))
+    assert len(said) > 50
+    assert all(str(path) in each and "\n" not in each for each in said)
+    assert max(map(len, said)) < 500 + len(str(path))

@@ -1,0 +1,238 @@
+"""What is written is there whole, or as it was before: on a full disk, and where the process is killed."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import re
+import signal
+import stat
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from piezoest.bench import origin, suite, tables
+from piezoest.bench.runner import COLUMNS
+from piezoest.export.c_code import CCode
+from piezoest.export.tables import Table
+from piezoest.models import AmplitudeProfile
+from piezoest.records import write_columns
+from piezoest.report.page import Page
+
+resource = pytest.importorskip("resource", reason="without limits no disk is full")
+
+SIZE = 5000
+
+
+@contextlib.contextmanager
+def full_disk(room: int = 2000) -> Iterator[None]:
+    """No file may become longer than so many bytes; Python ignores the signal, and the write fails."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def columns(seed: int) -> dict[str, Any]:
+    noise = np.random.default_rng(seed).standard_normal((2, SIZE))
+    return {"time_s": np.arange(SIZE) / 1e3, "voltage_V": noise[0], "displacement_um": noise[1]}
+
+
+def page(path: Path, seed: int) -> None:
+    written = Page("title", "about")
+    written.footer(f"{seed}" * SIZE)
+    written.write(path)
+
+
+def figure(path: Path, seed: int) -> None:
+    from matplotlib.figure import Figure
+
+    from piezoest._files import save_figure
+
+    drawn = Figure()
+    drawn.subplots().plot(columns(seed)["voltage_V"])
+    save_figure(drawn, path)
+
+
+def rows(path: Path, seed: int, format: str) -> None:
+    row = {**dict.fromkeys(COLUMNS), "errors": columns(seed)["voltage_V"].tolist(), "seed": seed}
+    tables.write_tables([row], path.parent, format)
+
+
+def table(path: Path, seed: int) -> None:
+    values = columns(seed)["voltage_V"]
+    Table(1e3, values, values, (np.column_stack([values, values]),)).write(path.parent)
+
+
+OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
+    **{
+        f"log{ending}": lambda path, seed: write_columns(path, columns(seed))
+        for ending in ("", ".csv", ".tsv", ".parquet", ".h5", ".mat", ".npy", ".npz")
+    },
+    "profile.json": lambda path, seed: AmplitudeProfile(
+        np.arange(1.0, SIZE), np.full((SIZE - 1, 3), 0.1 * seed)
+    ).save(path),
+    "page.html": page,
+    "figure.png": figure,
+    "controller.c": lambda path, seed: CCode(
+        "controller", f"{seed}" * SIZE, f"{seed}" * SIZE, "double", False
+    ).write(path.parent),
+    "waveform.csv": table,
+    "suite.json": lambda path, seed: suite.write(columns(seed)["voltage_V"].tolist(), path),
+    "put.json": lambda path, seed: origin.put(columns(seed)["voltage_V"].tolist(), path),
+    "periods.csv": lambda path, seed: rows(path, seed, "csv"),
+    "periods.parquet": lambda path, seed: rows(path, seed, "parquet"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OUTPUTS)
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path, name: str) -> None:
+    if name.endswith((".parquet", ".h5")):
+        pytest.importorskip("pyarrow" if name.endswith(".parquet") else "h5py")
+    if name.endswith(".html"):
+        pytest.importorskip("plotly")
+    path = tmp_path / name
+    OUTPUTS[name](path, 1)
+    before = content(tmp_path)
+    assert len(before[name]) > 2000
+    with full_disk(), pytest.raises(OSError, match=re.escape(str(tmp_path))):
+        OUTPUTS[name](path, 2)
+    assert content(tmp_path) == before
+    OUTPUTS[name](path, 2)
+    assert content(tmp_path)[name] != before[name]
+
+
+KILLED = """
+import os, signal, sys
+import numpy as np
+
+def half(file, *rest, **options):
+    file.write("half a line")
+    file.flush()
+    os.kill(os.getpid(), signal.SIGKILL)
+
+from piezoest.records import write_columns
+np.savetxt = half
+write_columns(sys.argv[1], {"time_s": [0.0, 1.0], "voltage_V": [2.0, 3.0]})
+"""
+
+
+def test_a_kill_in_the_middle_leaves_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "voltage.csv"
+    path.write_text("as it was", encoding="utf-8")
+    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert path.read_text(encoding="utf-8") == "as it was"
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError, OSError(errno.ENOSPC, "full")])
+def test_nothing_is_left_beside_the_file(tmp_path: Path, error: Any) -> None:
+    from piezoest._files import replacing
+
+    path = tmp_path / "model.json"
+    path.write_text("as it was", encoding="utf-8")
+
+    def write() -> None:
+        with replacing(path) as temporary:
+            temporary.write_text("half", encoding="utf-8")
+            raise error
+
+    with pytest.raises(error if isinstance(error, type) else OSError) as failure:
+        write()
+    assert content(tmp_path) == {"model.json": b"as it was"}
+    if isinstance(failure.value, OSError):
+        assert failure.value.filename == str(path)
+
+
+def test_rights_and_links_stay(tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    kept, link, dangling = tmp_path / "folder" / "kept.csv", tmp_path / "link.csv", tmp_path / "dangling.csv"
+    write_columns(kept, {"a": [1.0]})
+    umask = os.umask(0)
+    os.umask(umask)
+    assert stat.S_IMODE(kept.stat().st_mode) == 0o666 & ~umask
+    kept.chmod(0o640)
+    link.symlink_to(Path("folder", "kept.csv"))
+    dangling.symlink_to(tmp_path / "folder" / "new.csv")
+    for path in (link, dangling):
+        write_columns(path, {"b": [2.0]})
+        assert path.is_symlink()
+        assert path.read_text(encoding="utf-8").split() == ["b", "2"]
+    assert stat.S_IMODE(kept.stat().st_mode) == 0o640
+
+
+def test_errors_name_the_file_that_was_asked_for(tmp_path: Path) -> None:
+    (tmp_path / "plain").touch()
+    for path in (tmp_path / "no" / "log.csv", tmp_path / "plain" / "log.csv", tmp_path):
+        with pytest.raises(OSError, match=r"log\.csv|Is a directory") as failure:
+            write_columns(path, {"a": [1.0]})
+        assert failure.value.filename == str(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everything")
+def test_a_file_that_may_not_be_written_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.touch(0o444)
+    with pytest.raises(PermissionError, match=r"log\.csv"):
+        write_columns(path, {"a": [1.0]})
+
+
+def test_pipes_are_written_to_as_they_are(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.csv"
+    os.mkfifo(pipe)
+    read: list[str] = []
+    reader = threading.Thread(target=lambda: read.append(pipe.read_text(encoding="utf-8")))
+    reader.start()
+    write_columns(pipe, {"a": [1.0, 2.0]})
+    reader.join()
+    assert read == ["a\n1\n2\n"]
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+@pytest.mark.skipif(not Path("/dev/stdout").exists(), reason="no /dev/stdout here")
+def test_standard_output_is_written_to_as_it_is(tmp_path: Path) -> None:
+    program = "from piezoest.records import write_columns; write_columns('/dev/stdout', {'a': [1.0]})"
+    path = tmp_path / "out"
+    with path.open("wb") as file:
+        subprocess.run([sys.executable, "-c", program], stdout=file, check=True)
+        assert os.fstat(file.fileno()).st_ino == path.stat().st_ino
+    assert path.read_text(encoding="utf-8") == "a\n1\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{", "not JSON"),
+        ("[" * 100_000, "nested too deeply"),
+        ("\udcff", "not JSON"),
+        ("9" * 5000, "not JSON"),
+    ],
+)
+def test_json_that_cannot_be_read(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "profile.json"
+    path.write_bytes(text.encode(errors="surrogateescape"))
+    with pytest.raises(ValueError, match=rf"profile\.json.*{words}"):
+        AmplitudeProfile.load(path)
+
+
+@pytest.mark.parametrize("theta", [{}, "x", [[1.0]], [[10**400, 1, 1]], None])
+def test_profiles_that_are_none(tmp_path: Path, theta: Any) -> None:
+    path = tmp_path / "profile.json"
+    data = {"profile": "AmplitudeProfile", "format": 1, "swings": [1.0], "theta": theta}
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(ValueError, match="theta must be"):
+        AmplitudeProfile.load(path)
