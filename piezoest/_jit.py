@@ -13,11 +13,11 @@ processes, share a symbol: loaded together, one runs the other's code. So
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import inspect
 import math
-import os
 import pickle
 import re
 import sys
@@ -39,6 +39,8 @@ from numba.core.typeinfer import register_dispatcher
 from numba.extending import intrinsic, overload
 from numba.misc.appdirs import user_cache_dir
 from numba.np import arrayobj
+
+from piezoest._files import replacing
 
 # For `njit` of loops over given arrays: references to arrays are not counted, nor in what is called.
 # Each view of an array costs two atomic operations else, more than the arithmetic. Such functions make
@@ -263,12 +265,8 @@ class _MachineCode(_Cache):
             return
         serialise: Any = dumps
         code: bytes = serialise(data._reduce())
-        beside = place.with_name(f"{place.name}.{os.getpid()}")
-        try:
+        with contextlib.suppress(OSError), replacing(place) as beside:
             beside.write_bytes(self._fingerprint(sig, data.codegen, code) + code)
-            beside.replace(place)
-        except OSError:
-            beside.unlink(missing_ok=True)
 
     @property
     def cache_path(self) -> str:

@@ -11,7 +11,8 @@ Flat memory within a larger array, from `start` on: how often the reference has 
 hand-over, whether one came soon after another, direction of travel, furthest reference in it, where the
 present leg began, recent swing, present reference [µm], reference at the last hand-over, whether it is time
 for the next; the voltage at the furthest reference and at the turn before, and the displacement that the
-model had for them; gain and centre of the line, samples at which the corridor was in the way.
+model had for them; gain and centre of the line, samples at which the corridor was in the way,
+whether there was a sample.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from numba.extending import register_jitable
 
 (
     TURNS, SOON, DIRECTION, FURTHEST, TURNED, SWING, PRESENT, HANDED, DUE,
-    U_FURTHEST, U_TURNED, X_FURTHEST, X_TURNED, GAIN, CENTRE, USED, SIZE,
-) = range(17)  # fmt: skip
+    U_FURTHEST, U_TURNED, X_FURTHEST, X_TURNED, GAIN, CENTRE, USED, BEGUN, SIZE,
+) = range(18)  # fmt: skip
 
 # Half-width, as a fraction of half the recent swing of the reference.
 WIDTH = 0.3
@@ -59,6 +60,7 @@ def swing(path: Any, start: int) -> Any:
 @register_jitable
 def kept(path: Any, start: int, r: Any, wanted: Any) -> Any:
     """`wanted` kept within the corridor, where models follow one another soon; r is the next reference."""
+    path[start + BEGUN] = 1.0
     path[start + PRESENT] = r
     way = np.abs(r - path[start + HANDED])
     recent = max(swing(path, start), np.abs(r - path[start + TURNED]))
@@ -123,8 +125,7 @@ def _turn(path: Any, start: int) -> None:
 @register_jitable
 def hand_over(path: Any, start: int) -> None:
     """Note that another model was handed over."""
-    moved = path[start + PRESENT] != path[start + HANDED] or path[start + TURNS] > 0.0
-    if moved:
+    if path[start + BEGUN] != 0.0:
         path[start + SOON] = path[start + TURNS] < 2.0
     path[start + TURNS] = 0.0
     path[start + HANDED] = path[start + PRESENT]

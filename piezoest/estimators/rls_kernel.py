@@ -55,7 +55,8 @@ NOISE_SAMPLES, PRECISION = 2000.0, 3e-3
 # Least alpha and beta of the model handed out, in parts of their initial values.
 LEAST = 1e-2
 OFF_CENTRE, LEAST_STEP, CEILING = 0.3, 1e-6, 1e4
-# What the slopes up and down differ by without an offset, as a fraction of them, and a level, of half a swing.
+# By how much the slopes up and down differ where nothing is off centre, relative to them; and the levels,
+# relative to half a swing.
 SLOPES_DIFFER, LEVELS_DIFFER = 3e-3, 2e-2
 
 
@@ -154,7 +155,8 @@ def trust_in_levels(state: Any, config: Any) -> Any:
     if config[WALK] == 0.0:
         return 0.0
     memory_squared = config[WALK_MEMORY] * config[WALK_MEMORY]
-    by_slopes = SLOPES_DIFFER / (_decay(state, config) * LEVELS_DIFFER * 0.5 * state[SWING + swing.SIZE] + SLOWEST)
+    half_swing = 0.5 * state[SWING + swing.SIZE]
+    by_slopes = SLOPES_DIFFER / (_decay(state, config) * LEVELS_DIFFER * half_swing + SLOWEST)
     unknown = _noise_memory(state, config) + memory_squared * by_slopes * by_slopes
     return unknown / (unknown + memory_squared + SLOWEST)
 
