@@ -3,90 +3,49 @@
 from __future__ import annotations
 
 import time
-from itertools import pairwise
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
-from numba import njit
-from numba.extending import register_jitable
 
-from piezoest._checks import WILDEST, FloatArray, integer, non_negative, positive
-from piezoest.equations import coleman_hodgdon as equations
+from piezoest._checks import FloatArray, integer, non_negative, positive
 from piezoest.estimators.arrival import moved_on
 from piezoest.estimators.base import EstimatorBase, Status, Trace
 from piezoest.estimators.coordinates import Coordinates, coordinates
+from piezoest.estimators.horizon_kernel import (
+    FAILURES,
+    HELD,
+    INNOVATION,
+    LAST,
+    MISSING,
+    NOISE,
+    NOTHING,
+    OFFSET,
+    SAMPLES,
+    SOLVES,
+    UPDATED,
+    UPDATES,
+    VARIANCE,
+    W_H,
+    A,
+    C,
+    Layout,
+    chunk,
+    step,
+    table,
+)
+from piezoest.estimators.saved_state import Table
 from piezoest.estimators.shooting import Prior, Problem, Solution, inverse_information, single_shooting
 from piezoest.estimators.thinning import thinned
 from piezoest.models import ColemanHodgdon, LinearGain
 
-# The state: counters, the held model with its w_h, the last innovation, then the blocks of `_Layout`.
-SAMPLES, MISSING, SOLVES, FAILURES, UPDATES, LAST, KNOWN, U_LAST = range(8)
-W_H, A, B, C, OFFSET, INNOVATION, VARIANCE, NOISE = range(8, 16)
-HEAD = 16
-WAITING, UPDATED, MISSED, HELD = range(4)
-
-# Stands for a missing sample in the rings, where JSON could not take NaN.
-NOTHING = 2.0 * WILDEST
+# Most samples of a window, all of which are kept.
+LONGEST = 1e7
 # Points that a window is thinned out to, if the user does not say.
 POINTS = 2000
 # Start's standard deviation of an offset, in parts of b/a (the largest w_h).
 OFFSET_UNCERTAINTY = 1e3
 # Relative change at which a solve has ended: far below what a hop's new samples move.
 TOLERANCE = 1e-8
-
-
-@register_jitable
-def _take(state: Any, u: float, x: float, ring_u: Any, ring_x: Any) -> None:
-    """One raw sample into the rings; the held model's state and innovation."""
-    k = int(state[SAMPLES]) % ring_u.size
-    known = np.abs(u) < WILDEST
-    if known:
-        if state[KNOWN] != 0.0:
-            state[W_H] = equations.hysteresis_step(state[W_H], u - state[U_LAST], state[A], state[B])
-        state[KNOWN] = 1.0
-        state[U_LAST] = u
-    measured = known and np.abs(x) < WILDEST
-    # An unknown voltage is held: the next known one then is one change, as exact if monotone.
-    ring_u[k] = state[U_LAST] if state[KNOWN] != 0.0 else NOTHING
-    ring_x[k] = x if measured else NOTHING
-    state[SAMPLES] += 1.0
-    if measured:
-        state[INNOVATION] = x - (state[C] * u + state[W_H] + state[OFFSET])
-        state[LAST] = HELD
-    else:
-        state[MISSING] += 1.0
-        state[LAST] = MISSED
-
-
-@njit("void(f8[::1], f8, f8, i8, i8)", cache=True)
-def _step(state: Any, u: float, x: float, start: int, length: int) -> None:
-    _take(state, u, x, state[start : start + length], state[start + length : start + 2 * length])
-
-
-@njit(cache=True)
-def _chunk(state: Any, u: Any, x: Any, start: int, length: int, y: Any) -> None:
-    for k in range(u.size):
-        _take(state, u[k], x[k], state[start : start + length], state[start + length : start + 2 * length])
-        y[k] = state[INNOVATION]
-
-
-class _Layout(NamedTuple):
-    """Where the blocks of the state lie; n coordinates, m parameters."""
-
-    q: slice
-    mean: slice
-    root: slice
-    theta: slice
-    P: slice
-    gain: slice
-    rings: int
-    size: int
-
-    @classmethod
-    def of(cls, n: int, m: int, window: int) -> _Layout:
-        edges = np.cumsum([HEAD, n, n, n * n, m, m * m, m]).tolist()
-        q, mean, root, theta, P, gain = (slice(i, j) for i, j in pairwise(edges))
-        return cls(q, mean, root, theta, P, gain, edges[-1], edges[-1] + 2 * window)
 
 
 class MovingHorizon(EstimatorBase):
@@ -160,6 +119,8 @@ class MovingHorizon(EstimatorBase):
     ) -> None:
         sample_rate = positive("sample_rate", sample_rate)
         window, hop = positive("window", window), positive("hop", hop)
+        if not window * sample_rate <= LONGEST:
+            raise ValueError(f"window must be at most {LONGEST:g} samples long, got {window:g} s")
         if round(hop * sample_rate) >= round(window * sample_rate):
             raise ValueError(f"hop must be shorter than the window of {window:g} s, got {hop:g} s")
         initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
@@ -184,9 +145,12 @@ class MovingHorizon(EstimatorBase):
             "max_iterations": integer("max_iterations", max_iterations, 1),
         }
         n, m = len(self._coordinates().free), len(self.parameter_names)
-        self._layout = _Layout.of(n, m, self._window)
+        self._layout = Layout.of(n, m, self._window)
         self._begin(self._arguments, self._new_state())
         self._message, self._seconds = "", float("nan")
+
+    def _table(self) -> Table:
+        return table(self._layout, self._window, self._arguments["noise"], self._model_of)
 
     def _coordinates(self) -> Coordinates:
         held = () if self._arguments["offset"] else ("offset",)
@@ -237,7 +201,7 @@ class MovingHorizon(EstimatorBase):
     # ------------------------------------------------------------ samples
 
     def _sample(self, u: float, x: float) -> None:
-        _step(self._state, u, x, self._layout.rings, self._window)
+        step(self._state, u, x, self._layout.rings, self._window)
         if int(self._state[SAMPLES]) % self._hop == 0:
             self._solve()
 
@@ -249,7 +213,7 @@ class MovingHorizon(EstimatorBase):
         while done < u.size:
             left = self._hop - int(self._state[SAMPLES]) % self._hop
             end = min(done + left, u.size)
-            _chunk(self._state, u[done:end], x[done:end], layout.rings, self._window, y[done:end])
+            chunk(self._state, u[done:end], x[done:end], layout.rings, self._window, y[done:end])
             # Rows up to the one before the solve hold the old model.
             for first, last in ((done, end - 1), (end - 1, end)):
                 if last == end and end - done == left:
@@ -362,7 +326,10 @@ class MovingHorizon(EstimatorBase):
     @property
     def model(self) -> ColemanHodgdon | LinearGain:
         """Admissible model as held: of the last good solve."""
-        theta, n = self.theta, self._initial.theta.size
+        return self._model_of(self._state)
+
+    def _model_of(self, state: FloatArray) -> ColemanHodgdon | LinearGain:
+        theta, n = state[self._layout.theta], self._initial.theta.size
         offset = float(theta[n]) if theta.size > n else self._initial.offset
         return type(self._initial).from_theta(theta[:n], offset)
 

@@ -9,10 +9,11 @@ import numpy as np
 from piezoest._checks import FloatArray, positive
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
-from piezoest.estimators import rls_loops, rls_model, rls_profile
+from piezoest.estimators import rls_loops, rls_model, rls_profile, state_tables
 from piezoest.estimators import rls_settings as settings
 from piezoest.estimators.base import NO_ROWS, NONE, Compiled, Freezable, Status, Trace
 from piezoest.estimators.delay_line import delay_line
+from piezoest.estimators.saved_state import Table
 from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain, Model
 from piezoest.policies import Forgetting, Policy, policy_to_dict
 
@@ -56,7 +57,7 @@ class HysteresisRLS(Freezable):
         unipolar voltage then needs no high-pass, and what a larger loop leaves behind is taken out.
         Default: with ``memory="period"``, except for a `LinearGain`; not with the paper's memory.
     delay : float
-        Samples by which the measured displacement lags the voltage; may be fractional.
+        Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     time_base : {"discrete", "continuous"}
         Time base of the law, see `RecursiveLeastSquares`; ``"continuous"`` is the paper's,
         in seconds.
@@ -178,6 +179,9 @@ class HysteresisRLS(Freezable):
             },
             state,
         )
+
+    def _table(self) -> Table:
+        return state_tables.rls(self._config, self._state.size)
 
     def _loops(self) -> tuple[Any, Any]:
         """Compiled functions that take a record, and propose a model, for the compiled ring of `track`."""

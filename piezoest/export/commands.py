@@ -158,7 +158,9 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
             raise ValueError(
                 f"{path}: estimator must be one of {sorted(kinds)}, got {learnt.get('estimator')!r}"
             )
-        estimator = kind.from_dict(learnt)
+        # Where the file is the estimator's own, model and limits may stand beside it.
+        beside = ("model", "limits") if learnt is data else ()
+        estimator = kind.from_dict({key: v for key, v in learnt.items() if key not in beside})
     inner = data.get("model")
     described: dict[str, Any] = inner if isinstance(inner, dict) else data
     if estimator is not None and described is data:

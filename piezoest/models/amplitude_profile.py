@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, positive
+from piezoest._checks import FloatArray, array_1d, as_floats, fields, positive
 from piezoest.models.coleman_hodgdon import ColemanHodgdon
 
 _FORMAT = 1
@@ -42,8 +42,9 @@ class AmplitudeProfile:
 
     def __post_init__(self) -> None:
         swings = array_1d("swings", self.swings)
-        theta = np.array(self.theta, dtype=np.float64).reshape(-1, 3) if swings.size == 0 else self.theta
-        theta = np.array(theta, dtype=np.float64)
+        theta = as_floats("theta", self.theta).copy()
+        if theta.size == swings.size == 0:
+            theta = theta.reshape(-1, 3)
         if theta.shape != (swings.size, 3) or not np.all(np.isfinite(theta)):
             raise ValueError(f"theta must be finite with shape ({swings.size}, 3), got {theta.shape}")
         if np.any(np.diff(swings, prepend=0.0) <= 0.0):
@@ -116,9 +117,10 @@ class AmplitudeProfile:
         ValueError
             If it describes no profile, or one of another format.
         """
-        if data.get("profile") != cls.__name__ or data.get("format") != _FORMAT:
+        if not isinstance(data, dict) or (data.get("profile"), data.get("format")) != (cls.__name__, _FORMAT):
             raise ValueError(f"data is no {cls.__name__} of format {_FORMAT}: write it with save()")
-        return cls(data.get("swings"), data.get("theta"))  # type: ignore[arg-type]
+        fields("profile", data, ("profile", "format", "swings", "theta"), ("model",))
+        return cls(data["swings"], data["theta"])
 
     def save(self, path: str | Path) -> None:
         """Write the profile as JSON.

@@ -36,8 +36,8 @@ class Forgetting:
     memory: float = np.inf
 
     def __post_init__(self) -> None:
-        if not self.memory > 0.0:
-            raise ValueError(f"memory must be above zero (infinite for no forgetting), got {self.memory}")
+        if self.memory != np.inf:
+            positive("memory", self.memory)
 
     def factor(self, step: float) -> float:
         """Weight that the past keeps over one step: exp(-step/memory).
