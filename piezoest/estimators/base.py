@@ -311,7 +311,7 @@ class EstimatorBase(ABC):
             "estimator": type(self).__name__,
             "format": _FORMAT,
             "arguments": copy.deepcopy(self._arguments),
-            "state": self._state.tolist(),
+            "state": saved_state.to_save(self._state, self._table()),
             # JSON knows no NaN.
             "pending": "missing"
             if self._pending is not None and not np.isfinite(self._pending)

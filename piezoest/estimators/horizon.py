@@ -32,7 +32,7 @@ from piezoest.estimators.horizon_kernel import (
     chunk,
     step,
     table,
-)
+)  # fmt: skip
 from piezoest.estimators.saved_state import Table
 from piezoest.estimators.shooting import Prior, Problem, Solution, inverse_information, single_shooting
 from piezoest.estimators.thinning import thinned
@@ -150,7 +150,7 @@ class MovingHorizon(EstimatorBase):
         self._message, self._seconds = "", float("nan")
 
     def _table(self) -> Table:
-        return table(self._layout, self._window, self._arguments["noise"], self._model_of)
+        return table(self._layout, self._window, self._arguments["noise"], self._fits)
 
     def _coordinates(self) -> Coordinates:
         held = () if self._arguments["offset"] else ("offset",)
@@ -283,7 +283,10 @@ class MovingHorizon(EstimatorBase):
         if not found.success or not np.isfinite(problem.cost(found.q)):
             return False
         _, jacobian = problem.evaluate(found.q)
-        covariance = inverse_information(jacobian.T @ jacobian)
+        try:
+            covariance = inverse_information(jacobian.T @ jacobian)
+        except np.linalg.LinAlgError:
+            return False
         if not np.all(np.isfinite(covariance)):
             return False
         state = self._state
@@ -306,7 +309,10 @@ class MovingHorizon(EstimatorBase):
         names = problem.coordinates.free
         if "initial_state" in names:
             walk[names.index("initial_state")] = self._arguments["process_noise"] * state[NOISE]
-        follower, prior = moved_on(problem, q, k, walk)
+        try:
+            follower, prior = moved_on(problem, q, k, walk)
+        except np.linalg.LinAlgError:
+            return
         if np.all(np.isfinite(prior.root)) and np.all(np.isfinite(prior.mean)):
             state[layout.q], state[layout.mean], state[layout.root] = follower, prior.mean, prior.root.ravel()
 
@@ -332,6 +338,16 @@ class MovingHorizon(EstimatorBase):
         theta, n = state[self._layout.theta], self._initial.theta.size
         offset = float(theta[n]) if theta.size > n else self._initial.offset
         return type(self._initial).from_theta(theta[:n], offset)
+
+    def _fits(self, state: FloatArray) -> bool:
+        """Whether the model held is admissible and that of theta, and the coordinates are within bounds."""
+        model = self._model_of(state)
+        own = (model.a, model.b, model.c) if isinstance(model, ColemanHodgdon) else (0.0, 0.0, model.gain)
+        lower, upper = self._coordinates().bounds(q := state[self._layout.q])
+        within = np.all((lower <= q) & (q <= upper))
+        return bool(
+            within and model.is_admissible and np.allclose((*own, model.offset), state[A : OFFSET + 1])
+        )
 
     @property
     def P(self) -> FloatArray:

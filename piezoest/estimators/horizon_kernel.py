@@ -82,13 +82,8 @@ class Layout(NamedTuple):
         return cls(q, mean, root, theta, P, gain, edges[-1], edges[-1] + 2 * window)
 
 
-def table(layout: Layout, window: int, noise: float, model_of: Callable[[FloatArray], Any]) -> Table:
-    """Layout of `MovingHorizon`; `noise` is the least that it assumes."""
-
-    def models_agree(state: FloatArray) -> bool:
-        model = model_of(state)
-        own = getattr(model, "a", 0.0), getattr(model, "b", 0.0), getattr(model, "c", model.theta[0])
-        return bool(model.is_admissible and np.allclose((*own, model.offset), state[A : OFFSET + 1]))
+def table(layout: Layout, window: int, noise: float, fits: Callable[[FloatArray], bool]) -> Table:
+    """Blocks of the state; `noise` is the least that is assumed, `fits` says whether the models agree."""
 
     def rings_fit(state: FloatArray) -> bool:
         rings = state[layout.rings :]
@@ -124,7 +119,7 @@ def table(layout: Layout, window: int, noise: float, model_of: Callable[[FloatAr
         (
             no_more_than(SAMPLES, MISSING),
             no_more_than(SOLVES, FAILURES),
-            ("the model as held must be admissible, and that of theta", models_agree),
+            ("the model as held must be admissible and that of theta, the coordinates within bounds", fits),
             ("the window must hold samples, or what stands for missing ones", rings_fit),
         ),
     )

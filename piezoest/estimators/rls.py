@@ -19,6 +19,8 @@ from piezoest.policies import Forgetting, Policy, policy_to_dict
 
 # Seconds of memory where the paper's law is asked for without one.
 PAPER_MEMORY = 0.4
+# In parts of the sample rate: below it nothing comes through the low-pass.
+LEAST_CUTOFF = 1e-9
 
 
 class HysteresisRLS(Freezable):
@@ -46,7 +48,7 @@ class HysteresisRLS(Freezable):
     noise : float
         Standard deviation of the displacement's noise [µm]; weighs the start against the data.
     cutoff : float
-        Cut-off frequency of W_p [Hz].
+        Cut-off frequency of W_p [Hz], at least 1e-9 of the sample rate.
     high_pass : float, optional
         Cut-off frequency of a first-order high-pass on both sides [Hz], against a biased
         sensor (last remark of App. A). Below the reference's lowest frequency. It can only
@@ -132,6 +134,10 @@ class HysteresisRLS(Freezable):
         if offset is None:
             offset = memory == "period" and isinstance(initial, ColemanHodgdon)
         cutoff = min(positive("cutoff", cutoff), 0.5 * sample_rate)
+        if cutoff < LEAST_CUTOFF * sample_rate:
+            raise ValueError(
+                f"cutoff must be at least {LEAST_CUTOFF:g} of the sample rate, got {cutoff:g} Hz"
+            )
         fraction, line = delay_line(delay)
         self._initial = initial
         self._scale = settings.parameter_scale(initial, offset)

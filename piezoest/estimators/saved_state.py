@@ -19,6 +19,8 @@ from piezoest._checks import FloatArray, array_1d, fields, finite
 
 # No number that an estimator comes by is beyond this, and no count: six centuries at 50 kHz.
 LARGEST, MOST = 1e60, 2.0**50
+# Least argument other than zero, and the reciprocal of the largest.
+SMALLEST_ARGUMENT = 1e-20
 # Rounding that a covariance may show, in parts of its variances; and how far below zero an eigenvalue.
 ASYMMETRY, INDEFINITE = 1e-9, 1e-6
 
@@ -33,16 +35,22 @@ class Kind(NamedTuple):
     whole : bool
         Whole numbers only.
     square : bool
-        A covariance, row by row.
+        A symmetric matrix without a variance below zero, row by row.
+    definite : bool
+        No direction with a variance below zero either, but for rounding.
     fixed : bool
         As construction leaves them.
+    idle : bool
+        Work space: written before it is read, and neither saved nor loaded.
     """
 
     low: float = -LARGEST
     high: float = LARGEST
     whole: bool = False
     square: bool = False
+    definite: bool = False
     fixed: bool = False
+    idle: bool = False
 
 
 def whole(low: float, high: float) -> Kind:
@@ -52,7 +60,8 @@ def whole(low: float, high: float) -> Kind:
 
 NUMBER, AMOUNT, SHARE = Kind(), Kind(0.0), Kind(0.0, 1.0)
 COUNT, FLAG, SIGN = whole(0.0, MOST), whole(0.0, 1.0), whole(-1.0, 1.0)
-COVARIANCE, FIXED = Kind(square=True), Kind(fixed=True)
+COVARIANCE, SYMMETRIC = Kind(square=True, definite=True), Kind(square=True)
+FIXED, WORK = Kind(fixed=True), Kind(idle=True)
 
 
 class Block(NamedTuple):
@@ -96,16 +105,38 @@ def check(values: Any, table: Table, start: FloatArray) -> FloatArray:
     ValueError
         Naming the block that it cannot be.
     """
+    if not isinstance(values, list | tuple | np.ndarray):
+        raise ValueError(f"state must be a list of numbers, got {type(values).__name__}")
+    for place, value in enumerate(values):
+        if not isinstance(value, float | int):
+            raise ValueError(f"state must be a list of numbers, got {value!r} at position {place}")
     state = array_1d("state", values).copy()
     if state.size != start.size:
         raise ValueError(f"state holds {state.size} numbers, these arguments need {start.size}")
-    edges = [*(block.start for block in table.blocks), state.size]
-    for block, (first, last) in zip(table.blocks, pairwise(edges), strict=True):
-        _check_block(block, state[first:last], start[first:last])
+    for block, part in _parts(table, state.size):
+        if block.kind.idle:
+            state[part] = start[part]
+        else:
+            _check_block(block, state[part], start[part])
     for words, holds in table.rules:
         if not holds(state):
             raise ValueError(f"state: {words}: it was changed after to_dict()")
     return state
+
+
+def to_save(state: FloatArray, table: Table) -> list[float]:
+    """Return the numbers of a state without what is left in its work space."""
+    state = state.copy()
+    for block, part in _parts(table, state.size):
+        if block.kind.idle:
+            state[part] = 0.0
+    numbers: list[float] = state.tolist()
+    return numbers
+
+
+def _parts(table: Table, size: int) -> list[tuple[Block, slice]]:
+    edges = [*(block.start for block in table.blocks), size]
+    return [(block, slice(*pair)) for block, pair in zip(table.blocks, pairwise(edges), strict=True)]
 
 
 def _check_block(block: Block, values: FloatArray, start: FloatArray) -> None:
@@ -123,12 +154,12 @@ def _check_block(block: Block, values: FloatArray, start: FloatArray) -> None:
             f"state: {block.name} must be a {number} from {kind.low:g} to {kind.high:g}, "
             f"got {values[wrong][0]:g} at position {block.start + int(np.argmax(wrong))}"
         )
-    if kind.square and not is_covariance(values):
+    if kind.square and not is_covariance(values, kind.definite):
         raise ValueError(f"state: {block.name} must be symmetric and positive, as a covariance is")
 
 
-def is_covariance(flat: FloatArray) -> bool:
-    """Whether numbers are a covariance, row by row, but for rounding."""
+def is_covariance(flat: FloatArray, definite: bool) -> bool:
+    """Whether numbers are a covariance, row by row, but for rounding; `definite`: in all directions."""
     n = math.isqrt(flat.size)
     P = flat.reshape(n, n)
     variance = np.diag(P)
@@ -136,7 +167,11 @@ def is_covariance(flat: FloatArray) -> bool:
         return False
     deviation = np.sqrt(variance)
     unit = np.outer(deviation, deviation)
-    if np.any(np.abs(P) > (1.0 + INDEFINITE) * unit) or np.any(np.abs(P - P.T) > ASYMMETRY * unit):
+    if np.any(np.abs(P - P.T) > ASYMMETRY * unit):
+        return False
+    if not definite:
+        return True
+    if np.any(np.abs(P) > (1.0 + INDEFINITE) * unit):
         return False
     correlation = np.divide(P, unit, out=np.zeros_like(P), where=unit > 0.0)
     return bool(np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0] >= -INDEFINITE)
@@ -159,11 +194,29 @@ def check_head(name: str, version: int, data: Any, more: tuple[str, ...]) -> Non
 def construct(cls: Any, arguments: Any) -> Any:
     """Make an estimator from saved arguments, all of which must be there."""
     fields("arguments", arguments, inspect.signature(cls).parameters)
+    _check_magnitudes("arguments", arguments)
     try:
         with np.errstate(all="ignore"):
             return cls(**cls._revive(arguments))
     except (TypeError, ArithmeticError) as error:
         raise ValueError(f"arguments make no {cls.__name__}: {error}") from None
+
+
+def _check_magnitudes(name: str, value: Any) -> None:
+    """Refuse numbers whose squares and products are beyond those of float64: no stage has them."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            _check_magnitudes(f"{name}[{key!r}]", inner)
+    elif isinstance(value, list | tuple):
+        for place, inner in enumerate(value):
+            _check_magnitudes(f"{name}[{place}]", inner)
+    elif isinstance(value, int | float) and value not in (0, math.inf):
+        largest = 1.0 / SMALLEST_ARGUMENT
+        if not SMALLEST_ARGUMENT <= abs(value) <= largest:
+            raise ValueError(
+                f"{name} must be zero or of a size from {SMALLEST_ARGUMENT:g} to {largest:g}, "
+                f"got {str(value)[:20]}"
+            )
 
 
 def pending_voltage(value: Any) -> float | None:
