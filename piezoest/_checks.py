@@ -103,7 +103,7 @@ def as_floats(name: str, value: Any) -> FloatArray:
             value = [math.nan if item is np.ma.masked else item for item in value]
         array = value if isinstance(value, np.ndarray) else np.asarray(value)
         if isinstance(array, np.ma.MaskedArray):
-            array = array.astype(np.float64).filled(np.nan)
+            array = np.ma.filled(array.astype(np.float64), np.nan)
         if array.dtype.kind not in "biufO":
             raise TypeError
         if array.dtype.kind == "O" and any(isinstance(item, (str, bytes)) for item in array.flat):

@@ -112,9 +112,9 @@ class BatchFit(EstimatorBase):
             raise ValueError("initial_model has a gain of zero, whose sign is not known: pass a rough value")
         if not isinstance(creep, Creep | None):
             raise ValueError(f"creep must be a Creep, got {creep!r}: its time constants are kept")
-        if not isinstance(method, str) or method not in METHODS:
+        if method not in tuple(METHODS):
             raise ValueError(f"method must be one of {sorted(METHODS)}, got {method!r}")
-        if not isinstance(loss, str) or loss not in TUNING:
+        if loss not in tuple(TUNING):
             raise ValueError(f"loss must be one of {sorted(TUNING)}, got {loss!r}")
         self._initial = DEFAULT_MODEL if initial_model is None else initial_model
         self._creep = creep

@@ -8,31 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from piezoest._checks import FloatArray, integer, non_negative, positive
+from piezoest.estimators import horizon_kernel as kernel
 from piezoest.estimators.arrival import moved_on
 from piezoest.estimators.base import EstimatorBase, Status, Trace
 from piezoest.estimators.coordinates import Coordinates, coordinates
-from piezoest.estimators.horizon_kernel import (
-    FAILURES,
-    HELD,
-    INNOVATION,
-    LAST,
-    MISSING,
-    NOISE,
-    NOTHING,
-    OFFSET,
-    SAMPLES,
-    SOLVES,
-    UPDATED,
-    UPDATES,
-    VARIANCE,
-    W_H,
-    A,
-    C,
-    Layout,
-    chunk,
-    step,
-    table,
-)  # fmt: skip
 from piezoest.estimators.saved_state import Table
 from piezoest.estimators.shooting import Prior, Problem, Solution, inverse_information, single_shooting
 from piezoest.estimators.thinning import thinned
@@ -145,12 +124,12 @@ class MovingHorizon(EstimatorBase):
             "max_iterations": integer("max_iterations", max_iterations, 1),
         }
         n, m = len(self._coordinates().free), len(self.parameter_names)
-        self._layout = Layout.of(n, m, self._window)
+        self._layout = kernel.Layout.of(n, m, self._window)
         self._begin(self._arguments, self._new_state())
         self._message, self._seconds = "", float("nan")
 
     def _table(self) -> Table:
-        return table(self._layout, self._window, self._arguments["noise"], self._fits)
+        return kernel.table(self._layout, self._window, self._arguments["noise"], self._fits)
 
     def _coordinates(self) -> Coordinates:
         held = () if self._arguments["offset"] else ("offset",)
@@ -167,9 +146,9 @@ class MovingHorizon(EstimatorBase):
         state[layout.q] = state[layout.mean] = q
         state[layout.root] = np.diag(1.0 / deviation).ravel()
         self._hold(state, q, np.diag(deviation**2))
-        state[NOISE] = self._arguments["noise"]
-        state[VARIANCE] = state[NOISE] ** 2
-        state[layout.rings :] = NOTHING
+        state[kernel.NOISE] = self._arguments["noise"]
+        state[kernel.VARIANCE] = state[kernel.NOISE] ** 2
+        state[layout.rings :] = kernel.NOTHING
         return state
 
     def _typical(self, q: FloatArray) -> FloatArray:
@@ -189,7 +168,7 @@ class MovingHorizon(EstimatorBase):
         """Make the model of q the one that is held."""
         v, _, theta, T = self._coordinates()(q, self._held)
         m = len(self.parameter_names)
-        state[A : OFFSET + 1] = v[:4]
+        state[kernel.A : kernel.OFFSET + 1] = v[:4]
         state[self._layout.theta] = theta[:m]
         P = T[:m] @ covariance @ T[:m].T
         state[self._layout.P] = (0.5 * (P + P.T)).ravel()
@@ -201,8 +180,8 @@ class MovingHorizon(EstimatorBase):
     # ------------------------------------------------------------ samples
 
     def _sample(self, u: float, x: float) -> None:
-        step(self._state, u, x, self._layout.rings, self._window)
-        if int(self._state[SAMPLES]) % self._hop == 0:
+        kernel.step(self._state, u, x, self._layout.rings, self._window)
+        if int(self._state[kernel.SAMPLES]) % self._hop == 0:
             self._solve()
 
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
@@ -211,9 +190,9 @@ class MovingHorizon(EstimatorBase):
         y = np.empty(u.size)
         done = 0
         while done < u.size:
-            left = self._hop - int(self._state[SAMPLES]) % self._hop
+            left = self._hop - int(self._state[kernel.SAMPLES]) % self._hop
             end = min(done + left, u.size)
-            chunk(self._state, u[done:end], x[done:end], layout.rings, self._window, y[done:end])
+            kernel.chunk(self._state, u[done:end], x[done:end], layout.rings, self._window, y[done:end])
             # Rows up to the one before the solve hold the old model.
             for first, last in ((done, end - 1), (end - 1, end)):
                 if last == end and end - done == left:
@@ -221,7 +200,7 @@ class MovingHorizon(EstimatorBase):
                 part = slice(first // every, last // every)
                 theta[part] = self._state[layout.theta]
                 P[part] = self._state[layout.P]
-                S[part] = self._state[VARIANCE]
+                S[part] = self._state[kernel.VARIANCE]
             done = end
         return Trace(
             index=np.arange(every - 1, rows * every, every),
@@ -237,45 +216,45 @@ class MovingHorizon(EstimatorBase):
     def _in_order(self) -> tuple[FloatArray, FloatArray, int]:
         """Voltage and displacement of the window, oldest first, and its first sample's number."""
         state, W, start = self._state, self._window, self._layout.rings
-        samples = int(state[SAMPLES])
+        samples = int(state[kernel.SAMPLES])
         order = np.arange(max(0, samples - W), samples)
         u, x = state[start : start + W][order % W], state[start + W : start + 2 * W][order % W]
-        x[x == NOTHING] = np.nan
+        x[x == kernel.NOTHING] = np.nan
         return u, x, int(order[0])
 
     def _solve(self) -> None:
         """Fit the window, move the arrival cost on by a hop."""
         began = time.perf_counter()
         u, x, first = self._in_order()
-        known = u != NOTHING
+        known = u != kernel.NOTHING
         if not known.any():
             return
         u[~known] = u[known][0]  # before the first known voltage; nothing is measured there
         state, layout, n = self._state, self._layout, self._layout.q.stop - self._layout.q.start
         # The window's first sample at the next solve, counted from this one's.
-        leaving = max(0, int(state[SAMPLES]) + self._hop - self._window) - first
+        leaving = max(0, int(state[kernel.SAMPLES]) + self._hop - self._window) - first
         points, shift, mean_x, weight = thinned(u, x, first, self._arguments["decimation"], leaving)
-        mean_x -= state[C] * shift
+        mean_x -= state[kernel.C] * shift
         prior = Prior(state[layout.mean].copy(), state[layout.root].reshape(n, n).copy())
         problem = Problem(
             u[points], mean_x, self._coordinates(), self._held, np.empty(0),
-            weight / state[NOISE], prior,
+            weight / state[kernel.NOISE], prior,
         )  # fmt: skip
         q = state[layout.q].copy()
         found = single_shooting(problem, q, "linear", 1.0, self._arguments["max_iterations"], TOLERANCE)
-        state[SOLVES] += 1.0
+        state[kernel.SOLVES] += 1.0
         good = self._take_over(problem, found)
         if good:
             q = found.q
-            state[UPDATES] += state[LAST] == HELD
-            state[LAST] = UPDATED if state[LAST] == HELD else state[LAST]
+            state[kernel.UPDATES] += state[kernel.LAST] == kernel.HELD
+            state[kernel.LAST] = kernel.UPDATED if state[kernel.LAST] == kernel.HELD else state[kernel.LAST]
         else:
-            state[FAILURES] += 1.0
+            state[kernel.FAILURES] += 1.0
         self._move_on(problem, q, int(np.searchsorted(points, leaving)), leaving)
         if good and problem.measured:
             residual = problem.evaluate(q)[0][: points.size]
             chi = np.sqrt(float(residual @ residual) / problem.measured)
-            state[NOISE] = max(self._arguments["noise"], state[NOISE] * chi)
+            state[kernel.NOISE] = max(self._arguments["noise"], state[kernel.NOISE] * chi)
         self._message, self._seconds = found.message, time.perf_counter() - began
 
     def _take_over(self, problem: Problem, found: Solution) -> bool:
@@ -292,11 +271,13 @@ class MovingHorizon(EstimatorBase):
         state = self._state
         self._hold(state, found.q, covariance)
         run, by_q = problem.simulate(found.q)
-        state[W_H] = run.end[0]
+        state[kernel.W_H] = run.end[0]
         row = run.jacobian[-1] @ by_q
         _, _, _, T = self._coordinates()(found.q, self._held)
-        state[VARIANCE] = state[NOISE] ** 2 + row @ covariance @ row
-        state[self._layout.gain] = (T[: len(self.parameter_names)] @ covariance @ row) / state[VARIANCE]
+        state[kernel.VARIANCE] = state[kernel.NOISE] ** 2 + row @ covariance @ row
+        state[self._layout.gain] = (T[: len(self.parameter_names)] @ covariance @ row) / state[
+            kernel.VARIANCE
+        ]
         return True
 
     def _move_on(self, problem: Problem, q: FloatArray, k: int, leaving: int) -> None:
@@ -308,7 +289,7 @@ class MovingHorizon(EstimatorBase):
         walk = self._arguments["process_noise"] * self._typical(q) * np.sqrt(leaving / self.sample_rate)
         names = problem.coordinates.free
         if "initial_state" in names:
-            walk[names.index("initial_state")] = self._arguments["process_noise"] * state[NOISE]
+            walk[names.index("initial_state")] = self._arguments["process_noise"] * state[kernel.NOISE]
         try:
             follower, prior = moved_on(problem, q, k, walk)
         except np.linalg.LinAlgError:
@@ -345,9 +326,8 @@ class MovingHorizon(EstimatorBase):
         own = (model.a, model.b, model.c) if isinstance(model, ColemanHodgdon) else (0.0, 0.0, model.gain)
         lower, upper = self._coordinates().bounds(q := state[self._layout.q])
         within = np.all((lower <= q) & (q <= upper))
-        return bool(
-            within and model.is_admissible and np.allclose((*own, model.offset), state[A : OFFSET + 1])
-        )
+        same = np.allclose((*own, model.offset), state[kernel.A : kernel.OFFSET + 1])
+        return bool(within and same and model.is_admissible)
 
     @property
     def P(self) -> FloatArray:
@@ -363,12 +343,12 @@ class MovingHorizon(EstimatorBase):
     @property
     def y(self) -> float:
         """Last measured displacement less that of the held model [µm]."""
-        return float(self._state[INNOVATION])
+        return float(self._state[kernel.INNOVATION])
 
     @property
     def S(self) -> float:
         """Variance of an innovation at the last good solve [µm²]."""
-        return float(self._state[VARIANCE])
+        return float(self._state[kernel.VARIANCE])
 
     @property
     def K(self) -> FloatArray:
@@ -382,19 +362,19 @@ class MovingHorizon(EstimatorBase):
         ``updates`` counts the good solves, ``held`` the measured samples between them.
         """
         state = self._state
-        samples, missing, updates = (int(state[i]) for i in (SAMPLES, MISSING, UPDATES))
-        last = ("waiting", "updated", "missing", "held")[int(state[LAST])]
+        samples, missing, updates = (int(state[i]) for i in (kernel.SAMPLES, kernel.MISSING, kernel.UPDATES))
+        last = ("waiting", "updated", "missing", "held")[int(state[kernel.LAST])]
         return Status(samples, updates, missing, samples - missing - updates, 0, False, last)
 
     @property
     def solves(self) -> int:
         """Solves so far, failed ones too: never more than one a hop."""
-        return int(self._state[SOLVES])
+        return int(self._state[kernel.SOLVES])
 
     @property
     def failures(self) -> int:
         """Solves that failed, after which the last good model was held."""
-        return int(self._state[FAILURES])
+        return int(self._state[kernel.FAILURES])
 
     @property
     def solver_message(self) -> str:

@@ -23,6 +23,8 @@ LARGEST, MOST = 1e60, 2.0**50
 SMALLEST_ARGUMENT = 1e-20
 # Rounding that a covariance may show, in parts of its variances; and how far below zero an eigenvalue.
 ASYMMETRY, INDEFINITE = 1e-9, 1e-6
+# Rounding of a variance that is no divisor.
+NEGATIVE = 1e-9
 
 
 class Kind(NamedTuple):
@@ -163,9 +165,9 @@ def is_covariance(flat: FloatArray, definite: bool) -> bool:
     n = math.isqrt(flat.size)
     P = flat.reshape(n, n)
     variance = np.diag(P)
-    if np.any(variance < 0.0):
+    if np.any(variance < (0.0 if definite else -NEGATIVE)):
         return False
-    deviation = np.sqrt(variance)
+    deviation = np.sqrt(np.fmax(variance, 0.0))
     unit = np.outer(deviation, deviation)
     if np.any(np.abs(P - P.T) > ASYMMETRY * unit):
         return False

@@ -41,7 +41,7 @@ from piezoest.estimators.saved_state import (
 MEASURED = Kind(-1e3 * WILDEST, 1e3 * WILDEST)
 DISTANCE = Kind(0.0, 1e3 * WILDEST)
 # Parameters, most of them in parts of their start.
-PARAMETER = Kind(-1e15, 1e15)
+PARAMETER = Kind(-1e20, 1e20)
 # Least half-width of a grid of plays [V].
 LEAST_RANGE = 1e-15
 
@@ -314,7 +314,7 @@ def play_rls(config: FloatArray, size: int) -> Table:
                 (k.COUNT, "measurements of the window", COUNT),
                 (k.TRAVEL, "the travel of the window", AMOUNT),
                 (k.X_SUM, "the sum of the window", NUMBER),
-                (k.OFFSET, "the offset", MEASURED),
+                (k.OFFSET, "the offset", PARAMETER),
                 (k.X_LAST, "the last displacement", MEASURED),
                 (k.GAP, "samples of a gap", COUNT),
                 (k.GAP_TRAVEL, "the travel of a gap", AMOUNT),

@@ -24,7 +24,7 @@ __all__ = [
 ]
 
 
-def model_from_dict(data: dict[str, Any]) -> Model:
+def model_from_dict(data: Any) -> Model:
     """Make the model that its `to_dict` described, of whichever class.
 
     Parameters

@@ -104,7 +104,7 @@ class AmplitudeProfile:
         return data
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
+    def from_dict(cls, data: Any) -> Self:
         """Make the profile from what `to_dict` gave.
 
         Parameters

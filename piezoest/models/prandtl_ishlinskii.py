@@ -191,7 +191,7 @@ class PrandtlIshlinskii(Model):
         return data
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
+    def from_dict(cls, data: Any) -> Self:
         """Make the model from what `to_dict` gave.
 
         Parameters

@@ -102,7 +102,7 @@ def policy_to_dict(policy: Policy) -> dict[str, Any]:
     return {"policy": type(policy).__name__, **dataclasses.asdict(policy)}
 
 
-def policy_from_dict(data: dict[str, Any]) -> Policy:
+def policy_from_dict(data: Any) -> Policy:
     """Make the policy that `policy_to_dict` described.
 
     Raises

@@ -268,14 +268,14 @@ class Sulking:
 
 
 # What drivers return for a number: all take 3.
-NUMBERS = (
+NUMBERS: tuple[Any, ...] = (
     float, int, np.float64, np.float32, np.float16, np.longdouble, np.int64, np.uint8, Fraction, Decimal,
     lambda v: [v], lambda v: (int(v),), np.array, lambda v: np.array([v]), lambda v: np.array([v], np.int16),
     lambda v: np.array(v, np.float32), lambda v: np.array([v], object), np.ma.array,
     lambda v: np.ma.array([v]), lambda v: np.ma.array([v], mask=[False]), lambda v: [np.int32(v)],
 )  # fmt: skip
 # What is none of theirs.
-NO_READINGS = (
+NO_READINGS: tuple[Any, ...] = (
     "1.5", "", b"1", bytearray(b"1"), np.str_("1"), np.array(["1"]), 10**400, -(10**400), 1.0 + 0.0j,
     np.complex64(1.0), np.array([1.0j]), [], (), [1.0, 2.0], [[1.0]], [None], ["1"], {}, {1.0}, object(),
     Sulking(), float, np.zeros(2), np.zeros((1, 1)), np.zeros(0), np.ma.masked, np.ma.array([1.0], mask=True),
@@ -288,9 +288,9 @@ def test_takes_a_number_of_any_kind(kind: Any) -> None:
     for k, (made, other) in enumerate(zip(NUMBERS, reversed(NUMBERS), strict=True)):
         u, x = float(k), float(k // 4)
         plain.step(u, x)
-        stepped.step(made(u), other(x))  # type: ignore[operator]
-        parted.predict(other(u))  # type: ignore[operator]
-        parted.update(made(x))  # type: ignore[operator]
+        stepped.step(made(u), other(x))
+        parted.predict(other(u))
+        parted.update(made(x))
     for flag in (True, np.True_, np.bool_(False)):
         plain.step(float(flag), float(flag))
         stepped.step(flag, flag)
