@@ -82,6 +82,8 @@ def number_or_nan(value: Any) -> float:
     """
     if isinstance(value, float):
         return float(value)
+    if value is None:
+        return math.nan
     try:
         if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim == 1):
             (value,) = value
@@ -98,6 +100,8 @@ def number_or_nan(value: Any) -> float:
 
 def as_floats(name: str, value: Any) -> FloatArray:
     """Return numbers of any shape as float64, masked ones as NaN."""
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
     try:
         if isinstance(value, (list, tuple)) and any(item is np.ma.masked for item in value):
             value = [math.nan if item is np.ma.masked else item for item in value]

@@ -316,7 +316,7 @@ class HysteresisRLS(Freezable):
             gain = self._state[kernel.GAIN : kernel.GAIN + n]
             energy = (1.0 - pole) / (1.0 + pole) * self._config[kernel.NOISE_RATIO] ** 2
             C = C + np.outer(gain, gain) * energy
-        return np.sqrt(np.diag(C)) * self._scale
+        return np.sqrt(np.fmax(np.diag(C), 0.0)) * self._scale
 
     @property
     def y(self) -> float:

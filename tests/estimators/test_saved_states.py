@@ -141,11 +141,11 @@ def test_work_space_is_not_saved() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda n: pz.HysteresisRLS(RATE, delay=n), "delay must lie within"),
-        (lambda n: pz.HysteresisEKF(RATE, delay=n), "delay must lie within"),
-        (lambda n: pz.OutputErrorRLS(RATE, delay=n), "delay must lie within"),
-        (lambda n: pz.FilterPyEKF(RATE, delay=n), "delay must lie within"),
-        (lambda n: pz.PrandtlIshlinskiiRLS(RATE, delay=n), "delay must lie within"),
+        (lambda n: pz.HysteresisRLS(RATE, delay=n), "delay must be at most"),
+        (lambda n: pz.HysteresisEKF(RATE, delay=n), "delay must be at most"),
+        (lambda n: pz.OutputErrorRLS(RATE, delay=n), "delay must be at most"),
+        (lambda n: pz.FilterPyEKF(RATE, delay=n), "delay must be at most"),
+        (lambda n: pz.PrandtlIshlinskiiRLS(RATE, delay=n), "delay must be at most"),
         (lambda n: pz.OutputErrorRLS(RATE, members=n), "members must be a whole number from 3 to 1000"),
         (lambda n: pz.PrandtlIshlinskiiRLS(RATE, thresholds=n), "thresholds must be a whole number from 0"),
         (lambda n: pz.PrandtlIshlinskiiRLS(RATE, bends=n), "bends must be a whole number from 0"),
@@ -163,7 +163,7 @@ def test_arguments_that_become_sizes_are_bounded(make: Any, message: str) -> Non
 
 def test_an_argument_in_a_dictionary_is_bounded_too() -> None:
     data = pz.HysteresisRLS(RATE, delay=7.0).to_dict()
-    with pytest.raises(ValueError, match="delay must lie within"):
+    with pytest.raises(ValueError, match="delay must be at most"):
         pz.HysteresisRLS.from_dict(data | {"arguments": data["arguments"] | {"delay": 1e9}})
     with pytest.raises(ValueError, match=r"arguments\['noise'\] must be zero or of a size"):
         pz.HysteresisRLS.from_dict(data | {"arguments": data["arguments"] | {"noise": 1e-300}})
