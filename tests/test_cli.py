@@ -194,7 +194,7 @@ def test_mistakes_in_compensate(reference: Path) -> None:
         "[1]": "no model",
         '{"model": ["a"]}': "no model",
         '{"model": "Foo"}': "Foo",
-        '{"alpha": 1}': "describe",
+        '{"alpha": 1}': "ColemanHodgdon has no 'beta'",
     }
     for text, word in contents.items():
         Path("model.json").write_text(text)
