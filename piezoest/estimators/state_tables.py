@@ -42,6 +42,8 @@ MEASURED = Kind(-1e3 * WILDEST, 1e3 * WILDEST)
 DISTANCE = Kind(0.0, 1e3 * WILDEST)
 # Parameters, most of them in parts of their start.
 PARAMETER = Kind(-1e20, 1e20)
+# In parts of the least decay and of the margin of an EKF, which are 1e-2 and 1e-3 of its start.
+GROWING, GREATEST = 1e5, 1e10
 # Least half-width of a grid of plays [V].
 LEAST_RANGE = 1e-15
 
@@ -240,6 +242,15 @@ def output_error(config: FloatArray, size: int) -> Table:
 def ekf(config: FloatArray, size: int) -> Table:
     """Layout of `HysteresisEKF`, and of filterpy's filters."""
     k, n = ekf_kernel, int(config[ekf_kernel.N])
+
+    def parameters_fit(state: FloatArray) -> bool:
+        a, b, c = state[k.HEAD + 1 : k.HEAD + 4]
+        least_a, least_b = config[k.LEAST_A], config[k.LEAST_B]
+        if config[k.PROJECT] != 0.0:
+            return bool(a >= least_a and b >= least_b)
+        # Without projection a decay below zero is an exponential that grows: not without end.
+        return bool(-GROWING * least_a <= a and abs(c) <= GREATEST * config[k.MARGIN])
+
     return Table(
         (
             *at(
@@ -269,11 +280,8 @@ def ekf(config: FloatArray, size: int) -> Table:
         (
             no_more_than(k.SAMPLES, k.MISSED, k.UPDATES),
             (
-                "the filter's state must be in the admissible set",
-                lambda state: (
-                    config[k.PROJECT] == 0.0
-                    or (state[k.HEAD + 1] >= config[k.LEAST_A] and state[k.HEAD + 2] >= config[k.LEAST_B])
-                ),
+                "the filter's parameters must be admissible, or near it where it does not project",
+                lambda state: config[k.HYSTERETIC] == 0.0 or parameters_fit(state),
             ),
         ),
     )

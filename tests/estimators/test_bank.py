@@ -70,9 +70,9 @@ def test_a_channel_without_a_number_is_missing_and_stops_no_other() -> None:
     for k in range(20):
         u, x = [0.1 * k, 0.2 * k, 0.3 * k], [0.01 * k, 0.02 * k, 0.03 * k]
         plain.step([u[0], np.nan, u[2]], [np.nan, x[1], x[2]])
-        odd = ("error", np.ma.masked, 1j, 10**400, [], None)[k % 6]
+        odd: Any = ("error", np.ma.masked, 1j, 10**400, [], None)[k % 6]
         listed.step([u[0], odd, np.array([u[2]])], np.array([None, x[1], (x[2],)], object))
-        hidden = np.ma.array(x, mask=[True, False, False])
+        hidden: Any = np.ma.array(x, mask=[True, False, False])
         masked.step(np.ma.array(u, mask=[False, True, False]), hidden)
     assert plain.status[0].missing == 20
     for bank in (listed, masked):
