@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -24,9 +25,9 @@ def finite(name: str, value: Any) -> float:
     """
     if type(value) is float and math.isfinite(value):
         return value  # a live loop makes a model now and then
-    if isinstance(value, (str, bytes)) or np.ndim(value) != 0:
-        raise ValueError(f"{name} must be one number, got {value!r}: pass a plain float")
     try:
+        if isinstance(value, (str, bytes)) or np.ndim(value) != 0:
+            raise TypeError
         number = float(value)
     except OverflowError:
         raise ValueError(f"{name} must be a number of at most 1.8e308: check where it comes from") from None
@@ -61,12 +62,77 @@ def fraction(name: str, value: Any, low: float = 0.0, high: float = 1.0) -> floa
     return number
 
 
-def integer(name: str, value: Any, minimum: int = 0) -> int:
-    """Return `value` as an int of at least `minimum`; 3.0 passes, 3.5 does not."""
+def integer(name: str, value: Any, minimum: int = 0, maximum: int | None = None) -> int:
+    """Return `value` as an int from `minimum` to `maximum`; 3.0 passes, 3.5 does not.
+
+    What becomes a size has a `maximum`: a slip of the pen must not ask for all memory.
+    """
     number = finite(name, value)
-    if number != int(number) or number < minimum:
-        raise ValueError(f"{name} must be a whole number of at least {minimum}, got {value!r}")
+    if number != int(number) or number < minimum or (maximum is not None and number > maximum):
+        bounds = f"of at least {minimum}" if maximum is None else f"from {minimum} to {maximum}"
+        raise ValueError(f"{name} must be a whole number {bounds}, got {value!r}")
     return int(number)
+
+
+def number_or_nan(value: Any) -> float:
+    """Return what a driver gave as a float: NaN where it is not one real number.
+
+    Numbers of any kind, and arrays, lists and tuples of one of them, are numbers. Text, masked
+    values, complex numbers, other shapes and other objects are missing; nothing is raised.
+    """
+    if isinstance(value, float):
+        return float(value)
+    if value is None:
+        return math.nan
+    try:
+        if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim == 1):
+            (value,) = value
+        if isinstance(value, np.ndarray) and value is not np.ma.masked:
+            value = value[()]  # of no dimensions; with more it stays an array
+        if value is np.ma.masked or isinstance(value, (str, bytes, bytearray, np.ndarray)):
+            return math.nan
+        if isinstance(value, np.generic) and value.dtype.kind not in "biuf":
+            return math.nan
+        return float(value)
+    except Exception:  # whatever a driver's own class does: a stream must not stop
+        return math.nan
+
+
+def as_floats(name: str, value: Any) -> FloatArray:
+    """Return numbers of any shape as float64, masked ones as NaN."""
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
+    try:
+        if isinstance(value, (list, tuple)) and any(item is np.ma.masked for item in value):
+            value = [math.nan if item is np.ma.masked else item for item in value]
+        array = value if isinstance(value, np.ndarray) else np.asarray(value)
+        if isinstance(array, np.ma.MaskedArray):
+            array = np.ma.filled(array.astype(np.float64), np.nan)
+        if array.dtype.kind not in "biufO":
+            raise TypeError
+        if array.dtype.kind == "O" and any(isinstance(item, (str, bytes)) for item in array.flat):
+            raise TypeError
+        return np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} must be numbers, got {_described(value)}") from None
+
+
+def _described(value: Any) -> str:
+    kind = getattr(value, "dtype", None)
+    return type(value).__name__ if kind is None else f"{type(value).__name__} of {kind}"
+
+
+def fields(name: str, data: Any, needed: Iterable[str], optional: Iterable[str] = ()) -> dict[str, Any]:
+    """Return a dictionary that came from outside, if it has the fields it needs and no others."""
+    if not isinstance(data, dict):
+        raise ValueError(f"{name} must be a dictionary, got {type(data).__name__}")
+    needed = list(needed)
+    if missing := [field for field in needed if field not in data]:
+        raise ValueError(f"{name} has no {', '.join(map(repr, missing))}")
+    known = {*needed, *optional}
+    if unknown := [field for field in data if field not in known]:
+        raise ValueError(f"{name} has unknown fields {unknown}: choose of {sorted(known)}")
+    return data
 
 
 def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: int = 0) -> FloatArray:
@@ -87,12 +153,9 @@ def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: 
         and value.size >= minimum_length
     ):
         return value
-    try:
-        array = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} must be numbers in shape (N,), got {type(value).__name__}") from None
-    if np.ndim(value) == 0 or array.ndim != 1:
-        shape = np.shape(value)
+    array = as_floats(name, value)
+    if array.ndim != 1:
+        shape = array.shape
         hint = ""
         if len(shape) == 2 and shape[1] == 1:
             hint = f": pass {name}[:, 0]"
@@ -110,4 +173,4 @@ def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: 
                 f"{name} holds {bad.size} values that are NaN or infinite (first at index {bad[0]}): "
                 "remove or interpolate them first"
             )
-    return array
+    return np.ascontiguousarray(array)

@@ -194,7 +194,7 @@ def test_mistakes_in_compensate(reference: Path) -> None:
         "[1]": "no model",
         '{"model": ["a"]}': "no model",
         '{"model": "Foo"}': "Foo",
-        '{"alpha": 1}': "describe",
+        '{"alpha": 1}': "ColemanHodgdon has no 'beta'",
         "[" * 100_000: "nested too deeply",
         json.dumps({**TRUE.to_dict(), "alpha": 10**400}): "alpha must be a number of at most",
     }

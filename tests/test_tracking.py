@@ -54,6 +54,7 @@ def test_intervals_are_a_loop_of_steps() -> None:
             lambda self: self._inner.model, lambda self, model: setattr(self._inner, "model", model)
         )
         displacement = property(lambda self: self._inner.displacement)
+        hand_over_due = property(lambda self: self._inner.hand_over_due)
 
     r = pz.signals.triangle(5.0, 5.0, 1, FS)
     whole = ring(1)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 import os
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, integer
+from piezoest._checks import FloatArray, as_floats, integer, number_or_nan
 from piezoest.estimators import bank_kernel
 from piezoest.estimators.base import Status
 from piezoest.estimators.ekf import HysteresisEKF
@@ -20,6 +21,8 @@ _LOOPS: dict[type, Any] = {HysteresisRLS: bank_kernel.rls, HysteresisEKF: bank_k
 
 # Samples (of all channels) below which a second core costs more than it brings.
 WORTH_A_CORE = 4096
+# Most channels: each has a state of its own.
+MOST_CHANNELS = 1_000_000
 
 
 class EstimatorBank:
@@ -33,7 +36,7 @@ class EstimatorBank:
     estimator : HysteresisRLS or HysteresisEKF
         Every channel starts as a copy of it, in its present state; it is not changed itself.
     channels : int
-        Number of stages, N.
+        Number of stages, N, up to a million.
     threads : int, optional
         Cores to use; default all.
 
@@ -62,7 +65,7 @@ class EstimatorBank:
                 f"estimator must be a HysteresisRLS or a HysteresisEKF, got {type(estimator).__name__}: "
                 "keep a list of estimators instead"
             )
-        channels = integer("channels", channels, 1)
+        channels = integer("channels", channels, 1, MOST_CHANNELS)
         self._threads = integer("threads", os.cpu_count() or 1 if threads is None else threads, 1)
         self._kind = estimator._kind
         reader: Any = estimator.copy()
@@ -71,15 +74,18 @@ class EstimatorBank:
         self._states = np.tile(self._start, (channels, 1))
         self._none = np.empty((0, channels, self._reader._n))
 
+    def __copy__(self) -> Self:
+        return copy.deepcopy(self)
+
     def __len__(self) -> int:
         """Return the number of channels."""
         return len(self._states)
 
     def _channels_of(self, name: str, values: Any, dimensions: int) -> FloatArray:
-        try:
-            array = np.require(values, np.float64, ["C", "W"])
-        except (TypeError, ValueError):
-            raise ValueError(f"{name} must be numbers, got {type(values).__name__}") from None
+        if dimensions == 1 and not (isinstance(values, np.ndarray) and values.dtype.kind in "biuf"):
+            # One channel's driver must not stop the others.
+            values = [number_or_nan(value) for value in values] if np.iterable(values) else values
+        array = np.require(as_floats(name, values), requirements=["C", "W"])
         if array.ndim != dimensions or array.shape[-1] != len(self):
             shape = f"(K, {len(self)})" if dimensions == 2 else f"({len(self)},)"
             raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
@@ -108,7 +114,8 @@ class EstimatorBank:
         Parameters
         ----------
         u, x : array_like, shape (N,)
-            Voltages [V] and measured displacements [µm]; NaN where there is none.
+            Voltages [V] and measured displacements [µm]; NaN, None or a masked value where there is none.
+            In a list whatever is no number counts as missing, as in `HysteresisRLS.step`.
 
         Raises
         ------

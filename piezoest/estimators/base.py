@@ -9,7 +9,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, integer
+from piezoest._checks import FloatArray, array_1d, integer, number_or_nan
+from piezoest.estimators import saved_state
 from piezoest.models import Model, model_from_dict
 from piezoest.policies import policy_from_dict
 
@@ -138,6 +139,9 @@ class EstimatorBase(ABC):
     #: Promises of the face this class does not keep: name of the promise to the reason.
     conformance_exceptions: ClassVar[dict[str, str]] = {}
 
+    #: What the class saves beside its state.
+    _saved_too: ClassVar[tuple[str, ...]] = ()
+
     _arguments: dict[str, Any]
     _pending: float | None
     _start: FloatArray
@@ -192,12 +196,12 @@ class EstimatorBase(ABC):
         Parameters
         ----------
         u : float
-            Voltage [V]. A second `predict` without an `update` between them makes the first
-            a sample without a measurement.
+            Voltage [V]; of any kind, as in `step`. A second `predict` without an `update` between them
+            makes the first a sample without a measurement.
         """
         if self._pending is not None:
             self._sample(self._pending, np.nan)
-        self._pending = np.nan if u is None else float(u)
+        self._pending = number_or_nan(u)
 
     def update(self, x: float | None) -> None:
         """Take the measurement that belongs to the last `predict`.
@@ -205,7 +209,7 @@ class EstimatorBase(ABC):
         Parameters
         ----------
         x : float or None
-            Displacement [µm]; None, NaN or infinity where there is none.
+            Displacement [µm]; of any kind, as in `step`; None, NaN or infinity where there is none.
 
         Raises
         ------
@@ -215,7 +219,7 @@ class EstimatorBase(ABC):
         if self._pending is None:
             raise ValueError("update(x) needs the sample's voltage: call predict(u) before, or step(u, x)")
         u, self._pending = self._pending, None
-        self._sample(u, np.nan if x is None else x)
+        self._sample(u, number_or_nan(x))
 
     def step(self, u: float | None, x: float | None) -> None:
         """Take one sample: ``predict(u)`` and ``update(x)``.
@@ -226,13 +230,23 @@ class EstimatorBase(ABC):
             Voltage [V].
         x : float or None
             Measured displacement [µm]; None, NaN or infinity where there is none: the
-            sample is skipped and `status` says so. Nothing is raised: a stream must not stop.
+            sample is skipped and `status` says so.
+
+        Notes
+        -----
+        Nothing is raised: a stream must not stop. Both may be what a driver returns: a number of any kind,
+        or an array, a list or a tuple of one. Whatever else comes (text, a masked value, another shape)
+        counts as missing.
         """
+        if type(u) is not float:
+            u = number_or_nan(u)
+        if type(x) is not float:
+            x = number_or_nan(x)
         if self._pending is not None:
             self.predict(u)
             self.update(x)
             return
-        self._sample(np.nan if u is None else u, np.nan if x is None else x)
+        self._sample(u, x)
 
     def run(self, u: Any, x: Any, *, every: int = 1, record: tuple[str, ...] = ()) -> Trace:
         """Take a whole record; continues from the current state, the same as a loop of `step`.
@@ -288,13 +302,16 @@ class EstimatorBase(ABC):
         """Return an independent estimator in the same state."""
         return copy.deepcopy(self)
 
+    def __copy__(self) -> Self:
+        return self.copy()
+
     def to_dict(self) -> dict[str, Any]:
         """Return arguments and state as a JSON-safe dictionary; `from_dict` resumes bit for bit."""
         return {
             "estimator": type(self).__name__,
             "format": _FORMAT,
             "arguments": copy.deepcopy(self._arguments),
-            "state": self._state.tolist(),
+            "state": saved_state.to_save(self._state, self._table()),
             # JSON knows no NaN.
             "pending": "missing"
             if self._pending is not None and not np.isfinite(self._pending)
@@ -308,8 +325,14 @@ class EstimatorBase(ABC):
         if revived.get("initial_model") is not None:
             revived["initial_model"] = model_from_dict(revived["initial_model"])
         if "policies" in revived:
+            if not isinstance(revived["policies"], list | tuple):
+                raise ValueError(f"policies must be a list, got {revived['policies']!r}")
             revived["policies"] = tuple(policy_from_dict(item) for item in revived["policies"])
         return revived
+
+    @abstractmethod
+    def _table(self) -> saved_state.Table:
+        """What the state consists of."""
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
@@ -323,21 +346,13 @@ class EstimatorBase(ABC):
         Raises
         ------
         ValueError
-            If the dictionary is of another class or format, or its state does not fit.
+            If the dictionary is of another class or format, a field is missing or unknown, an argument is
+            refused, or the state is none that the estimator can have been in.
         """
-        if data.get("estimator") != cls.__name__:
-            raise ValueError(f"data is of a {data.get('estimator')!r}, not of a {cls.__name__}")
-        if data.get("format") != _FORMAT:
-            raise ValueError(f"data has format {data.get('format')!r}, this version reads {_FORMAT}")
-        estimator = cls(**cls._revive(data["arguments"]))
-        state = array_1d("state", data["state"])
-        if state.size != estimator._state.size:
-            raise ValueError(
-                f"state holds {state.size} numbers, {cls.__name__} needs {estimator._state.size}"
-            )
-        estimator._load(state)
-        pending = data.get("pending")
-        estimator._pending = np.nan if pending == "missing" else pending
+        saved_state.check_head(cls.__name__, _FORMAT, data, cls._saved_too)
+        estimator: Self = saved_state.construct(cls, data["arguments"])
+        estimator._load(saved_state.check(data["state"], estimator._table(), estimator._start))
+        estimator._pending = saved_state.pending_voltage(data["pending"])
         return estimator
 
 

@@ -13,6 +13,7 @@ from piezoest.estimators.base import EstimatorBase, Status, Trace
 from piezoest.estimators.batch_result import BatchFitResult, report
 from piezoest.estimators.coordinates import Coordinates, coordinates
 from piezoest.estimators.multiple_shooting import multiple_shooting
+from piezoest.estimators.saved_state import COUNT, MOST, Block, Table
 from piezoest.estimators.shooting import TUNING, Problem, Solution, single_shooting, spread
 from piezoest.estimators.starts import DEFAULT_MODEL, best_start
 from piezoest.models import ColemanHodgdon, Creep, LinearGain
@@ -79,6 +80,8 @@ class BatchFit(EstimatorBase):
     2nd ed. (1999), ch. 7, 9 and 10.
     """
 
+    _saved_too = ("u", "x")
+
     __slots__ = ("_creep", "_fitted", "_fixed", "_initial", "_result", "_told", "_u", "_x")
 
     conformance_exceptions: ClassVar[dict[str, str]] = {
@@ -109,12 +112,16 @@ class BatchFit(EstimatorBase):
             raise ValueError("initial_model has a gain of zero, whose sign is not known: pass a rough value")
         if not isinstance(creep, Creep | None):
             raise ValueError(f"creep must be a Creep, got {creep!r}: its time constants are kept")
-        if method not in METHODS:
+        if method not in tuple(METHODS):
             raise ValueError(f"method must be one of {sorted(METHODS)}, got {method!r}")
-        if loss not in TUNING:
+        if loss not in tuple(TUNING):
             raise ValueError(f"loss must be one of {sorted(TUNING)}, got {loss!r}")
         self._initial = DEFAULT_MODEL if initial_model is None else initial_model
         self._creep = creep
+        if not isinstance(fixed, Mapping | None):
+            raise ValueError(f"fixed must be a mapping of names to values, got {fixed!r}")
+        if hop is not None and not positive("hop", hop) * sample_rate <= MOST:
+            raise ValueError(f"hop must be at most {MOST:g} samples long, got {hop:g} s")
         self._fixed = {name: finite(f"fixed[{name!r}]", value) for name, value in (fixed or {}).items()}
         if not offset:
             self._fixed.setdefault("offset", self._initial.offset)
@@ -130,7 +137,7 @@ class BatchFit(EstimatorBase):
                 "noise": None if noise is None else positive("noise", noise),
                 "fixed": {name: float(value) for name, value in (fixed or {}).items()},
                 "max_iterations": integer("max_iterations", max_iterations, 1),
-                "hop": None if hop is None else positive("hop", hop),
+                "hop": None if hop is None else float(hop),
             },
             np.zeros(1),  # the number of samples in _u and _x, which grow
         )
@@ -408,6 +415,9 @@ class BatchFit(EstimatorBase):
         creep = arguments["creep"]
         return {**super()._revive(arguments), "creep": None if creep is None else Creep.from_dict(creep)}
 
+    def _table(self) -> Table:
+        return Table((Block(0, "the number of samples", COUNT),))
+
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
         """Make an estimator that continues where `to_dict` was called.
@@ -420,14 +430,12 @@ class BatchFit(EstimatorBase):
         Raises
         ------
         ValueError
-            If the dictionary is of another class or format, or its record does not fit.
+            If the dictionary is of another class or format, a field is missing or unknown, an argument is
+            refused, or its record does not fit.
         """
         estimator = super().from_dict(data)
         n, estimator._state[0] = int(estimator._state[0]), 0.0
-        u, x = (
-            np.array([np.nan if value is None else value for value in data.get(name, [])], dtype=np.float64)
-            for name in ("u", "x")
-        )
+        u, x = (array_1d(name, data[name], allow_nan=True) for name in ("u", "x"))
         if not u.size == x.size == n:
             raise ValueError(f"u and x must hold the state's {n} samples, got {u.size} and {x.size}")
         estimator._collect(u, x)

@@ -9,10 +9,15 @@ import numpy as np
 from piezoest._checks import FloatArray, non_negative
 from piezoest._jit import unrolled
 
+# Most samples that a measurement may lag.
+LONGEST = 1e6
+
 
 def delay_line(delay: float) -> tuple[float, FloatArray]:
     """Fraction of a sample and new storage for a delay in samples, whole or fractional."""
-    delay = non_negative("delay", delay)
+    if non_negative("delay", delay) > LONGEST:
+        raise ValueError(f"delay must be at most {LONGEST:g} samples, got {delay:g}")
+    delay = float(delay)
     storage = np.zeros(int(delay) + 2)
     storage[0] = -1.0
     return delay - int(delay), storage

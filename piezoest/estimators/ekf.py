@@ -9,9 +9,10 @@ import numpy as np
 from piezoest._checks import FloatArray, non_negative, positive
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import ekf_kernel as kernel
-from piezoest.estimators import ekf_loops
+from piezoest.estimators import ekf_loops, state_tables
 from piezoest.estimators.base import NO_ROWS, NONE, Compiled, EstimatorBase, Status, Trace
 from piezoest.estimators.delay_line import delay_line
+from piezoest.estimators.saved_state import Table
 from piezoest.models import ColemanHodgdon, LinearGain, Model
 
 
@@ -46,7 +47,7 @@ class HysteresisEKF(EstimatorBase):
         Estimate an offset of the displacement too, which walks as `mismatch` says: what a larger
         loop leaves behind after a change of amplitude.
     delay : float
-        Samples by which the measured displacement lags the voltage; may be fractional.
+        Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     project : bool
         Keep the estimate in the admissible set, by projection in the metric of P.
 
@@ -133,6 +134,9 @@ class HysteresisEKF(EstimatorBase):
             },
             np.concatenate([state, line]),
         )
+
+    def _table(self) -> Table:
+        return state_tables.ekf(self._config, self._state.size)
 
     def _sample(self, u: float, x: float) -> None:
         ekf_loops.steps[self._kind](self._state, self._config, u, x)

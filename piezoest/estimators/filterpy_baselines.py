@@ -151,7 +151,7 @@ class _FilterPyBaseline(HysteresisEKF):
         x, P = self._filter.x.copy(), self._filter.P
         try:
             part(*arguments)
-        except np.linalg.LinAlgError:
+        except (np.linalg.LinAlgError, ValueError):  # scipy refuses what is not finite
             self._filter.x, self._filter.P = x, P
             return False
         return True

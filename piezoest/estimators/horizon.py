@@ -3,90 +3,28 @@
 from __future__ import annotations
 
 import time
-from itertools import pairwise
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
-from numba.extending import register_jitable
 
-from piezoest._checks import WILDEST, FloatArray, integer, non_negative, positive
-from piezoest._jit import compiled
-from piezoest.equations import coleman_hodgdon as equations
+from piezoest._checks import FloatArray, integer, non_negative, positive
+from piezoest.estimators import horizon_kernel as kernel
 from piezoest.estimators.arrival import moved_on
 from piezoest.estimators.base import EstimatorBase, Status, Trace
 from piezoest.estimators.coordinates import Coordinates, coordinates
+from piezoest.estimators.saved_state import Table
 from piezoest.estimators.shooting import Prior, Problem, Solution, inverse_information, single_shooting
 from piezoest.estimators.thinning import thinned
 from piezoest.models import ColemanHodgdon, LinearGain
 
-# The state: counters, the held model with its w_h, the last innovation, then the blocks of `_Layout`.
-SAMPLES, MISSING, SOLVES, FAILURES, UPDATES, LAST, KNOWN, U_LAST = range(8)
-W_H, A, B, C, OFFSET, INNOVATION, VARIANCE, NOISE = range(8, 16)
-HEAD = 16
-WAITING, UPDATED, MISSED, HELD = range(4)
-
-# Stands for a missing sample in the rings, where JSON could not take NaN.
-NOTHING = 2.0 * WILDEST
+# Most samples of a window, all of which are kept.
+LONGEST = 1e7
 # Points that a window is thinned out to, if the user does not say.
 POINTS = 2000
 # Start's standard deviation of an offset, in parts of b/a (the largest w_h).
 OFFSET_UNCERTAINTY = 1e3
 # Relative change at which a solve has ended: far below what a hop's new samples move.
 TOLERANCE = 1e-8
-
-
-@register_jitable
-def _take(state: Any, u: float, x: float, ring_u: Any, ring_x: Any) -> None:
-    """One raw sample into the rings; the held model's state and innovation."""
-    k = int(state[SAMPLES]) % ring_u.size
-    known = np.abs(u) < WILDEST
-    if known:
-        if state[KNOWN] != 0.0:
-            state[W_H] = equations.hysteresis_step(state[W_H], u - state[U_LAST], state[A], state[B])
-        state[KNOWN] = 1.0
-        state[U_LAST] = u
-    measured = known and np.abs(x) < WILDEST
-    # An unknown voltage is held: the next known one then is one change, as exact if monotone.
-    ring_u[k] = state[U_LAST] if state[KNOWN] != 0.0 else NOTHING
-    ring_x[k] = x if measured else NOTHING
-    state[SAMPLES] += 1.0
-    if measured:
-        state[INNOVATION] = x - (state[C] * u + state[W_H] + state[OFFSET])
-        state[LAST] = HELD
-    else:
-        state[MISSING] += 1.0
-        state[LAST] = MISSED
-
-
-@compiled("void(f8[::1], f8, f8, i8, i8)")
-def _step(state: Any, u: float, x: float, start: int, length: int) -> None:
-    _take(state, u, x, state[start : start + length], state[start + length : start + 2 * length])
-
-
-@compiled()
-def _chunk(state: Any, u: Any, x: Any, start: int, length: int, y: Any) -> None:
-    for k in range(u.size):
-        _take(state, u[k], x[k], state[start : start + length], state[start + length : start + 2 * length])
-        y[k] = state[INNOVATION]
-
-
-class _Layout(NamedTuple):
-    """Where the blocks of the state lie; n coordinates, m parameters."""
-
-    q: slice
-    mean: slice
-    root: slice
-    theta: slice
-    P: slice
-    gain: slice
-    rings: int
-    size: int
-
-    @classmethod
-    def of(cls, n: int, m: int, window: int) -> _Layout:
-        edges = np.cumsum([HEAD, n, n, n * n, m, m * m, m]).tolist()
-        q, mean, root, theta, P, gain = (slice(i, j) for i, j in pairwise(edges))
-        return cls(q, mean, root, theta, P, gain, edges[-1], edges[-1] + 2 * window)
 
 
 class MovingHorizon(EstimatorBase):
@@ -160,6 +98,8 @@ class MovingHorizon(EstimatorBase):
     ) -> None:
         sample_rate = positive("sample_rate", sample_rate)
         window, hop = positive("window", window), positive("hop", hop)
+        if not window * sample_rate <= LONGEST:
+            raise ValueError(f"window must be at most {LONGEST:g} samples long, got {window:g} s")
         if round(hop * sample_rate) >= round(window * sample_rate):
             raise ValueError(f"hop must be shorter than the window of {window:g} s, got {hop:g} s")
         initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
@@ -184,9 +124,12 @@ class MovingHorizon(EstimatorBase):
             "max_iterations": integer("max_iterations", max_iterations, 1),
         }
         n, m = len(self._coordinates().free), len(self.parameter_names)
-        self._layout = _Layout.of(n, m, self._window)
+        self._layout = kernel.Layout.of(n, m, self._window)
         self._begin(self._arguments, self._new_state())
         self._message, self._seconds = "", float("nan")
+
+    def _table(self) -> Table:
+        return kernel.table(self._layout, self._window, self._arguments["noise"], self._fits)
 
     def _coordinates(self) -> Coordinates:
         held = () if self._arguments["offset"] else ("offset",)
@@ -203,9 +146,9 @@ class MovingHorizon(EstimatorBase):
         state[layout.q] = state[layout.mean] = q
         state[layout.root] = np.diag(1.0 / deviation).ravel()
         self._hold(state, q, np.diag(deviation**2))
-        state[NOISE] = self._arguments["noise"]
-        state[VARIANCE] = state[NOISE] ** 2
-        state[layout.rings :] = NOTHING
+        state[kernel.NOISE] = self._arguments["noise"]
+        state[kernel.VARIANCE] = state[kernel.NOISE] ** 2
+        state[layout.rings :] = kernel.NOTHING
         return state
 
     def _typical(self, q: FloatArray) -> FloatArray:
@@ -225,7 +168,7 @@ class MovingHorizon(EstimatorBase):
         """Make the model of q the one that is held."""
         v, _, theta, T = self._coordinates()(q, self._held)
         m = len(self.parameter_names)
-        state[A : OFFSET + 1] = v[:4]
+        state[kernel.A : kernel.OFFSET + 1] = v[:4]
         state[self._layout.theta] = theta[:m]
         P = T[:m] @ covariance @ T[:m].T
         state[self._layout.P] = (0.5 * (P + P.T)).ravel()
@@ -237,8 +180,8 @@ class MovingHorizon(EstimatorBase):
     # ------------------------------------------------------------ samples
 
     def _sample(self, u: float, x: float) -> None:
-        _step(self._state, u, x, self._layout.rings, self._window)
-        if int(self._state[SAMPLES]) % self._hop == 0:
+        kernel.step(self._state, u, x, self._layout.rings, self._window)
+        if int(self._state[kernel.SAMPLES]) % self._hop == 0:
             self._solve()
 
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
@@ -247,9 +190,9 @@ class MovingHorizon(EstimatorBase):
         y = np.empty(u.size)
         done = 0
         while done < u.size:
-            left = self._hop - int(self._state[SAMPLES]) % self._hop
+            left = self._hop - int(self._state[kernel.SAMPLES]) % self._hop
             end = min(done + left, u.size)
-            _chunk(self._state, u[done:end], x[done:end], layout.rings, self._window, y[done:end])
+            kernel.chunk(self._state, u[done:end], x[done:end], layout.rings, self._window, y[done:end])
             # Rows up to the one before the solve hold the old model.
             for first, last in ((done, end - 1), (end - 1, end)):
                 if last == end and end - done == left:
@@ -257,7 +200,7 @@ class MovingHorizon(EstimatorBase):
                 part = slice(first // every, last // every)
                 theta[part] = self._state[layout.theta]
                 P[part] = self._state[layout.P]
-                S[part] = self._state[VARIANCE]
+                S[part] = self._state[kernel.VARIANCE]
             done = end
         return Trace(
             index=np.arange(every - 1, rows * every, every),
@@ -273,45 +216,45 @@ class MovingHorizon(EstimatorBase):
     def _in_order(self) -> tuple[FloatArray, FloatArray, int]:
         """Voltage and displacement of the window, oldest first, and its first sample's number."""
         state, W, start = self._state, self._window, self._layout.rings
-        samples = int(state[SAMPLES])
+        samples = int(state[kernel.SAMPLES])
         order = np.arange(max(0, samples - W), samples)
         u, x = state[start : start + W][order % W], state[start + W : start + 2 * W][order % W]
-        x[x == NOTHING] = np.nan
+        x[x == kernel.NOTHING] = np.nan
         return u, x, int(order[0])
 
     def _solve(self) -> None:
         """Fit the window, move the arrival cost on by a hop."""
         began = time.perf_counter()
         u, x, first = self._in_order()
-        known = u != NOTHING
+        known = u != kernel.NOTHING
         if not known.any():
             return
         u[~known] = u[known][0]  # before the first known voltage; nothing is measured there
         state, layout, n = self._state, self._layout, self._layout.q.stop - self._layout.q.start
         # The window's first sample at the next solve, counted from this one's.
-        leaving = max(0, int(state[SAMPLES]) + self._hop - self._window) - first
+        leaving = max(0, int(state[kernel.SAMPLES]) + self._hop - self._window) - first
         points, shift, mean_x, weight = thinned(u, x, first, self._arguments["decimation"], leaving)
-        mean_x -= state[C] * shift
+        mean_x -= state[kernel.C] * shift
         prior = Prior(state[layout.mean].copy(), state[layout.root].reshape(n, n).copy())
         problem = Problem(
             u[points], mean_x, self._coordinates(), self._held, np.empty(0),
-            weight / state[NOISE], prior,
+            weight / state[kernel.NOISE], prior,
         )  # fmt: skip
         q = state[layout.q].copy()
         found = single_shooting(problem, q, "linear", 1.0, self._arguments["max_iterations"], TOLERANCE)
-        state[SOLVES] += 1.0
+        state[kernel.SOLVES] += 1.0
         good = self._take_over(problem, found)
         if good:
             q = found.q
-            state[UPDATES] += state[LAST] == HELD
-            state[LAST] = UPDATED if state[LAST] == HELD else state[LAST]
+            state[kernel.UPDATES] += state[kernel.LAST] == kernel.HELD
+            state[kernel.LAST] = kernel.UPDATED if state[kernel.LAST] == kernel.HELD else state[kernel.LAST]
         else:
-            state[FAILURES] += 1.0
+            state[kernel.FAILURES] += 1.0
         self._move_on(problem, q, int(np.searchsorted(points, leaving)), leaving)
         if good and problem.measured:
             residual = problem.evaluate(q)[0][: points.size]
             chi = np.sqrt(float(residual @ residual) / problem.measured)
-            state[NOISE] = max(self._arguments["noise"], state[NOISE] * chi)
+            state[kernel.NOISE] = max(self._arguments["noise"], state[kernel.NOISE] * chi)
         self._message, self._seconds = found.message, time.perf_counter() - began
 
     def _take_over(self, problem: Problem, found: Solution) -> bool:
@@ -319,17 +262,22 @@ class MovingHorizon(EstimatorBase):
         if not found.success or not np.isfinite(problem.cost(found.q)):
             return False
         _, jacobian = problem.evaluate(found.q)
-        covariance = inverse_information(jacobian.T @ jacobian)
+        try:
+            covariance = inverse_information(jacobian.T @ jacobian)
+        except np.linalg.LinAlgError:
+            return False
         if not np.all(np.isfinite(covariance)):
             return False
         state = self._state
         self._hold(state, found.q, covariance)
         run, by_q = problem.simulate(found.q)
-        state[W_H] = run.end[0]
+        state[kernel.W_H] = run.end[0]
         row = run.jacobian[-1] @ by_q
         _, _, _, T = self._coordinates()(found.q, self._held)
-        state[VARIANCE] = state[NOISE] ** 2 + row @ covariance @ row
-        state[self._layout.gain] = (T[: len(self.parameter_names)] @ covariance @ row) / state[VARIANCE]
+        state[kernel.VARIANCE] = state[kernel.NOISE] ** 2 + row @ covariance @ row
+        state[self._layout.gain] = (T[: len(self.parameter_names)] @ covariance @ row) / state[
+            kernel.VARIANCE
+        ]
         return True
 
     def _move_on(self, problem: Problem, q: FloatArray, k: int, leaving: int) -> None:
@@ -341,8 +289,11 @@ class MovingHorizon(EstimatorBase):
         walk = self._arguments["process_noise"] * self._typical(q) * np.sqrt(leaving / self.sample_rate)
         names = problem.coordinates.free
         if "initial_state" in names:
-            walk[names.index("initial_state")] = self._arguments["process_noise"] * state[NOISE]
-        follower, prior = moved_on(problem, q, k, walk)
+            walk[names.index("initial_state")] = self._arguments["process_noise"] * state[kernel.NOISE]
+        try:
+            follower, prior = moved_on(problem, q, k, walk)
+        except np.linalg.LinAlgError:
+            return
         if np.all(np.isfinite(prior.root)) and np.all(np.isfinite(prior.mean)):
             state[layout.q], state[layout.mean], state[layout.root] = follower, prior.mean, prior.root.ravel()
 
@@ -362,9 +313,21 @@ class MovingHorizon(EstimatorBase):
     @property
     def model(self) -> ColemanHodgdon | LinearGain:
         """Admissible model as held: of the last good solve."""
-        theta, n = self.theta, self._initial.theta.size
+        return self._model_of(self._state)
+
+    def _model_of(self, state: FloatArray) -> ColemanHodgdon | LinearGain:
+        theta, n = state[self._layout.theta], self._initial.theta.size
         offset = float(theta[n]) if theta.size > n else self._initial.offset
         return type(self._initial).from_theta(theta[:n], offset)
+
+    def _fits(self, state: FloatArray) -> bool:
+        """Whether the model held is admissible and that of theta, and the coordinates are within bounds."""
+        model = self._model_of(state)
+        own = (model.a, model.b, model.c) if isinstance(model, ColemanHodgdon) else (0.0, 0.0, model.gain)
+        lower, upper = self._coordinates().bounds(q := state[self._layout.q])
+        within = np.all((lower <= q) & (q <= upper))
+        same = np.allclose((*own, model.offset), state[kernel.A : kernel.OFFSET + 1])
+        return bool(within and same and model.is_admissible)
 
     @property
     def P(self) -> FloatArray:
@@ -380,12 +343,12 @@ class MovingHorizon(EstimatorBase):
     @property
     def y(self) -> float:
         """Last measured displacement less that of the held model [µm]."""
-        return float(self._state[INNOVATION])
+        return float(self._state[kernel.INNOVATION])
 
     @property
     def S(self) -> float:
         """Variance of an innovation at the last good solve [µm²]."""
-        return float(self._state[VARIANCE])
+        return float(self._state[kernel.VARIANCE])
 
     @property
     def K(self) -> FloatArray:
@@ -399,19 +362,19 @@ class MovingHorizon(EstimatorBase):
         ``updates`` counts the good solves, ``held`` the measured samples between them.
         """
         state = self._state
-        samples, missing, updates = (int(state[i]) for i in (SAMPLES, MISSING, UPDATES))
-        last = ("waiting", "updated", "missing", "held")[int(state[LAST])]
+        samples, missing, updates = (int(state[i]) for i in (kernel.SAMPLES, kernel.MISSING, kernel.UPDATES))
+        last = ("waiting", "updated", "missing", "held")[int(state[kernel.LAST])]
         return Status(samples, updates, missing, samples - missing - updates, 0, False, last)
 
     @property
     def solves(self) -> int:
         """Solves so far, failed ones too: never more than one a hop."""
-        return int(self._state[SOLVES])
+        return int(self._state[kernel.SOLVES])
 
     @property
     def failures(self) -> int:
         """Solves that failed, after which the last good model was held."""
-        return int(self._state[FAILURES])
+        return int(self._state[kernel.FAILURES])
 
     @property
     def solver_message(self) -> str:

@@ -11,9 +11,11 @@ from piezoest.equations import coleman_hodgdon, output_error
 from piezoest.estimators import output_error_kernel as kernel
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as front
+from piezoest.estimators import state_tables
 from piezoest.estimators.base import NO_ROWS, NONE, Compiled, Freezable, Status, Trace
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.rls_settings import FIRST_HALF, LONGEST_GAP
+from piezoest.estimators.saved_state import Table
 from piezoest.models import ColemanHodgdon
 from piezoest.policies import OutlierRejection, Policy, RandomWalk, policy_to_dict, select
 
@@ -21,6 +23,8 @@ from piezoest.policies import OutlierRejection, Policy, RandomWalk, policy_to_di
 SLACK = 1e-4
 # Swings that a disturbance lasts.
 LASTING = 0.3
+# Most decays in the bank: each sample moves them all.
+MOST_MEMBERS = 1000
 
 POLICIES = (RandomWalk(), OutlierRejection())
 
@@ -48,9 +52,9 @@ class OutputErrorRLS(Freezable):
     span : float
         Factor: the bank reaches from the initial decay divided by it to the decay times it.
     members : int
-        Decays in the bank, 3 or more.
+        Decays in the bank, 3 to 1000.
     delay : float
-        Samples by which the measured displacement lags the voltage; may be fractional.
+        Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     policies : tuple of policies, optional
         `policies.RandomWalk`, which sets the memory, and `policies.OutlierRejection`, which
         may be left out. Default both.
@@ -105,7 +109,7 @@ class OutputErrorRLS(Freezable):
             raise ValueError(f"initial_model {initial} is not admissible: use nearest_admissible()")
         if positive("span", span) <= 1.0:
             raise ValueError(f"span must be above 1, got {span:g}")
-        members = integer("members", members, 3)
+        members = integer("members", members, 3, MOST_MEMBERS)
         walk = select(policies, RandomWalk)
         rejection = select(policies, OutlierRejection)
         if not isinstance(walk, RandomWalk):
@@ -163,6 +167,9 @@ class OutputErrorRLS(Freezable):
             },
             np.concatenate([state, line]),
         )
+
+    def _table(self) -> Table:
+        return state_tables.output_error(self._config, self._state.size)
 
     def _sample(self, u: float, x: float) -> None:
         kernel.step(self._state, self._config, u, x)

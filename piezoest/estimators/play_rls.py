@@ -12,8 +12,10 @@ from piezoest._checks import FloatArray, array_1d, integer, non_negative, positi
 from piezoest.estimators import play_rls_kernel as kernel
 from piezoest.estimators import play_rls_layout as layout
 from piezoest.estimators import play_rls_settings as settings
+from piezoest.estimators import state_tables
 from piezoest.estimators.base import NO_ROWS, Freezable, Status, Trace
 from piezoest.estimators.delay_line import delay_line
+from piezoest.estimators.saved_state import Table
 from piezoest.models import (
     ColemanHodgdon,
     Creep,
@@ -22,6 +24,9 @@ from piezoest.models import (
     Model,
     PrandtlIshlinskii,
 )
+
+# Most of each: an update costs the square of the parameters, and so does their memory.
+MOST_THRESHOLDS, MOST_BENDS, MOST_PARAMETERS = 200, 50, 1000
 
 
 class PrandtlIshlinskiiRLS(Freezable):
@@ -44,9 +49,9 @@ class PrandtlIshlinskiiRLS(Freezable):
         Least and largest voltage [V]. Default: learnt. The grid then grows with the voltage,
         and once shrinks to it if after four turns it was laid too wide.
     thresholds : int
-        Number n of plays. Rule: the i-th threshold is i/n of half the voltage range.
+        Number n of plays, up to 200. Rule: the i-th threshold is i/n of half the voltage range.
     bends : int
-        Number k of voltages at which slopes may change, evenly over the range; 0 for a
+        Number k of voltages at which slopes may change, up to 50, evenly over the range; 0 for a
         symmetric loop.
     creep : tuple of float
         Time constants of creep [s]; empty for none.
@@ -56,7 +61,7 @@ class PrandtlIshlinskiiRLS(Freezable):
     noise : float
         Standard deviation of the displacement's noise [µm].
     delay : float
-        Samples by which the measured displacement lags the voltage; may be fractional.
+        Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     mechanics : MassSpringDamper, optional
         Resonance that the voltage goes through before it is compared, so that it is not learnt
         as hysteresis: for references that reach towards it, with a `LeadFilter`.
@@ -115,10 +120,15 @@ class PrandtlIshlinskiiRLS(Freezable):
         plan = settings.plan(
             initial,
             voltage_range,
-            integer("thresholds", thresholds),
-            integer("bends", bends),
+            integer("thresholds", thresholds, 0, MOST_THRESHOLDS),
+            integer("bends", bends, 0, MOST_BENDS),
             array_1d("creep", creep),
         )
+        if (parameters := plan.slopes.size + plan.times.size) > MOST_PARAMETERS:
+            raise ValueError(
+                f"thresholds, bends and creep make {parameters} parameters, more than {MOST_PARAMETERS}: "
+                "take fewer"
+            )
         fraction, line = delay_line(delay)
         self._initial = initial
         self._creep = plan.times
@@ -170,6 +180,9 @@ class PrandtlIshlinskiiRLS(Freezable):
         if given.get("mechanics") is not None:
             given["mechanics"] = MassSpringDamper.from_dict(given["mechanics"])
         return given
+
+    def _table(self) -> Table:
+        return state_tables.play_rls(self._config, self._state.size)
 
     def _sample(self, u: float, x: float) -> None:
         kernel.step(self._state, self._config, u, x)

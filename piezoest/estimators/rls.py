@@ -9,15 +9,18 @@ import numpy as np
 from piezoest._checks import FloatArray, positive
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
-from piezoest.estimators import rls_loops, rls_model, rls_profile
+from piezoest.estimators import rls_loops, rls_model, rls_profile, state_tables
 from piezoest.estimators import rls_settings as settings
 from piezoest.estimators.base import NO_ROWS, NONE, Compiled, Freezable, Status, Trace
 from piezoest.estimators.delay_line import delay_line
+from piezoest.estimators.saved_state import Table
 from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain, Model
 from piezoest.policies import Forgetting, Policy, policy_to_dict
 
 # Seconds of memory where the paper's law is asked for without one.
 PAPER_MEMORY = 0.4
+# In parts of the sample rate: below it nothing comes through the low-pass.
+LEAST_CUTOFF = 1e-9
 
 
 class HysteresisRLS(Freezable):
@@ -45,7 +48,7 @@ class HysteresisRLS(Freezable):
     noise : float
         Standard deviation of the displacement's noise [µm]; weighs the start against the data.
     cutoff : float
-        Cut-off frequency of W_p [Hz].
+        Cut-off frequency of W_p [Hz], at least 1e-9 of the sample rate.
     high_pass : float, optional
         Cut-off frequency of a first-order high-pass on both sides [Hz], against a biased
         sensor (last remark of App. A). Below the reference's lowest frequency. It can only
@@ -56,7 +59,7 @@ class HysteresisRLS(Freezable):
         unipolar voltage then needs no high-pass, and what a larger loop leaves behind is taken out.
         Default: with ``memory="period"``, except for a `LinearGain`; not with the paper's memory.
     delay : float
-        Samples by which the measured displacement lags the voltage; may be fractional.
+        Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     time_base : {"discrete", "continuous"}
         Time base of the law, see `RecursiveLeastSquares`; ``"continuous"`` is the paper's,
         in seconds.
@@ -131,6 +134,10 @@ class HysteresisRLS(Freezable):
         if offset is None:
             offset = memory == "period" and isinstance(initial, ColemanHodgdon)
         cutoff = min(positive("cutoff", cutoff), 0.5 * sample_rate)
+        if cutoff < LEAST_CUTOFF * sample_rate:
+            raise ValueError(
+                f"cutoff must be at least {LEAST_CUTOFF:g} of the sample rate, got {cutoff:g} Hz"
+            )
         fraction, line = delay_line(delay)
         self._initial = initial
         self._scale = settings.parameter_scale(initial, offset)
@@ -178,6 +185,9 @@ class HysteresisRLS(Freezable):
             },
             state,
         )
+
+    def _table(self) -> Table:
+        return state_tables.rls(self._config, self._state.size)
 
     def _sample(self, u: float, x: float) -> None:
         rls_loops.steps[self._kind](self._state, self._config, u, x)
@@ -302,7 +312,7 @@ class HysteresisRLS(Freezable):
             gain = self._state[kernel.GAIN : kernel.GAIN + n]
             energy = (1.0 - pole) / (1.0 + pole) * self._config[kernel.NOISE_RATIO] ** 2
             C = C + np.outer(gain, gain) * energy
-        return np.sqrt(np.diag(C)) * self._scale
+        return np.sqrt(np.fmax(np.diag(C), 0.0)) * self._scale
 
     @property
     def y(self) -> float:

@@ -139,11 +139,13 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
             raise ValueError(
                 f"{path}: estimator must be one of {sorted(kinds)}, got {learnt.get('estimator')!r}"
             )
+        # Where the file is the estimator's own, model and limits may stand beside it.
+        beside = ("model", "limits") if learnt is data else ()
+        own = {key: value for key, value in learnt.items() if key not in beside}
         try:
-            estimator = kind.from_dict(learnt)
-        except (KeyError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
-            reason = f"it lacks {error}" if isinstance(error, KeyError) else error
-            raise ValueError(f"{path}: its estimator is not what to_dict() gave: {reason}") from None
+            estimator = kind.from_dict(own)
+        except ValueError as error:
+            raise ValueError(f"{path}: its estimator is not what to_dict() gave: {error}") from None
     limits = data.get("limits") or {}
     if not isinstance(limits, dict):
         raise ValueError(f'{path}: limits must be names with numbers, such as {{"maximum": 150}}')

@@ -24,7 +24,7 @@ __all__ = [
 ]
 
 
-def model_from_dict(data: dict[str, Any]) -> Model:
+def model_from_dict(data: Any) -> Model:
     """Make the model that its `to_dict` described, of whichever class.
 
     Parameters
@@ -40,7 +40,7 @@ def model_from_dict(data: dict[str, Any]) -> Model:
     kinds: dict[str, type[Model]] = {
         kind.__name__: kind for kind in (ColemanHodgdon, LinearGain, PrandtlIshlinskii, Preisach)
     }
-    name = data.get("model")
+    name = data.get("model") if isinstance(data, dict) else data
     if not isinstance(name, str) or name not in kinds:
         raise ValueError(f"model {name!r} is unknown: choose of {sorted(kinds)}")
     return kinds[name].from_dict(data)

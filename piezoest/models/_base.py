@@ -9,12 +9,16 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, finite
+from piezoest._checks import FloatArray, array_1d, fields, finite
 
 
 @functools.cache
 def _field_names(kind: Any) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(kind))
+
+
+def _is_needed(field: Any) -> bool:
+    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
 class Model(ABC):
@@ -87,13 +91,10 @@ class Model(ABC):
         ValueError
             If a field is missing or unknown, or the dictionary is of another model.
         """
-        fields = {key: value for key, value in data.items() if key != "model"}
-        if data.get("model", cls.__name__) != cls.__name__:
-            raise ValueError(f"data is of a {data['model']}, not of a {cls.__name__}")
-        known = {field.name for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
-        if unknown := sorted(set(fields) - known):
-            raise ValueError(f"data has unknown fields {unknown}: {cls.__name__} has {sorted(known)}")
-        try:
-            return cls(**fields)
-        except TypeError as error:
-            raise ValueError(f"data does not describe a {cls.__name__}: {error}") from None
+        every = dataclasses.fields(cls)  # type: ignore[arg-type]
+        needed = [field.name for field in every if _is_needed(field)]
+        optional = ["model", *(field.name for field in every if not _is_needed(field))]
+        values = dict(fields(cls.__name__, data, needed, optional))
+        if (name := values.pop("model", cls.__name__)) != cls.__name__:
+            raise ValueError(f"data is of a {name}, not of a {cls.__name__}")
+        return cls(**values)

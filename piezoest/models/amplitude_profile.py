@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, positive
+from piezoest._checks import FloatArray, array_1d, as_floats, fields, positive
 from piezoest._files import read_json, write_text
 from piezoest.models.coleman_hodgdon import ColemanHodgdon
 
@@ -43,10 +43,7 @@ class AmplitudeProfile:
 
     def __post_init__(self) -> None:
         swings = array_1d("swings", self.swings)
-        try:
-            theta = np.array(self.theta, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise ValueError(f"theta must be numbers in shape ({swings.size}, 3): {error}") from None
+        theta = as_floats("theta", self.theta).copy()
         if theta.size == swings.size == 0:
             theta = theta.reshape(-1, 3)
         if theta.shape != (swings.size, 3) or not np.all(np.isfinite(theta)):
@@ -108,7 +105,7 @@ class AmplitudeProfile:
         return data
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
+    def from_dict(cls, data: Any) -> Self:
         """Make the profile from what `to_dict` gave.
 
         Parameters
@@ -121,9 +118,10 @@ class AmplitudeProfile:
         ValueError
             If it describes no profile, or one of another format.
         """
-        if data.get("profile") != cls.__name__ or data.get("format") != _FORMAT:
+        if not isinstance(data, dict) or (data.get("profile"), data.get("format")) != (cls.__name__, _FORMAT):
             raise ValueError(f"data is no {cls.__name__} of format {_FORMAT}: write it with save()")
-        return cls(data.get("swings"), data.get("theta"))  # type: ignore[arg-type]
+        fields("profile", data, ("profile", "format", "swings", "theta"), ("model",))
+        return cls(data["swings"], data["theta"])
 
     def save(self, path: str | Path) -> None:
         """Write the profile as JSON.

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, finite, integer, positive
+from piezoest._checks import FloatArray, array_1d, fields, finite, integer, positive
 from piezoest._jit import compiled
 from piezoest.equations.creep import creep_step
 
@@ -108,9 +108,7 @@ class Creep:
         ValueError
             If a field is missing or unknown.
         """
-        if set(data) != {"gains", "time_constants"}:
-            raise ValueError(f"data must have the fields gains and time_constants, got {sorted(data)}")
-        return cls(data["gains"], data["time_constants"])
+        return cls(**fields("creep", data, ("gains", "time_constants")))
 
     def decays(self, sample_rate: float) -> FloatArray:
         """Factors exp(-dt/tau_i) of one sample, shape (n,).

@@ -7,7 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, non_negative, positive
+from piezoest._checks import FloatArray, array_1d, fields, non_negative, positive
 from piezoest._jit import compiled
 from piezoest.equations.mechanics import mechanics_coefficients, mechanics_step
 
@@ -54,11 +54,7 @@ class MassSpringDamper:
         ValueError
             If a field is missing or unknown.
         """
-        if set(data) != {"natural_frequency", "damping_ratio"}:
-            raise ValueError(
-                f"data must have the fields natural_frequency and damping_ratio, got {sorted(data)}"
-            )
-        return cls(**data)
+        return cls(**fields("mechanics", data, ("natural_frequency", "damping_ratio")))
 
     def coefficients(self, sample_rate: float) -> FloatArray:
         """Exact step of one sample with the input held, shape (6,): see `mechanics_coefficients`.

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, finite, positive
+from piezoest._checks import FloatArray, array_1d, as_floats, finite, positive
 from piezoest._jit import compiled
 from piezoest.equations.bent_plays import bent_plays_step, prandtl_ishlinskii_voltage
 from piezoest.equations.creep import creep_to_come, unit_creep_step
@@ -191,7 +191,7 @@ class PrandtlIshlinskii(Model):
         return data
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
+    def from_dict(cls, data: Any) -> Self:
         """Make the model from what `to_dict` gave.
 
         Parameters
@@ -204,7 +204,7 @@ class PrandtlIshlinskii(Model):
         ValueError
             If a field is missing or unknown, or the dictionary is of another model.
         """
-        if data.get("creep") is not None:
+        if isinstance(data, dict) and data.get("creep") is not None:
             data = {**data, "creep": Creep.from_dict(data["creep"])}
         # Named, for a class with slots is made twice and `super()` then finds the first.
         return super(PrandtlIshlinskii, cls).from_dict(data)
@@ -347,7 +347,7 @@ def _bends(bends: Any, weights: Any, plays: int) -> tuple[FloatArray, FloatArray
     """Rising voltages and a row of changes for each, as arrays that nobody else can write to."""
     bends = array_1d("bends", bends).copy()
     shape = (bends.size, 1 + plays)
-    changes = np.array(weights, dtype=np.float64)
+    changes = as_floats("bend_weights", weights).copy()
     if changes.size == 0:
         changes = changes.reshape(0, 1 + plays)
     if changes.shape != shape:

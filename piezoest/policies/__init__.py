@@ -6,6 +6,7 @@ import dataclasses
 import math
 from typing import Any, cast, get_args
 
+from piezoest._checks import fields
 from piezoest.policies.covariance import (
     ChangeDetection,
     CovarianceResetting,
@@ -101,16 +102,18 @@ def policy_to_dict(policy: Policy) -> dict[str, Any]:
     return {"policy": type(policy).__name__, **dataclasses.asdict(policy)}
 
 
-def policy_from_dict(data: dict[str, Any]) -> Policy:
+def policy_from_dict(data: Any) -> Policy:
     """Make the policy that `policy_to_dict` described.
 
     Raises
     ------
     ValueError
-        If there is no policy of that name.
+        If there is no policy of that name, a field is missing or unknown, or a value is refused.
     """
     kinds = {kind.__name__: kind for kind in get_args(Policy)}
-    fields = {key: value for key, value in data.items() if key != "policy"}
-    if data.get("policy") not in kinds:
-        raise ValueError(f"policy {data.get('policy')!r} is unknown: choose of {sorted(kinds)}")
-    return cast(Policy, kinds[data["policy"]](**fields))
+    name = data.get("policy") if isinstance(data, dict) else data
+    if not isinstance(name, str) or name not in kinds:
+        raise ValueError(f"policy {name!r} is unknown: choose of {sorted(kinds)}")
+    names = [field.name for field in dataclasses.fields(kinds[name])]
+    values = {key: value for key, value in fields(name, data, ["policy", *names]).items() if key != "policy"}
+    return cast(Policy, kinds[name](**values))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from piezoest._checks import fraction, non_negative, positive
+from piezoest._checks import finite, fraction, non_negative, positive
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class NormBound:
     limit: float = 100.0
 
     def __post_init__(self) -> None:
-        if not self.limit >= 1.0:
+        if finite("limit", self.limit) < 1.0:
             raise ValueError(
                 f"limit must be at least 1, got {self.limit}: the initial covariance must satisfy the bound"
             )

@@ -11,9 +11,13 @@ from piezoest._checks import fraction, positive
 
 Unit = Literal["period", "second"]
 
+# Least memory in periods, and least weight that the past keeps over a sample: nothing would be left below it.
+SHORTEST, LEAST_WEIGHT = 1e-3, 1e-3
 
-def _check_memory(memory: float, unit: str) -> None:
-    positive("memory", memory)
+
+def _check_memory(memory: float, unit: str = "period") -> None:
+    if positive("memory", memory) < SHORTEST and unit == "period":
+        raise ValueError(f"memory must be at least {SHORTEST:g} periods, got {memory:g}")
     if unit not in ("period", "second"):
         raise ValueError(f"unit must be 'period' or 'second', got {unit!r}")
 
@@ -36,18 +40,18 @@ class Forgetting:
     memory: float = np.inf
 
     def __post_init__(self) -> None:
-        if not self.memory > 0.0:
-            raise ValueError(f"memory must be above zero (infinite for no forgetting), got {self.memory}")
+        if self.memory != np.inf:
+            positive("memory", self.memory)
 
     def factor(self, step: float) -> float:
-        """Weight that the past keeps over one step: exp(-step/memory).
+        """Weight that the past keeps over one step: exp(-step/memory), at least 0.001.
 
         Parameters
         ----------
         step : float
             Time between samples, in the unit of `memory`.
         """
-        return float(np.exp(-step / self.memory))
+        return max(float(np.exp(-step / self.memory)), LEAST_WEIGHT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +78,14 @@ class RandomWalk:
     Raises
     ------
     ValueError
-        If a value is not above zero.
+        If memory is less than 0.001, or drift not above zero.
     """
 
     memory: float = 0.15
     drift: float = 0.4
 
     def __post_init__(self) -> None:
-        positive("memory", self.memory)
+        _check_memory(self.memory)
         positive("drift", self.drift)
 
 
@@ -99,7 +103,7 @@ class PeriodicForgetting:
     Raises
     ------
     ValueError
-        If memory is not above zero.
+        If memory is less than 0.001.
 
     Notes
     -----
@@ -109,7 +113,7 @@ class PeriodicForgetting:
     memory: float = 2.0
 
     def __post_init__(self) -> None:
-        positive("memory", self.memory)
+        _check_memory(self.memory)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +134,7 @@ class DirectionalForgetting:
     Raises
     ------
     ValueError
-        If memory is not above zero, or the unit is another.
+        If memory is not above zero or less than 0.001 periods, or the unit is another.
     """
 
     memory: float = 1.0
@@ -161,7 +165,8 @@ class VariableForgetting:
     Raises
     ------
     ValueError
-        If memory is not above zero, shortest not within (0, 1], or the unit is another.
+        If memory is not above zero or less than 0.001 periods, shortest not within (0, 1], or the
+        unit is another.
     """
 
     memory: float = 1.0
@@ -173,11 +178,11 @@ class VariableForgetting:
         positive("shortest", fraction("shortest", self.shortest))
 
     def least_factor(self, step: float) -> float:
-        """Least weight that the past keeps over one step: exp(-step/(shortest memory)).
+        """Least weight that the past keeps over one step: exp(-step/(shortest memory)), at least 0.001.
 
         Parameters
         ----------
         step : float
             Time between samples, in the unit of `memory`.
         """
-        return float(np.exp(-step / (self.shortest * self.memory)))
+        return max(float(np.exp(-step / (self.shortest * self.memory))), LEAST_WEIGHT)

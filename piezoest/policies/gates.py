@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from piezoest._checks import integer, non_negative
+from piezoest._checks import finite, integer, non_negative
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,5 +85,5 @@ class ExcitationGate:
     least: float = 1e-4
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.least < 1.0:
+        if not 0.0 < finite("least", self.least) < 1.0:
             raise ValueError(f"least must lie within (0, 1), got {self.least}")

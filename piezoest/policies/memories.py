@@ -19,7 +19,7 @@ class AmplitudeMemory:
     Parameters
     ----------
     places : int
-        Amplitudes that are remembered; a further one replaces the nearest.
+        Amplitudes that are remembered, up to 1000; a further one replaces the nearest.
     tolerance : float
         Sizes that differ by less, in parts, are the same amplitude.
     uncertainty : float
@@ -36,6 +36,6 @@ class AmplitudeMemory:
     uncertainty: float = 0.05
 
     def __post_init__(self) -> None:
-        integer("places", self.places, 1)
+        integer("places", self.places, 1, 1000)
         positive("tolerance", fraction("tolerance", self.tolerance, 0.0, 0.5))
         positive("uncertainty", self.uncertainty)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import gc
 import tracemalloc
 from typing import Any
@@ -62,6 +63,39 @@ def test_each_channel_is_a_single_estimator(estimator: Any, threads: int) -> Non
         assert bank.channel(c).to_dict() == single.to_dict()
     bank.reset()
     np.testing.assert_array_equal(bank.theta[0], estimator.theta)
+
+
+def test_a_channel_without_a_number_is_missing_and_stops_no_other() -> None:
+    plain, listed, masked = (pz.EstimatorBank(pz.HysteresisRLS(SAMPLE_RATE), 3) for _ in range(3))
+    for k in range(20):
+        u, x = [0.1 * k, 0.2 * k, 0.3 * k], [0.01 * k, 0.02 * k, 0.03 * k]
+        plain.step([u[0], np.nan, u[2]], [np.nan, x[1], x[2]])
+        odd: Any = ("error", np.ma.masked, 1j, 10**400, [], None)[k % 6]
+        listed.step([u[0], odd, np.array([u[2]])], np.array([None, x[1], (x[2],)], object))
+        hidden: Any = np.ma.array(x, mask=[True, False, False])
+        masked.step(np.ma.array(u, mask=[False, True, False]), hidden)
+    assert plain.status[0].missing == 20
+    for bank in (listed, masked):
+        assert bank.status == plain.status
+        np.testing.assert_array_equal(bank.theta, plain.theta)
+    u, x = records(30, 3)
+    gaps = np.zeros(u.shape, bool)
+    gaps[5, 1] = gaps[9] = True
+    plain.run(u, np.where(gaps, np.nan, x))
+    masked.run(u, np.ma.array(np.where(gaps, 1e3, x), mask=gaps))
+    np.testing.assert_array_equal(masked.theta, plain.theta)
+
+
+def test_copies_are_independent() -> None:
+    u, x = records(200, 2)
+    bank = pz.EstimatorBank(pz.HysteresisRLS(SAMPLE_RATE), 2)
+    bank.run(u[:100], x[:100])
+    before = bank.theta
+    other = copy.copy(bank)
+    other.run(u[100:], x[100:])
+    np.testing.assert_array_equal(bank.theta, before)
+    bank.run(u[100:], x[100:])
+    np.testing.assert_array_equal(bank.theta, other.theta)
 
 
 def test_wrong_arguments_are_named() -> None:

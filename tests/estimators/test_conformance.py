@@ -7,11 +7,14 @@ promise, which is that of its test here without ``test_``, to the reason.
 
 from __future__ import annotations
 
+import copy
 import inspect
 import itertools
 import json
 import pickle
 import sys
+from decimal import Decimal
+from fractions import Fraction
 from typing import Any, cast
 
 import numpy as np
@@ -257,6 +260,96 @@ def test_takes_whole_numbers_and_scalars_of_numpy(kind: Any) -> None:
     assert face(plain) == face(whole) == face(scalar)
 
 
+class Sulking:
+    """What a driver's own class may do."""
+
+    def __float__(self) -> float:
+        raise RuntimeError("no reading")
+
+
+# What drivers return for a number: all take 3.
+NUMBERS: tuple[Any, ...] = (
+    float, int, np.float64, np.float32, np.float16, np.longdouble, np.int64, np.uint8, Fraction, Decimal,
+    lambda v: [v], lambda v: (int(v),), np.array, lambda v: np.array([v]), lambda v: np.array([v], np.int16),
+    lambda v: np.array(v, np.float32), lambda v: np.array([v], object), np.ma.array,
+    lambda v: np.ma.array([v]), lambda v: np.ma.array([v], mask=[False]), lambda v: [np.int32(v)],
+)  # fmt: skip
+# What is none of theirs.
+NO_READINGS: tuple[Any, ...] = (
+    "1.5", "", b"1", bytearray(b"1"), np.str_("1"), np.array(["1"]), 10**400, -(10**400), 1.0 + 0.0j,
+    np.complex64(1.0), np.array([1.0j]), [], (), [1.0, 2.0], [[1.0]], [None], ["1"], {}, {1.0}, object(),
+    Sulking(), float, np.zeros(2), np.zeros((1, 1)), np.zeros(0), np.ma.masked, np.ma.array([1.0], mask=True),
+    np.ma.array(1.0, mask=True), [np.ma.masked], np.datetime64("2020-01-01"), np.timedelta64(5, "s"),
+)  # fmt: skip
+
+
+def test_takes_a_number_of_any_kind(kind: Any) -> None:
+    plain, stepped, parted = kind(RATE), kind(RATE), kind(RATE)
+    for k, (made, other) in enumerate(zip(NUMBERS, reversed(NUMBERS), strict=True)):
+        u, x = float(k), float(k // 4)
+        plain.step(u, x)
+        stepped.step(made(u), other(x))
+        parted.predict(other(u))
+        parted.update(made(x))
+    for flag in (True, np.True_, np.bool_(False)):
+        plain.step(float(flag), float(flag))
+        stepped.step(flag, flag)
+        parted.predict(flag)
+        parted.update(flag)
+    assert face(plain) == face(stepped) == face(parted)
+    assert plain.status.missing == 0
+
+
+def test_what_is_no_number_is_missing(kind: Any) -> None:
+    u, x = record(0.5)
+    plain, other = kind(RATE), kind(RATE)
+    for estimator in (plain, other):
+        steps(estimator, u[:30], x[:30])
+    for k, nothing in enumerate(NO_READINGS):
+        u_k, x_k = float(u[30 + k]), float(x[30 + k])
+        plain.step(u_k, None)
+        other.step(u_k, nothing)
+        plain.step(None, x_k)
+        other.step(nothing, x_k)
+        plain.predict(np.nan)
+        other.predict(nothing)
+        plain.step(u_k, np.nan)
+        other.step(u_k, nothing)
+        other.predict(u_k)
+        other.update(nothing)
+        plain.step(u_k, None)
+        assert other.status == plain.status, repr(nothing)
+    assert other.status.missing == 5 * len(NO_READINGS)
+    with pytest.raises(ValueError, match="predict"):
+        other.update(0.0)  # nothing was left waiting
+    for estimator in (plain, other):
+        steps(estimator, u[70:], x[70:])
+    assert face(other) == face(plain)
+
+
+def test_masked_samples_are_missing(kind: Any) -> None:
+    u, x = record(0.5)
+    plain, other = kind(RATE), kind(RATE)
+    masked_u, masked_x = np.ma.array(u), np.ma.array(x)
+    masked_u[50] = masked_x[30:33] = np.ma.masked
+    masked_u.data[50] = masked_x.data[30:33] = 1e3
+    u[50] = x[30:33] = np.nan
+    plain.run(u, x)
+    other.run(masked_u, masked_x)
+    assert face(other) == face(plain)
+    listed = kind(RATE)
+    listed.run(list(masked_u), list(masked_x))
+    assert face(listed) == face(plain)
+
+
+@pytest.mark.parametrize("values", [["1.0", "2.0"], [1.0 + 0.0j, 2.0], [[1.0], [1.0, 2.0]], [{}, 1.0]])
+def test_refuses_records_that_are_no_numbers(kind: Any, values: Any) -> None:
+    with pytest.raises(ValueError, match="u must be numbers"):
+        kind(RATE).run(values, [1.0, 2.0])
+    with pytest.raises(ValueError, match="x must be numbers"):
+        kind(RATE).run([1.0, 2.0], values)
+
+
 def test_refuses_wrong_shapes(kind: Any) -> None:
     u, x = record(0.2)
     estimator = kind(RATE)
@@ -455,7 +548,8 @@ def test_model_is_admissible_after_anything(kind: Any, name: str, model: Any) ->
         assert np.isfinite(compensator.step(0.1))
     assert np.isfinite(estimator.y)
     assert np.isfinite(estimator.S)
-    json.dumps(estimator.to_dict(), allow_nan=False)
+    saved = json.loads(json.dumps(estimator.to_dict(), allow_nan=False))
+    assert face(kind.from_dict(saved)) == face(estimator)
 
 
 def test_works_in_the_ring(kind: Any) -> None:
@@ -496,12 +590,13 @@ def test_reset_equals_new(kind: Any) -> None:
     assert face(used) == face(new)
 
 
-def test_copies_are_independent(kind: Any) -> None:
+@pytest.mark.parametrize("duplicate", [lambda estimator: estimator.copy(), copy.copy, copy.deepcopy])
+def test_copies_are_independent(kind: Any, duplicate: Any) -> None:
     u, x = record()
     estimator = kind(RATE)
     estimator.run(u[:100], x[:100])
     before = face(estimator)
-    other = estimator.copy()
+    other = duplicate(estimator)
     assert type(other) is kind
     assert face(other) == before
     other.run(u[100:], x[100:])
@@ -551,6 +646,41 @@ def test_refuses_a_save_that_is_not_its_own(kind: Any) -> None:
         kind.from_dict(data | {"format": 99})
     with pytest.raises(ValueError, match="state"):
         kind.from_dict(data | {"state": [*data["state"], 0.0]})
+
+
+def test_saves_every_argument(kind: Any) -> None:
+    assert list(kind(RATE).to_dict()["arguments"]) == list(inspect.signature(kind).parameters)
+
+
+@pytest.mark.parametrize("name", ["estimator", "format", "arguments", "state", "pending"])
+def test_refuses_a_save_that_lacks_a_part(kind: Any, name: str) -> None:
+    data = kind(RATE).to_dict()
+    for changed in ({key: value for key, value in data.items() if key != name}, data | {name: {"a": [1]}}):
+        with pytest.raises(ValueError, match=r"data|arguments|state|pending"):
+            kind.from_dict(changed)
+    with pytest.raises(ValueError, match="no_such_key"):
+        kind.from_dict(data | {"no_such_key": 1})
+    with pytest.raises(ValueError, match="dictionary"):
+        kind.from_dict([data])
+
+
+def test_refuses_a_save_with_other_arguments(kind: Any) -> None:
+    data = kind(RATE).to_dict()
+    with pytest.raises(ValueError, match="arguments has unknown fields"):
+        kind.from_dict(data | {"arguments": data["arguments"] | {"no_such_argument": 1}})
+    with pytest.raises(ValueError, match="model"):
+        kind.from_dict(data | {"arguments": data["arguments"] | {"initial_model": [1.0]}})
+    for name in data["arguments"]:
+        lacking = {key: value for key, value in data["arguments"].items() if key != name}
+        with pytest.raises(ValueError, match=f"arguments has no '{name}'"):
+            kind.from_dict(data | {"arguments": lacking})
+
+
+@pytest.mark.parametrize("value", ["7", None, np.nan, [1.0], 10**400, {}])
+def test_refuses_a_state_that_is_not_of_numbers(kind: Any, value: Any) -> None:
+    data = kind(RATE).to_dict()
+    with pytest.raises(ValueError, match="state"):
+        kind.from_dict(data | {"state": [value, *data["state"][1:]]})
 
 
 def test_pickles(kind: Any) -> None:

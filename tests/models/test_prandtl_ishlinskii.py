@@ -121,7 +121,7 @@ def test_creep() -> None:
         Creep([0.1, 0.2], [1.0])
     with pytest.raises(ValueError, match="longest must be above"):
         Creep.logarithmic(0.01, shortest=1.0, longest=0.1)
-    with pytest.raises(ValueError, match="fields gains and time_constants"):
+    with pytest.raises(ValueError, match="creep has no 'time_constants'"):
         Creep.from_dict({"gains": [1.0]})
     with pytest.raises(ValueError, match="initial_state must hold 4"):
         creep.simulate(np.ones(5), sample_rate=1000.0, initial_state=np.zeros(3))
@@ -137,5 +137,5 @@ def test_mechanics() -> None:
         MassSpringDamper(0.0, 0.02)
     with pytest.raises(ValueError, match="initial_state must hold displacement and velocity"):
         mechanics.simulate(np.ones(3), sample_rate=1e4, initial_state=np.zeros(1))
-    with pytest.raises(ValueError, match="fields natural_frequency"):
+    with pytest.raises(ValueError, match="mechanics has no 'natural_frequency'"):
         MassSpringDamper.from_dict({})
