@@ -8,7 +8,7 @@ from typing import Any, Literal, Self
 
 import numpy as np
 
-from piezoest._checks import WILDEST, FloatArray, array_1d, integer, positive
+from piezoest._checks import WILDEST, FloatArray, array_1d, integer, number_or_nan, positive
 from piezoest.compensators import corridor, loop_inverse
 from piezoest.compensators.layout import (
     BY_PATH,
@@ -311,18 +311,20 @@ class Compensator:
         Parameters
         ----------
         r : float
-            Reference displacement [µm]; None, NaN or infinity holds the last voltage.
+            Reference displacement [µm]; NaN, infinity and what is no number hold the last voltage.
 
         Returns
         -------
         float
             Voltage [V], within the limits.
         """
+        if type(r) is not float:
+            r = number_or_nan(r)
         if self._waiting is not None and self._state[DUE] != 0.0:
             self._take_up_waiting()
         if isinstance(self._model, PrandtlIshlinskii):
-            return float(_plays().step(self._state, self._config, np.nan if r is None else r))
-        return loop_inverse.step(self._state, self._config, np.nan if r is None else r)
+            return float(_plays().step(self._state, self._config, r))
+        return loop_inverse.step(self._state, self._config, r)
 
     def run(self, r: Any) -> FloatArray:
         """Voltages for a whole reference; continues from the current state, as a loop of `step`.
@@ -360,3 +362,6 @@ class Compensator:
     def copy(self) -> Self:
         """Return an independent compensator in the same state."""
         return copy.deepcopy(self)
+
+    def __copy__(self) -> Self:
+        return self.copy()

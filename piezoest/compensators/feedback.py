@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import math
+from typing import Self
 
-from piezoest._checks import positive
+from piezoest._checks import number_or_nan, positive
 from piezoest.compensators.base import Compensator
 from piezoest.models import Model
 
@@ -70,22 +72,23 @@ class IntegralFeedback:
         """The feed-forward inside."""
         return self._compensator
 
-    def step(self, r: float, x: float | None) -> float:
+    def step(self, r: float | None, x: float | None) -> float:
         """Voltage for the next sample.
 
         Parameters
         ----------
         r : float
-            Reference displacement [µm].
+            Reference displacement [µm]; NaN, infinity and what is no number hold the last voltage.
         x : float or None
-            Displacement measured last [µm]; None, NaN or infinity if there is none.
+            Displacement measured last [µm]; None, NaN, infinity or what is no number if there is none.
 
         Returns
         -------
         float
             Voltage [V], within the compensator's limits.
         """
-        if x is not None and math.isfinite(x) and math.isfinite(r):
+        r, x = number_or_nan(r), number_or_nan(x)
+        if math.isfinite(x) and math.isfinite(r):
             growth = self._step_gain * (r - x)
             if growth * self._compensator.limited <= 0.0:
                 self._integral += growth
@@ -95,3 +98,6 @@ class IntegralFeedback:
         """Return to the state after construction."""
         self._integral = 0.0
         self._compensator.reset()
+
+    def __copy__(self) -> Self:
+        return copy.deepcopy(self)

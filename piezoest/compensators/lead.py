@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest._checks import WILDEST, FloatArray, array_1d, finite, positive
+from piezoest._checks import WILDEST, FloatArray, array_1d, finite, number_or_nan, positive
 from piezoest._jit import compiled
 from piezoest.compensators.base import Compensator, CompensatorStatus
 from piezoest.compensators.limits import VoltageLimits
@@ -135,14 +135,14 @@ class LeadFilter:
         Parameters
         ----------
         r : float
-            Reference displacement [µm]; None, NaN or infinity holds the last voltage.
+            Reference displacement [µm]; NaN, infinity and what is no number hold the last voltage.
 
         Returns
         -------
         float
             Voltage [V], within the limits.
         """
-        lead = _step(self._state, self._coefficients, np.nan if r is None else r)
+        lead = _step(self._state, self._coefficients, r if type(r) is float else number_or_nan(r))
         return self._compensator.step(lead)
 
     def run(self, r: Any) -> FloatArray:
@@ -175,3 +175,6 @@ class LeadFilter:
     def copy(self) -> Self:
         """Return an independent one in the same state."""
         return copy.deepcopy(self)
+
+    def __copy__(self) -> Self:
+        return self.copy()

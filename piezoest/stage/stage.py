@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, finite, integer, positive
+from piezoest._checks import FloatArray, array_1d, finite, integer, number_or_nan, positive
 from piezoest.models.coleman_hodgdon import ColemanHodgdon
 from piezoest.models.creep import Creep
 from piezoest.models.linear_gain import LinearGain
@@ -201,8 +202,8 @@ class SimulatedStage:
         Parameters
         ----------
         u : float
-            Voltage [V]. For NaN or infinity the last finite voltage is held: a program may
-            compute a NaN, an amplifier cannot put it out.
+            Voltage [V]. For NaN, infinity and what is no number the last finite voltage is held: a
+            program may compute a NaN, an amplifier cannot put it out.
 
         Returns
         -------
@@ -212,7 +213,7 @@ class SimulatedStage:
         factor, shape = (float(values[0]) for values in self._factors(1))
         noise = self._generator.standard_normal() if self._noisy else 0.0
         measured, displacement = kernel.step(
-            self._state, self._settings, self._plays, self._terms, float(u), noise, factor, shape
+            self._state, self._settings, self._plays, self._terms, number_or_nan(u), noise, factor, shape
         )
         self._count += 1
         self._displacement = displacement
@@ -256,6 +257,9 @@ class SimulatedStage:
         self._generator = np.random.default_rng(self._seed)
         self._count = 0
         self._displacement = self._hysteresis.offset
+
+    def __copy__(self) -> Self:
+        return copy.deepcopy(self)
 
     def _factors(self, n: int) -> tuple[FloatArray, FloatArray]:
         """Factors of the hysteresis and of its shape for the next n samples: shape (n,), or (1,) for 1."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -173,3 +174,75 @@ def test_integral_feedback_does_not_wind_up() -> None:
     assert np.isfinite(loop.integral)
     loop.reset()
     assert loop.integral == 0.0
+
+
+ODD = [np.array([2.0]), np.array(2.0), [2.0], (2.0,), np.float32(2.0), np.int64(2), 2, np.ma.array([2.0])]
+NO_NUMBERS = [
+    "2",
+    10**400,
+    2j,
+    object(),
+    [1.0, 2.0],
+    np.zeros(3),
+    np.ma.masked,
+    np.ma.masked_all(1),
+    None,
+    b"2",
+]
+
+
+def lead(compensator: Any) -> Any:
+    return pz.LeadFilter(compensator, pz.MassSpringDamper(780.0, 0.02), sample_rate=50_000.0)
+
+
+def feedback(compensator: Any) -> Any:
+    return pz.IntegralFeedback(compensator, gain=10.0, sample_rate=50_000.0)
+
+
+@pytest.mark.parametrize("wrap", [lambda c: c, lead])
+@pytest.mark.parametrize("model", [pz.LinearGain(0.15), pz.PrandtlIshlinskii(0.1, [1.0], [0.02])])
+def test_what_a_program_hands_over_for_a_reference(wrap: Any, model: Any) -> None:
+    plain = wrap(pz.InverseCompensator(model))
+    voltages = [plain.step(r) for r in (1.0, 2.0)]
+    for value in ODD:
+        compensator = wrap(pz.InverseCompensator(model))
+        assert [compensator.step(1.0), compensator.step(value)] == voltages
+    for value in NO_NUMBERS:
+        compensator = wrap(pz.InverseCompensator(model))
+        first = compensator.step(1.0)
+        assert compensator.step(value) == first
+        assert compensator.status.missing == 1
+
+
+def test_what_a_driver_hands_back_to_feedback() -> None:
+    plain = feedback(pz.InverseCompensator(pz.LinearGain(0.15)))
+    voltage = [plain.step(1.0, 2.0), plain.step(1.0, 2.0)]
+    for value in ODD:
+        loop = feedback(pz.InverseCompensator(pz.LinearGain(0.15)))
+        assert [loop.step(1.0, value), loop.step(np.array([1.0]), value)] == voltage
+    for value in NO_NUMBERS:
+        loop = feedback(pz.InverseCompensator(pz.LinearGain(0.15)))
+        first = loop.step(1.0, value)
+        assert loop.step(value, 2.0) == first
+        assert loop.integral == 0.0
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: pz.InverseCompensator(pz.ColemanHodgdon(0.02, 0.12, 0.0036)),
+        lambda: lead(pz.LinearCompensator(pz.LinearGain(0.15))),
+        lambda: feedback(pz.LinearCompensator(pz.LinearGain(0.15))),
+        lambda: pz.PaperStage(50_000.0),
+        lambda: pz.PreisachStage(50_000.0),
+    ],
+)
+def test_a_copy_is_independent(make: Any) -> None:
+    original = make()
+    arguments = (1.0, 0.5) if isinstance(original, pz.IntegralFeedback) else (1.0,)
+    original.step(*arguments)
+    copied = copy.copy(original)
+    expected = [copy.deepcopy(original).step(*arguments)]
+    for _ in range(5):
+        copied.step(*arguments)
+    assert [original.step(*arguments)] == expected
