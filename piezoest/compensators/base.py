@@ -224,7 +224,7 @@ class Compensator:
     def model(self) -> Model:
         """Model whose inverse is used. Setting it is bumpless.
 
-        It takes effect by travel: when the reference has moved by 1/64 of its recent swing since the last one
+        It takes effect by travel: when the reference has moved by 1/32 of its recent swing since the last one
         did, at once if it has, or has not moved at all; until then the model in use drives on, and of several
         that are set the last one waits. Where models follow one another soon, the voltage stays in a corridor
         around linear feed-forward (`piezoest.compensators.corridor`).
