@@ -16,12 +16,16 @@ from piezoest.estimators.delay_line import delayed
 
 # State: bookkeeping, then vectors of n or n*n numbers, the delay line last.
 U_LAST, PRIMED, SAMPLES, MISSED, UPDATES, MOVED, LAST, INNOVATION, INNOVATION_VARIANCE = range(9)
-U_CENTRE, X_CENTRE, CENTRED, HEAD = 9, 10, 11, 12
+U_CENTRE, X_CENTRE, CENTRED, HELD, RESETS, HEAD = range(9, 15)
 
-# Configuration: scalars, then n process noises and the parameters' least values.
-N, HYSTERETIC, NOISE, FRACTION, OFFSET, PROJECT, LEAST_A, LEAST_B, MARGIN, CONFIG = range(10)
+# Configuration: scalars, the parameters' least values, the start's variances (up to five), and behind them n
+# process noises.
+N, HYSTERETIC, NOISE, FRACTION, OFFSET, PROJECT, LEAST_A, LEAST_B, MARGIN, START = range(10)
+CONFIG = START + 5
 
-WAITING, UPDATED, MISSING = 0.0, 1.0, 2.0
+WAITING, UPDATED, MISSING, HOLDING = 0.0, 1.0, 2.0, 3.0
+# Least gain of a linear model handed out, in parts of the start's.
+LEAST_GAIN = 1e-2
 
 
 @register_jitable
@@ -100,6 +104,18 @@ def _onto_admissible(s: Any, P: Any, config: Any, n: int, work: Any) -> Any:
 
 
 @unrolled
+def _restart(state: Any, s: Any, P: Any, config: Any, n: int) -> None:
+    """Let P start anew, and with it the hysteresis w_h; the parameters stay."""
+    for i in range(n):
+        for j in range(n):
+            P[i * n + j] = 0.0
+        P[i * n + i] = config[START + i]
+    if config[HYSTERETIC] != 0.0:
+        s[0] = 0.0
+    state[RESETS] += 1.0
+
+
+@unrolled
 def _take(state: Any, config: Any, line: Any, u: Any, x: Any, n: int) -> None:
     """One sample of a filter of `n` states; `line` is None where nothing is delayed."""
     s, P, gain, work = _views(state, n)
@@ -114,6 +130,8 @@ def _take(state: Any, config: Any, line: Any, u: Any, x: Any, n: int) -> None:
         u -= state[U_CENTRE]
         _time_update(s, P, u - state[U_LAST], config, n, work)
         state[U_LAST] = u
+        if not (np.abs(s[0]) < kalman.LARGEST_TRACE and kalman.is_covariance(P, n)):
+            _restart(state, s, P, config, n)
     else:
         x = np.nan
     if not np.abs(x) < WILDEST:
@@ -125,7 +143,13 @@ def _take(state: Any, config: Any, line: Any, u: Any, x: Any, n: int) -> None:
         state[X_CENTRE] = x * config[OFFSET]
     measurement_row(work[:n], u, config, n)
     y = x - state[X_CENTRE] - kalman.measure(s, work[:n], n)
-    S = kalman.update(s, P, work[:n], y, config[NOISE], n, gain, work[n:])
+    S = kalman.innovation_variance(P, work[:n], config[NOISE], n, work[n:])
+    if not kalman.is_safe(y, S, n, work[n:]):
+        _restart(state, s, P, config, n)
+        state[HELD] += 1.0
+        state[LAST] = HOLDING
+        return
+    kalman.correct(s, P, work[:n], y, config[NOISE], S, n, gain, work[n:])
     state[MOVED] = 0.0
     if config[PROJECT] != 0.0:
         state[MOVED] = _onto_admissible(s, P, config, n, work)
@@ -148,7 +172,7 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
     s = state[HEAD : HEAD + int(config[N])]
     offset = terms[1]
     if config[HYSTERETIC] == 0.0:
-        gain = s[0] if s[0] * terms[0] > 0.0 else 1e-2 * terms[0]
+        gain = admissible.kept_gain(s[0], terms[0], LEAST_GAIN)
         if config[OFFSET] != 0.0:
             offset = s[1] + state[X_CENTRE] - gain * state[U_CENTRE]
         model[0] = gain
@@ -164,7 +188,16 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
     model[3] = offset
     if not admissible.has_inverse(alpha, beta, gamma):
         work = np.empty(9)
-        admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
+        if not admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN):
+            model[2] = 0.0
+    # A model that is far smaller than the start's commands far larger voltages.
+    if model[0] < config[LEAST_A] or model[2] < (2.0 * config[LEAST_B] + config[MARGIN]) * model[0]:
+        a = max(a, config[LEAST_A])
+        b = max(s[2], config[LEAST_B])
+        alpha, beta, gamma = equations.rate_parameters(a, b, max(s[3], 2.0 * b + config[MARGIN]))
+        model[0] = alpha
+        model[1] = beta
+        model[2] = gamma
 
 
 @njit(PROPOSE_TYPES, cache=True)

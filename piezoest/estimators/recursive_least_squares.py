@@ -127,15 +127,70 @@ def _note(state: Any, y: Any, S: Any) -> None:
 
 
 @unrolled
+def _restart(state: Any, n: Any) -> None:
+    """Let P start anew."""
+    P = state[HEAD + n : HEAD + n + n * n]
+    equations.restore_covariance(P, state[HEAD + n + n * n : HEAD + n + 2 * n * n], n)
+    state[RESETS] += 1.0
+
+
+@unrolled
+def _settle(state: Any, n: Any, taken: Any, y: Any, S: Any) -> None:
+    """Count a sample: an update, or one that was not safe; then theta stays and P starts anew."""
+    if taken:
+        _note(state, y, S)
+    else:
+        state[LAST] = HOLDING
+        state[HELD] += 1.0
+        _restart(state, n)
+
+
+@unrolled
+def _views(state: Any, n: Any) -> Any:
+    """Theta, P, work space."""
+    i = HEAD + n
+    return state[HEAD:i], state[i : i + n * n], state[i + 2 * n * n :]
+
+
+@unrolled
+def _discretely(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
+    theta, P, work = _views(state, n)
+    y, quadratic = equations.innovation(theta, P, phi, z, n, work)
+    taken = equations.is_safe(P, n, y, quadratic + forgetting * R, work)
+    S = R
+    if taken:
+        S = equations.discrete_correction(
+            theta, P, n, y, quadratic, forgetting, R, config[BOUND], 1.0, work
+        )
+    _settle(state, n, taken, y, S)
+
+
+@unrolled
+def _continuously(state: Any, config: Any, phi: Any, z: Any, n: Any) -> None:
+    theta, P, work = _views(state, n)
+    h = config[STEP]
+    y, S = equations.continuous_step(theta, P, phi, z, n, h, config[RATE], config[NORMALISED], work)
+    taken = equations.continuous_is_safe(P, n, y, S, h, work)
+    if taken:
+        equations.continuous_correction(theta, P, n, h, config[BOUND], 1.0, work)
+    _settle(state, n, taken, y, S)
+
+
+@unrolled
+def _by_direction(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
+    theta, P, work = _views(state, n)
+    y, q = equations.innovation(theta, P, phi, z, n, work)
+    taken = equations.is_safe(P, n, y, q + R, work)
+    if taken:
+        equations.directional_correction(theta, P, n, y, q, forgetting, R, config[BOUND], 1.0, work)
+    _settle(state, n, taken, y, q + R)
+
+
+@unrolled
 def adapt_discretely(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
     """One sample of the ordinary law: gate, update with noise variance R."""
-    if not _informs(state, config, phi, n):
-        return
-    theta = state[HEAD : HEAD + n]
-    P = state[HEAD + n : HEAD + n + n * n]
-    work = state[HEAD + n + 2 * n * n :]
-    y, S = equations.discrete_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
-    _note(state, y, S)
+    if _informs(state, config, phi, n):
+        _discretely(state, config, phi, z, n, R, forgetting)
 
 
 @unrolled
@@ -143,22 +198,15 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting:
     """One sample of the law as configured: gate, resetting, update with noise variance R."""
     if not _informs(state, config, phi, n):
         return
-    theta = state[HEAD : HEAD + n]
-    P = state[HEAD + n : HEAD + n + n * n]
-    P_0 = state[HEAD + n + n * n : HEAD + n + 2 * n * n]
-    work = state[HEAD + n + 2 * n * n :]
+    _, P, work = _views(state, n)
     if config[FLOOR] > 0.0 and equations.above_floor(P, n, config[FLOOR], work) == 0.0:
-        equations.restore_covariance(P, P_0, n, 1.0)
-        state[RESETS] += 1.0
+        _restart(state, n)
     if config[CONTINUOUS] != 0.0:
-        y, S = equations.continuous_update(
-            theta, P, phi, z, n, config[STEP], config[RATE], config[NORMALISED], config[BOUND], 1.0, work
-        )
+        _continuously(state, config, phi, z, n)
     elif config[DIRECTIONAL] != 0.0:
-        y, S = equations.directional_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
+        _by_direction(state, config, phi, z, n, R, forgetting)
     else:
-        y, S = equations.discrete_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
-    _note(state, y, S)
+        _discretely(state, config, phi, z, n, R, forgetting)
 
 
 # Compiled when it is first called: few need it by itself.
