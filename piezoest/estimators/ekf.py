@@ -111,9 +111,9 @@ class HysteresisEKF(EstimatorBase):
         self._config[kernel.PROJECT] = project and hysteretic
         if hysteretic:
             self._config[kernel.LEAST_A : kernel.LEAST_A + 3] = (
-                1e-2 * start[1],
-                1e-2 * start[2],
-                1e-3 * start[3],
+                kernel.LEAST * start[1],
+                kernel.LEAST * start[2],
+                kernel.LEAST_MARGIN * start[3],
             )
         self._config[kernel.START : kernel.START + n] = spread**2
         self._config[kernel.CONFIG :] = walk**2 / sample_rate

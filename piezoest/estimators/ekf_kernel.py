@@ -24,8 +24,8 @@ N, HYSTERETIC, NOISE, FRACTION, OFFSET, PROJECT, LEAST_A, LEAST_B, MARGIN, START
 CONFIG = START + 5
 
 WAITING, UPDATED, MISSING, HOLDING = 0.0, 1.0, 2.0, 3.0
-# Least gain of a linear model handed out, in parts of the start's.
-LEAST_GAIN = 1e-2
+# Least a, b or gain of a model handed out, in parts of the start's; least c - 2b, in parts of its c.
+LEAST, LEAST_MARGIN = 1e-2, 1e-3
 
 
 @register_jitable
@@ -172,7 +172,7 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
     s = state[HEAD : HEAD + int(config[N])]
     offset = terms[1]
     if config[HYSTERETIC] == 0.0:
-        gain = admissible.kept_gain(s[0], terms[0], LEAST_GAIN)
+        gain = admissible.kept_gain(s[0], terms[0], LEAST)
         if config[OFFSET] != 0.0:
             offset = s[1] + state[X_CENTRE] - gain * state[U_CENTRE]
         model[0] = gain
@@ -186,18 +186,35 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
     model[1] = beta
     model[2] = gamma
     model[3] = offset
+    known = True
     if not admissible.has_inverse(alpha, beta, gamma):
         work = np.empty(9)
-        if not admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN):
-            model[2] = 0.0
-    # A model that is far smaller than the start's commands far larger voltages.
-    if model[0] < config[LEAST_A] or model[2] < (2.0 * config[LEAST_B] + config[MARGIN]) * model[0]:
-        a = max(a, config[LEAST_A])
-        b = max(s[2], config[LEAST_B])
-        alpha, beta, gamma = equations.rate_parameters(a, b, max(s[3], 2.0 * b + config[MARGIN]))
-        model[0] = alpha
-        model[1] = beta
-        model[2] = gamma
+        known = admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
+    if not known or model[0] < config[LEAST_A] or model[2] < _least_slope(config) * model[0]:
+        _lift(model, config, known)
+
+
+@register_jitable
+def _least_slope(config: Any) -> Any:
+    """Least c of a model handed out."""
+    return 2.0 * config[LEAST_B] + config[MARGIN]
+
+
+@register_jitable
+def _lift(model: Any, config: Any, known: Any) -> None:
+    """Lift a model's a and c to their least values; where it is not known, take the start's.
+
+    A model that is far smaller than the start's commands far larger voltages.
+    """
+    a, b, c = config[LEAST_A] / LEAST, config[LEAST_B] / LEAST, config[MARGIN] / LEAST_MARGIN
+    if known:
+        a = max(model[0], config[LEAST_A])
+        c = max(model[2] / model[0], _least_slope(config))
+        b = min(max(c - model[1], config[LEAST_B]), 0.5 * (c - config[MARGIN]))
+    alpha, beta, gamma = equations.rate_parameters(a, b, c)
+    model[0] = alpha
+    model[1] = beta
+    model[2] = gamma
 
 
 @njit(PROPOSE_TYPES, cache=True)

@@ -10,11 +10,11 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from piezoest._checks import WILDEST, FloatArray, integer, non_negative, positive
+from piezoest._checks import WILDEST, FloatArray, check_start, integer, moderate, positive
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators.arrival import moved_on
 from piezoest.estimators.base import EstimatorBase, Status, Trace
-from piezoest.estimators.coordinates import Coordinates, coordinates
+from piezoest.estimators.coordinates import Coordinates, coordinates, large_enough
 from piezoest.estimators.shooting import Prior, Problem, Solution, inverse_information, single_shooting
 from piezoest.estimators.thinning import thinned
 from piezoest.models import ColemanHodgdon, LinearGain
@@ -158,7 +158,7 @@ class MovingHorizon(EstimatorBase):
         noise: float = 1.5e-3,
         max_iterations: int = 50,
     ) -> None:
-        sample_rate = positive("sample_rate", sample_rate)
+        sample_rate = moderate("sample_rate", sample_rate)
         window, hop = positive("window", window), positive("hop", hop)
         if round(hop * sample_rate) >= round(window * sample_rate):
             raise ValueError(f"hop must be shorter than the window of {window:g} s, got {hop:g} s")
@@ -167,6 +167,7 @@ class MovingHorizon(EstimatorBase):
             raise ValueError(f"initial_model must be a ColemanHodgdon or a LinearGain, got {initial!r}")
         if not initial.is_admissible:
             raise ValueError(f"initial_model must be admissible, got {initial}: use nearest_admissible()")
+        check_start(initial)
         self._initial = initial
         self._window, self._hop = max(2, round(window * sample_rate)), max(1, round(hop * sample_rate))
         if decimation is None:
@@ -178,9 +179,9 @@ class MovingHorizon(EstimatorBase):
             "decimation": integer("decimation", decimation, 1),
             "initial_model": initial.to_dict(),
             "offset": bool(offset),
-            "uncertainty": positive("uncertainty", uncertainty),
-            "process_noise": non_negative("process_noise", process_noise),
-            "noise": positive("noise", noise),
+            "uncertainty": moderate("uncertainty", uncertainty),
+            "process_noise": moderate("process_noise", process_noise, or_zero=True),
+            "noise": moderate("noise", noise),
             "max_iterations": integer("max_iterations", max_iterations, 1),
         }
         n, m = len(self._coordinates().free), len(self.parameter_names)
@@ -298,8 +299,24 @@ class MovingHorizon(EstimatorBase):
             weight / state[NOISE], prior,
         )  # fmt: skip
         q = state[layout.q].copy()
-        found = single_shooting(problem, q, "linear", 1.0, self._arguments["max_iterations"], TOLERANCE)
         state[SOLVES] += 1.0
+        kept = state.copy()
+        try:
+            with np.errstate(all="ignore"):
+                self._message = self._fit(problem, q, points, leaving)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            self._message = str(error)
+            state[:] = kept
+            state[FAILURES] += 1.0
+        if not np.all(np.isfinite(state)):
+            state[:] = kept
+            state[FAILURES] += 1.0
+        self._seconds = time.perf_counter() - began
+
+    def _fit(self, problem: Problem, q: FloatArray, points: Any, leaving: int) -> str:
+        """Solve, hold what is good, and move the arrival cost on; returns the solver's words."""
+        state = self._state
+        found = single_shooting(problem, q, "linear", 1.0, self._arguments["max_iterations"], TOLERANCE)
         good = self._take_over(problem, found)
         if good:
             q = found.q
@@ -312,7 +329,7 @@ class MovingHorizon(EstimatorBase):
             residual = problem.evaluate(q)[0][: points.size]
             chi = np.sqrt(float(residual @ residual) / problem.measured)
             state[NOISE] = max(self._arguments["noise"], state[NOISE] * chi)
-        self._message, self._seconds = found.message, time.perf_counter() - began
+        return found.message
 
     def _take_over(self, problem: Problem, found: Solution) -> bool:
         """Hold what was found, if it is any good."""
@@ -361,10 +378,10 @@ class MovingHorizon(EstimatorBase):
 
     @property
     def model(self) -> ColemanHodgdon | LinearGain:
-        """Admissible model as held: of the last good solve."""
+        """Admissible model as held: of the last good solve, its slope at least 1 % of the start's."""
         theta, n = self.theta, self._initial.theta.size
         offset = float(theta[n]) if theta.size > n else self._initial.offset
-        return type(self._initial).from_theta(theta[:n], offset)
+        return large_enough(type(self._initial).from_theta(theta[:n], offset), self._initial)
 
     @property
     def P(self) -> FloatArray:
@@ -375,7 +392,7 @@ class MovingHorizon(EstimatorBase):
     @property
     def standard_errors(self) -> FloatArray:
         """Square roots of the diagonal of `P`, shape (n,)."""
-        return np.sqrt(np.diag(self.P))
+        return np.sqrt(np.fmax(np.diag(self.P), 0.0))
 
     @property
     def y(self) -> float:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from piezoest._checks import FloatArray, check_start, finite, moderate
+from piezoest._checks import FloatArray, check_start, finite
 from piezoest.estimators import play_rls_layout as layout
 from piezoest.estimators.play_rls_grid import LEVEL_START
 from piezoest.models import ColemanHodgdon, LinearGain, PrandtlIshlinskii

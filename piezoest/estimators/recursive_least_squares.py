@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from piezoest._checks import FloatArray, array_1d, finite, integer, positive
+from piezoest._checks import FloatArray, array_1d, finite, integer, moderate
 from piezoest._jit import UNCOUNTED, unrolled
 from piezoest.equations import least_squares as equations
 from piezoest.policies import (
@@ -40,8 +40,13 @@ WAITING, UPDATED, MISSING, HOLDING, REJECTED = 0.0, 1.0, 2.0, 3.0, 4.0
 # Positive: variable forgetting is on, and whoever knows the clock sets its least factor.
 LEAST_BY_THE_CLOCK = 1e-300
 
+# Least part of the past that a sample keeps: P is divided by it.
+LEAST_KEPT = 1e-6
+
 # Beyond this a number is no measurement, and its square could overflow.
 LARGEST = 1e100
+# A covariance beyond 1e60 counts as one that has wound up: no start is near it.
+LARGEST_START = 1e50
 
 
 @register_jitable
@@ -68,7 +73,7 @@ def configure(
     if time_base == "continuous" and isinstance(chosen, DirectionalForgetting | VariableForgetting):
         raise ValueError(f"policies: {type(chosen).__name__} goes with the discrete time base")
     config = np.zeros(CONFIG_SIZE)
-    config[FORGETTING] = forgetting.factor(step)
+    config[FORGETTING] = max(forgetting.factor(step), LEAST_KEPT)
     config[NOISE] = noise
     config[BOUND] = bound.limit * np.trace(P_0) if isinstance(bound, NormBound) else np.inf
     config[CONTINUOUS] = time_base == "continuous"
@@ -80,7 +85,7 @@ def configure(
     config[DEAD_ZONE] = dead_zone.threshold if isinstance(dead_zone, DeadZone) else -1.0
     config[DIRECTIONAL] = isinstance(chosen, DirectionalForgetting)
     if isinstance(chosen, VariableForgetting):
-        config[LEAST_FACTOR] = chosen.least_factor(step) if timed else LEAST_BY_THE_CLOCK
+        config[LEAST_FACTOR] = max(chosen.least_factor(step), LEAST_KEPT) if timed else LEAST_BY_THE_CLOCK
     return config
 
 
@@ -159,9 +164,7 @@ def _discretely(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forge
     taken = equations.is_safe(P, n, y, quadratic + forgetting * R, work)
     S = R
     if taken:
-        S = equations.discrete_correction(
-            theta, P, n, y, quadratic, forgetting, R, config[BOUND], 1.0, work
-        )
+        S = equations.discrete_correction(theta, P, n, y, quadratic, forgetting, R, config[BOUND], 1.0, work)
     _settle(state, n, taken, y, S)
 
 
@@ -292,10 +295,10 @@ class RecursiveLeastSquares:
         if start.size != self._n:
             raise ValueError(f"theta must have shape ({self._n},), got {start.shape}")
         P_0 = covariance_matrix("P", P, self._n)
-        noise_variance = positive("noise_variance", noise_variance)
+        noise_variance = moderate("noise_variance", noise_variance)
         if time_base == "continuous" and noise_variance != 1.0:
             raise ValueError("noise_variance must be 1 in the continuous law: scale z and phi instead")
-        self._config = configure(tuple(policies), positive("step", step), time_base, noise_variance, P_0)
+        self._config = configure(tuple(policies), moderate("step", step), time_base, noise_variance, P_0)
         for policy in policies:
             if not isinstance(policy, _OWN) or getattr(policy, "unit", "second") != "second":
                 raise ValueError(f"policies: {policy!r} needs a voltage's clock: see HysteresisRLS")
@@ -368,6 +371,8 @@ def covariance_matrix(name: str, value: Any, n: int) -> FloatArray:
         raise ValueError(f"{name} must have shape ({n}, {n}), got {matrix.shape}")
     if not np.all(np.isfinite(matrix)) or not np.array_equal(matrix, matrix.T):
         raise ValueError(f"{name} must be finite and symmetric: pass (P + P.T) / 2")
+    if np.trace(matrix) > LARGEST_START:
+        raise ValueError(f"{name} must have a trace of at most {LARGEST_START:g}, got {np.trace(matrix):g}")
     if np.linalg.eigvalsh(matrix)[0] <= 0.0:
         raise ValueError(f"{name} must be positive definite: its smallest eigenvalue is not above zero")
     return np.ascontiguousarray(matrix)

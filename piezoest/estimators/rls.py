@@ -298,7 +298,7 @@ class HysteresisRLS(Freezable):
         mismatch is not in them. With the continuous time base, or ``errors=False``, they are those of `P`.
         """
         if self._config[kernel.ERRORS] == 0.0 or self._state[kernel.FRONT + law.UPDATES] == 0.0:
-            return np.sqrt(np.diag(self.P))
+            return np.sqrt(np.fmax(np.diag(self.P), 0.0))
         n = self._n
         C = self._state[kernel.ERROR : kernel.ERROR + n * n].reshape(n, n)
         pole = self._config[kernel.LOW_POLE]
@@ -308,7 +308,7 @@ class HysteresisRLS(Freezable):
             gain = self._state[kernel.GAIN : kernel.GAIN + n]
             energy = (1.0 - pole) / (1.0 + pole) * self._config[kernel.NOISE_RATIO] ** 2
             C = C + np.outer(gain, gain) * energy
-        return np.sqrt(np.diag(C)) * self._scale
+        return np.sqrt(np.fmax(np.diag(C), 0.0)) * self._scale
 
     @property
     def y(self) -> float:
@@ -330,8 +330,11 @@ class HysteresisRLS(Freezable):
             / self._scale
             * (1.0 / self._config[kernel.SCALE + 4])
         )
-        product = self.P @ phi
-        return product / (phi @ product + (1.0 / self._config[kernel.SCALE + 4]) ** 2)
+        with np.errstate(all="ignore"):
+            product = self.P @ phi
+            gain = product / (phi @ product + (1.0 / self._config[kernel.SCALE + 4]) ** 2)
+        # Where it overflows, the sample was not taken.
+        return gain if np.all(np.isfinite(gain)) else np.zeros(self._n)
 
     @property
     def status(self) -> Status:

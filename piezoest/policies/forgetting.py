@@ -7,13 +7,13 @@ from typing import Literal
 
 import numpy as np
 
-from piezoest._checks import fraction, positive
+from piezoest._checks import fraction, moderate, positive
 
 Unit = Literal["period", "second"]
 
 
 def _check_memory(memory: float, unit: str) -> None:
-    positive("memory", memory)
+    moderate("memory", memory)
     if unit not in ("period", "second"):
         raise ValueError(f"unit must be 'period' or 'second', got {unit!r}")
 
@@ -81,8 +81,8 @@ class RandomWalk:
     drift: float = 0.4
 
     def __post_init__(self) -> None:
-        positive("memory", self.memory)
-        positive("drift", self.drift)
+        moderate("memory", self.memory)
+        moderate("drift", self.drift)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +109,7 @@ class PeriodicForgetting:
     memory: float = 2.0
 
     def __post_init__(self) -> None:
-        positive("memory", self.memory)
+        moderate("memory", self.memory)
 
 
 @dataclass(frozen=True, slots=True)
