@@ -12,7 +12,7 @@ import numpy as np
 
 from piezoest._jit import unrolled
 
-# What an update moves must have squares whose sum is below this; beyond such a trace a covariance has
+# The square of an innovation and its variance must stay below the first; beyond the second a variance has
 # wound up.
 LARGEST, LARGEST_TRACE = 1e200, 1e60
 
@@ -87,27 +87,22 @@ def innovation_variance(P, h, R, n, work):
 
 
 @unrolled
-def is_safe(y, S, n, work):
-    """Whether an update moves nothing beyond all measure; `work` holds P h', see `innovation_variance`.
+def is_safe(y, S):
+    """Whether an update by the innovation y of variance S moves nothing beyond all measure.
 
     Asked before the update, as `least_squares.is_safe`: NaN or infinity anywhere in the state, P, h or the
     measurement ends up in one of these numbers.
     """
-    reach = y * y
-    for i in range(n):
-        reach = reach + work[i] * work[i]
-    return S > 0.0 and reach < LARGEST
+    return S > 0.0 and y * y + S < LARGEST
 
 
 @unrolled
 def is_covariance(P, n):
-    """Whether the variances of P and all that the first state goes with are numbers, not below zero."""
+    """Whether no variance of P is lost, and the first, which alone can grow without end, is a number."""
     least = P[0]
-    reach = P[0]
     for i in range(1, n):
         least = min(least, P[i * n + i])
-        reach = reach + P[i * n + i] + np.abs(P[i])
-    return least >= 0.0 and reach < LARGEST_TRACE
+    return least >= 0.0 and P[0] < LARGEST_TRACE
 
 
 @unrolled

@@ -18,6 +18,8 @@ from piezoest.equations.integrators import NODES, WEIGHTS
 # What an update moves must have squares below this; a trace counts this many times: beyond 1e60 a covariance
 # has wound up. Then no gain takes theta where the next innovation's square would pass the bound for good.
 LARGEST, TRACE_WEIGHT = 1e200, 1e140
+# A step of the continuous law that leaves this times the innovation is one too long for its gain.
+UNSTABLE = 2.0
 
 
 @unrolled
@@ -169,14 +171,20 @@ def continuous_step(theta, P, phi, z, n, h, forgetting_rate, normalised, work):
 
 
 @register_jitable
-def continuous_is_safe(P, n, y, S, h, work):
-    """Whether a `continuous_step` moves nothing beyond all measure, as `is_safe`."""
+def continuous_is_safe(P, phi, n, y, S, h, work):
+    """Whether a `continuous_step` moves nothing beyond all measure, as `is_safe`, and is stable.
+
+    A step that is too long for the gain, as without the normalisation it can be, would leave more of the
+    innovation than there was, and the next one more than that.
+    """
     m = n + n * n
     total = work[n + m : n + 2 * m]
     reach = (y * y + S * S) + trace(P, n) * TRACE_WEIGHT
     for i in range(m):
         reach = reach + h * total[i] * (h * total[i])
-    return is_covariance(P, n) and reach < LARGEST
+    left = y - h * predicted_output(total, phi, n)
+    stable = np.abs(left) <= UNSTABLE * np.abs(y)
+    return is_covariance(P, n) and stable and reach < LARGEST
 
 
 @register_jitable

@@ -144,7 +144,7 @@ def _take(state: Any, config: Any, line: Any, u: Any, x: Any, n: int) -> None:
     measurement_row(work[:n], u, config, n)
     y = x - state[X_CENTRE] - kalman.measure(s, work[:n], n)
     S = kalman.innovation_variance(P, work[:n], config[NOISE], n, work[n:])
-    if not kalman.is_safe(y, S, n, work[n:]):
+    if not kalman.is_safe(y, S):
         _restart(state, s, P, config, n)
         state[HELD] += 1.0
         state[LAST] = HOLDING

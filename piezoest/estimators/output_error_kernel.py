@@ -182,7 +182,7 @@ def _adapt(state: Any, config: Any, u: Any, x: Any, part: Any, jumped: Any) -> N
         cov[CENTRE * SIZE + CENTRE] += y * y
     work = state[WORK : WORK + SIZE * SIZE]
     variance = kalman.innovation_variance(cov, phi, R, SIZE, work)
-    if not (kalman.is_safe(y, variance, SIZE, work) and kalman.is_covariance(cov, SIZE)):
+    if not (kalman.is_safe(y, variance) and kalman.is_covariance(cov, SIZE)):
         _hold(state, config)
         return
     kalman.correct(s, cov, phi, y, R, variance, SIZE, state[GAIN : GAIN + SIZE], work)

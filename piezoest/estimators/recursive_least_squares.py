@@ -173,7 +173,7 @@ def _continuously(state: Any, config: Any, phi: Any, z: Any, n: Any) -> None:
     theta, P, work = _views(state, n)
     h = config[STEP]
     y, S = equations.continuous_step(theta, P, phi, z, n, h, config[RATE], config[NORMALISED], work)
-    taken = equations.continuous_is_safe(P, n, y, S, h, work)
+    taken = equations.continuous_is_safe(P, phi, n, y, S, h, work)
     if taken:
         equations.continuous_correction(theta, P, n, h, config[BOUND], 1.0, work)
     _settle(state, n, taken, y, S)

@@ -99,6 +99,7 @@ def test_continuous_law_without_its_normalisation_stays_a_number() -> None:
     estimator.run(u, LOOP.simulate(u, allow_jumps=True))
     assert_numbers(estimator)
     assert estimator.status.resets > 0
+    np.testing.assert_allclose(estimator.theta, LOOP.theta, rtol=1.0)
 
 
 def test_covariance_that_winds_up_starts_anew() -> None:
@@ -252,20 +253,6 @@ def test_any_bits_in_a_bank(kind: str) -> None:
             assert bank.channel(c).status == single.status
 
 
-def test_goes_on_learning_afterwards() -> None:
-    rng = np.random.default_rng(4)
-    u = 33.0 * np.sin(np.arange(6000) / 30.0)
-    x = LOOP.simulate(u, allow_jumps=True) + 1e-3 * rng.standard_normal(u.size)
-    for kind in ("rls", "rls-bare", "ekf", "rls-continuous-bare"):
-        estimator = MAKERS[kind]()
-        for _ in range(5):
-            estimator.run(wild(rng, 200), wild(rng, 200))
-        for _ in range(3):
-            estimator.run(u, x)
-        assert_numbers(estimator)
-        np.testing.assert_allclose(slope(estimator.model), LOOP.c, rtol=0.2, err_msg=kind)
-
-
 # ---------------------------------------------------------------- settings
 
 FORGETTINGS = (
@@ -283,7 +270,10 @@ OTHERS = (
 
 def drawn(rng: np.random.Generator) -> pz.HysteresisRLS:
     """`HysteresisRLS` of any legal settings; ValueError for others."""
-    size = lambda low, high: float(10.0 ** rng.uniform(low, high))  # noqa: E731
+
+    def size(low: float, high: float) -> float:
+        return float(10.0 ** rng.uniform(low, high))
+
     far = rng.random() < 0.5
     a, ratio = size(-20.0, 20.0) if far else 0.02, rng.uniform(1.0, 2.1)
     beta = size(-20.0, 20.0) if far else 0.12
@@ -373,8 +363,9 @@ def test_extreme_starts_of_the_others(kind: Any) -> None:
     ],
 )
 def test_settings_beyond_any_unit_are_refused(name: str, value: float) -> None:
+    options: Any = {"sample_rate": RATE, name: value}
     with pytest.raises(ValueError, match=name):
-        pz.HysteresisRLS(**{"sample_rate": RATE, name: value})
+        pz.HysteresisRLS(**options)
 
 
 @pytest.mark.parametrize("kind", ["HysteresisRLS", "HysteresisEKF", "MovingHorizon", "BatchFit"])
