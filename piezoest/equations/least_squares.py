@@ -20,6 +20,8 @@ from piezoest.equations.integrators import NODES, WEIGHTS
 LARGEST, TRACE_WEIGHT = 1e200, 1e140
 # A step of the continuous law that leaves this times the innovation is one too long for its gain.
 UNSTABLE = 2.0
+# A regressor whose phi' P phi is less has no direction to forget along.
+LEAST_TOLD = 1e-100
 
 
 @unrolled
@@ -221,7 +223,8 @@ def directional_correction(theta, P, n, y, q, forgetting, R, bound, enable, work
     """The part of `directional_update` behind `innovation`; returns S."""
     S = q + R
     lost = (1.0 - forgetting) * R
-    shrink = (forgetting * q - lost) / (forgetting * S * (q + (q == 0.0)))
+    told = (q > LEAST_TOLD) * 1.0
+    shrink = told * (forgetting * q - lost) / (forgetting * S * (q + (1.0 - told)))
     size = 0.0
     removed = 0.0
     for i in range(n):

@@ -283,7 +283,8 @@ class BatchFit(EstimatorBase):
                 found = self._solve(count)
         except (ValueError, np.linalg.LinAlgError):
             return None
-        numbers = np.concatenate([found.theta, found.P.ravel(), [found.noise], *map(np.ravel, found._last)])
+        gain, variance = found._last
+        numbers = np.concatenate([found.theta, found.P.ravel(), gain, [found.noise, variance]])
         return found if np.all(np.isfinite(numbers)) else None
 
     def _solve(self, count: int) -> BatchFitResult:

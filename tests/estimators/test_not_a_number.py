@@ -180,6 +180,15 @@ def test_what_is_not_taken_is_counted_and_leaves_theta() -> None:
     assert np.isfinite([estimator.y, estimator.S]).all()
 
 
+def test_directional_forgetting_has_no_direction_in_almost_nothing() -> None:
+    estimator = pz.RecursiveLeastSquares(
+        2, P=1.0, policies=(p.DirectionalForgetting(100.0, unit="second"), p.NormBound())
+    )
+    for size in (1e-100, 1e-159, 1e-162, 5e-324, 0.0, 1.0):
+        estimator.update(1.0, [size, -size])
+        assert np.all(np.isfinite(estimator.P)), size
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -1.0])
 def test_spoilt_covariance_starts_anew(bad: float) -> None:
     u = 33.0 * np.sin(np.arange(300) / 10.0)
