@@ -14,6 +14,10 @@ FloatArray = NDArray[np.float64]
 # Beyond this, in V or µm, no stage goes: a sample that does is taken for missing.
 WILDEST = 1e9
 
+# Settings and parameters of estimators lie within this and its inverse: products of a few of them, and of
+# their squares, are far from overflow.
+MODERATE = 1e20
+
 
 def finite(name: str, value: Any) -> float:
     """Return `value` as a finite float.
@@ -52,6 +56,26 @@ def non_negative(name: str, value: Any) -> float:
     if number < 0.0:
         raise ValueError(f"{name} must be zero or more, got {number:g}")
     return number
+
+
+def moderate(name: str, value: Any, *, or_zero: bool = False) -> float:
+    """Return `value` as a float above zero, or zero, whose square is far from overflow and underflow."""
+    number = non_negative(name, value) if or_zero else positive(name, value)
+    if number != 0.0 and not 1.0 / MODERATE <= number <= MODERATE:
+        raise ValueError(
+            f"{name} must lie within [{1.0 / MODERATE:g}, {MODERATE:g}], got {number:g}: check its unit"
+        )
+    return number
+
+
+def check_start(initial: Any) -> None:
+    """Refuse an initial model with parameters that no stage has, in the units of this library."""
+    for value in (*initial.theta.tolist(), initial.offset):
+        if value != 0.0 and not 1.0 / MODERATE <= abs(value) <= MODERATE:
+            raise ValueError(
+                f"initial_model must have parameters within [{1.0 / MODERATE:g}, {MODERATE:g}] in size, "
+                f"got {value:g} in {initial}: check its units"
+            )
 
 
 def fraction(name: str, value: Any, low: float = 0.0, high: float = 1.0) -> float:

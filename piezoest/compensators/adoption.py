@@ -26,7 +26,8 @@ def adopt(compensator: Any, settings: Any, model: Any, hysteretic: bool, change:
         return True
     if not admissible.has_inverse(model[0], model[1], model[2]):
         work = np.empty(9)
-        admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
+        if not admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN):
+            return False
     a, b, c = equations.loop_parameters(model[0], model[1], model[2])
     change(compensator, settings, a, b, c, model[3])
     return True

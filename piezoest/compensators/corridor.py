@@ -12,7 +12,7 @@ hand-over, whether one came soon after another, direction of travel, furthest re
 present leg began, recent swing, present reference [µm], reference at the last hand-over, whether it is time
 for the next; the voltage at the furthest reference and at the turn before, and the displacement that the
 model had for them; gain and centre of the line, samples at which the corridor was in the way,
-whether there was a sample.
+whether there was a sample, length of the last leg.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from numba.extending import register_jitable
 
 (
     TURNS, SOON, DIRECTION, FURTHEST, TURNED, SWING, PRESENT, HANDED, DUE,
-    U_FURTHEST, U_TURNED, X_FURTHEST, X_TURNED, GAIN, CENTRE, USED, BEGUN, SIZE,
-) = range(18)  # fmt: skip
+    U_FURTHEST, U_TURNED, X_FURTHEST, X_TURNED, GAIN, CENTRE, USED, BEGUN, LEG, SIZE,
+) = range(19)  # fmt: skip
 
 # Half-width, as a fraction of half the recent swing of the reference.
 WIDTH = 0.3
-# A model takes effect from this fraction of the recent swing on.
-HAND_OVER = 1.0 / 32.0
+# A model takes effect from this fraction on of the last leg, or of the present one if that is longer.
+HAND_OVER = 1.0 / 64.0
 # A way back is a turn from this fraction of the recent swing on; a leg takes this fraction of itself from it.
 TURN, FADES = 0.02, 0.5
 # How much the line's gain may change in a turn, and its centre, as a fraction of half the swing.
@@ -65,7 +65,8 @@ def kept(path: Any, start: int, r: Any, wanted: Any) -> Any:
     way = np.abs(r - path[start + HANDED])
     recent = max(swing(path, start), np.abs(r - path[start + TURNED]))
     # Before the first turn nobody knows how far a swing goes.
-    path[start + DUE] = max(path[start + DUE], (way >= HAND_OVER * recent) * 1.0)
+    if way >= HAND_OVER * max(path[start + LEG], np.abs(r - path[start + TURNED])):
+        path[start + DUE] = 1.0
     if path[start + SOON] == 0.0:
         return wanted
     gain = path[start + GAIN]
@@ -100,6 +101,7 @@ def _turn(path: Any, start: int) -> None:
     """Note the recent swing, and let the line follow what the model made of it."""
     leg = np.abs(path[start + FURTHEST] - path[start + TURNED])
     path[start + SWING] = max(leg, path[start + SWING] - FADES * leg)
+    path[start + LEG] = leg
     u_0, u_1 = path[start + U_TURNED], path[start + U_FURTHEST]
     x_0, x_1 = path[start + X_TURNED], path[start + X_FURTHEST]
     gain = path[start + GAIN]

@@ -14,6 +14,10 @@ from numba.extending import register_jitable
 # the result admissible however far it came.
 _ITERATIONS = 8
 
+# Models within these bounds have a voltage that is a number for every displacement a stage can make:
+# of alpha [1/V] and of the slope c = gamma/alpha [µm/V].
+SMALLEST, LARGEST = 1e-100, 1e100
+
 # Distance kept from the faces where a model is moved into the set, in parts of gamma.
 NEAREST_MARGIN = 1e-6
 
@@ -69,36 +73,56 @@ def _onto_surface(theta, P, n, factor, side):
 
 @register_jitable
 def project_admissible(theta, P, n, alpha_least, beta_least, margin):
-    """Move theta (n,) in place to the nearest admissible point in the metric of P.
+    """Move theta (n,) in place to the nearest admissible point in the metric of P; False if there is none.
 
     theta[:3] = (alpha, beta, gamma); further entries (an offset) move with them as P's
-    correlations say. P is flat (n*n,) and is not changed.
+    correlations say. P is flat (n*n,) and is not changed. Where anything is NaN or beyond all measure
+    the result is False, and theta is not to be used: a clamp would make NaN the least gain there is,
+    and with it the largest voltage.
     """
     _onto_least(theta, P, n, 0, alpha_least)
     _onto_least(theta, P, n, 1, beta_least)
     _onto_surface(theta, P, n, 1.0 + margin, -1.0)
     _onto_surface(theta, P, n, 2.0 - margin, 1.0)
+    reach = 0.0
+    for i in range(n):
+        reach = reach + np.abs(theta[i])
     theta[0] = np.fmax(theta[0], alpha_least)
     theta[1] = np.fmax(theta[1], beta_least)
     area = theta[0] * theta[1]
     theta[2] = np.fmin(np.fmax(theta[2], (1.0 + margin) * area), (2.0 - margin) * area)
+    return reach < LARGEST and theta[2] < LARGEST
+
+
+@register_jitable
+def kept_gain(gain, start, least):
+    """Gain to hand out: of the start's sign and at least its part `least`; the start's where it is no number.
+
+    A small gain commands a large voltage: a sensor that reads zero must not.
+    """
+    if not np.abs(gain) < LARGEST:
+        return start
+    return gain if gain / start >= least else least * start
 
 
 @register_jitable
 def has_inverse(alpha, beta, gamma):
-    """True if the parameters are admissible to the letter: a > 0, beta > 0, b > 0 and c >= 2b."""
-    if not (alpha > 0.0 and beta > 0.0):
+    """True if the parameters are admissible to the letter: a > 0, beta > 0, b > 0 and c >= 2b.
+
+    Numbers that overflow on the way from a displacement to its voltage are not.
+    """
+    if not (alpha > SMALLEST and alpha < LARGEST and beta > 0.0):
         return False
     c = gamma / alpha
     b = c - beta
-    return b > 0.0 and c >= 2.0 * b
+    return b > 0.0 and c >= 2.0 * b and c > SMALLEST and c < LARGEST
 
 
 @register_jitable
 def nearest_admissible(theta, P, margin):
     """Move theta (3,) in place into the set, each parameter measured in parts of its own value.
 
-    `P` (9,) is work space.
+    False if there is no such point, see `project_admissible`. `P` (9,) is work space.
     """
     for i in range(9):
         P[i] = 0.0
@@ -107,4 +131,4 @@ def nearest_admissible(theta, P, margin):
         P[i * 3 + i] = scale * scale
     alpha_least = 1e-9 * np.fmax(np.abs(theta[0]), 1e-12)
     beta_least = 1e-9 * np.fmax(np.abs(theta[1]), 1e-12)
-    project_admissible(theta, P, 3, alpha_least, beta_least, margin)
+    return project_admissible(theta, P, 3, alpha_least, beta_least, margin)

@@ -12,6 +12,10 @@ import numpy as np
 
 from piezoest._jit import unrolled
 
+# The square of an innovation and its variance must stay below the first; beyond the second a variance has
+# wound up.
+LARGEST, LARGEST_TRACE = 1e200, 1e60
+
 
 @unrolled
 def bilinear_variance(P, du, a, n):
@@ -64,6 +68,14 @@ def update(s, P, h, y, R, n, gain, work):
     (I - K h) P (I - K h)' + K R K', row by row so that P stays symmetric. `gain` (n,)
     receives K; `work` has 2 n numbers.
     """
+    S = innovation_variance(P, h, R, n, work)
+    correct(s, P, h, y, R, S, n, gain, work)
+    return S
+
+
+@unrolled
+def innovation_variance(P, h, R, n, work):
+    """S = h P h' + R; `work` (n,) receives P h'."""
     S = R + 0.0
     for i in range(n):
         total = P[i * n] * h[0]
@@ -71,6 +83,31 @@ def update(s, P, h, y, R, n, gain, work):
             total = total + P[i * n + j] * h[j]
         work[i] = total  # of P h', which is h P
         S = S + h[i] * total
+    return S
+
+
+@unrolled
+def is_safe(y, S):
+    """Whether an update by the innovation y of variance S moves nothing beyond all measure.
+
+    Asked before the update, as `least_squares.is_safe`: NaN or infinity anywhere in the state, P, h or the
+    measurement ends up in one of these numbers.
+    """
+    return S > 0.0 and y * y + S < LARGEST
+
+
+@unrolled
+def is_covariance(P, n):
+    """Whether no variance of P is lost, and the first, which alone can grow without end, is a number."""
+    least = P[0]
+    for i in range(1, n):
+        least = min(least, P[i * n + i])
+    return least >= 0.0 and P[0] < LARGEST_TRACE
+
+
+@unrolled
+def correct(s, P, h, y, R, S, n, gain, work):
+    """The part of `update` behind `innovation_variance`."""
     each = 1.0 / S
     for i in range(n):
         gain[i] = work[i] * each
@@ -86,7 +123,6 @@ def update(s, P, h, y, R, n, gain, work):
             entry = P[i * n + j] - gain[i] * work[j] - work[n + i] * gain[j]
             P[i * n + j] = entry
             P[j * n + i] = entry
-    return S
 
 
 @unrolled
@@ -104,6 +140,8 @@ def project(s, P, g, least, n, work):
             total = total + P[i * n + j] * g[j]
         work[i] = total
         norm = norm + g[i] * total
+    # A norm that has underflown has no direction to go in: whoever asks clamps what is left over.
+    told = (norm * LARGEST_TRACE > np.abs(lack)) * outside
     for i in range(n):
-        s[i] = s[i] + outside * work[i] * lack / (norm + (norm == 0.0))
+        s[i] = s[i] + told * work[i] * lack / (norm + (norm == 0.0))
     return outside

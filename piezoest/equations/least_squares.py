@@ -15,6 +15,14 @@ from numba.extending import register_jitable
 from piezoest._jit import unrolled
 from piezoest.equations.integrators import NODES, WEIGHTS
 
+# What an update moves must have squares below this; a trace counts this many times: beyond 1e60 a covariance
+# has wound up. Then no gain takes theta where the next innovation's square would pass the bound for good.
+LARGEST, TRACE_WEIGHT = 1e200, 1e140
+# A step of the continuous law that leaves this times the innovation is one too long for its gain.
+UNSTABLE = 2.0
+# A regressor whose phi' P phi is less has no direction to forget along.
+LEAST_TOLD = 1e-100
+
 
 @unrolled
 def predicted_output(theta, phi, n):
@@ -46,6 +54,37 @@ def trace(P, n):
 
 
 @unrolled
+def innovation(theta, P, phi, z, n, work):
+    """Innovation y = z - theta . phi and phi' P phi; `work` (n,) receives P phi."""
+    y = z - predicted_output(theta, phi, n)
+    return y, covariance_times(P, phi, n, work)
+
+
+@unrolled
+def is_covariance(P, n):
+    """Whether all variances of P are above zero: rounding can take more than there is."""
+    least = P[0]
+    for i in range(1, n):
+        least = min(least, P[i * n + i])
+    return least > 0.0
+
+
+@unrolled
+def is_safe(P, n, y, spread, work):
+    """Whether an update by the gain P phi/spread moves nothing beyond all measure; `work` holds P phi.
+
+    Asked before the update: what is not safe is not taken, and the last good estimate stays. NaN or
+    infinity anywhere in theta, P, phi or z ends up in one of these numbers. A covariance that
+    rounding has taken a variance from is not safe either.
+    """
+    least = min(spread, P[0])  # one comparison for all: this is asked of every sample
+    for i in range(1, n):
+        least = min(least, P[i * n + i])
+    reach = (predicted_output(work, work, n) + y * y) + trace(P, n) * TRACE_WEIGHT
+    return least > 0.0 and reach < LARGEST
+
+
+@unrolled
 def discrete_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
     """One sample of recursive least squares; returns the innovation y and its variance S.
 
@@ -55,8 +94,14 @@ def discrete_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
     (A6) to the letter this cannot freeze P for good). With `enable` 0.0 nothing changes.
     `work` (n,) holds P phi.
     """
-    y = z - predicted_output(theta, phi, n)
-    quadratic = covariance_times(P, phi, n, work)
+    y, quadratic = innovation(theta, P, phi, z, n, work)
+    S = discrete_correction(theta, P, n, y, quadratic, forgetting, R, bound, enable, work)
+    return y, S
+
+
+@unrolled
+def discrete_correction(theta, P, n, y, quadratic, forgetting, R, bound, enable, work):
+    """The part of `discrete_update` behind `innovation`; returns S."""
     spread = quadratic + forgetting * R
     gain = enable / spread
     # trace(P) - |P phi|^2 / spread <= bound mu times spread^2: without waiting for the division, and with the
@@ -72,7 +117,7 @@ def discrete_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
             entry = (P[i * n + j] - share * (within * work[j])) * grow
             P[i * n + j] = entry
             P[j * n + i] = entry
-    return y, quadratic * inverse + R
+    return quadratic * inverse + R
 
 
 @register_jitable
@@ -96,6 +141,14 @@ def continuous_update(theta, P, phi, z, n, h, forgetting_rate, normalised, bound
     while ||P|| <= `bound`, or where the step makes it smaller. `work` has n + 4 (n + n*n)
     numbers.
     """
+    y, S = continuous_step(theta, P, phi, z, n, h, forgetting_rate, normalised, work)
+    continuous_correction(theta, P, n, h, bound, enable, work)
+    return y, S
+
+
+@register_jitable
+def continuous_step(theta, P, phi, z, n, h, forgetting_rate, normalised, work):
+    """The part of `continuous_update` that changes nothing: its rates go into `work`, from 2 n + n*n on."""
     m = n + n * n
     product = work[:n]
     slope = work[n : n + m]
@@ -116,6 +169,31 @@ def continuous_update(theta, P, phi, z, n, h, forgetting_rate, normalised, bound
         )
         for i in range(m):
             total[i] = total[i] + WEIGHTS[k] * slope[i]
+    return y, S
+
+
+@register_jitable
+def continuous_is_safe(P, phi, n, y, S, h, work):
+    """Whether a `continuous_step` moves nothing beyond all measure, as `is_safe`, and is stable.
+
+    A step that is too long for the gain, as without the normalisation it can be, would leave more of the
+    innovation than there was, and the next one more than that.
+    """
+    m = n + n * n
+    total = work[n + m : n + 2 * m]
+    reach = (y * y + S * S) + trace(P, n) * TRACE_WEIGHT
+    for i in range(m):
+        reach = reach + h * total[i] * (h * total[i])
+    left = y - h * predicted_output(total, phi, n)
+    stable = np.abs(left) <= UNSTABLE * np.abs(y)
+    return is_covariance(P, n) and stable and reach < LARGEST
+
+
+@register_jitable
+def continuous_correction(theta, P, n, h, bound, enable, work):
+    """The part of `continuous_update` that moves theta and P, by the rates in `work`."""
+    m = n + n * n
+    total = work[n + m : n + 2 * m]
     size = trace(P, n)
     growth = h * trace(total[n:m], n)
     within = np.fmin((size + growth <= bound) * 1.0 + (growth <= 0.0) * 1.0, 1.0) * enable
@@ -123,7 +201,6 @@ def continuous_update(theta, P, phi, z, n, h, forgetting_rate, normalised, bound
         theta[i] = theta[i] + enable * h * total[i]
     for i in range(n * n):
         P[i] = P[i] + within * h * total[n + i]
-    return y, S
 
 
 @unrolled
@@ -136,11 +213,18 @@ def directional_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
     P^-1 += (mu - (1 - mu) R/q) phi phi'/R. Along phi this is exponential forgetting, across it
     nothing is lost. `bound`, `enable` and `work` as in `discrete_update`.
     """
-    y = z - predicted_output(theta, phi, n)
-    q = covariance_times(P, phi, n, work)
+    y, q = innovation(theta, P, phi, z, n, work)
+    S = directional_correction(theta, P, n, y, q, forgetting, R, bound, enable, work)
+    return y, S
+
+
+@unrolled
+def directional_correction(theta, P, n, y, q, forgetting, R, bound, enable, work):
+    """The part of `directional_update` behind `innovation`; returns S."""
     S = q + R
     lost = (1.0 - forgetting) * R
-    shrink = (forgetting * q - lost) / (forgetting * S * (q + (q == 0.0)))
+    told = (q > LEAST_TOLD) * 1.0
+    shrink = told * (forgetting * q - lost) / (forgetting * S * (q + (1.0 - told)))
     size = 0.0
     removed = 0.0
     for i in range(n):
@@ -153,7 +237,7 @@ def directional_update(theta, P, phi, z, n, forgetting, R, bound, enable, work):
             entry = P[i * n + j] - within * shrink * work[i] * work[j]
             P[i * n + j] = entry
             P[j * n + i] = entry
-    return y, S
+    return S
 
 
 @unrolled
@@ -252,7 +336,7 @@ def add_covariance(P, P_0, n):
 
 
 @unrolled
-def restore_covariance(P, P_0, n, reset):
-    """Covariance resetting: P = P_0 where `reset` is 1.0 (Ioannou and Sun, sec. 4.3.6)."""
+def restore_covariance(P, P_0, n):
+    """Covariance resetting: P = P_0 (Ioannou and Sun, sec. 4.3.6)."""
     for i in range(n * n):
-        P[i] = P[i] + reset * (P_0[i] - P[i])
+        P[i] = P_0[i]

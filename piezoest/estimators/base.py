@@ -56,9 +56,10 @@ class Status:
     missing : int
         Samples without a usable voltage or displacement (None, NaN, infinite).
     held : int
-        Samples with a measurement but too little excitation to say anything.
+        Samples with a measurement that was not taken: too little excitation to say anything, or an update
+        that would not be a number, or one beyond all measure.
     resets : int
-        Times the covariance was reset.
+        Times the covariance was reset, also where it was lost or an update was not taken for that reason.
     projected : bool
         Whether `model` is the nearest admissible one and not `theta` itself.
     last : str

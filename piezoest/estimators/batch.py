@@ -8,10 +8,10 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from piezoest._checks import WILDEST, FloatArray, array_1d, finite, integer, positive
+from piezoest._checks import WILDEST, FloatArray, array_1d, check_start, finite, integer, moderate, positive
 from piezoest.estimators.base import EstimatorBase, Status, Trace
 from piezoest.estimators.batch_result import BatchFitResult, report
-from piezoest.estimators.coordinates import Coordinates, coordinates
+from piezoest.estimators.coordinates import Coordinates, coordinates, large_enough
 from piezoest.estimators.multiple_shooting import multiple_shooting
 from piezoest.estimators.saved_state import COUNT, MOST, Block, Table
 from piezoest.estimators.shooting import TUNING, Problem, Solution, single_shooting, spread
@@ -105,11 +105,13 @@ class BatchFit(EstimatorBase):
         max_iterations: int = 100,
         hop: float | None = None,
     ) -> None:
-        sample_rate = positive("sample_rate", sample_rate)
+        sample_rate = moderate("sample_rate", sample_rate)
         if not isinstance(initial_model, ColemanHodgdon | LinearGain | None):
             raise ValueError(f"initial_model must be a ColemanHodgdon or a LinearGain, got {initial_model!r}")
         if isinstance(initial_model, LinearGain) and not initial_model.is_admissible:
             raise ValueError("initial_model has a gain of zero, whose sign is not known: pass a rough value")
+        if initial_model is not None:
+            check_start(initial_model)
         if not isinstance(creep, Creep | None):
             raise ValueError(f"creep must be a Creep, got {creep!r}: its time constants are kept")
         if method not in tuple(METHODS):
@@ -134,7 +136,7 @@ class BatchFit(EstimatorBase):
                 "creep": None if creep is None else creep.to_dict(),
                 "method": method,
                 "loss": loss,
-                "noise": None if noise is None else positive("noise", noise),
+                "noise": None if noise is None else moderate("noise", noise),
                 "fixed": {name: float(value) for name, value in (fixed or {}).items()},
                 "max_iterations": integer("max_iterations", max_iterations, 1),
                 "hop": None if hop is None else float(hop),
@@ -277,9 +279,20 @@ class BatchFit(EstimatorBase):
             told = int(usable[-1]) + 1 if usable.size else 0
             if told != self._told:
                 ready = usable.size >= self._fewest() and self._excited(told)
-                self._result = self._solve(told) if ready else None
+                self._result = self._solved(told) if ready else None
             self._fitted, self._told = count, told
         return self._result
+
+    def _solved(self, count: int) -> BatchFitResult | None:
+        """Fit the first so many samples; None where that is not a number, as a stream must not stop."""
+        try:
+            with np.errstate(all="ignore"):
+                found = self._solve(count)
+        except (ValueError, np.linalg.LinAlgError):
+            return None
+        gain, variance = found._last
+        numbers = np.concatenate([found.theta, found.P.ravel(), gain, [found.noise, variance]])
+        return found if np.all(np.isfinite(numbers)) else None
 
     def _solve(self, count: int) -> BatchFitResult:
         """Fit the first so many samples."""
@@ -348,9 +361,15 @@ class BatchFit(EstimatorBase):
 
     @property
     def model(self) -> ColemanHodgdon | LinearGain:
-        """Admissible model: of the fit, or the initial one while there is none."""
+        """Admissible model: of the fit, or the initial one while there is none.
+
+        Its slope is at least 1 % of that of the initial model, where one was given.
+        """
         fit = self.result
-        return self._initial if fit is None else fit.model
+        if fit is None:
+            return self._initial
+        given = self._arguments["initial_model"] is not None
+        return large_enough(fit.model, self._initial) if given else fit.model
 
     @property
     def P(self) -> FloatArray:
@@ -363,7 +382,7 @@ class BatchFit(EstimatorBase):
     @property
     def standard_errors(self) -> FloatArray:
         """Square roots of the diagonal of `P`, shape (n,)."""
-        return np.sqrt(np.diag(self.P))
+        return np.sqrt(np.fmax(np.diag(self.P), 0.0))
 
     @property
     def y(self) -> float:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.equations import admissible
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.models import ColemanHodgdon, LinearGain
 from piezoest.symbolic import jacobian, trace
@@ -17,6 +18,8 @@ from piezoest.symbolic import jacobian, trace
 MARGIN = 1e-6
 # Least alpha, beta and gain, in parts of their start.
 LEAST = 1e-6
+# Least gain, c and a of the model handed out, in parts of the start's.
+LEAST_HANDED_OUT = 1e-2
 
 
 class Coordinates:
@@ -109,6 +112,29 @@ class Coordinates:
             (lower if start[i] > 0.0 else upper)[i] = LEAST * start[i]
         lower[names == "ratio"], upper[names == "ratio"] = 1.0 + MARGIN, 2.0 - MARGIN
         return lower, upper
+
+
+def large_enough(
+    model: ColemanHodgdon | LinearGain, start: ColemanHodgdon | LinearGain
+) -> ColemanHodgdon | LinearGain:
+    """The model, its gain or slope and its decay lifted to 1 % of the start's.
+
+    A smaller gain commands a larger voltage: what a sensor that reads zero teaches must not.
+
+    Parameters
+    ----------
+    model, start : ColemanHodgdon or LinearGain
+        Of one kind.
+    """
+    if isinstance(model, LinearGain) or isinstance(start, LinearGain):
+        gain = admissible.kept_gain(model.theta[0], start.theta[0], LEAST_HANDED_OUT)
+        return model if gain == model.theta[0] else LinearGain(float(gain), model.offset)
+    a, c = LEAST_HANDED_OUT * start.a, LEAST_HANDED_OUT * start.c
+    if model.a >= a and model.c >= c:
+        return model
+    return ColemanHodgdon.from_loop(
+        max(model.a, a), max(model.c, c) * (model.b / model.c), max(model.c, c), model.offset
+    )
 
 
 def _replaced(held: tuple[str, ...]) -> str | None:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from piezoest._checks import FloatArray, non_negative, positive
+from piezoest._checks import FloatArray, check_start, moderate
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import ekf_kernel as kernel
 from piezoest.estimators import ekf_loops, state_tables
@@ -85,15 +85,16 @@ class HysteresisEKF(EstimatorBase):
         delay: float = 0.0,
         project: bool = True,
     ) -> None:
-        sample_rate = positive("sample_rate", sample_rate)
+        sample_rate = moderate("sample_rate", sample_rate)
         initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
         if not isinstance(initial, ColemanHodgdon | LinearGain):
             raise ValueError(f"initial_model must be a ColemanHodgdon or a LinearGain, got {initial!r}")
         if not initial.is_admissible:
             raise ValueError(f"initial_model {initial} is not admissible: use nearest_admissible()")
-        uncertainty = positive("uncertainty", uncertainty)
-        drift = non_negative("drift", drift)
-        mismatch = non_negative("mismatch", mismatch)
+        check_start(initial)
+        uncertainty = moderate("uncertainty", uncertainty)
+        drift = moderate("drift", drift, or_zero=True)
+        mismatch = moderate("mismatch", mismatch, or_zero=True)
         fraction, line = delay_line(delay)
         start, spread, walk = starting_point(initial, uncertainty, drift, mismatch, offset)
         n = start.size
@@ -105,16 +106,17 @@ class HysteresisEKF(EstimatorBase):
         self._config[kernel.HYSTERETIC] = hysteretic
         # The linear gain has no state that could stray: there the mismatch is noise.
         stray = 0.0 if hysteretic else mismatch**2 * sample_rate
-        self._config[kernel.NOISE] = positive("noise", noise) ** 2 + stray
+        self._config[kernel.NOISE] = moderate("noise", noise) ** 2 + stray
         self._config[kernel.FRACTION] = fraction
         self._config[kernel.OFFSET] = bool(offset)
         self._config[kernel.PROJECT] = project and hysteretic
         if hysteretic:
             self._config[kernel.LEAST_A : kernel.LEAST_A + 3] = (
-                1e-2 * start[1],
-                1e-2 * start[2],
-                1e-3 * start[3],
+                kernel.LEAST * start[1],
+                kernel.LEAST * start[2],
+                kernel.LEAST_MARGIN * start[3],
             )
+        self._config[kernel.START : kernel.START + n] = spread**2
         self._config[kernel.CONFIG :] = walk**2 / sample_rate
         self._kind = (n, bool(delay > 0.0)) if hysteretic else (0, True)
         state = np.zeros(kernel.state_size(n))
@@ -228,7 +230,7 @@ class HysteresisEKF(EstimatorBase):
     @property
     def standard_errors(self) -> FloatArray:
         """Square roots of the diagonal of `P`, shape (n,)."""
-        return np.sqrt(np.diag(self.P))
+        return np.sqrt(np.fmax(np.diag(self.P), 0.0))
 
     @property
     def y(self) -> float:
@@ -254,10 +256,10 @@ class HysteresisEKF(EstimatorBase):
             samples=int(head[kernel.SAMPLES]),
             updates=int(head[kernel.UPDATES]),
             missing=int(head[kernel.MISSED]),
-            held=0,
-            resets=0,
+            held=int(head[kernel.HELD]),
+            resets=int(head[kernel.RESETS]),
             projected=bool(head[kernel.MOVED]),
-            last=("waiting", "updated", "missing")[int(head[kernel.LAST])],
+            last=("waiting", "updated", "missing", "held")[int(head[kernel.LAST])],
         )
 
     @property

@@ -15,12 +15,16 @@ from piezoest.estimators.delay_line import delayed
 
 # State: bookkeeping, then vectors of n or n*n numbers, the delay line last.
 U_LAST, PRIMED, SAMPLES, MISSED, UPDATES, MOVED, LAST, INNOVATION, INNOVATION_VARIANCE = range(9)
-U_CENTRE, X_CENTRE, CENTRED, HEAD = 9, 10, 11, 12
+U_CENTRE, X_CENTRE, CENTRED, HELD, RESETS, HEAD = range(9, 15)
 
-# Configuration: scalars, then n process noises and the parameters' least values.
-N, HYSTERETIC, NOISE, FRACTION, OFFSET, PROJECT, LEAST_A, LEAST_B, MARGIN, CONFIG = range(10)
+# Configuration: scalars, the parameters' least values, the start's variances (up to five), and behind them n
+# process noises.
+N, HYSTERETIC, NOISE, FRACTION, OFFSET, PROJECT, LEAST_A, LEAST_B, MARGIN, START = range(10)
+CONFIG = START + 5
 
-WAITING, UPDATED, MISSING = 0.0, 1.0, 2.0
+WAITING, UPDATED, MISSING, HOLDING = 0.0, 1.0, 2.0, 3.0
+# Least a, b or gain of a model handed out, in parts of the start's; least c - 2b, in parts of its c.
+LEAST, LEAST_MARGIN = 1e-2, 1e-3
 
 
 @register_jitable
@@ -99,6 +103,18 @@ def _onto_admissible(s: Any, P: Any, config: Any, n: int, work: Any) -> Any:
 
 
 @unrolled
+def _restart(state: Any, s: Any, P: Any, config: Any, n: int) -> None:
+    """Let P start anew, and with it the hysteresis w_h; the parameters stay."""
+    for i in range(n):
+        for j in range(n):
+            P[i * n + j] = 0.0
+        P[i * n + i] = config[START + i]
+    if config[HYSTERETIC] != 0.0:
+        s[0] = 0.0
+    state[RESETS] += 1.0
+
+
+@unrolled
 def _take(state: Any, config: Any, line: Any, u: Any, x: Any, n: int) -> None:
     """One sample of a filter of `n` states; `line` is None where nothing is delayed."""
     s, P, gain, work = _views(state, n)
@@ -113,6 +129,8 @@ def _take(state: Any, config: Any, line: Any, u: Any, x: Any, n: int) -> None:
         u -= state[U_CENTRE]
         _time_update(s, P, u - state[U_LAST], config, n, work)
         state[U_LAST] = u
+        if not (np.abs(s[0]) < kalman.LARGEST_TRACE and kalman.is_covariance(P, n)):
+            _restart(state, s, P, config, n)
     else:
         x = np.nan
     if not np.abs(x) < WILDEST:
@@ -124,7 +142,13 @@ def _take(state: Any, config: Any, line: Any, u: Any, x: Any, n: int) -> None:
         state[X_CENTRE] = x * config[OFFSET]
     measurement_row(work[:n], u, config, n)
     y = x - state[X_CENTRE] - kalman.measure(s, work[:n], n)
-    S = kalman.update(s, P, work[:n], y, config[NOISE], n, gain, work[n:])
+    S = kalman.innovation_variance(P, work[:n], config[NOISE], n, work[n:])
+    if not kalman.is_safe(y, S):
+        _restart(state, s, P, config, n)
+        state[HELD] += 1.0
+        state[LAST] = HOLDING
+        return
+    kalman.correct(s, P, work[:n], y, config[NOISE], S, n, gain, work[n:])
     state[MOVED] = 0.0
     if config[PROJECT] != 0.0:
         state[MOVED] = _onto_admissible(s, P, config, n, work)
@@ -147,7 +171,7 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
     s = state[HEAD : HEAD + int(config[N])]
     offset = terms[1]
     if config[HYSTERETIC] == 0.0:
-        gain = s[0] if s[0] * terms[0] > 0.0 else 1e-2 * terms[0]
+        gain = admissible.kept_gain(s[0], terms[0], LEAST)
         if config[OFFSET] != 0.0:
             offset = s[1] + state[X_CENTRE] - gain * state[U_CENTRE]
         model[0] = gain
@@ -161,9 +185,35 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
     model[1] = beta
     model[2] = gamma
     model[3] = offset
+    known = True
     if not admissible.has_inverse(alpha, beta, gamma):
         work = np.empty(9)
-        admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
+        known = admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
+    if not known or model[0] < config[LEAST_A] or model[2] < _least_slope(config) * model[0]:
+        _lift(model, config, known)
+
+
+@register_jitable
+def _least_slope(config: Any) -> Any:
+    """Least c of a model handed out."""
+    return 2.0 * config[LEAST_B] + config[MARGIN]
+
+
+@register_jitable
+def _lift(model: Any, config: Any, known: Any) -> None:
+    """Lift a model's a and c to their least values; where it is not known, take the start's.
+
+    A model that is far smaller than the start's commands far larger voltages.
+    """
+    a, b, c = config[LEAST_A] / LEAST, config[LEAST_B] / LEAST, config[MARGIN] / LEAST_MARGIN
+    if known:
+        a = max(model[0], config[LEAST_A])
+        c = max(model[2] / model[0], _least_slope(config))
+        b = min(max(c - model[1], config[LEAST_B]), 0.5 * (c - config[MARGIN]))
+    alpha, beta, gamma = equations.rate_parameters(a, b, c)
+    model[0] = alpha
+    model[1] = beta
+    model[2] = gamma
 
 
 @compiled(PROPOSE_TYPES)

@@ -124,7 +124,8 @@ class _FilterPyBaseline(HysteresisEKF):
                 state[kernel.U_CENTRE] = u * config[kernel.OFFSET]
                 state[kernel.U_LAST] = u - state[kernel.U_CENTRE]
             u -= state[kernel.U_CENTRE]
-            self._guarded(self._predict, u - state[kernel.U_LAST])
+            if not self._guarded(self._predict, u - state[kernel.U_LAST]):
+                state[kernel.RESETS] += 1.0
             state[kernel.U_LAST] = u
         else:
             x = np.nan
@@ -138,8 +139,9 @@ class _FilterPyBaseline(HysteresisEKF):
         h = np.zeros(n)
         kernel.measurement_row(h, u, config, n)
         if not self._guarded(self._update, x - state[kernel.X_CENTRE], h):
-            state[kernel.MISSED] += 1.0
-            state[kernel.LAST] = kernel.MISSING
+            state[kernel.RESETS] += 1.0
+            state[kernel.HELD] += 1.0
+            state[kernel.LAST] = kernel.HOLDING
             return
         state[kernel.INNOVATION] = np.ravel(self._filter.y)[0]
         state[kernel.INNOVATION_VARIANCE] = np.ravel(self._filter.S)[0]
@@ -147,14 +149,32 @@ class _FilterPyBaseline(HysteresisEKF):
         state[kernel.LAST] = kernel.UPDATED
 
     def _guarded(self, part: Any, *arguments: Any) -> bool:
-        """Run a part of the filter; where it breaks, put back what was before: a stream must not stop."""
-        x, P = self._filter.x.copy(), self._filter.P
+        """Run a part of the filter; where it breaks, the parameters stay and P starts anew.
+
+        A stream must not stop, and what is not a number would stay in the filter for good.
+        """
+        x = self._filter.x.copy()
         try:
-            part(*arguments)
+            with np.errstate(all="ignore"):
+                part(*arguments)
+            if self._is_sound():
+                return True
         except (np.linalg.LinAlgError, ValueError):  # scipy refuses what is not finite
-            self._filter.x, self._filter.P = x, P
-            return False
-        return True
+            pass
+        if self._config[kernel.HYSTERETIC]:
+            x[0] = 0.0
+        variances = self._config[kernel.START : kernel.START + self._n]
+        self._filter.x, self._filter.P = x, np.diag(variances)
+        self._filter.K = np.zeros((self._n, 1))
+        self._filter.y, self._filter.S = np.zeros(1), np.ones((1, 1))
+        return False
+
+    def _is_sound(self) -> bool:
+        """Whether state, covariance and gain are numbers, far from overflow, and no variance is lost."""
+        P = self._filter.P
+        parts = self._filter.x, P, self._filter.K, self._filter.S
+        numbers = np.concatenate([np.ravel(part) for part in parts])
+        return bool(np.all(np.abs(numbers) < kalman.LARGEST_TRACE) and np.all(np.diag(P) >= 0.0))
 
     def _absorb(self, u: FloatArray, x: FloatArray) -> None:
         EstimatorBase._absorb(self, u, x)  # not the compiled loop of `HysteresisEKF`

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from piezoest._checks import FloatArray, integer, non_negative, positive
+from piezoest._checks import FloatArray, check_start, integer, moderate, positive
 from piezoest.estimators import horizon_kernel as kernel
 from piezoest.estimators.arrival import moved_on
 from piezoest.estimators.base import EstimatorBase, Status, Trace
-from piezoest.estimators.coordinates import Coordinates, coordinates
+from piezoest.estimators.coordinates import Coordinates, coordinates, large_enough
 from piezoest.estimators.saved_state import Table
 from piezoest.estimators.shooting import Prior, Problem, Solution, inverse_information, single_shooting
 from piezoest.estimators.thinning import thinned
@@ -96,7 +96,7 @@ class MovingHorizon(EstimatorBase):
         noise: float = 1.5e-3,
         max_iterations: int = 50,
     ) -> None:
-        sample_rate = positive("sample_rate", sample_rate)
+        sample_rate = moderate("sample_rate", sample_rate)
         window, hop = positive("window", window), positive("hop", hop)
         if not window * sample_rate <= LONGEST:
             raise ValueError(f"window must be at most {LONGEST:g} samples long, got {window:g} s")
@@ -107,6 +107,7 @@ class MovingHorizon(EstimatorBase):
             raise ValueError(f"initial_model must be a ColemanHodgdon or a LinearGain, got {initial!r}")
         if not initial.is_admissible:
             raise ValueError(f"initial_model must be admissible, got {initial}: use nearest_admissible()")
+        check_start(initial)
         self._initial = initial
         self._window, self._hop = max(2, round(window * sample_rate)), max(1, round(hop * sample_rate))
         if decimation is None:
@@ -118,9 +119,9 @@ class MovingHorizon(EstimatorBase):
             "decimation": integer("decimation", decimation, 1),
             "initial_model": initial.to_dict(),
             "offset": bool(offset),
-            "uncertainty": positive("uncertainty", uncertainty),
-            "process_noise": non_negative("process_noise", process_noise),
-            "noise": positive("noise", noise),
+            "uncertainty": moderate("uncertainty", uncertainty),
+            "process_noise": moderate("process_noise", process_noise, or_zero=True),
+            "noise": moderate("noise", noise),
             "max_iterations": integer("max_iterations", max_iterations, 1),
         }
         n, m = len(self._coordinates().free), len(self.parameter_names)
@@ -241,8 +242,24 @@ class MovingHorizon(EstimatorBase):
             weight / state[kernel.NOISE], prior,
         )  # fmt: skip
         q = state[layout.q].copy()
-        found = single_shooting(problem, q, "linear", 1.0, self._arguments["max_iterations"], TOLERANCE)
         state[kernel.SOLVES] += 1.0
+        kept = state.copy()
+        try:
+            with np.errstate(all="ignore"):
+                self._message = self._fit(problem, q, points, leaving)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            self._message = str(error)
+            state[:] = kept
+            state[kernel.FAILURES] += 1.0
+        if not np.all(np.isfinite(state)):
+            state[:] = kept
+            state[kernel.FAILURES] += 1.0
+        self._seconds = time.perf_counter() - began
+
+    def _fit(self, problem: Problem, q: FloatArray, points: Any, leaving: int) -> str:
+        """Solve, hold what is good, and move the arrival cost on; returns the solver's words."""
+        state = self._state
+        found = single_shooting(problem, q, "linear", 1.0, self._arguments["max_iterations"], TOLERANCE)
         good = self._take_over(problem, found)
         if good:
             q = found.q
@@ -255,7 +272,7 @@ class MovingHorizon(EstimatorBase):
             residual = problem.evaluate(q)[0][: points.size]
             chi = np.sqrt(float(residual @ residual) / problem.measured)
             state[kernel.NOISE] = max(self._arguments["noise"], state[kernel.NOISE] * chi)
-        self._message, self._seconds = found.message, time.perf_counter() - began
+        return found.message
 
     def _take_over(self, problem: Problem, found: Solution) -> bool:
         """Hold what was found, if it is any good."""
@@ -312,13 +329,13 @@ class MovingHorizon(EstimatorBase):
 
     @property
     def model(self) -> ColemanHodgdon | LinearGain:
-        """Admissible model as held: of the last good solve."""
-        return self._model_of(self._state)
+        """Admissible model as held: of the last good solve, its slope at least 1 % of the start's."""
+        return large_enough(self._model_of(self._state), self._initial)
 
     def _model_of(self, state: FloatArray) -> ColemanHodgdon | LinearGain:
         theta, n = state[self._layout.theta], self._initial.theta.size
         offset = float(theta[n]) if theta.size > n else self._initial.offset
-        return type(self._initial).from_theta(theta[:n], offset)
+        return large_enough(type(self._initial).from_theta(theta[:n], offset), self._initial)
 
     def _fits(self, state: FloatArray) -> bool:
         """Whether the model held is admissible and that of theta, and the coordinates are within bounds."""
@@ -338,7 +355,7 @@ class MovingHorizon(EstimatorBase):
     @property
     def standard_errors(self) -> FloatArray:
         """Square roots of the diagonal of `P`, shape (n,)."""
-        return np.sqrt(np.diag(self.P))
+        return np.sqrt(np.fmax(np.diag(self.P), 0.0))
 
     @property
     def y(self) -> float:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from piezoest._checks import FloatArray, integer, non_negative, positive
+from piezoest._checks import FloatArray, check_start, integer, moderate, non_negative
 from piezoest.equations import coleman_hodgdon, output_error
 from piezoest.estimators import output_error_kernel as kernel
 from piezoest.estimators import recursive_least_squares as law
@@ -101,13 +101,14 @@ class OutputErrorRLS(Freezable):
         delay: float = 0.0,
         policies: tuple[Policy, ...] = POLICIES,
     ) -> None:
-        sample_rate = positive("sample_rate", sample_rate)
+        sample_rate = moderate("sample_rate", sample_rate)
         initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
         if not isinstance(initial, ColemanHodgdon):
             raise ValueError(f"initial_model must be a ColemanHodgdon, got {initial!r}")
         if not initial.is_admissible:
             raise ValueError(f"initial_model {initial} is not admissible: use nearest_admissible()")
-        if positive("span", span) <= 1.0:
+        check_start(initial)
+        if moderate("span", span) <= 1.0:
             raise ValueError(f"span must be above 1, got {span:g}")
         members = integer("members", members, 3, MOST_MEMBERS)
         walk = select(policies, RandomWalk)
@@ -138,22 +139,20 @@ class OutputErrorRLS(Freezable):
         config[front.NOISE_FACTOR] = 2.0 / front.PRECISION**2
         config[kernel.SLACK] = slack**2
         config[kernel.LASTING] = LASTING
-        config[kernel.VARIANCE] = positive("noise", noise) ** 2
+        config[kernel.VARIANCE] = moderate("noise", noise) ** 2
         config[kernel.MEMBERS] = members
+        b = initial.b / initial.c
+        config[kernel.START_B] = b
+        config[kernel.SPREAD] = moderate("uncertainty", uncertainty) ** 2
         decays = initial.a * np.geomspace(1.0 / span, span, members)
         config[kernel.STEP] = np.log(decays[1] / decays[0])
         self._config = np.concatenate([config, decays])
 
         state = np.zeros(kernel.bank_end(self._config))
         nearest = int(np.argmin(np.abs(np.log(decays / initial.a))))
-        b = initial.b / initial.c
         state[kernel.MEMBER] = state[kernel.MEMBER_BEFORE] = nearest
         state[kernel.S : kernel.S + 3] = b, 1.0, b * np.log(initial.a / decays[nearest])
-        covariance = np.zeros(9)
-        output_error.walk_covariance(b, 1.0, covariance)
-        P = np.zeros((kernel.SIZE, kernel.SIZE))
-        P[:3, :3] = covariance.reshape(3, 3) * positive("uncertainty", uncertainty) ** 2
-        state[kernel.P : kernel.P + P.size] = P.ravel()
+        kernel.start_covariance(state, config)
         self._begin(
             {
                 "sample_rate": sample_rate,

@@ -38,8 +38,8 @@ BANK = WORK + SIZE * SIZE + SIZE
 
 # Configuration behind the front end's: the sample's slack in samples, squared; memory of the
 # disturbance in swings; ratio of the bank's neighbours, in logarithm; least variance of the noise
-# [µm²]; members.
-SLACK, LASTING, STEP, VARIANCE, MEMBERS, DECAYS = range(front.CONFIG, front.CONFIG + 6)
+# [µm²]; members; the start's b, and its relative variance.
+SLACK, LASTING, STEP, VARIANCE, MEMBERS, START_B, SPREAD, DECAYS = range(front.CONFIG, front.CONFIG + 8)
 
 # Another member of the bank is taken from this part of the way to it on.
 NEXT = 0.6
@@ -142,6 +142,29 @@ def _choose_member(state: Any, config: Any) -> None:
 
 
 @register_jitable
+def start_covariance(state: Any, config: Any) -> None:
+    """Covariance as at the start."""
+    cov, Q = state[P : P + SIZE * SIZE], state[WORK : WORK + 9]
+    equations.walk_covariance(config[START_B], 1.0, Q)
+    for i in range(SIZE):
+        for j in range(SIZE):
+            cov[i * SIZE + j] = 0.0
+    for i in range(3):
+        for j in range(3):
+            cov[i * SIZE + j] = Q[i * 3 + j] * config[SPREAD]
+
+
+@register_jitable
+def _hold(state: Any, config: Any) -> None:
+    """Count a sample whose update is not safe: the estimate stays, P starts anew."""
+    start_covariance(state, config)
+    law_state = state[front.FRONT :]
+    law_state[law.RESETS] += 1.0
+    law_state[law.HELD] += 1.0
+    law_state[law.LAST] = law.HOLDING
+
+
+@register_jitable
 def _adapt(state: Any, config: Any, u: Any, x: Any, part: Any, jumped: Any) -> None:
     """One update of the filter."""
     s, cov = state[S : S + SIZE], state[P : P + SIZE * SIZE]
@@ -156,9 +179,12 @@ def _adapt(state: Any, config: Any, u: Any, x: Any, part: Any, jumped: Any) -> N
     y = x / config[front.SCALE + 1] - kalman.measure(s, phi, SIZE)
     if jumped:
         cov[CENTRE * SIZE + CENTRE] += y * y
-    variance = kalman.update(
-        s, cov, phi, y, R, SIZE, state[GAIN : GAIN + SIZE], state[WORK : WORK + SIZE * SIZE]
-    )
+    work = state[WORK : WORK + SIZE * SIZE]
+    variance = kalman.innovation_variance(cov, phi, R, SIZE, work)
+    if not (kalman.is_safe(y, variance) and kalman.is_covariance(cov, SIZE)):
+        _hold(state, config)
+        return
+    kalman.correct(s, cov, phi, y, R, variance, SIZE, state[GAIN : GAIN + SIZE], work)
     _choose_member(state, config)
     law_state = state[front.FRONT :]
     law_state[law.INNOVATION] = y

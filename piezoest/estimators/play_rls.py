@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, integer, non_negative, positive
+from piezoest._checks import FloatArray, array_1d, integer, moderate
 from piezoest.estimators import play_rls_kernel as kernel
 from piezoest.estimators import play_rls_layout as layout
 from piezoest.estimators import play_rls_settings as settings
@@ -115,7 +115,7 @@ class PrandtlIshlinskiiRLS(Freezable):
         delay: float = 0.0,
         mechanics: MassSpringDamper | None = None,
     ) -> None:
-        sample_rate = positive("sample_rate", sample_rate)
+        sample_rate = moderate("sample_rate", sample_rate)
         initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
         plan = settings.plan(
             initial,
@@ -136,13 +136,13 @@ class PrandtlIshlinskiiRLS(Freezable):
         n, k, m = plan.relative.size, plan.bends.size, plan.times.size
         size = layout.lay_out(config, n, k, m, line.size)
         config[layout.GAIN] = plan.unit
-        config[layout.NOISE] = non_negative("noise", noise)
+        config[layout.NOISE] = moderate("noise", noise, or_zero=True)
         config[layout.FRACTION] = fraction
         config[layout.FIXED] = plan.fixed
         config[layout.FIRST_HALF] = max(1.0, settings.FIRST_HALF * sample_rate)
         config[layout.LONGEST_GAP] = max(1, int(settings.LONGEST_GAP * sample_rate))
         settings.tune(config)
-        theta, spread, P = settings.prior(plan, positive("uncertainty", uncertainty), config)
+        theta, spread, P = settings.prior(plan, moderate("uncertainty", uncertainty), config)
         decays = np.exp(-1.0 / (sample_rate * plan.times))
         if mechanics is not None and not isinstance(mechanics, MassSpringDamper):
             raise ValueError(f"mechanics must be a MassSpringDamper, got {mechanics!r}")
@@ -246,7 +246,7 @@ class PrandtlIshlinskiiRLS(Freezable):
     @property
     def standard_errors(self) -> FloatArray:
         """Standard deviations of `theta` as the law sees them, shape (n,)."""
-        return np.sqrt(np.diag(self.P))
+        return np.sqrt(np.fmax(np.diag(self.P), 0.0))
 
     @property
     def y(self) -> float:

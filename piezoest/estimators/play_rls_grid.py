@@ -42,6 +42,7 @@ from piezoest.estimators.play_rls_regressors import new_window, output, regresso
 
 LEVEL_START = 0.03  # deviation of the level where nothing is known of it, in parts of the stroke
 FAR = 1e30
+LEAST_RANGE = 1e-9  # half-width that a grid shrinks to, in parts of the one before
 
 
 @register_jitable
@@ -151,4 +152,4 @@ def watch_range(state: Any, config: Any, u: Any) -> None:
     elif state[TURNS] == 4.0:
         state[TURNS] = 5.0
         if 1.3 * half < state[RANGE] and half > 0.0:
-            regrid(state, config, middle, 1.05 * half)
+            regrid(state, config, middle, max(1.05 * half, LEAST_RANGE * state[RANGE]))

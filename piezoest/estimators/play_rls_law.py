@@ -41,6 +41,7 @@ from piezoest.estimators.play_rls_regressors import add_row, slopes_of
 
 SWEEPS = 10
 SMALLEST = 1e-18
+LARGEST = 1e100  # variance of an innovation that says nothing any more
 WILD = 100.0  # standard deviations beyond which an innovation counts no more
 
 
@@ -138,8 +139,9 @@ def update(state: Any, config: Any, half: Any, first: int) -> None:
         add_row(work, state[P0 + i * size : P0 + i * size + size], mean[i], size)
     for i in range(size):
         S += mean[i] * work[i]
-    if not (S >= R and abs(y) < WILDEST):
-        # Rounding has spoilt the covariance, as voltages of another order of magnitude can.
+    if not (R > 0.0 and S >= R and S < LARGEST and abs(y) < WILDEST):
+        # Rounding has spoilt the covariance, as voltages of another order of magnitude can. NaN or infinity
+        # anywhere ends up in one of these numbers too.
         for i in range(size * size):
             state[P0 + i] = config[int(config[PRIOR]) + i]
         state[RESETS] += 1.0

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from piezoest._checks import FloatArray, finite
+from piezoest._checks import FloatArray, check_start, finite
 from piezoest.estimators import play_rls_layout as layout
 from piezoest.estimators.play_rls_grid import LEVEL_START
 from piezoest.models import ColemanHodgdon, LinearGain, PrandtlIshlinskii
@@ -54,6 +54,7 @@ def plan(initial: Any, voltage_range: Any, thresholds: int, bends: int, times: F
         )
     if not initial.is_admissible:
         raise ValueError(f"initial_model must be admissible, got {initial}")
+    check_start(initial)
     if np.any(times <= 0.0):
         raise ValueError(f"creep must hold time constants above zero, got {times.min():g} s")
     centre, half, fixed = 0.0, 0.0, voltage_range is not None

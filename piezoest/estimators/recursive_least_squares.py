@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+import copy
+from typing import Any, Literal, Self
 
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest._checks import FloatArray, array_1d, finite, integer, positive
+from piezoest._checks import FloatArray, array_1d, finite, integer, moderate
 from piezoest._jit import UNCOUNTED, compiled, unrolled
 from piezoest.equations import least_squares as equations
 from piezoest.policies import (
@@ -39,8 +40,13 @@ WAITING, UPDATED, MISSING, HOLDING, REJECTED = 0.0, 1.0, 2.0, 3.0, 4.0
 # Positive: variable forgetting is on, and whoever knows the clock sets its least factor.
 LEAST_BY_THE_CLOCK = 1e-300
 
+# Least part of the past that a sample keeps: P is divided by it.
+LEAST_KEPT = 1e-6
+
 # Beyond this a number is no measurement, and its square could overflow.
 LARGEST = 1e100
+# A covariance beyond 1e60 counts as one that has wound up: no start is near it.
+LARGEST_START = 1e50
 
 
 @register_jitable
@@ -67,7 +73,7 @@ def configure(
     if time_base == "continuous" and isinstance(chosen, DirectionalForgetting | VariableForgetting):
         raise ValueError(f"policies: {type(chosen).__name__} goes with the discrete time base")
     config = np.zeros(CONFIG_SIZE)
-    config[FORGETTING] = forgetting.factor(step)
+    config[FORGETTING] = max(forgetting.factor(step), LEAST_KEPT)
     config[NOISE] = noise
     config[BOUND] = bound.limit * np.trace(P_0) if isinstance(bound, NormBound) else np.inf
     config[CONTINUOUS] = time_base == "continuous"
@@ -79,7 +85,7 @@ def configure(
     config[DEAD_ZONE] = dead_zone.threshold if isinstance(dead_zone, DeadZone) else -1.0
     config[DIRECTIONAL] = isinstance(chosen, DirectionalForgetting)
     if isinstance(chosen, VariableForgetting):
-        config[LEAST_FACTOR] = chosen.least_factor(step) if timed else LEAST_BY_THE_CLOCK
+        config[LEAST_FACTOR] = max(chosen.least_factor(step), LEAST_KEPT) if timed else LEAST_BY_THE_CLOCK
     return config
 
 
@@ -126,15 +132,68 @@ def _note(state: Any, y: Any, S: Any) -> None:
 
 
 @unrolled
+def _restart(state: Any, n: Any) -> None:
+    """Let P start anew."""
+    P = state[HEAD + n : HEAD + n + n * n]
+    equations.restore_covariance(P, state[HEAD + n + n * n : HEAD + n + 2 * n * n], n)
+    state[RESETS] += 1.0
+
+
+@unrolled
+def _settle(state: Any, n: Any, taken: Any, y: Any, S: Any) -> None:
+    """Count a sample: an update, or one that was not safe; then theta stays and P starts anew."""
+    if taken:
+        _note(state, y, S)
+    else:
+        state[LAST] = HOLDING
+        state[HELD] += 1.0
+        _restart(state, n)
+
+
+@unrolled
+def _views(state: Any, n: Any) -> Any:
+    """Theta, P, work space."""
+    i = HEAD + n
+    return state[HEAD:i], state[i : i + n * n], state[i + 2 * n * n :]
+
+
+@unrolled
+def _discretely(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
+    theta, P, work = _views(state, n)
+    y, quadratic = equations.innovation(theta, P, phi, z, n, work)
+    taken = equations.is_safe(P, n, y, quadratic + forgetting * R, work)
+    S = R
+    if taken:
+        S = equations.discrete_correction(theta, P, n, y, quadratic, forgetting, R, config[BOUND], 1.0, work)
+    _settle(state, n, taken, y, S)
+
+
+@unrolled
+def _continuously(state: Any, config: Any, phi: Any, z: Any, n: Any) -> None:
+    theta, P, work = _views(state, n)
+    h = config[STEP]
+    y, S = equations.continuous_step(theta, P, phi, z, n, h, config[RATE], config[NORMALISED], work)
+    taken = equations.continuous_is_safe(P, phi, n, y, S, h, work)
+    if taken:
+        equations.continuous_correction(theta, P, n, h, config[BOUND], 1.0, work)
+    _settle(state, n, taken, y, S)
+
+
+@unrolled
+def _by_direction(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
+    theta, P, work = _views(state, n)
+    y, q = equations.innovation(theta, P, phi, z, n, work)
+    taken = equations.is_safe(P, n, y, q + R, work)
+    if taken:
+        equations.directional_correction(theta, P, n, y, q, forgetting, R, config[BOUND], 1.0, work)
+    _settle(state, n, taken, y, q + R)
+
+
+@unrolled
 def adapt_discretely(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
     """One sample of the ordinary law: gate, update with noise variance R."""
-    if not _informs(state, config, phi, n):
-        return
-    theta = state[HEAD : HEAD + n]
-    P = state[HEAD + n : HEAD + n + n * n]
-    work = state[HEAD + n + 2 * n * n :]
-    y, S = equations.discrete_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
-    _note(state, y, S)
+    if _informs(state, config, phi, n):
+        _discretely(state, config, phi, z, n, R, forgetting)
 
 
 @unrolled
@@ -142,22 +201,15 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting:
     """One sample of the law as configured: gate, resetting, update with noise variance R."""
     if not _informs(state, config, phi, n):
         return
-    theta = state[HEAD : HEAD + n]
-    P = state[HEAD + n : HEAD + n + n * n]
-    P_0 = state[HEAD + n + n * n : HEAD + n + 2 * n * n]
-    work = state[HEAD + n + 2 * n * n :]
+    _, P, work = _views(state, n)
     if config[FLOOR] > 0.0 and equations.above_floor(P, n, config[FLOOR], work) == 0.0:
-        equations.restore_covariance(P, P_0, n, 1.0)
-        state[RESETS] += 1.0
+        _restart(state, n)
     if config[CONTINUOUS] != 0.0:
-        y, S = equations.continuous_update(
-            theta, P, phi, z, n, config[STEP], config[RATE], config[NORMALISED], config[BOUND], 1.0, work
-        )
+        _continuously(state, config, phi, z, n)
     elif config[DIRECTIONAL] != 0.0:
-        y, S = equations.directional_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
+        _by_direction(state, config, phi, z, n, R, forgetting)
     else:
-        y, S = equations.discrete_update(theta, P, phi, z, n, forgetting, R, config[BOUND], 1.0, work)
-    _note(state, y, S)
+        _discretely(state, config, phi, z, n, R, forgetting)
 
 
 # Compiled when it is first called: few need it by itself.
@@ -243,10 +295,10 @@ class RecursiveLeastSquares:
         if start.size != self._n:
             raise ValueError(f"theta must have shape ({self._n},), got {start.shape}")
         P_0 = covariance_matrix("P", P, self._n)
-        noise_variance = positive("noise_variance", noise_variance)
+        noise_variance = moderate("noise_variance", noise_variance)
         if time_base == "continuous" and noise_variance != 1.0:
             raise ValueError("noise_variance must be 1 in the continuous law: scale z and phi instead")
-        self._config = configure(tuple(policies), positive("step", step), time_base, noise_variance, P_0)
+        self._config = configure(tuple(policies), moderate("step", step), time_base, noise_variance, P_0)
         for policy in policies:
             if not isinstance(policy, _OWN) or getattr(policy, "unit", "second") != "second":
                 raise ValueError(f"policies: {policy!r} needs a voltage's clock: see HysteresisRLS")
@@ -258,7 +310,7 @@ class RecursiveLeastSquares:
         Parameters
         ----------
         z : float
-            Output. A sample in which z or phi is NaN, infinite or beyond 1e100 is skipped.
+            Output. A sample in which z or phi is NaN, infinite, beyond 1e100 or no number is skipped.
         phi : array_like, shape (n,)
             Regressor.
 
@@ -270,13 +322,16 @@ class RecursiveLeastSquares:
         phi = array_1d("phi", phi, allow_nan=True)
         if phi.size != self._n:
             raise ValueError(f"phi must have shape ({self._n},), got {phi.shape}")
-        _update(self._state, self._config, phi, float(z), self._n)
+        _update(self._state, self._config, phi, number_or_nan(z), self._n)
 
     def reset_covariance(self) -> None:
         """Put P back to its initial value (covariance resetting on call)."""
         n = self._n
         self._state[HEAD + n : HEAD + n + n * n] = self._state[HEAD + n + n * n : HEAD + n + 2 * n * n]
         self._state[RESETS] += 1.0
+
+    def __copy__(self) -> Self:
+        return copy.deepcopy(self)
 
     @property
     def theta(self) -> FloatArray:
@@ -319,6 +374,8 @@ def covariance_matrix(name: str, value: Any, n: int) -> FloatArray:
         raise ValueError(f"{name} must have shape ({n}, {n}), got {matrix.shape}")
     if not np.all(np.isfinite(matrix)) or not np.array_equal(matrix, matrix.T):
         raise ValueError(f"{name} must be finite and symmetric: pass (P + P.T) / 2")
+    if np.trace(matrix) > LARGEST_START:
+        raise ValueError(f"{name} must have a trace of at most {LARGEST_START:g}, got {np.trace(matrix):g}")
     if np.linalg.eigvalsh(matrix)[0] <= 0.0:
         raise ValueError(f"{name} must be positive definite: its smallest eigenvalue is not above zero")
     return np.ascontiguousarray(matrix)

@@ -6,7 +6,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from piezoest._checks import FloatArray, positive
+from piezoest._checks import FloatArray, check_start, moderate
+from piezoest.equations import admissible
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
 from piezoest.estimators import rls_loops, rls_model, rls_profile, state_tables
@@ -116,14 +117,15 @@ class HysteresisRLS(Freezable):
         errors: bool = True,
         policies: tuple[Policy, ...] | None = None,
     ) -> None:
-        sample_rate = positive("sample_rate", sample_rate)
+        sample_rate = moderate("sample_rate", sample_rate)
         initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
         if not isinstance(initial, ColemanHodgdon | LinearGain):
             raise ValueError(f"initial_model must be a ColemanHodgdon or a LinearGain, got {initial!r}")
+        check_start(initial)
         if np.any(initial.theta == 0.0):
             raise ValueError(f"initial_model must have no parameter at zero, got {initial}")
         if memory is not None and memory != "period":
-            memory = positive("memory", memory)
+            memory = moderate("memory", memory)
         if not isinstance(offset, bool | None):
             raise ValueError(f"offset must be True, False or None, got {offset!r}")
         if time_base == "continuous" and memory == "period":
@@ -133,7 +135,7 @@ class HysteresisRLS(Freezable):
         settings.check_policies(policies, memory, time_base, initial)
         if offset is None:
             offset = memory == "period" and isinstance(initial, ColemanHodgdon)
-        cutoff = min(positive("cutoff", cutoff), 0.5 * sample_rate)
+        cutoff = min(moderate("cutoff", cutoff), 0.5 * sample_rate)
         if cutoff < LEAST_CUTOFF * sample_rate:
             raise ValueError(
                 f"cutoff must be at least {LEAST_CUTOFF:g} of the sample rate, got {cutoff:g} Hz"
@@ -153,14 +155,14 @@ class HysteresisRLS(Freezable):
             cutoff=cutoff,
             high_pass=high_pass,
             fraction=fraction,
-            noise=positive("noise", noise),
+            noise=moderate("noise", noise),
             per_second=time_base == "continuous",
         )
         # The continuous law's P is the covariance already.
         config[kernel.ERRORS] = bool(errors) and time_base == "discrete"
         settings.policy_settings(config, policies, sample_rate)
         settings.note_duties(config, errors)
-        P_0 = np.diag(np.full(n, positive("uncertainty", uncertainty) ** 2))
+        P_0 = np.diag(np.full(n, moderate("uncertainty", uncertainty) ** 2))
         forgetting = Forgetting(memory if isinstance(memory, float) else np.inf)
         law_config = law.configure((forgetting, *policies), 1.0 / sample_rate, time_base, 1.0, P_0)
         self._config = np.concatenate([config, law_config])
@@ -302,7 +304,7 @@ class HysteresisRLS(Freezable):
         mismatch is not in them. With the continuous time base, or ``errors=False``, they are those of `P`.
         """
         if self._config[kernel.ERRORS] == 0.0 or self._state[kernel.FRONT + law.UPDATES] == 0.0:
-            return np.sqrt(np.diag(self.P))
+            return np.sqrt(np.fmax(np.diag(self.P), 0.0))
         n = self._n
         C = self._state[kernel.ERROR : kernel.ERROR + n * n].reshape(n, n)
         pole = self._config[kernel.LOW_POLE]
@@ -334,8 +336,11 @@ class HysteresisRLS(Freezable):
             / self._scale
             * (1.0 / self._config[kernel.SCALE + 4])
         )
-        product = self.P @ phi
-        return product / (phi @ product + (1.0 / self._config[kernel.SCALE + 4]) ** 2)
+        with np.errstate(all="ignore"):
+            product = self.P @ phi
+            gain = product / (phi @ product + (1.0 / self._config[kernel.SCALE + 4]) ** 2)
+        # Where it overflows, the sample was not taken.
+        return gain if np.all(np.isfinite(gain)) else np.zeros(self._n)
 
     @property
     def status(self) -> Status:
@@ -356,7 +361,8 @@ class HysteresisRLS(Freezable):
     def _as_estimated_is_admissible(self) -> bool:
         theta = self.theta
         if isinstance(self._initial, LinearGain):
-            return bool(theta[0] * self._initial.gain > 0.0)
+            gain = float(theta[0])
+            return gain == admissible.kept_gain(gain, self._initial.gain, kernel.LEAST)
         return bool(rls_model.is_admissible(theta, self._terms))
 
     @property

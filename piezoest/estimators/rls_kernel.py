@@ -58,6 +58,8 @@ OFF_CENTRE, LEAST_STEP, CEILING = 0.3, 1e-6, 1e4
 # By how much the slopes up and down differ where nothing is off centre, relative to them; and the levels,
 # relative to half a swing.
 SLOPES_DIFFER, LEVELS_DIFFER = 3e-3, 2e-2
+# Beyond this trace the covariance of the estimate's error says nothing, and starts anew.
+LARGEST_ERROR = 1e60
 
 
 @unrolled
@@ -238,6 +240,9 @@ def _propagate_error(state: Any, config: Any, phi: Any, n: int, forgetting: Any,
     filtered = state[GAIN : GAIN + n]
     ratio, differenced = config[NOISE_RATIO], config[HYSTERETIC]
     least_squares.propagate_error(C, phi, gain, filtered, n, config[LOW_POLE], ratio, differenced, work)
+    if not (least_squares.is_covariance(C, n) and least_squares.trace(C, n) < LARGEST_ERROR):
+        for i in range(n * n):
+            C[i] = state[start + i]
 
 
 @register_jitable
@@ -404,10 +409,10 @@ def _take(state: Any, config: Any, clock: Any, line: Any, extra: Any, u: Any, x:
     if extra is not None:
         _adapt(state, config, extra, phi, z, n, R, forgetting, half, part)
         return
-    first = law_state[law.UPDATES] == 0.0
+    resets = law_state[law.RESETS] - (law_state[law.UPDATES] == 0.0)
     law.adapt_discretely(law_state, config[CONFIG:], phi, z, n, R, forgetting)
     if law_state[law.LAST] == law.UPDATED and config[ERRORS] != 0.0:
-        _propagate_error(state, config, phi, n, forgetting, first)
+        _propagate_error(state, config, phi, n, forgetting, law_state[law.RESETS] != resets)
 
 
 @register_jitable

@@ -40,6 +40,17 @@ def is_admissible(theta: Any, terms: Any) -> Any:
 
 
 @register_jitable
+def _start(theta: Any, terms: Any, n: Any) -> None:
+    """The start's model, or the nearest to it: where the estimate has none."""
+    for i in range(n):
+        theta[i] = 0.0
+    alpha, beta = terms[SCALE], terms[SCALE + 1]
+    theta[0], theta[1] = alpha, beta
+    area = alpha * beta
+    theta[2] = min(max(terms[SCALE + 2], (1.0 + MARGIN) * area), (2.0 - MARGIN) * area)
+
+
+@register_jitable
 def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
     """(alpha, beta, gamma, offset) or (gain, -, -, offset) into `model`: theta or its nearest point."""
     n = int(config[kernel.N])
@@ -49,7 +60,7 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
         theta[i] = state[head + i] * terms[SCALE + i]
     offset = terms[START_OFFSET]
     if config[kernel.HYSTERETIC] == 0.0:
-        gain = theta[0] if theta[0] * terms[GAIN] > 0.0 else kernel.LEAST * terms[GAIN]
+        gain = admissible.kept_gain(theta[0], terms[GAIN], kernel.LEAST)
         if n == 2:
             offset = theta[1] + state[kernel.X_CENTRE] - gain * state[kernel.U_CENTRE]
         model[0] = gain
@@ -60,9 +71,10 @@ def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
         for i in range(n):
             for j in range(n):
                 P[i * n + j] = state[head + n + i * n + j] * (terms[SCALE + i] * terms[SCALE + j])
-        admissible.project_admissible(
+        if not admissible.project_admissible(
             theta, P, n, kernel.LEAST * terms[SCALE], kernel.LEAST * terms[SCALE + 1], MARGIN
-        )
+        ):
+            _start(theta, terms, n)
     for i in range(3):
         model[i] = theta[i]
     if n == 4:

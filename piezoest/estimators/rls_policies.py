@@ -27,6 +27,8 @@ ENOUGH, EVERY = 2.0, 64.0
 ALIKE, UNLIKE = 2.0, 2.0
 # Of each parameter only the shape is taken up: the offset keeps what the stage's history gave it.
 ALPHA, OFFSET_SLOPE, SHAPE = 0, 3, 3
+# With an alpha below this, in parts of the start's, there is no offset to keep.
+LEAST_ALPHA = 1e-9
 
 
 @register_jitable
@@ -41,9 +43,9 @@ def project(theta: Any, P: Any, n: Any, scale: Any, least: Any, margin: Any, wor
     for i in range(n):
         for j in range(n):
             work[n + i * n + j] = P[i * n + j] * (scale[i] / scale[4]) * (scale[j] / scale[4])
-    admissible.project_admissible(work, work[n:], n, alpha_least, beta_least, margin)
-    for i in range(n):
-        theta[i] = work[i] * scale[4] / scale[i]
+    if admissible.project_admissible(work, work[n:], n, alpha_least, beta_least, margin):
+        for i in range(n):
+            theta[i] = work[i] * scale[4] / scale[i]
 
 
 @register_jitable
@@ -97,7 +99,7 @@ def remembered(extra: Any, n: Any, places: Any, tolerance: Any, size: Any, theta
     weight = 0.0
     if high > low:
         weight = min(max((size - low) / (high - low), 0.0), 1.0)
-    kept = theta[OFFSET_SLOPE] / theta[ALPHA] if n > SHAPE else 0.0
+    kept = theta[OFFSET_SLOPE] / theta[ALPHA] if n > SHAPE and abs(theta[ALPHA]) > LEAST_ALPHA else 0.0
     for i in range(min(n, SHAPE)):
         theta[i] = extra[below + 1 + i] + weight * (extra[above + 1 + i] - extra[below + 1 + i])
     if n > SHAPE:

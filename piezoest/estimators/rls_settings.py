@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from piezoest._checks import FloatArray, positive
+from piezoest._checks import FloatArray, moderate
 from piezoest.equations import filters
 from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators import rls_kernel as kernel
@@ -154,13 +154,15 @@ def front_end(
     """Configuration of the front end, without the policies'."""
     config = np.zeros(kernel.CONFIG)
     pole = float(filters.first_order_pole(cutoff, sample_rate))
+    if pole == 1.0:
+        raise ValueError(f"cutoff must be nearer to the sample rate of {sample_rate:g} Hz, got {cutoff:g} Hz")
     n = scale.size
     config[kernel.N] = n
     config[kernel.HYSTERETIC] = hysteretic
     config[kernel.LOW_POLE] = pole
     if high_pass is not None:
         config[kernel.HIGH_PASS] = 1.0
-        config[kernel.HIGH_POLE] = filters.first_order_pole(positive("high_pass", high_pass), sample_rate)
+        config[kernel.HIGH_POLE] = filters.first_order_pole(moderate("high_pass", high_pass), sample_rate)
     config[kernel.FRACTION] = fraction
     config[kernel.OFFSET] = offset
     config[kernel.LONGEST_GAP] = max(1, int(LONGEST_GAP * sample_rate))

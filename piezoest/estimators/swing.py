@@ -17,6 +17,8 @@ DIRECTION, FURTHEST, SINCE, USUAL, SIZE, TURNED, STATE = range(7)
 TURN = 0.1
 # No clock is slower than this, in samples.
 LONGEST = 1e6
+# Smaller swings [V] than this are none: their size may round to zero.
+SMALLEST = 1e-100
 
 
 @unrolled
@@ -57,4 +59,4 @@ def part_of_swing(swing: Any, travel: Any, otherwise: Any) -> Any:
     """
     if swing[USUAL] == 0.0:
         return (travel > 0.0) / max(otherwise, swing[SINCE])
-    return min(travel / swing[SIZE], 1.0)
+    return min(travel / max(swing[SIZE], SMALLEST), 1.0)

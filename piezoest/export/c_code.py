@@ -26,8 +26,16 @@ from piezoest.models import ColemanHodgdon, Model, PrandtlIshlinskii
 Precision = Literal["double", "float"]
 
 _FIXED = "it fixed: c(None, InverseCompensator(estimator.model))"
-# What rounding cannot tell apart is more in float.
-_FLOAT = {("piezoest.equations.bent_plays", "SAME"): 1e-5}
+# What rounding cannot tell apart is more in float, and what is beyond all measure is less.
+_FLOAT = {
+    ("piezoest.equations.bent_plays", "SAME"): 1e-5,
+    ("piezoest.equations.least_squares", "LARGEST"): 1e36,
+    ("piezoest.equations.least_squares", "TRACE_WEIGHT"): 1e18,
+    ("piezoest.equations.kalman", "LARGEST"): 1e36,
+    ("piezoest.equations.kalman", "LARGEST_TRACE"): 1e18,
+    ("piezoest.equations.admissible", "LARGEST"): 1e18,
+    ("piezoest.equations.admissible", "SMALLEST"): 1e-18,
+}
 
 
 @dataclass(frozen=True, slots=True)

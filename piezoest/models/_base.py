@@ -21,6 +21,23 @@ def _is_needed(field: Any) -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
+def finite_voltage(model: Model, u: FloatArray) -> FloatArray:
+    """Return the voltage that a model's inverse gave.
+
+    Raises
+    ------
+    ValueError
+        If it is not a number somewhere.
+    """
+    bad = np.flatnonzero(~np.isfinite(u))
+    if bad.size:
+        raise ValueError(
+            f"r is out of reach of {model}: {bad.size} samples of the voltage are not finite (first at "
+            f"index {bad[0]}): check the units of both"
+        )
+    return u
+
+
 class Model(ABC):
     """Base of the models of a stage: voltage u [V] to displacement x [µm].
 

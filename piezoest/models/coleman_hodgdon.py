@@ -11,7 +11,7 @@ from piezoest._checks import FloatArray, array_1d, finite
 from piezoest._jit import compiled
 from piezoest.equations import admissible
 from piezoest.equations import coleman_hodgdon as equations
-from piezoest.models._base import Model
+from piezoest.models._base import Model, finite_voltage
 from piezoest.signals import check_continuity
 
 
@@ -105,12 +105,20 @@ class ColemanHodgdon(Model):
         -------
         ColemanHodgdon
             This model itself if it is admissible.
+
+        Raises
+        ------
+        ValueError
+            If the parameters are so small or large that there is none.
         """
         if self.is_admissible:
             return self
         theta = self.theta
-        admissible.nearest_admissible(theta, np.empty(9), margin)
+        with np.errstate(all="ignore"):
+            known = admissible.nearest_admissible(theta, np.empty(9), margin)
         alpha, beta, gamma = (float(value) for value in theta)
+        if not (known and admissible.has_inverse(alpha, beta, gamma)):
+            raise ValueError(f"{self} has no admissible model near it: check the units of its parameters")
         return type(self)(alpha, beta, gamma, self.offset)
 
     def simulate(self, u: FloatArray, *, initial_state: float = 0.0, allow_jumps: bool = False) -> FloatArray:
@@ -163,7 +171,8 @@ class ColemanHodgdon(Model):
         Raises
         ------
         ValueError
-            If the model is not admissible, or r is not a finite, connected 1-D array.
+            If the model is not admissible, r is not a finite, connected 1-D array, or the voltage is too
+            large for a number.
         """
         if not self.is_admissible:
             raise ValueError(f"{self} is not admissible and has no inverse: use nearest_admissible()")
@@ -176,7 +185,7 @@ class ColemanHodgdon(Model):
             check_continuity(r, name="r")
         u = np.empty_like(r)
         _invert(r, finite("initial_state", initial_state), self.a, self.b, self.c, self.offset, u)
-        return u
+        return finite_voltage(self, u)
 
 
 @compiled()

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from piezoest._checks import FloatArray, array_1d
-from piezoest.models._base import Model
+from piezoest.equations import admissible
+from piezoest.models._base import Model, finite_voltage
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +40,8 @@ class LinearGain(Model):
 
     @property
     def is_admissible(self) -> bool:
-        """Whether the gain can be inverted: it is not zero."""
-        return self.gain != 0.0
+        """Whether the gain can be inverted: it is neither zero nor so small that the voltage overflows."""
+        return abs(self.gain) > admissible.SMALLEST
 
     def simulate(self, u: FloatArray) -> FloatArray:
         """Displacement for a voltage record.
@@ -71,8 +74,9 @@ class LinearGain(Model):
         Raises
         ------
         ValueError
-            If the gain is zero.
+            If the gain is zero or next to it, or the voltage is too large for a number.
         """
         if not self.is_admissible:
-            raise ValueError("gain is 0 µm/V, which has no inverse: identify the gain first")
-        return (array_1d("r", r) - self.offset) / self.gain
+            raise ValueError(f"gain is {self.gain:g} µm/V, which has no inverse: identify the gain first")
+        with np.errstate(over="ignore", invalid="ignore"):
+            return finite_voltage(self, (array_1d("r", r) - self.offset) / self.gain)

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, as_floats, finite, positive
 from piezoest._jit import compiled
+from piezoest.equations import admissible
 from piezoest.equations.bent_plays import bent_plays_step, prandtl_ishlinskii_voltage
 from piezoest.equations.creep import creep_to_come, unit_creep_step
-from piezoest.models._base import Model
+from piezoest.models._base import Model, finite_voltage
 from piezoest.models.creep import Creep
 
 # Rounding allowed for in a given initial state, in parts of the largest threshold.
@@ -215,7 +216,10 @@ class PrandtlIshlinskii(Model):
         negative_creep = float(np.minimum(self._creep_gains, 0.0).sum())
         lowest = np.vstack([np.zeros(self.weights.size + 1), np.cumsum(self.bend_weights, axis=0)])
         slopes = np.append(self.gain, self.weights) + lowest.min(axis=0)
-        return bool(np.all(np.cumsum(slopes) > 0.0) and negative_creep > -1.0)
+        with np.errstate(over="ignore", invalid="ignore"):
+            rising = np.cumsum(slopes)
+        within = np.all(rising > admissible.SMALLEST) and np.all(rising < admissible.LARGEST)
+        return bool(within and negative_creep > -1.0)
 
     def simulate(
         self,
@@ -280,7 +284,7 @@ class PrandtlIshlinskii(Model):
         ------
         ValueError
             If the model is not admissible, r is not a finite 1-D array, no input can leave
-            `initial_state` behind, or the sample rate is missing.
+            `initial_state` behind, the sample rate is missing, or the voltage is too large for a number.
         """
         if not self.is_admissible:
             slopes = self.gain + np.concatenate(([0.0], np.cumsum(self.weights)))
@@ -291,7 +295,7 @@ class PrandtlIshlinskii(Model):
         u = array_1d("r", r).copy()
         y, z = self._start(initial_state)
         _invert(u, y, z, self.gain, self.offset, *self._arrays(sample_rate))
-        return u
+        return finite_voltage(self, u)
 
     def _arrays(self, sample_rate: float | None) -> tuple[FloatArray, ...]:
         """Thresholds, weights, creep gains and decays, bends and their weights, all flat."""

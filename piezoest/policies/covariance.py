@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from piezoest._checks import finite, fraction, non_negative, positive
+from piezoest._checks import finite, fraction, moderate, positive
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +95,8 @@ class ChangeDetection:
     drift: float = 1.0
 
     def __post_init__(self) -> None:
-        positive("threshold", self.threshold)
-        non_negative("drift", self.drift)
+        moderate("threshold", self.threshold)
+        moderate("drift", self.drift, or_zero=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from piezoest._checks import fraction, positive
+from piezoest._checks import fraction, moderate, positive
 
 Unit = Literal["period", "second"]
 
@@ -16,7 +16,7 @@ SHORTEST, LEAST_WEIGHT = 1e-3, 1e-3
 
 
 def _check_memory(memory: float, unit: str = "period") -> None:
-    if positive("memory", memory) < SHORTEST and unit == "period":
+    if moderate("memory", memory) < SHORTEST and unit == "period":
         raise ValueError(f"memory must be at least {SHORTEST:g} periods, got {memory:g}")
     if unit not in ("period", "second"):
         raise ValueError(f"unit must be 'period' or 'second', got {unit!r}")
@@ -86,7 +86,7 @@ class RandomWalk:
 
     def __post_init__(self) -> None:
         _check_memory(self.memory)
-        positive("drift", self.drift)
+        moderate("drift", self.drift)
 
 
 @dataclass(frozen=True, slots=True)

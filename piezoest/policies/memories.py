@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from piezoest._checks import fraction, integer, positive
+from piezoest._checks import fraction, integer, moderate, positive
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,4 +38,4 @@ class AmplitudeMemory:
     def __post_init__(self) -> None:
         integer("places", self.places, 1, 1000)
         positive("tolerance", fraction("tolerance", self.tolerance, 0.0, 0.5))
-        positive("uncertainty", self.uncertainty)
+        moderate("uncertainty", self.uncertainty)

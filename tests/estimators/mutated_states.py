@@ -196,15 +196,8 @@ def fate(cls: Any, data: Any, as_saved: bool = False) -> str | None:
     try:
         check_use(estimator)
     except Exception as error:
-        return None if integrates_freely(data) else f"use: {error!r}"
+        return f"use: {error!r}"
     return None
-
-
-def integrates_freely(data: Any) -> bool:
-    """Whether it is the continuous law without normalisation, which is unstable from its constructor on."""
-    arguments = data["arguments"]
-    named = [policy["policy"] for policy in arguments.get("policies", ())]
-    return arguments.get("time_base") == "continuous" and "Normalisation" not in named
 
 
 def main(count: int, seed: int, first: int = 0) -> int:

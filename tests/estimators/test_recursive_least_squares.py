@@ -95,3 +95,17 @@ def test_wrong_arguments() -> None:
         pz.policies.policy_from_dict({"policy": "Magic"})
     with pytest.raises(ValueError, match="must be made of policies"):
         pz.RecursiveLeastSquares(2, policies=("forgetting",))  # type: ignore[arg-type]
+
+
+def test_odd_outputs_are_numbers_or_missing_and_a_copy_is_independent() -> None:
+    law = pz.RecursiveLeastSquares(2)
+    law.update(np.array([2.0]), [1.0, 0.5])  # type: ignore[arg-type]
+    known = law.theta
+    assert np.any(known != 0.0)
+    for z in ("2", 10**400, None, 2j, [1.0, 2.0]):
+        law.update(z, [1.0, 0.5])  # type: ignore[arg-type]
+        assert np.array_equal(law.theta, known)
+    other = copy.copy(law)
+    other.update(5.0, [1.0, 0.0])
+    assert np.array_equal(law.theta, known)
+    assert not np.array_equal(other.theta, known)

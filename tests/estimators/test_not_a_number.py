@@ -1,0 +1,440 @@
+"""Whatever comes in, nothing that is not a number comes out: of any estimator, with any settings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import piezoest as pz
+from piezoest import policies as p
+from piezoest.equations import admissible
+from piezoest.estimators import ekf_kernel, output_error_kernel, rls_kernel
+from piezoest.estimators import recursive_least_squares as law
+
+FloatArray = NDArray[np.float64]
+
+RATE = 1000.0
+LINE = pz.LinearGain(0.15)
+LOOP = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+SPECIAL = np.array(
+    [0.0, -0.0, 5e-324, -5e-324, 1e-310, 1e-160, -1e-20, 1.0, -33.0, 1e8, -9e8, 1e9, 1e155, -1e308,
+     np.nan, np.inf, -np.inf]
+)  # fmt: skip
+
+
+def rls(**options: Any) -> pz.HysteresisRLS:
+    return pz.HysteresisRLS(options.pop("rate", RATE), **options)
+
+
+MAKERS: dict[str, Any] = {
+    "rls": rls,
+    "rls-bare": lambda: rls(memory=0.4, policies=(), errors=False),
+    "rls-continuous": lambda: rls(time_base="continuous", policies=(p.NormBound(), p.DeadZone())),
+    "rls-continuous-bare": lambda: rls(time_base="continuous", policies=()),
+    "rls-line": lambda: rls(initial_model=LINE, offset=True),
+    "rls-line-bare": lambda: rls(initial_model=LINE, memory=0.4, policies=()),
+    "rls-all": lambda: rls(
+        policies=(
+            p.RandomWalk(),
+            p.OutlierRejection(1),
+            p.Projection(),
+            p.ChangeDetection(),
+            p.AmplitudeMemory(),
+        )
+    ),
+    "output-error": lambda: pz.OutputErrorRLS(RATE),
+    "ekf": lambda: pz.HysteresisEKF(RATE),
+    "ekf-free": lambda: pz.HysteresisEKF(RATE, project=False, offset=True),
+    "ekf-line": lambda: pz.HysteresisEKF(RATE, initial_model=LINE, offset=True),
+    "plays": lambda: pz.PrandtlIshlinskiiRLS(RATE),
+    "plays-line": lambda: pz.PrandtlIshlinskiiRLS(RATE, initial_model=LINE),
+    "filterpy-ekf": lambda: pz.FilterPyEKF(RATE),
+    "filterpy-ukf": lambda: pz.FilterPyUKF(RATE),
+}
+SLOW_MAKERS: dict[str, Any] = {
+    "horizon": lambda: pz.MovingHorizon(RATE, window=0.03, hop=0.01),
+    "horizon-line": lambda: pz.MovingHorizon(RATE, window=0.03, hop=0.01, initial_model=LINE, offset=True),
+    "batch": lambda: pz.BatchFit(RATE, offset=True),
+    "batch-line": lambda: pz.BatchFit(RATE, initial_model=LINE),
+}
+
+
+def wild(rng: np.random.Generator, count: int) -> FloatArray:
+    """Numbers from all over float64: any bits, all sizes a stage takes, special ones, a wave between them."""
+    bits = rng.integers(0, 2**64, count, dtype=np.uint64).view(np.float64)
+    sizes = rng.choice([-1.0, 1.0], count) * 10.0 ** rng.uniform(-30.0, 9.0, count)
+    wave = 33.0 * np.sin(np.arange(count) / rng.uniform(1.0, 50.0))
+    kinds = np.stack([bits, sizes, rng.choice(SPECIAL, count), wave, np.full(count, rng.choice(SPECIAL))])
+    share = rng.dirichlet(np.full(len(kinds), 0.4))
+    return np.asarray(kinds[rng.choice(len(kinds), count, p=share), np.arange(count)])
+
+
+def assert_numbers(estimator: Any) -> None:
+    """Nothing visible is NaN or infinite, and the model can be inverted."""
+    for name in ("theta", "P", "y", "S", "K", "standard_errors"):
+        values = np.asarray(getattr(estimator, name))
+        assert np.all(np.isfinite(values)), (name, values)
+    assert isinstance(estimator.status, pz.Status)
+    model = estimator.model
+    assert np.all(np.isfinite(model.theta)), model
+    assert np.isfinite(model.offset)
+    assert model.is_admissible, model
+
+
+def slope(model: Any) -> float:
+    return float(model.c if isinstance(model, pz.ColemanHodgdon) else model.gain)
+
+
+# ---------------------------------------------------------------- what was seen to fail
+
+
+def test_continuous_law_without_its_normalisation_stays_a_number() -> None:
+    estimator = rls(time_base="continuous", policies=(p.NormBound(), p.DeadZone()))
+    u = 33.0 * np.sin(np.arange(200) / 10.0)
+    estimator.run(u, LOOP.simulate(u, allow_jumps=True))
+    assert_numbers(estimator)
+    assert estimator.status.resets > 0
+    np.testing.assert_allclose(estimator.theta, LOOP.theta, rtol=1.0)
+
+
+def test_covariance_that_winds_up_starts_anew() -> None:
+    estimator = rls(memory=0.4, policies=())
+    u = 33.0 * np.sin(np.arange(2000) / 50.0)
+    x = LOOP.simulate(u)
+    estimator.run(u, x)
+    learnt = estimator.theta
+    estimator.run(np.full(300_000, u[-1]), np.full(300_000, x[-1]))
+    assert_numbers(estimator)
+    assert estimator.status.resets > 0
+    np.testing.assert_allclose(estimator.theta, learnt, rtol=1e-3)
+    more = rls(memory=0.4, policies=())
+    more._load(estimator._state)
+    more.run(u, x)
+    np.testing.assert_allclose(more.theta, LOOP.theta, rtol=0.05)
+
+
+@pytest.mark.parametrize("place", range(3))
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_projection_says_when_it_has_no_model(place: int, bad: float) -> None:
+    theta, P = LOOP.theta, np.eye(3).ravel()
+    assert admissible.project_admissible(theta, P, 3, 2e-4, 1.2e-3, 1e-3)
+    theta[place] = bad
+    with np.errstate(all="ignore"):
+        assert not admissible.project_admissible(theta, P, 3, 2e-4, 1.2e-3, 1e-3)
+        P[place] = np.nan
+        assert not admissible.project_admissible(np.array([-1.0, 0.1, 5.0]), P, 3, 2e-4, 1.2e-3, 1e-3)
+
+
+@pytest.mark.parametrize("kind", ["rls", "rls-line"])
+def test_theta_that_is_no_number_hands_out_the_start(kind: str) -> None:
+    estimator = MAKERS[kind]()
+    start = estimator.model
+    head = rls_kernel.FRONT + law.HEAD
+    estimator._state[head] = np.nan
+    assert slope(estimator.model) == pytest.approx(slope(start))
+
+
+@pytest.mark.parametrize(
+    "kind", ["rls-line", "rls-line-bare", "ekf-line", "plays-line", "rls", "ekf", "ekf-free"]
+)
+def test_a_sensor_that_reads_zero_leaves_a_gain(kind: str) -> None:
+    estimator = MAKERS[kind]()
+    start = slope(estimator.model)
+    u = 33.0 * np.sin(np.arange(20_000) / 50.0)
+    estimator.run(u, np.zeros(u.size))
+    assert slope(estimator.model) >= 1e-3 * start
+    assert_numbers(estimator)
+
+
+@pytest.mark.parametrize("kind", ["horizon", "horizon-line", "batch-line"])
+def test_a_sensor_that_reads_zero_leaves_a_gain_in_windows(kind: str) -> None:
+    estimator = SLOW_MAKERS[kind]()
+    start = slope(estimator.model)
+    u = 33.0 * np.sin(np.arange(100) / 5.0)
+    estimator.run(u, np.zeros(u.size))
+    assert slope(estimator.model) >= 0.99e-2 * start
+    assert_numbers(estimator)
+
+
+def test_negative_gain_keeps_its_sign_and_floor() -> None:
+    estimator = rls(initial_model=pz.LinearGain(-0.15))
+    u = 33.0 * np.sin(np.arange(20_000) / 50.0)
+    estimator.run(u, 0.15 * u)
+    assert slope(estimator.model) == pytest.approx(-0.0015)
+    assert estimator.status.projected
+
+
+def test_what_is_not_taken_is_counted_and_leaves_theta() -> None:
+    estimator = pz.RecursiveLeastSquares(2, theta=[1.0, 2.0], P=1.0, policies=())
+    estimator.update(3.0, [1.0, 1.0])
+    theta = estimator.theta
+    estimator.update(9e99, [9e99, -9e99])
+    assert np.array_equal(estimator.theta, theta)
+    assert np.array_equal(estimator.P, np.eye(2))
+    assert estimator.resets == 1
+    assert np.isfinite([estimator.y, estimator.S]).all()
+
+
+def test_directional_forgetting_has_no_direction_in_almost_nothing() -> None:
+    estimator = pz.RecursiveLeastSquares(
+        2, P=1.0, policies=(p.DirectionalForgetting(100.0, unit="second"), p.NormBound())
+    )
+    for size in (1e-100, 1e-159, 1e-162, 5e-324, 0.0, 1.0):
+        estimator.update(1.0, [size, -size])
+        assert np.all(np.isfinite(estimator.P)), size
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -1.0])
+def test_spoilt_covariance_starts_anew(bad: float) -> None:
+    u = 33.0 * np.sin(np.arange(300) / 10.0)
+    x = LOOP.simulate(u, allow_jumps=True)
+    first_variance = {
+        "rls": rls_kernel.FRONT + law.HEAD + 4,
+        "rls-bare": rls_kernel.FRONT + law.HEAD + 3,
+        "ekf": ekf_kernel.HEAD + 4,
+        "output-error": output_error_kernel.P,
+    }
+    for kind, place in first_variance.items():
+        estimator = MAKERS[kind]()
+        estimator.run(u, x)
+        theta, resets = estimator.theta, estimator.status.resets
+        estimator._state[place] = bad
+        estimator.step(u[-1] + 0.5, x[-1] + 0.05)
+        assert_numbers(estimator)
+        assert estimator.status.resets == resets + 1
+        np.testing.assert_allclose(estimator.theta[:3], theta[:3], rtol=0.5)
+
+
+# ---------------------------------------------------------------- all of float64
+
+NUMBERS = st.one_of(
+    st.floats(width=64), st.floats(-1e9, 1e9), st.sampled_from(SPECIAL.tolist()), st.floats(-50.0, 50.0)
+)
+
+
+@pytest.mark.parametrize("kind", sorted(MAKERS))
+@settings(max_examples=60)
+@given(samples=st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=30))
+def test_any_samples(kind: str, samples: list[tuple[float, float]]) -> None:
+    estimator = MAKERS[kind]()
+    for u, x in samples:
+        estimator.step(u, x)
+        assert_numbers(estimator)
+
+
+@pytest.mark.parametrize("kind", sorted(MAKERS))
+def test_any_bits(kind: str) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(20 if kind.startswith("filterpy") else 60):
+        estimator = MAKERS[kind]()
+        for _ in range(4):
+            count = int(rng.integers(1, 60))
+            estimator.run(wild(rng, count), wild(rng, count))
+            assert_numbers(estimator)
+
+
+@pytest.mark.parametrize("kind", sorted(SLOW_MAKERS))
+def test_any_bits_in_windows(kind: str) -> None:
+    rng = np.random.default_rng(2)
+    for _ in range(6):
+        estimator = SLOW_MAKERS[kind]()
+        estimator.run(wild(rng, 35), wild(rng, 35))
+        assert_numbers(estimator)
+
+
+@pytest.mark.parametrize("kind", ["rls-bare", "rls", "ekf"])
+def test_any_bits_in_a_bank(kind: str) -> None:
+    rng = np.random.default_rng(3)
+    bank = pz.EstimatorBank(MAKERS[kind](), 5)
+    singles = [MAKERS[kind]() for _ in range(5)]
+    for _ in range(20):
+        u, x = (wild(rng, 200).reshape(40, 5) for _ in range(2))
+        bank.run(u, x)
+        for c, single in enumerate(singles):
+            single.run(u[:, c], x[:, c])
+            assert_numbers(bank.channel(c))
+            assert np.array_equal(bank.channel(c).theta, single.theta)
+            assert bank.channel(c).status == single.status
+
+
+# ---------------------------------------------------------------- settings
+
+FORGETTINGS = (
+    p.RandomWalk(),
+    p.PeriodicForgetting(),
+    p.DirectionalForgetting(),
+    p.VariableForgetting(),
+    None,
+)
+OTHERS = (
+    p.NormBound(), p.Normalisation(), p.CovarianceResetting(1e-3), p.DeadZone(), p.OutlierRejection(3),
+    p.Projection(), p.ChangeDetection(), p.ExcitationGate(), p.AmplitudeMemory(),
+)  # fmt: skip
+
+
+def drawn(rng: np.random.Generator) -> pz.HysteresisRLS:
+    """`HysteresisRLS` of any legal settings; ValueError for others."""
+
+    def size(low: float, high: float) -> float:
+        return float(10.0 ** rng.uniform(low, high))
+
+    far = rng.random() < 0.5
+    a, ratio = size(-20.0, 20.0) if far else 0.02, rng.uniform(1.0, 2.1)
+    beta = size(-20.0, 20.0) if far else 0.12
+    loop = pz.ColemanHodgdon(a, beta, ratio * a * beta, rng.choice([0.0, size(-5.0, 9.0)]))
+    line = pz.LinearGain(float(rng.choice([-1.0, 1.0])) * size(-20.0, 20.0))
+    chosen = [policy for policy in (rng.choice(np.array(FORGETTINGS, dtype=object)),) if policy is not None]
+    chosen += [policy for policy in OTHERS if rng.random() < 0.3]
+    return pz.HysteresisRLS(
+        size(-3.0, 12.0),
+        initial_model=line if rng.random() < 0.3 else loop,
+        memory=("period", None, size(-12.0, 12.0))[rng.integers(3)],
+        uncertainty=size(-12.0, 12.0) if far else 0.5,
+        noise=size(-12.0, 12.0) if far else 1.5e-3,
+        offset=(True, False, None)[rng.integers(3)],
+        high_pass=None if rng.random() < 0.7 else size(-6.0, 6.0),
+        delay=float(rng.choice([0.0, 0.5, 2.3])),
+        time_base="continuous" if rng.random() < 0.3 else "discrete",
+        errors=bool(rng.random() < 0.7),
+        policies=tuple(chosen),
+    )
+
+
+def sweep(seed: int, count: int) -> None:
+    rng, made = np.random.default_rng(seed), 0
+    while made < count:
+        try:
+            estimator = drawn(rng)
+        except ValueError:
+            continue
+        made += 1
+        for _ in range(3):
+            samples = int(rng.integers(1, 80))
+            estimator.run(wild(rng, samples), wild(rng, samples))
+            assert_numbers(estimator)
+
+
+def test_any_settings() -> None:
+    sweep(0, 100)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_many_settings(seed: int) -> None:
+    sweep(seed, 3000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", sorted(MAKERS))
+def test_many_bits(kind: str) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(100 if kind.startswith("filterpy") else 3000):
+        estimator = MAKERS[kind]()
+        for _ in range(4):
+            count = int(rng.integers(1, 120))
+            estimator.run(wild(rng, count), wild(rng, count))
+            assert_numbers(estimator)
+
+
+@pytest.mark.parametrize("kind", [pz.HysteresisEKF, pz.OutputErrorRLS, pz.PrandtlIshlinskiiRLS])
+def test_extreme_starts_of_the_others(kind: Any) -> None:
+    rng, made = np.random.default_rng(6), 0
+    while made < 40:
+        a, beta = (10.0 ** rng.uniform(-20.0, 20.0) for _ in range(2))
+        try:
+            estimator = kind(
+                10.0 ** rng.uniform(-3.0, 12.0),
+                initial_model=pz.ColemanHodgdon(a, beta, rng.uniform(1.01, 1.99) * a * beta),
+                uncertainty=10.0 ** rng.uniform(-9.0, 9.0),
+                noise=10.0 ** rng.uniform(-9.0, 9.0),
+            )
+        except ValueError:
+            continue
+        made += 1
+        for _ in range(3):
+            estimator.run(wild(rng, 60), wild(rng, 60))
+            assert_numbers(estimator)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("uncertainty", 1e-200),
+        ("noise", 1e200),
+        ("memory", 1e-300),
+        ("cutoff", 1e-15),
+        ("sample_rate", 1e300),
+    ],
+)
+def test_settings_beyond_any_unit_are_refused(name: str, value: float) -> None:
+    options: Any = {"sample_rate": RATE, name: value}
+    with pytest.raises(ValueError, match=name):
+        pz.HysteresisRLS(**options)
+
+
+@pytest.mark.parametrize("kind", ["HysteresisRLS", "HysteresisEKF", "MovingHorizon", "BatchFit"])
+@pytest.mark.parametrize("gain", [5e-324, 1e-90, 1e90, 1e308])
+def test_starts_beyond_any_unit_are_refused(kind: str, gain: float) -> None:
+    with pytest.raises(ValueError, match="initial_model"):
+        getattr(pz, kind)(RATE, initial_model=pz.LinearGain(gain))
+
+
+# ---------------------------------------------------------------- models
+
+
+def voltages_of(model: Any, r: FloatArray, **options: Any) -> None:
+    try:
+        u = model.invert(r, **options)
+    except ValueError:
+        return
+    assert np.all(np.isfinite(u)), model
+
+
+@settings(max_examples=300)
+@given(gain=st.floats(), r=st.lists(st.floats(), min_size=1, max_size=5))
+def test_a_line_gives_a_voltage_or_an_error(gain: float, r: list[float]) -> None:
+    try:
+        model = pz.LinearGain(gain)
+    except ValueError:
+        return
+    voltages_of(model, np.array(r))
+    if model.is_admissible:
+        assert np.isfinite(1e9 / model.gain)
+
+
+SIZES = st.one_of(st.floats(), st.floats(1e-320, 1e300), st.floats(1e-3, 1e3))
+
+
+@settings(max_examples=300)
+@given(alpha=SIZES, beta=SIZES, ratio=st.floats(0.9, 2.1), r=st.lists(st.floats(), min_size=1, max_size=5))
+def test_a_loop_gives_a_voltage_or_an_error(alpha: float, beta: float, ratio: float, r: list[float]) -> None:
+    try:
+        model = pz.ColemanHodgdon(alpha, beta, alpha * beta * ratio)
+    except ValueError:
+        return
+    voltages_of(model, np.array(r), allow_jumps=True)
+    try:
+        nearest = model.nearest_admissible()
+    except ValueError:
+        return
+    assert nearest.is_admissible
+    voltages_of(nearest, np.array(r), allow_jumps=True)
+
+
+@settings(max_examples=300)
+@given(numbers=st.lists(SIZES, min_size=5, max_size=5), r=st.lists(st.floats(), min_size=1, max_size=5))
+def test_plays_give_a_voltage_or_an_error(numbers: list[float], r: list[float]) -> None:
+    gain, first, second, low, high = numbers
+    for bends, changes in (((), ()), ((low,), [[high, 0.0, 0.0]])):
+        try:
+            model = pz.PrandtlIshlinskii(
+                gain, [first, second], [low, high], bends=bends, bend_weights=changes
+            )
+        except ValueError:
+            continue
+        voltages_of(model, np.array(r))

@@ -1,0 +1,105 @@
+"""Generated controllers fed with any bits: what they learn and what they put out are numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import piezoest as pz
+from piezoest.equations import kalman
+from piezoest.equations import least_squares as ls
+from piezoest.export import c_code
+from piezoest.export.compiled import compiler
+
+FloatArray = NDArray[np.float64]
+
+FS = 1000.0
+START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+LINE = pz.LinearGain(0.15)
+LIMITS = pz.VoltageLimits(-60.0, 60.0)
+
+try:
+    compiler()
+except ValueError as absent:
+    pytest.skip(str(absent), allow_module_level=True)
+
+
+def pair(kind: str) -> Any:
+    estimators: dict[str, Any] = {
+        "rls": lambda: pz.HysteresisRLS(FS, initial_model=START),
+        "rls-bare": lambda: pz.HysteresisRLS(FS, initial_model=START, memory=0.4, policies=(), errors=False),
+        "rls-continuous": lambda: pz.HysteresisRLS(
+            FS, initial_model=START, time_base="continuous", policies=(pz.policies.NormBound(),)
+        ),
+        "rls-line": lambda: pz.HysteresisRLS(FS, initial_model=LINE, offset=True),
+        "ekf": lambda: pz.HysteresisEKF(FS, initial_model=START),
+        "ekf-free": lambda: pz.HysteresisEKF(FS, initial_model=START, offset=True, project=False),
+        "output-error": lambda: pz.OutputErrorRLS(FS, initial_model=START),
+    }
+    model = LINE if kind.endswith("line") else START
+    return estimators[kind](), pz.InverseCompensator(model, LIMITS)
+
+
+KINDS = ("rls", "rls-bare", "rls-continuous", "rls-line", "ekf", "ekf-free", "output-error")
+
+
+def wild(rng: np.random.Generator, count: int, precision: str) -> FloatArray:
+    """Any bits of that precision, all sizes, and a wave between them."""
+    if precision == "double":
+        bits = rng.integers(0, 2**64, count, dtype=np.uint64).view(np.float64)
+    else:
+        bits = rng.integers(0, 2**32, count, dtype=np.uint32).view(np.float32).astype(np.float64)
+    sizes = rng.choice([-1.0, 1.0], count) * 10.0 ** rng.uniform(-30.0, 9.0, count)
+    wave = 5.0 * np.sin(np.arange(count) / rng.uniform(1.0, 50.0))
+    special = rng.choice([0.0, -0.0, np.nan, np.inf, -np.inf, 1e-45, 3e38, 9e8], count)
+    kinds = np.stack([bits, sizes, wave, special])
+    share = rng.dirichlet(np.full(len(kinds), 0.4))
+    return np.asarray(kinds[rng.choice(len(kinds), count, p=share), np.arange(count)])
+
+
+def feed(kind: str, precision: Any, rounds: int) -> None:
+    estimator, compensator = pair(kind)
+    made = pz.export.CompiledController(pz.export.c(estimator, compensator, precision=precision))
+    rng = np.random.default_rng(0)
+    least = 0.9e-3 * (START.c if not kind.endswith("line") else LINE.gain)
+    for _ in range(rounds):
+        made.reset()
+        for _ in range(4):
+            count = int(rng.integers(1, 80))
+            with np.errstate(all="ignore"):
+                u = made.run(wild(rng, count, precision), wild(rng, count, precision))
+            assert np.all(np.isfinite(u))
+            assert np.all(np.abs(u) <= 60.0)
+            parameters = made.parameters
+            assert np.all(np.isfinite(parameters)), parameters
+            slope = parameters[0] if kind.endswith("line") else parameters[2] / parameters[0]
+            assert slope >= least, parameters
+
+
+@pytest.mark.parametrize("precision", ["double", "float"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_any_bits(kind: str, precision: str) -> None:
+    feed(kind, precision, 150)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("precision", ["double", "float"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_many_bits(kind: str, precision: str) -> None:
+    feed(kind, precision, 20_000)
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "value"),
+    [
+        ("least_squares", "LARGEST", ls.LARGEST),
+        ("least_squares", "TRACE_WEIGHT", ls.TRACE_WEIGHT),
+        ("kalman", "LARGEST", kalman.LARGEST),
+        ("kalman", "LARGEST_TRACE", kalman.LARGEST_TRACE),
+    ],
+)
+def test_what_is_beyond_all_measure_is_within_float(module: str, name: str, value: float) -> None:
+    assert c_code._FLOAT[f"piezoest.equations.{module}", name] < float(np.finfo(np.float32).max) < value
