@@ -7,12 +7,7 @@ stays within a fraction of half the recent swing around a straight line, linear 
 centre follow the models' own from one turn of the reference to the next, but only so fast. A model that has
 driven for two turns or more was not learnt in such a loop: the line then goes through what it makes of them.
 
-Flat memory within a larger array, from `start` on: how often the reference has turned since the last
-hand-over, whether one came soon after another, direction of travel, furthest reference in it, where the
-present leg began, recent swing, present reference [µm], reference at the last hand-over, whether it is time
-for the next; the voltage at the furthest reference and at the turn before, and the displacement that the
-model had for them; gain and centre of the line, samples at which the corridor was in the way,
-whether there was a sample, length of the last leg.
+Before two legs of the reference have told the models' gain, the corridor is wide, around the first model's line.
 """
 
 from __future__ import annotations
@@ -22,13 +17,19 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-(
-    TURNS, SOON, DIRECTION, FURTHEST, TURNED, SWING, PRESENT, HANDED, DUE,
-    U_FURTHEST, U_TURNED, X_FURTHEST, X_TURNED, GAIN, CENTRE, USED, BEGUN, LEG, SIZE,
-) = range(19)  # fmt: skip
+# Flat memory within a larger array: turns of the reference since the last hand-over, and whether one came soon
+# after another; direction of travel, furthest reference in it, and where the present leg began [µm];
+TURNS, SOON, DIRECTION, FURTHEST, TURNED = range(5)
+# recent swing of the reference, its last leg, its present value, that at the last hand-over [µm], and whether
+# it is time for the next;
+SWING, LEG, PRESENT, HANDED, DUE = range(5, 10)
+# voltage, and displacement that the model had for it, at the furthest reference and at the turn before;
+U_FURTHEST, U_TURNED, X_FURTHEST, X_TURNED = range(10, 14)
+# gain and centre of the line, samples at which the corridor was in the way, whether there was any, legs so far.
+GAIN, CENTRE, USED, BEGUN, LEGS, SIZE = range(14, 20)
 
-# Half-width, as a fraction of half the recent swing of the reference.
-WIDTH = 0.3
+# Half-width, as a fraction of half the recent swing of the reference; until two legs have told the gain.
+WIDTH, FIRST_WIDTH = 0.3, 3.0
 # A model takes effect from this fraction on of the last leg, or of the present one if that is longer.
 HAND_OVER = 1.0 / 64.0
 # A way back is a turn from this fraction of the recent swing on; a leg takes this fraction of itself from it.
@@ -71,7 +72,8 @@ def kept(path: Any, start: int, r: Any, wanted: Any) -> Any:
         return wanted
     gain = path[start + GAIN]
     line = (r - path[start + CENTRE]) / gain
-    half = np.abs(0.5 * WIDTH * recent / gain)
+    width = WIDTH if path[start + LEGS] >= 2.0 else FIRST_WIDTH
+    half = np.abs(0.5 * width * recent / gain)
     inside = min(max(wanted, line - half), line + half)
     path[start + USED] += inside != wanted
     return inside
@@ -102,11 +104,12 @@ def _turn(path: Any, start: int) -> None:
     leg = np.abs(path[start + FURTHEST] - path[start + TURNED])
     path[start + SWING] = max(leg, path[start + SWING] - FADES * leg)
     path[start + LEG] = leg
+    path[start + LEGS] += 1.0
     u_0, u_1 = path[start + U_TURNED], path[start + U_FURTHEST]
     x_0, x_1 = path[start + X_TURNED], path[start + X_FURTHEST]
     gain = path[start + GAIN]
     slope = (x_1 - x_0) / (u_1 - u_0) if u_1 != u_0 else gain
-    free = path[start + TURNS] >= 2.0 or path[start + SOON] == 0.0
+    free = path[start + TURNS] >= 2.0 or path[start + SOON] == 0.0 or path[start + LEGS] <= 2.0
     if slope * gain > 0.0 and np.abs(slope) < 1e9:
         ratio = slope / gain
         if not free:

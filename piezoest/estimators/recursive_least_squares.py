@@ -8,7 +8,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest._checks import FloatArray, array_1d, finite, integer, moderate
+from piezoest._checks import FloatArray, array_1d, finite, integer, moderate, number_or_nan
 from piezoest._jit import UNCOUNTED, compiled, unrolled
 from piezoest.equations import least_squares as equations
 from piezoest.policies import (

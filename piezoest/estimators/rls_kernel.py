@@ -158,7 +158,8 @@ def trust_in_levels(state: Any, config: Any) -> Any:
         return 0.0
     memory_squared = config[WALK_MEMORY] * config[WALK_MEMORY]
     half_swing = 0.5 * state[SWING + swing.SIZE]
-    by_slopes = SLOPES_DIFFER / (_decay(state, config) * LEVELS_DIFFER * half_swing + SLOWEST)
+    ratio = SLOPES_DIFFER / (_decay(state, config) * LEVELS_DIFFER * half_swing + SLOWEST)
+    by_slopes = ratio * ratio
     unknown = _noise_memory(state, config) + memory_squared * by_slopes * by_slopes
     return unknown / (unknown + memory_squared + SLOWEST)
 

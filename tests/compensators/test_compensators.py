@@ -185,7 +185,6 @@ NO_NUMBERS = [
     [1.0, 2.0],
     np.zeros(3),
     np.ma.masked,
-    np.ma.masked_all(1),
     None,
     b"2",
 ]
