@@ -211,7 +211,7 @@ def test_voltages_that_are_no_numbers_are_not_written(reference: Path) -> None:
     Path("model.json").write_text(json.dumps({"model": "LinearGain", "gain": 5e-324}))
     with np.errstate(all="ignore"):
         result = run("compensate", reference, "-p", "model.json", "-o", "voltage.csv")
-    refused(result, "voltage.csv is not written: voltage_V has", "no finite numbers")
+    refused(result, "5e-324", "has no inverse: its gain must not be zero, nor next to it")
     assert not Path("voltage.csv").exists()
 
 

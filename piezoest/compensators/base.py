@@ -138,7 +138,7 @@ class Compensator:
             raise ValueError(f"hand_over must be 'path' or 'place', got {hand_over!r}")
         self._config[BY_PATH] = hand_over == "path"
         if not self._accepts(model).is_admissible:
-            hint = "its gain must not be zero"
+            hint = "its gain must not be zero, nor next to it"
             if isinstance(model, ColemanHodgdon):
                 hint = "use nearest_admissible()"
             elif isinstance(model, PrandtlIshlinskii):

@@ -7,7 +7,7 @@ stays within a fraction of half the recent swing around a straight line, linear 
 centre follow the models' own from one turn of the reference to the next, but only so fast. A model that has
 driven for two turns or more was not learnt in such a loop: the line then goes through what it makes of them.
 
-Before two legs of the reference have told the models' gain, the corridor is wide, around the first model's line.
+Until two legs of the reference have told the models' gain, the corridor is wide, around the first one's line.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-# Flat memory within a larger array: turns of the reference since the last hand-over, and whether one came soon
-# after another; direction of travel, furthest reference in it, and where the present leg began [µm];
+# Flat memory within a larger array: turns of the reference since the last hand-over, whether one came soon
+# after another; direction of travel, furthest reference in it, where the present leg began [µm];
 TURNS, SOON, DIRECTION, FURTHEST, TURNED = range(5)
 # recent swing of the reference, its last leg, its present value, that at the last hand-over [µm], and whether
 # it is time for the next;
 SWING, LEG, PRESENT, HANDED, DUE = range(5, 10)
 # voltage, and displacement that the model had for it, at the furthest reference and at the turn before;
 U_FURTHEST, U_TURNED, X_FURTHEST, X_TURNED = range(10, 14)
-# gain and centre of the line, samples at which the corridor was in the way, whether there was any, legs so far.
+# gain and centre of the line, samples at which the corridor was in the way, whether any came, legs so far.
 GAIN, CENTRE, USED, BEGUN, LEGS, SIZE = range(14, 20)
 
 # Half-width, as a fraction of half the recent swing of the reference; until two legs have told the gain.
@@ -34,8 +34,8 @@ WIDTH, FIRST_WIDTH = 0.3, 3.0
 HAND_OVER = 1.0 / 64.0
 # A way back is a turn from this fraction of the recent swing on; a leg takes this fraction of itself from it.
 TURN, FADES = 0.02, 0.5
-# How much the line's gain may change in a turn, and its centre, as a fraction of half the swing.
-LARGEST_RATIO, LARGEST_SHIFT = 1.25, 0.25
+# Factor by which the line's gain may change in a turn; its centre by half the swing times that, less one.
+LARGEST_RATIO, FIRST_RATIO = 1.25, 4.0
 
 
 @register_jitable
@@ -109,16 +109,17 @@ def _turn(path: Any, start: int) -> None:
     x_0, x_1 = path[start + X_TURNED], path[start + X_FURTHEST]
     gain = path[start + GAIN]
     slope = (x_1 - x_0) / (u_1 - u_0) if u_1 != u_0 else gain
-    free = path[start + TURNS] >= 2.0 or path[start + SOON] == 0.0 or path[start + LEGS] <= 2.0
+    free = path[start + TURNS] >= 2.0 or path[start + SOON] == 0.0
+    most = LARGEST_RATIO if path[start + LEGS] > 2.0 else FIRST_RATIO
     if slope * gain > 0.0 and np.abs(slope) < 1e9:
         ratio = slope / gain
         if not free:
-            ratio = min(max(ratio, 1.0 / LARGEST_RATIO), LARGEST_RATIO)
+            ratio = min(max(ratio, 1.0 / most), most)
         gain = gain * ratio
     shift = 0.5 * (x_0 + x_1 - gain * (u_0 + u_1)) - path[start + CENTRE]
     if not free:
-        most = LARGEST_SHIFT * 0.5 * path[start + SWING]
-        shift = min(max(shift, -most), most)
+        furthest = (most - 1.0) * 0.5 * path[start + SWING]
+        shift = min(max(shift, -furthest), furthest)
     path[start + GAIN] = gain
     path[start + CENTRE] += shift
     path[start + TURNS] += 1.0

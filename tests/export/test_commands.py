@@ -61,8 +61,8 @@ def test_model_learns_on(model: Path, kind: str) -> None:
         ("arguments", None, "not what to_dict"),
         ("arguments", {"no": 1}, "not what to_dict"),
         ("arguments", {"sample_rate": 10**400}, "not what to_dict"),
-        ("arguments", "missing", "it lacks 'arguments'"),
-        ("state", "missing", "it lacks 'state'"),
+        ("arguments", "missing", "has no 'arguments'"),
+        ("state", "missing", "has no 'state'"),
         ("state", {}, "not what to_dict"),
     ],
 )
