@@ -9,7 +9,7 @@ import numpy as np
 
 from piezoest import supervisor_kernel as kernel
 from piezoest._checks import FloatArray, positive
-from piezoest.models import ColemanHodgdon, LinearGain, Model
+from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
 
 # A model that is right to this part of the displacement's range is good enough anyway.
 NEGLIGIBLE = 0.005
@@ -157,31 +157,31 @@ class Supervisor:
         unexplained, negligible = float(memory[kernel.UNEXPLAINED]), NEGLIGIBLE * float(memory[kernel.SPAN])
         limit = allowed = max(self._limit * unexplained, negligible)
         error = self._error(proposed)
-        reason = f"{proposed} misses {error:.3g} µm, a line {unexplained:.3g} µm"
         if self._held is not None:
             allowed = max(CLEARLY * allowed, negligible) if memory[kernel.KEPT] >= self._until else 0.0
-        elif memory[kernel.KEPT] >= self._until and (astray := float(memory[kernel.ASTRAY_BY])) > ASTRAY * limit:
-            return self._fall(self._line(present), f"the stage misses the reference by {astray:.3g} µm, {reason}")
+        elif memory[kernel.KEPT] >= self._until and memory[kernel.LEAST_MISS] > ASTRAY * limit:
+            missed = f"the stage misses the reference by {memory[kernel.LEAST_MISS]:.3g} µm"
+            return self._fall(self._line(present), f"{missed}, a line {unexplained:.3g} µm")
         if error <= allowed:
             if self._held is None and error > negligible and error > ABOUT * self._error(present):
                 # One lucky model after another is worse than any of them: the better one stays.
                 return present
             if self._held is not None:
-                self._note("resumed", reason)
+                self._note("resumed", _reason(proposed, error, unexplained))
                 self._until = memory[kernel.KEPT] + kernel.A_SWING
             self._good, self._held, self._kept = proposed, None, False
             return proposed
         if self._held is not None:
             return self._stay(present, limit)
-        if self._error(present) <= limit:
+        if memory[kernel.WORST_MISS] <= limit or self._error(present) <= limit:
             if not self._kept:
-                self._note("kept", reason)
+                self._note("kept", _reason(proposed, error, unexplained))
             self._kept = True
             return present
         good = self._good
         if good is None or self._error(good) > limit:
             good = self._line(present)
-        return self._fall(good, reason)
+        return self._fall(good, _reason(proposed, error, unexplained))
 
     def _without_a_line(self, present: Model, proposed: Model) -> Model:
         """The proposed model or the first one, if that is clearly better than the one in use."""
@@ -232,18 +232,26 @@ class Supervisor:
         elif isinstance(model, LinearGain):
             error = kernel.missed_by_loop(memory, points, 1.0, 0.0, model.gain, model.offset)
         else:
-            error = kernel.missed_but_for_mean(memory, points, _displacements(model, memory, points))
+            error = kernel.missed_but_for_mean(memory, points, self._displacements(model))
         return error if math.isfinite(error) else math.inf
+
+    def _displacements(self, model: Model) -> FloatArray:
+        """Displacements of a model of any kind at the points, which creep takes to come at an even rate."""
+        memory, points = self._memory, self._points
+        count, options = int(memory[kernel.COUNT]), {}
+        if isinstance(model, PrandtlIshlinskii) and model.creep is not None:
+            between = float(np.median(np.diff(points[kernel.SAMPLE, :count])))
+            options = {"sample_rate": self._sample_rate / max(between, 1.0)}
+        with np.errstate(all="ignore"):
+            y = model.simulate(kernel.voltages(memory, points), **options)  # type: ignore[attr-defined]
+        return np.ascontiguousarray(y[-count:], dtype=float)
 
     def _note(self, action: str, reason: str) -> None:
         self._events.append(Event(self._elapsed / self._sample_rate, action, reason))
 
 
-def _displacements(model: Model, memory: FloatArray, points: FloatArray) -> FloatArray:
-    """Displacements of a model of any kind at the points."""
-    with np.errstate(all="ignore"):
-        y = model.simulate(kernel.voltages(memory, points))  # type: ignore[attr-defined]
-    return np.ascontiguousarray(y[-int(memory[kernel.COUNT]) :], dtype=float)
+def _reason(model: Model, error: float, unexplained: float) -> str:
+    return f"{model} misses {error:.3g} µm, a line {unexplained:.3g} µm"
 
 
 def _line_of(model: Model) -> tuple[float, float]:

@@ -32,17 +32,17 @@ FROZEN = 0.02
 # the others, but for this many, counts like a root mean square so many times smaller.
 SPIKES, FAR_OFF, PEAK = 4, 5.0, 2.0
 
-# Rows of what is kept: voltage, displacement, reference, what kind of point it is, and a model's error.
-U, X, R, KIND, MISSED, ROWS = range(6)
+# Rows of what is kept: voltage, displacement, reference, sample, what kind of point it is, a model's error.
+U, X, R, SAMPLE, KIND, MISSED, ROWS = range(7)
 # Kinds: one to judge by; the voltage rests, the reference moves; the reading tells nothing; a spike.
 GOOD, RESTS, DEAD, SPIKE = range(4)
 # Flat memory. Of voltage and reference: direction, furthest value in it, last turning point, size of a
 # swing, largest of all. Then numbers of points, the last reading and the line.
 DIRECTION, FURTHEST, TURNED, SWING, LARGEST, OF_R = range(6)
 (
-    TURNS, FURTHEST_X, FURTHEST_R, COUNT, NEW, KEPT, LAST_U, LAST_R, THINNED, LOWEST, HIGHEST, READING, READ_AT,
-    STILL, KNOWN, BASE, GAIN, OFFSET, UNEXPLAINED, SPAN, ASTRAY_BY, PATH,
-) = range(2 * OF_R, 2 * OF_R + 22)  # fmt: skip
+    TURNS, FURTHEST_X, FURTHEST_R, SAMPLES, COUNT, NEW, KEPT, LAST_U, LAST_R, THINNED, LOWEST, HIGHEST, READING, READ_AT,
+    STILL, KNOWN, BASE, GAIN, OFFSET, UNEXPLAINED, SPAN, LEAST_MISS, WORST_MISS, PATH,
+) = range(2 * OF_R, 2 * OF_R + 24)  # fmt: skip
 # What a look at an interval says.
 NOT_YET, NOTHING_READ, NO_LINE, AT_REST, JUDGE = range(5)
 
@@ -90,7 +90,7 @@ def _keep(memory, points, u, x, r, readable):
         n = WINDOW
     step = memory[SWING] / A_SWING
     rests = memory[KEPT] > 0.0 and abs(u - memory[LAST_U]) < 0.25 * step
-    points[U, n], points[X, n], points[R, n] = u, x, r
+    points[U, n], points[X, n], points[R, n], points[SAMPLE, n] = u, x, r, memory[SAMPLES]
     points[KIND, n] = RESTS if rests else (GOOD if readable else DEAD)
     before = n - A_SWING // 4
     if before >= 0 and abs(u - points[U, before]) > 12.0 * step:
@@ -202,9 +202,9 @@ def _draw_line(memory, points, whole):
 
 
 @register_jitable
-def _astray(memory, points):
-    """Least root mean square of r - x [µm] in the quarters of the last swing; how many points rested there."""
-    n, least, resting = int(memory[COUNT]), np.inf, 0
+def _track(memory, points):
+    """Least and largest root mean square of r - x [µm] in the quarters of the last swing; points at rest."""
+    n, least, worst, resting = int(memory[COUNT]), np.inf, 0.0, 0
     for quarter in range(4):
         squares, count = 0.0, 0
         end = n - quarter * A_SWING // 4
@@ -215,14 +215,17 @@ def _astray(memory, points):
                 if points[KIND, j] < DEAD:
                     squares += (points[R, j] - points[X, j]) ** 2
                     count += 1
-        least = min(least, np.sqrt(squares / count) if count >= A_SWING // 8 else 0.0)
-    return least, resting
+        known = count >= A_SWING // 8
+        least = min(least, np.sqrt(squares / count) if known else 0.0)
+        worst = max(worst, np.sqrt(squares / count) if known else np.inf)
+    return least, worst, resting
 
 
 @compiled("i8(f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])", **UNCOUNTED)
 def look(memory: Any, points: Any, r: Any, u: Any, x: Any) -> int:
     """Take an interval; what can be said now."""
     for k in range(u.size):
+        memory[SAMPLES] += 1.0
         readable = _readable(memory, u[k], x[k])
         extreme, extreme_x, extreme_r = memory[FURTHEST], memory[FURTHEST_X], memory[FURTHEST_R]
         turned = _follow(memory, 0, u[k])
@@ -244,16 +247,15 @@ def look(memory: Any, points: Any, r: Any, u: Any, x: Any) -> int:
         return NOT_YET
     memory[NEW] = 0.0
     n, dead = int(memory[COUNT]), 0
-    least, resting = _astray(memory, points)
+    memory[LEAST_MISS], memory[WORST_MISS], resting = _track(memory, points)
     if resting >= 3 * A_SWING // 8:
         return AT_REST
     for j in range(max(0, n - A_SWING // 4), n):
         dead += points[KIND, j] == DEAD
     if 2 * dead > min(n, A_SWING // 4):
         return NOTHING_READ
-    if not _draw_line(memory, points, memory[TURNS] >= 2.0):
+    if memory[TURNS] == 0.0 or not _draw_line(memory, points, memory[TURNS] >= 2.0):
         return NO_LINE
-    memory[ASTRAY_BY] = least
     return JUDGE
 
 
