@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -11,8 +12,9 @@ from piezoest import supervisor_kernel as kernel
 from piezoest._checks import FloatArray, positive
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
 
-# A model that is right to this part of the displacement's range is good enough anyway.
-NEGLIGIBLE = 0.005
+# A model that is right to this part of the displacement's range is good enough anyway; the second number
+# before the first turn, for a line knows no loop then.
+NEGLIGIBLE, EARLY = 0.005, 0.1
 # A model in use that is about as good, to this part, makes room for the next one.
 ABOUT = 1.1
 # After a fall a model must be better than the line by this, or the two would take turns.
@@ -149,12 +151,13 @@ class Supervisor:
         """The model for the time until the next verdict."""
         memory = self._memory
         if found == kernel.NOTHING_READ:
-            return present if self._held is None else self._held
+            return self._held or self._good or present
         if found == kernel.AT_REST:
             return self._at_rest(present)
         if found == kernel.NO_LINE:
             return self._without_a_line(present, proposed)
-        unexplained, negligible = float(memory[kernel.UNEXPLAINED]), NEGLIGIBLE * float(memory[kernel.SPAN])
+        unexplained = float(memory[kernel.UNEXPLAINED])
+        negligible = (NEGLIGIBLE if memory[kernel.TURNS] > 0.0 else EARLY) * float(memory[kernel.SPAN])
         limit = allowed = max(self._limit * unexplained, negligible)
         error = self._error(proposed)
         if self._held is not None:
@@ -228,6 +231,8 @@ class Supervisor:
         if isinstance(model, ColemanHodgdon):
             a = model.alpha
             c = model.gamma / a
+            if not 1.0 / kernel.FAR < c / memory[kernel.BASE] < kernel.FAR:
+                return math.inf
             error = kernel.missed_by_loop(memory, points, a, c - model.beta, c, model.offset)
         elif isinstance(model, LinearGain):
             error = kernel.missed_by_loop(memory, points, 1.0, 0.0, model.gain, model.offset)
@@ -240,8 +245,9 @@ class Supervisor:
         memory, points = self._memory, self._points
         count, options = int(memory[kernel.COUNT]), {}
         if isinstance(model, PrandtlIshlinskii) and model.creep is not None:
-            between = float(np.median(np.diff(points[kernel.SAMPLE, :count])))
-            options = {"sample_rate": self._sample_rate / max(between, 1.0)}
+            samples = points[kernel.SAMPLE, :count:8].tolist()
+            between = sorted(later - sooner for sooner, later in itertools.pairwise(samples))
+            options = {"sample_rate": 8.0 * self._sample_rate / between[len(between) // 2] if between else None}
         with np.errstate(all="ignore"):
             y = model.simulate(kernel.voltages(memory, points), **options)  # type: ignore[attr-defined]
         return np.ascontiguousarray(y[-count:], dtype=float)

@@ -26,8 +26,8 @@ FIRST = 16
 # The line's gain must be known this well before anything is judged by it, and lie within this factor of
 # what was known before.
 GAIN_KNOWN, FAR = 0.05, 20.0
-# A displacement that changes by less than this part of the line's over a quarter of a swing stands still.
-FROZEN = 0.02
+# A displacement that changes by less than this part of the line's over so many points stands still.
+FROZEN, STRETCH = 0.04, 8
 # Errors that do not count, the largest of a window, if they are so many times the mean one; the largest of
 # the others, but for this many, counts like a root mean square so many times smaller.
 SPIKES, FAR_OFF, PEAK = 4, 5.0, 2.0
@@ -92,8 +92,8 @@ def _keep(memory, points, u, x, r, readable):
     rests = memory[KEPT] > 0.0 and abs(u - memory[LAST_U]) < 0.25 * step
     points[U, n], points[X, n], points[R, n], points[SAMPLE, n] = u, x, r, memory[SAMPLES]
     points[KIND, n] = RESTS if rests else (GOOD if readable else DEAD)
-    before = n - A_SWING // 4
-    if before >= 0 and abs(u - points[U, before]) > 12.0 * step:
+    before = n - STRETCH
+    if before >= 0 and abs(u - points[U, before]) > 0.75 * STRETCH * step:
         if abs(x - points[X, before]) < FROZEN * abs(memory[GAIN] * (u - points[U, before])):
             for j in range(before, n + 1):
                 points[KIND, j] = DEAD
@@ -247,6 +247,8 @@ def look(memory: Any, points: Any, r: Any, u: Any, x: Any) -> int:
         return NOT_YET
     memory[NEW] = 0.0
     n, dead = int(memory[COUNT]), 0
+    if memory[KNOWN] == 0.0 and points[KIND, n - 1] < DEAD:
+        memory[OFFSET] = points[X, n - 1] - memory[GAIN] * points[U, n - 1]
     memory[LEAST_MISS], memory[WORST_MISS], resting = _track(memory, points)
     if resting >= 3 * A_SWING // 8:
         return AT_REST
@@ -254,7 +256,7 @@ def look(memory: Any, points: Any, r: Any, u: Any, x: Any) -> int:
         dead += points[KIND, j] == DEAD
     if 2 * dead > min(n, A_SWING // 4):
         return NOTHING_READ
-    if memory[TURNS] == 0.0 or not _draw_line(memory, points, memory[TURNS] >= 2.0):
+    if not _draw_line(memory, points, memory[TURNS] >= 2.0):
         return NO_LINE
     return JUDGE
 

@@ -47,7 +47,7 @@ class Wild:
 
 
 def test_leaves_a_good_estimator_alone() -> None:
-    supervisor = pz.Supervisor(FS, window=0.2)
+    supervisor = pz.Supervisor(FS)
     plain, guarded = ring(pz.HysteresisRLS(FS)), ring(pz.HysteresisRLS(FS), supervisor)
     assert guarded.max_error(last_periods=2) == pytest.approx(plain.max_error(last_periods=2), rel=0.05)
     assert guarded.max_error_per_period()[1:].max() < 1.1 * plain.max_error_per_period()[1:].max()
@@ -55,14 +55,14 @@ def test_leaves_a_good_estimator_alone() -> None:
 
 
 def test_leaves_a_model_of_another_kind_alone() -> None:
-    supervisor = pz.Supervisor(FS, window=0.2)
+    supervisor = pz.Supervisor(FS)
     guarded = ring(pz.PrandtlIshlinskiiRLS(FS), supervisor)
     assert guarded.max_error(last_periods=2) < 0.02
     assert not supervisor.holding
 
 
 def test_keeps_nonsense_away_from_the_stage() -> None:
-    supervisor = pz.Supervisor(FS, window=0.2)
+    supervisor = pz.Supervisor(FS)
     plain, guarded = ring(Wild()), ring(Wild(), supervisor)
     linear = 0.55
     assert plain.max_error_per_period()[5:7].max() > 1.5 * linear
@@ -82,7 +82,7 @@ def test_falls_back_to_a_line_and_stays_there() -> None:
         def step(self, u: float, x: float | None) -> None:
             pass
 
-    supervisor = pz.Supervisor(FS, window=0.2)
+    supervisor = pz.Supervisor(FS)
     plain, guarded = ring(WrongLoop()), ring(WrongLoop(), supervisor)
     assert plain.max_error_per_period()[2:].min() > 0.55 * 1.2
     assert [event.action for event in supervisor.events] == ["fell back"]
@@ -95,7 +95,7 @@ def test_falls_back_to_a_line_and_stays_there() -> None:
 def test_short_memory_is_guarded() -> None:
     """Exponential forgetting over twenty samples runs away; with the guard it does not stay away."""
     estimators = [pz.HysteresisRLS(FS, memory=0.001) for _ in range(2)]
-    plain, guarded = ring(estimators[0]), ring(estimators[1], pz.Supervisor(FS, window=0.2))
+    plain, guarded = ring(estimators[0]), ring(estimators[1], pz.Supervisor(FS))
     assert guarded.rms_error() < 0.5 * plain.rms_error()
     assert np.median(guarded.max_error_per_period()[1:]) < 1.2 * 0.55
 
