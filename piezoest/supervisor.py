@@ -25,6 +25,8 @@ ASTRAY = 1.5
 AGAIN, AT_MOST = 16.0, 512.0
 # The line fallen back to stays until it misses so many times what is allowed.
 STALE = 1.05
+# A model whose slopes or offset are this much from those of the last one is judged at once.
+ANOTHER = 0.1
 # b in parts of c in a Coleman-Hodgdon model that stands for a line.
 NO_LOOP = 1e-9
 
@@ -145,7 +147,20 @@ class Supervisor:
             return chosen
         if self._held is not None:
             return self._held
+        if self._trusts and self._is_another(proposed):
+            return self._judge(int(self._memory[kernel.FOUND]), present, proposed)
         return proposed if self._trusts else present
+
+    def _is_another(self, proposed: Model) -> bool:
+        """Whether a model is so far from the one last judged that no verdict holds for it."""
+        good = self._good
+        if not (isinstance(proposed, ColemanHodgdon) and isinstance(good, ColemanHodgdon)):
+            return False
+        return (
+            abs(proposed.beta - good.beta) > ANOTHER * good.beta
+            or abs(proposed.gamma / proposed.alpha - good.gamma / good.alpha) > ANOTHER * good.gamma / good.alpha
+            or abs(proposed.offset - good.offset) > ANOTHER * self._memory[kernel.SPAN]
+        )
 
     def _judge(self, found: int, present: Model, proposed: Model) -> Model:
         """The model for the time until the next verdict."""
@@ -207,7 +222,9 @@ class Supervisor:
 
     def _stay(self, present: Model, limit: float) -> Model:
         """What was fallen back to; the line of now where that has become worse."""
-        held = self._held
+        held, good = self._held, self._good
+        if good is not None and held is not good and self._error(good) <= CLEARLY * limit:
+            held = self._held = good
         if held is None or self._memory[kernel.KNOWN] == 0.0 or self._error(held) > STALE * limit:
             held = self._held = self._line(present)
         return held

@@ -41,8 +41,8 @@ GOOD, RESTS, DEAD, SPIKE = range(4)
 DIRECTION, FURTHEST, TURNED, SWING, LARGEST, OF_R = range(6)
 (
     TURNS, FURTHEST_X, FURTHEST_R, SAMPLES, COUNT, NEW, KEPT, LAST_U, LAST_R, THINNED, LOWEST, HIGHEST, READING, READ_AT,
-    STILL, KNOWN, BASE, GAIN, OFFSET, UNEXPLAINED, SPAN, LEAST_MISS, WORST_MISS, PATH,
-) = range(2 * OF_R, 2 * OF_R + 24)  # fmt: skip
+    STILL, KNOWN, BASE, GAIN, OFFSET, UNEXPLAINED, SPAN, LEAST_MISS, WORST_MISS, FOUND, PATH,
+) = range(2 * OF_R, 2 * OF_R + 25)  # fmt: skip
 # What a look at an interval says.
 NOT_YET, NOTHING_READ, NO_LINE, AT_REST, JUDGE = range(5)
 
@@ -179,7 +179,7 @@ def _leave_out_spikes(memory, points, usual):
 
 @register_jitable
 def _draw_line(memory, points, whole):
-    """Find the line, and what it misses; False if that cannot be told, or makes no sense."""
+    """Find the line, and what it misses, unless that cannot be told yet or makes no sense."""
     n, count, low, high = int(memory[COUNT]), 0, np.inf, -np.inf
     for j in range(max(0, n - WINDOW), n):
         if points[KIND, j] == SPIKE:
@@ -188,17 +188,19 @@ def _draw_line(memory, points, whole):
             count += 1
             low, high = min(low, points[X, j]), max(high, points[X, j])
     if count < 4:
-        return False
+        return NO_LINE
     gain, offset, doubt, usual = _fit(memory, points, whole)
     if _leave_out_spikes(memory, points, usual):
         gain, offset, doubt, usual = _fit(memory, points, whole)
-    if not (doubt < GAIN_KNOWN and 1.0 / FAR < gain / memory[BASE] < FAR):
-        return False
+    if not doubt < GAIN_KNOWN:
+        return NO_LINE
+    if not 1.0 / FAR < gain / memory[BASE] < FAR:
+        return NOTHING_READ
     if whole and memory[KNOWN] == 0.0:
         memory[KNOWN], memory[BASE] = 1.0, gain
     memory[GAIN], memory[OFFSET] = gain, offset
     memory[UNEXPLAINED], memory[SPAN] = _size(memory, points), min(high - low, abs(gain) * 2.0 * memory[SWING])
-    return True
+    return JUDGE
 
 
 @register_jitable
@@ -219,6 +221,22 @@ def _track(memory, points):
         least = min(least, np.sqrt(squares / count) if known else 0.0)
         worst = max(worst, np.sqrt(squares / count) if known else np.inf)
     return least, worst, resting
+
+
+@register_jitable
+def _what_can_be_said(memory, points):
+    """What a look at the points says, once it is time for a verdict."""
+    n, dead = int(memory[COUNT]), 0
+    if memory[KNOWN] == 0.0 and points[KIND, n - 1] < DEAD:
+        memory[OFFSET] = points[X, n - 1] - memory[GAIN] * points[U, n - 1]
+    memory[LEAST_MISS], memory[WORST_MISS], resting = _track(memory, points)
+    if resting >= 3 * A_SWING // 8:
+        return AT_REST
+    for j in range(max(0, n - A_SWING // 4), n):
+        dead += points[KIND, j] == DEAD
+    if 2 * dead > min(n, A_SWING // 4):
+        return NOTHING_READ
+    return _draw_line(memory, points, memory[TURNS] >= 2.0)
 
 
 @compiled("i8(f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])", **UNCOUNTED)
@@ -246,19 +264,8 @@ def look(memory: Any, points: Any, r: Any, u: Any, x: Any) -> int:
     if memory[NEW] < A_VERDICT:
         return NOT_YET
     memory[NEW] = 0.0
-    n, dead = int(memory[COUNT]), 0
-    if memory[KNOWN] == 0.0 and points[KIND, n - 1] < DEAD:
-        memory[OFFSET] = points[X, n - 1] - memory[GAIN] * points[U, n - 1]
-    memory[LEAST_MISS], memory[WORST_MISS], resting = _track(memory, points)
-    if resting >= 3 * A_SWING // 8:
-        return AT_REST
-    for j in range(max(0, n - A_SWING // 4), n):
-        dead += points[KIND, j] == DEAD
-    if 2 * dead > min(n, A_SWING // 4):
-        return NOTHING_READ
-    if not _draw_line(memory, points, memory[TURNS] >= 2.0):
-        return NO_LINE
-    return JUDGE
+    memory[FOUND] = _what_can_be_said(memory, points)
+    return int(memory[FOUND])
 
 
 @compiled("f8(f8[::1], f8[:, ::1], f8, f8, f8, f8)", **UNCOUNTED)
