@@ -21,7 +21,7 @@ WINDOW, HALF_LIFE, ROOM = 160, 64, 192
 # A way back of this part of a swing is a turn, and a swing fades by this part from one to the next; it
 # never counts for less than this part of the largest, or noise would.
 TURN, FADES, LEAST = 1.0 / 32.0, 0.2, 0.01
-# Until the voltage has turned twice, the line goes through the mean of so many points.
+# A line takes so many points, and goes through the mean of the first ones until the voltage has turned twice.
 FIRST = 16
 # The line's gain must be known this well before anything is judged by it, and lie within this factor of
 # what was known before.
@@ -187,7 +187,7 @@ def _draw_line(memory, points, whole):
         if points[KIND, j] == GOOD:
             count += 1
             low, high = min(low, points[X, j]), max(high, points[X, j])
-    if count < 4:
+    if count < FIRST:
         return NO_LINE
     gain, offset, doubt, usual = _fit(memory, points, whole)
     if _leave_out_spikes(memory, points, usual):
