@@ -158,7 +158,8 @@ class Supervisor:
             return False
         return (
             abs(proposed.beta - good.beta) > ANOTHER * good.beta
-            or abs(proposed.gamma / proposed.alpha - good.gamma / good.alpha) > ANOTHER * good.gamma / good.alpha
+            or abs(proposed.gamma / proposed.alpha - good.gamma / good.alpha)
+            > ANOTHER * good.gamma / good.alpha
             or abs(proposed.offset - good.offset) > ANOTHER * self._memory[kernel.SPAN]
         )
 
@@ -264,7 +265,9 @@ class Supervisor:
         if isinstance(model, PrandtlIshlinskii) and model.creep is not None:
             samples = points[kernel.SAMPLE, :count:8].tolist()
             between = sorted(later - sooner for sooner, later in itertools.pairwise(samples))
-            options = {"sample_rate": 8.0 * self._sample_rate / between[len(between) // 2] if between else None}
+            options = {
+                "sample_rate": 8.0 * self._sample_rate / between[len(between) // 2] if between else None
+            }
         with np.errstate(all="ignore"):
             y = model.simulate(kernel.voltages(memory, points), **options)  # type: ignore[attr-defined]
         return np.ascontiguousarray(y[-count:], dtype=float)

@@ -199,7 +199,10 @@ def _draw_line(memory, points, whole):
     if whole and memory[KNOWN] == 0.0:
         memory[KNOWN], memory[BASE] = 1.0, gain
     memory[GAIN], memory[OFFSET] = gain, offset
-    memory[UNEXPLAINED], memory[SPAN] = _size(memory, points), min(high - low, abs(gain) * 2.0 * memory[SWING])
+    memory[UNEXPLAINED], memory[SPAN] = (
+        _size(memory, points),
+        min(high - low, abs(gain) * 2.0 * memory[SWING]),
+    )
     return JUDGE
 
 
