@@ -40,15 +40,16 @@ GOOD, RESTS, DEAD, SPIKE = range(4)
 # swing, largest of all. Then numbers of points, the last reading and the line.
 DIRECTION, FURTHEST, TURNED, SWING, LARGEST, OF_R = range(6)
 (
-    TURNS, FURTHEST_X, FURTHEST_R, SAMPLES, COUNT, NEW, KEPT, LAST_U, LAST_R, THINNED, LOWEST, HIGHEST, READING, READ_AT,
-    STILL, KNOWN, BASE, GAIN, OFFSET, UNEXPLAINED, SPAN, LEAST_MISS, WORST_MISS, FOUND, PATH,
+    TURNS, FURTHEST_X, FURTHEST_R, SAMPLES, COUNT, NEW, KEPT, LAST_U, LAST_R, THINNED, LOWEST, HIGHEST,
+    READING, READ_AT, STILL, KNOWN, BASE, GAIN, OFFSET, UNEXPLAINED, SPAN, LEAST_MISS, WORST_MISS, FOUND,
+    PATH,
 ) = range(2 * OF_R, 2 * OF_R + 25)  # fmt: skip
 # What a look at an interval says.
 NOT_YET, NOTHING_READ, NO_LINE, AT_REST, JUDGE = range(5)
 
 
 @register_jitable
-def _follow(memory, at, value):
+def _follow(memory: Any, at: Any, value: Any) -> bool:
     """Follow voltage or reference; whether it has turned."""
     if memory[KEPT] == 0.0:
         memory[at + FURTHEST] = memory[at + TURNED] = value
@@ -67,7 +68,7 @@ def _follow(memory, at, value):
 
 
 @register_jitable
-def _readable(memory, u, x):
+def _readable(memory: Any, u: Any, x: Any) -> bool:
     """Whether a reading is no repetition of the last: a saturated or dead sensor tells nothing."""
     if x != memory[READING]:
         memory[READING], memory[READ_AT], memory[STILL] = x, u, 0.0
@@ -77,7 +78,7 @@ def _readable(memory, u, x):
 
 
 @register_jitable
-def _keep(memory, points, u, x, r, readable):
+def _keep(memory: Any, points: Any, u: Any, x: Any, r: Any, readable: Any) -> None:
     """Keep a point; the oldest go into the recent path of the voltage."""
     n = int(memory[COUNT])
     if n == ROOM:
@@ -93,17 +94,17 @@ def _keep(memory, points, u, x, r, readable):
     points[U, n], points[X, n], points[R, n], points[SAMPLE, n] = u, x, r, memory[SAMPLES]
     points[KIND, n] = RESTS if rests else (GOOD if readable else DEAD)
     before = n - STRETCH
-    if before >= 0 and abs(u - points[U, before]) > 0.75 * STRETCH * step:
-        if abs(x - points[X, before]) < FROZEN * abs(memory[GAIN] * (u - points[U, before])):
-            for j in range(before, n + 1):
-                points[KIND, j] = DEAD
+    way = abs(u - points[U, before]) if before >= 0 else 0.0
+    if way > 0.75 * STRETCH * step and abs(x - points[X, before]) < FROZEN * abs(memory[GAIN]) * way:
+        for j in range(before, n + 1):
+            points[KIND, j] = DEAD
     memory[COUNT], memory[LAST_U], memory[LAST_R] = n + 1, u, r
     memory[NEW] += 1.0
     memory[KEPT] += 1.0
 
 
 @register_jitable
-def _thin(memory, points):
+def _thin(memory: Any, points: Any) -> None:
     """Where a swing has become twice as large, points are kept as far apart as they now are."""
     n, kept = int(memory[COUNT]), 1
     for j in range(1, n):
@@ -119,8 +120,8 @@ def _thin(memory, points):
 
 
 @register_jitable
-def _size(memory, points):
-    """Root mean square of the errors [µm], the newest counting more, or a part of the largest if that is more."""
+def _size(memory: Any, points: Any) -> float:
+    """Root mean square of the errors [µm], the newest count more; a part of the largest if more."""
     n = int(memory[COUNT])
     first, second, third, squares, weights, weight = 0.0, 0.0, 0.0, 0.0, 0.0, 1.0
     for j in range(n - 1, max(0, n - WINDOW) - 1, -1):
@@ -136,7 +137,7 @@ def _size(memory, points):
 
 
 @register_jitable
-def _fit(memory, points, whole):
+def _fit(memory: Any, points: Any, whole: Any) -> Any:
     """Gain and centre (u, x) of the best line and how well the gain is known; errors go to the points."""
     n = int(memory[COUNT])
     start = max(0, n - WINDOW)
@@ -163,7 +164,7 @@ def _fit(memory, points, whole):
 
 
 @register_jitable
-def _leave_out_spikes(memory, points, usual):
+def _leave_out_spikes(memory: Any, points: Any, usual: Any) -> bool:
     """Mark the few errors that are far off; False if there are none, or too many for spikes."""
     found, n = 0, int(memory[COUNT])
     for j in range(max(0, n - WINDOW), n):
@@ -178,7 +179,7 @@ def _leave_out_spikes(memory, points, usual):
 
 
 @register_jitable
-def _draw_line(memory, points, whole):
+def _draw_line(memory: Any, points: Any, whole: Any) -> int:
     """Find the line, and what it misses, unless that cannot be told yet or makes no sense."""
     n, count, low, high = int(memory[COUNT]), 0, np.inf, -np.inf
     for j in range(max(0, n - WINDOW), n):
@@ -207,7 +208,7 @@ def _draw_line(memory, points, whole):
 
 
 @register_jitable
-def _track(memory, points):
+def _track(memory: Any, points: Any) -> Any:
     """Least and largest root mean square of r - x [µm] in the quarters of the last swing; points at rest."""
     n, least, worst, resting = int(memory[COUNT]), np.inf, 0.0, 0
     for quarter in range(4):
@@ -227,7 +228,7 @@ def _track(memory, points):
 
 
 @register_jitable
-def _what_can_be_said(memory, points):
+def _what_can_be_said(memory: Any, points: Any) -> int:
     """What a look at the points says, once it is time for a verdict."""
     n, dead = int(memory[COUNT]), 0
     if memory[KNOWN] == 0.0 and points[KIND, n - 1] < DEAD:

@@ -106,7 +106,7 @@ LINE = 0.7
 
 
 class NoisyStage:
-    """A stage whose reading has noise, and perhaps a fault: a function of time [s], reading and noise [µm]."""
+    """A stage with a noisy reading, and perhaps a fault: a function of time [s], reading and noise [µm]."""
 
     sample_rate = FS
 
