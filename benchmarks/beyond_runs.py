@@ -211,7 +211,7 @@ def faults(job: Job) -> Numbers:
             compensator=pz.InverseCompensator(START, LIMITS, transfer_samples=100, sample_rate=FAULT_RATE),
             estimator=estimator,
             update_interval=40,
-            supervisor=pz.Supervisor(FAULT_RATE, window=0.2) if guard else None,
+            supervisor=pz.Supervisor(FAULT_RATE) if guard else None,
         )
         sound = (
             np.all(np.isfinite(record.theta))

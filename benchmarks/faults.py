@@ -62,7 +62,7 @@ def one(case: Case) -> dict[str, Any]:
     reference = fault.reference(pz.signals.triangle(AMPLITUDE, FREQUENCY, PERIODS, SAMPLE_RATE))
     learner = candidate(case.estimator)(SAMPLE_RATE, START)
     transfer = round(TRANSFER * SAMPLE_RATE)
-    supervisor = pz.Supervisor(SAMPLE_RATE, window=1.0 / FREQUENCY) if case.guard else None
+    supervisor = pz.Supervisor(SAMPLE_RATE) if case.guard else None
     row: dict[str, Any] = {"fault": case.fault, "estimator": case.estimator, "guard": case.guard}
     try:
         record = pz.track(

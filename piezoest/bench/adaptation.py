@@ -142,7 +142,7 @@ def follow(
         compensator=compensator,
         estimator=watch(made),
         update_interval=case.update_interval,
-        supervisor=Supervisor(rate, window=case.period / rate) if guard else None,
+        supervisor=Supervisor(rate) if guard else None,
     )
 
 

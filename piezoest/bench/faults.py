@@ -152,7 +152,7 @@ FAULTS: dict[str, Fault] = {
         Fault(
             "voltage-sign", "The amplifier is wired the wrong way round.",
             "An admissible model rises with the voltage, so none fits, and the voltage goes to its "
-            "limits. The guard falls back to a line, which may fall.",
+            "limits. The guard keeps the model in use: it turns no gain round.",
             _around(WeakAmplifier, limit=100.0, factor=-1.0),
         ),
         Fault(

@@ -153,7 +153,7 @@ def ring(name: str, estimator: type, *, guard: bool = False) -> tuple[pz.Trackin
         compensator=pz.InverseCompensator(START, LIMITS, transfer_samples=100, sample_rate=FS),
         estimator=learner,
         update_interval=20,
-        supervisor=pz.Supervisor(FS, window=0.2) if guard else None,
+        supervisor=pz.Supervisor(FS) if guard else None,
     )
     return record, learner
 
