@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, integer
-from piezoest.estimators.base import EstimatorBase
+from piezoest.estimators.base import NONE, EstimatorBase
 from piezoest.signals import check_continuity
 from piezoest.supervisor import Supervisor
 
@@ -182,7 +182,7 @@ def track(
     update_interval: int = 50,
     sample_rate: float | None = None,
     allow_jumps: bool = False,
-    supervisor: Supervisor | None = None,
+    supervisor: Supervisor | bool | None = True,
 ) -> TrackingRecord:
     """Let a stage follow a reference, and the compensator learn from the estimator.
 
@@ -204,9 +204,10 @@ def track(
     allow_jumps : bool
         Take a reference with unfiltered steps instead of refusing it; without a slew-rate limit
         they reach the voltage.
-    supervisor : Supervisor, optional
+    supervisor : Supervisor or bool
         Guard that falls back to the last good model, or to linear feed-forward, when the
-        compensated error is worse than linear feed-forward's.
+        compensated error is worse than linear feed-forward's. True (default) makes one; False or
+        None is none.
 
     Returns
     -------
@@ -215,7 +216,8 @@ def track(
     Raises
     ------
     ValueError
-        If r is not a finite 1-D array or jumps, or no sample rate is known or two of them differ.
+        If r is not a finite 1-D array or jumps, no sample rate is known or two of them differ, or
+        supervisor is none of these.
 
     Notes
     -----
@@ -227,31 +229,43 @@ def track(
     if not allow_jumps:
         check_continuity(reference, rate, "r")
     interval = integer("update_interval", update_interval, 1)
+    guard = _guard(supervisor, rate)
     period = getattr(r, "period", None)
     period = None if period is None else round(period)
     N = reference.size
     voltage, measured, displacement = np.empty(N), np.empty(N), np.empty(N)
     history: list[FloatArray] = []
-    names = ()
+    known, theta, names = None, NONE, ()
     for start in range(0, N, interval):
         part = slice(start, min(start + interval, N))
         _turn(part, stage, compensator, reference, voltage, measured, displacement)
         if estimator is not None:
             present = compensator.model
-            history.append(present.theta)
-            names = present.parameter_names
+            if present is not known:
+                known, theta, names = present, present.theta, present.parameter_names
+            history.append(theta)
             _feed(estimator, voltage[part], measured[part])
-            if not getattr(compensator, "hand_over_due", True):
-                continue
-            model = estimator.model
-            if supervisor is not None:
-                parts = reference[part], voltage[part], measured[part]
-                model = supervisor.review(*parts, compensator.model, model)
-            compensator.model = model
+            due = bool(getattr(compensator, "hand_over_due", True))
+            model = estimator.model if due else present
+            if guard is not None:
+                model = guard.review(reference[part], voltage[part], measured[part], present, model)
+            if due and model is not present:
+                compensator.model = model
     parameters = _of_one_kind(history) if history else np.empty((-(-N // interval), 0))
     return TrackingRecord(
         reference, voltage, measured, displacement, parameters, names, rate, period, interval
     )
+
+
+def _guard(supervisor: Any, rate: float) -> Supervisor | None:
+    """The guard that was asked for."""
+    if supervisor is None or supervisor is False:
+        return None
+    if supervisor is True:
+        return Supervisor(rate)
+    if not isinstance(supervisor, Supervisor):
+        raise ValueError(f"supervisor must be a Supervisor, True or False, got {supervisor!r}")
+    return supervisor
 
 
 def _turn(
