@@ -60,7 +60,9 @@ class Supervisor:
     model, is not handed on: the compensator keeps its present model if that one passes, else gets the
     last one that had passed if it still does, else the line itself. The line takes over, too, where the
     stage misses the reference by more than a line would all the time, or the voltage rests at a limit
-    while the reference moves within reach. Between two verdicts the last one holds. Errors are root mean
+    while the reference moves within reach. Between two verdicts the last one holds, but for a model far
+    from the one last judged, which is judged at once. While the stage tracks clearly better than a line
+    would, a model near the last good one is taken without more ado. Errors are root mean
     squares, or half the largest value where that is more; the recent past weighs more. At the start,
     until the line's gain is known, a model must be clearly better than the one in use.
 
