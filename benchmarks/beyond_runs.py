@@ -74,6 +74,7 @@ def follow(reference: pz.Signal, stage: Any, estimator: Any) -> pz.TrackingRecor
         compensator=compensator,
         estimator=estimator,
         update_interval=max(1, round(1e-3 * rate)),
+        supervisor=False,
     )
 
 

@@ -70,7 +70,8 @@ def compare(name: str, kind: str, samples: int) -> dict[str, Any]:
     estimator, compensator = pair(kind, case)
     double = pz.export.CompiledController(pz.export.c(estimator, compensator))
     single = pz.export.CompiledController(pz.export.c(estimator, compensator, precision="float"))
-    library = pz.track(r, stage=case.new_stage(), compensator=compensator, estimator=estimator)
+    parts: dict[str, Any] = {"compensator": compensator, "estimator": estimator, "supervisor": False}
+    library = pz.track(r, stage=case.new_stage(), **parts)
     before = np.concatenate([[np.nan], library.measured[:-1]])
     voltage = double.run(library.reference, before)
     scale = float(np.max(np.abs(library.voltage)))
@@ -101,7 +102,9 @@ def rounding(name: str, kind: str, samples: int) -> float:
     case, r = build(name, samples)
     estimator, compensator = pair(kind, case)
     single = pz.signals.from_array(r.values.astype(np.float32).astype(float), r.sample_rate, period=r.period)
-    record = pz.track(single, stage=case.new_stage(), compensator=compensator, estimator=estimator)
+    record = pz.track(
+        single, stage=case.new_stage(), compensator=compensator, estimator=estimator, supervisor=False
+    )
     return settled(record.error, round(case.period))
 
 

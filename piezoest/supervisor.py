@@ -170,6 +170,11 @@ class Supervisor:
         memory = self._memory
         if found == kernel.NOTHING_READ:
             return self._held or self._good or present
+        if (
+            isinstance(proposed, LinearGain)
+            and 1.0 / kernel.FAR < proposed.gain / memory[kernel.BASE] < kernel.FAR
+        ):
+            return proposed  # a line itself
         if found == kernel.AT_REST:
             return self._at_rest(present)
         if found == kernel.NO_LINE:

@@ -23,10 +23,10 @@ TURNS, SOON, DIRECTION, FURTHEST, TURNED = range(5)
 # recent swing of the reference, its last leg, its present value, that at the last hand-over [µm], and whether
 # it is time for the next;
 SWING, LEG, PRESENT, HANDED, DUE = range(5, 10)
-# voltage, and displacement that the model had for it, at the furthest reference and at the turn before;
-U_FURTHEST, U_TURNED, X_FURTHEST, X_TURNED = range(10, 14)
+# voltage at the furthest reference and at the turn before, whether its range was in the way since;
+U_FURTHEST, U_TURNED, BLOCKED = range(10, 13)
 # gain and centre of the line, samples at which the corridor was in the way, whether any came, legs so far.
-GAIN, CENTRE, USED, BEGUN, LEGS, SIZE = range(14, 20)
+GAIN, CENTRE, USED, BEGUN, LEGS, SIZE = range(13, 19)
 
 # Half-width, as a fraction of half the recent swing of the reference; until two legs have told the gain.
 WIDTH, FIRST_WIDTH = 0.3, 3.0
@@ -36,6 +36,8 @@ HAND_OVER = 1.0 / 64.0
 TURN, FADES = 0.02, 0.5
 # Factor by which the line's gain may change in a turn; its centre by half the swing times that, less one.
 LARGEST_RATIO, FIRST_RATIO = 1.25, 4.0
+# Beyond this a ratio of gains is no number.
+LARGEST = 1e100
 
 
 @register_jitable
@@ -45,7 +47,6 @@ def begin(path: Any, start: int, u: Any, x: Any, gain: Any) -> None:
         path[start + k] = 0.0
     path[start + FURTHEST] = path[start + TURNED] = path[start + PRESENT] = path[start + HANDED] = x
     path[start + U_FURTHEST] = path[start + U_TURNED] = u
-    path[start + X_FURTHEST] = path[start + X_TURNED] = x
     path[start + GAIN] = gain
     path[start + CENTRE] = x - gain * u
     path[start + DUE] = 1.0
@@ -80,52 +81,55 @@ def kept(path: Any, start: int, r: Any, wanted: Any) -> Any:
 
 
 @register_jitable
-def follow(path: Any, start: int, u: Any, x: Any) -> None:
-    """Take the voltage given out, and the displacement x that the model expects of it."""
+def follow(path: Any, start: int, u: Any, blocked: Any) -> None:
+    """Take the voltage given out; `blocked` is whether its range or its rate was in the way."""
     r = path[start + PRESENT]
     way = r - path[start + FURTHEST]
     if path[start + DIRECTION] * way >= 0.0:
         if path[start + DIRECTION] == 0.0:
             path[start + DIRECTION] = np.sign(way)
-        path[start + FURTHEST] = r
-        path[start + U_FURTHEST] = u
-        path[start + X_FURTHEST] = x
     elif np.abs(way) > TURN * swing(path, start):
         _turn(path, start)
         path[start + DIRECTION] = -path[start + DIRECTION]
-        path[start + FURTHEST] = r
-        path[start + U_FURTHEST] = u
-        path[start + X_FURTHEST] = x
+    else:
+        return
+    path[start + FURTHEST] = r
+    path[start + U_FURTHEST] = u
+    path[start + BLOCKED] = max(path[start + BLOCKED], blocked)
 
 
 @register_jitable
 def _turn(path: Any, start: int) -> None:
-    """Note the recent swing, and let the line follow what the model made of it."""
-    leg = np.abs(path[start + FURTHEST] - path[start + TURNED])
+    """Note the recent swing, and let the line follow what the models made of it.
+
+    By the voltages that were given for the reference, which go on without a bump whatever model comes: what
+    one alone expects of them may be far off.
+    """
+    r_0, r_1 = path[start + TURNED], path[start + FURTHEST]
+    u_0, u_1 = path[start + U_TURNED], path[start + U_FURTHEST]
+    leg = np.abs(r_1 - r_0)
     path[start + SWING] = max(leg, path[start + SWING] - FADES * leg)
     path[start + LEG] = leg
     path[start + LEGS] += 1.0
-    u_0, u_1 = path[start + U_TURNED], path[start + U_FURTHEST]
-    x_0, x_1 = path[start + X_TURNED], path[start + X_FURTHEST]
-    gain = path[start + GAIN]
-    slope = (x_1 - x_0) / (u_1 - u_0) if u_1 != u_0 else gain
     free = path[start + TURNS] >= 2.0 or path[start + SOON] == 0.0
-    most = LARGEST_RATIO if path[start + LEGS] > 2.0 else FIRST_RATIO
-    if slope * gain > 0.0 and np.abs(slope) < 1e9:
-        ratio = slope / gain
+    if path[start + BLOCKED] == 0.0 and u_1 != u_0:
+        gain = path[start + GAIN]
+        most = LARGEST_RATIO if path[start + LEGS] > 2.0 else FIRST_RATIO
+        ratio = (r_1 - r_0) / (u_1 - u_0) / gain
         if not free:
             ratio = min(max(ratio, 1.0 / most), most)
-        gain = gain * ratio
-    shift = 0.5 * (x_0 + x_1 - gain * (u_0 + u_1)) - path[start + CENTRE]
-    if not free:
-        furthest = (most - 1.0) * 0.5 * path[start + SWING]
-        shift = min(max(shift, -furthest), furthest)
-    path[start + GAIN] = gain
-    path[start + CENTRE] += shift
+        if ratio > 0.0 and ratio < LARGEST:
+            gain = gain * ratio
+        shift = 0.5 * (r_0 + r_1 - gain * (u_0 + u_1)) - path[start + CENTRE]
+        if not free:
+            furthest = (most - 1.0) * 0.5 * path[start + SWING]
+            shift = min(max(shift, -furthest), furthest)
+        path[start + GAIN] = gain
+        path[start + CENTRE] += shift
     path[start + TURNS] += 1.0
-    path[start + TURNED] = path[start + FURTHEST]
+    path[start + TURNED] = r_1
     path[start + U_TURNED] = u_1
-    path[start + X_TURNED] = x_1
+    path[start + BLOCKED] = 0.0
 
 
 @register_jitable

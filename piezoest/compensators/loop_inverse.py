@@ -54,7 +54,7 @@ def voltage(state: Any, config: Any, r: Any) -> Any:
     if given != wanted:
         w_next = equations.hysteresis_step(w_h, given - u, a, b)
     state[W_H] = w_next
-    remember_voltage(state, given, c * given + w_next + config[OFFSET])
+    remember_voltage(state, given)
     return given
 
 

@@ -31,19 +31,16 @@ def _voltage(
     """Voltage for the next reference sample; plays and creep follow the voltage really given out."""
     state[SAMPLES] += 1.0
     u = state[VOLTAGE]
-    known = np.abs(r) < WILDEST
-    held = share = 0.0
-    if known:
+    if np.abs(r) < WILDEST:
         state[OWED] *= config[DECAY]
         held, share = creep_to_come(z, gains, decays)
         w = (r - state[OWED] - config[OFFSET] - held) / (1.0 + share)
         wanted = prandtl_ishlinskii_voltage(y, u, w, config[C], thresholds, weights, bends, changes)
         u = limited(state, config, r, wanted)
+        remember_voltage(state, u)
     else:
         state[MISSED] += 1.0
     w = bent_plays_step(y, u, config[C], thresholds, weights, bends, changes)
-    if known:
-        remember_voltage(state, u, w * (1.0 + share) + held + config[OFFSET])
     # Creep goes on while the voltage is held, too.
     unit_creep_step(z, w, decays)
     return u

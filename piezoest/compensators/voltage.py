@@ -39,13 +39,13 @@ def limited(state: Any, config: Any, r: Any, wanted: Any) -> Any:
     state[SLEWED] += slewed != inside
     state[SATURATED] += given != slewed
     state[LIMITED_NOW] = np.sign(wanted - given)
+    corridor.follow(state, CORRIDOR, given, (given != inside) * 1.0)
     return given
 
 
 @register_jitable
-def remember_voltage(state: Any, given: Any, x: Any) -> None:
-    """Take a voltage given out, and the displacement the model expects of it, into all that has a memory."""
+def remember_voltage(state: Any, given: Any) -> None:
+    """Take a voltage given out into all that has a memory of it."""
     state[VOLTAGE] = given
     recent_path.follow(state, PATH, given)
     remember(state, MEMORY, given)
-    corridor.follow(state, CORRIDOR, given, x)

@@ -77,7 +77,8 @@ class Controller:
 
     Notes
     -----
-    A loop of ``x = stage.step(u); u = controller.step(r, x)`` is `piezoest.track`, bit for bit.
+    A loop of ``x = stage.step(u); u = controller.step(r, x)`` is `piezoest.track` without its
+    guard, bit for bit.
     """
 
     __slots__ = ("_compensator", "_estimator", "_frozen", "_interval", "_voltage", "_waited")

@@ -183,7 +183,11 @@ def test_double_equals_the_library_over_every_scenario(kind: str) -> None:
         compensator = pz.InverseCompensator(case.start, LIMITS)
         ours = pz.export.CompiledController(pz.export.c(estimator, compensator))
         record = pz.track(
-            pz.signals.from_array(r, FS), stage=case.new_stage(), compensator=compensator, estimator=estimator
+            pz.signals.from_array(r, FS),
+            stage=case.new_stage(),
+            compensator=compensator,
+            estimator=estimator,
+            supervisor=False,
         )
         voltage = ours.run(r, np.concatenate([[np.nan], record.measured[:-1]]))
         atol = 1e-12 * np.max(np.abs(record.voltage))
@@ -196,7 +200,8 @@ def test_controller_is_track(log: tuple[Any, Any]) -> None:
     r = log[0]
     estimator, compensator = PAIRS["rls"]()
     case = SCENARIOS["cold-start"].build(0)
-    record = pz.track(r, stage=case.new_stage(), compensator=compensator, estimator=estimator)
+    parts: dict[str, Any] = {"compensator": compensator, "estimator": estimator}
+    record = pz.track(r, stage=case.new_stage(), **parts, supervisor=False)
     own = pz.track(
         r, stage=case.new_stage(), compensator=pz.export.Controller(*PAIRS["rls"]()), sample_rate=FS
     )
@@ -217,7 +222,13 @@ def test_float_settles_to_the_same_error(name: str) -> None:
     case = SCENARIOS["cold-start"].build(0, after=10)
     estimator, compensator = PAIRS[name]()
     single = pz.export.CompiledController(code(name, "float"))
-    library = pz.track(case.reference, stage=case.new_stage(), compensator=compensator, estimator=estimator)
+    library = pz.track(
+        case.reference,
+        stage=case.new_stage(),
+        compensator=compensator,
+        estimator=estimator,
+        supervisor=False,
+    )
     own = pz.track(case.reference, stage=case.new_stage(), compensator=single)
     # Rounding moves the samples at which a model is handed over.
     assert own.max_error(2) == pytest.approx(library.max_error(2), rel=0.03)
