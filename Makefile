@@ -9,7 +9,7 @@ BIN := $(VENV)/bin
 export MPLBACKEND ?= Agg
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help venv tools demo calibrate target test lint format types layers docs docs-live figures bench-smoke bench clean
+.PHONY: help venv tools demo calibrate target test test-slow lint format types layers docs docs-live figures bench-smoke bench clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -60,6 +60,9 @@ calibrate: $(VENV)/.installed  ## Fit the simulated stage to the paper's tables 
 
 test: $(VENV)/.installed-test  ## Run the tests (ARGS="-k name" passes options to pytest)
 	$(BIN)/python -m pytest $(ARGS)
+
+test-slow: $(VENV)/.installed-test  ## Run the tests that take long: caches of many processes, random sweeps
+	$(BIN)/python -m pytest -m slow $(ARGS)
 
 lint: $(VENV)/.installed-lint  ## Check style and formatting
 	$(BIN)/ruff check .
