@@ -335,7 +335,7 @@ class MovingHorizon(EstimatorBase):
     def _model_of(self, state: FloatArray) -> ColemanHodgdon | LinearGain:
         theta, n = state[self._layout.theta], self._initial.theta.size
         offset = float(theta[n]) if theta.size > n else self._initial.offset
-        return large_enough(type(self._initial).from_theta(theta[:n], offset), self._initial)
+        return type(self._initial).from_theta(theta[:n], offset)
 
     def _fits(self, state: FloatArray) -> bool:
         """Whether the model held is admissible and that of theta, and the coordinates are within bounds."""

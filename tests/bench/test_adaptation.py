@@ -225,19 +225,15 @@ def test_the_best_fixed_memory_is_that_with_the_least_settled_error() -> None:
     assert asked.best_fixed(rows, "gain-step") is None
 
 
-def test_a_dwell_without_creep_moves_the_parameters_less() -> None:
-    moved = []
+def test_a_dwell_moves_no_parameter_of_the_model_in_use() -> None:
+    """Models are handed over by the reference's travel, whatever an estimator makes of creep."""
     for creep in (True, False):
         job = bench.Job("dwell", 0, ("HysteresisRLS",), {**SMALL, "rest": 4.0, "creep": creep}, title="rest")
         runs = bench.play(job)
         assert {each.scenario for each in runs} == {"rest"}
         metrics = runs[1].metrics
         assert metrics is not None
-        assert metrics.rest_excursion is not None
-        assert metrics.rest_excursion_later is not None
-        assert metrics.rest_excursion_later < metrics.rest_excursion
-        moved.append(metrics.rest_excursion_later)
-    assert moved[1] < moved[0]
+        assert metrics.rest_excursion == metrics.rest_excursion_later == 0.0
 
 
 @pytest.mark.parametrize("one", COMBINATIONS, ids=lambda one: f"{one.name}, {one.said}")

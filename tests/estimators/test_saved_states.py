@@ -50,7 +50,7 @@ ALL = (
         (pz.HysteresisRLS(RATE, delay=7.0), 199, "the delay line's position"),
         (pz.OutputErrorRLS(RATE), 18, "the bank's member in use"),
         (pz.OutputErrorRLS(RATE), 214, "the delay line's position"),
-        (pz.HysteresisEKF(RATE), 64, "the delay line's position"),
+        (pz.HysteresisEKF(RATE), 66, "the delay line's position"),
         (pz.PrandtlIshlinskiiRLS(RATE), 35, "the memory's count"),
         (pz.PrandtlIshlinskiiRLS(RATE), 2516, "the delay line's position"),
         (pz.PrandtlIshlinskiiRLS(RATE), 2420, "the grid must be as"),
