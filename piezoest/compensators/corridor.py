@@ -91,6 +91,7 @@ def follow(path: Any, start: int, u: Any, blocked: Any) -> None:
         path[start + DIRECTION] = -path[start + DIRECTION]
         path[start + TURNS] += 1.0
         path[start + LEGS] += 1.0
+        path[start + SOON] *= path[start + TURNS] < 2.0
     if path[start + SOON] != 0.0 and blocked == 0.0 and path[start + LEGS] > 0.0:
         _follow_line(path, start, u, r)
 
