@@ -30,7 +30,7 @@ GAIN, CENTRE, MEAN_U, MEAN_R, SQUARE, PRODUCT, KNOWN = range(11, 18)
 USED, BEGUN, LEGS, SIZE = range(18, 22)
 
 # Half-width, as a fraction of half the recent swing of the reference; before the line is known by half.
-WIDTH, FIRST_WIDTH, ENOUGH = 0.3, 0.6, 0.5
+WIDTH, FIRST_WIDTH, ENOUGH = 0.3, 1.0, 0.5
 # A model takes effect from this fraction on of the last leg, or of the present one if that is longer.
 HAND_OVER = 1.0 / 64.0
 # A way back is a turn from this fraction of such a leg on.
