@@ -23,11 +23,14 @@ from piezoest._jit import (
     unrolled,
 )
 from piezoest.estimators import ekf_kernel, ekf_loops, rls_kernel, rls_loops
+from piezoest.estimators import recursive_least_squares as law
 from piezoest.estimators.rls_loops import CONFIG, HEAD
 
 # Channels side by side in vector instructions; channels that share cache lines; samples taken by a channel
 # before it is the next one's turn; rows of samples asked for ahead.
 LANES, BLOCK, CHUNK, AHEAD = 32, 8, 64, 16
+# Samples that lanes take on trial.
+TRIAL = 256
 # Fewer samples than this of a channel are not worth to bring its state into registers for.
 WORTH_MOVING = 8
 
@@ -109,7 +112,21 @@ def _fill(source: Any, target: Any) -> None:
 @unrolled
 def _lane(lane: int, n: int, states: Any, config: Any, u: Any, x: Any) -> None:
     """One sample of the channel in this lane."""
-    rls_loops.take(n, None, states[:, lane], config, None, u[lane], x[lane])
+    rls_kernel._take(states[:, lane], config, None, None, None, u[lane], x[lane], n, 1)
+
+
+@register_jitable
+def _again(
+    n: int, state: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, rows: Any
+) -> None:  # fmt: skip
+    """Take a channel's samples `start` to `stop` by themselves."""
+    row, due = start // every, every - start % every
+    for k in range(start, stop):
+        rls_loops.take(n, None, state, config, None, u[k], x[k])
+        due -= 1
+        if due == 0:
+            _keep(state, HEAD, n, rows[row])
+            row, due = row + 1, every
 
 
 @compiled(nogil=True, **UNCOUNTED)
@@ -117,44 +134,56 @@ def side_by_side(
     n: int, length: int,
     states: Any, config: Any, u: Any, x: Any, start: int, stop: int, every: int, rows: Any,
 ) -> None:  # fmt: skip
-    """The bare law for many channels in the same vector instructions; its branches become masks."""
+    """The bare law for many channels in the same vector instructions; its branches become masks.
+
+    They take all samples on trial: a restart of P behind a mask would cost more than all that leads to it.
+    A channel in which one was not safe goes back to where it was, and takes them again by itself.
+    """
     lasting = HEAD + n + 2 * n * n + n  # up to P phi; what follows is work space of other laws
+    restarts = rls_kernel.FRONT + law.RESETS
     settings = local(CONFIG)
     for i in range(CONFIG):
         settings[i] = config[i]
-    now, u_filled, x_filled = local_rows(length, LANES), local(LANES), local(LANES)
+    now, before = local_rows(length, LANES), local_rows(length, LANES)
+    u_filled, x_filled = local(LANES), local(LANES)
     for first in range(start, stop, LANES):
         used = min(LANES, stop - first)
         # The lanes that are left over repeat the last channel, and are forgotten.
         for lane in range(LANES):
-            c = first + min(lane, used - 1)
-            for i in range(rls_kernel.SWING):
-                now[i, lane] = states[c, i]
-            for i in range(rls_kernel.FRONT, lasting):
-                now[i, lane] = states[c, i]
+            for i in range(lasting):
+                now[i, lane] = states[first + min(lane, used - 1), i]
         row, due = 0, every
         for k in range(min(AHEAD, u.shape[0])):
             read_ahead(u[k, first : first + used])
             read_ahead(x[k, first : first + used])
-        for k in range(u.shape[0]):
-            if k + AHEAD < u.shape[0]:
-                read_ahead(u[k + AHEAD, first : first + used])
-                read_ahead(x[k + AHEAD, first : first + used])
-            u_now, x_now = u[k, first : first + used], x[k, first : first + used]
-            if used < LANES:
-                _fill(u_now, u_filled)
-                _fill(x_now, x_filled)
-                u_now, x_now = u_filled, x_filled
-            in_lanes(_lane, LANES, (n, now, settings, u_now, x_now))
-            due -= 1
-            if due == 0:
-                for lane in range(used):
-                    _keep(now[:, lane], HEAD, n, rows[row, first + lane])
-                row, due = row + 1, every
+        for begin in range(0, u.shape[0], TRIAL):
+            end = min(begin + TRIAL, u.shape[0])
+            for i in range(lasting):
+                for lane in range(LANES):
+                    before[i, lane] = now[i, lane]
+            for k in range(begin, end):
+                if k + AHEAD < u.shape[0]:
+                    read_ahead(u[k + AHEAD, first : first + used])
+                    read_ahead(x[k + AHEAD, first : first + used])
+                u_now, x_now = u[k, first : first + used], x[k, first : first + used]
+                if used < LANES:
+                    _fill(u_now, u_filled)
+                    _fill(x_now, x_filled)
+                    u_now, x_now = u_filled, x_filled
+                in_lanes(_lane, LANES, (n, now, settings, u_now, x_now))
+                due -= 1
+                if due == 0:
+                    for lane in range(used):
+                        _keep(now[:, lane], HEAD, n, rows[row, first + lane])
+                    row, due = row + 1, every
+            for lane in range(used):
+                if now[restarts, lane] != before[restarts, lane]:
+                    c = first + lane
+                    _again(n, before[:, lane], settings, u[:, c], x[:, c], begin, end, every, rows[:, c])
+                    for i in range(lasting):
+                        now[i, lane] = before[i, lane]
         for lane in range(used):
-            for i in range(rls_kernel.SWING):
-                states[first + lane, i] = now[i, lane]
-            for i in range(rls_kernel.FRONT, lasting):
+            for i in range(lasting):
                 states[first + lane, i] = now[i, lane]
 
 

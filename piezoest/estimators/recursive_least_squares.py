@@ -190,6 +190,20 @@ def _by_direction(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, for
 
 
 @unrolled
+def adapt_on_trial(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
+    """As `adapt_discretely`, but what is not safe is taken too, and counted by RESETS.
+
+    Whoever calls this looks at that count later, and takes those samples again by the other one.
+    """
+    if _informs(state, config, phi, n):
+        theta, P, work = _views(state, n)
+        y, quadratic = equations.innovation(theta, P, phi, z, n, work)
+        state[RESETS] += not equations.is_safe(P, n, y, quadratic + forgetting * R, work)
+        S = equations.discrete_correction(theta, P, n, y, quadratic, forgetting, R, config[BOUND], 1.0, work)
+        _note(state, y, S)
+
+
+@unrolled
 def adapt_discretely(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting: Any) -> None:
     """One sample of the ordinary law: gate, update with noise variance R."""
     if _informs(state, config, phi, n):

@@ -346,11 +346,14 @@ def _adapt(
 
 
 @unrolled
-def _take(state: Any, config: Any, clock: Any, line: Any, extra: Any, u: Any, x: Any, n: int) -> None:
+def _take(
+    state: Any, config: Any, clock: Any, line: Any, extra: Any, u: Any, x: Any, n: int, trial: Any
+) -> None:  # fmt: skip
     """One raw sample: a regression of n parameters for the law, or a note of why there is none.
 
     `clock` is the state of `swing`, `line` the delay line, `extra` the state of the policies that are off by
-    default. Each may be None where nobody asks for it, and nothing is compiled for it.
+    default; `trial` says that the bare law is to take it on trial. Each may be None where nobody asks for it,
+    and nothing is compiled for it.
     """
     law_state = state[FRONT:]
     if line is not None and np.abs(u) < WILDEST:
@@ -391,6 +394,9 @@ def _take(state: Any, config: Any, clock: Any, line: Any, extra: Any, u: Any, x:
         law_state[law.LAST] = law.HOLDING
         return
     forgetting = config[CONFIG + law.FORGETTING]
+    if trial is not None:
+        law.adapt_on_trial(law_state, config[CONFIG:], phi, z, n, 1.0, forgetting)
+        return
     if clock is None:
         law.adapt_discretely(law_state, config[CONFIG:], phi, z, n, 1.0, forgetting)
         return
@@ -421,4 +427,4 @@ def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
     """One raw sample, with whatever was asked for."""
     n = int(config[N])
     extra = state[FRONT + law.state_size(n) :]
-    _take(state, config, state[SWING:EXCITATION], extra[int(config[EXTRA]) :], extra, u, x, n)
+    _take(state, config, state[SWING:EXCITATION], extra[int(config[EXTRA]) :], extra, u, x, n, None)

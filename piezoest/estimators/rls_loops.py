@@ -35,9 +35,9 @@ def size(n: int) -> int:
 def take(n: int, paced: Any, state: Any, config: Any, line: Any, u: Any, x: Any) -> None:
     """One sample of n parameters: of the bare law where `paced` is None, without delay where `line` is."""
     if paced is None:
-        kernel._take(state, config, None, line, None, u, x, n)
+        kernel._take(state, config, None, line, None, u, x, n, None)
     else:
-        kernel._take(state, config, state[kernel.SWING : kernel.EXCITATION], line, None, u, x, n)
+        kernel._take(state, config, state[kernel.SWING : kernel.EXCITATION], line, None, u, x, n, None)
 
 
 @unrolled
