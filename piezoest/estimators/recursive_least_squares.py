@@ -9,7 +9,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import FloatArray, array_1d, finite, integer, moderate, number_or_nan
-from piezoest._jit import UNCOUNTED, compiled, unrolled
+from piezoest._jit import UNCOUNTED, OnDemand, compiled, specialised, unrolled
 from piezoest.equations import least_squares as equations
 from piezoest.policies import (
     CovarianceResetting,
@@ -226,7 +226,6 @@ def adapt(state: Any, config: Any, phi: Any, z: Any, n: Any, R: Any, forgetting:
         _discretely(state, config, phi, z, n, R, forgetting)
 
 
-# Compiled when it is first called: few need it by itself.
 @compiled(**UNCOUNTED)
 def _update(state: Any, config: Any, phi: Any, z: float, n: int) -> None:
     within = np.abs(z) < LARGEST
@@ -239,6 +238,12 @@ def _update(state: Any, config: Any, phi: Any, z: float, n: int) -> None:
     if config[LEAST_FACTOR] > 0.0:
         forgetting = varied(state, phi, z, n, config[NOISE], forgetting, config[LEAST_FACTOR])
     adapt(state, config, phi, z, n, config[NOISE], forgetting)
+
+
+@OnDemand
+def _updates() -> Any:
+    """``_updates[()]``: `_update`, compiled when it is first called, for few need it by itself."""
+    return specialised(_update, "void(f8[::1], f8[::1], f8[::1], f8, i8)")
 
 
 # What any regression can do.
@@ -336,7 +341,9 @@ class RecursiveLeastSquares:
         phi = array_1d("phi", phi, allow_nan=True)
         if phi.size != self._n:
             raise ValueError(f"phi must have shape ({self._n},), got {phi.shape}")
-        _update(self._state, self._config, phi, number_or_nan(z), self._n)
+        if type(z) is not float:
+            z = number_or_nan(z)
+        _updates[()](self._state, self._config, phi, z, self._n)
 
     def reset_covariance(self) -> None:
         """Put P back to its initial value (covariance resetting on call)."""
