@@ -70,15 +70,17 @@ def _worst(values: list[float | None]) -> float | None:
 
 
 def _reductions(rows: list[Any], small: list[Any]) -> Iterator[Criterion]:
-    told = dict(_by_stage(small))
+    with_delay = dict(_by_stage(small))
     for stage, cases in _by_stage(rows):
-        asked = TRIANGLES_REDUCED[stage]
+        bound = TRIANGLES_REDUCED[stage]
         for name in TRIANGLES:
             reduced = 1.0 - cases[name][f"{OURS}_left"]["worst"]
-            yield _line(stage, f"{name}: error reduced by", reduced, asked, "%", least=True)
-        if stage in told:
-            reduced = 1.0 - told[stage][TOLD]["max_um"]["worst"] / cases[SMALLEST]["linear_um"]["median"]
-            yield _line(stage, f"{SMALLEST}, {TOLD}: error reduced by", reduced, asked, "%", least=True)
+            yield _line(stage, f"{name}: error reduced by", reduced, bound, "%", least=True)
+        if stage in with_delay:
+            reduced = (
+                1.0 - with_delay[stage][TOLD]["max_um"]["worst"] / cases[SMALLEST]["linear_um"]["median"]
+            )
+            yield _line(stage, f"{SMALLEST}, {TOLD}: error reduced by", reduced, bound, "%", least=True)
         reduced = 1.0 - cases[PRBS][f"{OURS}_left"]["worst"]
         yield _line(stage, "PRBS: error reduced by", reduced, PRBS_REDUCED[stage], "%", least=True)
 

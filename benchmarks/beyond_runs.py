@@ -32,9 +32,9 @@ LIMITS = pz.VoltageLimits(-100.0, 100.0)
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One case of one part on one stage, with one seed."""
+    """One case of one section on one stage, with one seed."""
 
-    part: str
+    section: str
     case: str
     stage: str
     seed: int
@@ -43,19 +43,19 @@ class Job:
         return STAGES[self.stage](rate, seed=self.seed, **parts)
 
 
-def jobs(part: str, seeds: int) -> list[Job]:
-    """All of a part, with at most so many seeds."""
+def jobs(section: str, seeds: int) -> list[Job]:
+    """All of a section, with at most so many seeds."""
     return [
-        Job(part, case, stage, seed)
-        for seed in range(min(seeds, ENOUGH.get(part, seeds)))
-        for case in CASES[part]
+        Job(section, case, stage, seed)
+        for seed in range(min(seeds, ENOUGH.get(section, seeds)))
+        for case in CASES[section]
         for stage in STAGES
     ]
 
 
 def play(job: Job) -> tuple[Job, Numbers]:
     """Run a job."""
-    return job, RUNS[job.part](job)
+    return job, RUNS[job.section](job)
 
 
 def follow(reference: pz.Signal, stage: Any, estimator: Any) -> pz.TrackingRecord:
@@ -287,14 +287,14 @@ PLAIN = "none"
 @functools.cache
 def _loop(stage: str) -> tuple[Any, Any, Any]:
     """Voltage, plays of it and displacement over a settled loop, without noise, steps and resonance."""
-    rate, half, plays = 10_000.0, 35.0, 12
-    u = pz.signals.triangle(half, 5.0, 6, rate).values
+    rate, amplitude, plays = 10_000.0, 35.0, 12
+    u = pz.signals.triangle(amplitude, 5.0, 6, rate).values
     made = STAGES[stage](rate, noise=0.0, quantisation=False, mechanics=False)
     made.run(u)
-    thresholds = half * np.arange(1, plays) / plays
+    thresholds = amplitude * np.arange(1, plays) / plays
     operators = [pz.PrandtlIshlinskii(1e-12, [r], [1.0]).simulate(u) for r in thresholds]
     last = slice(-round(rate / 5.0), None)
-    return half, np.array([u, *operators])[:, last], made.displacement[last]
+    return amplitude, np.array([u, *operators])[:, last], made.displacement[last]
 
 
 def dead_zones(job: Job) -> Numbers:
@@ -303,14 +303,14 @@ def dead_zones(job: Job) -> Numbers:
     Two dead zones within the loop, at thirds of it. On the sum of the plays they are fitted as Kuhnen
     does, through the inverse of the superposition, whose dead zones act on the displacement.
     """
-    half, plays, x = _loop(job.stage)
+    amplitude, plays, x = _loop(job.stage)
     one = np.ones((1, x.size))
     inside = np.linspace(-1.0, 1.0, 4)[1:-1]
     if job.case == SUM:
         bends = x.mean() + 0.5 * np.ptp(x) * inside
         rows = np.vstack([plays, *(-np.maximum(x - bend, 0.0)[None] for bend in bends)])
     elif job.case == EACH:
-        edges = [-np.inf, *(half * inside), np.inf]
+        edges = [-np.inf, *(amplitude * inside), np.inf]
         rows = np.array([segment(p, low, high) for p in plays for low, high in itertools.pairwise(edges)])
     else:
         rows = plays

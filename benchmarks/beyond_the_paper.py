@@ -35,7 +35,7 @@ PERIOD = 200  # samples of the recording
 def summarise(results: Iterable[tuple[Job, Numbers]]) -> list[dict[str, Any]]:
     """One row for each case and stage, in the order of `CASES`: of each number median, worst, mean, sum."""
     groups: dict[tuple[str, str], list[Numbers]] = {}
-    for job, numbers in sorted(results, key=lambda each: CASES[each[0].part].index(each[0].case)):
+    for job, numbers in sorted(results, key=lambda each: CASES[each[0].section].index(each[0].case)):
         groups.setdefault((job.case, job.stage), []).append(numbers)
     return [
         {
@@ -69,8 +69,8 @@ def recording(folder: Path) -> dict[str, float]:
         assert isinstance(model, pz.PrandtlIshlinskii)
         return x[:stop] - model.simulate(late[:stop])
 
-    half = u.size // 2
-    first = free(learnt(u[:half], x[:half]), u.size)
+    middle = u.size // 2
+    first = free(learnt(u[:middle], x[:middle]), u.size)
     other = free(learnt(model_file.voltage, model_file.displacement), u.size)
     estimator = learnt(u[: 5 * PERIOD], x[: 5 * PERIOD])
     ahead = []
@@ -79,7 +79,7 @@ def recording(folder: Path) -> dict[str, float]:
         ahead.append(free(estimator, stop)[start:])
         estimator.run(u[start:stop], x[start:stop])
     rms = {
-        "held_out_half_um": first[half:],
+        "held_out_half_um": first[middle:],
         "other_file_um": other,
         "other_file_without_mean_um": other - other.mean(),
         "one_period_ahead_um": np.concatenate(ahead),
@@ -87,13 +87,13 @@ def recording(folder: Path) -> dict[str, float]:
     return {name: float(np.sqrt(np.mean(error**2))) for name, error in rms.items()}
 
 
-def runs(part: str, seeds: int, processes: int | None) -> list[dict[str, Any]]:
-    """Rows of a part, with its progress on stderr."""
-    began, results, work = time.perf_counter(), [], jobs(part, seeds)
+def runs(section: str, seeds: int, processes: int | None) -> list[dict[str, Any]]:
+    """Rows of a section, with its progress on stderr."""
+    began, results, work = time.perf_counter(), [], jobs(section, seeds)
     for result in in_processes(play, work, processes):
         results.append(result)
         print(
-            f"\r{part}: {len(results)} of {len(work)} runs, {time.perf_counter() - began:.0f} s",
+            f"\r{section}: {len(results)} of {len(work)} runs, {time.perf_counter() - began:.0f} s",
             end="",
             file=sys.stderr,
             flush=True,

@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import piezoest as pz
-from piezoest.estimators import recursive_least_squares as law
-from piezoest.estimators import rls_kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -25,8 +23,8 @@ void run(int64_t N, const double *u, const double *x, const double *scale, doubl
     {name}_state state;
     {name}_init(&state);
     for (int64_t k = 0; k < N; k++) {{
-        rls_kernel_sample(state.estimator, u[k], x[k]);
-        for (int i = 0; i < {n}; i++) theta[{n} * k + i] = state.estimator[{theta} + i] * scale[i];
+        rls_kernel_sample(&state.estimator, u[k], x[k]);
+        for (int i = 0; i < {n}; i++) theta[{n} * k + i] = state.estimator.law.theta[i] * scale[i];
     }}
 }}
 """
@@ -96,19 +94,12 @@ class Exported:
         limits = pz.VoltageLimits(-100.0, 100.0)
         start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
         code = pz.export.c(estimator, pz.InverseCompensator(start, limits))
-        self._scale = estimator._scale
+        self._scale = np.ascontiguousarray(estimator.settings["parameter_scale"])
         with tempfile.TemporaryDirectory() as folder:
             _, source = code.write(folder)
             loop = Path(folder) / "loop.c"
-            loop.write_text(
-                _LOOP.format(
-                    source=source.name,
-                    name=code.name,
-                    theta=rls_kernel.FRONT + law.HEAD,
-                    n=self._scale.size,
-                ),
-                encoding="utf-8",
-            )
+            text = _LOOP.format(source=source.name, name=code.name, n=self._scale.size)
+            loop.write_text(text, encoding="utf-8")
             library = Path(folder) / "loop.so"
             subprocess.run([*COMMAND, "-o", str(library), str(loop), "-lm"], check=True)
             self._run = ctypes.CDLL(str(library)).run

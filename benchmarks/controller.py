@@ -37,10 +37,10 @@ def within(row: dict[str, Any]) -> bool:
     return row["float_difference"] <= max(LARGEST_FLOAT, ROUNDING * own)
 
 
-def pair(kind: str, case: Any) -> tuple[Any, Any]:
+def pair(learner: str, case: Any) -> tuple[Any, Any]:
     """Estimator and compensator."""
     estimators = {"HysteresisRLS": pz.HysteresisRLS, "HysteresisEKF": pz.HysteresisEKF}
-    estimator = estimators[kind](case.sample_rate, initial_model=case.start)
+    estimator = estimators[learner](case.sample_rate, initial_model=case.start)
     return estimator, pz.InverseCompensator(case.start, LIMITS)
 
 
@@ -48,9 +48,10 @@ def build(name: str, samples: int) -> tuple[Any, Any]:
     """Case and reference of at least so many samples, where the scenario can be that long."""
     periods = max(2, samples // 10_000)
     seconds = samples / 50_000.0
-    half = max(1, periods // 2)
+    before = max(1, periods // 2)
+    switches = name in ("amplitude-switch", "amplitude-drop")
     case = SCENARIOS[name].build(
-        0, before=half, after=periods - half if name in ("amplitude-switch", "amplitude-drop") else periods,
+        0, before=before, after=periods - before if switches else periods,
         rest=0.5 * seconds, drift=min(0.9 * seconds, 30.0),
     )  # fmt: skip
     return case, pz.signals.from_array(
@@ -64,10 +65,10 @@ def settled(error: Any, period: int) -> float:
     return float(np.mean(np.max(np.abs(error[-count * period :].reshape(count, period)), axis=1)))
 
 
-def compare(name: str, kind: str, samples: int) -> dict[str, Any]:
+def compare(name: str, learner: str, samples: int) -> dict[str, Any]:
     """One scenario, one estimator."""
     case, r = build(name, samples)
-    estimator, compensator = pair(kind, case)
+    estimator, compensator = pair(learner, case)
     double = pz.export.CompiledController(pz.export.c(estimator, compensator))
     single = pz.export.CompiledController(pz.export.c(estimator, compensator, precision="float"))
     parts: dict[str, Any] = {"compensator": compensator, "estimator": estimator, "supervisor": False}
@@ -79,10 +80,10 @@ def compare(name: str, kind: str, samples: int) -> dict[str, Any]:
     errors = [settled(record.error, round(case.period)) for record in (library, own)]
     largest = [float(np.max(np.abs(record.error[-2 * round(case.period) :]))) for record in (library, own)]
     apart = abs(errors[1] / errors[0] - 1.0)
-    rounded = rounding(name, kind, samples) if apart > LARGEST_FLOAT else None
+    rounded = rounding(name, learner, samples) if apart > LARGEST_FLOAT else None
     return {
         "scenario": name,
-        "estimator": kind,
+        "estimator": learner,
         "samples": len(r),
         "double_difference": float(np.max(np.abs(voltage - library.voltage))) / scale,
         "settled_error_um": errors[0],
@@ -94,13 +95,13 @@ def compare(name: str, kind: str, samples: int) -> dict[str, Any]:
     }
 
 
-def rounding(name: str, kind: str, samples: int) -> float:
+def rounding(name: str, learner: str, samples: int) -> float:
     """Settled error of the library itself, in double, for a reference rounded to float [µm].
 
     How far the ring carries a difference in the seventh digit; no float build can come closer than that.
     """
     case, r = build(name, samples)
-    estimator, compensator = pair(kind, case)
+    estimator, compensator = pair(learner, case)
     single = pz.signals.from_array(r.values.astype(np.float32).astype(float), r.sample_rate, period=r.period)
     record = pz.track(
         single, stage=case.new_stage(), compensator=compensator, estimator=estimator, supervisor=False
@@ -117,11 +118,11 @@ def main() -> int:
     arguments = parser.parse_args()
     rows = []
     for name in arguments.only or SCENARIOS:
-        for kind in ("HysteresisRLS", "HysteresisEKF"):
-            row = compare(name, kind, arguments.samples)
+        for learner in ("HysteresisRLS", "HysteresisEKF"):
+            row = compare(name, learner, arguments.samples)
             rows.append(row)
             print(
-                f"{name:<17} {kind:<14} {row['samples']} samples: double off by "
+                f"{name:<17} {learner:<14} {row['samples']} samples: double off by "
                 f"{row['double_difference']:.1e}; settled {row['settled_error_um']:.5f} µm, float "
                 f"{row['settled_error_float_um']:.5f} µm, {100.0 * row['float_difference']:.2f} % apart",
                 flush=True,

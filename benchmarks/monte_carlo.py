@@ -50,7 +50,7 @@ def draw(number: int, estimator: str) -> dict[str, Any]:
         float(np.exp(rng.uniform(*np.log(span)))) for span in (MEMORY, AMPLITUDE, FREQUENCY, NOISE)
     )
     scenario = list(SCENARIOS)[number % len(SCENARIOS)]
-    long = scenario in ("prbs", "random-walk", "two-tone")
+    long = SCENARIOS[scenario].is_long
     return {
         "number": number,
         "scenario": scenario,

@@ -39,14 +39,14 @@ def calls(wanted: dict[str, Calls], rounds: int = 10) -> dict[str, dict[str, flo
         name: itertools.cycle(list(zip(*(column.tolist() for column in calls.columns), strict=True)))
         for name, calls in wanted.items()
     }
-    taken: dict[str, list[FloatArray]] = {name: [] for name in wanted}
+    measured: dict[str, list[FloatArray]] = {name: [] for name in wanted}
     preempted, page_faults = dict.fromkeys(wanted, 0), dict.fromkeys(wanted, 0)
     for _ in range(rounds):
         for name, each in wanted.items():
             if not each.collect:
                 gc.disable()
             before = resource.getrusage(resource.RUSAGE_SELF)
-            taken[name].append(_times(each.function, rows[name], max(1, each.count // rounds)))
+            measured[name].append(_times(each.function, rows[name], max(1, each.count // rounds)))
             after = resource.getrusage(resource.RUSAGE_SELF)
             gc.enable()
             preempted[name] += after.ru_nivcsw - before.ru_nivcsw
@@ -57,7 +57,7 @@ def calls(wanted: dict[str, Calls], rounds: int = 10) -> dict[str, dict[str, flo
             "preempted": preempted[name],
             "page_faults": page_faults[name],
         }
-        for name, times in taken.items()
+        for name, times in measured.items()
     }
 
 
@@ -68,12 +68,12 @@ def _times(function: Callable[..., Any], rows: Iterator[tuple[float, ...]], coun
     for _ in range(1000):
         began = clock()
         empty.append(clock() - began)
-    taken = np.empty(count, dtype=np.uint32)
+    times = np.empty(count, dtype=np.uint32)
     for k, row in enumerate(itertools.islice(rows, count)):
         began = clock()
         function(*row)
-        taken[k] = min(clock() - began, 2**32 - 1)
-    return np.asarray(taken - np.median(empty))
+        times[k] = min(clock() - began, 2**32 - 1)
+    return np.asarray(times - np.median(empty))
 
 
 def _summary(times: FloatArray) -> dict[str, float]:

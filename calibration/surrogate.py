@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numba import njit
 
 import piezoest as pz
-from piezoest._jit import compiled
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations.creep import creep_step
 from piezoest.equations.play import prandtl_ishlinskii_step
@@ -64,7 +64,7 @@ def lags(stage: pz.SimulatedStage) -> tuple[float, float]:
     return float(np.mean((ramp - true)[-1000:])), float(np.mean((ramp - measured)[-1000:]))
 
 
-@compiled()
+@njit
 def _inverse(r: Any, a: float, b: float, c: float, settling: int) -> Any:
     """Stationary voltage for one period of the reference, which starts at its minimum."""
     low, high = r[0], r.max()
@@ -88,7 +88,7 @@ def _inverse(r: Any, a: float, b: float, c: float, settling: int) -> Any:
     return voltage
 
 
-@compiled()
+@njit
 def _respond(u: Any, gain: float, thresholds: Any, weights: Any, gains: Any, decays: Any) -> Any:
     """Stationary displacement for one period of a voltage that starts at its minimum."""
     x = np.empty_like(u)
@@ -105,7 +105,7 @@ def _respond(u: Any, gain: float, thresholds: Any, weights: Any, gains: Any, dec
     return x
 
 
-@compiled()
+@njit
 def _least_squares(u: Any, x: Any) -> Any:
     """Parameters of the derivative form over one period."""
     A = np.zeros((3, 3))

@@ -129,8 +129,8 @@ def as_floats(name: str, value: Any) -> FloatArray:
     try:
         if isinstance(value, (list, tuple)) and any(item is np.ma.masked for item in value):
             value = [math.nan if item is np.ma.masked else item for item in value]
-        array = value if isinstance(value, np.ndarray) else np.asarray(value)
-        if isinstance(array, np.ma.MaskedArray):
+        array = np.asanyarray(value)
+        if np.ma.isMaskedArray(array):
             array = np.ma.filled(array.astype(np.float64), np.nan)
         if array.dtype.kind not in "biufO":
             raise TypeError
@@ -141,15 +141,42 @@ def as_floats(name: str, value: Any) -> FloatArray:
         raise ValueError(f"{name} must be numbers, got {_described(value)}") from None
 
 
+def instance(name: str, value: Any, classes: Any, expected: str) -> Any:
+    """Return `value` if it is of one of the classes; `expected` says what they are, and what to do."""
+    if not isinstance(value, classes):
+        what, _, hint = expected.partition(": ")
+        raise ValueError(f"{name} must be {what}, got {type(value).__name__}{hint and f': {hint}'}")
+    return value
+
+
+def dictionary(value: Any) -> dict[str, Any]:
+    """Return `value` if it is a dictionary, else an empty one: for what came from a file."""
+    return value if isinstance(value, dict) else {}
+
+
+def class_named(data: Any, key: str, classes: Iterable[Any]) -> Any:
+    """Return the class whose name a dictionary has under `key`.
+
+    Raises
+    ------
+    ValueError
+        If the name is none of theirs.
+    """
+    known = {cls.__name__: cls for cls in classes}
+    name = data.get(key) if hasattr(data, "get") else data
+    if str(name) not in known:
+        raise ValueError(f"{key} {name!r} is unknown: choose of {sorted(known)}")
+    return known[str(name)]
+
+
 def _described(value: Any) -> str:
-    kind = getattr(value, "dtype", None)
-    return type(value).__name__ if kind is None else f"{type(value).__name__} of {kind}"
+    dtype = getattr(value, "dtype", None)
+    return type(value).__name__ if dtype is None else f"{type(value).__name__} of {dtype}"
 
 
 def fields(name: str, data: Any, needed: Iterable[str], optional: Iterable[str] = ()) -> dict[str, Any]:
     """Return a dictionary that came from outside, if it has the fields it needs and no others."""
-    if not isinstance(data, dict):
-        raise ValueError(f"{name} must be a dictionary, got {type(data).__name__}")
+    instance(name, data, dict, "a dictionary")
     needed = list(needed)
     if missing := [field for field in needed if field not in data]:
         raise ValueError(f"{name} has no {', '.join(map(repr, missing))}")

@@ -38,10 +38,11 @@ def errors(debug: bool = False) -> Iterator[None]:
 
 
 def _said(error: Exception) -> str:
-    if isinstance(error, OSError) and error.filename:
-        return f"{error.filename}: {error.strerror}"
-    if isinstance(error, MemoryError):
-        return f"not enough memory: {error}"
+    match error:
+        case OSError(filename=name) if name:
+            return f"{name}: {error.strerror}"
+        case MemoryError():
+            return f"not enough memory: {error}"
     return str(error)
 
 

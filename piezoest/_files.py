@@ -77,6 +77,22 @@ def read_json(path: str | Path) -> Any:
         raise ValueError(f"{path} is not JSON of ours: it is nested too deeply") from None
 
 
+def read_object(path: str | Path, what: str) -> dict[str, Any]:
+    """The dictionary that a JSON file holds.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    ValueError
+        As `read_json`, or if the file holds something else; says that it holds no `what`.
+    """
+    data = read_json(path)
+    if not isinstance(data, dict):
+        raise ValueError(f"{path} holds no {what}")
+    return data
+
+
 def _regular(path: Path) -> Path | None:
     """Regular file, there or to be, at the end of all links; None if it is something else."""
     for _ in range(40):

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from piezoest import supervisor_kernel as kernel
 from piezoest._checks import FloatArray, positive
-from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
+from piezoest.equations import loop_inverse
+from piezoest.models import ColemanHodgdon, LinearGain, Model
 
 # A model that is right to this part of the displacement's range is good enough anyway; the second number
 # before the first turn, for a line knows no loop then.
@@ -27,7 +28,7 @@ AGAIN, AT_MOST = 16.0, 512.0
 STALE = 1.05
 # A model whose slopes or offset are this much from those of the last one is judged at once.
 ANOTHER = 0.1
-# b in parts of c in a Coleman-Hodgdon model that stands for a line.
+# b relative to c in a Coleman-Hodgdon model that stands for a line.
 NO_LOOP = 1e-9
 
 
@@ -71,7 +72,7 @@ class Supervisor:
     sample_rate : float
         [Hz].
     limit : float
-        Error that is allowed, in parts of the line's.
+        Error that is allowed, relative to the line's.
 
     Raises
     ------
@@ -90,8 +91,8 @@ class Supervisor:
     """
 
     __slots__ = (
-        "_again", "_elapsed", "_events", "_first", "_good", "_held", "_kept", "_limit", "_memory", "_points",
-        "_sample_rate", "_trusts", "_until",
+        "_again", "_elapsed", "_events", "_first", "_good", "_held", "_kept", "_limit", "_memory",
+        "_sample_rate", "_seen", "_trusts", "_until",
     )  # fmt: skip
 
     def __init__(self, sample_rate: float, *, limit: float = 1.0) -> None:
@@ -102,7 +103,8 @@ class Supervisor:
     def reset(self) -> None:
         """Return to the state after construction."""
         self._elapsed = 0
-        self._memory, self._points = kernel.begin(1.0, 0.0)
+        self._memory = kernel.begin(1.0, 0.0)
+        self._seen = kernel.seen_in(self._memory)
         self._until, self._again = 0.0, AGAIN
         self._first: Model | None = None
         self._good: Model | None = None
@@ -140,9 +142,10 @@ class Supervisor:
         """
         if self._first is None:
             self._first = present
-            self._memory, self._points = kernel.begin(*_line_of(present))
+            self._memory = kernel.begin(*present.line)
         self._elapsed += u.size
-        found = kernel.look(self._memory, self._points, r, u, x)
+        r, u = np.ascontiguousarray(r, float), np.ascontiguousarray(u, float)
+        found = kernel.look.of(kernel.MEMORY)(self._memory, r, u, np.ascontiguousarray(x, float))
         if found != kernel.NOT_YET:
             chosen = self._judge(found, present, proposed)
             self._trusts = chosen is proposed and self._held is None
@@ -150,7 +153,7 @@ class Supervisor:
         if self._held is not None:
             return self._held
         if self._trusts and self._is_another(proposed):
-            return self._judge(int(self._memory[kernel.FOUND]), present, proposed)
+            return self._judge(int(self._seen.found), present, proposed)
         return proposed if self._trusts else present
 
     def _is_another(self, proposed: Model) -> bool:
@@ -160,35 +163,31 @@ class Supervisor:
             return False
         return (
             abs(proposed.beta - good.beta) > ANOTHER * good.beta
-            or abs(proposed.gamma / proposed.alpha - good.gamma / good.alpha)
-            > ANOTHER * good.gamma / good.alpha
-            or abs(proposed.offset - good.offset) > ANOTHER * self._memory[kernel.SPAN]
+            or abs(proposed.c - good.c) > ANOTHER * good.gamma / good.alpha
+            or abs(proposed.offset - good.offset) > ANOTHER * self._seen.span
         )
 
     def _judge(self, found: int, present: Model, proposed: Model) -> Model:
         """The model for the time until the next verdict."""
-        memory = self._memory
+        seen = self._seen = kernel.seen_in(self._memory)
         if found == kernel.NOTHING_READ:
             return self._held or self._good or present
-        if (
-            isinstance(proposed, LinearGain)
-            and 1.0 / kernel.FAR < proposed.gain / memory[kernel.BASE] < kernel.FAR
-        ):
+        if isinstance(proposed, LinearGain) and self._is_near(proposed.gain):
             return proposed  # a line itself
         if found == kernel.AT_REST:
             return self._at_rest(present)
         if found == kernel.NO_LINE:
             return self._without_a_line(present, proposed)
-        unexplained = float(memory[kernel.UNEXPLAINED])
-        negligible = (NEGLIGIBLE if memory[kernel.TURNS] > 0.0 else EARLY) * float(memory[kernel.SPAN])
+        unexplained = seen.unexplained
+        negligible = (NEGLIGIBLE if seen.turns > 0.0 else EARLY) * seen.span
         limit = allowed = max(self._limit * unexplained, negligible)
         error = self._error(proposed)
         if self._held is not None:
-            allowed = max(CLEARLY * allowed, negligible) if memory[kernel.KEPT] >= self._until else 0.0
-        elif memory[kernel.KEPT] >= self._until and memory[kernel.LEAST_MISS] > ASTRAY * limit:
-            missed = f"the stage misses the reference by {memory[kernel.LEAST_MISS]:.3g} µm"
+            allowed = max(CLEARLY * allowed, negligible) if seen.kept >= self._until else 0.0
+        elif seen.kept >= self._until and seen.least_miss > ASTRAY * limit:
+            missed = f"the stage misses the reference by {seen.least_miss:.3g} µm"
             return self._fall(self._line(present), f"{missed}, a line {unexplained:.3g} µm")
-        tracks = self._held is None and memory[kernel.WORST_MISS] <= CLEARLY * limit
+        tracks = self._held is None and seen.worst_miss <= CLEARLY * limit
         near = isinstance(proposed, ColemanHodgdon) and not self._is_another(proposed)
         if tracks and near and self._good is not None:
             # What the past cannot tell, as creep in a rest, does not speak against what tracks well.
@@ -199,31 +198,29 @@ class Supervisor:
                 # One lucky model after another is worse than any of them: the better one stays.
                 return present
             if self._held is not None:
-                self._note("resumed", _reason(proposed, error, unexplained))
-                self._until = memory[kernel.KEPT] + kernel.A_SWING
+                self._note("resumed", self._reason(proposed, error))
+                self._until = seen.kept + kernel.A_SWING
             self._good, self._held, self._kept = proposed, None, False
             return proposed
         if self._held is not None:
-            return self._stay(present, limit)
-        if memory[kernel.WORST_MISS] <= limit or self._error(present) <= limit:
+            return self._stay(self._held, present, limit)
+        if seen.worst_miss <= limit or self._error(present) <= limit:
             if not self._kept:
-                self._note("kept", _reason(proposed, error, unexplained))
+                self._note("kept", self._reason(proposed, error))
             self._kept = True
             return present
         good = self._good
         if good is None or self._error(good) > limit:
             good = self._line(present)
-        return self._fall(good, _reason(proposed, error, unexplained))
+        return self._fall(good, self._reason(proposed, error))
 
     def _without_a_line(self, present: Model, proposed: Model) -> Model:
         """The proposed model or the first one, if that is clearly better than the one in use."""
         if self._held is not None:
             return self._held
         error = self._error(present)
-        for other in (proposed, self._first):
-            if other is not None and self._error(other) <= CLEARLY * error:
-                return other
-        return present
+        others = (other for other in (proposed, self._first) if other is not None)
+        return next((other for other in others if self._error(other) <= CLEARLY * error), present)
 
     def _at_rest(self, present: Model) -> Model:
         """The line where the voltage rests though the reference moves within its reach."""
@@ -231,71 +228,61 @@ class Supervisor:
         if self._held is not None:
             self._held = line
             return line
-        voltage = float(self._memory[kernel.LAST_U])
+        voltage = self._seen.last_u
         return self._fall(line, f"the voltage rests at {voltage:.3g} V while the reference moves")
 
-    def _stay(self, present: Model, limit: float) -> Model:
+    def _stay(self, held: Model, present: Model, limit: float) -> Model:
         """What was fallen back to; the line of now where that has become worse."""
-        held, good = self._held, self._good
+        good = self._good
         if good is not None and held is not good and self._error(good) <= CLEARLY * limit:
-            held = self._held = good
-        if held is None or self._memory[kernel.KNOWN] == 0.0 or self._error(held) > STALE * limit:
-            held = self._held = self._line(present)
+            held = good
+        if self._seen.known == 0.0 or self._error(held) > STALE * limit:
+            held = self._line(present)
+        self._held = held
         return held
 
     def _fall(self, model: Model, reason: str) -> Model:
-        self._held, self._until = model, float(self._memory[kernel.KEPT]) + self._again
+        self._held, self._until = model, self._seen.kept + self._again
         self._again = min(2.0 * self._again, AT_MOST)
         self._note("fell back", f"{reason}; now {model}")
         return model
 
     def _line(self, present: Model) -> Model:
         """Linear feed-forward as a model; of the kind in use, so that `theta` keeps its shape."""
-        gain, offset = float(self._memory[kernel.GAIN]), float(self._memory[kernel.OFFSET])
+        gain, offset = self._seen.gain, self._seen.offset
         if isinstance(present, ColemanHodgdon) and gain > 0.0:
             return ColemanHodgdon.from_loop(present.a, NO_LOOP * gain, gain, offset)
         return LinearGain(gain, offset)
 
+    def _is_near(self, gain: float) -> bool:
+        """Whether a gain is anything like that of the stage."""
+        return 1.0 / kernel.FAR < gain / self._seen.base < kernel.FAR
+
     def _error(self, model: Model) -> float:
         """How much a model misses of the last swings [µm]."""
-        memory, points = self._memory, self._points
-        if isinstance(model, ColemanHodgdon):
-            a = model.alpha
-            c = model.gamma / a
-            if not 1.0 / kernel.FAR < c / memory[kernel.BASE] < kernel.FAR:
+        memory: Any = self._memory
+        if model.inverse is loop_inverse:
+            loop = model.inverse_settings(None)
+            if loop["b"] > 0.0 and not self._is_near(loop["c"]):
                 return math.inf
-            error = kernel.missed_by_loop(memory, points, a, c - model.beta, c, model.offset)
-        elif isinstance(model, LinearGain):
-            error = kernel.missed_by_loop(memory, points, 1.0, 0.0, model.gain, model.offset)
+            error = kernel.missed_by_loop.of(kernel.MEMORY)(memory, *loop.values())
         else:
-            error = kernel.missed_but_for_mean(memory, points, self._displacements(model))
+            error = kernel.missed_but_for_mean.of(kernel.MEMORY)(memory, self._displacements(model))
         return error if math.isfinite(error) else math.inf
 
     def _displacements(self, model: Model) -> FloatArray:
-        """Displacements of a model of any kind at the points, which creep takes to come at an even rate."""
-        memory, points = self._memory, self._points
-        count, options = int(memory[kernel.COUNT]), {}
-        if isinstance(model, PrandtlIshlinskii) and model.creep is not None:
-            samples = points[kernel.SAMPLE, :count:8].tolist()
-            between = sorted(later - sooner for sooner, later in itertools.pairwise(samples))
-            options = {
-                "sample_rate": 8.0 * self._sample_rate / between[len(between) // 2] if between else None
-            }
+        """Displacements of any model at the points, which creep takes to come at an even rate."""
+        count, options = int(self._memory["count"]), {}
+        if getattr(model, "creep", None) is not None:
+            between = np.sort(np.diff(self._memory["points"]["sample"][:count:8]))
+            rate = 8.0 * self._sample_rate / between[between.size // 2] if between.size else None
+            options = {"sample_rate": rate}
         with np.errstate(all="ignore"):
-            y = model.simulate(kernel.voltages(memory, points), **options)  # type: ignore[attr-defined]
+            y = model.simulate(kernel.voltages(self._memory), **options)  # type: ignore[attr-defined]
         return np.ascontiguousarray(y[-count:], dtype=float)
+
+    def _reason(self, model: Model, error: float) -> str:
+        return f"{model} misses {error:.3g} µm, a line {self._seen.unexplained:.3g} µm"
 
     def _note(self, action: str, reason: str) -> None:
         self._events.append(Event(self._elapsed / self._sample_rate, action, reason))
-
-
-def _reason(model: Model, error: float, unexplained: float) -> str:
-    return f"{model} misses {error:.3g} µm, a line {unexplained:.3g} µm"
-
-
-def _line_of(model: Model) -> tuple[float, float]:
-    """Gain and offset of a model, as far as they can be told before anything is measured."""
-    if isinstance(model, ColemanHodgdon):
-        return model.beta, model.offset
-    y = model.simulate(np.array([0.0, 1e-3, 0.0, 1.0]))  # type: ignore[attr-defined]
-    return float(y[-1] - y[0]), float(y[0])

@@ -14,7 +14,6 @@ import casadi
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.equations import coleman_hodgdon as hysteresis
 from piezoest.equations.creep import creep_step
 
 # NumPy's functions on SX then give SX, which is what the equations rely on.
@@ -25,17 +24,15 @@ casadi.GlobalOptions.setNumpyMode(1)
 UNROLLED, CHAINED = 50, 20
 
 
-def trace(function: Callable[..., Any], *sizes: int, name: str = "traced") -> Any:
+def trace(function: Callable[..., Any], *sizes: int) -> Any:
     """CasADi Function of an equation.
 
     Parameters
     ----------
     function : callable
-        Of numbers and flat arrays, returning numbers, arrays or a tuple of these.
+        Of numbers and flat arrays, returning a number or a tuple of numbers.
     *sizes : int
         Length of each argument; 0 for a number.
-    name : str
-        Name of the Function.
 
     Returns
     -------
@@ -43,10 +40,12 @@ def trace(function: Callable[..., Any], *sizes: int, name: str = "traced") -> An
         Of the same arguments; one output, the results in one column.
     """
     arguments = [casadi.SX.sym(f"v{i}", max(size, 1)) for i, size in enumerate(sizes)]
-    # An equation may write into its arrays: it is given copies.
-    results = function(*(casadi.SX(argument) for argument in arguments))
+    # An equation may write into its arrays, and knows their length: they are lists.
+    results = function(
+        *(casadi.vertsplit(v) if size else v for v, size in zip(arguments, sizes, strict=True))
+    )
     results = results if isinstance(results, tuple) else (results,)
-    return casadi.Function(name, arguments, [casadi.vertcat(*results)], {"cse": True})
+    return casadi.Function("traced", arguments, [casadi.vertcat(*results)], {"cse": True})
 
 
 def jacobian(function: Callable[..., Any], *sizes: int) -> Callable[..., FloatArray]:
@@ -54,10 +53,8 @@ def jacobian(function: Callable[..., Any], *sizes: int) -> Callable[..., FloatAr
 
     Parameters
     ----------
-    function : callable
-        Of numbers and flat arrays, returning numbers, arrays or a tuple of these.
-    *sizes : int
-        Length of each argument; 0 for a number.
+    function, *sizes
+        As in `trace`.
 
     Returns
     -------
@@ -65,7 +62,7 @@ def jacobian(function: Callable[..., Any], *sizes: int) -> Callable[..., FloatAr
         Of the same arguments; gives an ndarray of shape (results, arguments).
     """
     traced = trace(function, *sizes)
-    symbols = [casadi.SX.sym(f"v{i}", max(size, 1)) for i, size in enumerate(sizes)]
+    symbols = traced.sx_in()
     derivative = casadi.jacobian(traced(*symbols), casadi.vertcat(*symbols))
     compiled = casadi.Function("derivative", symbols, [derivative], {"cse": True})
     return lambda *values: compiled(*values).full()
@@ -87,38 +84,52 @@ class Pass(NamedTuple):
 class Simulation:
     """Output of a stage and its sensitivities, in one pass over a record.
 
-    x = c u + w_h + creep + offset, where creep is driven by c u + w_h. Parameters
-    p = (a, b, c, offset, gains...), state s = (w_h, z...). With a = b = w_h = 0 it is the linear
-    gain c. The forward sensitivities ds/dp and ds/ds(0) are carried along as further states.
+    x = w + creep + offset, where w is the model's and drives the creep. Parameters
+    p = (the model's constants..., offset, gains..., delay), state s = (the model's..., z...). The
+    forward sensitivities ds/dp and ds/ds(0) are carried along as further states.
 
     Parameters
     ----------
+    model : type of FreeRunning
+        Gives the equation.
+    constants : int
+        Number of constants that its equation has.
     creep_terms : int
         Number of creep terms.
+    delayed : bool
+        Whether the derivative by a delay of the voltage is wanted too: the last of the parameters then, whose
+        value is 0, for the voltage comes delayed.
     """
 
-    __slots__ = ("_carried", "_plain", "_sensitive", "n_p", "n_s")
+    __slots__ = ("_carried", "_delayed", "_model", "_plain", "_sensitive", "_sizes", "n_p", "n_s")
 
-    def __init__(self, creep_terms: int = 0) -> None:
-        self.n_p, self.n_s = 4 + creep_terms, 1 + creep_terms
+    def __init__(self, model: Any, constants: int, creep_terms: int, delayed: bool) -> None:
+        self._model, self._delayed = model, delayed
+        self._sizes = constants, len(model.state_names), creep_terms
+        # A simulation has a state, though it may be one that stays as it is.
+        self.n_p = constants + 1 + creep_terms + delayed
+        self.n_s = max(1, len(model.state_names) + creep_terms)
         self._plain = _lengthened(self._step(sensitive=False))
         self._sensitive = _lengthened(self._step(sensitive=True))
 
     def _equations(self, s: Any, u: Any, p: Any, decays: Any) -> tuple[Any, Any]:
-        """State and output after the voltage has gone from u[0] to u[1]."""
-        w_h = hysteresis.hysteresis_step(s[0], u[1] - u[0], p[0], p[1])
-        w = p[2] * u[1] + w_h
-        if self.n_s == 1:
-            return w_h, w + p[3]
-        z = casadi.SX(s[1:])
-        x = w + creep_step(z, w, p[4:], decays) + p[3]
-        return casadi.vertcat(w_h, z), x
+        """State and output after the voltage has gone from u[0] to u[1]; its slopes by the delay follow."""
+        constants, states, terms = self._sizes
+        if self._delayed:
+            u = u[:2] + p[-1] * u[2:]
+        own, w = self._model.free_step(s[:states], u[0], u[1], p[:constants])
+        if terms == 0:
+            return casadi.vertcat(*own) if own else s, w + p[constants]
+        z = casadi.vertsplit(s[states:])
+        gains = p[constants + 1 : constants + 1 + terms]
+        x = w + creep_step(z, w, gains, decays) + p[constants]
+        return casadi.vertcat(*own, *z), x
 
     def _step(self, sensitive: bool) -> Any:
         """One sample as a Function (state, voltages, constants) -> (state, outputs)."""
         n_p, n_s = self.n_p, self.n_s
-        s, u = casadi.SX.sym("s", n_s), casadi.SX.sym("u", 2)
-        p, decays = casadi.SX.sym("p", n_p), casadi.SX.sym("d", n_s - 1)
+        s, u = casadi.SX.sym("s", n_s), casadi.SX.sym("u", 4 if self._delayed else 2)
+        p, decays = casadi.SX.sym("p", n_p), casadi.SX.sym("d", self._sizes[2])
         constants = casadi.vertcat(p, decays)
         s_next, x = self._equations(s, u, p, decays)
         if not sensitive:
@@ -133,13 +144,12 @@ class Simulation:
         direct = casadi.horzcat(by_p[:, reaching.tolist()], casadi.SX.zeros(n_s, n_s))
         by_s = casadi.jacobian(s_next, s)
         S_next = casadi.densify(casadi.mtimes(by_s, S) + direct)
-        row = casadi.densify(casadi.horzcat(casadi.jacobian(x, p), casadi.SX.zeros(1, n_s)))
+        row = casadi.horzcat(casadi.jacobian(x, p), casadi.SX.zeros(1, n_s))
         row[:, self._carried.tolist()] += casadi.mtimes(casadi.jacobian(x, s), S)
+        outputs = casadi.densify(casadi.vertcat(x, row.T))
         state = casadi.vertcat(s, casadi.vec(S))
         following = casadi.vertcat(s_next, casadi.vec(S_next))
-        return casadi.Function(
-            "step", [state, u, constants], [following, casadi.vertcat(x, row.T)], {"cse": True}
-        )
+        return casadi.Function("step", [state, u, constants], [following, outputs], {"cse": True})
 
     def run(
         self,
@@ -148,6 +158,7 @@ class Simulation:
         s: FloatArray,
         decays: FloatArray,
         *,
+        slope: FloatArray | None = None,
         before: float | None = None,
         sensitive: bool = True,
     ) -> Pass:
@@ -158,21 +169,23 @@ class Simulation:
         u : ndarray, shape (N,)
             Voltage [V].
         p : ndarray, shape (n_p,)
-            (a, b, c, offset, gains...).
+            (constants..., offset, gains..., delay).
         s : ndarray, shape (n_s,)
-            State (w_h, z...) [µm] before the first sample.
+            State before the first sample.
         decays : ndarray, shape (creep terms,)
             exp(-dt/tau_i).
+        slope : ndarray, shape (N,), optional
+            Derivative of the voltage by the delay, where that is a parameter [V].
         before : float, optional
             Voltage before the first sample [V]; default u[0].
         sensitive : bool
             Whether to carry the sensitivities along.
         """
         N, n_p, n_s = u.size, self.n_p, self.n_s
-        voltages = np.empty((N, 2))
-        voltages[:, 1] = u
-        voltages[1:, 0] = u[:-1]
-        voltages[:1, 0] = u[:1] if before is None else before
+        columns = [np.append(u[:1] if before is None else before, u[:-1]), u]
+        if slope is not None:
+            columns += [np.append(slope[:1], slope[:-1]), slope]
+        voltages = np.column_stack(columns)
         state = np.array(s, dtype=np.float64)
         if sensitive:
             start = np.zeros((self._carried.size, n_s))
@@ -190,8 +203,8 @@ class Simulation:
 
 def _lengthened(step: Any) -> list[tuple[int, Any]]:
     """The step for 1000, 50 and 1 samples, longest first."""
-    n, m = step.size1_in(0), step.size1_in(2)
-    state, u = casadi.SX.sym("s", n), casadi.SX.sym("u", 2, UNROLLED)
+    n, v, m = (step.size1_in(i) for i in range(3))
+    state, u = casadi.SX.sym("s", n), casadi.SX.sym("u", v, UNROLLED)
     constants = casadi.SX.sym("c", m)
     now, rows = state, []
     for k in range(UNROLLED):
@@ -200,7 +213,7 @@ def _lengthened(step: Any) -> list[tuple[int, Any]]:
     several = casadi.Function("several", [state, u, constants], [now, casadi.horzcat(*rows)], {"cse": True})
     many = several.mapaccum("many", CHAINED)
     s, c = casadi.MX.sym("s", n), casadi.MX.sym("c", m)
-    U = casadi.MX.sym("u", 2, UNROLLED * CHAINED)
+    U = casadi.MX.sym("u", v, UNROLLED * CHAINED)
     states, outputs = many(s, U, casadi.repmat(c, 1, CHAINED))
     block = casadi.Function("block", [s, U, c], [states[:, -1], outputs])
     return [(UNROLLED * CHAINED, block), (UNROLLED, several), (1, step)]
@@ -230,16 +243,10 @@ def _drive(
             done += length
 
 
-@lru_cache(maxsize=8)
-def simulation(creep_terms: int = 0) -> Simulation:
-    """Simulation with so many creep terms; made once.
-
-    Parameters
-    ----------
-    creep_terms : int
-        Number of creep terms.
-    """
-    return Simulation(creep_terms)
+@lru_cache(maxsize=16)
+def simulation(model: Any, constants: int, creep_terms: int = 0, delayed: bool = False) -> Simulation:
+    """`Simulation` of these arguments; made once."""
+    return Simulation(model, constants, creep_terms, delayed)
 
 
 class Evaluation(NamedTuple):
@@ -291,10 +298,10 @@ def ipopt(
     """
     point = _Point(evaluate)
     n, m = start.size, constraints
-    values = _Part("values", [n], [(1, 1), (m, 1)], lambda e: (e.objective, e.constraints), point)
-    parts = {
-        "grad_f": _Part("grad_f", [n, 0], [(1, 1), (n, 1)], lambda e: (e.objective, e.gradient), point),
-        "jac_g": _Part(
+    values = _Output("values", [n], [(1, 1), (m, 1)], lambda e: (e.objective, e.constraints), point)
+    functions = {
+        "grad_f": _Output("grad_f", [n, 0], [(1, 1), (n, 1)], lambda e: (e.objective, e.gradient), point),
+        "jac_g": _Output(
             "jac_g", [n, 0], [(m, 1), (m, n)], lambda e: (e.constraints, e.constraint_jacobian), point
         ),
         "hess_lag": _Hessian("hess_lag", [n, 0, 1, m], [(n, n)], lambda e: (np.triu(e.hessian),), point),
@@ -303,7 +310,7 @@ def ipopt(
     objective, g = values(z)
     problem: Any = {"x": z, "f": objective, "g": g}
     options: Any = {
-        **parts,
+        **functions,
         "print_time": False,
         "no_nlp_grad": True,
         "ipopt": {
@@ -342,8 +349,8 @@ class _Point:
         return self._value
 
 
-class _Part(casadi.Callback):
-    """Some parts of an `Evaluation` as a CasADi Function of z."""
+class _Output(casadi.Callback):
+    """Something of an `Evaluation` as a CasADi Function of z."""
 
     def __init__(
         self,
@@ -374,7 +381,7 @@ class _Part(casadi.Callback):
         return [casadi.DM(value) for value in chosen]
 
 
-class _Hessian(_Part):
+class _Hessian(_Output):
     """Upper triangle of the objective's Hessian, times its multiplier."""
 
     def get_sparsity_out(self, i: int) -> Any:

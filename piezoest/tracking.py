@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, integer
-from piezoest.estimators.base import NONE, EstimatorBase
+from piezoest.estimators.base import EstimatorBase
+from piezoest.estimators.compiled import NONE
 from piezoest.signals import check_continuity
 from piezoest.supervisor import Supervisor
 
@@ -244,7 +245,7 @@ def track(
             if present is not known:
                 known, theta, names = present, present.theta, present.parameter_names
             history.append(theta)
-            _feed(estimator, voltage[part], measured[part])
+            feed(estimator, voltage[part], measured[part])
             due = bool(getattr(compensator, "hand_over_due", True))
             model = estimator.model if due else present
             if guard is not None:
@@ -299,10 +300,10 @@ def _of_one_kind(history: list[FloatArray]) -> FloatArray:
     return rows
 
 
-def _feed(estimator: Any, u: FloatArray, x: FloatArray) -> None:
+def feed(estimator: Any, u: FloatArray, x: FloatArray) -> None:
     """Give an interval to the estimator; what a run would return is not needed."""
     if isinstance(estimator, EstimatorBase) and type(estimator).run is EstimatorBase.run:
-        estimator._absorb(u, x)
+        estimator.absorb(u, x)
         return
     if hasattr(estimator, "run"):
         estimator.run(u, x)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from piezoest._checks import FloatArray
+from piezoest._checks import FloatArray, instance
 from piezoest.compensators import InverseCompensator, LinearCompensator
 from piezoest.estimators.bank import EstimatorBank
 from piezoest.estimators.base import EstimatorBase
@@ -47,11 +47,8 @@ def warmup(*used: Any) -> float:
     >>> seconds = pz.warmup(pz.HysteresisRLS(50_000.0, delay=1.0))
     """
     for learner in used:
-        if not isinstance(learner, EstimatorBase | EstimatorBank):
-            raise ValueError(
-                f"used must be estimators of piezoest or an EstimatorBank, got {type(learner).__name__}: "
-                "warm up one of your own by a step of it"
-            )
+        expected = "estimators of piezoest or an EstimatorBank: warm up one of your own by a step of it"
+        instance("used", learner, EstimatorBase | EstimatorBank, expected)
     began = time.perf_counter()
     sample_rate = 50_000.0
     u = np.linspace(0.0, 1.0, 8)

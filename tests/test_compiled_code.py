@@ -15,16 +15,16 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from numba import types
 from numba.core.dispatcher import Dispatcher
 
 import piezoest
-from piezoest import _jit
+from piezoest import machine_code
+from piezoest.compile import Compiled, compiled
 
 PACKAGE = Path(piezoest.__file__).parent
 
 
-@_jit.compiled()
+@compiled
 def tripled(x: float) -> float:
     return 3.0 * x
 
@@ -48,37 +48,36 @@ def modules() -> list[ModuleType]:
     return [importlib.import_module(each.name) for each in found if not each.name.endswith("__main__")]
 
 
-def dispatchers() -> dict[str, Any]:
+def compiled_functions() -> dict[str, Compiled]:
     """Every compiled function of the package."""
-    found: dict[str, Any] = {}
+    found: dict[str, Compiled] = {}
     for module in modules():
-        for value in vars(module).values():
-            if isinstance(value, Dispatcher):
-                found[f"{value.py_func.__module__}.{value.py_func.__qualname__}"] = value
+        for name, value in vars(module).items():
+            assert not isinstance(value, Dispatcher), (
+                f"{module.__name__}.{name}: use piezoest.compile.compiled"
+            )
+            if isinstance(value, Compiled):
+                found[f"{value.__module__}.{value.__name__}"] = value
     return found
 
 
-def test_what_is_compiled_stands_at_module_level_and_takes_no_function() -> None:
-    found = dispatchers()
-    assert len(found) > 30
-    for name, dispatcher in found.items():
+def test_what_is_compiled_stands_at_module_level() -> None:
+    found = compiled_functions()
+    assert len(found) > 20
+    for name, function in found.items():
         assert "<locals>" not in name
-        assert isinstance(dispatcher._cache, _jit._MachineCode), f"{name}: use piezoest._jit.compiled"
-        for signature in dispatcher.overloads:
-            assert not any(isinstance(kind, types.FunctionType | types.Dispatcher) for kind in signature), (
-                name
-            )
+        assert isinstance(function.dispatcher._cache, machine_code.MachineCode)
 
     def inner(x: float) -> float:
         return x
 
     with pytest.raises(TypeError, match="inner must stand at module level"):
-        _jit.compiled()(inner)
+        compiled(inner)
 
 
 def functions_of(function: Any, found: set[Any]) -> set[Any]:
     """Functions of the package that a compiled one can call, by the names in its code."""
-    function = inspect.unwrap(getattr(function, "py_func", function))
+    function = inspect.unwrap(getattr(function, "function", function))
     if function in found:
         return found
     found.add(function)
@@ -88,20 +87,26 @@ def functions_of(function: Any, found: set[Any]) -> set[Any]:
         codes += [constant for constant in code.co_consts if inspect.iscode(constant)]
         values = [known.get(name) for name in code.co_names]
         owners = [value for value in values if isinstance(value, ModuleType)]
-        values += [getattr(owner, name, None) for owner in owners for name in code.co_names]
+        values += [vars(owner).get(name) for owner in owners for name in code.co_names]
         for value in values:
-            inner = getattr(value, "py_func", value)
-            if inspect.isfunction(inner) and inner.__module__.startswith("piezoest"):
+            inner = value.function if isinstance(value, Compiled) else value
+            # Also through chains of policies' hooks, which have no file.
+            if inspect.isfunction(inner) and (
+                str(inner.__module__).startswith("piezoest") or inner.__code__.co_filename.startswith("<")
+            ):
                 functions_of(inner, found)
     return found
 
 
 def test_sources_are_all_that_compiled_functions_are_made_of() -> None:
-    known = set(_jit.sources())
+    known = set(machine_code.sources())
     reached: set[Any] = set()
-    for dispatcher in dispatchers().values():
-        functions_of(dispatcher, reached)
+    for function in compiled_functions().values():
+        functions_of(function, reached)
     assert len(reached) > 100
+    hooks = {function for function in reached if function.__module__ == "piezoest.policies.dead_zone"}
+    assert [function.__name__ for function in hooks] == ["permits"]
+    reached = {function for function in reached if not function.__code__.co_filename.startswith("<")}
     missing = {f"{Path(inspect.getfile(f)).name}: {f.__name__}" for f in reached} - {
         f"{Path(inspect.getfile(f)).name}: {f.__name__}" for f in reached if Path(inspect.getfile(f)) in known
     }
@@ -129,17 +134,21 @@ def copy_of_the_package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     [
         ("equations/coleman_hodgdon.py", "def inverse_increment", "# edited\ndef inverse_increment", True),
         ("_checks.py", "WILDEST = 1e9", "WILDEST = 1e8", True),
-        ("compensators/layout.py", "VOLTAGE, W_H", "W_H, VOLTAGE", True),
-        ("estimators/rls_kernel.py", "LEAST = 1e-2", "LEAST = 2e-2", True),
+        ("equations/swing.py", "TURN = 0.1", "TURN = 0.2", True),
+        ("estimators/rls_kernel.py", "LEAST, MARGIN = 1e-2", "LEAST, MARGIN = 2e-2", True),
+        ("policies/dead_zone.py", "information = 0.0", "information = 1.0", True),
+        ("policies/base.py", "def chain", "# edited\ndef chain", True),
+        ("compiled_records.py", "def _place", "# edited\ndef _place", True),
         ("bench/runner.py", "import", "# edited\nimport", False),
         ("estimators/rls.py", "PAPER_MEMORY = 0.4", "PAPER_MEMORY = 0.5", False),
+        ("policies/norm_bound.py", "limit: float = 100.0", "limit: float = 90.0", False),
         ("cli/__init__.py", "import", "# edited\nimport", False),
     ],
 )
 def test_only_an_edit_of_a_source_makes_machine_code_anew(
     copy_of_the_package: Path, file: str, old: str, new: str, changes: bool
 ) -> None:
-    program = "from piezoest import _jit; print(_jit.digest())"
+    program = "from piezoest import machine_code; print(machine_code.digest())"
     before = run(program, copy_of_the_package)
     path = copy_of_the_package / "piezoest" / file
     text = path.read_text(encoding="utf-8")
@@ -153,12 +162,12 @@ def test_only_an_edit_of_a_source_makes_machine_code_anew(
 
 @pytest.fixture
 def kept_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(_jit, "folder", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "folder", lambda: tmp_path)
     return tmp_path
 
 
-def compiled_anew() -> Any:
-    return _jit.compiled()(tripled.py_func)
+def compiled_anew(**options: bool) -> Any:
+    return compiled(tripled.function, **options)
 
 
 def test_a_damaged_file_is_compiled_anew(kept_in: Path) -> None:
@@ -169,11 +178,11 @@ def test_a_damaged_file_is_compiled_anew(kept_in: Path) -> None:
         file.write_bytes(damaged)
         again = compiled_anew()
         assert again(2.0) == 6.0
-        assert sum(again.stats.cache_hits.values()) == 0
+        assert sum(again.dispatcher.stats.cache_hits.values()) == 0
         assert file.read_bytes()[:32] != damaged[:32] or len(damaged) != len(whole)
     again = compiled_anew()
     assert again(2.0) == 6.0
-    assert sum(again.stats.cache_hits.values()) == 1
+    assert sum(again.dispatcher.stats.cache_hits.values()) == 1
     assert [path.name for path in kept_in.iterdir()] == [file.name]
 
 
@@ -183,13 +192,13 @@ def test_other_sources_options_or_versions_are_compiled_anew(
     compiled_anew()(2.0)
     for name, value in (("digest", lambda: "another"), ("_own_source", lambda path: "another")):
         with monkeypatch.context() as changed:
-            changed.setattr(_jit, name, value)
+            changed.setattr(machine_code, name, value)
             again = compiled_anew()
             assert again(2.0) == 6.0
-            assert sum(again.stats.cache_hits.values()) == 0
-    other = _jit.compiled(error_model="numpy")(tripled.py_func)
+            assert sum(again.dispatcher.stats.cache_hits.values()) == 0
+    other = compiled_anew(makes_arrays=True)
     assert other(2.0) == 6.0
-    assert sum(other.stats.cache_hits.values()) == 0
+    assert sum(other.dispatcher.stats.cache_hits.values()) == 0
 
 
 def test_without_a_folder_that_can_be_written_all_works_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -197,10 +206,10 @@ def test_without_a_folder_that_can_be_written_all_works_and_says_so(monkeypatch:
         raise PermissionError
 
     monkeypatch.setattr("tempfile.TemporaryFile", refuse)
-    find: Any = inspect.unwrap(_jit.folder)
+    find: Any = inspect.unwrap(machine_code.folder)
     with pytest.warns(RuntimeWarning, match="name one in NUMBA_CACHE_DIR"):
         assert find() is None
-    monkeypatch.setattr(_jit, "folder", lambda: None)
+    monkeypatch.setattr(machine_code, "folder", lambda: None)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert compiled_anew()(2.0) == 6.0
@@ -299,3 +308,43 @@ def test_an_edited_equation_is_run_by_a_plain_script(copy_of_the_package: Path) 
         assert float(run(program, copy_of_the_package, NUMBA_CACHE_DIR="")) != first
     finally:
         path.write_text(text, encoding="utf-8")
+
+
+def test_an_edit_of_what_a_model_of_ones_own_imports_counts(tmp_path: Path) -> None:
+    names = 'offset: float = 0.0\n    parameter_names = parameter_units = state_names = ("gain",)\n'
+    (tmp_path / "mine.py").write_text(
+        "import helper\nfrom dataclasses import dataclass\n"
+        "from piezoest.compile import inlined\nfrom piezoest.models import StepModel\n"
+        f"@dataclass(frozen=True, slots=True)\nclass Mine(StepModel):\n    gain: float\n    {names}"
+        "@inlined\ndef displacement(state, u_0, u, constants):\n    return helper.twice(u)\n"
+        "@inlined\ndef voltage(state, u_0, x, constants):\n    return x\n"
+    )
+    program = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
+        "from mine import Mine; print(Mine(1.0).simulate([1.0])[0])"
+    )
+    for factor in (2.0, 5.0):
+        text = f"from piezoest.compile import inlined\n@inlined\ndef twice(u):\n    return {factor} * u\n"
+        (tmp_path / "helper.py").write_text(text)
+        assert float(run(program, NUMBA_CACHE_DIR=str(tmp_path / "kept"))) == factor
+
+
+def test_relative_imports_are_found() -> None:
+    text = "import a.b\nfrom . import c\nfrom .d import e\nfrom ..f import g\nfrom h import i\n"
+    found = machine_code._imported_by(text, "top.sub")
+    assert {"a.b", "top.sub.c", "top.sub.d", "top.f", "h", "h.i"} <= found
+
+
+def test_what_was_edited_after_its_import_is_not_kept(tmp_path: Path) -> None:
+    module = tmp_path / "edited.py"
+    text = (
+        "from __future__ import annotations\nfrom piezoest.compile import compiled\n\n\n"
+        "@compiled\ndef f(u: float) -> float:\n    return u + 1.0\n"
+    )
+    module.write_text(text, encoding="utf-8")
+    os.utime(module, (1.0, 1.0))
+    program = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import edited; "
+    edit = f"from pathlib import Path; Path({str(module)!r}).write_text({text.replace('1.0', '100.0')!r}); "
+    kept = str(tmp_path / "kept")
+    assert float(run(program + edit + "print(edited.f(0.0))", NUMBA_CACHE_DIR=kept)) == 1.0
+    assert float(run(program + "print(edited.f(0.0))", NUMBA_CACHE_DIR=kept)) == 100.0

@@ -69,7 +69,9 @@ def test_derivative_of_an_equation() -> None:
 @pytest.mark.parametrize("sensitive", [True, False])
 def test_simulation_is_that_of_the_model(samples: int, sensitive: bool) -> None:
     u = voltage(samples)
-    run = symbolic.simulation().run(u, parameters(), np.array([-0.4]), np.empty(0), sensitive=sensitive)
+    run = symbolic.simulation(pz.ColemanHodgdon, 3).run(
+        u, parameters(), np.array([-0.4]), np.empty(0), sensitive=sensitive
+    )
     x = TRUE.simulate(u, initial_state=-0.4, allow_jumps=True)
     np.testing.assert_allclose(run.x, x, rtol=0.0, atol=1e-12)
     assert run.end[0] == pytest.approx(x[-1] - TRUE.c * u[-1] - TRUE.offset, abs=1e-12)
@@ -78,7 +80,7 @@ def test_simulation_is_that_of_the_model(samples: int, sensitive: bool) -> None:
 def test_simulation_with_creep() -> None:
     creep = pz.Creep([0.02, 0.03], [0.05, 0.5])
     u = voltage()
-    run = symbolic.simulation(2).run(
+    run = symbolic.simulation(pz.ColemanHodgdon, 3, 2).run(
         u, parameters(*creep.gains), np.array([-0.4, 0.0, 0.0]), creep.decays(RATE)
     )
     w = TRUE.simulate(u, initial_state=-0.4, allow_jumps=True) - TRUE.offset
@@ -88,7 +90,7 @@ def test_simulation_with_creep() -> None:
 
 def test_simulation_in_two_parts_is_one() -> None:
     u, s = voltage(), np.array([-0.4])
-    simulation = symbolic.simulation()
+    simulation = symbolic.simulation(pz.ColemanHodgdon, 3)
     whole = simulation.run(u, parameters(), s, np.empty(0))
     first = simulation.run(u[:777], parameters(), s, np.empty(0))
     second = simulation.run(u[777:], parameters(), first.end, np.empty(0), before=u[776])
@@ -102,7 +104,7 @@ def test_simulation_in_two_parts_is_one() -> None:
 def test_sensitivities_are_derivatives() -> None:
     u, decays = voltage(1234), pz.Creep([0.0], [0.05]).decays(RATE)
     p, s = parameters(0.02), np.array([-0.4, 0.1])
-    simulation = symbolic.simulation(1)
+    simulation = symbolic.simulation(pz.ColemanHodgdon, 3, 1)
     run = simulation.run(u, p, s, decays)
     point = np.concatenate([p, s])
     for i in range(point.size):
@@ -123,9 +125,9 @@ def test_sensitivities_are_derivatives() -> None:
     "held", [(), ("alpha",), ("beta",), ("gamma",), ("beta", "gamma"), ("alpha", "gamma"), ("alpha", "beta")]
 )
 def test_coordinates_of_a_model_are_the_model(held: tuple[str, ...]) -> None:
-    varied = coordinates(True, tuple(sorted(held)), 1)
+    varied = coordinates(pz.ColemanHodgdon, tuple(sorted(held)), 1)
     values = np.array([getattr(TRUE, name) for name in sorted(held)])
-    q = varied.of(TRUE, -0.4, np.array([0.02]))
+    q = varied.of(TRUE, {"initial_state": -0.4, "creep_gains[0]": 0.02})
     v, by_q, theta, theta_by_q = varied(q, values)
     np.testing.assert_allclose(v, [TRUE.a, TRUE.b, TRUE.c, 0.3, 0.02, -0.4, 0.0], rtol=1e-12)
     np.testing.assert_allclose(theta, [*TRUE.theta, 0.3, -0.4, 0.02], rtol=1e-12)
@@ -139,15 +141,15 @@ def test_coordinates_of_a_model_are_the_model(held: tuple[str, ...]) -> None:
 
 
 def test_bounds_are_the_admissible_set() -> None:
-    varied = coordinates(True, (), 0)
-    lower, upper = varied.bounds(varied.of(TRUE, 0.0, np.empty(0)))
+    varied = coordinates(pz.ColemanHodgdon, ())
+    lower, upper = varied.bounds(varied.of(TRUE))
     i = varied.free.index("ratio")
     for ratio, inside in ((lower[i], True), (upper[i], True), (0.99, False), (2.01, False)):
         q = np.array([0.021, 0.147, ratio, 0.0, 0.0])
         _, _, theta, _ = varied(q, np.empty(0))
         assert pz.ColemanHodgdon.from_theta(theta[:3]).is_admissible == inside
     outside = pz.ColemanHodgdon(0.021, 0.147, 0.0063 * 1.2)
-    q = varied.of(outside, 0.0, np.empty(0))
+    q = varied.of(outside)
     assert np.all((lower <= q) & (q <= upper))
 
 

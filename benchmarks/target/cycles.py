@@ -45,9 +45,9 @@ def registers(operands: str) -> int:
     """Number of registers in a list."""
     found = re.search(r"\{([^}]*)\}", operands)
     total = 0
-    for part in (found[1] if found else "").split(","):
-        ends = [int(number) for number in re.findall(r"\d+", part)]
-        total += ends[1] - ends[0] + 1 if "-" in part and len(ends) == 2 else 1
+    for span in (found[1] if found else "").split(","):
+        ends = [int(number) for number in re.findall(r"\d+", span)]
+        total += ends[1] - ends[0] + 1 if "-" in span and len(ends) == 2 else 1
     return total
 
 

@@ -165,10 +165,12 @@ def emulate(firmware: Path, *options: str) -> str:
 def run(firmware: Path, precision: str) -> tuple[Any, int]:
     """Voltages and bytes of stack."""
     text = emulate(firmware)
-    digits, kind, whole = (8, np.float32, np.uint32) if precision == "float" else (16, np.float64, np.uint64)
+    digits, number, whole = (
+        (8, np.float32, np.uint32) if precision == "float" else (16, np.float64, np.uint64)
+    )
     before, after = text.split("stack ")
     words = re.findall(rf"^[0-9a-f]{{{digits}}}$", before, re.M)
-    voltages = np.array([int(word, 16) for word in words], whole).view(kind).astype(np.float64)
+    voltages = np.array([int(word, 16) for word in words], whole).view(number).astype(np.float64)
     return voltages, int(after.split()[0], 16)
 
 

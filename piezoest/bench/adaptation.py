@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from piezoest.bench.candidates import candidate
+from piezoest.bench.cases import Case
 from piezoest.bench.estimators import REFERENCE, find_estimators
 from piezoest.bench.executors import in_processes
 from piezoest.bench.metrics import Metrics, measure
-from piezoest.bench.scenarios import SCENARIOS, Case
+from piezoest.bench.scenarios import SCENARIOS
 from piezoest.compensators import InverseCompensator, LinearCompensator, VoltageLimits
 from piezoest.estimators.rls import HysteresisRLS
 from piezoest.models import LinearGain
@@ -41,7 +42,7 @@ class Job:
     estimators : tuple of str
         As `piezoest.bench.candidates.candidate` reads them.
     overrides : dict
-        Fields of `piezoest.bench.scenarios.Conditions`.
+        Fields of `piezoest.bench.cases.Conditions`.
     guard : bool
         Whether the supervisor of the ring is on.
     title : str, optional
@@ -186,7 +187,7 @@ def jobs_for(
     seeds : iterable of int
         Starts of the random numbers.
     overrides : dict
-        Fields of `piezoest.bench.scenarios.Conditions`.
+        Fields of `piezoest.bench.cases.Conditions`.
 
     Returns
     -------
@@ -335,10 +336,11 @@ def json_safe(value: Any) -> Any:
     value : object
         Of dictionaries, lists, tuples and plain values.
     """
-    if isinstance(value, dict):
-        return {key: json_safe(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [json_safe(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
+    match value:
+        case dict():
+            return {key: json_safe(item) for key, item in value.items()}
+        case list() | tuple():
+            return [json_safe(item) for item in value]
+        case float() if not math.isfinite(value):
+            return None
     return value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,6 +13,7 @@ from rich.console import Console
 
 from piezoest._errors import INTERRUPTED
 from piezoest._files import write_text
+from piezoest._options import grouped
 from piezoest.bench.origin import origin
 from piezoest.bench.shared import Html, check_html, json_target, progress, write_html
 
@@ -22,31 +24,42 @@ EPILOG = (
 )
 
 
-def adaptation(
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Runs:
+    """What is run."""
+
     scenario: Annotated[
-        list[str] | None, typer.Option("--scenario", help="Only this one; may be repeated. Default all.")
-    ] = None,
+        list[str] | None,
+        typer.Option("--scenario", "-s", help="Only this one; may be repeated. Default all."),
+    ] = None
     estimator: Annotated[
         list[str] | None,
         typer.Option(
             "--estimator",
+            "-e",
             metavar="NAME|MODULE:CLASS",
             help='May be repeated, and have arguments: "HysteresisRLS(memory=0.4)".',
         ),
-    ] = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Runs of each scenario and estimator.")] = 5,
+    ] = None
+    seeds: Annotated[int, typer.Option(min=1, help="Runs of each scenario and estimator.")] = 5
     sample_rate: Annotated[
         float,
         typer.Option(min=2000.0, help="Hz; at 20 000 and below the stage leaves its filters out."),
-    ] = 50_000.0,
-    periods: Annotated[int, typer.Option(min=4, help="Of the reference, after the change.")] = 15,
+    ] = 50_000.0
+    periods: Annotated[int, typer.Option(min=4, help="Of the reference, after the change.")] = 15
+
+
+@grouped
+def adaptation(
+    runs: Runs,
+    *,
     json_to: Annotated[
         str | None,
         typer.Option("--json", metavar="FILE", help="Write JSON; - prints it instead of the tables."),
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default one for each core.")] = None,
     html: Html = None,
-    asked: Annotated[
+    targets: Annotated[
         bool,
         typer.Option(
             "--asked", help="All that is asked of the default estimator, on the scenarios that tell."
@@ -69,32 +82,32 @@ def adaptation(
     Errors are those of the true displacement in the ring of the simulated stage and the inverse
     compensator, 5 µm at 5 Hz where nothing else is said.
     """
-    if asked and (scenario or estimator or policies):
+    if targets and (runs.scenario or runs.estimator or policies):
         raise typer.BadParameter("goes without --scenario, --estimator and --policies", param_hint="--asked")
-    if policies and estimator:
+    if policies and runs.estimator:
         raise typer.BadParameter("goes without --estimator", param_hint="--policies")
     if figures is not None and not policies:
         raise typer.BadParameter("goes with --policies", param_hint="--figures")
     target = json_target(json_to)
     check_html(html)
     began = time.perf_counter()
-    overrides = {"sample_rate": sample_rate, "after": periods}
+    overrides = {"sample_rate": runs.sample_rate, "after": runs.periods}
     try:
         with progress() as say:
             say("loading (compiles once after the installation)")
             from piezoest.bench.adaptation import in_parallel
 
-            work = _work(scenario, estimator, seeds, overrides, asked=asked, policies=policies)
-            runs: list[Any] = []
+            work = _work(runs, overrides, targets=targets, policies=policies)
+            found: list[Any] = []
             for done, some in enumerate(in_parallel(work, jobs), 1):
-                runs += some
+                found += some
                 # Some fifty lines where stderr is a file.
                 if done * 50 // len(work) > (done - 1) * 50 // len(work):
                     say(f"{done} of {len(work)} cases, {time.perf_counter() - began:.0f} s")
     except KeyboardInterrupt:
         raise typer.Exit(INTERRUPTED) from None
-    head = {**origin(began), "seeds": seeds}
-    document = _document(runs, head, overrides, single=single)
+    head = {**origin(began), "seeds": runs.seeds}
+    document = _document(found, head, overrides, single=single)
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     write_html(document, html)
     if figures is not None:
@@ -113,28 +126,20 @@ def adaptation(
         typer.echo(f"JSON: {target}")
 
 
-def _work(
-    scenario: list[str] | None,
-    estimator: list[str] | None,
-    seeds: int,
-    overrides: dict[str, Any],
-    *,
-    asked: bool,
-    policies: bool,
-) -> list[Any]:
-    """Jobs for what was asked for."""
+def _work(runs: Runs, overrides: dict[str, Any], *, targets: bool, policies: bool) -> list[Any]:
+    """Jobs of the options."""
     from piezoest.bench.adaptation import default_estimators, jobs_for
-    from piezoest.bench.asked import jobs_asked
     from piezoest.bench.combinations import COMBINATIONS
     from piezoest.bench.scenarios import SCENARIOS
+    from piezoest.bench.targets import target_jobs
 
-    if asked:
-        return list(jobs_asked(seeds, overrides))
-    chosen = estimator or default_estimators()
+    if targets:
+        return list(target_jobs(runs.seeds, overrides))
+    chosen = runs.estimator or default_estimators()
     if policies:
         chosen = [one.estimator for one in COMBINATIONS]
     try:
-        return list(jobs_for(scenario or list(SCENARIOS), chosen, range(seeds), overrides))
+        return list(jobs_for(runs.scenario or list(SCENARIOS), chosen, range(runs.seeds), overrides))
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
 
@@ -143,8 +148,8 @@ def _document(
     runs: list[Any], origin: dict[str, Any], overrides: dict[str, Any], *, single: bool
 ) -> dict[str, Any]:
     from piezoest.bench.adaptation import place, summarise
-    from piezoest.bench.asked import criteria, describe
     from piezoest.bench.estimators import REFERENCE
+    from piezoest.bench.targets import criteria, describe
 
     runs = sorted(runs, key=lambda run: (place(run.scenario), run.seed))
     summary = summarise(runs)

@@ -22,7 +22,7 @@ KEY = (
     f"≤ {SOON}: part of the runs that settled within so many periods. Settles: periods until every "
     "further error is below 1.2 % of the amplitude. Worst: largest error after the change. Settled: that "
     "of the last three periods. /linear: over linear feed-forward's in the same run; settled, and in the "
-    "worst period but the first. Moved: largest deviation of a parameter from its final value, in parts of "
+    "worst period but the first. Moved: largest deviation of a parameter from its final value, relative to "
     "it. Diverged: largest error after the first period above 1.5 times linear feed-forward's.",
 )
 
@@ -49,7 +49,7 @@ def print_report(document: dict[str, Any], console: Any) -> None:
         table.add_row(*UNITS, style="dim", end_section=True)
         for row in document["summary"]:
             if row["scenario"] == name:
-                table.add_row(*_cells(row))
+                table.add_row(*cells(row))
         console.print(table)
     for line in (
         *KEY,
@@ -64,7 +64,8 @@ def print_report(document: dict[str, Any], console: Any) -> None:
         console.print(f"failed: {failure}", style="red", highlight=False, markup=False, soft_wrap=True)
 
 
-def _cells(row: Row) -> list[str]:
+def cells(row: Row) -> list[str]:
+    """Cells of a scenario's row in the table."""
     numbers = [_pair(row[quantity], digits) for _, quantity, digits in COLUMNS]
     settled = f"{100.0 * row['settled_soon']:.0f} %"
     # Two lines each, so there is room for the arguments below the name.

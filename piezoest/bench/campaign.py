@@ -181,7 +181,7 @@ class _Group:
         self.diverged += failed or bool(row["diverged"])
         self.settled += row["settling_periods"] is not None
         for name in (*QUANTITIES, "ratio"):
-            self.values.setdefault(name, array("d")).append(worth(row, name))
+            self.values.setdefault(name, array("d")).append(value_of(row, name))
         if row["microseconds"] is not None:
             self.values.setdefault("microseconds", array("d")).append(row["microseconds"])
         if not failed:
@@ -189,7 +189,7 @@ class _Group:
             self.errors.append(array("d", (math.inf if e is None else e for e in row["errors"])))
 
 
-def worth(row: Row, quantity: str) -> float:
+def value_of(row: Row, quantity: str) -> float:
     """A number of a run; infinite where it failed, did not settle or left all bounds.
 
     Parameters

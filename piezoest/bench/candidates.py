@@ -75,9 +75,10 @@ def _arguments(text: str) -> dict[str, Any]:
         call = ast.parse("_" + text[text.index("(") :].strip(), mode="eval").body
     except SyntaxError as error:
         raise ValueError(f"{text}: {error.msg}") from None
-    if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name):
-        raise ValueError(f"{text}: write it as Name(argument=value, ...)")
-    return _keywords(call, text)
+    match call:
+        case ast.Call(func=ast.Name()):
+            return _keywords(call, text)
+    raise ValueError(f"{text}: write it as Name(argument=value, ...)")
 
 
 def _keywords(call: ast.Call, text: str) -> dict[str, Any]:
@@ -87,16 +88,21 @@ def _keywords(call: ast.Call, text: str) -> dict[str, Any]:
 
 
 def _value(node: ast.expr, text: str) -> Any:
-    if isinstance(node, ast.Tuple | ast.List):
-        return tuple(_value(item, text) for item in node.elts)
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-        if node.func.id not in policies.__all__:
-            raise ValueError(f"{text}: {node.func.id} is no policy: choose of {', '.join(policies.__all__)}")
-        try:
-            return getattr(policies, node.func.id)(**_keywords(node, text))
-        except TypeError as error:
-            raise ValueError(f"{text}: {error}") from None
+    match node:
+        case ast.Tuple(elts=items) | ast.List(elts=items):
+            return tuple(_value(item, text) for item in items)
+        case ast.Call(func=ast.Name(id=name)):
+            return _policy(name, _keywords(node, text), text)
     try:
         return ast.literal_eval(node)
     except ValueError:
         raise ValueError(f"{text}: {ast.unparse(node)} is no number, string, tuple or policy") from None
+
+
+def _policy(name: str, arguments: dict[str, Any], text: str) -> Any:
+    if name not in policies.__all__:
+        raise ValueError(f"{text}: {name} is no policy: choose of {', '.join(policies.__all__)}")
+    try:
+        return getattr(policies, name)(**arguments)
+    except TypeError as error:
+        raise ValueError(f"{text}: {error}") from None

@@ -21,7 +21,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.bench.adaptation import json_safe
-from piezoest.bench.campaign import QUANTITIES, title, worth
+from piezoest.bench.campaign import QUANTITIES, title, value_of
 from piezoest.bench.runner import Row
 
 LEVEL = 0.05  # false discovery rate
@@ -113,7 +113,7 @@ def logarithms(pairs: Sequence[Pair], quantity: str) -> FloatArray:
     -------
     ndarray, shape (N,)
     """
-    values = np.array([[worth(row, quantity) for row in pair] for pair in pairs]).reshape(-1, 2)
+    values = np.array([[value_of(row, quantity) for row in pair] for pair in pairs]).reshape(-1, 2)
     a, b = values[:, 0], values[:, 1]
     same = (a == b) | (np.isinf(a) & np.isinf(b))
     # A settling time may be zero: so is the ratio of two of them one, and that to another infinite.

@@ -1,12 +1,15 @@
 """Every policy of adaptation in a combination that makes sense, to be put on the scenarios.
 
-`HysteresisRLS` alone is `policies.RandomWalk`, `DeadZone` and `OutlierRejection`, and learns an offset;
-so do the others here, that the policies make the difference and not the model.
+One that no combination here is about is put beside the default. `HysteresisRLS` alone is
+`policies.RandomWalk`, `DeadZone` and `OutlierRejection`, and learns an offset; so do the others here, that
+the policies make the difference and not the model.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+from piezoest.policies.base import REGISTERED, Policy
 
 REST = "DeadZone(), OutlierRejection()"  # what is in the default beside the forgetting
 
@@ -30,7 +33,7 @@ class Combination:
     estimator: str
 
 
-def _clocked(policies: str) -> str:
+def _by_period(policies: str) -> str:
     return f"HysteresisRLS(policies=({policies}))"
 
 
@@ -38,11 +41,11 @@ def _seconds(memory: float | None, policies: str) -> str:
     return f"HysteresisRLS(memory={memory}, offset=True, policies=({policies}))"
 
 
-COMBINATIONS: tuple[Combination, ...] = (
+_CHOSEN = (
     Combination("RandomWalk", "the default", "HysteresisRLS"),
-    Combination("no OutlierRejection", "else the default", _clocked("RandomWalk(), DeadZone()")),
-    Combination("no DeadZone", "else the default", _clocked("RandomWalk(), OutlierRejection()")),
-    Combination("Projection", "and the default", _clocked(f"RandomWalk(), {REST}, Projection()")),
+    Combination("no OutlierRejection", "else the default", _by_period("RandomWalk(), DeadZone()")),
+    Combination("no DeadZone", "else the default", _by_period("RandomWalk(), OutlierRejection()")),
+    Combination("Projection", "and the default", _by_period(f"RandomWalk(), {REST}, Projection()")),
     Combination("Forgetting", "0.4 s, nothing else", _seconds(0.4, "")),
     Combination("NormBound", "Forgetting of 0.4 s", _seconds(0.4, "NormBound(),")),
     Combination(
@@ -52,9 +55,9 @@ COMBINATIONS: tuple[Combination, ...] = (
         "Normalisation", "continuous time, 0.4 s",
         "HysteresisRLS(memory=0.4, offset=True, time_base='continuous')",
     ),
-    Combination("PeriodicForgetting", "2 periods", _clocked(f"PeriodicForgetting(memory=2.0), {REST}")),
-    Combination("DirectionalForgetting", "1 period", _clocked(f"DirectionalForgetting(), {REST}")),
-    Combination("VariableForgetting", "1 to 0.1 periods", _clocked(f"VariableForgetting(), {REST}")),
+    Combination("PeriodicForgetting", "2 periods", _by_period(f"PeriodicForgetting(memory=2.0), {REST}")),
+    Combination("DirectionalForgetting", "1 period", _by_period(f"DirectionalForgetting(), {REST}")),
+    Combination("VariableForgetting", "1 to 0.1 periods", _by_period(f"VariableForgetting(), {REST}")),
     Combination("no forgetting", "DeadZone", _seconds(None, "DeadZone(),")),
     Combination(
         "CovarianceResetting", "no forgetting, DeadZone",
@@ -68,3 +71,15 @@ COMBINATIONS: tuple[Combination, ...] = (
     ),
     Combination("AmplitudeMemory", "1 s, DeadZone", _seconds(1.0, "DeadZone(), AmplitudeMemory()")),
 )  # fmt: skip
+
+
+def _with_the_default(policy: type[Policy]) -> Combination:
+    name, forgetting = policy.__name__, "" if policy.forgets else "RandomWalk(), "
+    return Combination(name, "and the default", _by_period(f"{forgetting}{REST}, {name}()"))
+
+
+_NAMED = " ".join(f"{one.name} {one.estimator}" for one in _CHOSEN)
+COMBINATIONS: tuple[Combination, ...] = (
+    *_CHOSEN,
+    *(_with_the_default(policy) for policy in REGISTERED.values() if policy.__name__ not in _NAMED),
+)

@@ -100,7 +100,7 @@ def _until_death(
                 try:
                     under_way[pool.submit(work, item)] = item
                 except BrokenProcessPool:
-                    # Another one's death, seen before it could be told.
+                    # Another one's death, seen before it could be known.
                     queue.put_back(item)
                     break
             if not under_way:

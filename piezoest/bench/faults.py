@@ -88,9 +88,9 @@ class Fault:
         return r if self.reference_factor == 1.0 else self.reference_factor * r
 
 
-def _around(kind: Callable[..., FaultyStage], **arguments: float) -> Callable[..., FaultyStage]:
+def _on(fault: Callable[..., FaultyStage], **arguments: float) -> Callable[..., FaultyStage]:
     def stage(make: Callable[[float], Any], sample_rate: float, seed: int) -> FaultyStage:
-        return kind(make(sample_rate), **arguments, seed=seed)
+        return fault(make(sample_rate), **arguments, seed=seed)
 
     return stage
 
@@ -99,9 +99,7 @@ def _wrong_rate(make: Callable[[float], Any], sample_rate: float, seed: int) -> 
     return WrongRate(make(sample_rate / 1.1), 1.1, seed=seed)
 
 
-NONE = Fault(
-    "none", "Nothing is wrong.", "What there is to compare with.", _around(FaultyStage), recovers=True
-)
+NONE = Fault("none", "Nothing is wrong.", "What there is to compare with.", _on(FaultyStage), recovers=True)
 
 BEGINS = 1.0  # s: five periods at 5 Hz, most of what there is to learn
 
@@ -113,71 +111,71 @@ FAULTS: dict[str, Fault] = {
             "missing-1", "1 % of the samples missing.",
             "A sample without a reading is counted and teaches nothing; the model stays, the voltage "
             "goes on.",
-            _around(Missing, part=0.01), recovers=True,
+            _on(Missing, share=0.01), recovers=True,
         ),
         Fault(
             "missing-50", "Half of the samples missing.",
             "The same; the samples that are left are enough.",
-            _around(Missing, part=0.5), recovers=True,
+            _on(Missing, share=0.5), recovers=True,
         ),
         Fault(
             "gap", "No samples for 1 s.",
             "The compensator keeps its model, and learning goes on with the first readings.",
-            _around(Gap, start=BEGINS), ends=BEGINS + 1.0, recovers=True,
+            _on(Gap, start=BEGINS), ends=BEGINS + 1.0, recovers=True,
         ),
         Fault(
             "spikes", "Five spikes of 10 µm a second.",
             "What the stage cannot have made is left out. An estimator that takes it is misled; the "
             "guard keeps the model in use, or a line.",
-            _around(Spikes), recovers=True,
+            _on(Spikes), recovers=True,
         ),
         Fault(
             "stuck", "The reading stands still for 1 s.",
             "A reading that does not change while the voltage moves is left out. An estimator that "
             "takes it is misled; the guard keeps the model in use, or a line.",
-            _around(Stuck, start=BEGINS), ends=BEGINS + 1.0, recovers=True,
+            _on(Stuck, start=BEGINS), ends=BEGINS + 1.0, recovers=True,
         ),
         Fault(
             "adc-saturation", "The converter ends at 4 µm.",
             "Readings at the end of the range stand still and are left out; the model is that of the "
             "rest of the loop, and misses more where nothing is read.",
-            _around(Saturation, limit=4.0),
+            _on(Saturation, limit=4.0),
         ),
         Fault(
             "gauge-sign", "The gauge is wired the wrong way round.",
             "Nothing in the ring can know: it does what makes the gauge right, and the stage goes the "
             "wrong way. Within the voltage limits, with the guard and without.",
-            _around(Factor, factor=-1.0),
+            _on(Factor, factor=-1.0),
         ),
         Fault(
             "voltage-sign", "The amplifier is wired the wrong way round.",
             "An admissible model rises with the voltage, so none fits, and the voltage goes to its "
             "limits. The guard keeps the model in use: it turns no gain round.",
-            _around(WeakAmplifier, limit=100.0, factor=-1.0),
+            _on(WeakAmplifier, limit=100.0, factor=-1.0),
         ),
         Fault(
             "wrong-unit", "Readings in nm, taken for µm.",
             "The stage seems a thousand times as sensitive: it hardly moves, or the voltage goes to its "
             "limits where no admissible model is found. The guard keeps it from the latter.",
-            _around(Factor, factor=1000.0),
+            _on(Factor, factor=1000.0),
         ),
         Fault(
             "offset-step", "The gauge's zero moves by 0.5 µm.",
             "The gauge is believed: an estimator that learns an offset takes the stage along by it, and "
             "settles.",
-            _around(OffsetStep, start=BEGINS), recovers=True, carried=0.5,
+            _on(OffsetStep, start=BEGINS), recovers=True, carried=0.5,
         ),
         Fault(
             "voltage-saturation", "The amplifier ends at 25 V and does not say so.",
             "The stage does not get where the reference is, and a model of voltages that never came is "
             "wrong; once the guard sees that, a line takes its place.",
-            _around(WeakAmplifier, limit=25.0),
+            _on(WeakAmplifier, limit=25.0),
         ),
         Fault(
             "out-of-range", "A reference four times as large, which the stage cannot reach.",
             "The voltage stays at its limits, the compensator says so, and the error is at least what "
             "is out of reach.",
-            _around(FaultyStage), reference_factor=4.0,
+            _on(FaultyStage), reference_factor=4.0,
         ),
         Fault(
             "wrong-rate", "The samples are 10 % slower than everyone believes.",

@@ -109,18 +109,18 @@ class Missing(FaultyStage):
     ----------
     stage : object
         See `FaultyStage`.
-    part : float
+    share : float
         Of the samples that are missing, within [0, 1].
     seed : int
         Start of the random numbers.
     """
 
-    def __init__(self, stage: Any, part: float, *, seed: int = 0) -> None:
-        self._part = fraction("part", part)
+    def __init__(self, stage: Any, share: float, *, seed: int = 0) -> None:
+        self._share = fraction("share", share)
         super().__init__(stage, seed=seed)
 
     def _reading(self, x: FloatArray) -> FloatArray:
-        return np.where(self._generator.random(x.size) < self._part, np.nan, x)
+        return np.where(self._generator.random(x.size) < self._share, np.nan, x)
 
 
 class Gap(FaultyStage):

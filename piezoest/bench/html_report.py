@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from piezoest import _extras
+from piezoest._checks import dictionary
 from piezoest.bench import adaptation_report, paper_report, suite_report
 from piezoest.bench.adaptation import SOON
 from piezoest.report import Page
@@ -40,8 +42,9 @@ def write_html(document: Document, path: str | Path) -> None:
         If the file cannot be written.
     """
     suite = document.get("suite")
-    if not isinstance(suite, str):
+    if suite is None:
         raise ValueError("document has no suite: pass what piezoest bench writes with --json")
+    suite = str(suite)
     page = Page(TITLES.get(suite, f"piezoest bench {suite}"), _origin(document))
     PAGES.get(suite, _any)(page, document)
     versions = ", ".join(f"{name} {version}" for name, version in document.get("versions", {}).items())
@@ -56,10 +59,10 @@ def _origin(document: Document) -> str:
         str(machine.get("cpu", "")),
         f"{machine['cores']} cores" if "cores" in machine else "",
         str(machine.get("python", "")),
-        "" if seeds is None else f"seeds: {len(seeds) if isinstance(seeds, list) else seeds}",
+        "" if seeds is None else f"seeds: {len(seeds) if hasattr(seeds, '__len__') else seeds}",
         f"{document['seconds']:.0f} s" if "seconds" in document else "",
     ]
-    return ", ".join(part for part in parts if part) + "."
+    return ", ".join(text for text in parts if text) + "."
 
 
 def _go() -> Any:
@@ -69,7 +72,7 @@ def _go() -> Any:
 def _colours(names: Iterable[str]) -> dict[str, str]:
     """One colour for each name, grey for linear feed-forward."""
     distinct = [name for name in dict.fromkeys(names) if name != REFERENCE]
-    return {REFERENCE: "#8a8f98", **{name: COLOURS[i % len(COLOURS)] for i, name in enumerate(distinct)}}
+    return {REFERENCE: "#8a8f98", **dict(zip(distinct, itertools.cycle(COLOURS), strict=False))}
 
 
 # ---------------------------------------------------------------- adaptation
@@ -118,7 +121,7 @@ def _summary_table(page: Page, rows: Sequence[Row]) -> None:
     heading = ["estimator", f"settled\n≤ {SOON} periods"]
     heading += [title for title, _, _ in adaptation_report.COLUMNS] + ["diverged"]
     page.table(
-        heading, [[cell.replace("\n", " · ") for cell in adaptation_report._cells(row)] for row in rows]
+        heading, [[cell.replace("\n", " · ") for cell in adaptation_report.cells(row)] for row in rows]
     )
 
 
@@ -324,15 +327,14 @@ def _ratios(entries: Sequence[Row]) -> Any:
 def _any(page: Page, document: Document) -> None:
     """Every list of flat rows as a table, and as bars of its first number by its first words."""
     for key, rows in document.items():
-        if not (isinstance(rows, list) and rows and all(isinstance(row, dict) for row in rows)):
-            continue
-        columns = [name for name, value in rows[0].items() if not isinstance(value, dict | list)]
-        words = [name for name in columns if isinstance(rows[0][name], str)]
-        numbers = [
-            name
-            for name in columns
-            if isinstance(rows[0][name], int | float) and not isinstance(rows[0][name], bool)
-        ]
+        match rows:
+            case [{**first}, *rest] if all(map(dictionary, rest)):
+                sorts = {str(name): _sort(value) for name, value in first.items()}
+            case _:
+                continue
+        columns = [name for name, sort in sorts.items() if sort != "nested"]
+        words = [name for name in columns if sorts[name] == "word"]
+        numbers = [name for name in columns if sorts[name] == "number"]
         page.heading(key.replace("_", " "))
         if words and numbers:
             figure = _go().Figure()
@@ -350,17 +352,29 @@ def _any(page: Page, document: Document) -> None:
         )
 
 
+def _sort(value: Any) -> str:
+    """What a value of JSON is to a table."""
+    match value:
+        case dict() | list():
+            return "nested"
+        case str():
+            return "word"
+        case None | bool():
+            return "mark"
+    return "number"
+
+
 def _cell(value: Any) -> str:
-    if isinstance(value, bool):
-        return "✓" if value else "✗"
-    return _short(value) if value is None or isinstance(value, int | float) else str(value)
+    if _sort(value) == "mark":
+        return {None: "—", True: "✓", False: "✗"}[value]
+    return _short(value) if _sort(value) == "number" else str(value)
 
 
 def _short(value: float | None) -> str:
-    """Three significant digits."""
+    """Three significant digits, and whole numbers in full."""
     if value is None or not math.isfinite(value):
         return "—"
-    return f"{value:.0f}" if isinstance(value, int) or abs(value) >= 100.0 else f"{value:.3g}"
+    return f"{value:.0f}" if type(value) is int or abs(value) >= 100.0 else f"{value:.3g}"
 
 
 PAGES: dict[str, Callable[[Page, Document], None]] = {

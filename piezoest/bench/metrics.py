@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.bench.scenarios import Case
+from piezoest.bench.cases import Case
 from piezoest.tracking import TrackingRecord
 
 SETTLED = 0.012  # of the amplitude: the level at which the paper's own method settles
@@ -33,7 +33,7 @@ class Metrics:
     settled_max, settled_rms : float
         Largest and root mean square error of the last three periods [µm].
     excursion : float
-        Largest deviation of a parameter from its final value after the change, in parts of
+        Largest deviation of a parameter from its final value after the change, relative to
         that.
     linear_settled_max : float
         `settled_max` of linear feed-forward in the same run [µm].
@@ -105,7 +105,8 @@ def measure(record: TrackingRecord, linear: TrackingRecord, case: Case) -> Metri
     if after.size < 2:
         raise ValueError(f"the record of {error.size} samples ends within a period of {case.period:g}")
     errors = largest(error, after)
-    tail = slice(int(after[-1 - min(LAST_PERIODS, errors.size)]), int(after[-1]))
+    periods = min(LAST_PERIODS, errors.size)
+    tail = slice(int(after[-1 - periods]), int(after[-1]))
     settled = float(np.max(error[tail]))
     linear_settled = float(np.max(linear_error[tail]))
     # Windows of a period on both sides of the change; those within the run's first period do not count.
@@ -204,7 +205,7 @@ def largest(error: FloatArray, edges: np.ndarray[tuple[int], np.dtype[np.int64]]
 
 
 def deviation(theta: FloatArray, level: FloatArray) -> float:
-    """Largest deviation of a parameter from a level, in parts of that; 0 without parameters.
+    """Largest deviation of a parameter from a level, relative to that; 0 without parameters.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ class Reference:
 
     Parameters
     ----------
-    kind : {"triangle", "prbs"}
+    shape : {"triangle", "prbs"}
         Smoothed triangle, or filtered pseudo-random binary signal.
     amplitude : float
         Nominal [µm].
@@ -56,14 +56,14 @@ class Reference:
         Of the triangle [Hz].
     """
 
-    kind: Literal["triangle", "prbs"]
+    shape: Literal["triangle", "prbs"]
     amplitude: float
     frequency: float = 0.0
 
     @property
     def name(self) -> str:
         """Name of the row in Tables I and II."""
-        return PRBS_ROW if self.kind == "prbs" else triangle_row(self.amplitude, self.frequency)
+        return PRBS_ROW if self.shape == "prbs" else triangle_row(self.amplitude, self.frequency)
 
     def signal(self, seconds: float) -> signals.Signal:
         """Whole periods that take at least `seconds`, from rest at zero.
@@ -73,7 +73,7 @@ class Reference:
         seconds : float
             [s].
         """
-        if self.kind == "prbs":
+        if self.shape == "prbs":
             period = signals.prbs(self.amplitude, sample_rate=SAMPLE_RATE, start="zero")
             return period.repeat(math.ceil(seconds / period.duration - 1e-9))
         periods = math.ceil(seconds * self.frequency - 1e-9)
@@ -125,10 +125,11 @@ class Experiment:
 
     def run(self) -> Run:
         """Run it."""
+        model: Any = self.model
         compensator = (
-            LinearCompensator(self.model)
-            if isinstance(self.model, LinearGain)
-            else InverseCompensator(self.model, hand_over=HAND_OVER)
+            LinearCompensator(model)
+            if self.compensation == "linear"
+            else InverseCompensator(model, hand_over=HAND_OVER)
         )
         estimator = (
             None

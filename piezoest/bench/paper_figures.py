@@ -46,9 +46,10 @@ def write_figures(result: PaperResult, folder: Path) -> list[Path]:
 
 
 def _figures(result: PaperResult) -> Iterator[tuple[str, Figure]]:
-    yield "figure3", input_output_map(result.inverse[SWEPT.name])
-    yield "figure4", triangle_tracking(result.linear[SWEPT.name], result.inverse[SWEPT.name])
-    yield "figure5", prbs_tracking(result.linear[PRBS.name], result.inverse[PRBS.name])
+    triangle, prbs = SWEPT.name, PRBS.name
+    yield "figure3", input_output_map(result.inverse[triangle])
+    yield "figure4", triangle_tracking(result.linear[triangle], result.inverse[triangle])
+    yield "figure5", prbs_tracking(result.linear[prbs], result.inverse[prbs])
     yield "adaptation", adaptation(result)
     if result.sweep:
         yield "memory", error_against_memory(result)

@@ -29,7 +29,7 @@ CALIBRATION, HELD_OUT = "calibration", "held out"
 KEY = "✓ within its bound, ✗ outside; numbers without a mark have none."
 
 
-def kind(entry: Entry) -> str:
+def use_of(entry: Entry) -> str:
     """Whether the calibration of the stage saw the number."""
     return HELD_OUT if entry["held_out"] else CALIBRATION
 
@@ -53,7 +53,7 @@ def table(entries: Iterable[Entry], number: str) -> tuple[Cells, list[Cells]]:
         ordered = [cells[quantity] for quantity in quantities]
         body += [
             [row, "paper", *(f"{entry['value']:g}" for entry in ordered)],
-            [kind(first), "ours", *(_digits(entry["ours"]) for entry in ordered)],
+            [use_of(first), "ours", *(_digits(entry["ours"]) for entry in ordered)],
             ["", "ratio", *(_ratio(entry) for entry in ordered)],
         ]
     return ["reference", "", *(HEADINGS[quantity] for quantity in quantities)], body
@@ -63,7 +63,7 @@ def verdict(entries: list[Entry]) -> list[str]:
     """How many numbers are within their bounds, and which are not, as sentences."""
     sentences = []
     for name in (CALIBRATION, HELD_OUT):
-        bounded = [entry for entry in entries if entry["within"] is not None and kind(entry) == name]
+        bounded = [entry for entry in entries if entry["within"] is not None and use_of(entry) == name]
         met = sum(entry["within"] for entry in bounded)
         sentences.append(f"{name.capitalize()}: {met} of {len(bounded)} numbers within their bounds.")
     sentences += [_miss(entry) for entry in entries if entry["within"] is False]
@@ -173,4 +173,4 @@ def _miss(entry: Entry) -> str:
     else:
         size = f"{100.0 * deviation:+.0f} %, bound {100.0 * bound:g} %"
     heading = HEADINGS[entry["quantity"]].split("\n")[0]
-    return f"Outside ({kind(entry)}): {entry['row']}, {heading}: {size}."
+    return f"Outside ({use_of(entry)}): {entry['row']}, {heading}: {size}."

@@ -9,7 +9,7 @@ from importlib import resources
 
 SOURCE = "Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012)"
 
-# Largest deviation that passes, in parts of the published number (error_reduction: in points
+# Largest deviation that passes, relative to the published number (error_reduction: in points
 # of per cent). Relative errors have none: they are the maximum errors over the peak of the
 # reference, printed with two digits.
 Bounds = dict[str, float]
@@ -73,7 +73,7 @@ class Published:
         return bounds.get(self.quantity)
 
     def deviation(self, ours: float) -> float:
-        """Deviation of `ours`, in parts of the value or in points of per cent.
+        """Deviation of `ours`, relative to the value or in points of per cent.
 
         Parameters
         ----------

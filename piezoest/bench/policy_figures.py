@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -92,7 +93,7 @@ def _transient(axes: Axes, row: Document, style: dict[str, Any]) -> None:
     """Median error of each period, held within the picture."""
     errors = [
         HIGHEST if error is None else min(HIGHEST, 100.0 * error / row["amplitude"])
-        for error in row["transient"][:FIRST]
+        for error in itertools.islice(row["transient"], FIRST)
     ]
     axes.plot(range(1, len(errors) + 1), errors, **style)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,9 +13,10 @@ from rich.console import Console
 
 from piezoest._errors import INTERRUPTED
 from piezoest._files import write_text
+from piezoest._options import grouped
 from piezoest.bench.origin import origin
 from piezoest.bench.shared import json_target, progress
-from piezoest.bench.suite_command import Dask, Jobs, Json, Scheduler
+from piezoest.bench.suite_command import Json, Where
 
 FOLDER = Path("bench-results-ranking")
 EPILOG = (
@@ -23,7 +25,23 @@ EPILOG = (
 )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How much is tried of each estimator."""
+
+    draws: Annotated[
+        int, typer.Option(min=1, help="Settings tried of each beside its default: a power of two.")
+    ] = 16
+    training_seeds: Annotated[int, typer.Option(min=1, help="Seeds to tune on.")] = 2
+    seeds: Annotated[int, typer.Option(min=1, help="Other seeds, to judge on.")] = 6
+    slow_seeds: Annotated[
+        int, typer.Option(min=1, help="The same for BatchFit and FilterPyUKF, the slow ones.")
+    ] = 3
+
+
+@grouped
 def rank(
+    *,
     estimator: Annotated[
         list[str] | None,
         typer.Option(
@@ -34,23 +52,14 @@ def rank(
     only: Annotated[
         list[str] | None, typer.Option(help="Only this estimator of the package; may be repeated.")
     ] = None,
-    draws: Annotated[
-        int, typer.Option(min=1, help="Settings tried of each beside its default: a power of two.")
-    ] = 16,
-    training_seeds: Annotated[int, typer.Option(min=1, help="Seeds to tune on.")] = 2,
-    seeds: Annotated[int, typer.Option(min=1, help="Other seeds, to judge on.")] = 6,
-    slow_seeds: Annotated[
-        int, typer.Option(min=1, help="The same for BatchFit and FilterPyUKF, the slow ones.")
-    ] = 3,
+    effort: Effort,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="DIR", help="Folder where finished runs are kept.")
     ] = FOLDER,
     figures: Annotated[
         Path | None, typer.Option("--figures", metavar="DIR", help="Write pictures as PNG.")
     ] = None,
-    jobs: Jobs = None,
-    dask: Dask = False,
-    scheduler: Scheduler = None,
+    where: Where,
     json_to: Json = None,
 ) -> None:  # fmt: skip
     """Rank estimators fairly: each tuned by the same budget, judged on seeds it was not tuned on.
@@ -68,15 +77,15 @@ def rank(
 
             candidates = tuning.tunables(estimator or [], only or [])
             for each in candidates:
-                tuning.draws(each, draws, 0)
+                tuning.draws(each, effort.draws, 0)
             first = ranking.FIRST_TRAINING_SEED
             budget = ranking.Budget(
-                draws=draws,
-                training_seeds=tuple(range(first, first + training_seeds)),
-                seeds=tuple(range(seeds)),
-                slow_seeds=tuple(range(min(seeds, slow_seeds))),
+                draws=effort.draws,
+                training_seeds=tuple(range(first, first + effort.training_seeds)),
+                seeds=tuple(range(effort.seeds)),
+                slow_seeds=tuple(range(min(effort.seeds, effort.slow_seeds))),
             )
-        execute = executor(jobs, dask, scheduler, [each.default for each in candidates])
+        execute = executor(where, [each.default for each in candidates])
         try:
             with campaign.store_in(output) as store:
                 with counting("training runs") as count:

@@ -17,7 +17,7 @@ import numpy as np
 
 from piezoest.bench import campaign, tuning
 from piezoest.bench.adaptation import follow, json_safe
-from piezoest.bench.campaign import Execute, worth
+from piezoest.bench.campaign import Execute, value_of
 from piezoest.bench.candidates import candidate
 from piezoest.bench.estimators import cost
 from piezoest.bench.machine import fingerprint
@@ -126,7 +126,7 @@ def tune(
 
 
 def score(rows: Iterable[Row]) -> float:
-    """Typical error over some runs, in parts of the amplitude; less is better.
+    """Typical error over some runs, relative to the amplitude; less is better.
 
     Parameters
     ----------
@@ -134,7 +134,8 @@ def score(rows: Iterable[Row]) -> float:
         From `piezoest.bench.runner.play`. A run that failed counts as one that followed nothing.
     """
     parts = [
-        min(worth(row, "mean_error") / row["amplitude"], WORST) if row["amplitude"] else WORST for row in rows
+        min(value_of(row, "mean_error") / row["amplitude"], WORST) if row["amplitude"] else WORST
+        for row in rows
     ]
     return float(np.exp(np.mean(np.log(parts))))
 

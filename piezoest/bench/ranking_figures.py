@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -79,8 +80,9 @@ def styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
         In the order of the colours.
     """
     found: dict[str, dict[str, Any]] = {REFERENCE: {"color": GREY, "marker": "_"}}
-    for k, name in enumerate(name for name in names if name != REFERENCE):
-        found[name] = {"color": COLOURS[k % len(COLOURS)], "marker": MARKERS[k % len(MARKERS)]}
+    styles = zip(itertools.cycle(COLOURS), itertools.cycle(MARKERS), strict=True)
+    for name, (color, marker) in zip((name for name in names if name != REFERENCE), styles, strict=False):
+        found[name] = {"color": color, "marker": marker}
     return found
 
 
@@ -213,9 +215,11 @@ def adaptation(document: Document) -> Figure:
 
 
 def _transient(axes: Axes, row: Document, style: dict[str, Any]) -> None:
-    errors = [None if error is None else 100.0 * error / row["amplitude"] for error in row["transient"]]
+    errors: list[Any] = [
+        None if error is None else 100.0 * error / row["amplitude"] for error in row["transient"]
+    ]
     periods = range(1, len(errors) + 1)
-    dashed = {"ls": "--", "zorder": 1} if row["estimator"] == REFERENCE else {}
-    marks = {**style, "marker": None} if dashed else style
-    every = max(1, len(errors) // 12)
-    axes.plot(periods, errors, lw=1.4, ms=4, markevery=every, label=row["estimator"], **marks, **dashed)  # type: ignore[arg-type]
+    looks: dict[str, Any] = {**style, "lw": 1.4, "ms": 4, "markevery": max(1, len(errors) // 12)}
+    if row["estimator"] == REFERENCE:
+        looks |= {"marker": None, "ls": "--", "zorder": 1}
+    axes.plot(periods, errors, label=row["estimator"], **looks)

@@ -18,10 +18,10 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.bench.candidates import candidate
-from piezoest.identification import fit
-from piezoest.models import ColemanHodgdon, LinearGain, Model
+from piezoest.identification.data import Data, prepare
+from piezoest.models import ColemanHodgdon, Model
 from piezoest.records import read_record
-from piezoest.tracking import _feed
+from piezoest.tracking import feed
 
 LOG = "log:"  # before a file's name, in the place of a scenario's
 LEARNT = 0.7  # of the samples
@@ -103,15 +103,15 @@ def numbers(
     """
     data, sample_rate = _read(path)
     learnt = round(LEARNT * data.u.size)
-    first = fit.prepare(data.u[:learnt], np.where(data.counts, data.x, np.nan)[:learnt])
+    first = prepare(data.u[:learnt], data.measured()[:learnt])
     if first.extent == 0.0 or not np.any(first.counts) or not np.any(data.counts[learnt:]):
         raise ValueError(f"{path}: there is nothing to learn from, or nothing to predict")
-    line = LinearGain(*fit.straight_line(first, 0.0))
+    line = first.line()
     line_error = _missed(line, data, learnt)
     error = line_error
     if estimator is not None:
-        error = _missed(_learn(estimator, first, line, sample_rate, watch), data, learnt)
-    largest = [float(np.max(part)) for part in np.array_split(error, min(SEGMENTS, error.size))]
+        error = _missed(_learn(estimator, first, sample_rate, watch), data, learnt)
+    largest = [float(np.max(segment)) for segment in np.array_split(error, min(SEGMENTS, error.size))]
     settled, line_settled = float(np.max(error)), float(np.max(line_error))
     return {
         "amplitude": 0.5 * float(np.ptp(data.x[data.counts])),
@@ -129,26 +129,23 @@ def numbers(
 
 
 @functools.lru_cache(maxsize=1)
-def _read(path: Path) -> tuple[fit.Data, float]:
+def _read(path: Path) -> tuple[Data, float]:
     record = read_record(path)
-    return fit.prepare(record.voltage, record.displacement), record.sample_rate
+    return prepare(record.voltage, record.displacement), record.sample_rate
 
 
-def _learn(
-    estimator: str, data: fit.Data, line: LinearGain, sample_rate: float, watch: Callable[[Any], Any]
-) -> Model:
+def _learn(estimator: str, data: Data, sample_rate: float, watch: Callable[[Any], Any]) -> Model:
     """Model of an estimator after the part to learn from; it starts from a plain guess about the line."""
-    a, b, c = 2.0 / data.extent, 0.4 * line.gain, 1.3 * line.gain
-    made = watch(candidate(estimator)(sample_rate, ColemanHodgdon.from_loop(a, b, c, line.offset)))
-    x = np.where(data.counts, data.x, np.nan)
+    made = watch(candidate(estimator)(sample_rate, data.loop_about_line()))
+    x = data.measured()
     for begins in range(0, data.u.size, AT_A_TIME):
-        part = slice(begins, begins + AT_A_TIME)
-        _feed(made, data.u[part], x[part])
+        block = slice(begins, begins + AT_A_TIME)
+        feed(made, data.u[block], x[block])
     model: Model = made.model
     return model
 
 
-def _missed(model: Any, data: fit.Data, learnt: int) -> FloatArray:
+def _missed(model: Any, data: Data, learnt: int) -> FloatArray:
     """What a model misses of the displacement after the learnt part, at the samples that have one.
 
     The gauge's zero is no matter of hysteresis: the mean error of the learnt part is taken off.

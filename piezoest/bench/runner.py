@@ -22,10 +22,11 @@ from piezoest._checks import FloatArray, integer
 from piezoest.bench import recorded
 from piezoest.bench.adaptation import follow, json_safe
 from piezoest.bench.candidates import candidate
+from piezoest.bench.cases import RIGHT_MODEL, Case, Conditions
 from piezoest.bench.estimators import REFERENCE, load_estimator
 from piezoest.bench.machine import fingerprint
 from piezoest.bench.metrics import Metrics, measure
-from piezoest.bench.scenarios import RIGHT_MODEL, SCENARIOS, Case, Conditions
+from piezoest.bench.scenarios import SCENARIOS
 from piezoest.stage import PaperStage, PreisachStage
 from piezoest.tracking import TrackingRecord
 
@@ -33,8 +34,6 @@ Row = dict[str, Any]
 Stage = Literal["paper", "preisach"]
 
 STAGES: dict[str, type[PaperStage] | type[PreisachStage]] = {"paper": PaperStage, "preisach": PreisachStage}
-# Where a period of the errors is several of the wave's.
-LONG = ("prbs", "random-walk", "two-tone")
 WARM_UP = 0.25  # s
 
 
@@ -50,8 +49,8 @@ class Settings:
     before, after : int
         Periods before a scenario's change, and after it.
     after_long : int
-        The same as `after` where an error is taken over several periods of the wave: prbs,
-        random-walk and two-tone.
+        The same as `after` where an error is taken over several periods of the wave, see
+        `piezoest.bench.scenarios.Scenario`.
     rest, drift : float
         Length of the dwell and of the drift [s].
     updates : int
@@ -84,7 +83,7 @@ class Settings:
             raise ValueError(f"stage must be one of {', '.join(STAGES)}, got {self.stage!r}")
 
     def conditions(self, scenario: str) -> dict[str, Any]:
-        """Fields of `piezoest.bench.scenarios.Conditions` for a scenario.
+        """Fields of `piezoest.bench.cases.Conditions` for a scenario.
 
         Parameters
         ----------
@@ -93,7 +92,7 @@ class Settings:
         """
         names = {field.name for field in fields(Conditions)}
         given = {name: value for name, value in asdict(self).items() if name in names}
-        return {**given, "after": self.after_long} if scenario in LONG else given
+        return {**given, "after": self.after_long} if SCENARIOS[scenario].is_long else given
 
 
 # Under a minute with all estimators on two cores.
@@ -315,12 +314,15 @@ _WARMED: set[tuple[str, Any]] = set()
 
 
 def _warm(estimator: str, sample_rate: float) -> None:
-    """Let an estimator load what it compiled before one of its kind is timed."""
+    """Let an estimator load what it compiled before one of its sort is timed."""
     if estimator == REFERENCE:
         return
     made = candidate(estimator)(sample_rate, RIGHT_MODEL)
-    kind = (estimator.partition("(")[0], getattr(made, "_kind", None))  # loops are compiled for settings, too
-    if kind in _WARMED:
+    loaded = (
+        estimator.partition("(")[0],
+        getattr(made, "_kind", None),
+    )  # loops are compiled for settings, too
+    if loaded in _WARMED:
         return
     u = 30.0 * np.sin(np.linspace(0.0, 6.0, round(WARM_UP * sample_rate)))
     x = RIGHT_MODEL.simulate(u)
@@ -329,4 +331,4 @@ def _warm(estimator: str, sample_rate: float) -> None:
     if hasattr(made, "run"):
         made.run(u[:2], x[:2])
     _ = made.model
-    _WARMED.add(kind)
+    _WARMED.add(loaded)

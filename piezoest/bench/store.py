@@ -52,7 +52,7 @@ class Store:
 
     def __exit__(
         self,
-        kind: type[BaseException] | None,
+        error_type: type[BaseException] | None,
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
@@ -131,7 +131,10 @@ class Store:
 def _read(line: bytes) -> dict[str, Any] | None:
     """Row of a whole line; None of a torn one."""
     try:
-        row = json.loads(line)
+        found = json.loads(line)
     except (ValueError, RecursionError):
         return None
-    return row if isinstance(row, dict) and isinstance(row.get("key"), str) else None
+    match found:
+        case {"key": str()}:
+            return dict(found)
+    return None

@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from piezoest._checks import dictionary
 from piezoest._files import read_json, write_text
 from piezoest.bench.adaptation import json_safe
 from piezoest.bench.campaign import failures, keys_of, summarise
@@ -74,7 +75,7 @@ def overview(summary: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        Errors in parts of the amplitude; null stands for infinite.
+        Errors relative to the amplitude; null stands for infinite.
     """
     groups: dict[str, list[dict[str, Any]]] = {}
     for row in summary:
@@ -130,8 +131,8 @@ def read(folder: Path) -> dict[str, Any]:
     path = folder / DOCUMENT
     if not path.exists():
         raise ValueError(f"{folder} holds no {DOCUMENT}: no campaign of piezoest bench was finished there")
-    document = read_json(path)
-    if not isinstance(document, dict) or not isinstance(document.get("settings"), dict):
+    document = dictionary(read_json(path))
+    if not dictionary(document.get("settings")):
         document = {}
     if missing := [name for name in (*HEAD, "settings") if name not in document]:
         raise ValueError(f"{path} is not what piezoest bench writes: it lacks {', '.join(missing)}")

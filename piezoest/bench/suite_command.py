@@ -7,6 +7,7 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +16,7 @@ from rich.console import Console
 
 from piezoest._errors import INTERRUPTED
 from piezoest._files import write_text
+from piezoest._options import grouped
 from piezoest.bench.origin import origin
 from piezoest.bench.shared import Html, check_html, json_target, progress, write_html
 
@@ -38,54 +40,92 @@ Json = Annotated[
 ]
 
 
-def suite(
-    context: typer.Context,
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Runs:
+    """What is run."""
+
     estimator: Annotated[
         list[str] | None,
         typer.Option(
-            "--estimator", "-e", metavar="NAME|MODULE:CLASS",
+            "--estimator",
+            "-e",
+            metavar="NAME|MODULE:CLASS",
             help='Beside the package\'s; may have arguments: "HysteresisRLS(memory=0.4)", and be repeated.',
         ),
-    ] = None,
+    ] = None
     only: Annotated[
         list[str] | None,
         typer.Option(help="Only this one in the place of the package's; may be repeated."),
-    ] = None,
+    ] = None
     scenario: Annotated[
         list[str] | None,
         typer.Option("--scenario", "-s", help="Only this one; may be repeated. Default all."),
-    ] = None,
+    ] = None
     logs: Annotated[
         str | None,
         typer.Option(metavar="DIR|PATTERN", help="Recorded logs (CSV) in the place of the scenarios."),
-    ] = None,
+    ] = None
     seeds: Annotated[
         int | None,
         typer.Option(min=1, help=f"Runs of each scenario and estimator; default {SEEDS}, quick 1."),
-    ] = None,
+    ] = None
     quick: Annotated[
         bool, typer.Option("--quick", help="Short runs at 2 kHz with one seed: under a minute on two cores.")
-    ] = False,
+    ] = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Written:
+    """Where results go."""
+
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="DIR", help=f"Folder of the results; default {FOLDER}."),
-    ] = None,
+    ] = None
     table: Annotated[
         str | None, typer.Option(help="parquet or csv; default Parquet where pyarrow is installed.")
-    ] = None,
-    sample_rate: Annotated[float | None, typer.Option(min=2000.0, help="Hz; default 5000.")] = None,
-    stage: Annotated[str, typer.Option(help="paper or preisach.")] = "paper",
-    guard: Annotated[bool, typer.Option("--guard", help="With the supervisor of the ring.")] = False,
-    scenarios: Annotated[bool, typer.Option("--by-scenario", help="Print each scenario's table.")] = False,
+    ] = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ring:
+    """What all runs share."""
+
+    sample_rate: Annotated[float | None, typer.Option(min=2000.0, help="Hz; default 5000.")] = None
+    stage: Annotated[str, typer.Option(help="paper or preisach.")] = "paper"
+    guard: Annotated[bool, typer.Option("--guard", help="With the supervisor of the ring.")] = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """How results are shown."""
+
+    scenarios: Annotated[bool, typer.Option("--by-scenario", help="Print each scenario's table.")] = False
     figures: Annotated[
         Path | None, typer.Option("--figures", metavar="DIR", help="Draw how fast each adapts, as PNG.")
-    ] = None,
-    html: Html = None,
-    jobs: Jobs = None,
-    dask: Dask = False,
-    scheduler: Scheduler = None,
+    ] = None
+    html: Html = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Where:
+    """On what the runs are made."""
+
+    jobs: Jobs = None
+    dask: Dask = False
+    scheduler: Scheduler = None
+
+
+@grouped
+def suite(
+    context: typer.Context,
+    runs: Runs,
+    written: Written,
+    ring: Ring,
+    shown: Shown,
+    where: Where,
     json_to: Json = None,
-) -> None:  # fmt: skip
+) -> None:
     """Compare estimators on the simulated stage.
 
     Without a command: all scenarios × all estimators × seeds, in parallel. Finished runs are kept in the
@@ -114,28 +154,29 @@ def suite(
         return
 
     target = json_target(json_to)
-    check_html(html)
-    folder = output or (QUICK_FOLDER if quick else FOLDER)
+    check_html(shown.html)
+    folder = written.output or (QUICK_FOLDER if runs.quick else FOLDER)
     began = time.perf_counter()
     with usage():
         with progress() as say:
             say("loading (compiles once after the installation)")
-            import dataclasses
-
             from piezoest.bench import campaign, suite, tables
             from piezoest.bench.recorded import logs_of
             from piezoest.bench.runner import QUICK, Settings
             from piezoest.bench.scenarios import SCENARIOS
 
-            settings = dataclasses.replace(QUICK if quick else Settings(), stage=stage, guard=guard)  # type: ignore[arg-type]
-            if sample_rate is not None:
-                settings = dataclasses.replace(settings, sample_rate=sample_rate)
-            named = [*(only or campaign.default_estimators()), *(estimator or [])]
-            numbers = range(seeds or (1 if quick else SEEDS))
-            places = list(scenario or ([] if logs else SCENARIOS)) + (logs_of(logs) if logs else [])
+            stage: Any = ring.stage
+            settings = QUICK if runs.quick else Settings()
+            settings = replace(settings, stage=stage, guard=ring.guard)
+            if ring.sample_rate is not None:
+                settings = replace(settings, sample_rate=ring.sample_rate)
+            named = [*(runs.only or campaign.default_estimators()), *(runs.estimator or [])]
+            numbers = range(runs.seeds or (1 if runs.quick else SEEDS))
+            logs = logs_of(runs.logs) if runs.logs else []
+            places = [*(runs.scenario or ([] if runs.logs else SCENARIOS)), *logs]
             tasks = campaign.plan(places, named, numbers, settings)
-            format = tables.checked_format(table)
-        execute = executor(jobs, dask, scheduler, named)
+            format = tables.checked_format(written.table)
+        execute = executor(where, named)
         try:
             with campaign.store_in(folder) as store, counting("runs") as count:
                 campaign.run(tasks, store, execute, count)
@@ -145,18 +186,18 @@ def suite(
             Console(stderr=True).print(f"stopped: the same command goes on from {folder}")
             raise typer.Exit(INTERRUPTED) from None
     suite.write(document, folder / suite.DOCUMENT)
-    write_html(document, html)
-    if figures is not None:
+    write_html(document, shown.html)
+    if shown.figures is not None:
         from piezoest.bench.ranking_figures import write_adaptation
 
-        for path in write_adaptation(document, figures):
+        for path in write_adaptation(document, shown.figures):
             typer.echo(f"Figure: {path}", err=json_to == "-")
     if json_to == "-":
         typer.echo(json.dumps(document, indent=1, ensure_ascii=False))
         return
     from piezoest.bench.suite_report import print_overview
 
-    print_overview(document, Console(), scenarios=scenarios)
+    print_overview(document, Console(), scenarios=shown.scenarios)
     typer.echo(f"Tables and {suite.DOCUMENT}: {folder}")
     if target is not None:
         suite.write(document, target)
@@ -205,13 +246,13 @@ def compare(
         raise typer.Exit(WORSE)
 
 
-def executor(jobs: int | None, dask: bool, scheduler: str | None, estimators: list[str]) -> Execute:
+def executor(where: Where, estimators: list[str]) -> Execute:
     """Where runs are made: on the cores, or on Dask where that is asked for."""
     from piezoest.bench import campaign
 
-    if scheduler is not None or dask:
-        return campaign.over_dask(scheduler, jobs, estimators)
-    return campaign.over_cores(jobs)
+    if where.scheduler is not None or where.dask:
+        return campaign.over_dask(where.scheduler, where.jobs, estimators)
+    return campaign.over_cores(where.jobs)
 
 
 @contextlib.contextmanager

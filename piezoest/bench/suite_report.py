@@ -125,9 +125,9 @@ def _scenario_cells(row: Row) -> list[str]:
     ]  # fmt: skip
 
 
-def percent(part: float | None) -> str:
-    """A part in per cent, three significant digits; a dash for what is not known or infinite."""
-    return number(None if part is None else 100.0 * part)
+def percent(share: float | None) -> str:
+    """A share in per cent, three significant digits; a dash for what is not known or infinite."""
+    return number(None if share is None else 100.0 * share)
 
 
 def number(value: float | None) -> str:

@@ -131,8 +131,8 @@ def _typed(cells: Mapping[str, str]) -> Row:
     return {name: None if text == "" else _value(COLUMNS[name], text) for name, text in cells.items()}
 
 
-def _value(kind: type, text: str) -> Any:
-    return text == "True" if kind is bool else kind(text)
+def _value(column: type, text: str) -> Any:
+    return text == "True" if column is bool else column(text)
 
 
 @contextlib.contextmanager
@@ -148,8 +148,8 @@ def _parquet(path: Path, columns: Mapping[str, type]) -> Iterator[Callable[[Row]
     import pyarrow
     import pyarrow.parquet as parquet
 
-    kinds = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_()}
-    schema = pyarrow.schema([(name, kinds[kind]) for name, kind in columns.items()])
+    types = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_()}
+    schema = pyarrow.schema([(name, types[column]) for name, column in columns.items()])
     batch: list[Row] = []
     with replacing(path) as temporary, parquet.ParquetWriter(temporary, schema) as writer:
 

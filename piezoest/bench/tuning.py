@@ -46,18 +46,18 @@ class Between:
         if positive("high", self.high) <= positive("low", self.low):
             raise ValueError(f"high must be above low, got {self.low} and {self.high}")
 
-    def at(self, part: float) -> float | int:
-        """Value at a part of the way, within [0, 1).
+    def at(self, position: float) -> float | int:
+        """Value at a position along the way, within [0, 1).
 
         Parameters
         ----------
-        part : float
+        position : float
             0 for low.
         """
         if self.whole:
             first, last = math.log(self.low), math.log(self.high + 1.0)
-            return min(int(math.exp(first + part * (last - first))), int(self.high))
-        value = math.exp(math.log(self.low) + part * (math.log(self.high) - math.log(self.low)))
+            return min(int(math.exp(first + position * (last - first))), int(self.high))
+        value = math.exp(math.log(self.low) + position * (math.log(self.high) - math.log(self.low)))
         return float(f"{value:.3g}")
 
 
@@ -73,15 +73,15 @@ class OneOf:
 
     values: tuple[Any, ...]
 
-    def at(self, part: float) -> Any:
-        """Value at a part of the way, within [0, 1).
+    def at(self, position: float) -> Any:
+        """Value at a position along the way, within [0, 1).
 
         Parameters
         ----------
-        part : float
+        position : float
             0 for the first.
         """
-        return self.values[min(int(part * len(self.values)), len(self.values) - 1)]
+        return self.values[min(int(position * len(self.values)), len(self.values) - 1)]
 
 
 Space = Mapping[str, Between | OneOf]
@@ -111,15 +111,18 @@ class Tunable:
     space: Space = field(default_factory=dict)
     slow: bool = False
 
-    def text(self, parts: Sequence[float]) -> str:
+    def text(self, point: Sequence[float]) -> str:
         """Description of the estimator at a point of its space.
 
         Parameters
         ----------
-        parts : sequence of float
+        point : sequence of float
             Within [0, 1), one for each value.
         """
-        values = {name: repr(self.space[name].at(part)) for name, part in zip(self.space, parts, strict=True)}
+        values = {
+            name: repr(self.space[name].at(position))
+            for name, position in zip(self.space, point, strict=True)
+        }
         return self.template.format(**values)
 
 
@@ -250,10 +253,10 @@ def draws(tunable: Tunable, number: int, seed: int) -> list[str]:
 
 
 def _of_the_package(text: str) -> Tunable:
-    kind = text if text in SPACES else text.partition("(")[0]
-    template, space = SPACES.get(kind, ("", {}))
+    name = text if text in SPACES else text.partition("(")[0]
+    template, space = SPACES.get(name, ("", {}))
     return Tunable(
-        NAMES.get(kind, kind), text, template or _call(text.partition("(")[0], space), space, kind in SLOW
+        NAMES.get(name, name), text, template or _call(text.partition("(")[0], space), space, name in SLOW
     )
 
 
@@ -262,12 +265,14 @@ def _own(text: str) -> Tunable:
     declared = {} if "(" in text else getattr(class_of(text), "tuning_space", {})
     space: dict[str, Between | OneOf] = {}
     for name, values in declared.items():
-        if isinstance(values, tuple) and len(values) == 2:
-            space[name] = Between(*values)
-        elif isinstance(values, list) and values:
-            space[name] = OneOf(tuple(values))
-        else:
-            raise ValueError(f"{text}: tuning_space[{name!r}] must be (low, high) or a list, got {values!r}")
+        match values:
+            case tuple((low, high)):
+                space[name] = Between(low, high)
+            case list([_, *_]):
+                space[name] = OneOf(tuple(values))
+            case _:
+                message = f"tuning_space[{name!r}] must be (low, high) or a list, got {values!r}"
+                raise ValueError(f"{text}: {message}")
     return Tunable(text, text, _call(text, space), space)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.bench.campaign import title, worth
+from piezoest.bench.campaign import title, value_of
 from piezoest.bench.changes import logarithms, signed_rank
 from piezoest.bench.estimators import REFERENCE
 from piezoest.bench.runner import Row
@@ -32,7 +32,7 @@ def overall(rows: Sequence[Row], times: dict[str, dict[str, Any]]) -> list[dict[
     Returns
     -------
     list of dict
-        ``adapting``, ``settled`` and ``worst`` are errors in parts of the amplitude: geometric means over
+        ``adapting``, ``settled`` and ``worst`` are errors relative to the amplitude: geometric means over
         the scenarios of the median over the seeds, of the typical error, of the largest of the last
         three periods and of the largest after the change. ``efficient``: none is better in all of
         these and in cost.
@@ -47,7 +47,7 @@ def overall(rows: Sequence[Row], times: dict[str, dict[str, Any]]) -> list[dict[
                 "adapting": _over_scenarios(mine, "mean_error"),
                 "settled": _over_scenarios(mine, "settled_max"),
                 "worst": _over_scenarios(mine, "worst_error"),
-                "settling_time": _median([worth(row, "settling_time") for row in mine]),
+                "settling_time": _median([value_of(row, "settling_time") for row in mine]),
                 "runs": len(mine),
                 "runs_settled": sum(row["settling_time"] is not None for row in mine),
                 "diverged": sum(bool(row["diverged"]) for row in mine),
@@ -104,7 +104,7 @@ def weaknesses(rows: Sequence[Row], lines: Sequence[dict[str, Any]]) -> dict[str
             values = {
                 name: _median(
                     [
-                        worth(row, quantity)
+                        value_of(row, quantity)
                         for row in rows
                         if row["estimator"] == name and title(row) == scenario
                     ]
@@ -190,7 +190,7 @@ def decide(rows: Sequence[Row], lines: Sequence[dict[str, Any]]) -> list[dict[st
     Returns
     -------
     list of dict
-        ``order``: names with their numbers, errors in parts of the amplitude; ``linear``: that of linear
+        ``order``: names with their numbers, errors relative to the amplitude; ``linear``: that of linear
         feed-forward; ``p``: of first against second, paired by run (Wilcoxon's signed ranks).
     """
     steps = {line["name"]: line["step_microseconds"] for line in lines}
@@ -233,11 +233,11 @@ def _first_against_second(rows: Sequence[Row], order: Sequence[str], quantity: s
 
 
 def _over_scenarios(rows: Sequence[Row], quantity: str) -> float:
-    """Geometric mean over the scenarios of the median over the seeds, in parts of the amplitude."""
+    """Geometric mean over the scenarios of the median over the seeds, relative to the amplitude."""
     groups: dict[str, list[float]] = {}
     for row in rows:
-        part = worth(row, quantity) / row["amplitude"] if row["amplitude"] else math.inf
-        groups.setdefault(title(row), []).append(part)
+        relative = value_of(row, quantity) / row["amplitude"] if row["amplitude"] else math.inf
+        groups.setdefault(title(row), []).append(relative)
     return math.exp(float(np.mean(np.log([_median(values) for values in groups.values()]))))
 
 

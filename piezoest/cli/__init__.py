@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import io
+import contextlib
 import sys
 from typing import Annotated
 
@@ -29,8 +29,8 @@ def main() -> None:
     """Run the command line."""
     for stream in (sys.stdout, sys.stderr):
         # A µ or a frame that the terminal's encoding lacks must not end a command.
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
+        with contextlib.suppress(AttributeError):  # of a stream that someone put in the place of this one
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
         app(prog_name="piezoest")
     except KeyboardInterrupt:

@@ -4,43 +4,15 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, cast
 
 import numpy as np
 
-from piezoest._checks import WILDEST, FloatArray, array_1d, integer, number_or_nan, positive
-from piezoest.compensators import corridor, loop_inverse
-from piezoest.compensators.layout import (
-    BY_PATH,
-    CONFIG,
-    CORRIDOR,
-    DECAY,
-    INTEGRATED,
-    LARGEST_STEP,
-    LIMITED_NOW,
-    MAXIMUM,
-    MEMORY,
-    MINIMUM,
-    MISSED,
-    OFFSET,
-    OWED,
-    PATH,
-    SAMPLES,
-    SATURATED,
-    SLEWED,
-    STATE,
-    VOLTAGE,
-    W_H,
-    A,
-    B,
-    C,
-)
+from piezoest._checks import FloatArray, array_1d, integer, number_or_nan, positive
+from piezoest.compensators import inverse_kernel as kernel
 from piezoest.compensators.limits import VoltageLimits
-from piezoest.equations import recent_path
-from piezoest.equations.turning_points import recall, remember
-from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
-
-DUE = CORRIDOR + corridor.DUE
+from piezoest.layout import Named, Record, new
+from piezoest.models import Model
 
 Method = Literal["closed-form", "bogacki-shampine"]
 HandOver = Literal["path", "place"]
@@ -69,44 +41,19 @@ class CompensatorStatus:
     projected: bool
 
 
-def _is_tame(model: Model) -> bool:
-    """Whether no parameter is beyond what its inverse can take."""
-    if isinstance(model, ColemanHodgdon):
-        return all(abs(v) < WILDEST for v in (model.alpha, model.beta, model.gamma, model.offset))
-    return bool(np.all(np.abs([*model.theta, getattr(model, "offset", 0.0)]) < WILDEST))
-
-
-def _loop(model: Model) -> tuple[float, float, float, float]:
-    """(a, b, c, offset) of a model."""
-    if isinstance(model, ColemanHodgdon):
-        return model.a, model.b, model.c, model.offset
-    assert isinstance(model, LinearGain)
-    # No hysteresis: b = 0, and any a.
-    return 1.0, 0.0, model.gain, model.offset
-
-
-def _slope(model: Model) -> float:
-    """Slope of a model from rest [µm/V], about."""
-    if isinstance(model, ColemanHodgdon):
-        return model.beta
-    assert isinstance(model, LinearGain | PrandtlIshlinskii)
-    return model.gain
-
-
-def _plays() -> Any:
-    """Loops of a Prandtl-Ishlinskii model: loaded with the first one, for they take time to compile."""
-    from piezoest.compensators import play_inverse
-
-    return play_inverse
-
-
 class Compensator:
     """Feed-forward through the inverse of a model.
 
     See `LinearCompensator` and `InverseCompensator`.
     """
 
-    __slots__ = ("_config", "_limits", "_model", "_projected", "_sample_rate", "_start", "_state", "_waiting")
+    __slots__ = (
+        "_layouts", "_limits", "_loops", "_model", "_options", "_projected", "_sample_rate", "_settings",
+        "_start", "_state", "_waiting",
+    )  # fmt: skip
+
+    _layouts: tuple[Record, Record]
+    _loops: tuple[Any, Any] | None
 
     def __init__(
         self,
@@ -125,100 +72,72 @@ class Compensator:
         self._sample_rate = (
             limits.sample_rate if sample_rate is None else positive("sample_rate", sample_rate)
         )
-        self._config = np.zeros(CONFIG)
-        self._config[MINIMUM] = self._limits.minimum
-        self._config[MAXIMUM] = self._limits.maximum
-        self._config[LARGEST_STEP] = self._limits.largest_step
         transfer_samples = integer("transfer_samples", transfer_samples)
-        self._config[DECAY] = np.exp(-1.0 / transfer_samples) if transfer_samples else 0.0
         if method not in ("closed-form", "bogacki-shampine"):
             raise ValueError(f"method must be 'closed-form' or 'bogacki-shampine', got {method!r}")
-        self._config[INTEGRATED] = method == "bogacki-shampine"
         if hand_over not in ("path", "place"):
             raise ValueError(f"hand_over must be 'path' or 'place', got {hand_over!r}")
-        self._config[BY_PATH] = hand_over == "path"
+        self._options = {
+            "minimum": limits.minimum,
+            "maximum": limits.maximum,
+            "largest_step": limits.largest_step,
+            "decay": np.exp(-1.0 / transfer_samples) if transfer_samples else 0.0,
+            "integrated": method == "bogacki-shampine",
+            "by_path": hand_over == "path",
+        }
         if not self._accepts(model).is_admissible:
-            hint = "its gain must not be zero, nor next to it"
-            if isinstance(model, ColemanHodgdon):
-                hint = "use nearest_admissible()"
-            elif isinstance(model, PrandtlIshlinskii):
-                hint = "all its slopes must be above zero"
-            raise ValueError(f"model {model} is not admissible and has no inverse: {hint}")
-        self._projected = False
+            raise ValueError(f"model {model} is not admissible and has no inverse: {model.remedy}")
         self._start = model
-        self._begin(model)
+        self.reset()
 
     @property
-    def _compiled(self) -> tuple[Any, Any]:
-        """Functions that a controller's code is generated from: voltage; change of model, or None."""
-        if isinstance(self._model, PrandtlIshlinskii):
-            return _plays().step, None
-        return loop_inverse.voltage, loop_inverse.change_model
+    def state(self) -> Any:
+        """What it remembers, by name: a NumPy structured array; ``state["voltage"]``."""
+        return self._state
 
     @property
-    def _fixed(self) -> tuple[int, ...]:
-        """Positions in the configuration that no change of model or limits in that code touches."""
-        if isinstance(self._model, PrandtlIshlinskii):
-            return A, B, C, OFFSET, DECAY, INTEGRATED, BY_PATH, *range(CONFIG, self._config.size)
-        return DECAY, INTEGRATED, BY_PATH
+    def settings(self) -> Any:
+        """What compiled code is given beside `state`, by name: a NumPy structured array."""
+        return self._settings
 
-    def _begin(self, model: Model) -> None:
-        """Start at rest, at the voltage nearest to zero."""
-        self._configure(model)
-        self._model = model
-        self._state = np.zeros(STATE)
-        self._state[VOLTAGE] = self._limits.rest
-        recent_path.begin(self._state, PATH, self._limits.rest, self._config[A])
-        remember(self._state, MEMORY, self._limits.rest)
-        self._place(model, model)
+    @property
+    def layouts(self) -> tuple[Record, Record]:
+        """Layouts of `state` and `settings`, see `piezoest.compensators.inverse_kernel`."""
+        return self._layouts
+
+    def __getstate__(self) -> Any:
+        # Machine code is not pickled: it is looked up again.
+        kept, slots = cast(Any, super().__getstate__())
+        return kept, {**slots, "_loops": None}
+
+    def reset(self) -> None:
+        """Return to the state after construction, with the model given there."""
+        self._projected = False
         self._waiting: Model | None = None
-        corridor.begin(self._state, CORRIDOR, self._limits.rest, self._expected(), _slope(model))
+        self._model = self._start
+        self._make_room()
+        kernel.begin(*self._named(), self._limits.rest, self._model.slope)
+
+    def _make_room(self) -> None:
+        """State of zeros, and settings, for the model."""
+        values = self._model.inverse_settings(self._sample_rate)
+        self._layouts = kernel.layouts(*self._model.inverse.layouts(values))
+        self._state = new(self._layouts[0])
+        self._settings = new(self._layouts[1], **self._options, inverse=values)
+        self._loops = None
+
+    def _named(self) -> tuple[Named, Named]:
+        """State and settings for kernel functions in Python."""
+        return Named(self._state, self._layouts[0]), Named(self._settings, self._layouts[1])
 
     def _accepts(self, model: Model) -> Model:
-        """Return the model if it is of a kind this compensator can invert."""
-        if not isinstance(model, ColemanHodgdon | LinearGain | PrandtlIshlinskii):
+        """Return the model if this compensator can invert it."""
+        if getattr(model, "inverse", None) is None:
             raise ValueError(
-                "model must be a ColemanHodgdon, a PrandtlIshlinskii or a LinearGain, "
+                "model must be one with an inverse, as ColemanHodgdon, PrandtlIshlinskii and LinearGain, "
                 f"got {type(model).__name__}"
             )
         return model
-
-    def _configure(self, model: Model) -> None:
-        """Take over the model's numbers; states that only a Prandtl-Ishlinskii model has come and go."""
-        head = self._config[:CONFIG]
-        if not isinstance(model, PrandtlIshlinskii):
-            head[[A, B, C, OFFSET]] = _loop(model)
-            self._config = head.copy()
-            return
-        rate = model.sample_rate if self._sample_rate is None else self._sample_rate
-        arrays = model._arrays(rate)
-        counts = [float(values.size) for values in arrays[::2]]
-        head[[A, B, C, OFFSET]] = 1.0, 0.0, model.gain, model.offset
-        self._config = np.concatenate([head, counts, *arrays])
-
-    def _expected(self) -> float:
-        """Displacement that the model in use expects of the last sample [µm]."""
-        config, state = self._config, self._state
-        if isinstance(self._model, PrandtlIshlinskii):
-            return float(_plays().expected(state, config))
-        return float(config[C] * state[VOLTAGE] + state[W_H] + config[OFFSET])
-
-    def _place(self, model: Model, before: Model) -> None:
-        """Bring the model's memory to where the voltage is, as far as it is known."""
-        state = self._state
-        if not isinstance(model, PrandtlIshlinskii):
-            self._state = state[:STATE].copy()
-            return
-        terms = 0 if model.creep is None else model.creep.gains.size
-        z = np.zeros(terms)
-        if isinstance(before, PrandtlIshlinskii):
-            n = before.thresholds.size
-            if np.array_equal(before.thresholds, model.thresholds) and state.size == STATE + n + terms:
-                return
-            if state.size - STATE - n == terms:
-                z = state[STATE + n :]
-        y = [recall(state, MEMORY, r) for r in model.thresholds.tolist()]
-        self._state = np.concatenate([state[:STATE], y, z])
 
     @property
     def model(self) -> Model:
@@ -242,41 +161,49 @@ class Compensator:
     def model(self, model: Model) -> None:
         self._waiting = self._accepts(model)
         if self.hand_over_due:
-            self._take_up_waiting()
+            self._use_waiting()
 
     @property
     def hand_over_due(self) -> bool:
         """Whether a model that is set now takes effect at once."""
-        return bool(self._state[DUE] != 0.0)
+        return bool(self._state["corridor"]["due"])
 
-    def _take_up_waiting(self) -> None:
+    def _use_waiting(self) -> None:
         """Use the model that was set last."""
         model, self._waiting = self._waiting, None
         assert model is not None
-        if not _is_tame(model):
-            # An estimator that ran away: what its model's inverse gives is no number.
-            self._projected = True
-            return
-        self._projected = not model.is_admissible
+        self._projected = not (model.is_in_range and model.is_admissible)
         if self._projected:
-            if not isinstance(model, ColemanHodgdon):
+            # Out of range its inverse gives no number.
+            nearest = getattr(model, "nearest_admissible", None)
+            if nearest is None or not model.is_in_range:
                 return
-            model = model.nearest_admissible()
+            model = nearest()
         before, self._model = self._model, model
-        if not isinstance(model, PrandtlIshlinskii) and not isinstance(before, PrandtlIshlinskii):
-            loop_inverse.change(self._state, self._config, *_loop(model))
-            return
-        self._model = before
-        expected = self._expected() + self._state[OWED]
-        self._configure(model)
-        self._place(model, before)
-        self._model = model
-        a, b = self._config[A], self._config[B]
-        if b > 0.0:
-            recent_path.take_up(self._state, PATH, a)
-        self._state[W_H] = b * recent_path.hysteresis(self._state, PATH)
-        self._state[OWED] = expected - self._expected()
-        corridor.hand_over(self._state, CORRIDOR)
+        if model.inverse is before.inverse and hasattr(model.inverse, "change"):
+            numbers = np.array([*model.inverse_settings(self._sample_rate).values()])
+            kernel.change.of(*self._layouts)(self._state, self._settings, numbers)
+        else:
+            self._change_inverse(before)
+
+    def _change_inverse(self, before: Model) -> None:
+        """Go on with a model whose numbers are others than those of the one before."""
+        state, settings = self._state, self._settings
+        old_state, old_settings = self._named()
+        expected = old_state.inverse.expected(old_state, old_settings) + old_state.owed
+        self._make_room()
+        for name in state.dtype.names[:-1]:
+            self._state[name] = state[name]
+        stays = False
+        if self._model.inverse is before.inverse:
+            old, own = state["inverse"], self._state["inverse"]
+            layout: Any = self._layouts[0].by_name["inverse"]
+            for name in own.dtype.names:
+                if name not in layout.lengths and own[name].shape == old[name].shape:
+                    own[name] = old[name]
+            known = getattr(self._model.inverse, "stays", None)
+            stays = known is not None and known(settings["inverse"], self._settings["inverse"])
+        kernel.go_on(*self._named(), expected, stays)
 
     @property
     def limits(self) -> VoltageLimits:
@@ -286,22 +213,22 @@ class Compensator:
     @property
     def voltage(self) -> float:
         """Voltage given out last [V]."""
-        return float(self._state[VOLTAGE])
+        return float(self._state["voltage"])
 
     @property
     def limited(self) -> int:
         """Sign of what the limits withheld at the last sample: +1, -1, or 0 if nothing."""
-        return int(self._state[LIMITED_NOW])
+        return int(self._state["limited"])
 
     @property
     def status(self) -> CompensatorStatus:
         """What happened to the samples so far."""
         state = self._state
         return CompensatorStatus(
-            samples=int(state[SAMPLES]),
-            saturated=int(state[SATURATED]),
-            slewed=int(state[SLEWED]),
-            missing=int(state[MISSED]),
+            samples=int(state["samples"]),
+            saturated=int(state["saturated"]),
+            slewed=int(state["slewed"]),
+            missing=int(state["missing"]),
             projected=self._projected,
         )
 
@@ -320,11 +247,16 @@ class Compensator:
         """
         if type(r) is not float:
             r = number_or_nan(r)
-        if self._waiting is not None and self._state[DUE] != 0.0:
-            self._take_up_waiting()
-        if isinstance(self._model, PrandtlIshlinskii):
-            return float(_plays().step(self._state, self._config, r))
-        return loop_inverse.step(self._state, self._config, r)
+        if self._waiting is not None and self.hand_over_due:
+            self._use_waiting()
+        voltage: float = self._compiled()[0](self._state, self._settings, r)
+        return voltage
+
+    def _compiled(self) -> tuple[Any, Any]:
+        """Machine code for a sample and for a record."""
+        if self._loops is None:
+            self._loops = kernel.step.of(*self._layouts), kernel.run.of(*self._layouts)
+        return self._loops
 
     def run(self, r: Any) -> FloatArray:
         """Voltages for a whole reference; continues from the current state, as a loop of `step`.
@@ -350,14 +282,8 @@ class Compensator:
         while self._waiting is not None and start < r.size:
             u[start] = self.step(float(r[start]))
             start += 1
-        run = _plays().run if isinstance(self._model, PrandtlIshlinskii) else loop_inverse.run
-        run(self._state, self._config, r[start:], u[start:])
+        self._compiled()[1](self._state, self._settings, r[start:], u[start:])
         return u
-
-    def reset(self) -> None:
-        """Return to the state after construction, with the model given there."""
-        self._projected = False
-        self._begin(self._start)
 
     def copy(self) -> Self:
         """Return an independent compensator in the same state."""

@@ -5,7 +5,7 @@ it from that. A model takes effect by travel: when the reference has moved by a 
 the last one did. And since the hysteresis of a piezo stage is 10 to 20 % of its stroke, the voltage stays
 within a fraction of half the recent swing around a straight line, linear feed-forward: the least-squares line
 of the voltages that were given for the reference over the last swings. It follows the models, but slowly, for
-none of them can lead the voltage far from it. Until a leg has told their gain, the corridor is wide, around
+none of them can lead the voltage far from it. Until a leg has shown their gain, the corridor is wide, around
 the first model's line. A model that is set once, and drives for two turns, was not learnt in such a loop and
 has no corridor.
 """
@@ -17,17 +17,38 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-# Flat memory within a larger array: turns of the reference since the last hand-over, whether one came soon
-# after another; direction of travel, furthest reference in it, where this leg began, length of the last [µm];
-TURNS, SOON, DIRECTION, FURTHEST, TURNED, LEG = range(6)
-# the reference now, its travel since the last sample, the one at the last hand-over [µm], whether it is time
-# for the next, half the recent swing [µm];
-PRESENT, TRAVEL, HANDED, DUE, HALF = range(6, 11)
-# gain and centre of the line; means of voltage and reference over the last swings, mean square of the
-# voltage's deviation and mean product of both, weight of all that;
-GAIN, CENTRE, MEAN_U, MEAN_R, SQUARE, PRODUCT, KNOWN = range(11, 18)
-# samples at which the corridor was in the way, whether there was any, legs so far.
-USED, BEGUN, LEGS, SIZE = range(18, 22)
+from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SHARE, SIGN, record
+
+CORRIDOR = record(
+    # Turns of the reference since the last hand-over, whether one came soon after another.
+    turns=COUNT,
+    soon=FLAG,
+    # Direction of travel, furthest reference in it, where this leg began, length of the last [µm].
+    direction=SIGN,
+    furthest=MEASURED,
+    turned=MEASURED,
+    leg=DISTANCE,
+    # The reference now, its travel since the last sample, the one at the last hand-over [µm], whether it is
+    # time for the next, half the recent swing [µm].
+    present=MEASURED,
+    travel=DISTANCE,
+    handed=MEASURED,
+    due=FLAG,
+    half_swing=DISTANCE,
+    # Gain and centre of the line; means of voltage and reference over the last swings, mean square of the
+    # voltage's deviation and mean product of both, weight of all that.
+    gain=NUMBER,
+    centre=NUMBER,
+    mean_u=MEASURED,
+    mean_r=MEASURED,
+    square=AMOUNT,
+    product=NUMBER,
+    known=SHARE,
+    # Samples at which the corridor was in the way, whether there was any, legs so far.
+    used=COUNT,
+    begun=FLAG,
+    legs=COUNT,
+)
 
 # Half-width, as a fraction of half the recent swing of the reference; before the line is known by half.
 WIDTH, FIRST_WIDTH, ENOUGH = 0.3, 1.0, 0.5
@@ -42,84 +63,81 @@ LARGEST = 1e100
 
 
 @register_jitable
-def begin(path: Any, start: int, u: Any, x: Any, gain: Any) -> None:
-    """Begin at rest at voltage u, where the model has displacement x, with a line of this gain through it."""
-    for k in range(SIZE):
-        path[start + k] = 0.0
-    path[start + FURTHEST] = path[start + TURNED] = path[start + PRESENT] = path[start + HANDED] = x
-    path[start + MEAN_R] = x
-    path[start + MEAN_U] = u
-    path[start + GAIN] = gain
-    path[start + CENTRE] = x - gain * u
-    path[start + DUE] = 1.0
+def begin(corridor: Any, u: Any, x: Any, gain: Any) -> None:
+    """Begin with zeros, at rest at voltage u and displacement x, and a line of this gain through both."""
+    corridor.furthest = corridor.turned = corridor.present = corridor.handed = corridor.mean_r = x
+    corridor.mean_u = u
+    corridor.gain = gain
+    corridor.centre = x - gain * u
+    corridor.due = 1.0
 
 
 @register_jitable
-def kept(path: Any, start: int, r: Any, wanted: Any) -> Any:
+def kept(corridor: Any, r: Any, wanted: Any) -> Any:
     """`wanted` kept within the corridor, where models follow one another soon; r is the next reference."""
-    path[start + TRAVEL] = np.abs(r - path[start + PRESENT])
-    path[start + PRESENT] = r
-    path[start + BEGUN] = 1.0
-    leg = max(path[start + LEG], np.abs(r - path[start + TURNED]))
-    if np.abs(r - path[start + HANDED]) >= HAND_OVER * leg:
-        path[start + DUE] = 1.0
-    if path[start + SOON] == 0.0:
+    corridor.travel = np.abs(r - corridor.present)
+    corridor.present = r
+    corridor.begun = 1.0
+    leg = max(corridor.leg, np.abs(r - corridor.turned))
+    if np.abs(r - corridor.handed) >= HAND_OVER * leg:
+        corridor.due = 1.0
+    if corridor.soon == 0.0:
         return wanted
-    faded = path[start + HALF] - FADES * path[start + TRAVEL]
-    path[start + HALF] = max(np.abs(r - path[start + MEAN_R]), faded)
-    line = (r - path[start + CENTRE]) / path[start + GAIN]
-    width = WIDTH if path[start + KNOWN] >= ENOUGH else FIRST_WIDTH
-    half = np.abs(width * path[start + HALF] / path[start + GAIN])
-    inside = min(max(wanted, line - half), line + half)
-    path[start + USED] += inside != wanted
+    faded = corridor.half_swing - FADES * corridor.travel
+    corridor.half_swing = max(np.abs(r - corridor.mean_r), faded)
+    line = (r - corridor.centre) / corridor.gain
+    width = WIDTH if corridor.known >= ENOUGH else FIRST_WIDTH
+    room = np.abs(width * corridor.half_swing / corridor.gain)
+    inside = min(max(wanted, line - room), line + room)
+    corridor.used += inside != wanted
     return inside
 
 
 @register_jitable
-def follow(path: Any, start: int, u: Any, blocked: Any) -> None:
+def follow(corridor: Any, u: Any, blocked: Any) -> None:
     """Take the voltage given out; `blocked` is whether its range or its rate was in the way."""
-    r = path[start + PRESENT]
-    way = r - path[start + FURTHEST]
-    if path[start + DIRECTION] * way >= 0.0:
-        if path[start + DIRECTION] == 0.0:
-            path[start + DIRECTION] = np.sign(way)
-        path[start + FURTHEST] = r
-    elif np.abs(way) > TURN * max(path[start + LEG], np.abs(path[start + FURTHEST] - path[start + TURNED])):
-        path[start + LEG] = np.abs(path[start + FURTHEST] - path[start + TURNED])
-        path[start + TURNED] = path[start + FURTHEST]
-        path[start + FURTHEST] = r
-        path[start + DIRECTION] = -path[start + DIRECTION]
-        path[start + TURNS] += 1.0
-        path[start + LEGS] += 1.0
-        path[start + SOON] *= path[start + TURNS] < 2.0
-    if path[start + SOON] != 0.0 and blocked == 0.0 and path[start + LEGS] > 0.0:
-        _follow_line(path, start, u, r)
+    r = corridor.present
+    way = r - corridor.furthest
+    if corridor.direction * way >= 0.0:
+        if corridor.direction == 0.0:
+            corridor.direction = np.sign(way)
+        corridor.furthest = r
+    elif np.abs(way) > TURN * max(corridor.leg, np.abs(corridor.furthest - corridor.turned)):
+        corridor.leg = np.abs(corridor.furthest - corridor.turned)
+        corridor.turned = corridor.furthest
+        corridor.furthest = r
+        corridor.direction = -corridor.direction
+        corridor.turns += 1.0
+        corridor.legs += 1.0
+        corridor.soon *= corridor.turns < 2.0
+    if corridor.soon != 0.0 and blocked == 0.0 and corridor.legs > 0.0:
+        _follow_line(corridor, u, r)
 
 
 @register_jitable
-def _follow_line(path: Any, start: int, u: Any, r: Any) -> None:
+def _follow_line(corridor: Any, u: Any, r: Any) -> None:
     """Take a voltage and its reference into the line, by the reference's travel."""
-    if path[start + TRAVEL] == 0.0 or path[start + HALF] <= 0.0:
+    if corridor.travel == 0.0 or corridor.half_swing <= 0.0:
         return
-    weight = path[start + TRAVEL] / (2.0 * MEMORY * path[start + HALF])
-    path[start + KNOWN] = min(path[start + KNOWN] + weight, 1.0)
-    share = min(weight / path[start + KNOWN], 1.0)
-    du, dr = u - path[start + MEAN_U], r - path[start + MEAN_R]
-    path[start + MEAN_U] += share * du
-    path[start + MEAN_R] += share * dr
-    path[start + SQUARE] = (1.0 - share) * (path[start + SQUARE] + share * du * du)
-    path[start + PRODUCT] = (1.0 - share) * (path[start + PRODUCT] + share * du * dr)
-    gain = path[start + PRODUCT] / path[start + SQUARE] if path[start + SQUARE] > 0.0 else 0.0
-    if path[start + KNOWN] >= ENOUGH and gain * path[start + GAIN] > 0.0 and np.abs(gain) < LARGEST:
-        path[start + GAIN] = gain
-        path[start + CENTRE] = path[start + MEAN_R] - gain * path[start + MEAN_U]
+    weight = corridor.travel / (2.0 * MEMORY * corridor.half_swing)
+    corridor.known = min(corridor.known + weight, 1.0)
+    share = min(weight / corridor.known, 1.0)
+    du, dr = u - corridor.mean_u, r - corridor.mean_r
+    corridor.mean_u += share * du
+    corridor.mean_r += share * dr
+    corridor.square = (1.0 - share) * (corridor.square + share * du * du)
+    corridor.product = (1.0 - share) * (corridor.product + share * du * dr)
+    gain = corridor.product / corridor.square if corridor.square > 0.0 else 0.0
+    if corridor.known >= ENOUGH and gain * corridor.gain > 0.0 and np.abs(gain) < LARGEST:
+        corridor.gain = gain
+        corridor.centre = corridor.mean_r - gain * corridor.mean_u
 
 
 @register_jitable
-def hand_over(path: Any, start: int) -> None:
+def hand_over(corridor: Any) -> None:
     """Note that another model was handed over."""
-    if path[start + BEGUN] != 0.0:
-        path[start + SOON] = path[start + TURNS] < 2.0
-    path[start + TURNS] = 0.0
-    path[start + HANDED] = path[start + PRESENT]
-    path[start + DUE] = 0.0
+    if corridor.begun != 0.0:
+        corridor.soon = corridor.turns < 2.0
+    corridor.turns = 0.0
+    corridor.handed = corridor.present
+    corridor.due = 0.0

@@ -6,41 +6,38 @@ import copy
 from typing import Any, Self
 
 import numpy as np
-from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST, FloatArray, array_1d, finite, number_or_nan, positive
-from piezoest._jit import compiled
 from piezoest.compensators.base import Compensator, CompensatorStatus
 from piezoest.compensators.limits import VoltageLimits
-from piezoest.equations.lead import lead_coefficients, lead_step
+from piezoest.compile import Record, Vector, compiled, inlined
+from piezoest.equations.lead import SETTINGS, STATE, lead_coefficients, lead_step
+from piezoest.layout import new
 from piezoest.models import MassSpringDamper, Model
 
-# State: last r, r', r'', whether there was a sample before.
-STARTED, STATE = 3, 4
 
-
-@register_jitable
-def _lead(state: Any, coefficients: Any, r: Any) -> Any:
+@inlined
+def _lead(state: Any, settings: Any, r: Any) -> Any:
     """Reference to hand on; a missing sample is handed on, and the next one starts from rest."""
     if not np.abs(r) < WILDEST:
-        state[STARTED] = 0.0
+        state.started = 0.0
         return np.nan
-    if state[STARTED] == 0.0:
-        state[STARTED] = 1.0
-        state[0] = r
-        state[1] = state[2] = 0.0
-    return lead_step(state, r, coefficients)
+    if state.started == 0.0:
+        state.started = 1.0
+        state.r = r
+        state.first = state.second = 0.0
+    return lead_step(state, r, settings)
 
 
-@compiled("f8(f8[::1], f8[::1], f8)")
-def _step(state: Any, coefficients: Any, r: float) -> Any:
-    return _lead(state, coefficients, r)
+@compiled
+def _step(state: Record, settings: Record, r: float) -> Any:
+    return _lead(state, settings, r)
 
 
-@compiled("void(f8[::1], f8[::1], f8[::1])")
-def _run(state: Any, coefficients: Any, r: Any) -> None:
-    for k in range(r.size):
-        r[k] = _lead(state, coefficients, r[k])
+@compiled
+def _run(state: Record, settings: Record, r: Vector) -> None:
+    for k in range(len(r)):
+        r[k] = _lead(state, settings, r[k])
 
 
 class LeadFilter:
@@ -77,7 +74,7 @@ class LeadFilter:
     Equations: `piezoest.equations.lead`.
     """
 
-    __slots__ = ("_coefficients", "_compensator", "_state")
+    __slots__ = ("_compensator", "_settings", "_state")
 
     def __init__(
         self,
@@ -96,14 +93,14 @@ class LeadFilter:
             raise ValueError(f"mechanics must be a MassSpringDamper, got {mechanics!r}")
         omega = 2.0 * np.pi * mechanics.natural_frequency
         self._compensator = compensator
-        self._coefficients = lead_coefficients(
+        coefficients = lead_coefficients(
             mechanics.natural_frequency,
             mechanics.damping_ratio,
             finite("delay", delay),
             1.0 / omega if smoothing is None else positive("smoothing", smoothing),
             1.0 / positive("sample_rate", sample_rate),
         )
-        self._state = np.zeros(STATE)
+        self._settings, self._state = new(SETTINGS, **coefficients), new(STATE)
 
     @property
     def model(self) -> Model:
@@ -142,7 +139,8 @@ class LeadFilter:
         float
             Voltage [V], within the limits.
         """
-        lead = _step(self._state, self._coefficients, r if type(r) is float else number_or_nan(r))
+        step = _step.of(STATE, SETTINGS)
+        lead = step(self._state, self._settings, r if type(r) is float else number_or_nan(r))
         return self._compensator.step(lead)
 
     def run(self, r: Any) -> FloatArray:
@@ -164,12 +162,12 @@ class LeadFilter:
             If r is not a 1-D array of numbers.
         """
         lead = array_1d("r", r, allow_nan=True).copy()
-        _run(self._state, self._coefficients, lead)
+        _run.of(STATE, SETTINGS)(self._state, self._settings, lead)
         return self._compensator.run(lead)
 
     def reset(self) -> None:
         """Return to the state after construction."""
-        self._state = np.zeros(STATE)
+        self._state = new(STATE)
         self._compensator.reset()
 
     def copy(self) -> Self:

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba.extending import register_jitable
 
+from piezoest.compile import local, local_rows
+
 # Enough for the curved faces from anywhere within a factor of ten; the final clamp makes
 # the result admissible however far it came.
 _ITERATIONS = 8
@@ -18,7 +20,7 @@ _ITERATIONS = 8
 # of alpha [1/V] and of the slope c = gamma/alpha [µm/V].
 SMALLEST, LARGEST = 1e-100, 1e100
 
-# Distance kept from the faces where a model is moved into the set, in parts of gamma.
+# Distance kept from the faces where a model is moved into the set, relative to gamma.
 NEAREST_MARGIN = 1e-6
 
 
@@ -36,16 +38,16 @@ def is_admissible(alpha, beta, gamma, alpha_least, beta_least, margin):
 
 
 @register_jitable
-def _onto_least(theta, P, n, i, least):
+def _onto_least(theta, P, i, least):
     """Move theta along P's column i until theta[i] >= least, the nearest point in P's metric."""
-    variance = P[i * n + i]
+    variance = P[i, i]
     lack = np.fmax(least - theta[i], 0.0) / (variance + (variance == 0.0))
-    for j in range(n):
-        theta[j] = theta[j] + P[j * n + i] * lack
+    for j in range(len(theta)):
+        theta[j] = theta[j] + P[j, i] * lack
 
 
 @register_jitable
-def _onto_surface(theta, P, n, factor, side):
+def _onto_surface(theta, P, factor, side):
     """Move theta to the nearest point with gamma = factor alpha beta, if it lies beyond by `side`."""
     beyond = (side * (theta[2] - factor * theta[0] * theta[1]) > 0.0) * 1.0
     alpha_0 = theta[0]
@@ -58,34 +60,32 @@ def _onto_surface(theta, P, n, factor, side):
         g_alpha = -factor * beta
         g_beta = -factor * alpha
         value = gamma_0 + g_alpha * alpha_0 + g_beta * beta_0 + factor * alpha * beta
-        p_alpha = P[0] * g_alpha + P[1] * g_beta + P[2]
-        p_beta = P[n] * g_alpha + P[n + 1] * g_beta + P[n + 2]
-        p_gamma = P[2 * n] * g_alpha + P[2 * n + 1] * g_beta + P[2 * n + 2]
+        p_alpha = P[0, 0] * g_alpha + P[0, 1] * g_beta + P[0, 2]
+        p_beta = P[1, 0] * g_alpha + P[1, 1] * g_beta + P[1, 2]
+        p_gamma = P[2, 0] * g_alpha + P[2, 1] * g_beta + P[2, 2]
         norm = g_alpha * p_alpha + g_beta * p_beta + p_gamma
         multiplier = beyond * value / (norm + (norm == 0.0))
         alpha = alpha_0 - p_alpha * multiplier
         beta = beta_0 - p_beta * multiplier
-    for j in range(n):
-        theta[j] = theta[j] - multiplier * (
-            P[j * n] * -factor * beta + P[j * n + 1] * -factor * alpha + P[j * n + 2]
-        )
+    for j in range(len(theta)):
+        theta[j] = theta[j] - multiplier * (P[j, 0] * -factor * beta + P[j, 1] * -factor * alpha + P[j, 2])
 
 
 @register_jitable
-def project_admissible(theta, P, n, alpha_least, beta_least, margin):
+def project_admissible(theta, P, alpha_least, beta_least, margin):
     """Move theta (n,) in place to the nearest admissible point in the metric of P; False if there is none.
 
     theta[:3] = (alpha, beta, gamma); further entries (an offset) move with them as P's
-    correlations say. P is flat (n*n,) and is not changed. Where anything is NaN or beyond all measure
+    correlations say. P (n, n) is not changed. Where anything is NaN or beyond all measure
     the result is False, and theta is not to be used: a clamp would make NaN the least gain there is,
     and with it the largest voltage.
     """
-    _onto_least(theta, P, n, 0, alpha_least)
-    _onto_least(theta, P, n, 1, beta_least)
-    _onto_surface(theta, P, n, 1.0 + margin, -1.0)
-    _onto_surface(theta, P, n, 2.0 - margin, 1.0)
+    _onto_least(theta, P, 0, alpha_least)
+    _onto_least(theta, P, 1, beta_least)
+    _onto_surface(theta, P, 1.0 + margin, -1.0)
+    _onto_surface(theta, P, 2.0 - margin, 1.0)
     reach = 0.0
-    for i in range(n):
+    for i in range(len(theta)):
         reach = reach + np.abs(theta[i])
     theta[0] = np.fmax(theta[0], alpha_least)
     theta[1] = np.fmax(theta[1], beta_least)
@@ -119,16 +119,23 @@ def has_inverse(alpha, beta, gamma):
 
 
 @register_jitable
-def nearest_admissible(theta, P, margin):
-    """Move theta (3,) in place into the set, each parameter measured in parts of its own value.
+def nearest_admissible(theta, margin):
+    """Move theta (3,) in place into the set, each parameter measured relative to its own value.
 
-    False if there is no such point, see `project_admissible`. `P` (9,) is work space.
+    False if there is no such point, see `project_admissible`.
     """
-    for i in range(9):
-        P[i] = 0.0
+    P = local_rows(3, 3)
     for i in range(3):
+        for j in range(3):
+            P[i, j] = 0.0
         scale = np.fmax(np.abs(theta[i]), 1e-12)
-        P[i * 3 + i] = scale * scale
+        P[i, i] = scale * scale
+    first = local(3)
+    for i in range(3):
+        first[i] = theta[i]
     alpha_least = 1e-9 * np.fmax(np.abs(theta[0]), 1e-12)
     beta_least = 1e-9 * np.fmax(np.abs(theta[1]), 1e-12)
-    return project_admissible(theta, P, 3, alpha_least, beta_least, margin)
+    found = project_admissible(first, P, alpha_least, beta_least, margin)
+    for i in range(3):
+        theta[i] = first[i]
+    return found

@@ -15,7 +15,7 @@ from numba.extending import register_jitable
 
 from piezoest.equations.play import play, prandtl_ishlinskii_inverse, weighted_sum
 
-# Breakpoints nearer than this, in parts of the voltages about, are one: below rounding's reach.
+# Breakpoints nearer than this, relative to the voltages about, are one: below rounding's reach.
 SAME = 1e-13
 
 
@@ -44,7 +44,7 @@ def segment(p, low, high):
 def bent(p, slope, bends, changes, column, columns):
     """slope p + sum_j changes[j, column] dead_zone(p, bends[j]); `changes` is flat, in row order."""
     x = slope * p
-    for j in range(bends.shape[0]):
+    for j in range(len(bends)):
         x = x + changes[j * columns + column] * dead_zone(p, bends[j])
     return x
 
@@ -52,11 +52,11 @@ def bent(p, slope, bends, changes, column, columns):
 @register_jitable
 def bent_plays_output(y, u, gain, weights, bends, changes):
     """w of the voltage u and the play states y (n,), which are left alone."""
-    if bends.shape[0] == 0:
+    if len(bends) == 0:
         return gain * u + weighted_sum(weights, y)
-    columns = y.shape[0] + 1
+    columns = len(y) + 1
     w = bent(u, gain, bends, changes, 0, columns)
-    for i in range(y.shape[0]):
+    for i in range(len(y)):
         w = w + bent(y[i], weights[i], bends, changes, i + 1, columns)
     return w
 
@@ -64,7 +64,7 @@ def bent_plays_output(y, u, gain, weights, bends, changes):
 @register_jitable
 def bent_plays_step(y, u, gain, thresholds, weights, bends, changes):
     """w after the next voltage; the states `y` (n,) are updated in place."""
-    for i in range(y.shape[0]):
+    for i in range(len(y)):
         y[i] = play(y[i], u, thresholds[i])
     return bent_plays_output(y, u, gain, weights, bends, changes)
 
@@ -73,7 +73,7 @@ def bent_plays_step(y, u, gain, thresholds, weights, bends, changes):
 def _slope_ahead(p, way, slope, bends, changes, column, columns, near):
     """(slope, distance to the next bend) of one play's output as it moves on from p."""
     ahead = np.inf
-    for j in range(bends.shape[0]):
+    for j in range(len(bends)):
         gap = way * (bends[j] - p)
         if gap > near:
             ahead = min(ahead, gap)
@@ -91,11 +91,11 @@ def bent_plays_inverse(y, u, w, gain, thresholds, weights, bends, changes):
     to breakpoint, each a play that begins to move or an output that bends, until w lies on
     the piece at hand: exact, without a tolerance, and most samples pass none or one.
     """
-    n = y.shape[0]
+    n = len(y)
     columns = n + 1
     x = bent_plays_output(y, u, gain, weights, bends, changes)
     way = 1.0 if w > x else -1.0
-    for _ in range(n + columns * bends.shape[0] + 1):
+    for _ in range(n + columns * len(bends) + 1):
         near = SAME * (np.abs(u) + (thresholds[n - 1] if n > 0 else 0.0))
         slope, reach = _slope_ahead(u, way, gain, bends, changes, 0, columns, near)
         for i in range(n):
@@ -119,6 +119,6 @@ def bent_plays_inverse(y, u, w, gain, thresholds, weights, bends, changes):
 @register_jitable
 def prandtl_ishlinskii_voltage(y, u, w, gain, thresholds, weights, bends, changes):
     """The next voltage for w, by the shorter walk where nothing bends."""
-    if bends.shape[0] == 0:
+    if len(bends) == 0:
         return prandtl_ishlinskii_inverse(y, w, gain, thresholds, weights)
     return bent_plays_inverse(y, u, w, gain, thresholds, weights, bends, changes)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from numba.extending import register_jitable
 
+from piezoest.compile import inlined
+
 
 @register_jitable
 def creep_step(z, w, gains, decays):
@@ -18,23 +20,23 @@ def creep_step(z, w, gains, decays):
     in place.
     """
     x = 0.0
-    for i in range(z.shape[0]):
+    for i in range(len(z)):
         z[i] = z[i] + (1.0 - decays[i]) * (gains[i] * w - z[i])
         x = x + z[i]
     return x
 
 
-@register_jitable(inline="always")
+@inlined
 def unit_creep_step(z, w, decays):
     """`creep_step` with all gains one: the states `z` (n,) [µm] follow w, in place.
 
     x_creep = sum_i gains[i] z[i]; such states stay right when the gains change.
     """
-    for i in range(z.shape[0]):
+    for i in range(len(z)):
         z[i] = z[i] + (1.0 - decays[i]) * (w - z[i])
 
 
-@register_jitable(inline="always")
+@inlined
 def creep_to_come(z, gains, decays):
     """(held, share) of the next sample: x_creep = held + share w, for the w held over it.
 
@@ -44,7 +46,7 @@ def creep_to_come(z, gains, decays):
     """
     held = 0.0
     share = 0.0
-    for i in range(z.shape[0]):
+    for i in range(len(z)):
         held = held + gains[i] * decays[i] * z[i]
         share = share + gains[i] * (1.0 - decays[i])
     return held, share

@@ -16,15 +16,20 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba.extending import register_jitable
-from numpy.typing import NDArray
+
+from piezoest.layout import FIXED, FLAG, NUMBER, record
+
+# Last r, its two smoothed derivatives, whether there was a sample before.
+STATE = record(r=NUMBER, first=NUMBER, second=NUMBER, started=FLAG)
+# Pole and gain of a difference [1], [1/s]; of r' [s] and r'' [s²].
+SETTINGS = record(pole=FIXED, gain=FIXED, c1=FIXED, c2=FIXED)
 
 
 def lead_coefficients(
     natural_frequency: float, damping_ratio: float, delay: float, smoothing: float, dt: float
-) -> NDArray[np.float64]:
-    """Coefficients (4,) of `lead_step`: pole, gain of a difference [1/s], c1 [s], c2 [s²].
+) -> dict[str, float]:
+    """Settings of `lead_step`: pole, gain of a difference [1/s], c1 [s], c2 [s²].
 
     Parameters
     ----------
@@ -41,7 +46,7 @@ def lead_coefficients(
 
     Returns
     -------
-    ndarray, shape (4,)
+    dict of float
     """
     omega = 2.0 * math.pi * natural_frequency
     lag, damped = delay - 0.5 * dt, 2.0 * damping_ratio / omega
@@ -49,14 +54,14 @@ def lead_coefficients(
     smoothed = dt * (0.5 + pole / (1.0 - pole))
     c1 = damped + lag
     c2 = 1.0 / omega**2 + damped * lag + 0.5 * lag**2
-    return np.array([pole, (1.0 - pole) / dt, c1, c2 + c1 * smoothed])
+    return {"pole": pole, "gain": (1.0 - pole) / dt, "c1": c1, "c2": c2 + c1 * smoothed}
 
 
 @register_jitable
-def lead_step(state, r, coefficients):
-    """r + c1 r' + c2 r'' of the next sample; `state` = (last r, r', r'') is updated in place."""
-    before = state[1]
-    state[1] = coefficients[0] * before + coefficients[1] * (r - state[0])
-    state[2] = coefficients[0] * state[2] + coefficients[1] * (state[1] - before)
-    state[0] = r
-    return r + coefficients[2] * state[1] + coefficients[3] * state[2]
+def lead_step(state, r, settings):
+    """r + c1 r' + c2 r'' of the next sample; `state` follows."""
+    before = state.first
+    state.first = settings.pole * before + settings.gain * (r - state.r)
+    state.second = settings.pole * state.second + settings.gain * (state.first - before)
+    state.r = r
+    return r + settings.c1 * state.first + settings.c2 * state.second

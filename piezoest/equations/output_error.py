@@ -26,46 +26,48 @@ def hysteresis_and_slope(h, by_log_a, du, a):
 
 
 @register_jitable
-def recentre(s, P, n, step):
-    """Go from a_0 to a_0 exp(step): d = b ln(a/a_0) becomes d - step b, in s (n,) and P (n*n,)."""
+def recentre(s, P, step):
+    """Go from a_0 to a_0 exp(step): d = b ln(a/a_0) becomes d - step b, in s (n,) and P (n, n)."""
+    n = len(s)
     s[2] = s[2] - step * s[0]
     for j in range(n):
-        P[2 * n + j] = P[2 * n + j] - step * P[j]
+        P[2, j] = P[2, j] - step * P[0, j]
     for j in range(n):
-        P[j * n + 2] = P[j * n + 2] - step * P[j * n]
+        P[j, 2] = P[j, 2] - step * P[j, 0]
 
 
 @register_jitable
 def walk_covariance(b, c, Q):
-    """Covariance Q (9,) of (b, c, d) if alpha, beta and gamma each move by one part of themselves.
+    """Covariance Q (3, 3) of (b, c, d) if alpha, beta and gamma each move by one part of themselves.
 
     To first order, by (4): c = gamma/alpha moves by c (e_gamma - e_alpha), b = c - beta by as much less
     beta e_beta, d by b e_alpha. So b, a small difference of large numbers, may move by parts of c.
     """
     beta = c - b
-    Q[0] = 2.0 * c * c + beta * beta
-    Q[1] = 2.0 * c * c
-    Q[2] = -c * b
-    Q[3] = Q[1]
-    Q[4] = 2.0 * c * c
-    Q[5] = -c * b
-    Q[6] = Q[2]
-    Q[7] = Q[5]
-    Q[8] = b * b
+    Q[0, 0] = 2.0 * c * c + beta * beta
+    Q[0, 1] = 2.0 * c * c
+    Q[0, 2] = -c * b
+    Q[1, 0] = Q[0, 1]
+    Q[1, 1] = 2.0 * c * c
+    Q[1, 2] = -c * b
+    Q[2, 0] = Q[0, 2]
+    Q[2, 1] = Q[1, 2]
+    Q[2, 2] = b * b
 
 
 @register_jitable
-def relax(s, P, n, i, kept, variance):
-    """Take state i of s (n,) and P (n*n,) one step on as a first-order Markov process.
+def relax(s, P, i, kept, variance):
+    """Let state i of s (n,) and P (n, n) go one step on as a first-order Markov process.
 
     s_i = kept s_i + noise, with the noise that keeps the stationary variance at `variance`.
     """
+    n = len(s)
     s[i] = kept * s[i]
     for j in range(n):
-        P[i * n + j] = kept * P[i * n + j]
+        P[i, j] = kept * P[i, j]
     for j in range(n):
-        P[j * n + i] = kept * P[j * n + i]
-    P[i * n + i] = P[i * n + i] + (1.0 - kept * kept) * variance
+        P[j, i] = kept * P[j, i]
+    P[i, i] = P[i, i] + (1.0 - kept * kept) * variance
 
 
 @register_jitable

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba.extending import register_jitable
 
+from piezoest.compile import inlined
 from piezoest.equations.play import play
 
 
@@ -23,11 +24,11 @@ def relays(y, centre, width):
     return width * (np.tanh((y - centre) / width) + np.tanh(centre / width))
 
 
-@register_jitable(inline="always")
+@inlined
 def preisach_step(y, u, gain, thresholds, weights, centre, width):
     """w = gain u + sum_i weights[i] relays(play_i[u]); the states `y` (n,) are updated in place."""
     w = gain * u
-    for i in range(y.shape[0]):
+    for i in range(len(y)):
         y[i] = play(y[i], u, thresholds[i])
         w = w + weights[i] * relays(y[i], centre, width)
     return w

@@ -5,22 +5,20 @@ from __future__ import annotations
 import copy
 import itertools
 import os
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Self
 
 import numpy as np
 
 from piezoest._checks import FloatArray, as_floats, integer, number_or_nan
-from piezoest.estimators import bank_kernel
 from piezoest.estimators.base import Status
-from piezoest.estimators.ekf import HysteresisEKF
-from piezoest.estimators.rls import HysteresisRLS
+from piezoest.estimators.compiled import CompiledEstimator
+from piezoest.layout import write
 from piezoest.models import Model
 
-_LOOPS: dict[type, Any] = {HysteresisRLS: bank_kernel.rls, HysteresisEKF: bank_kernel.kalman}
-
 # Samples (of all channels) below which a second core costs more than it brings.
-WORTH_A_CORE = 4096
+SAMPLES_PER_CORE = 4096
 # Most channels: each has a state of its own.
 MOST_CHANNELS = 1_000_000
 
@@ -33,8 +31,9 @@ class EstimatorBank:
 
     Parameters
     ----------
-    estimator : HysteresisRLS or HysteresisEKF
-        Every channel starts as a copy of it, in its present state; it is not changed itself.
+    estimator : HysteresisRLS, HysteresisEKF, OutputErrorRLS or PrandtlIshlinskiiRLS
+        Or another one whose samples go through compiled functions. Every channel starts as a copy of it, in
+        its present state; it is not changed itself.
     channels : int
         Number of stages, N, up to a million.
     threads : int, optional
@@ -55,24 +54,21 @@ class EstimatorBank:
     (64, 4)
     """
 
-    __slots__ = ("_kind", "_none", "_reader", "_start", "_states", "_threads")
+    __slots__ = ("_reader", "_start", "_states", "_threads")
 
-    _reader: Any
-
-    def __init__(self, estimator: Any, channels: int, *, threads: int | None = None) -> None:
-        if type(estimator) not in _LOOPS:
+    def __init__(self, estimator: CompiledEstimator, channels: int, *, threads: int | None = None) -> None:
+        if not isinstance(estimator, CompiledEstimator):
             raise ValueError(
-                f"estimator must be a HysteresisRLS or a HysteresisEKF, got {type(estimator).__name__}: "
+                f"estimator must be a compiled one, such as HysteresisRLS, got {type(estimator).__name__}: "
                 "keep a list of estimators instead"
             )
         channels = integer("channels", channels, 1, MOST_CHANNELS)
         self._threads = integer("threads", os.cpu_count() or 1 if threads is None else threads, 1)
-        self._kind = estimator._kind
-        reader: Any = estimator.copy()
-        self._reader = reader
-        self._start = estimator._state.copy()
-        self._states = np.tile(self._start, (channels, 1))
-        self._none = np.empty((0, channels, self._reader._n))
+        self._reader = estimator.copy()
+        if self._reader.is_waiting:
+            self._reader.update(None)
+        self._start = self._reader.state.copy()
+        self._states = np.repeat(self._start[np.newaxis], channels)
 
     def __copy__(self) -> Self:
         return copy.deepcopy(self)
@@ -91,22 +87,24 @@ class EstimatorBank:
             raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
         return array
 
-    def _take(self, u: FloatArray, x: FloatArray, every: int, theta: FloatArray) -> None:
-        channels = len(self)
-        parts = min(self._threads, max(1, u.size // WORTH_A_CORE), channels)
-        reader = self._reader
-        loop = _LOOPS[type(reader)][*self._kind, len(u) < bank_kernel.WORTH_MOVING]
+    def _through(self, u: FloatArray, x: FloatArray, every: int) -> FloatArray:
+        """Run checked records (K, N); every k-th sample's row of each channel."""
+        channels, reader = len(self), self._reader
+        rows = np.empty((u.shape[0] // every, channels, reader.row_size))
+        parts = min(self._threads, max(1, u.size // SAMPLES_PER_CORE), channels)
+        loop = reader.kernel.step_channels.of(*reader.layouts)
+        edges = [channels * i // parts for i in range(parts + 1)]
+        arguments: list[Any] = [
+            (self._states, reader.settings, u, x, first, stop, every, rows)
+            for first, stop in itertools.pairwise(edges)
+        ]
         if parts == 1:
-            loop(self._states, reader._config, u, x, 0, channels, every, theta)
-            return
-        edges = [channels * part // parts for part in range(parts + 1)]
+            loop(*arguments[0])
+            return rows
         with ThreadPoolExecutor(parts) as pool:
-            tasks = [
-                pool.submit(loop, self._states, reader._config, u, x, start, stop, every, theta)
-                for start, stop in itertools.pairwise(edges)
-            ]
-        for task in tasks:
-            task.result()
+            for task in [pool.submit(loop, *each) for each in arguments]:
+                task.result()
+        return rows
 
     def step(self, u: Any, x: Any) -> None:
         """Take one sample of every channel.
@@ -123,7 +121,7 @@ class EstimatorBank:
             If a shape is another one.
         """
         u, x = self._channels_of("u", u, 1), self._channels_of("x", x, 1)
-        self._take(u[np.newaxis], x[np.newaxis], 2, self._none)
+        self._through(u[np.newaxis], x[np.newaxis], 2)
 
     def run(self, u: Any, x: Any, *, every: int = 1) -> FloatArray:
         """Take whole records; continues from the present state.
@@ -149,14 +147,15 @@ class EstimatorBank:
         if u.shape != x.shape:
             raise ValueError(f"u and x must have the same shape, got {u.shape} and {x.shape}")
         every = integer("every", every, 1)
-        rows = np.empty((u.shape[0] // every, len(self), self._reader._n))
-        self._take(u, x, every, rows)
-        theta: FloatArray = self._reader._theta_of(rows)
-        return theta
+        rows = self._through(u, x, every)
+        return np.stack([one.theta_of(rows[:, c]) for c, one in enumerate(self._each())], axis=1)
 
-    def _channel(self, c: int) -> Any:
-        self._reader._state = self._states[c]
-        return self._reader
+    def _each(self) -> Iterator[CompiledEstimator]:
+        """An estimator in the state of each channel, until the next one is asked for."""
+        reader = self._reader.copy()
+        for c in range(len(self)):
+            write(reader.state, self._states[c : c + 1])
+            yield reader
 
     def channel(self, c: int) -> Any:
         """Return an independent estimator in the state of channel c.
@@ -166,24 +165,24 @@ class EstimatorBank:
         c : int
             Number of the channel, from 0.
         """
-        single = self._channel(c).copy()
-        single._state = self._states[c].copy()
+        single = self._reader.copy()
+        write(single.state, self._states[c].reshape(1))
         return single
 
     @property
     def theta(self) -> FloatArray:
         """Parameters of every channel, shape (N, n)."""
-        return np.array([self._channel(c).theta for c in range(len(self))])
+        return np.array([one.theta for one in self._each()])
 
     @property
     def models(self) -> list[Model]:
         """Admissible models as known now, one for each channel."""
-        return [self._channel(c).model for c in range(len(self))]
+        return [one.model for one in self._each()]
 
     @property
     def status(self) -> list[Status]:
         """What happened to the samples so far, for each channel."""
-        return [self._channel(c).status for c in range(len(self))]
+        return [one.status for one in self._each()]
 
     def reset(self) -> None:
         """Return every channel to the state of the estimator given."""

@@ -4,138 +4,32 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, Protocol, Self, runtime_checkable
+from collections.abc import Iterable
+from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, integer, number_or_nan
-from piezoest.estimators import saved_state
+from piezoest.estimators import samples, saved_state
+from piezoest.estimators.outcome import Estimator as Estimator
+from piezoest.estimators.outcome import Status as Status
+from piezoest.estimators.outcome import Trace as Trace
+from piezoest.layout import Record, by_name, from_bytes, new, write
 from piezoest.models import Model, model_from_dict
 from piezoest.policies import policy_from_dict
-
-# For the histories that a compiled loop is not asked for.
-NONE, NO_ROWS = np.empty(0), np.empty((0, 0))
 
 _FORMAT = 1
 
 
-@runtime_checkable
-class Estimator(Protocol):
-    """What `piezoest.track` needs of an estimator; any class with these two will do.
-
-    An estimator may also have ``run(u, x)``, which `track` then prefers to a loop of ``step``.
-    """
-
-    @property
-    def model(self) -> Model:
-        """Model as known now."""
-
-    def step(self, u: float, x: float | None) -> None:
-        """Take one sample.
-
-        Parameters
-        ----------
-        u : float
-            Voltage [V].
-        x : float or None
-            Measured displacement [µm]; None if it is missing.
-        """
-
-
-@dataclass(frozen=True, slots=True)
-class Status:
-    """What happened to the samples an estimator was given.
-
-    Parameters
-    ----------
-    samples : int
-        Samples seen.
-    updates : int
-        Samples that moved the estimate.
-    missing : int
-        Samples without a usable voltage or displacement (None, NaN, infinite).
-    held : int
-        Samples with a measurement that was not taken: too little excitation to say anything, or an update
-        that would not be a number, or one beyond all measure.
-    resets : int
-        Times the covariance was reset, also where it was lost or an update was not taken for that reason.
-    projected : bool
-        Whether `model` is the nearest admissible one and not `theta` itself.
-    last : str
-        What became of the last sample: ``"waiting"``, ``"updated"``, ``"missing"``, ``"held"``
-        or ``"rejected"``.
-    outliers : int
-        Measurements that were rejected as ones the stage cannot have made.
-    """
-
-    samples: int
-    updates: int
-    missing: int
-    held: int
-    resets: int
-    projected: bool
-    last: str
-    outliers: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Trace:
-    """History of an estimator over a `run`, every k-th sample.
-
-    Parameters
-    ----------
-    index : ndarray of int, shape (M,)
-        Positions in the record that was run.
-    theta : ndarray, shape (M, n)
-        Parameters after that sample.
-    parameter_names : tuple of str
-        Names of the columns of `theta`.
-    y, S : ndarray or None, shape (M,)
-        Innovation and its variance, if asked for.
-    P : ndarray or None, shape (M, n, n)
-        Covariance, if asked for.
-    """
-
-    index: np.ndarray[Any, np.dtype[np.int64]]
-    theta: FloatArray
-    parameter_names: tuple[str, ...]
-    y: FloatArray | None = None
-    S: FloatArray | None = None
-    P: FloatArray | None = field(default=None, repr=False)
-
-
-class Compiled(NamedTuple):
-    """Functions on flat arrays that an estimator consists of; a controller's code is generated from them.
-
-    Parameters
-    ----------
-    sample : callable
-        ``sample(state, config, u, x)``: one sample.
-    proposed : callable
-        ``proposed(state, config, terms, model)``: admissible (alpha, beta, gamma, offset), or
-        (gain, -, -, offset), into `model`.
-    frozen : int or None
-        Position in the state of a flag that holds the estimate; None if there is none.
-    unneeded : tuple of callable
-        Functions within `sample` that no model depends on: a controller leaves them out.
-    """
-
-    sample: Any
-    proposed: Any
-    frozen: int | None
-    unneeded: tuple[Any, ...] = ()
-
-
 class EstimatorBase(ABC):
-    """Shared behaviour: one flat state array, from which all else is derived.
+    """Shared behaviour: one state of named numbers, from which all else is derived.
 
-    A subclass keeps everything that changes in ``self._state`` (flat float64) and its
-    constructor's JSON-safe arguments in ``self._arguments``; copying, saving, resetting and
-    pickling then need nothing more.
+    A subclass keeps everything that changes in ``self._state`` (a structured array, see `piezoest.layout`)
+    and its constructor's JSON-safe arguments in ``self._arguments``; copying, saving, resetting and
+    pickling then need nothing more. What it shows is by default the state's number of that name.
     """
 
-    __slots__ = ("_arguments", "_pending", "_start", "_state")
+    __slots__ = ("_arguments", "_layout", "_pending", "_start", "_state")
 
     #: Promises of the face this class does not keep: name of the promise to the reason.
     conformance_exceptions: ClassVar[dict[str, str]] = {}
@@ -143,28 +37,56 @@ class EstimatorBase(ABC):
     #: What the class saves beside its state.
     _saved_too: ClassVar[tuple[str, ...]] = ()
 
-    _arguments: dict[str, Any]
-    _pending: float | None
-    _start: FloatArray
-    _state: FloatArray
+    #: Structured arrays among the slots, and the slots with their layouts.
+    _layouts_of: ClassVar[dict[str, str]] = {"_state": "_layout", "_start": "_layout"}
 
-    def _begin(self, arguments: dict[str, Any], state: FloatArray) -> None:
+    _arguments: dict[str, Any]
+    _layout: Record
+    _pending: float | None
+    _start: Any
+    _state: Any
+
+    def _begin(self, arguments: dict[str, Any], layout: Record, values: dict[str, Any]) -> None:
+        """Start with a state of zeros but for `values`."""
         self._arguments = arguments
-        self._state = state
-        self._start = state.copy()
+        self._layout = layout
+        self._state = new(layout, **values)
+        self._start = self._state.copy()
         self._pending = None
 
-    def _load(self, state: FloatArray) -> None:
-        """Take over a state."""
-        self._state[:] = state
+    def _load(self, state: Any) -> None:
+        """Go on from a state."""
+        write(self._state, state)
+
+    def _rules(self, state: Any) -> Iterable[saved_state.Rule]:
+        """What must hold between the numbers of a saved state: in words, and whether it does."""
+        return ()
+
+    @property
+    def state(self) -> Any:
+        """All that changes, by name: a NumPy structured array, a view; ``state["law"]["P"]``."""
+        return self._state
+
+    @property
+    def layout(self) -> Record:
+        """What `state` consists of, and what its numbers can be."""
+        return self._layout
 
     @abstractmethod
     def _sample(self, u: float, x: float) -> None:
-        """Take one sample; NaN in either is a missing measurement."""
+        """Go through one sample; NaN in either is a missing measurement."""
 
-    @abstractmethod
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        """Take checked records."""
+        """Go through checked records, here sample by sample in Python."""
+        rows, names = u.size // every, ("theta", *want)
+        kept = {name: np.empty((rows, *np.shape(getattr(self, name)))) for name in names}
+        for k in range(u.size):
+            self._sample(float(u[k]), float(x[k]))
+            if (k + 1) % every == 0:
+                for name in names:
+                    kept[name][k // every] = getattr(self, name)
+        index = np.arange(every - 1, rows * every, every)
+        return Trace(index=index, parameter_names=self.parameter_names, **kept)
 
     @property
     def sample_rate(self) -> float:
@@ -177,9 +99,29 @@ class EstimatorBase(ABC):
         """Admissible model as known now, ready for a compensator."""
 
     @property
-    @abstractmethod
     def theta(self) -> FloatArray:
         """Parameters as estimated, shape (n,), in the order of `parameter_names`."""
+        return np.array(self._state["theta"])
+
+    @property
+    def P(self) -> FloatArray:
+        """Covariance of `theta`, shape (n, n)."""
+        return np.array(self._state["P"])
+
+    @property
+    def K(self) -> FloatArray:
+        """Last gain."""
+        return np.array(self._state["K"])
+
+    @property
+    def y(self) -> float:
+        """Last innovation."""
+        return float(self._state["y"])
+
+    @property
+    def S(self) -> float:
+        """Variance of the last innovation."""
+        return float(self._state["S"])
 
     @property
     @abstractmethod
@@ -187,9 +129,30 @@ class EstimatorBase(ABC):
         """Names of the entries of `theta`."""
 
     @property
-    @abstractmethod
+    def standard_errors(self) -> FloatArray:
+        """Square roots of the diagonal of `P`, shape (n,)."""
+        return np.sqrt(np.fmax(np.diag(self.P), 0.0))
+
+    @property
     def status(self) -> Status:
-        """What happened to the samples so far."""
+        """What happened to the samples so far; what the state does not count is zero."""
+        known = self._state.dtype.names
+        counted = ("samples", "updates", "missing", "held", "resets", "outliers")
+        counts = {name: int(self._state[name]) for name in counted if name in known}
+        return Status(
+            **{**dict.fromkeys(counted, 0), **counts},
+            projected=self._is_projected(),
+            last=samples.NAMES[int(self._state["last"])],
+        )
+
+    def _is_projected(self) -> bool:
+        """Whether `model` is not `theta` itself."""
+        return False
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether `predict` was called, and `update` not yet."""
+        return self._pending is not None
 
     def predict(self, u: float | None) -> None:
         """Take the voltage of the next sample; `update` completes it.
@@ -223,7 +186,7 @@ class EstimatorBase(ABC):
         self._sample(u, number_or_nan(x))
 
     def step(self, u: float | None, x: float | None) -> None:
-        """Take one sample: ``predict(u)`` and ``update(x)``.
+        """Go through one sample: ``predict(u)`` and ``update(x)``.
 
         Parameters
         ----------
@@ -250,7 +213,7 @@ class EstimatorBase(ABC):
         self._sample(u, x)
 
     def run(self, u: Any, x: Any, *, every: int = 1, record: tuple[str, ...] = ()) -> Trace:
-        """Take a whole record; continues from the current state, the same as a loop of `step`.
+        """Go through a whole record; continues from the current state, the same as a loop of `step`.
 
         Parameters
         ----------
@@ -277,7 +240,7 @@ class EstimatorBase(ABC):
         return self._run(u, x, every, frozenset(record))
 
     def _records(self, u: Any, x: Any) -> tuple[FloatArray, FloatArray]:
-        """Check records, and take what `predict` has left over."""
+        """Check records, and finish what `predict` has left over."""
         # The compiled loops take writeable arrays only, though they write into none.
         u = array_1d("u", u, allow_nan=True)
         x = array_1d("x", x, allow_nan=True)
@@ -290,8 +253,14 @@ class EstimatorBase(ABC):
             self._pending = None
         return u, x
 
-    def _absorb(self, u: FloatArray, x: FloatArray) -> None:
-        """Do as `run`, but keep nothing."""
+    def absorb(self, u: FloatArray, x: FloatArray) -> None:
+        """Do as `run`, but keep nothing.
+
+        Parameters
+        ----------
+        u, x : array_like, shape (N,)
+            Voltage [V] and measured displacement [µm].
+        """
         self.run(u, x, every=max(1, u.size))
 
     def reset(self) -> None:
@@ -306,13 +275,28 @@ class EstimatorBase(ABC):
     def __copy__(self) -> Self:
         return self.copy()
 
+    def __getstate__(self) -> Any:
+        # Pickled are numbers without their names, which the layouts have.
+        kept, slots = cast(Any, super().__getstate__())
+        for name in self._layouts_of.keys() & slots.keys():
+            slots[name] = slots[name].tobytes()
+        return kept, slots
+
+    def __setstate__(self, state: Any) -> None:
+        kept, slots = state
+        for name, layout in self._layouts_of.items():
+            if name in slots:
+                slots[name] = from_bytes(slots[layout], slots[name])
+        for name, value in {**(kept or {}), **slots}.items():
+            setattr(self, name, value)
+
     def to_dict(self) -> dict[str, Any]:
         """Return arguments and state as a JSON-safe dictionary; `from_dict` resumes bit for bit."""
         return {
             "estimator": type(self).__name__,
             "format": _FORMAT,
             "arguments": copy.deepcopy(self._arguments),
-            "state": saved_state.to_save(self._state, self._table()),
+            "state": by_name(self._layout, self._state),
             # JSON knows no NaN.
             "pending": "missing"
             if self._pending is not None and not np.isfinite(self._pending)
@@ -331,10 +315,6 @@ class EstimatorBase(ABC):
             revived["policies"] = tuple(policy_from_dict(item) for item in revived["policies"])
         return revived
 
-    @abstractmethod
-    def _table(self) -> saved_state.Table:
-        """What the state consists of."""
-
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
         """Make an estimator that continues where `to_dict` was called.
@@ -352,24 +332,12 @@ class EstimatorBase(ABC):
         """
         saved_state.check_head(cls.__name__, _FORMAT, data, cls._saved_too)
         estimator: Self = saved_state.construct(cls, data["arguments"])
-        estimator._load(saved_state.check(data["state"], estimator._table(), estimator._start))
-        estimator._pending = saved_state.pending_voltage(data["pending"])
+        estimator._load(
+            saved_state.check(data["state"], estimator._layout, estimator._start, estimator._rules)
+        )
+        estimator._restore(data)
         return estimator
 
-
-class Freezable(EstimatorBase):
-    """An estimator whose estimate can be held, by a flag in its state."""
-
-    __slots__ = ()
-
-    #: Position of the flag in the state.
-    _frozen_at: ClassVar[int]
-
-    @property
-    def frozen(self) -> bool:
-        """Whether the estimate is held; settable. Samples are then counted as held."""
-        return bool(self._state[self._frozen_at])
-
-    @frozen.setter
-    def frozen(self, frozen: bool) -> None:
-        self._state[self._frozen_at] = float(bool(frozen))
+    def _restore(self, data: dict[str, Any]) -> None:
+        """Go on from what is saved beside the state."""
+        self._pending = saved_state.pending_voltage(data["pending"])

@@ -4,44 +4,51 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from piezoest._checks import FloatArray, non_negative
-from piezoest._jit import unrolled
+from piezoest._checks import non_negative
+from piezoest.compile import inlined
+from piezoest.layout import ABSENT, FIXED, MEASURED, Field, Length, numbers, record, whole
 
 # Most samples that a measurement may lag.
 LONGEST = 1e6
 
 
-def delay_line(delay: float) -> tuple[float, FloatArray]:
-    """Fraction of a sample and new storage for a delay in samples, whole or fractional."""
+def delay_line(delay: float) -> tuple[Field, dict[str, float]]:
+    """Layout and start of the storage for a delay in samples, whole or fractional; absent without one.
+
+    Raises
+    ------
+    ValueError
+        If the delay is negative or beyond a million.
+    """
     if non_negative("delay", delay) > LONGEST:
         raise ValueError(f"delay must be at most {LONGEST:g} samples, got {delay:g}")
-    delay = float(delay)
-    storage = np.zeros(int(delay) + 2)
-    storage[0] = -1.0
-    return delay - int(delay), storage
+    if delay == 0.0:
+        return ABSENT, {}
+    size = int(delay) + 1
+    voltages = numbers(Length("size", size), kind=MEASURED)
+    layout = record(position=whole(-1.0, size - 1.0), fraction=FIXED, voltages=voltages)
+    return layout, {"position": -1.0, "fraction": delay - int(delay)}
 
 
-@unrolled
-def delayed(line: Any, fraction: float, u: Any) -> Any:
-    """Voltage as the sensor sees it now, u the newest; `line` = (position, storage), from its end.
+@inlined
+def delayed(line: Any, u: Any) -> Any:
+    """Voltage as the sensor sees it now, u the newest; u itself where nothing is delayed.
 
     Before the first voltages have passed through, the first one counts.
     """
-    length = line.size - 1
-    if length == 1 and fraction == 0.0:
+    if line is None:
         return u
-    if line[0] < 0.0:
-        for i in range(length):
-            line[1 + i] = u
-        line[0] = 0.0
-    position = int(line[0])
+    size = len(line.voltages)
+    if line.position < 0.0:
+        for i in range(size):
+            line.voltages[i] = u
+        line.position = 0.0
+    position = int(line.position)
     following = position + 1
-    if following == length:  # a division would take longer than all the rest
+    if following == size:  # a division would take longer than all the rest
         following = 0
-    older = line[1 + position]
-    line[1 + position] = u
-    line[0] = following
-    younger = line[1 + following]
-    return younger + fraction * (older - younger)
+    older = line.voltages[position]
+    line.voltages[position] = u
+    line.position = following
+    younger = line.voltages[following]
+    return younger + line.fraction * (older - younger)

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Iterable
+from typing import Any, ClassVar
 
 import numpy as np
 
 from piezoest._checks import FloatArray, check_start, moderate
 from piezoest.equations import coleman_hodgdon as equations
-from piezoest.estimators import ekf_kernel as kernel
-from piezoest.estimators import ekf_loops, state_tables
-from piezoest.estimators.base import NO_ROWS, NONE, Compiled, EstimatorBase, Status, Trace
+from piezoest.estimators import ekf_kernel
+from piezoest.estimators.base import Trace
+from piezoest.estimators.compiled import NONE, CompiledEstimator
 from piezoest.estimators.delay_line import delay_line
-from piezoest.estimators.saved_state import Table
+from piezoest.estimators.saved_state import Rule, no_more_than
 from piezoest.models import ColemanHodgdon, LinearGain, Model
 
+# How far the parameters of a filter that does not project may be outside of the admissible set: a relative to
+# its least value, c relative to the least c - 2b. They are 1e-2 and 1e-3 of the start's.
+GROWING, GREATEST = 1e5, 1e10
 
-class HysteresisEKF(EstimatorBase):
+
+class HysteresisEKF(CompiledEstimator):
     """Extended Kalman filter for the loop's state and the model's parameters together.
 
-    The state is (w_h, a, b, c), with the offset as a fifth on request: in this second form
+    The state `s` is (w_h, a, b, c), with the offset as a fifth on request: in this second form
     of the Coleman-Hodgdon model (2)-(3) the measurement x = w_h + c u + offset is linear,
     w_h is linear in b, and the admissible set has flat faces. Between samples the exact
     step and its exact Jacobian are used, so that the filter is the same at any sample rate;
@@ -33,11 +38,11 @@ class HysteresisEKF(EstimatorBase):
         Model to start from; its kind is the kind that is estimated. Default
         ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack actuator.
     uncertainty : float
-        Standard deviation of each initial parameter (a, b, c or the gain), in parts of its value.
+        Standard deviation of each initial parameter (a, b, c or the gain), relative to its value.
     noise : float
         Standard deviation of the displacement's noise [µm].
     drift : float
-        Random walk of each parameter, in parts of its initial value per root second. The
+        Random walk of each parameter, relative to its initial value per root second. The
         filter's memory: 0 for constant parameters.
     mismatch : float
         Random walk of w_h [µm per root second]: how far the true stage strays from the model
@@ -60,15 +65,15 @@ class HysteresisEKF(EstimatorBase):
     -----
     Joseph's form of the update; process noise is given per second, so that a tuning
     survives a change of sample rate. `theta` and `P` are (alpha, beta, gamma) by (4), the
-    covariance to first order; `state` and `state_covariance` are the filter's own.
+    covariance to first order; `s` and `state_covariance` are the filter's own.
 
     Source: D. Simon, Optimal State Estimation (2006), sec. 13.2; the model: Eielsen, Gravdahl
     and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), (2)-(4).
     """
 
-    __slots__ = ("_config", "_initial", "_kind", "_n", "_terms")
+    __slots__ = ("_initial",)
 
-    _compiled = Compiled(kernel._sample, kernel.proposed, None)
+    kernel: ClassVar[Any] = ekf_kernel
 
     conformance_exceptions: ClassVar[dict[str, str]] = {}
 
@@ -95,33 +100,22 @@ class HysteresisEKF(EstimatorBase):
         uncertainty = moderate("uncertainty", uncertainty)
         drift = moderate("drift", drift, or_zero=True)
         mismatch = moderate("mismatch", mismatch, or_zero=True)
-        fraction, line = delay_line(delay)
+        line, line_start = delay_line(delay)
         start, spread, walk = starting_point(initial, uncertainty, drift, mismatch, offset)
-        n = start.size
-        self._initial, self._n = initial, n
         hysteretic = isinstance(initial, ColemanHodgdon)
-        self._terms = np.array([initial.gain if isinstance(initial, LinearGain) else 0.0, initial.offset])
-        self._config = np.zeros(kernel.CONFIG + n)
-        self._config[kernel.N] = n
-        self._config[kernel.HYSTERETIC] = hysteretic
         # The linear gain has no state that could stray: there the mismatch is noise.
         stray = 0.0 if hysteretic else mismatch**2 * sample_rate
-        self._config[kernel.NOISE] = moderate("noise", noise) ** 2 + stray
-        self._config[kernel.FRACTION] = fraction
-        self._config[kernel.OFFSET] = bool(offset)
-        self._config[kernel.PROJECT] = project and hysteretic
-        if hysteretic:
-            self._config[kernel.LEAST_A : kernel.LEAST_A + 3] = (
-                kernel.LEAST * start[1],
-                kernel.LEAST * start[2],
-                kernel.LEAST_MARGIN * start[3],
-            )
-        self._config[kernel.START : kernel.START + n] = spread**2
-        self._config[kernel.CONFIG :] = walk**2 / sample_rate
-        self._kind = (n, bool(delay > 0.0)) if hysteretic else (0, True)
-        state = np.zeros(kernel.state_size(n))
-        state[kernel.HEAD : kernel.HEAD + n] = start
-        state[kernel.HEAD + n : kernel.HEAD + n + n * n] = np.diag(spread**2).ravel()
+        self._initial = initial
+        self._configure(
+            ekf_kernel.settings_layout(start.size, hysteretic=hysteretic),
+            {
+                "noise": moderate("noise", noise) ** 2 + stray,
+                "offset": initial.offset,
+                "walk": walk**2 / sample_rate,
+                "variances": spread**2,
+                **_scale(initial),
+            },
+        )
         self._begin(
             {
                 "sample_rate": sample_rate,
@@ -134,143 +128,116 @@ class HysteresisEKF(EstimatorBase):
                 "delay": float(delay),
                 "project": bool(project),
             },
-            np.concatenate([state, line]),
+            ekf_kernel.state_layout(
+                start.size, line, offset=bool(offset), project=bool(project and hysteretic)
+            ),
+            {"filter": {"s": start, "P": np.diag(spread**2)}, "line": line_start},
         )
 
-    def _table(self) -> Table:
-        return state_tables.ekf(self._config, self._state.size)
+    def _rules(self, state: Any) -> Iterable[Rule]:
+        yield no_more_than(state["samples"], state["missing"], state["updates"])
+        if isinstance(self._initial, ColemanHodgdon):
+            words = "the filter's parameters must be admissible, or near it where it does not project"
+            yield words, self._parameters_fit(state)
 
-    def _sample(self, u: float, x: float) -> None:
-        ekf_loops.steps[self._kind](self._state, self._config, u, x)
-
-    def _absorb(self, u: FloatArray, x: FloatArray) -> None:
-        u, x = self._records(u, x)
-        run = ekf_loops.runs[self._kind]
-        run(self._state, self._config, u, x, u.size + 1, NONE, NO_ROWS, NO_ROWS, NONE, NONE, NO_ROWS)
+    def _parameters_fit(self, state: Any) -> bool:
+        _, a, b, c = state["filter"]["s"][:4]
+        least = self._settings["least"]
+        if self._arguments["project"]:
+            return bool(a >= least["a"] and b >= least["b"])
+        # Without projection a decay below zero is an exponential that grows: not without end.
+        return bool(-GROWING * least["a"] <= a and abs(c) <= GREATEST * least["margin"])
 
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        rows, n = u.size // every, self._n
+        rows, n = u.size // every, self.s.size
         theta = np.empty((rows, len(self.parameter_names)))
-        s = np.empty((rows if "P" in want else 0, n))
-        y = np.empty(rows if "y" in want else 0)
-        S = np.empty(rows if "S" in want else 0)
-        P = np.empty((rows if "P" in want else 0, n * n))
-        run = ekf_loops.runs[self._kind]
-        run(self._state, self._config, u, x, every, NONE, theta, s, y, S, P)
-        return self._trace(theta, s, y, S, P.reshape(-1, n, n), every, want)
-
-    def _trace(
-        self,
-        theta: FloatArray,
-        s: FloatArray,
-        y: FloatArray,
-        S: FloatArray,
-        P: FloatArray,
-        every: int,
-        want: frozenset[str],
-    ) -> Trace:
+        y = np.empty(rows) if "y" in want else NONE
+        S = np.empty(rows) if "S" in want else NONE
+        kept = rows if "P" in want else 0
+        P, s = np.empty((kept, n * n)), np.empty((kept, n))
+        self._through(u, x, every, (theta, y, S, P, s))
+        wanted = {"y": y, "S": S, "P": parameter_covariance(s, P.reshape(-1, n, n))}
         return Trace(
-            index=np.arange(every - 1, len(theta) * every, every),
+            index=np.arange(every - 1, rows * every, every),
             theta=theta,
             parameter_names=self.parameter_names,
-            y=y if "y" in want else None,
-            S=S if "S" in want else None,
-            P=self._theta_covariance(s, P) if "P" in want else None,
+            **{name: wanted[name] for name in want},
         )
 
-    def _theta_of(self, s: FloatArray) -> FloatArray:
-        """Parameters (…, n_theta) of states (…, n)."""
-        if isinstance(self._initial, LinearGain):
-            return s.copy()
-        alpha, beta, gamma = equations.rate_parameters(s[..., 1], s[..., 2], s[..., 3])
-        return np.stack([alpha, beta, gamma, *np.moveaxis(s[..., 4:], -1, 0)], axis=-1)
-
-    def _theta_covariance(self, s: FloatArray, P: FloatArray) -> FloatArray:
-        """Covariances (…, n_theta, n_theta) of the parameters, to first order."""
-        if isinstance(self._initial, LinearGain):
-            return P.copy()
-        n = self._n
-        jacobian = np.zeros((*s.shape[:-1], n - 1, n))
-        jacobian[..., 0, 1] = 1.0
-        jacobian[..., 1, 2] = -1.0
-        jacobian[..., 1, 3] = 1.0
-        jacobian[..., 2, 1] = s[..., 3]
-        jacobian[..., 2, 3] = s[..., 1]
-        if n == 5:
-            jacobian[..., 3, 4] = 1.0
-        return jacobian @ P @ np.swapaxes(jacobian, -1, -2)
-
     @property
-    def state(self) -> FloatArray:
+    def s(self) -> FloatArray:
         """The filter's own state: (w_h, a, b, c[, offset]) or (gain[, offset])."""
-        return self._state[kernel.HEAD : kernel.HEAD + self._n].copy()
+        s: FloatArray = self._state["filter"]["s"]
+        return s.copy()
 
     @property
     def state_covariance(self) -> FloatArray:
-        """Covariance of `state`, shape (n, n)."""
-        n = self._n
-        return self._state[kernel.HEAD + n : kernel.HEAD + n + n * n].reshape(n, n).copy()
+        """Covariance of `s`, shape (n, n)."""
+        P: FloatArray = self._state["filter"]["P"]
+        return P.copy()
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the entries of `theta`."""
         names = self._initial.parameter_names
-        return (*names, "offset") if self._config[kernel.OFFSET] else names
+        return (*names, "offset") if self._arguments["offset"] else names
 
     @property
     def theta(self) -> FloatArray:
         """Parameters, shape (n,), in the order of `parameter_names`."""
-        return self._theta_of(self.state)
+        return parameters(self.s)
 
     @property
     def P(self) -> FloatArray:
         """Covariance of `theta` to first order, shape (n, n)."""
-        return self._theta_covariance(self.state, self.state_covariance)
-
-    @property
-    def standard_errors(self) -> FloatArray:
-        """Square roots of the diagonal of `P`, shape (n,)."""
-        return np.sqrt(np.fmax(np.diag(self.P), 0.0))
-
-    @property
-    def y(self) -> float:
-        """Last innovation [µm]."""
-        return float(self._state[kernel.INNOVATION])
-
-    @property
-    def S(self) -> float:
-        """Variance of the last innovation [µm²]."""
-        return float(self._state[kernel.INNOVATION_VARIANCE])
+        return parameter_covariance(self.s, self.state_covariance)
 
     @property
     def K(self) -> FloatArray:
-        """Last gain, of `state`."""
-        n = self._n
-        return self._state[kernel.HEAD + n + n * n : kernel.HEAD + 2 * n + n * n].copy()
+        """Last gain, of `s`."""
+        K: FloatArray = self._state["filter"]["K"]
+        return K.copy()
 
-    @property
-    def status(self) -> Status:
-        """What happened to the samples so far."""
-        head = self._state
-        return Status(
-            samples=int(head[kernel.SAMPLES]),
-            updates=int(head[kernel.UPDATES]),
-            missing=int(head[kernel.MISSED]),
-            held=int(head[kernel.HELD]),
-            resets=int(head[kernel.RESETS]),
-            projected=bool(head[kernel.MOVED]),
-            last=("waiting", "updated", "missing", "held")[int(head[kernel.LAST])],
-        )
+    def _is_projected(self) -> bool:
+        projection = self._state["projection"]
+        return projection.dtype.names is not None and bool(projection["moved"])
 
     @property
     def model(self) -> Model:
         """Admissible model as known now."""
-        values = np.zeros(4)
-        kernel.propose(self._state, self._config, self._terms, values)
-        alpha, beta, gamma, offset = values.tolist()
+        alpha, beta, gamma, offset = self._proposed()
         if isinstance(self._initial, LinearGain):
             return LinearGain(alpha, offset)
         return ColemanHodgdon(alpha, beta, gamma, offset)
+
+
+def is_hysteretic(s: FloatArray) -> bool:
+    """Whether states (…, n) are of a hysteresis: those of a linear gain are one, or two with an offset."""
+    return s.shape[-1] > 2
+
+
+def parameters(s: FloatArray) -> FloatArray:
+    """Parameters (…, n_theta) of states (…, n)."""
+    if not is_hysteretic(s):
+        return s.copy()
+    alpha, beta, gamma = equations.rate_parameters(s[..., 1], s[..., 2], s[..., 3])
+    return np.stack([alpha, beta, gamma, *np.moveaxis(s[..., 4:], -1, 0)], axis=-1)
+
+
+def parameter_covariance(s: FloatArray, P: FloatArray) -> FloatArray:
+    """Covariances (…, n_theta, n_theta) of the parameters, to first order, from P of s (…, n)."""
+    if not is_hysteretic(s):
+        return P.copy()
+    n = s.shape[-1]
+    jacobian = np.zeros((*s.shape[:-1], n - 1, n))
+    jacobian[..., 0, 1] = 1.0
+    jacobian[..., 1, 2] = -1.0
+    jacobian[..., 1, 3] = 1.0
+    jacobian[..., 2, 1] = s[..., 3]
+    jacobian[..., 2, 3] = s[..., 1]
+    if n == 5:
+        jacobian[..., 3, 4] = 1.0
+    return jacobian @ P @ np.swapaxes(jacobian, -1, -2)
 
 
 def starting_point(
@@ -292,3 +259,11 @@ def starting_point(
         spread.append(10.0 * abs(initial.gain if isinstance(initial, LinearGain) else initial.c))
         walk.append(mismatch)
     return np.array(start), np.array(spread), np.array(walk)
+
+
+def _scale(initial: ColemanHodgdon | LinearGain) -> dict[str, Any]:
+    """Settings that hold the estimate near the start's size: least parameters, or the start's gain."""
+    if isinstance(initial, LinearGain):
+        return {"gain": initial.gain}
+    least, margin = ekf_kernel.LEAST, ekf_kernel.LEAST_MARGIN
+    return {"least": {"a": least * initial.a, "b": least * initial.b, "margin": margin * initial.c}}

@@ -1,4 +1,7 @@
-"""The compiled inside of `HysteresisEKF`: time update, measurement update, projection."""
+"""The compiled inside of `HysteresisEKF`: time update, measurement update, projection.
+
+The settings of a hysteresis have `least`, those of a linear gain have `gain` instead; the other is absent.
+"""
 
 from __future__ import annotations
 
@@ -8,215 +11,344 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import PROPOSE_TYPES, compiled, unrolled
+from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, nth, own_copy, put_back
 from piezoest.equations import admissible, kalman
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators.delay_line import delayed
+from piezoest.estimators.samples import HELD, MISSING, OUTCOME, UPDATED, keep_outcome
+from piezoest.layout import (
+    ABSENT,
+    AMOUNT,
+    COUNT,
+    COVARIANCE,
+    FLAG,
+    MEASURED,
+    NUMBER,
+    PARAMETER,
+    Field,
+    numbers,
+    record,
+)
+from piezoest.layout import Record as Layout
 
-# State: bookkeeping, then vectors of n or n*n numbers, the delay line last.
-U_LAST, PRIMED, SAMPLES, MISSED, UPDATES, MOVED, LAST, INNOVATION, INNOVATION_VARIANCE = range(9)
-U_CENTRE, X_CENTRE, CENTRED, HELD, RESETS, HEAD = range(9, 15)
+# With an offset the filter counts from the first voltage and displacement; whether there was a displacement.
+CENTRE = record(u=MEASURED, x=MEASURED, known=FLAG)
+# Whether the last update was projected.
+PROJECTION = record(moved=FLAG)
+# Least a and b, and least c - 2b.
+BOUNDS = record(a=NUMBER, b=NUMBER, margin=NUMBER)
 
-# Configuration: scalars, the parameters' least values, the start's variances (up to five), and behind them n
-# process noises.
-N, HYSTERETIC, NOISE, FRACTION, OFFSET, PROJECT, LEAST_A, LEAST_B, MARGIN, START = range(10)
-CONFIG = START + 5
-
-WAITING, UPDATED, MISSING, HOLDING = 0.0, 1.0, 2.0, 3.0
-# Least a, b or gain of a model handed out, in parts of the start's; least c - 2b, in parts of its c.
+# Least a, b or gain of a model handed out, relative to the start's; least c - 2b, relative to its c.
 LEAST, LEAST_MARGIN = 1e-2, 1e-3
 
 
-@register_jitable
-def state_size(n: int) -> int:
-    """Numbers that the state needs for n states of the filter; the delay line follows."""
-    return HEAD + 5 * n + 2 * n * n
-
-
-@unrolled
-def _views(state: Any, n: int) -> Any:
-    """State vector s, its covariance P, last gain K, workspace."""
-    i = HEAD
-    m = n * n
-    return (
-        state[i : i + n],
-        state[i + n : i + n + m],
-        state[i + n + m : i + 2 * n + m],
-        state[i + 2 * n + m : i + 5 * n + 2 * m],
+def state_layout(n: int, line: Field, *, offset: bool, project: bool) -> Layout:
+    """Layout of the state of a filter of n states; `line` is the storage of the delay."""
+    return record(
+        samples=COUNT,
+        missing=COUNT,
+        updates=COUNT,
+        held=COUNT,
+        resets=COUNT,
+        last=OUTCOME,
+        primed=FLAG,
+        u_last=MEASURED,
+        y=NUMBER,
+        S=AMOUNT,
+        centre=CENTRE if offset else ABSENT,
+        projection=PROJECTION if project else ABSENT,
+        filter=record(s=numbers(n, kind=PARAMETER), P=numbers(n, n, kind=COVARIANCE), K=numbers(n)),
+        line=line,
     )
 
 
-@unrolled
-def _time_update(s: Any, P: Any, du: Any, config: Any, n: int, work: Any) -> None:
+def settings_layout(n: int, *, hysteretic: bool) -> Layout:
+    """Layout of the settings: noise and random walk (variances), and of the start offset and variances."""
+    return record(
+        noise=AMOUNT,
+        offset=NUMBER,
+        gain=ABSENT if hysteretic else NUMBER,
+        least=BOUNDS if hysteretic else ABSENT,
+        walk=numbers(n),
+        variances=numbers(n),
+    )
+
+
+# ---------------------------------------------------------------- one sample
+
+
+@inlined
+def from_first_voltage(centre: Any, primed: Any, u: Any) -> Any:
+    """Voltage less the first one, where there is an offset; `primed` says whether that was seen."""
+    if centre is None:
+        return u
+    if primed == 0.0:
+        centre.u = u
+    return u - centre.u
+
+
+@inlined
+def from_first_displacement(centre: Any, x: Any) -> Any:
+    """Displacement less the first one, where there is an offset."""
+    if centre is None:
+        return x
+    if centre.known == 0.0:
+        centre.known = 1.0
+        centre.x = x
+    return x - centre.x
+
+
+@inlined
+def _time_update(s: Any, P: Any, du: Any, walk: Any, least: Any) -> None:
     """Exact sample map of the state, its Jacobian for the covariance, process noise."""
-    row, q = work[:n], work[n : 2 * n]
-    for i in range(n):
+    row, q = like(s), like(s)
+    for i in range(len(s)):
         row[i] = 0.0
-        q[i] = config[CONFIG + i]
-    if config[HYSTERETIC] != 0.0:
+        q[i] = walk[i]
+    if least is None:
+        row[0] = 1.0
+        kalman.predict_covariance(P, row, 1, q)
+    else:
         w_h, kept, by_a, by_b = equations.hysteresis_linearised(s[0], du, s[1], s[2])
-        q[0] += kalman.bilinear_variance(P, du, s[1], n)
+        q[0] += kalman.bilinear_variance(P, du, s[1])
         s[0] = w_h
         row[0], row[1], row[2] = kept, by_a, by_b
-        kalman.predict_covariance(P, row, 3, q, n, work[2 * n :])
-    else:
-        row[0] = 1.0
-        kalman.predict_covariance(P, row, 1, q, n, work[2 * n :])
+        kalman.predict_covariance(P, row, 3, q)
 
 
-@unrolled
-def measurement_row(h: Any, u: Any, config: Any, n: int) -> None:
+@inlined
+def measurement_row(h: Any, u: Any, least: Any, centre: Any) -> None:
     """dx/ds: x = w_h + c u (+ offset), or x = K u (+ offset)."""
-    for i in range(n):
+    for i in range(len(h)):
         h[i] = 0.0
-    if config[HYSTERETIC] != 0.0:
+    if least is None:
+        h[0] = u
+    else:
         h[0] = 1.0
         h[3] = u
-    else:
-        h[0] = u
-    if config[OFFSET] != 0.0:
-        h[n - 1] = 1.0
+    if centre is not None:
+        h[len(h) - 1] = 1.0
 
 
-@unrolled
-def _onto_admissible(s: Any, P: Any, config: Any, n: int, work: Any) -> Any:
-    """Project onto a >= least, b >= least, c - 2b >= margin: flat faces in this form."""
-    if s[1] >= config[LEAST_A] and s[2] >= config[LEAST_B] and s[3] - 2.0 * s[2] >= config[MARGIN]:
-        return 0.0
-    g = work[:n]
-    rest = work[n:]
-    moved = 0.0
-    for face in range(3):
-        for i in range(n):
-            g[i] = 0.0
-        least = config[LEAST_A + face]
-        if face < 2:
-            g[1 + face] = 1.0
-        else:
-            g[2], g[3] = -2.0, 1.0
-        moved = max(moved, kalman.project(s, P, g, least, n, rest))
+@register_jitable
+def _restart(state: Any, settings: Any, least: Any) -> None:
+    """Let P start anew, and with it the hysteresis w_h; the parameters stay."""
+    P = state.filter.P
+    for i in range(len(P)):
+        for j in range(len(P)):
+            P[i, j] = 0.0
+        P[i, i] = settings.variances[i]
+    if least is not None:
+        state.filter.s[0] = 0.0
+    state.resets += 1.0
+
+
+@register_jitable
+def _onto_face(s: Any, P: Any, by_a: float, by_b: float, by_c: float, least: Any) -> Any:
+    """Project onto by_a a + by_b b + by_c c >= least."""
+    g = like(s)
+    for i in range(len(s)):
+        g[i] = 0.0
+    g[1], g[2], g[3] = by_a, by_b, by_c
+    return kalman.project(s, P, g, least)
+
+
+@register_jitable
+def _onto_admissible(s: Any, P: Any, least: Any) -> Any:
+    """Project onto a, b and c - 2b of at least their bounds: flat faces in this form. 1.0 if that moves s."""
+    moved = _onto_face(s, P, 1.0, 0.0, 0.0, least.a)
+    moved = max(moved, _onto_face(s, P, 0.0, 1.0, 0.0, least.b))
+    moved = max(moved, _onto_face(s, P, 0.0, -2.0, 1.0, least.margin))
     # The faces meet at an angle: whatever is left over is clamped.
-    s[1] = max(s[1], config[LEAST_A])
-    s[2] = max(s[2], config[LEAST_B])
-    s[3] = max(s[3], 2.0 * s[2] + config[MARGIN])
+    s[1] = max(s[1], least.a)
+    s[2] = max(s[2], least.b)
+    s[3] = max(s[3], 2.0 * s[2] + least.margin)
     return moved
 
 
-@unrolled
-def _restart(state: Any, s: Any, P: Any, config: Any, n: int) -> None:
-    """Let P start anew, and with it the hysteresis w_h; the parameters stay."""
-    for i in range(n):
-        for j in range(n):
-            P[i * n + j] = 0.0
-        P[i * n + i] = config[START + i]
-    if config[HYSTERETIC] != 0.0:
-        s[0] = 0.0
-    state[RESETS] += 1.0
+@inlined
+def _project(projection: Any, s: Any, P: Any, least: Any) -> None:
+    """Keep the estimate in the admissible set, where it is to be."""
+    if projection is None:
+        return
+    projection.moved = 0.0
+    if not (s[1] >= least.a and s[2] >= least.b and s[3] - 2.0 * s[2] >= least.margin):
+        projection.moved = _onto_admissible(s, P, least)
 
 
-@unrolled
-def _take(state: Any, config: Any, line: Any, u: Any, x: Any, n: int) -> None:
-    """One sample of a filter of `n` states; `line` is None where nothing is delayed."""
-    s, P, gain, work = _views(state, n)
-    state[SAMPLES] += 1.0
+@inlined
+def advance(state: Any, line: Any, settings: Any, u: Any, x: Any) -> None:
+    """Take one sample; `line` is the storage of the delay."""
+    s, P = state.filter.s, state.filter.P
+    state.samples += 1.0
     if np.abs(u) < WILDEST:
-        if line is not None:
-            u = delayed(line, config[FRACTION], u)
-        if state[PRIMED] == 0.0:
-            state[PRIMED] = 1.0
-            state[U_CENTRE] = u * config[OFFSET]
-            state[U_LAST] = u - state[U_CENTRE]
-        u -= state[U_CENTRE]
-        _time_update(s, P, u - state[U_LAST], config, n, work)
-        state[U_LAST] = u
-        if not (np.abs(s[0]) < kalman.LARGEST_TRACE and kalman.is_covariance(P, n)):
-            _restart(state, s, P, config, n)
+        u = from_first_voltage(state.centre, state.primed, delayed(line, u))
+        if state.primed == 0.0:
+            state.primed = 1.0
+            state.u_last = u
+        _time_update(s, P, u - state.u_last, settings.walk, settings.least)
+        state.u_last = u
+        if not (np.abs(s[0]) < kalman.LARGEST_TRACE and kalman.is_covariance(P)):
+            _restart(state, settings, settings.least)
     else:
         x = np.nan
     if not np.abs(x) < WILDEST:
-        state[MISSED] += 1.0
-        state[LAST] = MISSING
+        state.missing += 1.0
+        state.last = MISSING
         return
-    if state[CENTRED] == 0.0:
-        state[CENTRED] = 1.0
-        state[X_CENTRE] = x * config[OFFSET]
-    measurement_row(work[:n], u, config, n)
-    y = x - state[X_CENTRE] - kalman.measure(s, work[:n], n)
-    S = kalman.innovation_variance(P, work[:n], config[NOISE], n, work[n:])
+    x = from_first_displacement(state.centre, x)
+    h, product = like(s), like(s)
+    measurement_row(h, u, settings.least, state.centre)
+    y = x - kalman.measure(s, h)
+    S = kalman.innovation_variance(P, h, settings.noise, product)
     if not kalman.is_safe(y, S):
-        _restart(state, s, P, config, n)
-        state[HELD] += 1.0
-        state[LAST] = HOLDING
+        _restart(state, settings, settings.least)
+        state.held += 1.0
+        state.last = HELD
         return
-    kalman.correct(s, P, work[:n], y, config[NOISE], S, n, gain, work[n:])
-    state[MOVED] = 0.0
-    if config[PROJECT] != 0.0:
-        state[MOVED] = _onto_admissible(s, P, config, n, work)
-    state[INNOVATION] = y
-    state[INNOVATION_VARIANCE] = S
-    state[UPDATES] += 1.0
-    state[LAST] = UPDATED
+    kalman.correct(s, P, h, y, settings.noise, S, state.filter.K, product)
+    _project(state.projection, s, P, settings.least)
+    state.y = y
+    state.S = S
+    state.updates += 1.0
+    state.last = UPDATED
+
+
+@inlined
+def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """Take one sample."""
+    advance(state, state.line, settings, u, x)
+
+
+# ---------------------------------------------------------------- what Python calls
+
+
+@inlined
+def _write_parameters(s: Any, least: Any, theta: Any) -> None:
+    """Parameters of the state s into theta."""
+    if least is None:
+        for i in range(len(s)):
+            theta[i] = s[i]
+    else:
+        theta[0], theta[1], theta[2] = equations.rate_parameters(s[1], s[2], s[3])
+        for i in range(4, len(s)):
+            theta[i - 1] = s[i]
+
+
+@compiled
+def step(state: Record, settings: Record, u: float, x: float) -> None:
+    """Take one sample."""
+    sample(state, settings, u, x)
+
+
+@compiled
+def run(
+    state: Record, settings: Record, u: Vector, x: Vector, every: int,
+    theta: Matrix, y: Vector, S: Vector, P: Matrix, s: Matrix,
+) -> None:  # fmt: skip
+    """Take records; every k-th sample goes into those histories that have room; P is that of s."""
+    row, due = 0, every
+    own, fixed = own_copy(state), own_copy(settings)
+    for k in range(u.size):
+        advance(own, state.line, fixed, u[k], x[k])
+        due -= 1
+        if due == 0:
+            _write_parameters(own.filter.s, fixed.least, theta[row])
+            keep_outcome(row, own.y, own.S, own.filter.P, y, S, P)
+            if s.size > 0:
+                for i in range(len(own.filter.s)):
+                    s[row, i] = own.filter.s[i]
+            row, due = row + 1, every
+    put_back(state, own)
+
+
+@compiled
+def step_channels(
+    states: Record, settings: Record, u: Matrix, x: Matrix, first: int, stop: int, every: int, theta: Cube
+) -> None:
+    """Take samples of the channels first..stop; every k-th theta goes into ``theta[row, channel]``."""
+    for c in range(first, stop):
+        state = nth(states, c)
+        row, due = 0, every
+        for k in range(len(u)):
+            sample(state, settings, u[k, c], x[k, c])
+            due -= 1
+            if due == 0:
+                _write_parameters(state.filter.s, settings.least, theta[row, c])
+                row, due = row + 1, every
+
+
+# ---------------------------------------------------------------- the model handed out
+
+
+@inlined
+def _offset(centre: Any, s: Any, slope: Any, otherwise: Any) -> Any:
+    """Offset of the loop of this slope [µm]; `otherwise` where it is not estimated."""
+    if centre is None:
+        return otherwise
+    return s[len(s) - 1] + centre.x - slope * centre.u
 
 
 @register_jitable
-def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
-    """One sample, with whatever was asked for."""
-    n = int(config[N])
-    _take(state, config, state[state_size(n) :], u, x, n)
+def _propose_line(state: Any, settings: Any, gain: Any, model: Any) -> None:
+    """(gain, -, -, offset) into `model`, where a gain is estimated."""
+    if gain is None:
+        return
+    s = state.filter.s
+    model[0] = admissible.kept_gain(s[0], gain, LEAST)
+    model[3] = _offset(state.centre, s, model[0], settings.offset)
 
 
 @register_jitable
-def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
-    """(alpha, beta, gamma, offset) or (gain, -, -, offset) into `model`, admissible; `terms` = start's."""
-    s = state[HEAD : HEAD + int(config[N])]
-    offset = terms[1]
-    if config[HYSTERETIC] == 0.0:
-        gain = admissible.kept_gain(s[0], terms[0], LEAST)
-        if config[OFFSET] != 0.0:
-            offset = s[1] + state[X_CENTRE] - gain * state[U_CENTRE]
-        model[0] = gain
-        model[3] = offset
+def _propose_loop(state: Any, settings: Any, least: Any, model: Any) -> None:
+    """(alpha, beta, gamma, offset) into `model`, where a hysteresis is estimated."""
+    if least is None:
         return
-    if config[OFFSET] != 0.0:
-        offset = s[4] + state[X_CENTRE] - s[3] * state[U_CENTRE]
-    a = s[1] if s[1] != 0.0 else config[LEAST_A]
+    s = state.filter.s
+    a = s[1] if s[1] != 0.0 else least.a
     alpha, beta, gamma = equations.rate_parameters(a, s[2], s[3])
     model[0] = alpha
     model[1] = beta
     model[2] = gamma
-    model[3] = offset
+    model[3] = _offset(state.centre, s, s[3], settings.offset)
     known = True
     if not admissible.has_inverse(alpha, beta, gamma):
-        work = np.empty(9)
-        known = admissible.nearest_admissible(model, work, admissible.NEAREST_MARGIN)
-    if not known or model[0] < config[LEAST_A] or model[2] < _least_slope(config) * model[0]:
-        _lift(model, config, known)
+        known = admissible.nearest_admissible(model, admissible.NEAREST_MARGIN)
+    if not known or model[0] < least.a or model[2] < _least_slope(least) * model[0]:
+        _lift(model, least, known)
 
 
 @register_jitable
-def _least_slope(config: Any) -> Any:
+def _least_slope(least: Any) -> Any:
     """Least c of a model handed out."""
-    return 2.0 * config[LEAST_B] + config[MARGIN]
+    return 2.0 * least.b + least.margin
 
 
 @register_jitable
-def _lift(model: Any, config: Any, known: Any) -> None:
-    """Lift a model's a and c to their least values; where it is not known, take the start's.
+def _lift(model: Any, least: Any, known: Any) -> None:
+    """Lift a model's a and c to their least values; where it is not known, give the start's.
 
     A model that is far smaller than the start's commands far larger voltages.
     """
-    a, b, c = config[LEAST_A] / LEAST, config[LEAST_B] / LEAST, config[MARGIN] / LEAST_MARGIN
+    a, b, c = least.a / LEAST, least.b / LEAST, least.margin / LEAST_MARGIN
     if known:
-        a = max(model[0], config[LEAST_A])
-        c = max(model[2] / model[0], _least_slope(config))
-        b = min(max(c - model[1], config[LEAST_B]), 0.5 * (c - config[MARGIN]))
+        a = max(model[0], least.a)
+        c = max(model[2] / model[0], _least_slope(least))
+        b = min(max(c - model[1], least.b), 0.5 * (c - least.margin))
     alpha, beta, gamma = equations.rate_parameters(a, b, c)
     model[0] = alpha
     model[1] = beta
     model[2] = gamma
 
 
-@compiled(PROPOSE_TYPES)
-def propose(state: Any, config: Any, terms: Any, model: Any) -> None:
+@register_jitable
+def proposed(state: Any, settings: Any, model: Any) -> None:
+    """(alpha, beta, gamma, offset) or (gain, -, -, offset) into `model`, admissible."""
+    _propose_line(state, settings, settings.gain, model)
+    _propose_loop(state, settings, settings.least, model)
+
+
+@compiled
+def propose(state: Record, settings: Record, model: Vector) -> None:
     """Compiled `proposed`."""
-    proposed(state, config, terms, model)
+    proposed(state, settings, model)

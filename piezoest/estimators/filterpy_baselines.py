@@ -7,6 +7,7 @@ evaluate the measurement before predicting).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,28 +19,41 @@ from piezoest.equations import kalman
 from piezoest.estimators import ekf_kernel as kernel
 from piezoest.estimators.base import EstimatorBase, Trace
 from piezoest.estimators.delay_line import delayed
-from piezoest.estimators.ekf import HysteresisEKF
+from piezoest.estimators.ekf import HysteresisEKF, is_hysteretic, parameter_covariance, parameters
+from piezoest.estimators.samples import HELD, MISSING, UPDATED
+from piezoest.estimators.saved_state import Rule
+from piezoest.layout import Named
 from piezoest.models import ColemanHodgdon, LinearGain
+
+
+def _shown(name: str) -> Any:
+    """Property of the held `HysteresisEKF`, of the filterpy object's present numbers."""
+
+    def shown(estimator: _FilterPyBaseline) -> Any:
+        return getattr(estimator._in_step(), name)
+
+    return property(shown, doc=getattr(HysteresisEKF, name).__doc__)
 
 
 class _HysteresisFilter(ExtendedKalmanFilter):  # type: ignore[misc]
     """filterpy's EKF with the exact step of w_h as its prediction of x."""
 
-    hysteretic = True
-
     def predict_x(self, u: float = 0.0) -> None:
         """Predict x for a change of voltage u [V]."""
-        if self.hysteretic:
+        if is_hysteretic(self.x):
             self.x[0] = equations.hysteresis_step(self.x[0], u, self.x[1], self.x[2])
 
 
-class _FilterPyBaseline(HysteresisEKF):
-    """What the two baselines share: bookkeeping around a filterpy object."""
+class _FilterPyBaseline(EstimatorBase):
+    """What the two baselines share: bookkeeping around a filterpy object.
 
-    __slots__ = ("_filter", "_flat")
+    They hold a `HysteresisEKF`, which takes no samples: its state and settings are theirs.
+    """
 
+    __slots__ = ("_ekf", "_filter")
+
+    _ekf: HysteresisEKF
     _filter: Any
-    _flat: FloatArray
 
     def __init__(
         self,
@@ -53,142 +67,134 @@ class _FilterPyBaseline(HysteresisEKF):
         offset: bool = False,
         delay: float = 0.0,
     ) -> None:
-        self._filter = None
-        super().__init__(
-            sample_rate,
-            initial_model=initial_model,
-            uncertainty=uncertainty,
-            noise=noise,
-            drift=drift,
-            mismatch=mismatch,
-            offset=offset,
-            delay=delay,
-            project=False,
-        )
-        del self._arguments["project"]
-        self._filter = self._make_filter()
-        self._filter.Q = np.diag(self._config[kernel.CONFIG :])
-        self._filter.R = np.array([[self._config[kernel.NOISE]]])
+        self._ekf = HysteresisEKF(
+            sample_rate, initial_model=initial_model, uncertainty=uncertainty, noise=noise, drift=drift,
+            mismatch=mismatch, offset=offset, delay=delay, project=False,
+        )  # fmt: skip
+        self._arguments = {name: value for name, value in self._ekf._arguments.items() if name != "project"}
+        self._filter = self._make_filter(self._ekf.s.size)
+        self._filter.Q = np.diag(self._ekf.settings["walk"])
+        self._filter.R = self._ekf.settings["noise"].reshape(1, 1).copy()
+        self._layout, self._pending = self._ekf.layout, None
+        self._state, self._start = self._ekf.state, self._ekf.state.copy()
         self._load(self._start)
 
-    def _make_filter(self) -> Any:
-        raise NotImplementedError
+    def __setstate__(self, state: Any) -> None:
+        super().__setstate__(state)
+        self._state = self._ekf.state  # its bookkeeping and the filter's are one
 
-    def _predict(self, du: float) -> None:
-        raise NotImplementedError
+    # Of its class: the filterpy object for n states, and how that predicts and updates.
+    _make_filter: Callable[[int], Any]
+    _predict: Callable[[float], None]
+    _update: Callable[[float, FloatArray], None]
 
-    def _update(self, x: float, h: FloatArray) -> None:
-        raise NotImplementedError
-
-    def _process_noise(self, du: float) -> FloatArray:
-        """Covariance that the process adds over du, the second-order variance of a w_h with it."""
-        Q = np.diag(self._config[kernel.CONFIG :])
-        if self._config[kernel.HYSTERETIC]:
-            s, P = self._filter.x, self._filter.P
-            Q[0, 0] += kalman.bilinear_variance(P.ravel(), du, s[1], self._n)
-        return Q
+    theta, P, standard_errors = _shown("theta"), _shown("P"), _shown("standard_errors")
+    s, state_covariance, K = _shown("s"), _shown("state_covariance"), _shown("K")
+    y, S, status = _shown("y"), _shown("S"), _shown("status")
+    model, parameter_names = _shown("model"), _shown("parameter_names")
+    state = _shown("state")
 
     @property
     def filter(self) -> Any:
         """The filterpy object itself, for filterpy's own tools such as `filterpy.common.Saver`."""
         return self._filter
 
-    @property
-    def _state(self) -> FloatArray:
-        """The flat state, brought up to date from the filterpy object."""
-        if self._filter is not None:
-            n, head = self._n, kernel.HEAD
-            self._flat[head : head + n] = self._filter.x
-            self._flat[head + n : head + n + n * n] = self._filter.P.ravel()
-            self._flat[head + n + n * n : head + 2 * n + n * n] = np.ravel(self._filter.K)
-        return self._flat
+    def _in_step(self) -> HysteresisEKF:
+        """Return the held estimator, with the filterpy object's numbers in its state."""
+        numbers = self._ekf.state["filter"]
+        numbers["s"], numbers["P"], numbers["K"] = self._filter.x, self._filter.P, np.ravel(self._filter.K)
+        return self._ekf
 
-    @_state.setter
-    def _state(self, state: FloatArray) -> None:
-        self._flat = state
+    def to_dict(self) -> dict[str, Any]:
+        """Return arguments and state as a JSON-safe dictionary; `from_dict` resumes bit for bit."""
+        self._in_step()
+        return super().to_dict()
 
-    def _load(self, state: FloatArray) -> None:
-        n, head = self._n, kernel.HEAD
-        self._flat[:] = state
-        self._filter.x = state[head : head + n].copy()
-        self._filter.P = state[head + n : head + n + n * n].reshape(n, n).copy()
-        self._filter.K = state[head + n + n * n : head + 2 * n + n * n].reshape(n, 1).copy()
+    def _load(self, state: Any) -> None:
+        super()._load(state)
+        numbers = state["filter"]
+        self._filter.x, self._filter.P = numbers["s"].copy(), numbers["P"].copy()
+        self._filter.K = numbers["K"].reshape(-1, 1).copy()
+
+    def _rules(self, state: Any) -> Iterable[Rule]:
+        return self._ekf._rules(state)
+
+    def _process_noise(self, du: float) -> FloatArray:
+        """Covariance that the process adds over du, the second-order variance of a w_h with it."""
+        Q: FloatArray = np.diag(self._ekf.settings["walk"])
+        if is_hysteretic(self._filter.x):
+            Q[0, 0] += kalman.bilinear_variance(self._filter.P, du, self._filter.x[1])
+        return Q
 
     def _sample(self, u: float, x: float) -> None:
-        state, config, n = self._flat, self._config, self._n
-        state[kernel.SAMPLES] += 1.0
+        state = Named(self._state, self._layout)
+        least = Named(self._ekf.settings, self._ekf.layouts[1]).least
+        state.samples += 1.0
         if abs(u) < WILDEST:
-            u = delayed(state[kernel.state_size(n) :], config[kernel.FRACTION], u)
-            if state[kernel.PRIMED] == 0.0:
-                state[kernel.PRIMED] = 1.0
-                state[kernel.U_CENTRE] = u * config[kernel.OFFSET]
-                state[kernel.U_LAST] = u - state[kernel.U_CENTRE]
-            u -= state[kernel.U_CENTRE]
-            if not self._guarded(self._predict, u - state[kernel.U_LAST]):
-                state[kernel.RESETS] += 1.0
-            state[kernel.U_LAST] = u
+            u = kernel.from_first_voltage(state.centre, state.primed, delayed(state.line, u))
+            if state.primed == 0.0:
+                state.primed, state.u_last = 1.0, u
+            if not self._guarded(self._predict, u - state.u_last):
+                state.resets += 1.0
+            state.u_last = u
         else:
             x = np.nan
         if not abs(x) < WILDEST:
-            state[kernel.MISSED] += 1.0
-            state[kernel.LAST] = kernel.MISSING
+            state.missing += 1.0
+            state.last = MISSING
             return
-        if state[kernel.CENTRED] == 0.0:
-            state[kernel.CENTRED] = 1.0
-            state[kernel.X_CENTRE] = x * config[kernel.OFFSET]
-        h = np.zeros(n)
-        kernel.measurement_row(h, u, config, n)
-        if not self._guarded(self._update, x - state[kernel.X_CENTRE], h):
-            state[kernel.RESETS] += 1.0
-            state[kernel.HELD] += 1.0
-            state[kernel.LAST] = kernel.HOLDING
+        h = np.zeros(self._filter.x.size)
+        x = kernel.from_first_displacement(state.centre, x)
+        kernel.measurement_row(h, u, least, state.centre)
+        if not self._guarded(self._update, x, h):
+            state.resets, state.held, state.last = state.resets + 1.0, state.held + 1.0, HELD
             return
-        state[kernel.INNOVATION] = np.ravel(self._filter.y)[0]
-        state[kernel.INNOVATION_VARIANCE] = np.ravel(self._filter.S)[0]
-        state[kernel.UPDATES] += 1.0
-        state[kernel.LAST] = kernel.UPDATED
+        state.y, state.S = np.ravel(self._filter.y)[0], np.ravel(self._filter.S)[0]
+        state.updates += 1.0
+        state.last = UPDATED
 
-    def _guarded(self, part: Any, *arguments: Any) -> bool:
-        """Run a part of the filter; where it breaks, the parameters stay and P starts anew.
+    def _guarded(self, function: Any, *arguments: Any) -> bool:
+        """Let the filter predict or update; where it breaks, the parameters stay and P starts anew.
 
         A stream must not stop, and what is not a number would stay in the filter for good.
         """
         x = self._filter.x.copy()
         try:
             with np.errstate(all="ignore"):
-                part(*arguments)
+                function(*arguments)
             if self._is_sound():
                 return True
         except (np.linalg.LinAlgError, ValueError):  # scipy refuses what is not finite
             pass
-        if self._config[kernel.HYSTERETIC]:
+        if is_hysteretic(self._filter.x):
             x[0] = 0.0
-        variances = self._config[kernel.START : kernel.START + self._n]
-        self._filter.x, self._filter.P = x, np.diag(variances)
-        self._filter.K = np.zeros((self._n, 1))
+        self._filter.x, self._filter.P = x, np.diag(self._ekf.settings["variances"])
+        self._filter.K = np.zeros((x.size, 1))
         self._filter.y, self._filter.S = np.zeros(1), np.ones((1, 1))
         return False
 
     def _is_sound(self) -> bool:
         """Whether state, covariance and gain are numbers, far from overflow, and no variance is lost."""
         P = self._filter.P
-        parts = self._filter.x, P, self._filter.K, self._filter.S
-        numbers = np.concatenate([np.ravel(part) for part in parts])
+        numbers = np.concatenate([np.ravel(a) for a in (self._filter.x, P, self._filter.K, self._filter.S)])
         return bool(np.all(np.abs(numbers) < kalman.LARGEST_TRACE) and np.all(np.diag(P) >= 0.0))
 
-    def _absorb(self, u: FloatArray, x: FloatArray) -> None:
-        EstimatorBase._absorb(self, u, x)  # not the compiled loop of `HysteresisEKF`
-
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        rows, n = u.size // every, self._n
+        rows, n = u.size // every, self._filter.x.size
         s, y, S, P = np.empty((rows, n)), np.empty(rows), np.empty(rows), np.empty((rows, n, n))
         for k in range(u.size):
             self._sample(float(u[k]), float(x[k]))
             if (k + 1) % every == 0:
                 row = k // every
                 s[row], P[row] = self._filter.x, self._filter.P
-                y[row], S[row] = self._flat[kernel.INNOVATION], self._flat[kernel.INNOVATION_VARIANCE]
-        return self._trace(self._theta_of(s), s, y, S, P, every, want)
+                y[row], S[row] = self._state["y"], self._state["S"]
+        wanted = {"y": y, "S": S, "P": parameter_covariance(s, P)}
+        return Trace(
+            index=np.arange(every - 1, rows * every, every),
+            theta=parameters(s),
+            parameter_names=self._ekf.parameter_names,
+            **{name: wanted[name] for name in want},
+        )
 
 
 class FilterPyEKF(_FilterPyBaseline):
@@ -201,11 +207,11 @@ class FilterPyEKF(_FilterPyBaseline):
     initial_model : ColemanHodgdon or LinearGain, optional
         Model to start from; its kind is the kind that is estimated.
     uncertainty : float
-        Standard deviation of each initial parameter, in parts of its value.
+        Standard deviation of each initial parameter, relative to its value.
     noise : float
         Standard deviation of the displacement's noise [µm].
     drift : float
-        Random walk of each parameter, in parts of its initial value per root second.
+        Random walk of each parameter, relative to its initial value per root second.
     mismatch : float
         Random walk of w_h [µm per root second].
     offset : bool
@@ -226,14 +232,12 @@ class FilterPyEKF(_FilterPyBaseline):
 
     __slots__ = ()
 
-    def _make_filter(self) -> Any:
-        made = _HysteresisFilter(dim_x=self._n, dim_z=1)
-        made.hysteretic = bool(self._config[kernel.HYSTERETIC])
-        return made
+    def _make_filter(self, n: int) -> Any:
+        return _HysteresisFilter(dim_x=n, dim_z=1)
 
     def _predict(self, du: float) -> None:
-        F = np.eye(self._n)
-        if self._config[kernel.HYSTERETIC]:
+        F = np.eye(self._filter.x.size)
+        if is_hysteretic(self._filter.x):
             s = self._filter.x
             F[0, :3] = equations.hysteresis_jacobian(s[0], du, s[1], s[2])
         self._filter.F, self._filter.Q = F, self._process_noise(du)
@@ -254,11 +258,11 @@ class FilterPyUKF(_FilterPyBaseline):
     initial_model : ColemanHodgdon or LinearGain, optional
         Model to start from; its kind is the kind that is estimated.
     uncertainty : float
-        Standard deviation of each initial parameter, in parts of its value.
+        Standard deviation of each initial parameter, relative to its value.
     noise : float
         Standard deviation of the displacement's noise [µm].
     drift : float
-        Random walk of each parameter, in parts of its initial value per root second.
+        Random walk of each parameter, relative to its initial value per root second.
     mismatch : float
         Random walk of w_h [µm per root second].
     offset : bool
@@ -286,13 +290,11 @@ class FilterPyUKF(_FilterPyBaseline):
         ),
     }
 
-    def _make_filter(self) -> Any:
-        n = self._n
+    def _make_filter(self, n: int) -> Any:
         points = MerweScaledSigmaPoints(n, alpha=0.1, beta=2.0, kappa=3.0 - n)
-        step = _advance if self._config[kernel.HYSTERETIC] else _stay
-        return UnscentedKalmanFilter(
-            dim_x=n, dim_z=1, dt=1.0 / self.sample_rate, hx=_read, fx=step, points=points
-        )
+        step = _advance if is_hysteretic(self._ekf.s) else _stay
+        dt = 1.0 / self._ekf.sample_rate
+        return UnscentedKalmanFilter(dim_x=n, dim_z=1, dt=dt, hx=_read, fx=step, points=points)
 
     def _predict(self, du: float) -> None:
         # Sigma points see the product of errors within a sample only, not that it keeps its sign

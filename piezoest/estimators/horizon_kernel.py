@@ -1,125 +1,86 @@
-"""Where `MovingHorizon` keeps what in its flat state, and the compiled way of samples into it."""
+"""What `MovingHorizon` keeps by name, and the compiled way of samples into its window."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
-from piezoest._checks import WILDEST, FloatArray
-from piezoest._jit import compiled
-from piezoest.equations import coleman_hodgdon as equations
-from piezoest.estimators.saved_state import AMOUNT, COUNT, COVARIANCE, FLAG, NUMBER, Kind, Table, whole
-from piezoest.estimators.state_tables import MEASURED, PARAMETER, at, no_more_than
+from piezoest._checks import WILDEST
+from piezoest.compile import Record, Vector, compiled, inlined
+from piezoest.equations.coleman_hodgdon import hysteresis_step
+from piezoest.estimators.samples import HELD, MISSING, WAITING
+from piezoest.layout import (
+    AMOUNT,
+    COUNT,
+    COVARIANCE,
+    FLAG,
+    MEASURED,
+    NUMBER,
+    PARAMETER,
+    Kind,
+    Length,
+    numbers,
+    record,
+    whole,
+)
 
-# The state: counters, the held model with its w_h, the last innovation, then the blocks of `Layout`.
-SAMPLES, MISSING, SOLVES, FAILURES, UPDATES, LAST, KNOWN, U_LAST = range(8)
-W_H, A, B, C, OFFSET, INNOVATION, VARIANCE, NOISE = range(8, 16)
-HEAD = 16
-WAITING, UPDATED, MISSED, HELD = range(4)
-
-# Stands for a missing sample in the rings, where JSON could not take NaN.
+# Stands for a missing sample in the window, where JSON could not have NaN.
 NOTHING = 2.0 * WILDEST
+# The model held between solves, of any class with such a loop, and its hysteresis now.
+MODEL = record(a=PARAMETER, b=PARAMETER, c=PARAMETER, offset=PARAMETER, w_h=NUMBER)
 
 
-@register_jitable
-def _take(state: Any, u: float, x: float, ring_u: Any, ring_x: Any) -> None:
-    """One raw sample into the rings; the held model's state and innovation."""
-    k = int(state[SAMPLES]) % ring_u.size
+def layout(n: int, m: int, window: int, noise: float) -> Any:
+    """State of n coordinates and m parameters; `window` in samples, `noise` the least that is assumed [µm].
+
+    `mean` and `root` are the arrival cost's, see `fit.Prior`; u and x are rings.
+    """
+    ring = numbers(Length("window", window), kind=MEASURED)
+    return record(
+        samples=COUNT, missing=COUNT, updates=COUNT, solves=COUNT, failures=COUNT,
+        last=whole(WAITING, HELD),
+        known=FLAG, u_last=MEASURED,
+        model=MODEL, innovation=NUMBER, variance=AMOUNT, noise=Kind(noise),
+        q=numbers(n, kind=PARAMETER), mean=numbers(n, kind=PARAMETER), root=numbers(n, n),
+        theta=numbers(m, kind=PARAMETER), P=numbers(m, m, kind=COVARIANCE), gain=numbers(m),
+        u=ring, x=ring,
+    )  # fmt: skip
+
+
+@inlined
+def sample(state: Any, u: float, x: float) -> None:
+    """One raw sample into the window; the held model's hysteresis and innovation."""
+    model = state.model
+    k = int(state.samples) % len(state.u)
     known = np.abs(u) < WILDEST
     if known:
-        if state[KNOWN] != 0.0:
-            state[W_H] = equations.hysteresis_step(state[W_H], u - state[U_LAST], state[A], state[B])
-        state[KNOWN] = 1.0
-        state[U_LAST] = u
+        if state.known != 0.0:
+            model.w_h = hysteresis_step(model.w_h, u - state.u_last, model.a, model.b)
+        state.known = 1.0
+        state.u_last = u
     measured = known and np.abs(x) < WILDEST
     # An unknown voltage is held: the next known one then is one change, as exact if monotone.
-    ring_u[k] = state[U_LAST] if state[KNOWN] != 0.0 else NOTHING
-    ring_x[k] = x if measured else NOTHING
-    state[SAMPLES] += 1.0
+    state.u[k] = state.u_last if state.known != 0.0 else NOTHING
+    state.x[k] = x if measured else NOTHING
+    state.samples += 1.0
     if measured:
-        state[INNOVATION] = x - (state[C] * u + state[W_H] + state[OFFSET])
-        state[LAST] = HELD
+        state.innovation = x - (model.c * u + model.w_h + model.offset)
+        state.last = HELD
     else:
-        state[MISSING] += 1.0
-        state[LAST] = MISSED
+        state.missing += 1.0
+        state.last = MISSING
 
 
-@compiled("void(f8[::1], f8, f8, i8, i8)")
-def step(state: Any, u: float, x: float, start: int, length: int) -> None:
-    """Take one raw sample."""
-    _take(state, u, x, state[start : start + length], state[start + length : start + 2 * length])
+@compiled
+def step(state: Record, u: float, x: float) -> None:
+    """One sample."""
+    sample(state, u, x)
 
 
-@compiled()
-def chunk(state: Any, u: Any, x: Any, start: int, length: int, y: Any) -> None:
-    """Take raw samples; their innovations go into `y`."""
+@compiled
+def run(state: Record, u: Vector, x: Vector, y: Vector) -> None:
+    """Samples; their innovations go into `y`."""
     for k in range(u.size):
-        _take(state, u[k], x[k], state[start : start + length], state[start + length : start + 2 * length])
-        y[k] = state[INNOVATION]
-
-
-class Layout(NamedTuple):
-    """Where the blocks of the state lie; n coordinates, m parameters."""
-
-    q: slice
-    mean: slice
-    root: slice
-    theta: slice
-    P: slice
-    gain: slice
-    rings: int
-    size: int
-
-    @classmethod
-    def of(cls, n: int, m: int, window: int) -> Layout:
-        """Layout of a problem's sizes; `window` in samples."""
-        edges = np.cumsum([HEAD, n, n, n * n, m, m * m, m]).tolist()
-        q, mean, root, theta, P, gain = (slice(i, j) for i, j in pairwise(edges))
-        return cls(q, mean, root, theta, P, gain, edges[-1], edges[-1] + 2 * window)
-
-
-def table(layout: Layout, window: int, noise: float, fits: Callable[[FloatArray], bool]) -> Table:
-    """Blocks of the state; `noise` is the least that is assumed, `fits` says whether the models agree."""
-
-    def rings_fit(state: FloatArray) -> bool:
-        rings = state[layout.rings :]
-        return bool(np.all((np.abs(rings) < WILDEST) | (rings == NOTHING)))
-
-    return Table(
-        (
-            *at(
-                0,
-                (SAMPLES, "samples", COUNT),
-                (MISSING, "samples missing", COUNT),
-                (SOLVES, "solves", COUNT),
-                (FAILURES, "failed solves", COUNT),
-                (UPDATES, "updates", COUNT),
-                (LAST, "what became of the last sample", whole(0.0, 3.0)),
-                (KNOWN, "whether there was a voltage", FLAG),
-                (U_LAST, "the last voltage", MEASURED),
-                (W_H, "the model's hysteresis", NUMBER),
-                (A, "the model as held", PARAMETER),
-                (INNOVATION, "the innovation", NUMBER),
-                (VARIANCE, "the innovation's variance", AMOUNT),
-                (NOISE, "the noise", Kind(noise)),
-                (layout.q.start, "the coordinates", PARAMETER),
-                (layout.mean.start, "the arrival's mean", PARAMETER),
-                (layout.root.start, "the arrival's information", NUMBER),
-                (layout.theta.start, "theta", PARAMETER),
-                (layout.P.start, "the covariance P", COVARIANCE),
-                (layout.gain.start, "the gain", NUMBER),
-                (layout.rings, "the window's voltages", MEASURED),
-                (layout.rings + window, "the window's displacements", MEASURED),
-            ),
-        ),
-        (
-            no_more_than(SAMPLES, MISSING),
-            no_more_than(SOLVES, FAILURES),
-            ("the model as held must be admissible and that of theta, the coordinates within bounds", fits),
-            ("the window must hold samples, or what stands for missing ones", rings_fit),
-        ),
-    )
+        sample(state, u[k], x[k])
+        y[k] = state.innovation

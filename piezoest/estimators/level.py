@@ -9,50 +9,53 @@ from __future__ import annotations
 
 from typing import Any
 
-from piezoest._jit import unrolled
+from piezoest.compile import inlined
 from piezoest.equations import coleman_hodgdon as equations
+from piezoest.layout import COUNT, NUMBER, record
 
-# Flat state: w_h for b = 1 µm/V [V]; turns so far; sums over the swing at hand, over the last one, and
-# over the last two that were whole, each of: samples, x, u, w_h.
-PLACE, TURNS, NOW, LAST, PERIOD, STATE = 0, 1, 2, 6, 10, 14
+SUMS = record(samples=COUNT, x=NUMBER, u=NUMBER, w_h=NUMBER)
+# w_h for b = 1 µm/V [V]; turns so far; sums over the swing at hand, over the last one, and over the last two
+# that were whole.
+LEVEL = record(w_h=NUMBER, turns=COUNT, now=SUMS, last=SUMS, period=SUMS)
 
 # The first way to a turning point is no swing; two whole ones follow it.
 ENOUGH_TURNS = 3.0
 
 
-@unrolled
+@inlined
 def move(level: Any, du: Any, a: Any) -> None:
-    """Take a change of voltage; `level` is updated in place, as by all below."""
-    level[PLACE] = equations.hysteresis_step(level[PLACE], du, a, 1.0)
+    """Follow a change of voltage."""
+    level.w_h = equations.hysteresis_step(level.w_h, du, a, 1.0)
 
 
-@unrolled
+@inlined
 def measure(level: Any, u: Any, x: Any) -> None:
-    """Take a measured displacement."""
-    level[NOW] += 1.0
-    level[NOW + 1] += x
-    level[NOW + 2] += u
-    level[NOW + 3] += level[PLACE]
+    """Add a measured displacement to the sums."""
+    level.now.samples += 1.0
+    level.now.x += x
+    level.now.u += u
+    level.now.w_h += level.w_h
 
 
-@unrolled
+@inlined
 def turn(level: Any) -> None:
     """Say that the voltage has turned: the swing at hand is over."""
-    level[TURNS] += 1.0
-    for i in range(4):
-        level[PERIOD + i] = level[LAST + i] + level[NOW + i]
-        level[LAST + i] = level[NOW + i]
-        level[NOW + i] = 0.0
+    level.turns += 1.0
+    now, last, period = level.now, level.last, level.period
+    period.samples, period.x = last.samples + now.samples, last.x + now.x
+    period.u, period.w_h = last.u + now.u, last.w_h + now.w_h
+    last.samples, last.x, last.u, last.w_h = now.samples, now.x, now.u, now.w_h
+    now.samples = now.x = now.u = now.w_h = 0.0
 
 
-@unrolled
+@inlined
 def is_known(level: Any) -> Any:
     """Whether there was a whole period."""
-    return level[TURNS] >= ENOUGH_TURNS and level[PERIOD] > 0.0
+    return level.turns >= ENOUGH_TURNS and level.period.samples > 0.0
 
 
-@unrolled
+@inlined
 def offset(level: Any, b: Any, c: Any) -> Any:
     """Mean of x - (c u + w_h) over the last whole period [µm]."""
-    total = level[PERIOD + 1] - c * level[PERIOD + 2] - b * level[PERIOD + 3]
-    return total / level[PERIOD]
+    total = level.period.x - c * level.period.u - b * level.period.w_h
+    return total / level.period.samples

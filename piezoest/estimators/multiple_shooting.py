@@ -11,12 +11,12 @@ from itertools import pairwise
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.estimators.shooting import Problem, Solution, bend
+from piezoest.estimators.fit import Problem, Solution, bend
 from piezoest.symbolic import Evaluation, Pass, ipopt
 
 SEGMENTS = 20
-# Samples on each side of a segment's start that tell its start state.
-AROUND = 10
+# Samples on each side of a segment's start that its start state is guessed from.
+NEIGHBOURS = 10
 # For a cost of one at the start and parameters of order one.
 TOLERANCE = 1e-7
 
@@ -26,23 +26,11 @@ def multiple_shooting(
 ) -> Solution:
     """Fit by IPOPT over segments with states of their own, tied together by constraints.
 
-    The Hessian is that of Gauss and Newton, from the same sensitivities as in single shooting.
-
-    Parameters
-    ----------
-    problem : Problem
-        Record and coordinates, without a prior.
-    start : ndarray, shape (n,)
-        Coordinates to start from.
-    loss : str
-        Of `TUNING`.
-    scale : float
-        Residual beyond which a robust loss bends.
-    max_iterations : int
-        IPOPT's.
+    The Hessian is that of Gauss and Newton, from the same sensitivities as in single shooting. The arguments
+    are those of `single_shooting`, for a problem without a prior; the iterations are IPOPT's.
     """
     segments = _Segments(problem, start, loss, scale)
-    lower, upper = problem.coordinates.bounds(start)
+    lower, upper = problem.bounds(start)
     wide = np.full(segments.start.size - start.size, np.inf)
     unit = segments.unit
     try:
@@ -73,9 +61,9 @@ class _Segments:
         N = problem.u.size
         self.edges = np.unique(np.linspace(0, N, min(SEGMENTS, N) + 1).astype(int))
         self.start = np.concatenate([q, *self._states(q)])
-        extent = float(np.ptp(problem.x[problem.weight > 0.0])) or 1.0
+        extent = float(np.ptp(problem.x[problem.measured])) or 1.0
         self.unit = np.full(self.start.size, extent)
-        # Coordinates in parts of what they start from; those at zero are displacements or gains.
+        # Coordinates relative to what they start from; those at zero are displacements or gains.
         names = problem.coordinates.free
         other = [0.1 if name.startswith("creep") else extent for name in names]
         self.unit[: q.size] = np.where(np.abs(q) > 1e-3 * np.array(other), np.abs(q), other)
@@ -85,58 +73,53 @@ class _Segments:
         self.normal = 1.0 / max(self.evaluate(self.start / self.unit).objective, least)
 
     def _states(self, q: FloatArray) -> list[FloatArray]:
-        """States to start from: simulated ones, w_h moved to what is measured around there."""
+        """States to start from: simulated ones, w_h moved to what is measured nearby."""
         problem = self.problem
         v, _, _, _ = problem.coordinates(q, problem.held)
-        n_p = problem.simulation.n_p
+        n_p = problem.coordinates.simulation.n_p
         run, _ = problem.simulate(q)
-        measured = np.flatnonzero(problem.weight > 0.0)
+        measured = np.flatnonzero(problem.measured)
         missed = problem.x[measured] - run.x[measured]
         s, states = v[n_p:], []
         for first, last in pairwise(self.edges[:-1].tolist()):
             u, before = problem.u[first:last], problem.u[max(first - 1, 0)]
-            s = problem.simulation.run(u, v[:n_p], s, problem.decays, before=before, sensitive=False).end
+            s = problem.coordinates.simulation.run(
+                u, v[:n_p], s, problem.decays, before=before, sensitive=False
+            ).end
             states.append(s.copy())
             near = int(np.searchsorted(measured, last))
-            around = missed[max(near - AROUND, 0) : near + AROUND]
+            nearby = missed[max(near - NEIGHBOURS, 0) : near + NEIGHBOURS]
             # A median, for a loss that is robust deserves a start that is.
-            if v[0] > 0.0 and around.size:
-                states[-1][0] += float(np.median(around))
+            if problem.coordinates.model.state_names and nearby.size:
+                states[-1][0] += float(np.median(nearby))
         return states
 
     def evaluate(self, z: FloatArray) -> Evaluation:
         """Everything IPOPT asks for at a point, by one pass over all segments."""
         self.evaluations += 1
         z = z * self.unit
-        problem, simulation = self.problem, self.problem.simulation
+        problem, simulation = self.problem, self.problem.coordinates.simulation
         n_q, n_p, n_s = len(problem.coordinates.free), simulation.n_p, simulation.n_s
         v, by_q, _, _ = problem.coordinates(z[:n_q], problem.held)
-        M = self.edges.size - 1
+        starts = np.concatenate([v[n_p:], z[n_q:]]).reshape(-1, n_s)
+        # Derivative by z of p and all starts; of a segment's (p, s) then of its cost and its end.
+        by_z = np.zeros((n_p + starts.size, z.size))
+        by_z[: n_p + n_s, :n_q] = by_q
+        by_z[n_p + n_s :, n_q:] = np.eye(z.size - n_q)
         objective, gradient, hessian = 0.0, np.zeros(z.size), np.zeros((z.size, z.size))
-        defect, defect_jacobian = np.zeros((M - 1) * n_s), np.zeros(((M - 1) * n_s, z.size))
-        for i in range(M):
-            # Derivative of this segment's (p, s) by z.
-            own = slice(n_q + (i - 1) * n_s, n_q + i * n_s)
-            V = np.zeros((n_p + n_s, z.size))
-            V[:n_p, :n_q] = by_q[:n_p]
-            if i == 0:
-                s = v[n_p:]
-                V[n_p:, :n_q] = by_q[n_p:]
-            else:
-                s = z[own]
-                V[n_p:, own] = np.eye(n_s)
-            part = slice(self.edges[i], self.edges[i + 1])
-            before = problem.u[max(part.start - 1, 0)]
-            run = simulation.run(problem.u[part], v[:n_p], s, problem.decays, before=before)
-            cost, g, H = self._sums(run, part)
+        ends, ends_by_z = np.empty_like(starts), np.empty((starts.size, z.size))
+        for i, s in enumerate(starts):
+            rows, own = slice(self.edges[i], self.edges[i + 1]), slice(i * n_s, (i + 1) * n_s)
+            before = problem.u[max(rows.start - 1, 0)]
+            run = simulation.run(problem.u[rows], v[:n_p], s, problem.decays, before=before)
+            V = np.concatenate([by_z[:n_p], by_z[n_p:][own]])
+            cost, g, H = self._sums(run, rows)
             objective += cost
             gradient += V.T @ g
             hessian += V.T @ H @ V
-            if i < M - 1:
-                rows, following = slice(i * n_s, (i + 1) * n_s), slice(n_q + i * n_s, n_q + (i + 1) * n_s)
-                defect[rows] = run.end - z[following]
-                defect_jacobian[rows] = run.end_jacobian @ V
-                defect_jacobian[rows, following] -= np.eye(n_s)
+            ends[i], ends_by_z[own] = run.end, run.end_jacobian @ V
+        defect = (ends[:-1] - starts[1:]).ravel()
+        defect_jacobian = ends_by_z[:-n_s] - by_z[n_p + n_s :]
         unit = self.unit
         state_unit = unit[n_q:]
         return Evaluation(
@@ -147,10 +130,10 @@ class _Segments:
             hessian * np.outer(unit, unit) * self.normal,
         )
 
-    def _sums(self, run: Pass, part: slice) -> tuple[float, FloatArray, FloatArray]:
+    def _sums(self, run: Pass, rows: slice) -> tuple[float, FloatArray, FloatArray]:
         """Cost of a segment, gradient and Gauss-Newton Hessian by (p, s)."""
-        weight = self.problem.weight[part]
-        residual = (run.x - self.problem.x[part]) * weight
+        weight = self.problem.weight[rows]
+        residual = (run.x - self.problem.x[rows]) * weight
         rho = bend(self.loss, (residual / self.scale) ** 2)
         J = run.jacobian * weight[:, None]
         cost = 0.5 * self.scale**2 * float(rho[0].sum())

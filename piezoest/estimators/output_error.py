@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from piezoest._checks import FloatArray, check_start, integer, moderate, non_negative
-from piezoest.equations import coleman_hodgdon, output_error
+from piezoest.equations import coleman_hodgdon, output_error, sensor_noise, swing
 from piezoest.estimators import output_error_kernel as kernel
-from piezoest.estimators import recursive_least_squares as law
-from piezoest.estimators import rls_kernel as front
-from piezoest.estimators import state_tables
-from piezoest.estimators.base import NO_ROWS, NONE, Compiled, Freezable, Status, Trace
+from piezoest.estimators import saved_state
+from piezoest.estimators.base import Status
+from piezoest.estimators.compiled import Freezable
 from piezoest.estimators.delay_line import delay_line
-from piezoest.estimators.rls_settings import FIRST_HALF, LONGEST_GAP
-from piezoest.estimators.saved_state import Table
+from piezoest.estimators.derivative_form import FIRST_HALF_PERIOD, LONGEST_GAP
+from piezoest.estimators.samples import NAMES
 from piezoest.models import ColemanHodgdon
-from piezoest.policies import OutlierRejection, Policy, RandomWalk, policy_to_dict, select
+from piezoest.policies import OutlierRejection, Policy, RandomWalk, check_policies, policy_to_dict
+from piezoest.policies.base import Conditions
 
 # Seconds within which the disturbance may pass for noise of a single sample.
 SLACK = 1e-4
@@ -46,7 +46,7 @@ class OutputErrorRLS(Freezable):
         Model to start from. Default ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack
         actuator.
     uncertainty : float
-        Standard deviation of each initial parameter (alpha, beta, gamma), in parts of its value.
+        Standard deviation of each initial parameter (alpha, beta, gamma), relative to its value.
     noise : float
         Least standard deviation of the displacement's noise [µm]; what is measured comes on top.
     span : float
@@ -67,7 +67,7 @@ class OutputErrorRLS(Freezable):
     Notes
     -----
     The law is a Kalman filter. Parameters walk by parts of alpha, beta and gamma as in
-    `HysteresisRLS`, on the reference's own clock. What no parameter explains (creep, the shape that the
+    `HysteresisRLS`, by the reference's own swings. What no parameter explains (creep, the shape that the
     model does not have) is a disturbance of its own that lasts a part of a swing, a Markov
     process of first order; so a slow error of the level does not weigh as often as it is sampled. The
     model's offset is the loop's centre and that disturbance together. At rest nothing moves.
@@ -79,11 +79,9 @@ class OutputErrorRLS(Freezable):
     Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), (2)-(4) (model).
     """
 
-    __slots__ = ("_config", "_initial", "_terms")
+    __slots__ = ("_initial",)
 
-    _frozen_at = front.FROZEN
-
-    _compiled = Compiled(kernel._sample, kernel.proposed, front.FROZEN)
+    kernel: ClassVar[Any] = kernel
 
     conformance_exceptions: ClassVar[dict[str, str]] = {
         "learns_a_linear_gain": "A linear gain has no loop, and nothing that an output-error form would add.",
@@ -111,48 +109,45 @@ class OutputErrorRLS(Freezable):
         if moderate("span", span) <= 1.0:
             raise ValueError(f"span must be above 1, got {span:g}")
         members = integer("members", members, 3, MOST_MEMBERS)
-        walk = select(policies, RandomWalk)
-        rejection = select(policies, OutlierRejection)
-        if not isinstance(walk, RandomWalk):
+        # By name, so that a policy that this law does not carry out cannot be passed over.
+        at = Conditions(
+            1.0 / sample_rate, np.eye(kernel.SIZE), by_period=True, has_swings=True, has_loop=True
+        )
+        given = {type(policy): policy.numbers(at) for policy in check_policies(policies, at)}
+        if RandomWalk not in given:
             raise ValueError("policies must hold a RandomWalk: it is what sets the memory here")
-        if unknown := [p for p in policies if not isinstance(p, RandomWalk | OutlierRejection)]:
+        if unknown := [p for p in policies if type(p) not in (RandomWalk, OutlierRejection)]:
             raise ValueError(f"policies: {unknown[0]!r} is none of RandomWalk and OutlierRejection")
-        fraction, line = delay_line(delay)
+        rejects = OutlierRejection in given
+        line, empty = delay_line(delay)
         self._initial = initial
-        self._terms = np.array([initial.offset])
-
-        config = np.zeros(kernel.DECAYS)
-        config[front.N] = 4
-        config[front.HYSTERETIC] = config[front.OFFSET] = 1.0
-        slack = max(1.0, SLACK * sample_rate)
-        config[front.FRACTION] = fraction
-        config[front.LONGEST_GAP] = max(1, int(LONGEST_GAP * sample_rate))
-        config[front.FIRST_HALF] = max(1.0, FIRST_HALF * sample_rate)
-        config[front.WALK] = 0.5 * walk.drift**2
-        config[front.WALK_MEMORY] = 2.0 * walk.memory
-        if isinstance(rejection, OutlierRejection):
-            config[front.OUTLIER] = 1.0
-            config[front.WARM_UP] = rejection.warm_up
-        config[front.SCALE : front.SCALE + 4] = initial.c
-        config[front.SCALE + 4] = 1.0
-        config[front.SLOPE] = initial.c
-        config[front.NOISE_FACTOR] = 2.0 / front.PRECISION**2
-        config[kernel.SLACK] = slack**2
-        config[kernel.LASTING] = LASTING
-        config[kernel.VARIANCE] = moderate("noise", noise) ** 2
-        config[kernel.MEMBERS] = members
-        b = initial.b / initial.c
-        config[kernel.START_B] = b
-        config[kernel.SPREAD] = moderate("uncertainty", uncertainty) ** 2
-        decays = initial.a * np.geomspace(1.0 / span, span, members)
-        config[kernel.STEP] = np.log(decays[1] / decays[0])
-        self._config = np.concatenate([config, decays])
-
-        state = np.zeros(kernel.bank_end(self._config))
+        b, decays = initial.b / initial.c, initial.a * np.geomspace(1.0 / span, span, members)
+        spread = moderate("uncertainty", uncertainty) ** 2
+        self._configure(
+            kernel.settings_layout(members, rejects=rejects),
+            {
+                "longest_gap": max(1, int(LONGEST_GAP * sample_rate)),
+                "first_half_period": max(1.0, FIRST_HALF_PERIOD * sample_rate),
+                "unit": initial.c,
+                "noise_factor": 2.0 / sensor_noise.PRECISION**2,
+                "slack": max(1.0, SLACK * sample_rate) ** 2,
+                "lasting": LASTING,
+                "step": np.log(decays[1] / decays[0]),
+                "variance": moderate("noise", noise) ** 2,
+                "start_b": b,
+                "spread": spread,
+                "start_offset": initial.offset,
+                "decays": decays,
+                "policies": {
+                    "random_walk": given[RandomWalk],
+                    "outlier_rejection": given.get(OutlierRejection, {}),
+                },
+            },
+        )
         nearest = int(np.argmin(np.abs(np.log(decays / initial.a))))
-        state[kernel.MEMBER] = state[kernel.MEMBER_BEFORE] = nearest
-        state[kernel.S : kernel.S + 3] = b, 1.0, b * np.log(initial.a / decays[nearest])
-        kernel.start_covariance(state, config)
+        P = np.zeros((kernel.SIZE, kernel.SIZE))
+        kernel.start_covariance(P, b, spread)
+        s = [b, 1.0, b * np.log(initial.a / decays[nearest]), 0.0, 0.0]
         self._begin(
             {
                 "sample_rate": sample_rate,
@@ -164,62 +159,64 @@ class OutputErrorRLS(Freezable):
                 "delay": non_negative("delay", delay),
                 "policies": [policy_to_dict(policy) for policy in policies],
             },
-            np.concatenate([state, line]),
+            kernel.layout(members, rejects=rejects, line=line),
+            {"member": nearest, "member_before": nearest, "law": {"s": s, "P": P}, "line": empty},
         )
 
-    def _table(self) -> Table:
-        return state_tables.output_error(self._config, self._state.size)
+    def _rules(self, state: Any) -> Any:
+        law = state["law"]
+        yield saved_state.no_more_than(
+            state["samples"], state["missed"], state["outliers"], law["updates"], law["held"]
+        )
+        yield swing.has_a_size(state["swing"])
 
-    def _sample(self, u: float, x: float) -> None:
-        kernel.step(self._state, self._config, u, x)
-
-    def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        rows, n = u.size // every, kernel.SIZE
-        s = np.empty((rows, n + 1))
-        y = np.empty(rows if "y" in want else 0)
-        S = np.empty(rows if "S" in want else 0)
-        P = np.empty((rows if "P" in want else 0, n * n))
-        kernel.run(self._state, self._config, u, x, every, NONE, NO_ROWS, s, y, S, P)
+    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
+        if name == "P":
+            return self._theta_covariance(rows, history)
         unit = self._initial.c
-        return Trace(
-            index=np.arange(every - 1, rows * every, every),
-            theta=self._theta_of(s),
-            parameter_names=self.parameter_names,
-            y=y * unit if "y" in want else None,
-            S=S * unit**2 if "S" in want else None,
-            P=self._theta_covariance(s, P.reshape(-1, n, n)) if "P" in want else None,
-        )
+        return history * (unit if name == "y" else unit**2)
+
+    @property
+    def covariance_size(self) -> int:
+        """Of the filter's vector."""
+        return kernel.SIZE
 
     def _decay_of(self, s: FloatArray) -> FloatArray:
         """Decay a of rows (…, 6) of the filter's state and the member in use, shape (…)."""
-        decays = self._config[kernel.DECAYS :]
-        correction = output_error.log_ratio(s[..., kernel.B], s[..., kernel.D], self._config[kernel.STEP])
-        return decays[s[..., kernel.SIZE].astype(int)] * np.exp(correction)
+        correction = output_error.log_ratio(s[..., 0], s[..., 2], float(self._settings["step"]))
+        decays: FloatArray = self._settings["decays"][s[..., -1].astype(int)] * np.exp(correction)
+        return decays
 
-    def _theta_of(self, s: FloatArray) -> FloatArray:
+    @property
+    def row_size(self) -> int:
+        """The filter's vector and the member in use."""
+        return kernel.SIZE + 1
+
+    def theta_of(self, s: FloatArray) -> FloatArray:
         """Parameters (…, 4) of rows (…, 6)."""
         unit = self._initial.c
-        a, b, c = self._decay_of(s), s[..., kernel.B] * unit, s[..., kernel.C] * unit
-        level = (s[..., kernel.CENTRE] + s[..., kernel.DISTURBANCE]) * unit
-        offset = level + self._state[front.X_CENTRE] - c * self._state[front.U_CENTRE]
-        if self._state[front.PRIMED] == 0.0:
+        a, b, c = self._decay_of(s), s[..., 0] * unit, s[..., 1] * unit
+        level = (s[..., 3] + s[..., 4]) * unit
+        centre = self._state["centre"]
+        offset = level + centre["x"] - c * centre["u"]
+        if not self._state["primed"]:
             offset = offset + self._initial.offset
         return np.stack([*coleman_hodgdon.rate_parameters(a, b, c), offset], axis=-1)
 
     def _jacobian(self, s: FloatArray) -> FloatArray:
         """Derivative (…, 4, 5) of `theta` by the filter's state."""
         unit = self._initial.c
-        a, b, c = self._decay_of(s), s[..., kernel.B], s[..., kernel.C]
+        a, b, c, d = self._decay_of(s), s[..., 0], s[..., 1], s[..., 2]
         b = np.fmax(b, kernel.LEAST_B * np.fmax(c, kernel.LEAST_C))
         jacobian = np.zeros((*s.shape[:-1], 4, kernel.SIZE))
-        jacobian[..., 0, kernel.B] = -a * s[..., kernel.D] / b**2
-        jacobian[..., 0, kernel.D] = a / b
-        jacobian[..., 1, kernel.B] = -unit
-        jacobian[..., 1, kernel.C] = unit
+        jacobian[..., 0, 0] = -a * d / b**2
+        jacobian[..., 0, 2] = a / b
+        jacobian[..., 1, 0] = -unit
+        jacobian[..., 1, 1] = unit
         jacobian[..., 2, :] = jacobian[..., 0, :] * (c * unit)[..., None]
-        jacobian[..., 2, kernel.C] += a * unit
-        jacobian[..., 3, kernel.C] = -self._state[front.U_CENTRE] * unit
-        jacobian[..., 3, kernel.CENTRE :] = unit
+        jacobian[..., 2, 1] += a * unit
+        jacobian[..., 3, 1] = -self._state["centre"]["u"] * unit
+        jacobian[..., 3, 3:] = unit
         return jacobian
 
     def _theta_covariance(self, s: FloatArray, P: FloatArray) -> FloatArray:
@@ -231,7 +228,7 @@ class OutputErrorRLS(Freezable):
     @property
     def _row(self) -> FloatArray:
         """The filter's state and the member in use, shape (6,)."""
-        return np.append(self._state[kernel.S : kernel.S + kernel.SIZE], self._state[kernel.MEMBER])
+        return np.append(self._state["law"]["s"], self._state["member"])
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -241,18 +238,17 @@ class OutputErrorRLS(Freezable):
     @property
     def decays(self) -> FloatArray:
         """Decays of the bank [1/V], shape (members,)."""
-        return self._config[kernel.DECAYS :].copy()
+        return np.array(self._settings["decays"])
 
     @property
     def theta(self) -> FloatArray:
         """Parameters as estimated, shape (4,), possibly outside the admissible set."""
-        return self._theta_of(self._row)
+        return self.theta_of(self._row)
 
     @property
     def P(self) -> FloatArray:
         """Covariance of `theta` to first order as the law sees it, shape (4, 4)."""
-        n = kernel.SIZE
-        return self._theta_covariance(self._row, self._state[kernel.P : kernel.P + n * n].reshape(n, n))
+        return self._theta_covariance(self._row, self._state["law"]["P"])
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -262,39 +258,36 @@ class OutputErrorRLS(Freezable):
     @property
     def y(self) -> float:
         """Last innovation [µm]."""
-        return float(self._state[front.FRONT + law.INNOVATION] * self._initial.c)
+        return float(self._state["law"]["innovation"] * self._initial.c)
 
     @property
     def S(self) -> float:
         """Variance of the last innovation as the law saw it [µm²]."""
-        return float(self._state[front.FRONT + law.INNOVATION_VARIANCE] * self._initial.c**2)
+        return float(self._state["law"]["innovation_variance"] * self._initial.c**2)
 
     @property
     def K(self) -> FloatArray:
         """Last gain, in `theta` per innovation, shape (4,)."""
-        gain = self._state[kernel.GAIN : kernel.GAIN + kernel.SIZE]
-        return self._jacobian(self._row) @ gain / self._initial.c
+        return np.asarray(self._jacobian(self._row) @ self._state["law"]["gain"] / self._initial.c)
 
     @property
     def status(self) -> Status:
         """What happened to the samples so far."""
-        head = self._state[front.FRONT :]
-        b, c = self._state[kernel.S : kernel.S + 2].tolist()
+        state, law = self._state, self._state["law"]
+        b, c = law["s"][:2].tolist()
         admissible = c >= kernel.LEAST_C and kernel.LEAST_B * c <= b <= 0.5 * (1.0 - kernel.MARGIN) * c
         return Status(
-            samples=int(self._state[front.SAMPLES]),
-            updates=int(head[law.UPDATES]),
-            missing=int(self._state[front.MISSED]),
-            held=int(head[law.HELD]),
-            resets=int(head[law.RESETS]),
+            samples=int(state["samples"]),
+            updates=int(law["updates"]),
+            missing=int(state["missed"]),
+            held=int(law["held"]),
+            resets=int(law["resets"]),
             projected=not admissible,
-            last=("waiting", "updated", "missing", "held", "rejected")[int(head[law.LAST])],
-            outliers=int(self._state[front.OUTLIERS]),
+            last=NAMES[int(law["last"])],
+            outliers=int(state["outliers"]),
         )
 
     @property
     def model(self) -> ColemanHodgdon:
         """Admissible model as known now: `theta` itself, or its nearest point in the metric of P."""
-        values = np.zeros(4)
-        kernel.propose(self._state, self._config, self._terms, values)
-        return ColemanHodgdon(*values.tolist())
+        return ColemanHodgdon(*self._proposed())

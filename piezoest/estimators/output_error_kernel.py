@@ -1,7 +1,7 @@
 """The compiled inside of `OutputErrorRLS`: a bank of hystereses, and a Kalman filter around one of them.
 
-What comes before the regression (outliers, the sensor's noise, the voltage's clock) is that of
-`HysteresisRLS`, in the same places of the state.
+The filter's vector is s = (b, c, d, centre, disturbance): b, c and d relative to the initial c, the loop's
+centre and the disturbance relative to that times a volt.
 """
 
 from __future__ import annotations
@@ -12,313 +12,352 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import PROPOSE_TYPES, RUN_TYPES, STEP_TYPES, UNCOUNTED, compiled
-from piezoest.equations import kalman, least_squares
+from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, local_rows, nth
+from piezoest.equations import believing, kalman, least_squares, sensor_noise, swing
 from piezoest.equations import output_error as equations
-from piezoest.estimators import believing, swing
-from piezoest.estimators import recursive_least_squares as law
-from piezoest.estimators import rls_kernel as front
 from piezoest.estimators.delay_line import delayed
-from piezoest.estimators.record_loops import keep_outcome
+from piezoest.estimators.derivative_form import learn_anew
+from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED, WAITING, keep_outcome
+from piezoest.layout import (
+    ABSENT,
+    AMOUNT,
+    COUNT,
+    COVARIANCE,
+    FIXED,
+    FLAG,
+    MEASURED,
+    NUMBER,
+    PARAMETER,
+    SHARE,
+    Field,
+    Length,
+    numbers,
+    record,
+    whole,
+)
+from piezoest.layout import Record as Layout
+from piezoest.policies.random_walk import OFF_CENTRE, SLOW, SLOWEST
 
-# The filter's state: b, c and d in parts of the initial c, the loop's centre and the disturbance in
-# that times a volt.
-B, C, D, CENTRE, DISTURBANCE, SIZE = range(6)
+# Numbers of the filter's vector.
+SIZE = 5
 
-# State, in places that the front end leaves free: regressors at the last update, the bank's member in
-# use and the one of the last update, samples at rest since.
-BEFORE = front.LOW
-MEMBER, MEMBER_BEFORE, RESTED = range(front.HIGH, front.HIGH + 3)
-# Then the filter's vectors, the bank and the delay line.
-S = front.FRONT + law.HEAD
-P = S + SIZE
-GAIN = P + SIZE * SIZE
-WORK = GAIN + SIZE
-BANK = WORK + SIZE * SIZE + SIZE
-
-# Configuration behind the front end's: the sample's slack in samples, squared; memory of the
-# disturbance in swings; ratio of the bank's neighbours, in logarithm; least variance of the noise
-# [µm²]; members; the start's b, and its relative variance.
-SLACK, LASTING, STEP, VARIANCE, MEMBERS, START_B, SPREAD, DECAYS = range(front.CONFIG, front.CONFIG + 8)
-
-# Another member of the bank is taken from this part of the way to it on.
+# Another member of the bank is used from this fraction of the way to it on.
 NEXT = 0.6
-# Least b and c - 2b of the model handed out, in parts of c; least c in parts of the start's.
+# Least b and c - 2b of the model handed out, relative to c; least c, relative to the start's.
 LEAST_B, MARGIN, LEAST_C = 2e-3, 1e-3, 1e-2
-# Slower than this part of its usual pace the voltage is at rest: what then moves x is creep.
+# Slower than this fraction of its usual pace the voltage is at rest: what then moves x is creep.
 RESTING = 0.01
 # No variance grows beyond so many times what a parameter walks in a swing.
 CEILING = 1e4
 
 
-@register_jitable
-def bank_end(config: Any) -> Any:
-    """Where the delay line begins."""
-    return BANK + 2 * int(config[MEMBERS])
+def layout(members: int, *, rejects: bool, line: Field) -> Layout:
+    """What is kept between samples, for a bank of `members` decays."""
+    member = whole(0.0, members - 1.0)
+    each = Length("members", members)
+    law = record(
+        innovation=NUMBER, innovation_variance=AMOUNT, updates=COUNT, held=COUNT, resets=COUNT, last=OUTCOME,
+        s=numbers(SIZE, kind=PARAMETER), P=numbers(SIZE, SIZE, kind=COVARIANCE), gain=numbers(SIZE),
+    )  # fmt: skip
+    return record(
+        primed=FLAG, u_last=MEASURED, x_last=MEASURED, travel=AMOUNT, gap=COUNT, samples=COUNT, missed=COUNT,
+        outliers=COUNT, frozen=FLAG, rested=COUNT, centre=record(u=MEASURED, x=MEASURED),
+        # The regressors, those of the last update, and the bank's members of then and now.
+        phi=numbers(SIZE), phi_before=numbers(3), member=member, member_before=member,
+        swing=swing.SWING, noise=sensor_noise.NOISE, belief=believing.BELIEF if rejects else ABSENT,
+        excitation=record(swings=SHARE, mean=numbers(3, 3, kind=COVARIANCE)), law=law,
+        # w_h for b = 1 of each decay, and its derivative by the decay's logarithm.
+        bank=record(h=numbers(each, kind=MEASURED), slope=numbers(each, kind=MEASURED)), line=line,
+    )  # fmt: skip
+
+
+def settings_layout(members: int, *, rejects: bool) -> Layout:
+    """What compiled code is given."""
+    policies = record(
+        random_walk=record(walk=FIXED, memory=FIXED),
+        outlier_rejection=record(warm_up=FIXED) if rejects else ABSENT,
+    )
+    return record(
+        longest_gap=FIXED, first_half_period=FIXED, unit=FIXED, noise_factor=FIXED, slack=FIXED,
+        lasting=FIXED, step=FIXED, variance=FIXED, start_b=FIXED, spread=FIXED, start_offset=FIXED,
+        policies=policies, decays=numbers(Length("members", members), kind=FIXED),
+    )  # fmt: skip
 
 
 @register_jitable
-def _move(state: Any, config: Any, u: Any) -> None:
-    """Take the next voltage into the bank and the clock."""
-    du = u - state[front.U_LAST]
-    state[front.U_LAST] = u
+def _move(state: Any, settings: Any, u: Any) -> None:
+    """Follow the voltage: the bank and the swing."""
+    du = u - state.u_last
+    state.u_last = u
     if du == 0.0:
         return
-    state[front.TRAVEL] += abs(du)
-    members = int(config[MEMBERS])
-    for i in range(members):
-        k = BANK + 2 * i
-        state[k], state[k + 1] = equations.hysteresis_and_slope(
-            state[k], state[k + 1], du, config[DECAYS + i]
-        )
-    swing.follow(state[front.SWING : front.SWING + swing.STATE], u)
+    state.travel += abs(du)
+    h, slope = state.bank.h, state.bank.slope
+    for i in range(len(h)):
+        h[i], slope[i] = equations.hysteresis_and_slope(h[i], slope[i], du, settings.decays[i])
+    swing.follow(state.swing, u)
 
 
 @register_jitable
-def _excite(state: Any, phi: Any, part: Any) -> None:
+def _excite(state: Any, fraction: Any) -> None:
     """Mean over a swing of the changes of the regressors, by each other, in unit of motion."""
-    before = state[BEFORE : BEFORE + SIZE]
-    if state[MEMBER] == state[MEMBER_BEFORE]:
-        state[front.WAY] = min(state[front.WAY] + part, 1.0)
+    phi, before, excitation = state.phi, state.phi_before, state.excitation
+    if state.member == state.member_before:
+        excitation.swings = min(excitation.swings + fraction, 1.0)
         for i in range(3):
             for j in range(3):
-                k = front.EXCITATION + i * 3 + j
                 product = (phi[i] - before[i]) * (phi[j] - before[j])
-                state[k] += (product / part - part * state[k]) / state[front.WAY]
-    state[MEMBER_BEFORE] = state[MEMBER]
+                mean = excitation.mean[i, j]
+                excitation.mean[i, j] = mean + (product / fraction - fraction * mean) / excitation.swings
+    state.member_before = state.member
     for i in range(3):
         before[i] = phi[i]
 
 
 @register_jitable
-def _walk(state: Any, config: Any, part: Any, pace: Any) -> Any:
+def _walk(state: Any, settings: Any, fraction: Any, pace: Any) -> Any:
     """Let P grow, and return the variance of a sample's own noise.
 
     As in `HysteresisRLS` everything is counted in swings, and the noise of a whole swing
     follows from the memory wanted and the excitation. Here it is how far the disturbance walks.
     """
-    s, cov = state[S : S + SIZE], state[P : P + SIZE * SIZE]
-    Q = state[WORK : WORK + 9]
-    c = max(s[C], LEAST_C)
-    equations.walk_covariance(min(max(s[B], LEAST_B * c), 0.5 * c), c, Q)
-    below = cov[C * SIZE + C] < CEILING * config[front.WALK] * Q[4]
+    s, P, policy = state.law.s, state.law.P, settings.policies.random_walk
+    Q = local_rows(3, 3)
+    b, c = s[0], max(s[1], LEAST_C)
+    equations.walk_covariance(min(max(b, LEAST_B * c), 0.5 * c), c, Q)
+    below = P[1, 1] < CEILING * policy.walk * Q[1, 1]
     noise = 0.0
     for i in range(3):
         for j in range(3):
-            q = config[front.WALK] * Q[i * 3 + j]
-            noise += q * state[front.EXCITATION + i * 3 + j]
-            cov[i * SIZE + j] += q * part * below
-    off_centre = front.OFF_CENTRE * c * state[front.SWING + swing.SIZE]
-    q = config[front.WALK] * off_centre * off_centre
-    k = CENTRE * SIZE + CENTRE
-    cov[k] = least_squares.random_walk(cov[k], q * part, CEILING * q)
-    memory_squared = config[front.WALK_MEMORY] * config[front.WALK_MEMORY] + front._noise_memory(
-        state, config
+            q = policy.walk * Q[i, j]
+            noise += q * state.excitation.mean[i, j]
+            P[i, j] += q * fraction * below
+    off_centre = OFF_CENTRE * c * state.swing.size
+    q = policy.walk * off_centre * off_centre
+    P[3, 3] = least_squares.random_walk(P[3, 3], q * fraction, CEILING * q)
+    memory_squared = policy.memory * policy.memory + sensor_noise.memory_squared(
+        state.noise, state.swing, s[1], settings.unit, settings.noise_factor
     )
     noise *= memory_squared
-    stationary = 0.5 * config[LASTING] * noise
-    equations.relax(s, cov, SIZE, DISTURBANCE, np.exp(-pace / config[LASTING]), stationary)
+    stationary = 0.5 * settings.lasting * noise
+    equations.relax(s, P, 4, np.exp(-pace / settings.lasting), stationary)
     # At rest creep goes on, unseen.
-    cov[SIZE * SIZE - 1] += min(state[RESTED] * pace * noise, stationary)
-    unit = config[front.SCALE + 1]
-    return config[SLACK] * noise * pace + (config[VARIANCE] + state[front.NOISE]) / (unit * unit)
+    P[4, 4] += min(state.rested * pace * noise, stationary)
+    unit = settings.unit
+    return settings.slack * noise * pace + (settings.variance + state.noise.variance) / (unit * unit)
 
 
 @register_jitable
-def _choose_member(state: Any, config: Any) -> None:
+def _choose_member(state: Any, settings: Any) -> None:
     """Go on with the next member of the bank where the estimate is nearer to it."""
-    s = state[S : S + SIZE]
-    if s[B] < 10.0 * LEAST_B * max(s[C], LEAST_C):
+    s = state.law.s
+    b, c, d = s[0], s[1], s[2]
+    if b < 10.0 * LEAST_B * max(c, LEAST_C):
         return
-    way = s[D] / s[B]
+    way = d / b
     step = 0.0
-    if way > NEXT * config[STEP] and state[MEMBER] < config[MEMBERS] - 1.0:
+    if way > NEXT * settings.step and state.member < len(settings.decays) - 1.0:
         step = 1.0
-    elif way < -NEXT * config[STEP] and state[MEMBER] > 0.0:
+    elif way < -NEXT * settings.step and state.member > 0.0:
         step = -1.0
     if step != 0.0:
-        equations.recentre(s, state[P : P + SIZE * SIZE], SIZE, step * config[STEP])
-        state[MEMBER] += step
+        equations.recentre(s, state.law.P, step * settings.step)
+        state.member += step
 
 
 @register_jitable
-def start_covariance(state: Any, config: Any) -> None:
-    """Covariance as at the start."""
-    cov, Q = state[P : P + SIZE * SIZE], state[WORK : WORK + 9]
-    equations.walk_covariance(config[START_B], 1.0, Q)
+def start_covariance(P: Any, start_b: Any, spread: Any) -> None:
+    """Covariance P as at the start."""
+    Q = local_rows(3, 3)
+    equations.walk_covariance(start_b, 1.0, Q)
     for i in range(SIZE):
         for j in range(SIZE):
-            cov[i * SIZE + j] = 0.0
+            P[i, j] = 0.0
     for i in range(3):
         for j in range(3):
-            cov[i * SIZE + j] = Q[i * 3 + j] * config[SPREAD]
+            P[i, j] = Q[i, j] * spread
 
 
 @register_jitable
-def _hold(state: Any, config: Any) -> None:
+def _hold(state: Any, settings: Any) -> None:
     """Count a sample whose update is not safe: the estimate stays, P starts anew."""
-    start_covariance(state, config)
-    law_state = state[front.FRONT :]
-    law_state[law.RESETS] += 1.0
-    law_state[law.HELD] += 1.0
-    law_state[law.LAST] = law.HOLDING
+    law = state.law
+    start_covariance(law.P, settings.start_b, settings.spread)
+    law.resets += 1.0
+    law.held += 1.0
+    law.last = HELD
 
 
 @register_jitable
-def _adapt(state: Any, config: Any, u: Any, x: Any, part: Any, jumped: Any) -> None:
+def _adapt(state: Any, settings: Any, u: Any, x: Any, fraction: Any, jumped: Any) -> None:
     """One update of the filter."""
-    s, cov = state[S : S + SIZE], state[P : P + SIZE * SIZE]
-    phi = state[front.PHI : front.PHI + SIZE]
-    k = BANK + 2 * int(state[MEMBER])
-    phi[B], phi[C], phi[D] = state[k], u, state[k + 1]
-    phi[CENTRE] = phi[DISTURBANCE] = 1.0
-    _excite(state, phi, part)
-    clock = state[front.SWING : front.SWING + swing.STATE]
-    pace = max(part, front.SLOW / swing.half_period(clock, config[front.FIRST_HALF]))
-    R = _walk(state, config, part, pace)
-    y = x / config[front.SCALE + 1] - kalman.measure(s, phi, SIZE)
+    law, phi = state.law, state.phi
+    s, P = law.s, law.P
+    member = int(state.member)
+    phi[0], phi[1], phi[2] = state.bank.h[member], u, state.bank.slope[member]
+    phi[3] = phi[4] = 1.0
+    _excite(state, fraction)
+    pace = max(fraction, SLOW / swing.half_period(state.swing, settings.first_half_period))
+    R = _walk(state, settings, fraction, pace)
+    y = x / settings.unit - kalman.measure(s, phi)
     if jumped:
-        cov[CENTRE * SIZE + CENTRE] += y * y
-    work = state[WORK : WORK + SIZE * SIZE]
-    variance = kalman.innovation_variance(cov, phi, R, SIZE, work)
-    if not (kalman.is_safe(y, variance) and kalman.is_covariance(cov, SIZE)):
-        _hold(state, config)
+        P[3, 3] += y * y
+    product = like(s)
+    variance = kalman.innovation_variance(P, phi, R, product)
+    if not (kalman.is_safe(y, variance) and kalman.is_covariance(P)):
+        _hold(state, settings)
         return
-    kalman.correct(s, cov, phi, y, R, variance, SIZE, state[GAIN : GAIN + SIZE], work)
-    _choose_member(state, config)
-    law_state = state[front.FRONT :]
-    law_state[law.INNOVATION] = y
-    law_state[law.INNOVATION_VARIANCE] = variance
-    law_state[law.UPDATES] += 1.0
-    law_state[law.LAST] = law.UPDATED
+    kalman.correct(s, P, phi, y, R, variance, law.gain, product)
+    _choose_member(state, settings)
+    law.innovation = y
+    law.innovation_variance = variance
+    law.updates += 1.0
+    law.last = UPDATED
 
 
 @register_jitable
-def _at_rest(state: Any, config: Any, part: Any) -> Any:
-    """Whether the voltage hardly moves, by its clock of before."""
-    usual = state[front.SWING + swing.USUAL]
-    usual = usual if usual > 0.0 else config[front.FIRST_HALF]
-    return part < max(RESTING * (1.0 + state[front.GAP]) / usual, front.SLOWEST)
+def _at_rest(state: Any, settings: Any, fraction: Any) -> Any:
+    """Whether the voltage hardly moves, by its swings of before."""
+    usual = state.swing.usual
+    usual = usual if usual > 0.0 else settings.first_half_period
+    return fraction < max(RESTING * (1.0 + state.gap) / usual, SLOWEST)
+
+
+@inlined
+def _believable(belief: Any, rejection: Any, state: Any, settings: Any, x: Any) -> Any:
+    """Whether x is a reading that the stage can have made, after the last good one."""
+    if belief is None:
+        return True
+    dx = x - state.centre.x - state.x_last
+    if believing.stands_still(belief, dx, state.travel, state.swing.size):
+        return False
+    slope = abs(state.law.s[1]) * settings.unit
+    return believing.believable(belief, dx, slope, state.travel, rejection.warm_up)
 
 
 @register_jitable
-def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
+def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     """One raw sample."""
-    law_state = state[front.FRONT :]
+    law = state.law
     if np.abs(u) < WILDEST:
-        u = delayed(state[bank_end(config) :], config[front.FRACTION], u)
-    state[front.SAMPLES] += 1.0
+        u = delayed(state.line, u)
+    state.samples += 1.0
     known = np.abs(u) < WILDEST
     measured = known and np.abs(x) < WILDEST
     if not measured:
-        state[front.MISSED] += 1.0
-        law_state[law.LAST] = law.MISSING
-    if state[front.PRIMED] == 0.0:
+        state.missed += 1.0
+        law.last = MISSING
+    if state.primed == 0.0:
         if measured:
-            state[front.PRIMED] = 1.0
-            state[front.U_CENTRE] = u
-            state[front.X_CENTRE] = x
-            law_state[law.LAST] = law.WAITING
+            state.primed = 1.0
+            state.centre.u = u
+            state.centre.x = x
+            law.last = WAITING
         return
     if known:
-        u -= state[front.U_CENTRE]
-        _move(state, config, u)
-    jumped = state[front.GAP] > config[front.LONGEST_GAP]
+        u -= state.centre.u
+        _move(state, settings, u)
+    jumped = state.gap > settings.longest_gap
     if jumped:
-        state[front.BELIEF + believing.SEEN] = 0.0
-    if measured and not front._believable(state, config, x):
-        state[front.OUTLIERS] += 1.0
-        law_state[law.LAST] = law.REJECTED
+        learn_anew(state.belief)
+    if measured and not _believable(state.belief, settings.policies.outlier_rejection, state, settings, x):
+        state.outliers += 1.0
+        law.last = REJECTED
         measured = False
     if not measured:
-        state[front.GAP] += 1.0
+        state.gap += 1.0
         return
-    x -= state[front.X_CENTRE]
-    if state[front.GAP] == 0.0:
-        front._measure_noise(state, x - state[front.X_LAST])
-    state[front.X_LAST] = x
-    clock = state[front.SWING : front.SWING + swing.STATE]
-    part = swing.part_of_swing(clock, state[front.TRAVEL], config[front.FIRST_HALF])
-    held = _at_rest(state, config, part) or state[front.FROZEN] != 0.0
-    state[front.TRAVEL] = state[front.GAP] = 0.0
+    x -= state.centre.x
+    if state.gap == 0.0:
+        sensor_noise.measure(state.noise, x - state.x_last)
+    state.x_last = x
+    fraction = swing.fraction_of_swing(state.swing, state.travel, settings.first_half_period)
+    held = _at_rest(state, settings, fraction) or state.frozen != 0.0
+    state.travel = state.gap = 0.0
     if held:
-        state[RESTED] += 1.0
-        law_state[law.HELD] += 1.0
-        law_state[law.LAST] = law.HOLDING
+        state.rested += 1.0
+        law.held += 1.0
+        law.last = HELD
         return
-    _adapt(state, config, u, x, part, jumped)
-    state[RESTED] = 0.0
+    _adapt(state, settings, u, x, fraction, jumped)
+    state.rested = 0.0
 
 
 @register_jitable
-def decay(config: Any, member: Any, b: Any, d: Any) -> Any:
-    """Decay a [1/V]: the member's own, corrected by d."""
-    return config[DECAYS + int(member)] * np.exp(equations.log_ratio(b, d, config[STEP]))
-
-
-@register_jitable
-def proposed(state: Any, config: Any, terms: Any, model: Any) -> None:
+def proposed(state: Any, settings: Any, model: Any) -> None:
     """(alpha, beta, gamma, offset) into `model`: as estimated, or the nearest point in the metric of P."""
-    s = np.empty(SIZE)
-    face = np.empty(SIZE)
-    work = np.empty(SIZE)
+    P = state.law.P
+    s, face = like(state.law.s), like(state.law.s)
     for i in range(SIZE):
-        s[i] = state[S + i]
+        s[i] = state.law.s[i]
         face[i] = 0.0
-    cov = state[P : P + SIZE * SIZE]
-    face[C] = 1.0
-    kalman.project(s, cov, face, LEAST_C, SIZE, work)
-    face[B], face[C] = 1.0, -LEAST_B
-    kalman.project(s, cov, face, 0.0, SIZE, work)
-    face[B], face[C] = -2.0, 1.0 - MARGIN
-    kalman.project(s, cov, face, 0.0, SIZE, work)
+    face[1] = 1.0
+    kalman.project(s, P, face, LEAST_C)
+    face[0], face[1] = 1.0, -LEAST_B
+    kalman.project(s, P, face, 0.0)
+    face[0], face[1] = -2.0, 1.0 - MARGIN
+    kalman.project(s, P, face, 0.0)
     # The faces meet at an angle: whatever is left over is clamped.
-    c = max(s[C], LEAST_C)
-    b = min(max(s[B], LEAST_B * c), 0.5 * (1.0 - MARGIN) * c)
-    unit = config[front.SCALE + 1]
-    a = decay(config, state[MEMBER], b, s[D])
+    c = max(s[1], LEAST_C)
+    b = min(max(s[0], LEAST_B * c), 0.5 * (1.0 - MARGIN) * c)
+    a = settings.decays[int(state.member)] * np.exp(equations.log_ratio(b, s[2], settings.step))
+    unit = settings.unit
     model[0] = a
     model[1] = (c - b) * unit
     model[2] = a * c * unit
-    model[3] = (s[CENTRE] + s[DISTURBANCE] - c * state[front.U_CENTRE]) * unit + state[front.X_CENTRE]
-    if state[front.PRIMED] == 0.0:
-        model[3] = terms[0]
+    model[3] = (s[3] + s[4] - c * state.centre.u) * unit + state.centre.x
+    if state.primed == 0.0:
+        model[3] = settings.start_offset
 
 
-@compiled(PROPOSE_TYPES)
-def propose(state: Any, config: Any, terms: Any, model: Any) -> None:
+@compiled
+def propose(state: Record, settings: Record, model: Vector) -> None:
     """Compiled `proposed`."""
-    proposed(state, config, terms, model)
+    proposed(state, settings, model)
 
 
-@compiled(STEP_TYPES, nogil=True, **UNCOUNTED)
-def step(state: Any, config: Any, u: float, x: float) -> None:
-    """Take one sample."""
-    _sample(state, config, u, x)
+@compiled
+def step(state: Record, settings: Record, u: float, x: float) -> None:
+    """One sample."""
+    sample(state, settings, u, x)
 
 
-@register_jitable
-def _keep(state: Any, row: int, s: Any, y: Any, variance: Any, covariance: Any) -> None:
-    """Write a sample's outcome into the histories that have room; `s`: the filter's state, the member."""
-    if s.size > 0:
-        for i in range(SIZE):
-            s[row, i] = state[S + i]
-        s[row, SIZE] = state[MEMBER]
-    now = state[front.FRONT :]
-    innovation, S_now = now[law.INNOVATION], now[law.INNOVATION_VARIANCE]
-    keep_outcome(row, innovation, S_now, state[P : P + SIZE * SIZE], SIZE, y, variance, covariance)
+@inlined
+def _keep_row(state: Any, row: Any) -> None:
+    """The filter's vector and the member in use into a row of six."""
+    for i in range(SIZE):
+        row[i] = state.law.s[i]
+    row[SIZE] = state.member
 
 
-@compiled(RUN_TYPES, nogil=True, **UNCOUNTED)
+@compiled
 def run(
-    state: Any, config: Any, u: Any, x: Any, every: int, scale: Any,
-    theta: Any, s: Any, y: Any, S: Any, P: Any,
+    state: Record, settings: Record, u: Vector, x: Vector, every: int,
+    s: Matrix, y: Vector, S: Vector, P: Matrix,
 ) -> None:  # fmt: skip
-    """Take records."""
+    """Records; every `every`-th sample goes into the histories that have room."""
+    law = state.law
     row, due = 0, every
     for k in range(u.size):
-        _sample(state, config, u[k], x[k])
+        sample(state, settings, u[k], x[k])
         due -= 1
         if due == 0:
-            _keep(state, row, s, y, S, P)
+            _keep_row(state, s[row])
+            keep_outcome(row, law.innovation, law.innovation_variance, law.P, y, S, P)
             row, due = row + 1, every
+
+
+@compiled
+def step_channels(
+    states: Record, settings: Record, u: Matrix, x: Matrix, first: int, stop: int, every: int, s: Cube
+) -> None:
+    """Records (K, N) of the channels from `first` to `stop`, each with a state of its own."""
+    for c in range(first, stop):
+        state = nth(states, c)
+        row, due = 0, every
+        for k in range(u.shape[0]):
+            sample(state, settings, u[k, c], x[k, c])
+            due -= 1
+            if due == 0:
+                _keep_row(state, s[row, c])
+                row, due = row + 1, every

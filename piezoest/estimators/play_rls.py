@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, integer, moderate
+from piezoest.equations import swing
+from piezoest.estimators import play_grid
 from piezoest.estimators import play_rls_kernel as kernel
-from piezoest.estimators import play_rls_layout as layout
-from piezoest.estimators import play_rls_settings as settings
-from piezoest.estimators import state_tables
-from piezoest.estimators.base import NO_ROWS, Freezable, Status, Trace
+from piezoest.estimators.compiled import Freezable
 from piezoest.estimators.delay_line import delay_line
-from piezoest.estimators.saved_state import Table
+from piezoest.estimators.saved_state import Rule, no_more_than
+from piezoest.layout import ABSENT, Named
 from piezoest.models import (
     ColemanHodgdon,
     Creep,
@@ -25,6 +25,8 @@ from piezoest.models import (
     PrandtlIshlinskii,
 )
 
+FIRST_HALF_PERIOD = 0.1  # s, before the voltage has turned
+LONGEST_GAP = 2e-3  # s, after which an outlier is a new level
 # Most of each: an update costs the square of the parameters, and so does their memory.
 MOST_THRESHOLDS, MOST_BENDS, MOST_PARAMETERS = 200, 50, 1000
 
@@ -56,7 +58,7 @@ class PrandtlIshlinskiiRLS(Freezable):
     creep : tuple of float
         Time constants of creep [s]; empty for none.
     uncertainty : float
-        Standard deviation of the start's scale, in parts of itself; what is uncertain within is
+        Standard deviation of the start's scale, relative to itself; what is uncertain within is
         the shape of the loop.
     noise : float
         Standard deviation of the displacement's noise [µm].
@@ -88,9 +90,9 @@ class PrandtlIshlinskiiRLS(Freezable):
     Identification, 2nd ed. (1999), sec. 11.2 (law).
     """
 
-    __slots__ = ("_config", "_creep", "_initial", "_scale")
+    __slots__ = ("_creep", "_initial", "_scale")
 
-    _frozen_at = layout.FROZEN
+    kernel: ClassVar[Any] = kernel
 
     conformance_exceptions: ClassVar[dict[str, str]] = {
         "learns_the_parameters": "Its parameters are slopes of plays, not those of the Coleman-Hodgdon "
@@ -117,7 +119,7 @@ class PrandtlIshlinskiiRLS(Freezable):
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
         initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
-        plan = settings.plan(
+        plan = play_grid.plan(
             initial,
             voltage_range,
             integer("thresholds", thresholds, 0, MOST_THRESHOLDS),
@@ -129,35 +131,29 @@ class PrandtlIshlinskiiRLS(Freezable):
                 f"thresholds, bends and creep make {parameters} parameters, more than {MOST_PARAMETERS}: "
                 "take fewer"
             )
-        fraction, line = delay_line(delay)
-        self._initial = initial
-        self._creep = plan.times
-        config = np.zeros(layout.CONFIG)
-        n, k, m = plan.relative.size, plan.bends.size, plan.times.size
-        size = layout.lay_out(config, n, k, m, line.size)
-        config[layout.GAIN] = plan.unit
-        config[layout.NOISE] = moderate("noise", noise, or_zero=True)
-        config[layout.FRACTION] = fraction
-        config[layout.FIXED] = plan.fixed
-        config[layout.FIRST_HALF] = max(1.0, settings.FIRST_HALF * sample_rate)
-        config[layout.LONGEST_GAP] = max(1, int(settings.LONGEST_GAP * sample_rate))
-        settings.tune(config)
-        theta, spread, P = settings.prior(plan, moderate("uncertainty", uncertainty), config)
-        decays = np.exp(-1.0 / (sample_rate * plan.times))
         if mechanics is not None and not isinstance(mechanics, MassSpringDamper):
             raise ValueError(f"mechanics must be a MassSpringDamper, got {mechanics!r}")
-        config[layout.INERT] = mechanics is not None
-        motion = np.zeros(6) if mechanics is None else mechanics.coefficients(sample_rate)
-        self._config = np.concatenate([config, plan.relative, plan.bends, decays, P.ravel(), spread, motion])
-        state = np.zeros(size)
-        state[layout.CENTRE], state[layout.RANGE] = plan.centre, plan.half
-        for name, values in ((layout.THETA, theta), (layout.P, P.ravel()), (layout.LINE, line)):
-            place = int(config[name])
-            state[place : place + values.size] = values
-        state[layout.OFFSET] = theta[-1]
-        kernel.start(state, self._config)
-        slopes = (n + 1) * (k + 1)
-        self._scale = np.append(np.full(slopes, plan.unit), np.ones(m))
+        theta, spread, P = play_grid.prior(plan, moderate("uncertainty", uncertainty))
+        line, line_start = delay_line(delay)
+        coefficients = {} if mechanics is None else {"coefficients": mechanics.coefficients(sample_rate)}
+        self._initial = initial
+        self._creep = plan.times
+        self._scale = np.append(np.full(plan.slopes.size, plan.unit), np.ones(plan.times.size))
+        self._configure(
+            kernel.settings_layout(plan),
+            {
+                "unit": plan.unit,
+                "noise": moderate("noise", noise, or_zero=True),
+                "first_half_period": max(1.0, FIRST_HALF_PERIOD * sample_rate),
+                "longest_gap": max(1, int(LONGEST_GAP * sample_rate)),
+                "grid_is_fixed": plan.fixed or plan.relative.size == 0,
+                "relative_thresholds": plan.relative,
+                "relative_bends": plan.bends,
+                "decays": np.exp(-1.0 / (sample_rate * plan.times)),
+                "prior": P,
+                "spread": spread,
+            },
+        )
         self._begin(
             {
                 "sample_rate": sample_rate,
@@ -171,8 +167,17 @@ class PrandtlIshlinskiiRLS(Freezable):
                 "delay": float(delay),
                 "mechanics": None if mechanics is None else mechanics.to_dict(),
             },
-            state,
+            kernel.layout(plan, line, ABSENT if mechanics is None else kernel.RESONANCE),
+            {
+                "plays": {"centre": plan.centre, "half_width": plan.half_width},
+                "law": {"theta": theta, "P": P},
+                "offset": theta[-1],
+                "line": line_start,
+                "resonance": coefficients,
+            },
         )
+        kernel.start(Named(self._state, self._layout), self._named_settings)
+        self._start = self._state.copy()
 
     @classmethod
     def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
@@ -181,33 +186,38 @@ class PrandtlIshlinskiiRLS(Freezable):
             given["mechanics"] = MassSpringDamper.from_dict(given["mechanics"])
         return given
 
-    def _table(self) -> Table:
-        return state_tables.play_rls(self._config, self._state.size)
+    @property
+    def _named_settings(self) -> Named:
+        return Named(self._settings, self._settings_layout)
 
-    def _sample(self, u: float, x: float) -> None:
-        kernel.step(self._state, self._config, u, x)
-
-    def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        rows, n, size = u.size // every, self._scale.size, self._scale.size + 1
-        theta = np.empty((rows, n))
-        y = np.empty(rows if "y" in want else 0)
-        S = np.empty(rows if "S" in want else 0)
-        P = np.empty((rows if "P" in want else 0, size * size))
-        kernel.run(self._state, self._config, u, x, every, self._scale, theta, NO_ROWS, y, S, P)
-        return Trace(
-            index=np.arange(every - 1, rows * every, every),
-            theta=theta,
-            parameter_names=self.parameter_names,
-            y=y if "y" in want else None,
-            S=S if "S" in want else None,
-            P=P.reshape(-1, size, size)[:, :n, :n] * np.outer(self._scale, self._scale)
-            if "P" in want
-            else None,
+    def _rules(self, state: Any) -> tuple[Rule, ...]:
+        plays, used = state["plays"], state["law"]["used"][:-1]
+        anew = state.copy()
+        play_grid.lay(Named(anew, self._layout).plays, self._named_settings)
+        laid = anew["plays"]
+        as_laid = all(np.array_equal(laid[name], plays[name]) for name in ("reach", "lower", "upper", "zero"))
+        usable = np.all(used >= 0.0) and np.all(used[: self._columns] >= kernel.LEAST_GAIN)
+        counters = (state[name] for name in ("missing", "outliers", "updates", "held"))
+        return (
+            swing.has_a_size(state["swing"]),
+            no_more_than(state["samples"], *counters),
+            ("the grid must be as its middle and half-width lay it", as_laid),
+            ("the parameters in use must be zero or more", usable),
         )
 
-    def _part(self, name: int, size: int) -> FloatArray:
-        place = int(self._config[name])
-        return self._state[place : place + size]
+    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
+        n = self._scale.size
+        return history[:, :n, :n] * np.outer(self._scale, self._scale) if name == "P" else history
+
+    @property
+    def covariance_size(self) -> int:
+        """Those of the parameters, and of the level."""
+        return int(self._scale.size) + 1
+
+    @property
+    def _columns(self) -> int:
+        """Segments of the voltage."""
+        return int(self._settings["relative_bends"].size) + 1
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -215,8 +225,8 @@ class PrandtlIshlinskiiRLS(Freezable):
 
         With bends each slope has an entry for each segment of the voltage, from the lowest.
         """
-        n, columns = int(self._config[layout.PLAYS]), int(self._config[layout.BENDS]) + 1
-        slopes = ["gain", *(f"weights[{i}]" for i in range(n))]
+        columns = self._columns
+        slopes = ["gain", *(f"weights[{i}]" for i in range(self._settings["relative_thresholds"].size))]
         if columns > 1:
             slopes = [f"{name} in segment {s}" for name in slopes for s in range(columns)]
         return (*slopes, *(f"creep.gains[{j}]" for j in range(self._creep.size)))
@@ -224,86 +234,59 @@ class PrandtlIshlinskiiRLS(Freezable):
     @property
     def thresholds(self) -> FloatArray:
         """Thresholds of the plays in use [V], shape (n,)."""
-        return self._part(layout.THRESHOLDS, int(self._config[layout.PLAYS])).copy()
+        thresholds: FloatArray = self._state["plays"]["reach"][self._columns :: self._columns].copy()
+        return thresholds
 
     @property
     def theta(self) -> FloatArray:
         """Slopes [µm/V] and creep gains [1] as estimated, shape (n,), in the order of `parameter_names`."""
-        return self._part(layout.THETA, self._scale.size) * self._scale
-
-    @property
-    def _usable(self) -> FloatArray:
-        """`theta`, or its nearest point in the metric of P where nothing is below its least."""
-        return self._part(layout.USED, self._scale.size) * self._scale
+        theta: FloatArray = self._state["law"]["theta"][:-1] * self._scale
+        return theta
 
     @property
     def P(self) -> FloatArray:
         """Covariance of `theta` as the law sees it, shape (n, n)."""
-        n, size = self._scale.size, self._scale.size + 1
-        P = self._part(layout.P, size * size).reshape(size, size)[:n, :n]
-        return P * np.outer(self._scale, self._scale)
-
-    @property
-    def standard_errors(self) -> FloatArray:
-        """Standard deviations of `theta` as the law sees them, shape (n,)."""
-        return np.sqrt(np.fmax(np.diag(self.P), 0.0))
+        P: FloatArray = self._state["law"]["P"][:-1, :-1] * np.outer(self._scale, self._scale)
+        return P
 
     @property
     def y(self) -> float:
         """Last innovation [µm], of the mean over a window of travel."""
-        return float(self._state[layout.INNOVATION])
+        return float(self._state["y"])
 
     @property
     def S(self) -> float:
         """Variance of the last innovation as the law saw it [µm²]."""
-        return float(self._state[layout.VARIANCE])
+        return float(self._state["S"])
 
     @property
     def K(self) -> FloatArray:
         """Gain that the present covariance gives the last regressor, shape (n,)."""
-        size = self._scale.size + 1
-        P = self._part(layout.P, size * size).reshape(size, size)
-        phi = self._part(layout.PHI, size)
-        product = P @ phi
-        stroke = self._config[layout.GAIN] * self._state[layout.RANGE]
-        return (
-            product[:-1]
-            * self._scale
-            / (phi @ product + (self._config[layout.SLACK] * stroke) ** 2 + self._config[layout.NOISE] ** 2)
-        )
+        state, settings = self._state, self._settings
+        phi = state["plays"]["phi"]
+        product = state["law"]["P"] @ phi
+        misfit = kernel.SLACK * (settings["unit"] * state["plays"]["half_width"])
+        gain: FloatArray = product[:-1] * self._scale / (phi @ product + misfit**2 + settings["noise"] ** 2)
+        return gain
 
-    @property
-    def status(self) -> Status:
-        """What happened to the samples so far."""
-        state = self._state
-        return Status(
-            samples=int(state[layout.SAMPLES]),
-            updates=int(state[layout.UPDATES]),
-            missing=int(state[layout.MISSED]),
-            held=int(state[layout.HELD]),
-            outliers=int(state[layout.OUTLIERS]),
-            resets=int(state[layout.RESETS]),
-            projected=bool(np.any(self._part(layout.FORCE, self._scale.size) > 0.0)),
-            last=("waiting", "updated", "missing", "held", "rejected")[int(state[layout.LAST])],
-        )
+    def _is_projected(self) -> bool:
+        return bool(np.any(self._state["law"]["force"][:-1] > 0.0))
 
     @property
     def model(self) -> Model:
         """Model as known now, always admissible: a `LinearGain` if it began as one."""
-        offset = float(self._state[layout.OFFSET])
+        offset, theta = float(self._state["offset"]), self._state["law"]["used"][:-1] * self._scale
         if isinstance(self._initial, LinearGain):
-            return LinearGain(float(self._usable[0]), offset)
-        n, k, m = (int(self._config[name]) for name in (layout.PLAYS, layout.BENDS, layout.TERMS))
-        theta = self._usable
-        slopes = theta[: (n + 1) * (k + 1)].reshape(n + 1, k + 1)
-        bends = self._part(layout.EDGES, k + 2)[1:-1]
+            return LinearGain(float(theta[0]), offset)
+        m, columns = self._creep.size, self._columns
+        slopes = theta[: theta.size - m].reshape(-1, columns)
         return PrandtlIshlinskii(
             float(slopes[0, 0]),
             self.thresholds,
             slopes[1:, 0],
             offset,
             creep=Creep(theta[theta.size - m :], self._creep) if m else None,
-            bends=bends,
+            bends=self._state["plays"]["lower"][1:columns].copy(),
             bend_weights=np.diff(slopes, axis=1).T,
             sample_rate=self.sample_rate,
         )

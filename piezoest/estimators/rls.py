@@ -2,26 +2,51 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from piezoest._checks import FloatArray, check_start, moderate
-from piezoest.equations import admissible
-from piezoest.estimators import recursive_least_squares as law
-from piezoest.estimators import rls_kernel as kernel
-from piezoest.estimators import rls_loops, rls_model, rls_profile, state_tables
-from piezoest.estimators import rls_settings as settings
-from piezoest.estimators.base import NO_ROWS, NONE, Compiled, Freezable, Status, Trace
+from piezoest.equations import admissible, swing
+from piezoest.estimators import derivative_form as form
+from piezoest.estimators import recursive_least_squares_kernel as law
+from piezoest.estimators import rls_kernel, saved_state
+from piezoest.estimators.base import Status
+from piezoest.estimators.compiled import NO_ROWS, NONE, Freezable
 from piezoest.estimators.delay_line import delay_line
-from piezoest.estimators.saved_state import Table
+from piezoest.estimators.recursive_least_squares import TimeBase, is_discrete
+from piezoest.estimators.samples import NAMES
 from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain, Model
-from piezoest.policies import Forgetting, Policy, policy_to_dict
+from piezoest.policies import (
+    DeadZone,
+    Forgetting,
+    Normalisation,
+    NormBound,
+    OutlierRejection,
+    PeriodicForgetting,
+    Policy,
+    RandomWalk,
+    amplitude_memory,
+    check_policies,
+    policy_to_dict,
+)
+from piezoest.policies.base import Conditions, layouts
 
 # Seconds of memory where the paper's law is asked for without one.
 PAPER_MEMORY = 0.4
-# In parts of the sample rate: below it nothing comes through the low-pass.
+# Relative to the sample rate: below it nothing comes through the low-pass.
 LEAST_CUTOFF = 1e-9
+# The offset's scale: a centre that is off by so many volts.
+OFFSET_VOLTS = 10.0
+
+
+def default_policies(memory: Any, initial: Model) -> tuple[Policy, ...]:
+    """Policies that go with a memory: the paper's with a dead zone, or those counted in swings."""
+    if memory != "period":
+        return NormBound(), DeadZone(), Normalisation()
+    if isinstance(initial, LinearGain):
+        return PeriodicForgetting(), DeadZone()
+    return RandomWalk(), DeadZone(), OutlierRejection()
 
 
 class HysteresisRLS(Freezable):
@@ -39,13 +64,13 @@ class HysteresisRLS(Freezable):
         Model to start from; its kind is the kind that is estimated. Default
         ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack actuator.
     memory : float, None or "period"
-        ``"period"`` (default): random-walk forgetting with a memory in parts of the
+        ``"period"`` (default): random-walk forgetting with a memory relative to the
         reference's own period, see `policies.RandomWalk` and, for a `LinearGain`,
         `policies.PeriodicForgetting`. A number: time constant of
         exponential forgetting [s], as in the paper. None: no forgetting. With the continuous
         time base ``"period"`` means 0.4 s.
     uncertainty : float
-        Standard deviation of each initial parameter, in parts of its value.
+        Standard deviation of each initial parameter, relative to its value.
     noise : float
         Standard deviation of the displacement's noise [µm]; weighs the start against the data.
     cutoff : float
@@ -80,7 +105,7 @@ class HysteresisRLS(Freezable):
 
     Notes
     -----
-    Inside, parameters are in parts of their initial value and the output in parts of its
+    Inside, parameters are relative to their initial value and the output relative to its
     noise, so that the covariance is well scaled. The regressor is integrated over each
     sample, which keeps the form exact to third order in the change of voltage.
 
@@ -88,16 +113,10 @@ class HysteresisRLS(Freezable):
     and App. A.
     """
 
-    __slots__ = ("_config", "_initial", "_kind", "_n", "_scale", "_terms")
+    __slots__ = ("_followed", "_initial", "_scale")
 
-    _frozen_at = kernel.FROZEN
-
-    _compiled = Compiled(
-        kernel._sample,
-        rls_model.proposed,
-        kernel.FROZEN,
-        unneeded=(kernel._propagate_error,),
-    )
+    kernel: ClassVar[Any] = rls_kernel
+    unneeded: ClassVar[tuple[Any, ...]] = (rls_kernel.propagate_error,)
 
     conformance_exceptions: ClassVar[dict[str, str]] = {}
 
@@ -113,7 +132,7 @@ class HysteresisRLS(Freezable):
         high_pass: float | None = None,
         offset: bool | None = None,
         delay: float = 0.0,
-        time_base: law.TimeBase = "discrete",
+        time_base: TimeBase = "discrete",
         errors: bool = True,
         policies: tuple[Policy, ...] | None = None,
     ) -> None:
@@ -128,103 +147,102 @@ class HysteresisRLS(Freezable):
             memory = moderate("memory", memory)
         if not isinstance(offset, bool | None):
             raise ValueError(f"offset must be True, False or None, got {offset!r}")
-        if time_base == "continuous" and memory == "period":
+        discrete = is_discrete(time_base)
+        if not discrete and memory == "period":
             memory = PAPER_MEMORY
+        has_loop = isinstance(initial, ColemanHodgdon)
         if policies is None:
-            policies = settings.default_policies(memory, initial)
-        settings.check_policies(policies, memory, time_base, initial)
+            policies = default_policies(memory, initial)
         if offset is None:
-            offset = memory == "period" and isinstance(initial, ColemanHodgdon)
+            offset = memory == "period" and has_loop
         cutoff = min(moderate("cutoff", cutoff), 0.5 * sample_rate)
         if cutoff < LEAST_CUTOFF * sample_rate:
             raise ValueError(
                 f"cutoff must be at least {LEAST_CUTOFF:g} of the sample rate, got {cutoff:g} Hz"
             )
-        fraction, line = delay_line(delay)
+        self._arguments = {
+            "sample_rate": sample_rate,
+            "initial_model": initial.to_dict(),
+            "memory": memory,
+            "uncertainty": float(moderate("uncertainty", uncertainty)),
+            "noise": float(moderate("noise", noise)),
+            "cutoff": cutoff,
+            "high_pass": None if high_pass is None else float(moderate("high_pass", high_pass)),
+            "offset": bool(offset),
+            "delay": float(delay),
+            "time_base": time_base,
+            "errors": bool(errors),
+        }
         self._initial = initial
-        self._scale = settings.parameter_scale(initial, offset)
-        self._n = n = self._scale.size
-        gain = initial.gain if isinstance(initial, LinearGain) else 0.0
-        self._terms = rls_model.model_terms(self._scale, gain, initial.offset)
-
-        config = settings.front_end(
-            sample_rate,
-            self._scale,
-            hysteretic=isinstance(initial, ColemanHodgdon),
-            offset=offset,
-            cutoff=cutoff,
-            high_pass=high_pass,
-            fraction=fraction,
-            noise=moderate("noise", noise),
-            per_second=time_base == "continuous",
+        scale = np.abs(initial.theta)
+        self._scale = np.append(scale, OFFSET_VOLTS * scale[-1]) if offset else scale
+        P_0 = np.diag(np.full(self._scale.size, uncertainty**2))
+        at = Conditions(
+            1.0 / sample_rate,
+            P_0,
+            discrete,
+            discrete and memory == "period",
+            has_swings=True,
+            has_loop=has_loop,
         )
-        # The continuous law's P is the covariance already.
-        config[kernel.ERRORS] = bool(errors) and time_base == "discrete"
-        settings.policy_settings(config, policies, sample_rate)
-        settings.note_duties(config, errors)
-        P_0 = np.diag(np.full(n, moderate("uncertainty", uncertainty) ** 2))
-        forgetting = Forgetting(memory if isinstance(memory, float) else np.inf)
-        law_config = law.configure((forgetting, *policies), 1.0 / sample_rate, time_base, 1.0, P_0)
-        self._config = np.concatenate([config, law_config])
-        self._kind = settings.kind(self._config, delay)
-        start = np.append(np.sign(initial.theta), np.zeros(int(offset)))
-        extra = np.zeros(int(config[kernel.EXTRA]))
-        state = np.concatenate([np.zeros(kernel.FRONT), law.new_state(start, P_0), extra, line])
-        self._begin(
+        stated = (Forgetting(memory),) if isinstance(memory, float) else ()
+        policies = check_policies((*stated, *check_policies(policies, at)), at)
+        self._arguments["policies"] = [policy_to_dict(policy) for policy in policies[len(stated) :]]
+        self._lay_out(policies, at)
+
+    def _lay_out(self, policies: tuple[Policy, ...], at: Conditions) -> None:
+        """Lay out state and settings for what the arguments ask for."""
+        n, options = self._scale.size, self._arguments
+        self._followed = form.followed(options, policies, at)
+        kept, given, values = layouts(policies, at)
+        high_pass = options["high_pass"] is not None
+        self._configure(
+            rls_kernel.settings_layout(n, has_loop=at.has_loop, high_pass=high_pass, policies=given),
             {
-                "sample_rate": sample_rate,
-                "initial_model": initial.to_dict(),
-                "memory": memory,
-                "uncertainty": float(uncertainty),
-                "noise": float(noise),
-                "cutoff": cutoff,
-                "high_pass": None if high_pass is None else float(high_pass),
-                "offset": bool(offset),
-                "delay": float(delay),
-                "time_base": time_base,
-                "errors": bool(errors),
-                "policies": [policy_to_dict(policy) for policy in policies],
+                **form.settings(self._initial, self._scale, options, at),
+                "law": law.law_settings(policies, at, 1.0),
+                "policies": values,
             },
-            state,
+        )
+        line, empty = delay_line(options["delay"])
+        start = np.append(np.sign(self._initial.theta), np.zeros(int(options["offset"])))
+        law_layout = law.law_layout(n, discrete=at.discrete)
+        self._begin(
+            options,
+            rls_kernel.layout(n, self._followed, law_layout, kept, line),
+            {"law": {"theta": start, "P": at.P_0}, "line": empty},
         )
 
-    def _table(self) -> Table:
-        return state_tables.rls(self._config, self._state.size)
+    def _rules(self, state: Any) -> Any:
+        own = state["law"]
+        yield saved_state.no_more_than(
+            state["samples"], state["missed"], state["outliers"], own["updates"], own["held"]
+        )
+        if state["swing"].size:
+            yield swing.has_a_size(state["swing"])
 
-    def _sample(self, u: float, x: float) -> None:
-        rls_loops.steps[self._kind](self._state, self._config, u, x)
+    def absorb(self, u: FloatArray, x: FloatArray) -> None:
+        """Do as `run`, but keep nothing.
 
-    def _absorb(self, u: FloatArray, x: FloatArray) -> None:
+        Parameters
+        ----------
+        u, x : array_like, shape (N,)
+            Voltage [V] and measured displacement [µm].
+        """
         u, x = self._records(u, x)
-        run = rls_loops.runs[self._kind]
-        run(self._state, self._config, u, x, u.size + 1, self._scale, NO_ROWS, NO_ROWS, NONE, NONE, NO_ROWS)
+        self._through(u, x, u.size + 1, (NO_ROWS, NONE, NONE, NO_ROWS))
 
-    def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        rows, n = u.size // every, self._n
-        theta = np.empty((rows, n))
-        y = np.empty(rows if "y" in want else 0)
-        S = np.empty(rows if "S" in want else 0)
-        P = np.empty((rows if "P" in want else 0, n * n))
-        run = rls_loops.runs[self._kind]
-        run(self._state, self._config, u, x, every, self._scale, theta, NO_ROWS, y, S, P)
-        return Trace(
-            index=np.arange(every - 1, rows * every, every),
-            theta=theta,
-            parameter_names=self.parameter_names,
-            y=y / self._config[kernel.SCALE + 4] if "y" in want else None,
-            S=S / self._config[kernel.SCALE + 4] ** 2 if "S" in want else None,
-            P=P.reshape(-1, n, n) * np.outer(self._scale, self._scale) if "P" in want else None,
-        )
-
-    def _theta_of(self, rows: FloatArray) -> FloatArray:
-        """Parameters of what the compiled loops write into their histories."""
-        return rows * self._scale
+    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
+        if name == "P":
+            return history * np.outer(self._scale, self._scale)
+        unit = float(self._settings["output_scale"])
+        return history / (unit if name == "y" else unit**2)
 
     def reset_covariance(self) -> None:
         """Put P back to its initial value: covariance resetting on call."""
-        n, head = self._n, kernel.FRONT + law.HEAD
-        self._state[head + n : head + n + n * n] = self._state[head + n + n * n : head + n + 2 * n * n]
-        self._state[kernel.FRONT + law.RESETS] += 1.0
+        own = self._state["law"]
+        own["P"] = self._settings["law"]["P_0"]
+        own["resets"] += 1.0
 
     def announce_change(self, amplitude: float | None = None) -> None:
         """Say that the stage or the reference is about to change: adds the initial covariance to P.
@@ -240,11 +258,13 @@ class HysteresisRLS(Freezable):
         ValueError
             If amplitude is not above zero, or given without `policies.AmplitudeMemory`.
         """
-        if amplitude is not None and rls_profile.announce(self._state, self._config, self._scale, amplitude):
+        if amplitude is not None and amplitude_memory.announce(
+            self._layout, self._state, self._settings, amplitude
+        ):
             return
-        n, start = self._n, kernel.FRONT + law.HEAD + self._n
-        self._state[start : start + n * n] += self._state[start + n * n : start + 2 * n * n]
-        self._state[kernel.FRONT + law.RESETS] += 1.0
+        own = self._state["law"]
+        own["P"] += self._settings["law"]["P_0"]
+        own["resets"] += 1.0
 
     @property
     def profile(self) -> AmplitudeProfile:
@@ -253,46 +273,43 @@ class HysteresisRLS(Freezable):
         Parameters move with the stage's amplitude: a profile that was saved spares the next start
         what this one had to learn.
         """
-        return rls_profile.read(self._state, self._config, self._scale)
+        return amplitude_memory.profile_of(self._state["policies"]["amplitude_memory"], self._scale)
 
     @profile.setter
     def profile(self, profile: AmplitudeProfile) -> None:
-        rls_profile.write(self._state, self._config, self._scale, profile)
+        own = self._state["policies"]["amplitude_memory"]
+        amplitude_memory.store_profile(own, self._scale, profile)
 
     @property
     def excitation(self) -> float:
-        """Least eigenvalue of the regressor's mean square over a swing, in parts of the mean one.
+        """Least eigenvalue of the regressor's mean square over a swing, relative to the mean one.
 
         The alpha_0 of (A8) for the scaled regressor, normalised: 1 if every direction is
         excited alike, 0 if one is not excited at all. NaN with ``errors=False``, unless
         `policies.ExcitationGate` is on: nobody follows it then.
         """
-        if self._config[kernel.WHOLE] == 0.0:
+        if "products" not in self._followed:
             return np.nan
-        n = self._n
-        mean = self._state[kernel.EXCITATION : kernel.EXCITATION + n * n].reshape(n, n)
+        mean = self._state["excitation"]["products"]
         total = float(np.trace(mean))
-        return max(0.0, float(np.linalg.eigvalsh(mean)[0]) * n / total) if total > 0.0 else 0.0
+        return max(0.0, float(np.linalg.eigvalsh(mean)[0]) * len(mean) / total) if total > 0.0 else 0.0
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the entries of `theta`; a fourth, ``offset_slope``, is alpha x_c - gamma u_c."""
-        extra = ("offset_slope",) if isinstance(self._initial, ColemanHodgdon) else ("offset",)
+        last = ("offset_slope",) if isinstance(self._initial, ColemanHodgdon) else ("offset",)
         names = self._initial.parameter_names
-        return (*names, *extra) if self._n > len(names) else names
+        return (*names, *last) if self._scale.size > len(names) else names
 
     @property
     def theta(self) -> FloatArray:
         """Parameters as estimated, shape (n,), possibly outside the admissible set."""
-        head = kernel.FRONT + law.HEAD
-        return self._state[head : head + self._n] * self._scale
+        return np.asarray(self._state["law"]["theta"] * self._scale)
 
     @property
     def P(self) -> FloatArray:
         """Covariance of `theta` as the law sees it, shape (n, n)."""
-        n, head = self._n, kernel.FRONT + law.HEAD
-        P = self._state[head + n : head + n + n * n].reshape(n, n)
-        return P * np.outer(self._scale, self._scale)
+        return np.asarray(self._state["law"]["P"] * np.outer(self._scale, self._scale))
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -303,74 +320,65 @@ class HysteresisRLS(Freezable):
         `least_squares.propagate_error`), for parameters that are constant: the model's own
         mismatch is not in them. With the continuous time base, or ``errors=False``, they are those of `P`.
         """
-        if self._config[kernel.ERRORS] == 0.0 or self._state[kernel.FRONT + law.UPDATES] == 0.0:
+        if "errors" not in self._followed or self._state["law"]["updates"] == 0.0:
             return np.sqrt(np.fmax(np.diag(self.P), 0.0))
-        n = self._n
-        C = self._state[kernel.ERROR : kernel.ERROR + n * n].reshape(n, n)
-        pole = self._config[kernel.LOW_POLE]
-        if self._config[kernel.HYSTERETIC]:
+        C = self._state["error_covariance"]
+        pole = float(self._settings["low_pole"])
+        if self._settings["differenced"]:
             # The newest noise has not yet been taken back by its difference; its energy
             # behind W_p is (1 - pole)/(1 + pole).
-            gain = self._state[kernel.GAIN : kernel.GAIN + n]
-            energy = (1.0 - pole) / (1.0 + pole) * self._config[kernel.NOISE_RATIO] ** 2
+            gain = self._state["error_gain"]
+            energy = (1.0 - pole) / (1.0 + pole) * float(self._settings["noise_ratio"]) ** 2
             C = C + np.outer(gain, gain) * energy
         return np.sqrt(np.fmax(np.diag(C), 0.0)) * self._scale
 
     @property
     def y(self) -> float:
         """Last innovation: filtered change of displacement a sample, or displacement [µm]."""
-        return float(self._state[kernel.FRONT + law.INNOVATION] / self._config[kernel.SCALE + 4])
+        return float(self._state["law"]["innovation"] / self._settings["output_scale"])
 
     @property
     def S(self) -> float:
         """Variance of the last innovation as the law saw it [µm²]."""
-        return float(
-            self._state[kernel.FRONT + law.INNOVATION_VARIANCE] / self._config[kernel.SCALE + 4] ** 2
-        )
+        return float(self._state["law"]["innovation_variance"] / self._settings["output_scale"] ** 2)
 
     @property
     def K(self) -> FloatArray:
         """Gain that the present covariance gives the last regressor, shape (n,)."""
-        phi = (
-            self._state[kernel.PHI : kernel.PHI + self._n]
-            / self._scale
-            * (1.0 / self._config[kernel.SCALE + 4])
-        )
+        unit = 1.0 / float(self._settings["output_scale"])
+        phi = self._state["phi"] / self._scale * unit
         with np.errstate(all="ignore"):
             product = self.P @ phi
-            gain = product / (phi @ product + (1.0 / self._config[kernel.SCALE + 4]) ** 2)
-        # Where it overflows, the sample was not taken.
-        return gain if np.all(np.isfinite(gain)) else np.zeros(self._n)
+            gain = product / (phi @ product + unit**2)
+        # Where it overflows, the sample moved nothing.
+        return gain if np.all(np.isfinite(gain)) else np.zeros(phi.size)
 
     @property
     def status(self) -> Status:
         """What happened to the samples so far."""
-        head = self._state[kernel.FRONT :]
-        last = ("waiting", "updated", "missing", "held", "rejected")[int(head[law.LAST])]
+        state, own = self._state, self._state["law"]
         return Status(
-            samples=int(self._state[kernel.SAMPLES]),
-            updates=int(head[law.UPDATES]),
-            missing=int(self._state[kernel.MISSED]),
-            held=int(head[law.HELD]),
-            outliers=int(self._state[kernel.OUTLIERS]),
-            resets=int(head[law.RESETS]),
+            samples=int(state["samples"]),
+            updates=int(own["updates"]),
+            missing=int(state["missed"]),
+            held=int(own["held"]),
+            outliers=int(state["outliers"]),
+            resets=int(own["resets"]),
             projected=not self._as_estimated_is_admissible(),
-            last=last,
+            last=NAMES[int(own["last"])],
         )
 
     def _as_estimated_is_admissible(self) -> bool:
         theta = self.theta
         if isinstance(self._initial, LinearGain):
             gain = float(theta[0])
-            return gain == admissible.kept_gain(gain, self._initial.gain, kernel.LEAST)
-        return bool(rls_model.is_admissible(theta, self._terms))
+            return gain == admissible.kept_gain(gain, self._initial.gain, rls_kernel.LEAST)
+        return bool(rls_kernel.is_admissible(theta, self._scale))
 
     @property
     def model(self) -> Model:
         """Admissible model as known now: `theta` itself, or its nearest point in the metric of P."""
-        values = np.zeros(4)
-        rls_model.propose(self._state, self._config, self._terms, values)
-        alpha, beta, gamma, offset = values.tolist()
+        alpha, beta, gamma, offset = self._proposed()
         if isinstance(self._initial, LinearGain):
             return LinearGain(alpha, offset)
         return ColemanHodgdon(alpha, beta, gamma, offset)

@@ -8,53 +8,37 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest._jit import unrolled
+from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, nth
+from piezoest.equations import admissible, believing, least_squares, sensor_noise, swing
 from piezoest.equations import coleman_hodgdon as equations
-from piezoest.equations import filters, least_squares
-from piezoest.estimators import believing, level, swing
-from piezoest.estimators import recursive_least_squares as law
-from piezoest.estimators import rls_policies as policies
+from piezoest.equations.innovation_energy import ENERGY
+from piezoest.estimators import derivative_form as form
+from piezoest.estimators import level
+from piezoest.estimators import recursive_least_squares_kernel as law
 from piezoest.estimators.delay_line import delayed
+from piezoest.estimators.samples import HELD, MISSING, REJECTED, UPDATED, WAITING, keep_outcome
+from piezoest.layout import (
+    ABSENT,
+    AMOUNT,
+    COUNT,
+    COVARIANCE,
+    FIXED,
+    FLAG,
+    MEASURED,
+    NUMBER,
+    SHARE,
+    SYMMETRIC,
+    WORK,
+    Field,
+    numbers,
+    record,
+)
+from piezoest.layout import Record as Layout
+from piezoest.policies.random_walk import SLOWEST, noise_memory
 
-# State: what is known of the last good sample, and of the voltage's way since.
-PRIMED, U_LAST, X_LAST, TRAVEL, MOMENT, RISE, GAP, SAMPLES, MISSED, OUTLIERS = range(10)
-U_CENTRE, X_CENTRE, FROZEN = 10, 11, 12
-LOW, HIGH, PHI = 13, 18, 23  # five filters each: four regressors and the output
-SWING = 28
-EXCITATION = SWING + swing.STATE  # mean over a swing of phi phi', both in unit of motion
-ERROR, GAIN = EXCITATION + 16, EXCITATION + 32  # covariance of the estimate's error, filtered gain
-# Filtered part of a swing that a sample is, and the swings (up to one) in EXCITATION's mean.
-MOTION, WAY = EXCITATION + 36, EXCITATION + 37
-# The sensor's noise: its variance as seen, and the last two changes of x it is seen from.
-NOISE, CHANGE, CHANGE_BEFORE, SEEN_NOISE = range(EXCITATION + 38, EXCITATION + 42)
-BELIEF = EXCITATION + 42
-LEVEL = BELIEF + believing.STATE
-FRONT = LEVEL + level.STATE  # the law's state begins here, the policies' and the delay line follow it
-
-# Configuration of the front end; the law's follows.
-N, HYSTERETIC, LOW_POLE, HIGH_POLE, HIGH_PASS, FRACTION, OFFSET, LONGEST_GAP, NOISE_RATIO = range(9)
-OUTLIER, FIRST_HALF, WALK, WALK_MEMORY, WARM_UP, PERIODS, DECAY_SCALE = 9, 10, 11, 12, 13, 14, 15
-SCALE = 16  # four scales of the parameters, one of the output
-# Policies that are off by default: numbers that their state takes (behind the law's), projection's margin,
-# threshold and drift of the detection, least excitation, shortest memory of variable forgetting in
-# parts of it, places of the memory of amplitudes, its tolerance, its variance.
-EXTRA, MARGIN, THRESHOLD, RISEN, EXCITED, SHORTEST, PLACES, TOLERANCE, RECALLED = range(21, 30)
-# Slope [µm/V] of a beta of one, variance of the sensor's noise to that of a slope, whether the covariance of
-# the estimate's error is followed, whether the regressor's mean square is as a whole or its diagonal alone,
-# and whether anybody asks for the voltage's swings.
-SLOPE, NOISE_FACTOR, ERRORS, WHOLE, PACED = 30, 31, 32, 33, 34
-CONFIG = 35
-
-# Slower than so many swings a sample the voltage is at rest; slower than this part of its usual
-# pace it counts as going at that.
-SLOWEST, SLOW = 1e-12, 0.2
-# Positions in theta; the offset may be off by this part of a swing, a parameter walks at least
-# so much (squared), and no variance grows beyond so many times its start.
-GAMMA, OFFSET_SLOPE = 2, 3
-NOISE_SAMPLES, PRECISION = 2000.0, 3e-3
-# Least alpha and beta of the model handed out, in parts of their initial values.
-LEAST = 1e-2
-OFF_CENTRE, LEAST_STEP, CEILING = 0.3, 1e-6, 1e4
+# Least alpha and beta of the model handed out, relative to their initial values; its distance from the faces
+# of the admissible set, relative to gamma.
+LEAST, MARGIN = 1e-2, 1e-3
 # By how much the slopes up and down differ where nothing is off centre, relative to them; and the levels,
 # relative to half a swing.
 SLOPES_DIFFER, LEVELS_DIFFER = 3e-3, 2e-2
@@ -62,369 +46,338 @@ SLOPES_DIFFER, LEVELS_DIFFER = 3e-3, 2e-2
 LARGEST_ERROR = 1e60
 
 
-@unrolled
-def _filtered(state: Any, config: Any, extra: Any, i: int, value: Any) -> Any:
-    """Low-pass (W_p of App. A), then the optional high-pass."""
-    state[LOW + i] = filters.low_pass_step(state[LOW + i], value, config[LOW_POLE])
-    value = state[LOW + i]
-    if extra is not None and config[HIGH_PASS] != 0.0:
-        state[HIGH + i], value = filters.high_pass_step(state[HIGH + i], value, config[HIGH_POLE])
-    return value
+def layout(n: int, follows: set[str], law_layout: Field, policies: Field, line: Field) -> Layout:
+    """What is kept between samples.
+
+    Parameters
+    ----------
+    n : int
+        Number of parameters.
+    follows : set of str
+        What is asked for beside the regression: ``"centre"``, ``"high_pass"``, ``"swings"``, ``"level"``,
+        ``"products"``, ``"noise"``, ``"belief"``, ``"energy"``, ``"errors"``.
+    law_layout, policies, line : Field
+        Of the law, of what policies keep, of the delay line.
+    """
+
+    def where(name: str, field: Field) -> Field:
+        return field if name in follows else ABSENT
+
+    filters_of = record(phi=numbers(n), z=NUMBER)
+    excitation = record(
+        motion=SHARE, swings=SHARE, squares=numbers(n, kind=AMOUNT),
+        products=where("products", numbers(n, n, kind=COVARIANCE)),
+    )  # fmt: skip
+    return record(
+        # The last good sample, and the voltage's path since: integrals of |du|, u |du| and du.
+        primed=FLAG, u_last=MEASURED, x_last=MEASURED, travel=AMOUNT, moment=NUMBER, rise=NUMBER, gap=COUNT,
+        samples=COUNT, missed=COUNT, outliers=COUNT, frozen=FLAG,
+        centre=where("centre", record(u=MEASURED, x=MEASURED)),
+        low_pass=filters_of, high_pass=where("high_pass", filters_of), phi=numbers(n),
+        swing=where("swings", swing.SWING), fraction=where("swings", WORK), level=where("level", level.LEVEL),
+        excitation=where("swings", excitation), noise=where("noise", sensor_noise.NOISE),
+        belief=where("belief", believing.BELIEF), energy=where("energy", ENERGY),
+        # The estimate's error: its covariance, and the gain behind W_p.
+        error_covariance=where("errors", numbers(n, n, kind=SYMMETRIC)),
+        error_gain=where("errors", numbers(n)),
+        law=law_layout, policies=policies, line=line,
+    )  # fmt: skip
 
 
-@unrolled
-def _prime(state: Any, config: Any, clock: Any, u: Any, x: Any) -> None:
-    """Start from (u, x) as the last good sample; what is usual is learnt anew."""
-    if clock is not None:
-        state[BELIEF + believing.SEEN] = 0.0
-    if state[PRIMED] == 0.0 and config[OFFSET] != 0.0:
-        state[U_CENTRE] = u
-        state[X_CENTRE] = x
-    state[PRIMED] = 1.0
-    state[U_LAST] = u - state[U_CENTRE]
-    state[X_LAST] = x - state[X_CENTRE]
-    state[TRAVEL] = state[MOMENT] = state[RISE] = state[GAP] = 0.0
+def settings_layout(n: int, *, has_loop: bool, high_pass: bool, policies: Field) -> Layout:
+    """What compiled code is given."""
+    start = record(gain=FIXED, offset=FIXED)
+    return record(
+        low_pole=FIXED, high_pole=FIXED if high_pass else ABSENT, longest_gap=FIXED, first_half_period=FIXED,
+        noise_ratio=FIXED, noise_factor=FIXED, differenced=FIXED, slope=FIXED, output_scale=FIXED,
+        scale=numbers(n, kind=FIXED), parameter_scale=numbers(n, kind=FIXED), start=start,
+        loop=record(decay_scale=FIXED) if has_loop else ABSENT,
+        law=law.law_settings_layout(n), policies=policies,
+    )  # fmt: skip
 
 
-@unrolled
-def _believable(state: Any, config: Any, x: Any) -> Any:
+# ---------------------------------------------------------------- one sample
+
+
+@inlined
+def _believable(belief: Any, rejection: Any, state: Any, settings: Any, x: Any) -> Any:
     """Whether x is a reading that the stage can have made, after the last good one."""
-    if config[OUTLIER] == 0.0:
+    if belief is None:
         return True
-    memory = state[BELIEF:LEVEL]
-    dx = x - state[X_CENTRE] - state[X_LAST]
-    if believing.stands_still(memory, dx, state[TRAVEL], state[SWING + swing.SIZE]):
+    dx = form.x_from_centre(state.centre, x) - state.x_last
+    if believing.stands_still(belief, dx, state.travel, state.swing.size):
         return False
-    slope = abs(state[FRONT + law.HEAD + 1]) * config[SLOPE]
-    return believing.believable(memory, dx, slope, state[TRAVEL], config[WARM_UP])
+    slope = abs(state.law.theta[1]) * settings.slope
+    return believing.believable(belief, dx, slope, state.travel, rejection.warm_up)
 
 
-@unrolled
-def _regression(state: Any, config: Any, clock: Any, extra: Any, x: Any, phi: Any, n: int) -> Any:
-    """Regressor into `phi` and output, from the last good sample to this one; starts the next."""
-    if clock is None or config[HYSTERETIC] != 0.0:
-        z = x - state[X_LAST]
-        if clock is not None and config[WALK] > 0.0:
-            _measure_noise(state, z)
-        phi[0] = -0.5 * (x + state[X_LAST]) * state[TRAVEL]
-        phi[1] = state[RISE]
-        phi[2] = state[MOMENT]
-        if n == 4:
-            phi[3] = state[TRAVEL]
-    else:
-        z = x
-        phi[0] = state[U_LAST]
-        if n == 2:
-            phi[1] = 1.0
-    state[X_LAST] = x
-    state[TRAVEL] = state[MOMENT] = state[RISE] = state[GAP] = 0.0
-    for i in range(n):
-        phi[i] = _filtered(state, config, extra, i, phi[i] * config[SCALE + i])
-    return _filtered(state, config, extra, 4, z * config[SCALE + 4])
-
-
-@unrolled
-def _measure_noise(state: Any, change: Any) -> None:
-    """Variance of the sensor's noise, from the third differences of x: a stage moves more smoothly."""
-    third = change - 2.0 * state[CHANGE] + state[CHANGE_BEFORE]
-    state[CHANGE_BEFORE] = state[CHANGE]
-    state[CHANGE] = change
-    state[SEEN_NOISE] = min(state[SEEN_NOISE] + 1.0, NOISE_SAMPLES)
-    if state[SEEN_NOISE] > 3.0:  # of the first differences none is whole
-        state[NOISE] += (third * third / 20.0 - state[NOISE]) / (state[SEEN_NOISE] - 3.0)
-
-
-@unrolled
-def _noise_memory(state: Any, config: Any) -> Any:
-    """Square of the memory in swings that it takes for the sensor's noise to move the gain by no more.
-
-    Over a swing of the displacement noise behind W_p leaves the slope uncertain by sqrt(2) parts of its
-    size.
-    """
-    if state[SWING + swing.USUAL] == 0.0:
-        return 0.0  # nobody knows yet how far a swing goes
-    swing_of_x = state[SWING + swing.SIZE] * state[FRONT + law.HEAD + 1] * config[SLOPE]
-    return state[NOISE] * config[NOISE_FACTOR] / max(swing_of_x * swing_of_x, SLOWEST)
-
-
-@unrolled
-def trust_in_levels(state: Any, config: Any) -> Any:
-    """Fraction of the offset to take from levels: 0 where the derivative tells it well, 1 where it cannot.
-
-    It cannot where noise covers the changes of x, nor where the swing is small: the offset is then told by a
-    difference of the slopes up and down that is smaller than what the loop's shape differs from the model's.
-    """
-    if config[WALK] == 0.0:
-        return 0.0
-    memory_squared = config[WALK_MEMORY] * config[WALK_MEMORY]
-    half_swing = 0.5 * state[SWING + swing.SIZE]
-    ratio = SLOPES_DIFFER / (_decay(state, config) * LEVELS_DIFFER * half_swing + SLOWEST)
-    by_slopes = ratio * ratio
-    unknown = _noise_memory(state, config) + memory_squared * by_slopes * by_slopes
-    return unknown / (unknown + memory_squared + SLOWEST)
-
-
-@unrolled
-def _decay(state: Any, config: Any) -> Any:
+@inlined
+def _decay(state: Any, settings: Any) -> Any:
     """alpha [1/V] as estimated, kept to what its model may have."""
-    return max(state[FRONT + law.HEAD], LEAST) * abs(config[DECAY_SCALE])
+    return max(state.law.theta[0], LEAST) * abs(settings.loop.decay_scale)
 
 
-@unrolled
-def _square_step(state: Any, config: Any, i: int) -> Any:
-    """Square of what a parameter walks in a swing: a part of itself; the offset, a part of the swing."""
-    head = FRONT + law.HEAD
-    size = state[head + i]
-    if i == OFFSET_SLOPE:
-        swing_in_offset = state[SWING + swing.SIZE] * config[SCALE + GAMMA] / config[SCALE + OFFSET_SLOPE]
-        size = OFF_CENTRE * state[head + GAMMA] * swing_in_offset
-    return config[WALK] * max(size * size, LEAST_STEP)
-
-
-@unrolled
-def _excite(state: Any, config: Any, phi: Any, n: int, part: Any) -> None:
-    """Take the regressor into its mean square over a swing."""
-    state[MOTION] = part = filters.low_pass_step(state[MOTION], part, config[LOW_POLE])
-    way = state[WAY] + part
-    if way < SLOWEST:
+@inlined
+def _follow_swings(voltage_swing: Any, state: Any, settings: Any, u: Any, du: Any) -> None:
+    if voltage_swing is None:
         return
-    state[WAY] = way = min(way, 1.0)
-    fresh, old = 1.0 / (max(part, SLOWEST) * way), part / way
-    for i in range(n):
-        mean = state[EXCITATION + i * n + i]
-        state[EXCITATION + i * n + i] = mean + (fresh * phi[i] * phi[i] - old * mean)
-    if config[WHOLE] == 0.0:
+    swing.follow(voltage_swing, u)
+    _follow_level(state.level, state, settings, du)
+
+
+@inlined
+def _follow_level(loop_level: Any, state: Any, settings: Any, du: Any) -> None:
+    if loop_level is None:
         return
-    for i in range(n):
-        for j in range(i + 1, n):
-            mean = state[EXCITATION + i * n + j]
-            mean += fresh * phi[i] * phi[j] - old * mean
-            state[EXCITATION + i * n + j] = mean
-            state[EXCITATION + j * n + i] = mean
+    level.move(loop_level, du, _decay(state, settings))
+    if state.swing.since == 0.0:
+        level.turn(loop_level)
 
 
-@unrolled
-def _walk(state: Any, config: Any, extra: Any, n: int, half: Any) -> Any:
-    """Let P grow, and return the noise variance of a sample that gives the memory wanted.
-
-    Everything is counted in swings of the voltage. With P growing by q a swing, the best
-    excited direction forgets within sqrt(rho/(q phi²)) swings, where phi is the regressor and rho
-    the noise variance of a whole swing: rho follows from the memory wanted and the mean of phi².
-    """
-    part = state[MOTION]
-    rho = 0.0
-    for i in range(n):
-        q = _square_step(state, config, i)
-        rho += q * state[EXCITATION + i * n + i]
-        k = FRONT + law.HEAD + n + i * n + i
-        if extra is not None and config[EXCITED] > 0.0:
-            q *= 1.0 - extra[policies.SHUT]
-        state[k] = least_squares.random_walk(state[k], q * part, CEILING * max(q, state[k + n * n]))
-    # Near a standstill the mechanics still move, which says nothing of the hysteresis.
-    memory_squared = config[WALK_MEMORY] * config[WALK_MEMORY] + _noise_memory(state, config)
-    return 1.0 + memory_squared * rho * max(part, SLOW / half)
+@inlined
+def _measure_level(loop_level: Any, u: Any, x: Any) -> None:
+    if loop_level is None:
+        return
+    level.measure(loop_level, u, x)
 
 
-@unrolled
-def _propagate_error(state: Any, config: Any, phi: Any, n: int, forgetting: Any, restart: bool) -> None:
+@inlined
+def _move(state: Any, settings: Any, u: Any) -> None:
+    """Follow the voltage: the regressor's integrals, and its swings where anybody asks for them."""
+    du = u - state.u_last
+    rise, moment, travel = equations.sample_regressor(state.u_last, u)
+    state.rise += rise
+    state.moment += moment
+    state.travel += travel
+    state.u_last = u
+    if rise != 0.0:
+        _follow_swings(state.swing, state, settings, u, du)
+
+
+@inlined
+def _measure_fraction(voltage_swing: Any, state: Any, settings: Any) -> None:
+    if voltage_swing is None:
+        return
+    state.fraction = swing.fraction_of_swing(voltage_swing, state.travel, settings.first_half_period)
+
+
+@inlined
+def propagate_error(C: Any, state: Any, settings: Any, restart: bool) -> None:
     """Covariance of the estimate's error under the sensor's noise, coloured by W_p and difference."""
-    C = state[ERROR : ERROR + n * n]
-    start = FRONT + law.HEAD + n + n * n
-    gain = state[start + n * n : start + n * n + n]  # the law's work space: P phi
-    work = state[start + n * n + n : start + n * n + 4 * n]
+    if C is None:
+        return
+    P_0, phi, product = settings.law.P_0, state.phi, state.law.product
     if restart:
-        for i in range(n * n):
-            C[i] = state[start + i]
-    scale = 1.0 / (forgetting * state[FRONT + law.INNOVATION_VARIANCE])
-    for i in range(n):
-        gain[i] *= scale
-    filtered = state[GAIN : GAIN + n]
-    ratio, differenced = config[NOISE_RATIO], config[HYSTERETIC]
-    least_squares.propagate_error(C, phi, gain, filtered, n, config[LOW_POLE], ratio, differenced, work)
-    if not (least_squares.is_covariance(C, n) and least_squares.trace(C, n) < LARGEST_ERROR):
-        for i in range(n * n):
-            C[i] = state[start + i]
+        least_squares.restore_covariance(C, P_0)
+    gain = like(phi)
+    scale = 1.0 / state.law.spread
+    for i in range(len(phi)):
+        gain[i] = product[i] * scale
+    least_squares.propagate_error(
+        C, phi, gain, state.error_gain, settings.low_pole, settings.noise_ratio, settings.differenced
+    )
+    if not (least_squares.is_covariance(C) and least_squares.trace(C) < LARGEST_ERROR):
+        least_squares.restore_covariance(C, P_0)
+
+
+@inlined
+def _adapt(state: Any, settings: Any, z: Any) -> None:
+    """One regression into the law, and the covariance of the estimate's error after it."""
+    own = state.law
+    law.begin(state, settings, z)
+    resets, first = own.resets, own.updates == 0.0
+    law.adapt(state, settings)
+    if own.last == UPDATED:
+        propagate_error(state.error_covariance, state, settings, first or own.resets != resets)
 
 
 @register_jitable
-def _visit(state: Any, config: Any, extra: Any, n: int, part: Any) -> None:
-    """Let the memory of amplitudes look at the swing."""
-    start = FRONT + law.HEAD
-    clock = state[SWING : SWING + swing.STATE]
-    theta = state[start : start + n]
-    if policies.visit(extra, clock, theta, n, part, int(config[PLACES]), config[TOLERANCE]):
-        policies.enlarge(state[start + n : start + n + n * n], n, config[RECALLED])
-        policies.enlarge(state[ERROR : ERROR + n * n], n, config[RECALLED])
-        state[FRONT + law.RESETS] += 1.0
-
-
-@register_jitable
-def _varied(
-    state: Any, config: Any, extra: Any, phi: Any, z: Any, n: int, R: Any, forgetting: Any, half: Any
-) -> Any:
-    """Factor of variable forgetting, against the innovation's usual energy."""
-    least = config[CONFIG + law.LEAST_FACTOR]
-    if config[PERIODS] > 0.0:
-        samples = 2.0 * half * config[PERIODS] * config[SHORTEST]
-        least = samples / (samples + 1.0)
-    forgetting = policies.nominal(extra, forgetting)
-    return law.varied(state[FRONT:], phi, z, n, R, forgetting, least)
-
-
-@register_jitable
-def _watch(state: Any, config: Any, extra: Any, n: int, part: Any) -> None:
-    """Learn the innovation's usual energy, and add P_0 where it says that something changed."""
-    y, S = state[FRONT + law.INNOVATION], state[FRONT + law.INNOVATION_VARIANCE]
-    if policies.changed(extra, y, S, part, config[THRESHOLD], config[RISEN]):
-        start = FRONT + law.HEAD + n
-        P_0 = state[start + n * n : start + 2 * n * n]
-        least_squares.add_covariance(state[start : start + n * n], P_0, n)
-        state[FRONT + law.RESETS] += 1.0
-
-
-@unrolled
-def _move(state: Any, config: Any, clock: Any, u: Any, n: int) -> None:
-    """Take a voltage into the regressor's integrals, and into the clock where anybody asks for it."""
-    du = u - state[U_LAST]
-    rise, moment, travel = equations.sample_regressor(state[U_LAST], u)
-    state[RISE] += rise
-    state[MOMENT] += moment
-    state[TRAVEL] += travel
-    state[U_LAST] = u
-    if clock is not None and config[PACED] != 0.0 and rise != 0.0:
-        swing.follow(clock, u)
-        if n == 4:
-            level.move(state[LEVEL:FRONT], du, _decay(state, config))
-            if clock[swing.SINCE] == 0.0:
-                level.turn(state[LEVEL:FRONT])
-
-
-@unrolled
-def _adapt(
-    state: Any,
-    config: Any,
-    extra: Any,
-    phi: Any,
-    z: Any,
-    n: int,
-    R: Any,
-    forgetting: Any,
-    half: Any,
-    part: Any,
-) -> None:
-    """The law, with what is off by default around it."""
-    law_state = state[FRONT:]
-    head = law.HEAD
-    resets, updates = law_state[law.RESETS], law_state[law.UPDATES]
-    if config[EXCITED] > 0.0:
-        work = law_state[head + n + 2 * n * n :]
-        policies.gate(extra, state[EXCITATION : EXCITATION + n * n], n, config[EXCITED], work)
-        if extra[policies.SHUT] != 0.0:
-            law_state[law.LAST] = law.HOLDING
-            law_state[law.HELD] += 1.0
-            return
-    if config[CONFIG + law.LEAST_FACTOR] > 0.0:
-        forgetting = _varied(state, config, extra, phi, z, n, R, forgetting, half)
-    law.adapt(law_state, config[CONFIG:], phi, z, n, R, forgetting)
-    if config[EXTRA] > 0.0 and law_state[law.LAST] == law.UPDATED:
-        _watch(state, config, extra, n, part)
-    if config[MARGIN] > 0.0:
-        policies.project(
-            law_state[head : head + n],
-            law_state[head + n : head + n + n * n],
-            n,
-            config[SCALE : SCALE + 5],
-            LEAST,
-            config[MARGIN],
-            law_state[head + 2 * n + 2 * n * n :],  # of the work space what the law's gain is not in
-        )
-    if law_state[law.LAST] == law.UPDATED and config[ERRORS] != 0.0:
-        restart = updates == 0.0 or law_state[law.RESETS] != resets
-        if config[CONFIG + law.DIRECTIONAL] != 0.0:
-            forgetting = 1.0  # it is not in that law's gain
-        _propagate_error(state, config, phi, n, forgetting, restart)
-
-
-@unrolled
-def _take(
-    state: Any, config: Any, clock: Any, line: Any, extra: Any, u: Any, x: Any, n: int, trial: Any
-) -> None:  # fmt: skip
-    """One raw sample: a regression of n parameters for the law, or a note of why there is none.
-
-    `clock` is the state of `swing`, `line` the delay line, `extra` the state of the policies that are off by
-    default; `trial` says that the bare law is to take it on trial. Each may be None where nobody asks for it,
-    and nothing is compiled for it.
-    """
-    law_state = state[FRONT:]
-    if line is not None and np.abs(u) < WILDEST:
-        u = delayed(line, config[FRACTION], u)
-    state[SAMPLES] += 1.0
-    # Asked once and early: the compiler would ask twice, and lose the bank's vector instructions.
-    waiting = state[PRIMED] == 0.0 or state[GAP] > config[LONGEST_GAP]
+def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """One raw sample: a regression for the law, or a note of why there is none."""
+    outcome = state.law
+    if np.abs(u) < WILDEST:
+        u = delayed(state.line, u)
+    state.samples += 1.0
+    # Asked once and early: the compiler would ask twice.
+    waiting = state.primed == 0.0 or state.gap > settings.longest_gap
     known = np.abs(u) < WILDEST
     measured = known and np.abs(x) < WILDEST
     if not measured:
-        state[MISSED] += 1.0
-        law_state[law.LAST] = law.MISSING
+        state.missed += 1.0
+        outcome.last = MISSING
     if waiting:
         if measured:
-            _prime(state, config, clock, u, x)
-            law_state[law.LAST] = law.WAITING
+            form.prime(state, u, x)
+            outcome.last = WAITING
         return
     if known:
         # A short gap is bridged: the voltage's integrals go on, the displacement's mean
         # is taken between the good samples on its two sides.
-        u -= state[U_CENTRE]
-        _move(state, config, clock, u, n)
-    if clock is not None and measured and not _believable(state, config, x):
-        state[OUTLIERS] += 1.0
-        law_state[law.LAST] = law.REJECTED
+        u = form.u_from_centre(state.centre, u)
+        _move(state, settings, u)
+    if measured and not _believable(state.belief, settings.policies.outlier_rejection, state, settings, x):
+        state.outliers += 1.0
+        outcome.last = REJECTED
         measured = False
     if not measured:
-        state[GAP] += 1.0
+        state.gap += 1.0
         return
-    if n == 4:
-        level.measure(state[LEVEL:FRONT], u, x - state[X_CENTRE])
-    phi = state[PHI : PHI + n]
-    part = 0.0  # nobody asks for it
-    if clock is not None and config[PACED] != 0.0:
-        part = swing.part_of_swing(clock, state[TRAVEL], config[FIRST_HALF])
-    z = _regression(state, config, clock, extra, x - state[X_CENTRE], phi, n)
-    if state[FROZEN] != 0.0:
-        law_state[law.LAST] = law.HOLDING
+    x = form.x_from_centre(state.centre, x)
+    _measure_level(state.level, u, x)
+    _measure_fraction(state.swing, state, settings)
+    z = form.filtered_regression(state, settings, x)
+    if state.frozen != 0.0:
+        outcome.last = HELD
         return
-    forgetting = config[CONFIG + law.FORGETTING]
-    if trial is not None:
-        law.adapt_on_trial(law_state, config[CONFIG:], phi, z, n, 1.0, forgetting)
-        return
-    if clock is None:
-        law.adapt_discretely(law_state, config[CONFIG:], phi, z, n, 1.0, forgetting)
-        return
-    if extra is not None and config[PLACES] > 0.0:
-        _visit(state, config, extra, n, part)
-    half = 0.0  # nobody asks for it
-    if config[WALK] > 0.0 or config[PERIODS] > 0.0:
-        half = swing.half_period(clock, config[FIRST_HALF])
-    if config[PERIODS] > 0.0:
-        samples = 2.0 * half * config[PERIODS]
-        forgetting = samples / (samples + 1.0)
-    if config[PACED] != 0.0:
-        _excite(state, config, phi, n, part)
-    R = 1.0
-    if config[WALK] > 0.0 and state[WAY] >= SLOWEST:
-        R = _walk(state, config, extra, n, half)
-    if extra is not None:
-        _adapt(state, config, extra, phi, z, n, R, forgetting, half, part)
-        return
-    resets = law_state[law.RESETS] - (law_state[law.UPDATES] == 0.0)
-    law.adapt_discretely(law_state, config[CONFIG:], phi, z, n, R, forgetting)
-    if law_state[law.LAST] == law.UPDATED and config[ERRORS] != 0.0:
-        _propagate_error(state, config, phi, n, forgetting, law_state[law.RESETS] != resets)
+    form.excite(state.excitation, state, settings)
+    _adapt(state, settings, z)
+
+
+# ---------------------------------------------------------------- the model
 
 
 @register_jitable
-def _sample(state: Any, config: Any, u: Any, x: Any) -> None:
-    """One raw sample, with whatever was asked for."""
-    n = int(config[N])
-    extra = state[FRONT + law.state_size(n) :]
-    _take(state, config, state[SWING:EXCITATION], extra[int(config[EXTRA]) :], extra, u, x, n, None)
+def is_admissible(theta: Any, scale: Any) -> Any:
+    """1.0 if the Coleman-Hodgdon parameters theta need not be moved."""
+    return admissible.is_admissible(theta[0], theta[1], theta[2], LEAST * scale[0], LEAST * scale[1], MARGIN)
+
+
+@register_jitable
+def _start(theta: Any, scale: Any) -> None:
+    """The start's model, or the nearest to it: where the estimate has none."""
+    for i in range(len(theta)):
+        theta[i] = 0.0
+    alpha, beta = scale[0], scale[1]
+    theta[0], theta[1] = alpha, beta
+    area = alpha * beta
+    theta[2] = min(max(scale[2], (1.0 + MARGIN) * area), (2.0 - MARGIN) * area)
+
+
+@register_jitable
+def trust_in_levels(walk: Any, state: Any, settings: Any) -> Any:
+    """Fraction of the offset that levels give: 0 where the derivative shows it well, 1 where it cannot.
+
+    It cannot where noise covers the changes of x, nor where the swing is small: the offset then comes from a
+    difference of the slopes up and down that is smaller than what the loop's shape differs from the model's.
+    """
+    if walk is None:
+        return 0.0
+    memory_squared = walk.memory * walk.memory
+    half_swing = 0.5 * state.swing.size
+    ratio = SLOPES_DIFFER / (_decay(state, settings) * LEVELS_DIFFER * half_swing + SLOWEST)
+    by_slopes = ratio * ratio
+    unknown = noise_memory(state, settings) + memory_squared * by_slopes * by_slopes
+    return unknown / (unknown + memory_squared + SLOWEST)
+
+
+@register_jitable
+def _offset(centre: Any, state: Any, settings: Any, theta: Any) -> Any:
+    """Offset of the loop: from the slopes, from levels, or the start's."""
+    if centre is None:
+        return settings.start.offset
+    c = theta[2] / theta[0]
+    origin = centre.x - c * centre.u
+    offset = equations.offset_from_rate_parameters(theta[0], theta[3])
+    trust = trust_in_levels(settings.policies.random_walk, state, settings)
+    if trust > 0.0:
+        levels = 0.0  # the start's, until a whole period is known
+        if level.is_known(state.level):
+            levels = level.offset(state.level, c - theta[1], c)
+        offset = offset + trust * (levels - offset)
+    return offset + origin
+
+
+@register_jitable
+def _line_offset(centre: Any, settings: Any, theta: Any, gain: Any) -> Any:
+    if centre is None:
+        return settings.start.offset
+    return theta[1] + centre.x - gain * centre.u
+
+
+@register_jitable
+def _proposed_line(state: Any, settings: Any, theta: Any, model: Any) -> None:
+    gain = admissible.kept_gain(theta[0], settings.start.gain, LEAST)
+    model[0] = gain
+    model[3] = _line_offset(state.centre, settings, theta, gain)
+
+
+@register_jitable
+def _proposed_loop(state: Any, settings: Any, theta: Any, model: Any) -> None:
+    scale, law_P = settings.parameter_scale, state.law.P
+    if is_admissible(theta, scale) == 0.0:
+        P = like(law_P)
+        for i in range(len(theta)):
+            for j in range(len(theta)):
+                P[i, j] = law_P[i, j] * (scale[i] * scale[j])
+        if not admissible.project_admissible(theta, P, LEAST * scale[0], LEAST * scale[1], MARGIN):
+            _start(theta, scale)
+    for i in range(3):
+        model[i] = theta[i]
+    model[3] = _offset(state.centre, state, settings, theta)
+
+
+@register_jitable
+def _proposed(loop: Any, state: Any, settings: Any, theta: Any, model: Any) -> None:
+    if loop is None:
+        _proposed_line(state, settings, theta, model)
+    else:
+        _proposed_loop(state, settings, theta, model)
+
+
+@register_jitable
+def proposed(state: Any, settings: Any, model: Any) -> None:
+    """(alpha, beta, gamma, offset) or (gain, -, -, offset) into `model`: theta or its nearest point."""
+    theta = like(state.law.theta)
+    for i in range(len(theta)):
+        theta[i] = state.law.theta[i] * settings.parameter_scale[i]
+    _proposed(settings.loop, state, settings, theta, model)
+
+
+# ---------------------------------------------------------------- what Python calls
+
+
+@compiled
+def step(state: Record, settings: Record, u: float, x: float) -> None:
+    """One sample."""
+    sample(state, settings, u, x)
+
+
+@compiled
+def run(
+    state: Record, settings: Record, u: Vector, x: Vector, every: int,
+    theta: Matrix, y: Vector, S: Vector, P: Matrix,
+) -> None:  # fmt: skip
+    """Records; every `every`-th sample goes into the histories that have room."""
+    own = state.law
+    row, due = 0, every
+    for k in range(u.size):
+        sample(state, settings, u[k], x[k])
+        due -= 1
+        if due == 0:
+            for i in range(len(own.theta)):
+                theta[row, i] = own.theta[i] * settings.parameter_scale[i]
+            keep_outcome(row, own.innovation, own.innovation_variance, own.P, y, S, P)
+            row, due = row + 1, every
+
+
+@compiled
+def step_channels(
+    states: Record, settings: Record, u: Matrix, x: Matrix, first: int, stop: int, every: int, theta: Cube
+) -> None:
+    """Records (K, N) of the channels from `first` to `stop`, each with a state of its own."""
+    for c in range(first, stop):
+        state = nth(states, c)
+        row, due = 0, every
+        for k in range(u.shape[0]):
+            sample(state, settings, u[k, c], x[k, c])
+            due -= 1
+            if due == 0:
+                for i in range(len(state.law.theta)):
+                    theta[row, c, i] = state.law.theta[i] * settings.parameter_scale[i]
+                row, due = row + 1, every
+
+
+@compiled
+def propose(state: Record, settings: Record, model: Vector) -> None:
+    """Compiled `proposed`."""
+    proposed(state, settings, model)

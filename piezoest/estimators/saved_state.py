@@ -1,169 +1,123 @@
-"""What a saved estimator must be before it is believed: its dictionary, each block of its state.
+"""What a saved estimator must be before it is believed: its dictionary, each number of its state.
 
-A state is one flat vector, and much in it becomes an index, a count or a divisor in compiled code, which asks
-no questions. A layout's `Table` says of each block what its numbers can be; the tables are in
-`piezoest.estimators.state_tables`.
+Much in a state becomes an index, a count or a divisor in compiled code, which asks no questions. Its layout
+says of each number what it can be.
 """
 
 from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable
-from itertools import pairwise
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, fields, finite
+from piezoest._checks import FloatArray, fields, finite
+from piezoest.layout import ABSENT, Kind, Record, leaves
 
-# No number that an estimator comes by is beyond this, and no count: six centuries at 50 kHz.
-LARGEST, MOST = 1e60, 2.0**50
 # Least argument other than zero, and the reciprocal of the largest.
 SMALLEST_ARGUMENT = 1e-20
-# Rounding that a covariance may show, in parts of its variances; and how far below zero an eigenvalue.
+# Rounding that a covariance may show, relative to its variances; and how far below zero an eigenvalue.
 ASYMMETRY, INDEFINITE = 1e-9, 1e-6
 # Rounding of a variance that is no divisor.
 NEGATIVE = 1e-9
 
 
-class Kind(NamedTuple):
-    """What the numbers of a block can be.
+Rule = tuple[str, Any]
+
+
+def check(saved: Any, layout: Record, start: Any, rules: Callable[[Any], Iterable[Rule]]) -> Any:
+    """Return a saved state as a structured array, if it is one of a layout.
 
     Parameters
     ----------
-    low, high : float
-        Least and largest value.
-    whole : bool
-        Whole numbers only.
-    square : bool
-        A symmetric matrix without a variance below zero, row by row.
-    definite : bool
-        No direction with a variance below zero either, but for rounding.
-    fixed : bool
-        As construction leaves them.
-    idle : bool
-        Work space: written before it is read, and neither saved nor loaded.
-    """
-
-    low: float = -LARGEST
-    high: float = LARGEST
-    whole: bool = False
-    square: bool = False
-    definite: bool = False
-    fixed: bool = False
-    idle: bool = False
-
-
-def whole(low: float, high: float) -> Kind:
-    """Whole numbers from `low` to `high`: codes and positions."""
-    return Kind(low, high, whole=True)
-
-
-NUMBER, AMOUNT, SHARE = Kind(), Kind(0.0), Kind(0.0, 1.0)
-COUNT, FLAG, SIGN = whole(0.0, MOST), whole(0.0, 1.0), whole(-1.0, 1.0)
-COVARIANCE, SYMMETRIC = Kind(square=True, definite=True), Kind(square=True)
-FIXED, WORK = Kind(fixed=True), Kind(idle=True)
-
-
-class Block(NamedTuple):
-    """A block of a state: it reaches to where the next one starts.
-
-    Parameters
-    ----------
-    start : int
-        Position of its first number.
-    name : str
-        For messages.
-    kind : Kind
-        What its numbers can be.
-    """
-
-    start: int
-    name: str
-    kind: Kind
-
-
-class Table(NamedTuple):
-    """A layout: blocks from the first number to the last, and what must hold between them.
-
-    Parameters
-    ----------
-    blocks : tuple of Block
-        In order, without gaps.
-    rules : tuple of (str, callable)
-        What must hold, in words, and as a function of the state.
-    """
-
-    blocks: tuple[Block, ...]
-    rules: tuple[tuple[str, Callable[[FloatArray], Any]], ...] = ()
-
-
-def check(values: Any, table: Table, start: FloatArray) -> FloatArray:
-    """Return a saved state as an array, if it is one of a layout; `start` is the state after construction.
+    saved : dict
+        Numbers by name, as `layout.by_name` gives them.
+    layout : Record
+        What they must be.
+    start : ndarray
+        The state after construction.
+    rules : callable
+        ``rules(state)``: what must hold between the numbers, in words, and whether it does.
 
     Raises
     ------
     ValueError
-        Naming the block that it cannot be.
+        Naming what it cannot be.
     """
-    if not isinstance(values, list | tuple | np.ndarray):
-        raise ValueError(f"state must be a list of numbers, got {type(values).__name__}")
-    for place, value in enumerate(values):
-        if not isinstance(value, float | int):
-            raise ValueError(f"state must be a list of numbers, got {value!r} at position {place}")
-    state = array_1d("state", values).copy()
-    if state.size != start.size:
-        raise ValueError(f"state holds {state.size} numbers, these arguments need {start.size}")
-    for block, part in _parts(table, state.size):
-        if block.kind.idle:
-            state[part] = start[part]
-        else:
-            _check_block(block, state[part], start[part])
-    for words, holds in table.rules:
-        if not holds(state):
+    state = start.copy()
+    _read(saved, layout, state, "state")
+    for name, kind, (values, first) in leaves(layout, state, start):
+        _check_numbers(name, kind, values, first)
+    for words, holds in rules(state):
+        if not holds:
             raise ValueError(f"state: {words}: it was changed after to_dict()")
     return state
 
 
-def to_save(state: FloatArray, table: Table) -> list[float]:
-    """Return the numbers of a state without what is left in its work space."""
-    state = state.copy()
-    for block, part in _parts(table, state.size):
-        if block.kind.idle:
-            state[part] = 0.0
-    numbers: list[float] = state.tolist()
-    return numbers
+def no_more_than(samples: Any, *counters: Any) -> Rule:
+    """Rule for counters that are parts of another."""
+    words = "its counters cannot add up to more than the samples or solves that there were"
+    return words, sum(counters) <= samples
 
 
-def _parts(table: Table, size: int) -> list[tuple[Block, slice]]:
-    edges = [*(block.start for block in table.blocks), size]
-    return [(block, slice(*pair)) for block, pair in zip(table.blocks, pairwise(edges), strict=True)]
+def _read(saved: Any, layout: Record, state: Any, path: str) -> None:
+    """Write saved numbers into a state, if names and shapes are its own."""
+    kept = [name for name, field in layout.fields if field != ABSENT and not _is_idle(field)]
+    fields(path, saved, kept)
+    for name in kept:
+        field, value = layout.by_name[name], saved[name]
+        if isinstance(field, Record):
+            _read(value, field, state[name], f"{path}[{name!r}]")
+        else:
+            state[name] = _as_numbers(value, state[name].shape, f"{path}[{name!r}]")
 
 
-def _check_block(block: Block, values: FloatArray, start: FloatArray) -> None:
-    kind = block.kind
+def _is_idle(field: Any) -> bool:
+    return bool(getattr(getattr(field, "kind", field), "idle", False))
+
+
+def _as_numbers(value: Any, shape: tuple[int, ...], path: str) -> Any:
+    """Floats of a shape, of nothing but numbers."""
+    flat = [value]
+    for _ in shape:
+        flat = [each for inner in flat for each in (inner if isinstance(inner, list | tuple) else [None])]
+    if not all(isinstance(each, float | int) for each in flat):
+        raise ValueError(f"state: {path} must be made of numbers, of shape {shape}")
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (ValueError, OverflowError):
+        raise ValueError(f"state: {path} must be made of float64 numbers, of shape {shape}") from None
+    if array.shape != shape:
+        raise ValueError(f"state: {path} must have shape {shape}, got {array.shape}")
+    if not np.all(np.isfinite(array)):
+        raise ValueError(f"state: {path} must be finite")
+    return array
+
+
+def _check_numbers(name: str, kind: Kind, values: Any, start: Any) -> None:
+    if kind.idle:
+        return
     if kind.fixed:
         if not np.array_equal(values, start):
-            raise ValueError(f"state: {block.name} must be as the arguments make them")
+            raise ValueError(f"state: {name} must be as the arguments make it")
         return
     wrong = (values < kind.low) | (values > kind.high)
     if kind.whole:
         wrong |= values != np.floor(values)
-    if wrong.any():
+    if np.any(wrong):
         number = "whole number" if kind.whole else "number"
         raise ValueError(
-            f"state: {block.name} must be a {number} from {kind.low:g} to {kind.high:g}, "
-            f"got {values[wrong][0]:g} at position {block.start + int(np.argmax(wrong))}"
+            f"state: {name} must be a {number} from {kind.low:g} to {kind.high:g}, "
+            f"got {float(np.asarray(values)[wrong].flat[0]):g}"
         )
     if kind.square and not is_covariance(values, kind.definite):
-        raise ValueError(f"state: {block.name} must be symmetric and positive, as a covariance is")
+        raise ValueError(f"state: {name} must be symmetric and positive, as a covariance is")
 
 
-def is_covariance(flat: FloatArray, definite: bool) -> bool:
-    """Whether numbers are a covariance, row by row, but for rounding; `definite`: in all directions."""
-    n = math.isqrt(flat.size)
-    P = flat.reshape(n, n)
+def is_covariance(P: FloatArray, definite: bool) -> bool:
+    """Whether a matrix is a covariance but for rounding; `definite`: in all directions."""
     variance = np.diag(P)
     if np.any(variance < (0.0 if definite else -NEGATIVE)):
         return False

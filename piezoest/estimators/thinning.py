@@ -17,16 +17,9 @@ def thinned(
 ) -> tuple[Any, FloatArray, FloatArray, FloatArray]:
     """Points of a record that stand for all of it.
 
-    Parameters
-    ----------
-    u, x : ndarray, shape (N,)
-        Voltage without gaps, displacement with NaN where it is missing.
-    first : int
-        Number of the first sample in the stream: the points stay where they are as it slides.
-    decimation : int
-        Samples per point.
-    also : int
-        One more sample that has to be a point.
+    The record (N,) is a voltage without gaps and a displacement with NaN where it is missing. `first` is its
+    first sample's number in the stream: the points stay where they are as it slides. `decimation` samples
+    make a point; the sample `also` has to be one too.
 
     Returns
     -------
@@ -39,26 +32,26 @@ def thinned(
     root_weight : ndarray, shape (M,)
         Square root of the number of samples averaged; 0 where there is no measurement.
     """
-    N, half = u.size, (decimation - 1) // 2
+    N, reach = u.size, (decimation - 1) // 2
     direction = np.sign(np.diff(u))
     moving = np.flatnonzero(direction)
     turns = moving[1:][direction[moving[1:]] != direction[moving[:-1]]]
     if turns.size * POINTS_PER_TURN * decimation > N:
-        decimation, half = 1, 0
-    middles = np.arange((half - first) % decimation, N, decimation)
+        decimation, reach = 1, 0
+    middles = np.arange((reach - first) % decimation, N, decimation)
     points = np.unique(np.concatenate([middles, turns, [0, min(also, N - 1), N - 1]]))
     weight = np.isin(points, middles) * 1.0
     shift, mean_x = np.zeros(points.size), x[points].copy()
-    if half > 0:
+    if reach > 0:
         turned = np.zeros(N + 1)
         turned[turns + 1] = 1.0
-        sums = [np.concatenate([[0.0], np.cumsum(part)]) for part in (turned[1:], np.isnan(x))]
-        whole = (points >= half) & (points + half < N) & (weight > 0.0)
-        low, high = points - half, points + half + 1
-        for part in sums:
-            whole[whole] = part[high[whole]] == part[low[whole]]
-        block = points[whole][:, None] + np.arange(-half, half + 1)
+        sums = [np.concatenate([[0.0], np.cumsum(hindrance)]) for hindrance in (turned[1:], np.isnan(x))]
+        whole = (points >= reach) & (points + reach < N) & (weight > 0.0)
+        low, high = points - reach, points + reach + 1
+        for count in sums:
+            whole[whole] = count[high[whole]] == count[low[whole]]
+        block = points[whole][:, None] + np.arange(-reach, reach + 1)
         shift[whole] = u[block].mean(axis=1) - u[points[whole]]
         mean_x[whole] = x[block].mean(axis=1)
-        weight[whole] = np.sqrt(2.0 * half + 1.0)
+        weight[whole] = np.sqrt(2.0 * reach + 1.0)
     return points, shift, mean_x, np.where(np.isfinite(mean_x), weight, 0.0)

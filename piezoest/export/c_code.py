@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import keyword
+import re
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,18 +14,35 @@ import numpy as np
 from piezoest._checks import integer
 from piezoest._files import write_text
 from piezoest._version import __version__
-from piezoest.compensators import Compensator
-from piezoest.compensators.adoption import adopt
-from piezoest.compensators.layout import OFFSET
+from piezoest.compensators import Compensator, inverse_kernel
 from piezoest.equations import turning_points
-from piezoest.estimators.base import Compiled
-from piezoest.export import c_text as text
+from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.export import ring
-from piezoest.export.c_translator import Translator
-from piezoest.export.c_values import Array, Expr, Known, Root, Value
+from piezoest.export.c_file import File
+from piezoest.export.c_printer import comment
+from piezoest.export.c_translator import translate
+from piezoest.export.c_values import Array, Known, Number, Root, Struct, Value, literal
+from piezoest.layout import new, record
 from piezoest.models import ColemanHodgdon, Model, PrandtlIshlinskii
 
 Precision = Literal["double", "float"]
+
+LICENCE = """Copyright (c) The piezoest developers. MIT licence: permission is granted, free of charge, to
+use, copy, modify, merge, publish, distribute, sublicense and sell this code, provided that this notice
+stays in it. It comes as is, without warranty of any kind."""
+
+_CHANGE = """\
+/* Use another model, without a bump; freeze before, or the next one learnt replaces it. An inadmissible
+ * model is replaced by its nearest admissible one; returns 0, and changes nothing, if there is none. */"""
+_NO_CHANGE = "/* The model of this controller is fixed: returns 0, and changes nothing. */"
+_ADOPT = """{real} model[4];
+
+    for (int i = 0; i < 4; ++i) {{
+        model[i] = parameters[i];
+    }}
+    return {adopt};"""
+_NO_ADOPT = "(void)state;\n    (void)parameters;\n    return 0;"
+_LEARN = "if (state->ring.started != {zero}) {{\n        {learn};\n    }}"
 
 _FIXED = "it fixed: c(None, InverseCompensator(estimator.model))"
 # What rounding cannot tell apart is more in float, and what is beyond all measure is less.
@@ -96,7 +115,7 @@ def c(
 
     Parameters
     ----------
-    estimator : HysteresisRLS, HysteresisEKF or None
+    estimator : HysteresisRLS, HysteresisEKF, OutputErrorRLS or None
         In its present state; None for feed-forward with a fixed model.
     compensator : InverseCompensator or LinearCompensator
         In its present state, with its limits. A `PrandtlIshlinskii` model in it stays fixed.
@@ -122,7 +141,7 @@ def c(
     if precision not in ("double", "float"):
         raise ValueError(f"precision must be 'double' or 'float', got {precision!r}")
     interval = integer("update_interval", update_interval, 1)
-    if not hasattr(compensator, "_compiled"):
+    if not isinstance(compensator, Compensator):
         raise ValueError(
             f"compensator must be an InverseCompensator or a LinearCompensator, got {compensator!r}"
         )
@@ -131,16 +150,20 @@ def c(
         if isinstance(getattr(estimator, "model", None), PrandtlIshlinskii):
             hint = "learn a Prandtl-Ishlinskii model beside the controller, and export " + _FIXED
         raise ValueError(
-            f"estimator must be a HysteresisRLS or a HysteresisEKF, got {type(estimator).__name__}: {hint}"
+            f"estimator must be one such as HysteresisRLS, got {type(estimator).__name__}: {hint}"
         )
     return _Generator(estimator, compensator, name, precision, interval).code()
 
 
 def _has_kernel(estimator: Any) -> bool:
-    """Whether its samples are taken by the compiled functions that it or a base of it names."""
-    kind = type(estimator)
-    owner = next((base for base in kind.__mro__ if isinstance(vars(base).get("_compiled"), Compiled)), None)
-    return owner is not None and kind._sample is owner._sample  # type: ignore[attr-defined]
+    """Whether the compiled functions that it names take its samples and propose its model."""
+    return isinstance(estimator, CompiledEstimator) and hasattr(estimator.kernel, "proposed")
+
+
+def filled(template: str, **texts: str) -> str:
+    """Text of a template, with each ``@name@`` replaced."""
+    path = resources.files("piezoest.export").joinpath("templates", template)
+    return re.sub("@([a-z_]+)@", lambda found: texts[found[1]], path.read_text(encoding="utf-8"))
 
 
 def _described(model: Model) -> str:
@@ -155,114 +178,98 @@ def _described(model: Model) -> str:
 
 
 class _Generator:
+    """A controller of these two objects, translated."""
+
     def __init__(self, estimator: Any, compensator: Compensator, name: str, precision: str, interval: int):
-        self.estimator, self.compensator, self.name, self.interval = estimator, compensator, name, interval
-        self.precision = precision
-        unneeded = () if estimator is None else estimator._compiled.unneeded
-        self.voltage, self.change = compensator._compiled
-        if self.change is None:
+        self.estimator, self.compensator, self.interval = estimator, compensator, interval
+        changes = hasattr(compensator.model.inverse, "change")
+        unneeded = () if estimator is None else estimator.unneeded
+        if not changes:
             # Only another model's plays would be set from it.
             unneeded = (*unneeded, turning_points.remember)
-        single = precision == "float"
-        self.translator = Translator(precision, single, unneeded, _FLOAT if single else {})
-        self.members: list[tuple[str, np.ndarray[Any, Any], str]] = []
-        self.hysteretic = isinstance(compensator.model, ColemanHodgdon)
+        self.file = File(name, precision, unneeded, _FLOAT if precision == "float" else {})
+        model = compensator.model if estimator is None else estimator.model
+        self.hysteretic = isinstance(model, ColemanHodgdon)
+        if estimator is not None and not changes:
+            raise ValueError(
+                f"the code for a {type(compensator.model).__name__} takes no other model: leave out the "
+                "estimator, or start the compensator with a ColemanHodgdon or LinearGain"
+            )
         if estimator is not None:
-            if self.change is None:
-                kind = type(compensator.model).__name__
-                raise ValueError(
-                    f"the code for a {kind} takes no other model: leave out the estimator, "
-                    "or start the compensator with a ColemanHodgdon or LinearGain"
-                )
-            compensator._accepts(estimator.model)
-            self.hysteretic = isinstance(estimator.model, ColemanHodgdon)
+            kind: Any = type(compensator)
+            kind(model, compensator.limits)  # which refuses what it cannot invert
+        self.state, settings, kernel = self._state(), self._settings(), Known(inverse_kernel)
+        self.file.struct(self.state.layout, "state")
+        self.give = self._call(ring.give, kernel, Number("r", "real"))
+        self.adopt = self.learn = ""
+        if changes:
+            self.adopt = self._call(ring.adopt, settings, kernel, Array("model", (4,), Root("model")))
+        if estimator is not None:
+            arguments = settings, Known(estimator.kernel), kernel, Number("x", "real")
+            self.learn = self._call(ring.learn, *arguments)
+
+    def _state(self) -> Struct:
+        """All that changes."""
+        compensator, model, estimator = self.compensator, self.compensator.model, self.estimator
+        parameters = np.zeros(4)
+        first = [model.gain] if hasattr(model, "gain") else model.theta
+        parameters[: len(first)] = first
+        parameters[3] = model.offset
+        layouts = compensator.layouts
+        fields = {"ring": ring.RING, "compensator": layouts[0], "settings": layouts[1]}
+        values = {"compensator": compensator.state, "settings": compensator.settings}
+        if estimator is not None:
+            fields["estimator"], values["estimator"] = estimator.layouts[0], estimator.state
+        layout = record(**fields)
+        start = new(layout, ring={"voltage": compensator.voltage, "model": parameters}, **values)
+        return Struct("state->", layout, start, Root("state"), "state")
+
+    def _settings(self) -> Struct:
+        """What never changes."""
+        state, own = (record(), record()) if self.estimator is None else self.estimator.layouts
+        layout = ring.settings_layout(own)
+        freezable, hysteretic = "frozen" in state.by_name, self.hysteretic
+        values = new(layout, interval=self.interval, freezable=freezable, hysteretic=hysteretic)
+        if self.estimator is not None:
+            values["estimator"] = self.estimator.settings
+        return Struct("", layout, values, Root(""), "settings", constant=True)
+
+    def _call(self, function: Any, *arguments: Value) -> str:
+        """Text of a call of a translated function with the state."""
+        made, _ = translate(self.file, function, [self.state, *arguments])
+        return f"{made.name}({', '.join(root.name for _, root, _ in made.parameters)})"
 
     def code(self) -> CCode:
-        """Translate, and put the pieces together."""
-        model = self.compensator.model
-        start = np.zeros(ring.STATE)
-        start[ring.PREVIOUS] = self.compensator.voltage
-        if self.change is not None:
-            start[ring.MODEL : ring.MODEL + model.theta.size] = model.theta
-            start[ring.MODEL + 3] = self.compensator._config[OFFSET]
-        elif isinstance(model, PrandtlIshlinskii):
-            start[ring.MODEL], start[ring.MODEL + 3] = model.gain, model.offset
-        self.member("ring", start, "voltage given out last, counters, model in use")
-        if self.estimator is not None:
-            self.member("estimator", self.estimator._state, "state of the estimator")
-        self.member("compensator", self.compensator._state, "state of the compensator")
-        self.member("settings", self.compensator._config, "inverse and limits of the compensator")
-        entries = {"give": self.entry_give()}
-        if self.change is not None:
-            entries["adopt"] = self.entry_adopt()
-        if self.estimator is not None:
-            entries["learn"] = self.entry_learn()
-        return CCode(
-            self.name,
-            text.header(self),
-            text.source(self, entries),
-            self.precision,
-            self.estimator is not None,
+        """Put the pieces together."""
+        file, give, adopt, learn = self.file, self.give, self.adopt, self.learn
+        zero, one = literal(0.0, file.single), literal(1.0, file.single)
+        model = "alpha [1/V], beta [um/V], gamma [um/V^2]" if self.hysteretic else "gain [um/V], 0, 0"
+        same = {
+            "head": "\n".join(comment([*self._provenance(), "", *LICENCE.splitlines()])),
+            "name": file.prefix, "real": file.real,
+        }  # fmt: skip
+        header = filled(
+            "controller.h",
+            guard=f"{file.prefix.upper()}_H",
+            types="\n".join(text for _, text in file.types.values()),
+            model=model,
+            change=_CHANGE if adopt else _NO_CHANGE,
+            **same,
         )
+        source = filled(
+            "controller.c",
+            start=file.start(self.state.layout, self.state.values),
+            functions=file.text(f"{give} {adopt} {learn}"),
+            learn=_LEARN.format(zero=zero, learn=learn) if learn else "(void)x;",
+            give=give,
+            adopt=_ADOPT.format(real=file.real, adopt=adopt) if adopt else _NO_ADOPT,
+            zero=zero,
+            one=one,
+            **same,
+        )
+        return CCode(file.prefix, header, source, file.real, self.estimator is not None)
 
-    def member(self, name: str, values: Any, meaning: str) -> None:
-        """One array of the state."""
-        self.members.append((name, np.asarray(values, dtype=np.float64), meaning))
-
-    def array(self, name: str, known: tuple[tuple[int, float], ...] = ()) -> Array:
-        """An array of the state as an argument."""
-        size = next(values.size for member, values, _ in self.members if member == name)
-        return Array(f"state->{name}", Root(), size=size, known=known)
-
-    def compensator_arrays(self) -> tuple[Array, Array]:
-        """State and settings; what no change of model or limits touches is known."""
-        fixed = self.compensator._fixed
-        known = tuple((i, float(self.compensator._config[i])) for i in fixed)
-        return self.array("compensator"), self.array("settings", known)
-
-    def entry_give(self) -> str:
-        """Call of `ring.give`."""
-        arguments: list[Value] = [self.array("ring"), *self.compensator_arrays(), Known(self.voltage)]
-        return self.call(ring.give, [*arguments, Expr("r", "real")])
-
-    def entry_adopt(self) -> str:
-        """Call of `adoption.adopt`."""
-        model = Array("model", Root(), size=4)
-        flags: list[Value] = [Known(self.hysteretic), Known(self.change)]
-        return self.call(adopt, [*self.compensator_arrays(), model, *flags])
-
-    def entry_learn(self) -> str:
-        """Call of `ring.learn`."""
-        compiled, table = self.estimator._compiled, self.translator.table
-        frozen_at = -1 if compiled.frozen is None else compiled.frozen
-        arguments: list[Value] = [
-            self.array("ring"),
-            self.array("estimator"),
-            table("estimator_settings", tuple(self.estimator._config)),
-            table("estimator_terms", tuple(self.estimator._terms)),
-            *self.compensator_arrays(),
-            Known(compiled.sample),
-            Known(compiled.proposed),
-            Known(self.change),
-            Known(self.interval),
-            Known(frozen_at),
-            Known(self.hysteretic),
-            Expr("x", "real"),
-        ]
-        return self.call(ring.learn, arguments)
-
-    def call(self, function: Any, arguments: list[Value]) -> str:
-        """Text of a call of a translated function."""
-        made, flat = self.translator.function(function, arguments)
-        passed = []
-        for place, _, _ in made.parameters:
-            value = flat[place]
-            assert isinstance(value, Array | Expr)
-            passed.append(value.base if isinstance(value, Array) else value.text)
-        return f"{made.name}({', '.join(passed)})"
-
-    @property
-    def provenance(self) -> list[str]:
+    def _provenance(self) -> list[str]:
         """What the code was made from."""
         estimator = "none" if self.estimator is None else type(self.estimator).__name__
         lines = [
@@ -272,7 +279,6 @@ class _Generator:
             f"Estimator: {estimator}.",
         ]
         if self.estimator is not None:
-            for key, value in self.estimator._arguments.items():
-                lines.append(f"    {key} = {value}")
+            lines += [f"    {key} = {v}" for key, v in self.estimator.to_dict()["arguments"].items()]
             lines.append(f"Model handed over every {self.interval} samples.")
         return lines

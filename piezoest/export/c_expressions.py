@@ -4,48 +4,35 @@ from __future__ import annotations
 
 import ast
 import inspect
+import math
 import operator
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from piezoest.export import c_printer as printer
+import numpy as np
+
+from piezoest.compile import like, local, local_rows
+from piezoest.export.c_file import File
+from piezoest.export.c_printer import Statement
 from piezoest.export.c_source import Source
-from piezoest.export.c_values import (
-    AND,
-    EQUAL,
-    LESS,
-    OR,
-    PRODUCT,
-    SUM,
-    TERNARY,
-    UNARY,
-    Array,
-    Expr,
-    Items,
-    Known,
-    Value,
-    wrap,
-)
+from piezoest.export.c_values import Array, Binds, Items, Known, Number, Refused, Room, Root, Value, number
 
-if TYPE_CHECKING:
-    from piezoest.export.c_translator import Translator
-
-_BINARY: dict[type, tuple[str, int, Callable[[Any, Any], Any]]] = {
-    ast.Add: ("+", SUM, operator.add),
-    ast.Sub: ("-", SUM, operator.sub),
-    ast.Mult: ("*", PRODUCT, operator.mul),
-    ast.Div: ("/", PRODUCT, operator.truediv),
-    ast.Mod: ("%", PRODUCT, operator.mod),
-    ast.FloorDiv: ("//", PRODUCT, operator.floordiv),
-    ast.Pow: ("**", PRODUCT, operator.pow),
+_ARITHMETIC: dict[type, tuple[str, int, Callable[[Any, Any], Any]]] = {
+    ast.Add: ("+", Binds.SUM, operator.add),
+    ast.Sub: ("-", Binds.SUM, operator.sub),
+    ast.Mult: ("*", Binds.PRODUCT, operator.mul),
+    ast.Div: ("/", Binds.PRODUCT, operator.truediv),
+    ast.Mod: ("%", Binds.PRODUCT, operator.mod),
+    ast.Pow: ("**", Binds.PRODUCT, operator.pow),
+    ast.FloorDiv: ("//", Binds.PRODUCT, operator.floordiv),
 }
-_COMPARE: dict[type, tuple[str, int, Callable[[Any, Any], Any]]] = {
-    ast.Lt: ("<", LESS, operator.lt),
-    ast.LtE: ("<=", LESS, operator.le),
-    ast.Gt: (">", LESS, operator.gt),
-    ast.GtE: (">=", LESS, operator.ge),
-    ast.Eq: ("==", EQUAL, operator.eq),
-    ast.NotEq: ("!=", EQUAL, operator.ne),
+_COMPARISONS: dict[type, tuple[str, int, Callable[[Any, Any], Any]]] = {
+    ast.Lt: ("<", Binds.LESS, operator.lt),
+    ast.LtE: ("<=", Binds.LESS, operator.le),
+    ast.Gt: (">", Binds.LESS, operator.gt),
+    ast.GtE: (">=", Binds.LESS, operator.ge),
+    ast.Eq: ("==", Binds.EQUAL, operator.eq),
+    ast.NotEq: ("!=", Binds.EQUAL, operator.ne),
 }
 _RESERVED = frozenset(
     """auto break case char const continue default do double else enum extern float for goto if inline
@@ -54,323 +41,315 @@ _RESERVED = frozenset(
     exp expf sqrt sqrtf fabs fabsf expm1 sign larger smaller larger_number smaller_number exp_minus_one
     gamma y0 y1 yn j0 j1 jn index signal""".split()  # noqa: SIM905
 )
+_BUILTIN = {made.__name__: made for made in (abs, min, max, int, float, bool, len, isinstance)}
+
+# Function to its name in C, and to what gives its value here: the C library's, which compiled code calls.
+_MATHEMATICS: dict[Any, tuple[str, Callable[..., float]]] = {
+    abs: ("fabs", abs), np.abs: ("fabs", abs), math.fabs: ("fabs", abs),
+    np.exp: ("exp", math.exp), math.exp: ("exp", math.exp),
+    np.sqrt: ("sqrt", math.sqrt), math.sqrt: ("sqrt", math.sqrt),
+    np.expm1: ("exp_minus_one", math.expm1), math.expm1: ("exp_minus_one", math.expm1),
+    np.sign: ("sign", np.sign), max: ("larger", max), min: ("smaller", min),
+    np.fmax: ("larger_number", np.fmax), np.fmin: ("smaller_number", np.fmin),
+}  # fmt: skip
+_LIBRARY = ("fabs", "exp", "sqrt")
 
 
-_BUILTIN = {function.__name__: function for function in (abs, min, max, int, float, bool, isinstance)}
-
-
-class Expressions:
+class Expressions(ast.NodeVisitor):
     """What a function's names stand for, and expressions of them."""
 
-    def __init__(self, translator: Translator, source: Source) -> None:
-        self.translator, self.source = translator, source
+    def __init__(self, file: File, source: Source) -> None:
+        self.file, self.source = file, source
         self.names: dict[str, Value] = {}
-        self.locals: dict[str, Any] = {}
-        self.out: list[printer.Statement] = []
+        self.locals: dict[str, str] = {}
+        self.out: list[Statement] = []
+        self.single = file.single
+        self.wanted: list[str] = []  # locals that the results of the call at hand go to
+        self._held = 0
 
     def safe(self, name: str) -> str:
         """The name in C."""
         name = name.lstrip("_") or "unused"
         return f"{name}_" if name in _RESERVED else name
 
-    # ------------------------------------------------------------ kinds
+    def visit(self, node: ast.AST) -> Any:
+        """Translate an expression or a statement.
 
-    def real(self, value: Value, node: ast.AST) -> Expr:
-        """As a real number."""
-        if isinstance(value, Known) and isinstance(value.value, bool | int | float):
-            return self.translator.runtime(Known(float(value.value)))
-        if not isinstance(value, Expr):
-            raise self.source.error(node, "a number is needed here")
-        if value.kind == "real":
-            return value
-        text = f"({self.translator.real}){wrap(value, UNARY)}"
-        return Expr(text, "real", UNARY, value.uses, value.reads, value.impure)
+        Raises
+        ------
+        TranslationError
+            If there is no C for it.
+        """
+        try:
+            return super().visit(node)
+        except Refused as problem:
+            raise self.source.error(node, str(problem)) from None
 
-    def whole(self, value: Value, node: ast.AST) -> Expr:
-        """As an int."""
-        if isinstance(value, Known) and float(value.value).is_integer():
-            return self.translator.runtime(Known(int(value.value), value.text))
-        if not isinstance(value, Expr) or value.kind == "real":
-            raise self.source.error(node, "a whole number is needed here: wrap it in int(...)")
-        return value
-
-    def number(self, node: ast.expr, kind: str) -> Expr:
-        """Expression as a number of a kind."""
-        value = self.value(node)
-        return self.whole(value, node) if kind == "int" else self.real(value, node)
-
-    def truth(self, value: Value, node: ast.AST) -> Known | Expr:
-        """As a condition."""
-        if isinstance(value, Known):
-            return Known(bool(value.value))
-        if not isinstance(value, Expr) or value.kind == "real":
-            raise self.source.error(node, "a condition must be a comparison")
-        return value
-
-    # ------------------------------------------------------------ dispatch
+    def generic_visit(self, node: ast.AST) -> None:
+        """Refuse what is not in the subset."""
+        raise Refused(f"{type(node).__name__} cannot be translated to C")
 
     def value(self, node: ast.expr) -> Value:
         """Translate an expression."""
-        if isinstance(node, ast.Constant):
-            return Known(node.value)
-        if isinstance(node, ast.Name):
-            return self.name(node)
-        if isinstance(node, ast.Attribute):
-            return self.attribute(node)
-        if isinstance(node, ast.Tuple):
-            return Items(tuple(self.value(item) for item in node.elts))
-        if isinstance(node, ast.Subscript):
-            return self.subscript(node)
-        if isinstance(node, ast.BinOp):
-            return self.binary(node)
-        if isinstance(node, ast.UnaryOp):
-            return self.unary(node)
-        if isinstance(node, ast.Compare):
-            return self.compare(node)
-        if isinstance(node, ast.BoolOp):
-            return self.boolean(node)
-        if isinstance(node, ast.IfExp):
-            return self.either(node)
-        if isinstance(node, ast.Call):
-            return self.call(node)
-        raise self.source.error(node, f"{type(node).__name__} cannot be translated to C")
+        found: Value = self.visit(node)
+        return found
 
-    def name(self, node: ast.Name) -> Value:
+    def number(self, value: Value, kind: str = "") -> Number:
+        """A value as a number that C computes."""
+        return number(value, self.single, kind)
+
+    # ------------------------------------------------------------ names, fields, entries
+
+    def visit_Constant(self, node: ast.Constant) -> Value:
+        """A number, or None."""
+        return Known(node.value)
+
+    def visit_Name(self, node: ast.Name) -> Value:
         """A local, a parameter, or something of the module."""
         if node.id in self.names:
             return self.names[node.id]
-        names = self.source.function.__globals__
-        if node.id in names:
-            return self.outside(names[node.id], node.id, self.source.function.__module__)
+        outside = self.source.function.__globals__
+        if node.id in outside:
+            return self.outside(Known(outside[node.id]), node.id, self.source.function.__module__)
         if node.id in _BUILTIN:
             return Known(_BUILTIN[node.id])
-        raise self.source.error(node, f"{node.id} is not known here")
+        raise Refused(f"{node.id} is not known here")
 
-    def outside(self, value: Any, name: str, module: str) -> Known:
-        """A constant of a module; whole numbers in capitals are positions and keep their names."""
-        if isinstance(value, int) and not isinstance(value, bool) and name.isupper():
-            parts = module.split(".")
-            owner = parts[-2] if parts[-1] == "base" else parts[-1]
-            text = f"{owner.lstrip('_')}_{name.lstrip('_')}".upper()
-            self.translator.positions[text] = value
-            return Known(value, text)
-        return Known(self.translator.coarser.get((module, name), value))
+    def outside(self, value: Value, name: str, module: str) -> Value:
+        """Something of a module; for float some constants are others, and tuples of numbers are tables."""
+        if not value.is_known:
+            return value
+        content = value.value
+        if type(content) is tuple and content and all(type(each) is float for each in content):
+            table = f"{self.source.owner}_{name.lower().lstrip('_')}"
+            return Array(table, (len(content),), Root(""), np.array(content))
+        return Known(self.file.coarser.get((module, name), content))
 
-    def attribute(self, node: ast.Attribute) -> Value:
-        """An attribute of a module, or the size of an array."""
+    def visit_Attribute(self, node: ast.Attribute) -> Value:
+        """A field of a record, or something of a module."""
         owner = self.value(node.value)
-        if isinstance(owner, Array) and node.attr in ("size", "shape"):
-            if owner.size is None:
-                raise self.source.error(node, "the size of this array is not known")
-            return Known(owner.size) if node.attr == "size" else Known((owner.size,))
-        if isinstance(owner, Known) and inspect.ismodule(owner.value) and hasattr(owner.value, node.attr):
-            return self.outside(getattr(owner.value, node.attr), node.attr, owner.value.__name__)
-        raise self.source.error(node, f"attribute {node.attr} cannot be translated to C")
+        module = getattr(getattr(owner, "value", None), "__name__", "")
+        return self.outside(owner.field(node.attr), node.attr, module)
 
-    # ------------------------------------------------------------ arrays
-
-    def subscript(self, node: ast.Subscript) -> Value:
-        """An entry or a part."""
+    def visit_Subscript(self, node: ast.Subscript) -> Value:
+        """An entry."""
         owner = self.value(node.value)
-        if isinstance(owner, Known) and isinstance(owner.value, tuple):
-            position = self.value(node.slice)
-            if isinstance(position, Known):
-                return Known(owner.value[position.value])
-            owner = self.translator.table(self.table_name(node), owner.value)
-            return self._entry(owner, position, node)
-        if isinstance(owner, Items):
-            position = self.value(node.slice)
-            if isinstance(position, Known):
-                return owner.items[position.value]
-        if not isinstance(owner, Array):
-            raise self.source.error(node, "only arrays and tuples have entries")
-        if isinstance(node.slice, ast.Slice):
-            return self.part(owner, node.slice)
-        return self._entry(owner, self.value(node.slice), node)
+        nodes = node.slice.elts if type(node.slice) is ast.Tuple else [node.slice]
+        if any(type(place) is ast.Slice for place in nodes):
+            raise Refused("a slice cannot be translated to C: hand over the array, and where to begin")
+        places = tuple(self.value(place) for place in nodes)
+        if type(owner) is Items:
+            return owner.entry(places, "")
+        found = owner.entry(places, "".join(f"[{self.number(place, 'int').text}]" for place in places))
+        if type(owner) is Array and owner.values is not None and not found.is_known:
+            self.file.tables[owner.text] = owner.values
+        return found
 
-    def table_name(self, node: ast.Subscript) -> str:
-        """Name of the table that a tuple of constants becomes."""
-        if not isinstance(node.value, ast.Name | ast.Attribute):
-            raise self.source.error(node, "a tuple that is read by position needs a name")
-        name = node.value.id if isinstance(node.value, ast.Name) else node.value.attr
-        return name.lower().lstrip("_")
+    def visit_Tuple(self, node: ast.Tuple) -> Value:
+        """Several values."""
+        return Items(tuple(self.arguments(node.elts)))
 
-    def part(self, owner: Array, node: ast.Slice) -> Array:
-        """A slice: pointer arithmetic."""
-        if node.step is not None:
-            raise self.source.error(node, "a slice with a step cannot be translated to C")
-        lower = Known(0) if node.lower is None else self.value(node.lower)
-        upper = None if node.upper is None else self.value(node.upper)
-        size = None
-        if isinstance(lower, Known):
-            if upper is None:
-                size = None if owner.size is None else owner.size - lower.value
-            elif isinstance(upper, Known):
-                size = upper.value - lower.value
-        offset = self.plus(owner.offset, lower, node)
-        return Array(owner.base, owner.root, offset, size, owner.known, owner.table)
+    def arguments(self, nodes: list[ast.expr]) -> list[Value]:
+        """Values of several expressions, from left to right: C leaves open which comes first.
 
-    def plus(self, left: Known | Expr, right: Value, node: ast.AST) -> Known | Expr:
-        """Sum of two positions."""
-        if isinstance(left, Known) and left.value == 0 and isinstance(right, Known | Expr):
-            return right
-        result = self.operate(ast.Add(), left, right, node)
-        assert isinstance(result, Known | Expr)
-        return result
+        What is read before a call that writes is held, and so is such a call's result before more is read.
+        """
+        values: list[Any] = []
+        for node in nodes:
+            before = len(self.out)
+            value: Any = self.value(node.value if type(node) is ast.Starred else node)
+            writes = len(self.out) > before or getattr(value, "impure", False)
+            reads = getattr(value, "reads", False)
+            for i, earlier in enumerate(values):
+                if type(earlier) is Number and (
+                    (writes and earlier.reads) or ((writes or reads) and earlier.impure)
+                ):
+                    values[i] = self.hold(earlier, before)
+                    before += 1
+            spread = range(value.length()) if type(node) is ast.Starred else None
+            values += [value] if spread is None else [value.entry((Known(i),), "") for i in spread]
+        return values
 
-    def entry(self, node: ast.Subscript, write: bool = False) -> Expr:
-        """An entry as text, for writing into it."""
-        owner = self.value(node.value)
-        if not isinstance(owner, Array):
-            raise self.source.error(node, "only an array's entries can be assigned to")
-        if owner.root.constant:
-            raise self.source.error(node, f"{owner.base} is constant in C: its entries cannot be assigned to")
-        if write:
-            owner.root.write()
-        return self._text(owner, self.value(node.slice), node)
-
-    def _entry(self, owner: Array, position: Value, node: ast.AST) -> Known | Expr:
-        if isinstance(position, Known):
-            number = owner.entry(position.value)
-            if number is not None:
-                return Known(number)
-        return self._text(owner, position, node)
-
-    def _text(self, owner: Array, position: Value, node: ast.AST) -> Expr:
-        place = self.whole(self.plus(owner.offset, position, node), node)
-        if owner.table:
-            self.translator.tables[owner.base] = tuple(value for _, value in sorted(owner.known))
-        uses = place.uses | (frozenset() if owner.table else frozenset({owner.base}))
-        return Expr(f"{owner.base}[{place.text}]", "real", uses=uses, reads=not owner.table)
+    def hold(self, value: Number, place: int | None = None) -> Number:
+        """Put a value into a local of its own, by a statement at a place in the block."""
+        self._held += 1
+        name = f"held_{self._held}"
+        self.locals[name] = value.kind
+        line = Statement(f"{name} = {value.text};", value.uses, name, not value.impure)
+        self.out.insert(len(self.out) if place is None else place, line)
+        return Number(name, value.kind, uses=frozenset({name}))
 
     # ------------------------------------------------------------ operators
 
-    def binary(self, node: ast.BinOp) -> Known | Expr:
+    def visit_BinOp(self, node: ast.BinOp) -> Value:
         """Arithmetic."""
-        return self.operate(node.op, self.value(node.left), self.value(node.right), node)
+        return self.operate(node.op, *self.arguments([node.left, node.right]))
 
-    def operate(self, op: ast.operator, left: Value, right: Value, node: ast.AST) -> Known | Expr:
+    def operate(self, op: ast.operator, left: Value, right: Value) -> Value:
         """Arithmetic on two values."""
-        if type(op) not in _BINARY or not all(isinstance(side, Known | Expr) for side in (left, right)):
-            raise self.source.error(node, f"{type(op).__name__} cannot be translated to C")
-        sign, strength, compute = _BINARY[type(op)]
-        if isinstance(left, Known) and isinstance(right, Known):
-            text = None
-            if left.text or right.text:
-                texts = [side.text or str(side.value) for side in (left, right)]
-                text = f"{texts[0]} {sign} {texts[1]}" if sign in "+-" and " " not in texts[1] else None
-                text = text or (f"{texts[0]} + {texts[1]}" if sign == "+" else None)
-            return Known(compute(left.value, right.value), text)
+        if type(op) not in _ARITHMETIC:
+            raise Refused(f"{type(op).__name__} cannot be translated to C")
+        sign, strength, compute = _ARITHMETIC[type(op)]
+        if left.is_number and left.is_known and right.is_number and right.is_known:
+            return Known(compute(left.value, right.value))
         if sign == "**":
-            if (
-                isinstance(right, Known)
-                and right.value == 2
-                and isinstance(left, Expr)
-                and left.text.isidentifier()
-            ):
-                return self.operate(ast.Mult(), left, left, node)
-            raise self.source.error(node, "a power: write x * x")
-        whole = all(
-            (isinstance(side, Known) and isinstance(side.value, int))
-            or (isinstance(side, Expr) and side.kind != "real")
-            for side in (left, right)
-        ) and not isinstance(op, ast.Div)
-        if sign in ("%", "//") and (not whole or sign == "//"):
-            raise self.source.error(node, f"{sign} on numbers that are not whole cannot be translated to C")
-        if sign == "%" and isinstance(right, Known) and right.value == 1:
-            return Known(0)
-        a, b = (self.whole(s, node) if whole else self.real(s, node) for s in (left, right))
-        self.check_order(node, a, b)
-        text = f"{wrap(a, strength)} {sign} {wrap(b, strength + 1 if sign != '+' or not whole else strength)}"
-        return joined(text, "int" if whole else "real", strength, a, b)
+            raise Refused("a power: write x * x")
+        kind, a, b = self.alike(left, right, "real" if sign == "/" else "int")
+        if sign == "//" or (sign == "%" and kind == "real"):
+            raise Refused(f"{sign} on numbers that are not whole cannot be translated to C")
+        text = f"{a.within(strength)} {sign} {b.within(strength + 1)}"
+        return Number.joined(text, kind, strength, a, b)
 
-    def check_order(self, node: ast.AST, *parts: Expr) -> None:
-        """C leaves open which operand comes first: refuse where that could matter."""
-        for i, part in enumerate(parts):
-            others = [other for j, other in enumerate(parts) if j != i]
-            if part.impure and any(other.reads or other.impure for other in others):
-                raise self.source.error(
-                    node,
-                    "a call that writes into an array stands beside a read: put its result into a name first",
-                )
+    def alike(self, left: Value, right: Value, kind: str = "int") -> tuple[str, Number, Number]:
+        """Two values as numbers of one kind: whole, if both are and `kind` is, or else real."""
+        kind = kind if left.is_whole and right.is_whole else "real"
+        return kind, self.number(left, kind), self.number(right, kind)
 
-    def unary(self, node: ast.UnaryOp) -> Known | Expr:
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> Value:
         """Sign and not."""
         value = self.value(node.operand)
-        if isinstance(node.op, ast.Not):
-            test = self.truth(value, node)
-            if isinstance(test, Known):
+        if type(node.op) is ast.Not:
+            test = value.truth()
+            if test.is_known:
                 return Known(not test.value)
-            return joined(f"!{wrap(test, UNARY)}", "bool", UNARY, test)
-        if isinstance(node.op, ast.USub) and isinstance(value, Known):
+            return negated(self.number(test))
+        if type(node.op) is not ast.USub or not value.is_number:
+            raise Refused(f"{type(node.op).__name__} cannot be translated to C")
+        if value.is_known:
             return Known(-value.value)
-        if isinstance(node.op, ast.USub) and isinstance(value, Expr) and value.kind != "bool":
-            return joined(f"-{wrap(value, UNARY + 1)}", value.kind, UNARY, value)
-        raise self.source.error(node, f"{type(node.op).__name__} cannot be translated to C")
-
-    def is_none(self, node: ast.Compare) -> bool:
-        """Whether what is compared with None is None: known when the code is generated."""
-        other = node.comparators[0]
-        if not (isinstance(other, ast.Constant) and other.value is None and isinstance(node.left, ast.Name)):
-            raise self.source.error(node, "`is` asks for None, of a name")
-        value = self.name(node.left)
-        return isinstance(value, Known) and value.value is None
-
-    def compare(self, node: ast.Compare) -> Known | Expr:
-        """One comparison."""
-        if len(node.ops) == 1 and isinstance(node.ops[0], ast.Is | ast.IsNot):
-            return Known(self.is_none(node) == isinstance(node.ops[0], ast.Is))
-        if len(node.ops) != 1 or type(node.ops[0]) not in _COMPARE:
-            raise self.source.error(node, "write one comparison at a time")
-        sign, strength, compute = _COMPARE[type(node.ops[0])]
-        left, right = self.value(node.left), self.value(node.comparators[0])
-        if isinstance(left, Known) and isinstance(right, Known):
-            return Known(bool(compute(left.value, right.value)))
-        whole = not any(isinstance(s, Expr) and s.kind == "real" for s in (left, right)) and not any(
-            isinstance(s, Known) and isinstance(s.value, float) for s in (left, right)
+        number = self.number(value)
+        return Number.joined(
+            f"-{number.within(Binds.PRIMARY)}", "int" if number.is_whole else "real", Binds.UNARY, number
         )
-        a, b = (self.whole(s, node) if whole else self.real(s, node) for s in (left, right))
-        self.check_order(node, a, b)
-        return joined(f"{wrap(a, SUM)} {sign} {wrap(b, SUM)}", "bool", strength, a, b)
 
-    def boolean(self, node: ast.BoolOp) -> Known | Expr:
-        """And, or; what is known drops out."""
-        stops = isinstance(node.op, ast.Or)
-        sign, strength = ("||", OR) if stops else ("&&", AND)
-        parts: list[Expr] = []
+    def visit_Compare(self, node: ast.Compare) -> Value:
+        """One comparison; several in a row are refused."""
+        if len(node.ops) != 1:
+            raise Refused("compare two values, and join comparisons by `and`")
+        (left, right), op = self.arguments([node.left, node.comparators[0]]), node.ops[0]
+        if type(op) in (ast.Is, ast.IsNot):
+            if not right.is_known or right.value is not None:
+                raise Refused("`is` compares with None only")
+            absent = left.is_known and left.value is None
+            return Known(absent == (type(op) is ast.Is))
+        if type(op) not in _COMPARISONS:
+            raise Refused(f"{type(op).__name__} cannot be translated to C")
+        sign, strength, compute = _COMPARISONS[type(op)]
+        if left.is_known and right.is_known:
+            return Known(bool(compute(left.value, right.value)))
+        _, a, b = self.alike(left, right)
+        return Number.joined(f"{a.within(Binds.SUM)} {sign} {b.within(Binds.SUM)}", "bool", strength, a, b)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> Value:
+        """And, or; what is known drops out, and what stands behind it is not looked at."""
+        stops = type(node.op) is ast.Or
+        sign, strength = ("||", Binds.OR) if stops else ("&&", Binds.AND)
+        parts: list[Number] = []
         for item in node.values:
-            test = self.truth(self.value(item), node)
-            if isinstance(test, Known):
-                if test.value == stops:
-                    # Later parts are not looked at.
-                    if not parts:
-                        return Known(stops)
-                    parts.append(Expr(str(int(stops)), "bool"))
-                    break
+            before = len(self.out)
+            test = self.value(item).truth()
+            if parts and len(self.out) > before:
+                raise Refused("a call behind `and` or `or` that needs statements: put it into a name first")
+            if test.is_known and test.value != stops:
                 continue
-            parts.append(test)
+            if test.is_known and not parts:
+                return test
+            parts.append(self.number(test))
+            if test.is_known:
+                break
         if not parts:
             return Known(not stops)
         if len(parts) == 1:
             return parts[0]
-        return joined(f" {sign} ".join(wrap(part, EQUAL) for part in parts), "bool", strength, *parts)
+        return Number.joined(
+            f" {sign} ".join(part.within(Binds.EQUAL) for part in parts), "bool", strength, *parts
+        )
 
-    def either(self, node: ast.IfExp) -> Value:
+    def visit_IfExp(self, node: ast.IfExp) -> Value:
         """A if test else B."""
-        test = self.truth(self.value(node.test), node)
-        if isinstance(test, Known):
+        test = self.value(node.test).truth()
+        if test.is_known:
             return self.value(node.body if test.value else node.orelse)
-        a, b = self.number(node.body, "real"), self.number(node.orelse, "real")
-        text = f"{wrap(test, OR)} ? {wrap(a, OR)} : {wrap(b, OR)}"
-        return joined(text, "real", TERNARY, test, a, b)
+        before = len(self.out)
+        left, right = self.value(node.body), self.value(node.orelse)
+        if len(self.out) > before:
+            raise Refused("a call within `if` and `else` of an expression: put it into a name first")
+        kind, a, b = self.alike(left, right)
+        number = self.number(test)
+        text = f"{number.within(Binds.OR)} ? {a.within(Binds.OR)} : {b.within(Binds.OR)}"
+        return Number.joined(text, kind, Binds.TERNARY, number, a, b)
 
-    def call(self, node: ast.Call) -> Value:
+    # ------------------------------------------------------------ calls
+
+    def visit_Call(self, node: ast.Call) -> Value:
         """A call within an expression."""
+        called = self.called(node)
+        wanted, self.wanted = self.wanted, []
+        arguments = self.arguments(node.args)
+        if called in _MATHEMATICS:
+            return self.mathematics(called, arguments)
+        special = _SPECIAL.get(called)
+        if special is not None:
+            return special(self, *arguments)
+        if not inspect.isfunction(called):
+            raise Refused(f"{called!r} cannot be called in C")
+        return self.invoke(called, arguments, wanted)
+
+    def called(self, node: ast.Call) -> Any:
+        """The function that is called."""
+        value = self.value(node.func)
+        if not value.is_known or node.keywords:
+            raise Refused("call a function by its name, with positional arguments")
+        return value.value
+
+    def mathematics(self, called: Any, arguments: list[Value]) -> Value:
+        """A function of math.h, or a helper beside it."""
+        name, compute = _MATHEMATICS[called]
+        if len(arguments) > 2:
+            raise Refused("min and max take two numbers")
+        if all(argument.is_known for argument in arguments):
+            return Known(float(compute(*(a.value for a in arguments))))
+        numbers = [self.number(argument, "real") for argument in arguments]
+        if name in _LIBRARY:
+            name = f"{name}f" if self.single else name
+        else:
+            self.file.helpers.add(name)
+        return Number.joined(
+            f"{name}({', '.join(number.text for number in numbers)})", "real", Binds.PRIMARY, *numbers
+        )
+
+    def converted(self, value: Value) -> Value:
+        """``int(value)``."""
+        if value.is_known:
+            return Known(int(value.value))
+        if value.is_whole:
+            return value
+        number = self.number(value, "real")
+        return Number.joined(f"(int){number.within(Binds.UNARY)}", "int", Binds.UNARY, number)
+
+    def invoke(self, called: Any, arguments: list[Value], wanted: list[str]) -> Value:
+        """A call of a translated function, whose results are wanted in locals of these names."""
         raise NotImplementedError
 
 
-def joined(text: str, kind: str, strength: int, *parts: Expr) -> Expr:
-    """An expression made of others."""
-    uses = frozenset().union(*(part.uses for part in parts))
-    reads, impure = any(part.reads for part in parts), any(part.impure for part in parts)
-    return Expr(text, kind, strength, uses, reads, impure)
+_SPECIAL: dict[Any, Callable[..., Value]] = {
+    len: lambda body, value: Known(value.length()),
+    isinstance: lambda body, value, kind: Known(value.is_number),  # what is calculated with is a number
+    bool: lambda body, value: value.truth(),
+    int: Expressions.converted,
+    float: lambda body, value: Known(float(value.value)) if value.is_known else body.number(value, "real"),
+    like: lambda body, value: Room(value.shape),
+    local: lambda body, size: Room((size.value,)),
+    local_rows: lambda body, rows, columns: Room((rows.value, columns.value)),
+}
+
+
+def negated(number: Number) -> Number:
+    """Not that."""
+    return Number.joined(f"!{number.within(Binds.UNARY)}", "bool", Binds.UNARY, number)
+
+
+def as_load(target: Any) -> ast.expr:
+    """The same name, field or entry, read."""
+    node: Any = type(target)(**{**dict(ast.iter_fields(target)), "ctx": ast.Load()})
+    return ast.copy_location(node, target)

@@ -7,16 +7,14 @@ import sys
 import tempfile
 import uuid
 import zipfile
-from importlib import resources
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import escape, quoteattr
 
 from piezoest._checks import positive
 from piezoest._files import replacing
 from piezoest._version import __version__
 from piezoest.compensators import Compensator
-from piezoest.export.c_code import CCode, Precision, c
+from piezoest.export.c_code import CCode, Precision, c, filled
 from piezoest.export.compiled import build_shared
 from piezoest.models import LinearGain
 
@@ -74,14 +72,10 @@ def fmu(
         raise ValueError(f"path must end in .fmu, got {path}")
     rate = _sample_rate(estimator, compensator, sample_rate)
     code = c(estimator, compensator, name=name, precision=precision, update_interval=update_interval)
-    linear = isinstance(compensator.model, LinearGain)
     guid = str(uuid.uuid5(_NAMESPACE, f"{code.source}{code.header}{rate!r}"))
-    template = resources.files("piezoest.export").joinpath("templates/fmi2.c").read_text(encoding="utf-8")
-    wrapper = template
-    for token, text in {"name": name, "real": precision, "guid": guid, "sample_rate": repr(rate)}.items():
-        wrapper = wrapper.replace(f"@{token}@", text)
+    wrapper = filled("fmi2.c", name=name, real=precision, guid=guid, sample_rate=repr(rate))
     files = {
-        "modelDescription.xml": _description(code, guid, rate, compensator, linear).encode(),
+        "modelDescription.xml": _description(code, guid, rate, compensator).encode(),
         f"sources/{name}.h": code.header.encode(),
         f"sources/{name}.c": code.source.encode(),
         "sources/fmi2.c": wrapper.encode(),
@@ -115,15 +109,14 @@ def _sample_rate(estimator: Any, compensator: Compensator, given: float | None) 
 def _platform() -> tuple[str, str]:
     """Folder and suffix of this computer's binaries."""
     bits = "64" if sys.maxsize > 2**32 else "32"
-    system = {"Windows": ("win", ".dll"), "Darwin": ("darwin", ".dylib")}.get(
-        platform.system(), ("linux", ".so")
-    )
-    return f"{system[0]}{bits}", system[1]
+    known = {"Windows": ("win", ".dll"), "Darwin": ("darwin", ".dylib")}
+    system, suffix = known.get(platform.system(), ("linux", ".so"))
+    return f"{system}{bits}", suffix
 
 
-def _description(code: CCode, guid: str, rate: float, compensator: Compensator, linear: bool) -> str:
+def _description(code: CCode, guid: str, rate: float, compensator: Compensator) -> str:
     """Text of modelDescription.xml."""
-    limits = compensator.limits
+    limits, linear = compensator.limits, isinstance(compensator.model, LinearGain)
     names = ("gain", "unused_1", "unused_2", "offset") if linear else ("alpha", "beta", "gamma", "offset")
     units = ("um/V", "", "", "um") if linear else ("1/V", "um/V", "um/V2", "um")
     reals = [
@@ -132,30 +125,22 @@ def _description(code: CCode, guid: str, rate: float, compensator: Compensator, 
         ("u", "output", "continuous", "Voltage", "V", None),
         ("minimum", "parameter", "tunable", "Least voltage", "V", _bound(limits.minimum)),
         ("maximum", "parameter", "tunable", "Largest voltage", "V", _bound(limits.maximum)),
-        *(
-            (f"model_{name}", "output", "discrete", f"Model in use: {name}", unit, None)
-            for name, unit in zip(names, units, strict=True)
-        ),
     ]
-    variables = []
+    for name, unit in zip(names, units, strict=True):
+        reals.append((f"model_{name}", "output", "discrete", f"Model in use: {name}", unit, None))
+    variables = ""
     for reference, (name, causality, variability, text, unit, start) in enumerate(reals):
         initial = ' initial="calculated"' if causality == "output" else ""
-        started = "" if start is None else f" start={quoteattr(start)}"
-        of_unit = f" unit={quoteattr(unit)}" if unit else ""
-        variables.append(
+        started = "" if start is None else f' start="{start}"'
+        of_unit = f' unit="{unit}"' if unit else ""
+        variables += (
             f'    <ScalarVariable name="{name}" valueReference="{reference}" causality="{causality}" '
-            f'variability="{variability}"{initial} description={quoteattr(text)}>'
-            f"<Real{of_unit}{started}/></ScalarVariable>"
+            f'variability="{variability}"{initial} description="{text}">'
+            f"<Real{of_unit}{started}/></ScalarVariable>\n"
         )
-    variables.append(
-        '    <ScalarVariable name="frozen" valueReference="0" causality="parameter" variability="tunable" '
-        'description="Hold the model"><Boolean start="false"/></ScalarVariable>'
-    )
     outputs = [i for i, row in enumerate(reals, 1) if row[1] == "output"]
     unknowns = "".join(f'\n      <Unknown index="{i}"/>' for i in outputs)
-    unit_names = sorted({unit for *_, unit, _ in reals if unit})
-    unit_list = "".join(f'\n    <Unit name="{escape(unit)}"/>' for unit in unit_names)
-    listed = "\n".join(variables)
+    unit_list = "".join(f'\n    <Unit name="{unit}"/>' for unit in sorted({*units, "um", "V"} - {""}))
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="{code.name}" guid="{guid}"
     description="Learns the hysteresis of a piezo stage and cancels it"
@@ -172,7 +157,8 @@ def _description(code: CCode, guid: str, rate: float, compensator: Compensator, 
   </UnitDefinitions>
   <DefaultExperiment startTime="0.0" stepSize="{1.0 / rate!r}"/>
   <ModelVariables>
-{listed}
+{variables}    <ScalarVariable name="frozen" valueReference="0" causality="parameter" variability="tunable" \
+description="Hold the model"><Boolean start="false"/></ScalarVariable>
   </ModelVariables>
   <ModelStructure>
     <Outputs>{unknowns}

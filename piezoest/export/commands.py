@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from piezoest._errors import errors
-from piezoest._files import read_json
+from piezoest._errors import Group
+from piezoest._files import read_object
+from piezoest._options import grouped
 
 if TYPE_CHECKING:
     from piezoest.models import Model
 
 app = typer.Typer(
+    cls=Group,
     no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -28,16 +31,32 @@ Source = Annotated[
         "model and estimator, with limits.",
     ),
 ]
-Learns = Annotated[
-    str | None, typer.Option("--estimator", help="rls or ekf learns from the model on; none keeps it.")
-]
-Rate = Annotated[float | None, typer.Option(help="Samples per second of the controller.")]
-Minimum = Annotated[float | None, typer.Option(help="Least voltage [V].")]
-Maximum = Annotated[float | None, typer.Option(help="Largest voltage [V].")]
-Slew = Annotated[float | None, typer.Option(help="Largest change of voltage [V/s].")]
-Name = Annotated[str, typer.Option(help="Prefix of all names, and name of the files.")]
-Precision = Annotated[str, typer.Option(help="double or float.")]
-Interval = Annotated[int, typer.Option(min=1, help="Samples between two changes of the model.")]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stated:
+    """What stands beside the file, or replaces what is in it."""
+
+    estimator: Annotated[
+        str | None, typer.Option(help="rls or ekf learns from the model on; none keeps it.")
+    ] = None
+    sample_rate: Annotated[float | None, typer.Option(help="Samples per second of the controller.")] = None
+    minimum: Annotated[float | None, typer.Option(help="Least voltage [V].")] = None
+    maximum: Annotated[float | None, typer.Option(help="Largest voltage [V].")] = None
+    slew_rate: Annotated[float | None, typer.Option(help="Largest change of voltage [V/s].")] = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Code:
+    """What the code is to be like."""
+
+    name: Annotated[str, typer.Option(help="Prefix of all names, and name of the files.")] = (
+        "piezoest_controller"
+    )
+    precision: Annotated[str, typer.Option(help="double or float.")] = "double"
+    update_interval: Annotated[int, typer.Option(min=1, help="Samples between two changes of the model.")] = (
+        50
+    )
 
 
 @app.callback()
@@ -49,54 +68,35 @@ def _export() -> None:
     epilog="Examples: piezoest export c model.json -o firmware --minimum 0 --maximum 150; "
     "piezoest export c model.json -o firmware --estimator rls --sample-rate 50000 --precision float"
 )
+@grouped
 def c(
     source: Source,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for header and source.")],
-    estimator: Learns = None,
-    sample_rate: Rate = None,
-    minimum: Minimum = None,
-    maximum: Maximum = None,
-    slew_rate: Slew = None,
-    name: Name = "piezoest_controller",
-    precision: Precision = "double",
-    update_interval: Interval = 50,
+    stated: Stated,
+    code: Code,
 ) -> None:
     """Write a controller in C99: one header, one source, no allocation."""
-    with errors():
-        from piezoest.export.c_code import c as generate
+    from piezoest.export.c_code import c as generate
 
-        pair = _pair(source, estimator, sample_rate, minimum, maximum, slew_rate)
-        kind: Any = precision
-        code = generate(*pair, name=name, precision=kind, update_interval=update_interval)
-        for path in code.write(output):
-            typer.echo(path)
+    for path in generate(*_pair(source, stated), **asdict(code)).write(output):
+        typer.echo(path)
 
 
 @app.command(
     epilog="Example: piezoest export fmu model.json -o stage.fmu --estimator rls --sample-rate 50000"
 )
+@grouped
 def fmu(
     source: Source,
     output: Annotated[Path, typer.Option("--output", "-o", help="File to write, ending in .fmu.")],
-    estimator: Learns = None,
-    sample_rate: Rate = None,
-    minimum: Minimum = None,
-    maximum: Maximum = None,
-    slew_rate: Slew = None,
-    name: Name = "piezoest_controller",
-    precision: Precision = "double",
-    update_interval: Interval = 50,
+    stated: Stated,
+    code: Code,
 ) -> None:
     """Write a co-simulation unit (FMI 2.0), with sources and the binary for this computer."""
-    with errors():
-        from piezoest.export.co_simulation import fmu as generate
+    from piezoest.export.co_simulation import fmu as generate
 
-        pair = _pair(source, estimator, sample_rate, minimum, maximum, slew_rate)
-        kind: Any = precision
-        path = generate(
-            *pair, output, name=name, precision=kind, update_interval=update_interval, sample_rate=sample_rate
-        )
-        typer.echo(path)
+    pair = _pair(source, stated)
+    typer.echo(generate(*pair, output, **asdict(code), sample_rate=stated.sample_rate))
 
 
 @app.command(epilog="Example: piezoest export table model.json period.csv -o tables")
@@ -111,65 +111,45 @@ def table(
     sample_rate: Annotated[float | None, typer.Option(help="Hz, if there is no column of time.")] = None,
 ) -> None:
     """Write the settled voltage of a periodic reference and the branches of its loop as CSV."""
-    with errors():
-        from piezoest.export.tables import table as generate
-        from piezoest.records import read_reference
+    from piezoest.export.tables import table as generate
+    from piezoest.records import read_reference
 
-        model, _, _ = _read(source)
-        signal = read_reference(reference, column=column, sample_rate=sample_rate)
-        for path in generate(model, signal, points=points).write(output):
-            typer.echo(path)
+    model, _, _ = _read(source)
+    signal = read_reference(reference, column=column, sample_rate=sample_rate)
+    for path in generate(model, signal, points=points).write(output):
+        typer.echo(path)
 
 
 def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
     """Model, estimator or None, and limits of a JSON file."""
+    from piezoest._checks import class_named
     from piezoest.estimators.ekf import HysteresisEKF
     from piezoest.estimators.rls import HysteresisRLS
     from piezoest.models import model_from_dict
 
-    data = read_json(path)
-    if not isinstance(data, dict):
-        raise ValueError(f"{path} holds no model: write it with identify --output")
-    learnt = data if isinstance(data.get("estimator"), str) else data.get("estimator")
-    estimator = None
-    if isinstance(learnt, dict):
-        kinds: dict[str, Any] = {"HysteresisRLS": HysteresisRLS, "HysteresisEKF": HysteresisEKF}
-        kind = kinds.get(str(learnt.get("estimator")))
-        if kind is None:
-            raise ValueError(
-                f"{path}: estimator must be one of {sorted(kinds)}, got {learnt.get('estimator')!r}"
-            )
-        # Where the file is the estimator's own, model and limits may stand beside it.
-        beside = ("model", "limits") if learnt is data else ()
-        own = {key: value for key, value in learnt.items() if key not in beside}
-        try:
-            estimator = kind.from_dict(own)
-        except ValueError as error:
-            raise ValueError(f"{path}: its estimator is not what to_dict() gave: {error}") from None
-    limits = data.get("limits") or {}
+    data = read_object(path, "model: write it with identify --output")
+    limits = data.pop("limits", None) or {}
     if not isinstance(limits, dict):
         raise ValueError(f'{path}: limits must be names with numbers, such as {{"maximum": 150}}')
-    inner = data.get("model")
-    described: dict[str, Any] = inner if isinstance(inner, dict) else data
+    described = data.pop("model") if isinstance(data.get("model"), dict) else data
+    # The file may be the estimator's own, with model and limits beside its fields.
+    learnt = data if isinstance(data.get("estimator"), str) else data.pop("estimator", None)
+    estimator = None
+    if learnt is not None:
+        try:
+            kind = class_named(learnt, "estimator", (HysteresisRLS, HysteresisEKF))
+            estimator = kind.from_dict(learnt)
+        except ValueError as error:
+            raise ValueError(f"{path}: its estimator is not what to_dict() gave: {error}") from None
     if estimator is not None and described is data:
-        return estimator.model, estimator, dict(limits)
+        return estimator.model, estimator, limits
     try:
-        model = model_from_dict(
-            {key: v for key, v in described.items() if key not in ("estimator", "limits")}
-        )
+        return model_from_dict(described), estimator, limits
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    return model, estimator, dict(limits)
 
 
-def _pair(
-    path: Path,
-    kind: str | None,
-    sample_rate: float | None,
-    minimum: float | None,
-    maximum: float | None,
-    slew_rate: float | None,
-) -> tuple[Any, Any]:
+def _pair(path: Path, stated: Stated) -> tuple[Any, Any]:
     """Estimator and compensator of a file and the options beside it."""
     from piezoest.compensators import InverseCompensator, LinearCompensator, VoltageLimits
     from piezoest.estimators.ekf import HysteresisEKF
@@ -177,24 +157,20 @@ def _pair(
     from piezoest.models import LinearGain
 
     model, estimator, limits = _read(path)
-    if kind not in (None, "none", "rls", "ekf"):
-        raise ValueError(f"--estimator must be rls, ekf or none, got {kind!r}")
-    if kind in ("rls", "ekf"):
-        if sample_rate is None:
+    if stated.estimator is not None:
+        kinds: dict[str, Any] = {"none": None, "rls": HysteresisRLS, "ekf": HysteresisEKF}
+        if stated.estimator not in kinds:
+            raise ValueError(f"--estimator must be rls, ekf or none, got {stated.estimator!r}")
+        kind = kinds[stated.estimator]
+        if kind is not None and stated.sample_rate is None:
             raise ValueError("an estimator needs --sample-rate")
-        made: Any = HysteresisRLS if kind == "rls" else HysteresisEKF
-        estimator = made(sample_rate, initial_model=model)
-    elif kind == "none":
-        estimator = None
-    stated = {"minimum": minimum, "maximum": maximum, "slew_rate": slew_rate}
-    limits |= {name: value for name, value in stated.items() if value is not None}
-    rate = sample_rate or getattr(estimator, "sample_rate", None)
-    if rate is not None:
-        limits["sample_rate"] = rate
+        estimator = None if kind is None else kind(stated.sample_rate, initial_model=model)
+    rate = stated.sample_rate or getattr(estimator, "sample_rate", None)
+    own = {"minimum": stated.minimum, "maximum": stated.maximum, "slew_rate": stated.slew_rate}
+    limits |= {name: value for name, value in {**own, "sample_rate": rate}.items() if value is not None}
     try:
         voltage = VoltageLimits(**{name: value for name, value in limits.items() if value is not None})
     except (TypeError, OverflowError) as error:
         raise ValueError(f"{path}: limits: {error}") from None
-    if isinstance(model, LinearGain):
-        return estimator, LinearCompensator(model, voltage)
-    return estimator, InverseCompensator(model, voltage)
+    feed_forward: Any = LinearCompensator if isinstance(model, LinearGain) else InverseCompensator
+    return estimator, feed_forward(model, voltage)

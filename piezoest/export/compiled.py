@@ -13,37 +13,11 @@ from typing import Any, Self
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d
-from piezoest.export.c_code import CCode
+from piezoest.export.c_code import CCode, filled
+from piezoest.export.ring import Ring
 
 # Without contraction to fused multiply-add the result is the library's to the last bit.
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
-
-_LOOP = """#include "{name}.h"
-#include <stddef.h>
-
-static {name}_state state;
-
-void begin(void);
-void one({real} r, {real} x, {real} *u);
-void many(size_t count, const {real} *r, const {real} *x, {real} *u);
-void hold(int frozen);
-void get({real} *parameters);
-int set(const {real} *parameters);
-int limit({real} minimum, {real} maximum);
-
-void begin(void) {{ {name}_init(&state); }}
-void one({real} r, {real} x, {real} *u) {{ *u = {name}_step(&state, r, x); }}
-void many(size_t count, const {real} *r, const {real} *x, {real} *u)
-{{
-    for (size_t k = 0; k < count; ++k) {{
-        u[k] = {name}_step(&state, r[k], x[k]);
-    }}
-}}
-void hold(int frozen) {{ {name}_freeze(&state, frozen); }}
-void get({real} *parameters) {{ {name}_get_parameters(&state, parameters); }}
-int set(const {real} *parameters) {{ return {name}_set_parameters(&state, parameters); }}
-int limit({real} minimum, {real} maximum) {{ return {name}_set_limits(&state, minimum, maximum); }}
-"""
 
 
 def compiler() -> str:
@@ -74,7 +48,7 @@ def build_shared(folder: Path, sources: list[str], target: Path, *flags: str) ->
         raise ValueError(f"the C compiler failed: {' '.join(command)}\n{done.stderr}")
 
 
-class CompiledController:
+class CompiledController(Ring):
     """Generated code, compiled by this computer's C compiler, with the face of `Controller`.
 
     For checks of the code against the library and against logs from a target. Each object has
@@ -91,10 +65,7 @@ class CompiledController:
         If there is no C compiler.
     """
 
-    __slots__ = ("_frozen", "_library", "_pointer", "_real", "code")
-
-    #: `piezoest.track` hands each measurement back: it can run a controller as its compensator.
-    needs_measurement = True
+    __slots__ = ("_library", "_pointer", "_real", "code")
 
     def __init__(self, code: CCode) -> None:
         self.code = code
@@ -102,7 +73,7 @@ class CompiledController:
         with tempfile.TemporaryDirectory(prefix="piezoest_", ignore_cleanup_errors=True) as place:
             folder = Path(place)
             code.write(folder)
-            loop = _LOOP.format(name=code.name, real=code.precision)
+            loop = filled("loop.c", name=code.name, real=code.precision)
             (folder / "loop.c").write_text(loop, encoding="utf-8")
             build_shared(folder, [f"{code.name}.c", "loop.c"], folder / "controller.so")
             self._library = ctypes.CDLL(str(folder / "controller.so"))
@@ -113,7 +84,6 @@ class CompiledController:
         self._library.one.argtypes = (real, real, self._pointer)
         self._library.limit.argtypes = (real, real)
         self._library.many.argtypes = (ctypes.c_size_t, *[self._pointer] * 3)
-        self._frozen = False
         self.reset()
 
     def reset(self) -> None:
@@ -121,14 +91,7 @@ class CompiledController:
         self._library.begin()
         self._frozen = False
 
-    @property
-    def frozen(self) -> bool:
-        """Whether the model is held; settable."""
-        return self._frozen
-
-    @frozen.setter
-    def frozen(self, frozen: bool) -> None:
-        self._frozen = bool(frozen)
+    def _hold(self) -> None:
         self._library.hold(int(self._frozen))
 
     @property
@@ -177,27 +140,7 @@ class CompiledController:
         self._library.one(np.nan if r is None else r, np.nan if x is None else x, self._at(u))
         return float(u[0])
 
-    def run(self, r: Any, x: Any) -> FloatArray:
-        """Turns for a whole log; see `Controller.run`.
-
-        Parameters
-        ----------
-        r, x : array_like, shape (N,)
-            Reference, and the displacement measured before each sample of it [µm].
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Voltage [V].
-
-        Raises
-        ------
-        ValueError
-            If the arrays are not one-dimensional, or of two lengths.
-        """
-        r, x = array_1d("r", r, allow_nan=True), array_1d("x", x, allow_nan=True)
-        if r.size != x.size:
-            raise ValueError(f"r and x must have the same length, got {r.size} and {x.size}")
+    def _run(self, r: FloatArray, x: FloatArray) -> FloatArray:
         with np.errstate(over="ignore"):
             r, x = r.astype(self._real), x.astype(self._real)
         u = np.empty(r.size, self._real)

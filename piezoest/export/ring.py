@@ -8,57 +8,112 @@ import numpy as np
 
 from piezoest._checks import WILDEST, FloatArray, array_1d, integer
 from piezoest.compensators import Compensator
-from piezoest.compensators.adoption import adopt
-from piezoest.compensators.base import DUE
+from piezoest.compile import local
+from piezoest.layout import COUNT, FLAG, MEASURED, Record, numbers, record
 from piezoest.models import Model
 
-# State of the ring: voltage given out last, whether there is one, samples since the last
-# change of model, whether the model is held, and the model: alpha, beta, gamma, offset.
-PREVIOUS, STARTED, WAITED, FROZEN, MODEL, STATE = 0, 1, 2, 3, 4, 8
+# Voltage given out last, whether there is one, samples since the last change of model, whether the model is
+# held, and the model: alpha, beta, gamma, offset, or gain, 0, 0, offset.
+RING = record(voltage=MEASURED, started=FLAG, waited=COUNT, frozen=FLAG, model=numbers(4))
 
 
-def learn(
-    ring: Any,
-    estimator: Any,
-    estimator_settings: Any,
-    terms: Any,
-    compensator: Any,
-    settings: Any,
-    sample: Any,
-    proposed: Any,
-    change: Any,
-    interval: int,
-    frozen_at: int,
-    hysteretic: bool,
-    x: Any,
-) -> None:
+def settings_layout(estimator: Record) -> Record:
+    """Layout of what no sample changes, around the estimator's settings.
+
+    Samples between two changes of model, whether the estimator itself can be held, whether its model has a
+    hysteresis.
+    """
+    return record(interval=COUNT, freezable=FLAG, hysteretic=FLAG, estimator=estimator)
+
+
+def learn(state: Any, settings: Any, estimator: Any, compensator: Any, x: Any) -> None:
     """Give the estimator the measurement of the previous voltage; hand its model over when it is time."""
-    if frozen_at >= 0:
-        estimator[frozen_at] = ring[FROZEN]
-    elif ring[FROZEN] != 0.0:
+    ring = state.ring
+    if settings.freezable != 0.0:
+        state.estimator.frozen = ring.frozen
+    elif ring.frozen != 0.0:
         x = np.nan
-    sample(estimator, estimator_settings, ring[PREVIOUS], x)
-    ring[WAITED] += 1.0
-    if ring[WAITED] >= interval:
-        ring[WAITED] = 0.0
-        if ring[FROZEN] == 0.0 and compensator[DUE] != 0.0:
-            model = np.zeros(4)
-            proposed(estimator, estimator_settings, terms, model)
-            if adopt(compensator, settings, model, hysteretic, change):
-                for i in range(4):
-                    ring[MODEL + i] = model[i]
+    estimator.sample(state.estimator, settings.estimator, ring.voltage, x)
+    ring.waited += 1.0
+    if ring.waited >= settings.interval:
+        ring.waited = 0.0
+        if ring.frozen == 0.0 and state.compensator.corridor.due != 0.0:
+            model = local(4)
+            for i in range(4):
+                model[i] = 0.0
+            estimator.proposed(state.estimator, settings.estimator, model)
+            adopt(state, settings, compensator, model)
 
 
-def give(ring: Any, compensator: Any, settings: Any, voltage: Any, r: Any) -> Any:
+def adopt(state: Any, settings: Any, compensator: Any, model: Any) -> bool:
+    """Hand a model to the compensator; False if it has no inverse. `model` becomes the one in use."""
+    if not compensator.set_model(state.compensator, state.settings, model, settings.hysteretic != 0.0):
+        return False
+    for i in range(4):
+        state.ring.model[i] = model[i]
+    return True
+
+
+def give(state: Any, compensator: Any, r: Any) -> Any:
     """Voltage for the next sample of the reference; a number, whatever came in."""
-    u = voltage(compensator, settings, r)
+    u = compensator.voltage(state.compensator, state.settings, r)
     if abs(u) < WILDEST:
-        ring[PREVIOUS] = u
-        ring[STARTED] = 1.0
-    return ring[PREVIOUS]
+        state.ring.voltage = u
+        state.ring.started = 1.0
+    return state.ring.voltage
 
 
-class Controller:
+class Ring:
+    """What the two controllers share: a log of turns, and whether the model is held."""
+
+    __slots__ = ("_frozen",)
+
+    #: `piezoest.track` hands each measurement back: it can run a controller as its compensator.
+    needs_measurement = True
+
+    @property
+    def frozen(self) -> bool:
+        """Whether the model is held; settable."""
+        return self._frozen
+
+    @frozen.setter
+    def frozen(self, frozen: bool) -> None:
+        self._frozen = bool(frozen)
+        self._hold()
+
+    def _hold(self) -> None:
+        """Hold the model, or learn on."""
+        raise NotImplementedError
+
+    def _run(self, r: FloatArray, x: FloatArray) -> FloatArray:
+        raise NotImplementedError
+
+    def run(self, r: Any, x: Any) -> FloatArray:
+        """Turns for a whole log.
+
+        Parameters
+        ----------
+        r, x : array_like, shape (N,)
+            Reference, and the displacement measured before each sample of it [µm]; NaN where
+            there is none.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Voltage [V].
+
+        Raises
+        ------
+        ValueError
+            If the arrays are not one-dimensional, or of two lengths.
+        """
+        r, x = array_1d("r", r, allow_nan=True), array_1d("x", x, allow_nan=True)
+        if r.size != x.size:
+            raise ValueError(f"r and x must have the same length, got {r.size} and {x.size}")
+        return self._run(r, x)
+
+
+class Controller(Ring):
     """What the exported code does, in Python: one `step` from reference and measurement to voltage.
 
     Parameters
@@ -81,10 +136,7 @@ class Controller:
     guard, bit for bit.
     """
 
-    __slots__ = ("_compensator", "_estimator", "_frozen", "_interval", "_voltage", "_waited")
-
-    #: `piezoest.track` hands each measurement back: it can run a controller as its compensator.
-    needs_measurement = True
+    __slots__ = ("_compensator", "_estimator", "_interval", "_voltage", "_waited")
 
     def __init__(self, estimator: Any, compensator: Compensator, *, update_interval: int = 50) -> None:
         if not isinstance(compensator, Compensator):
@@ -103,14 +155,7 @@ class Controller:
         """Model whose inverse is used."""
         return self._compensator.model
 
-    @property
-    def frozen(self) -> bool:
-        """Whether the model is held; settable."""
-        return self._frozen
-
-    @frozen.setter
-    def frozen(self, frozen: bool) -> None:
-        self._frozen = bool(frozen)
+    def _hold(self) -> None:
         if hasattr(self._estimator, "frozen"):
             self._estimator.frozen = self._frozen
 
@@ -141,26 +186,5 @@ class Controller:
         self._voltage = self._compensator.step(r)
         return self._voltage
 
-    def run(self, r: Any, x: Any) -> FloatArray:
-        """Turns for a whole log.
-
-        Parameters
-        ----------
-        r, x : array_like, shape (N,)
-            Reference, and the displacement measured before each sample of it [µm]; NaN where
-            there is none.
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Voltage [V].
-
-        Raises
-        ------
-        ValueError
-            If the arrays are not one-dimensional, or of two lengths.
-        """
-        r, x = array_1d("r", r, allow_nan=True), array_1d("x", x, allow_nan=True)
-        if r.size != x.size:
-            raise ValueError(f"r and x must have the same length, got {r.size} and {x.size}")
+    def _run(self, r: FloatArray, x: FloatArray) -> FloatArray:
         return np.array([self.step(a, b) for a, b in zip(r.tolist(), x.tolist(), strict=True)])

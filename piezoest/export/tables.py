@@ -13,7 +13,7 @@ from piezoest.models import Model
 from piezoest.records import write_columns
 from piezoest.signals import Signal, check_continuity
 
-# The loop has settled when the voltage of two periods differs by no more than this, in parts of its largest.
+# The loop has settled when the voltage of two periods differs by no more than this, relative to its largest.
 _SETTLED = 1e-9
 _MOST_PERIODS = 400
 

@@ -2,7 +2,8 @@
 
 from piezoest.identification.choice import Candidate, ModelChoice, choose_model
 from piezoest.identification.procedure import identify
-from piezoest.identification.result import Identification, Misfit, Whiteness
+from piezoest.identification.residual import Misfit, Whiteness
+from piezoest.identification.result import Identification
 from piezoest.identification.streamed import StreamedIdentification, identify_stream
 
 __all__ = [

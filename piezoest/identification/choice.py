@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.estimators.coordinates import late
 from piezoest.estimators.play_rls import PrandtlIshlinskiiRLS
-from piezoest.identification import fit as fitting
+from piezoest.identification.data import prepare
 from piezoest.identification.procedure import identify
-from piezoest.identification.result import Identification, Misfit, autocorrelation
+from piezoest.identification.residual import Misfit, autocorrelation
+from piezoest.identification.result import Identification
 from piezoest.models import Model, PrandtlIshlinskii
 from piezoest.records import Record
 
@@ -175,8 +177,8 @@ def choose_model(
         As `identify`.
     """
     base = identify(record, train=train, delay=delay, settle=settle)
-    whole = fitting.prepare(record.voltage, record.displacement)
-    late = fitting.delayed(whole.u, base.delay)
+    whole = prepare(record.voltage, record.displacement)
+    voltage = late(whole.u, base.delay)
     first = slice(base.left_out, base.trained)
     counts = whole.counts[: base.trained].copy()
     counts[: base.left_out] = False
@@ -188,7 +190,7 @@ def choose_model(
         )
 
     candidates = [
-        judged("straight line", base.line, 2, base.line.simulate(late)),
+        judged("straight line", base.line, 2, base.line.simulate(voltage)),
         judged("Coleman-Hodgdon", base.model, 5, base.prediction),
     ]
     rate = record.sample_rate
@@ -203,11 +205,11 @@ def choose_model(
             options["creep"] = ()
         estimator = PrandtlIshlinskiiRLS(rate, initial_model=base.model, **options)
         displacement = np.where(counts, record.displacement[: base.trained], np.nan)
-        estimator.run(late[: base.trained], displacement, every=base.trained)
+        estimator.run(voltage[: base.trained], displacement, every=base.trained)
         model = estimator.model
         if isinstance(model, PrandtlIshlinskii):
             parameters = int(np.sum(estimator.theta > 0.0)) + 1
-            candidates.append(judged(name, model, parameters, model.simulate(late)))
+            candidates.append(judged(name, model, parameters, model.simulate(voltage)))
     # Of one effective number of samples, so that the criteria compare.
     n = _independent(candidates[-1].residual[first])
     candidates = [

@@ -7,19 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piezoest.identification.result import autocorrelation
+from piezoest.identification.residual import autocorrelation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from piezoest.identification.result import Identification
 
 # A figure is some two thousand dots wide: more samples than this only make it slow.
 MOST_POINTS = 40_000
 
 
-def draw(found: Identification) -> Figure:
-    """Draw voltage, displacement and model over time, the loop, the residual, its autocorrelation."""
+def draw(found: Any) -> Figure:
+    """Draw an `Identification`: over time, the loop, the residual and its autocorrelation."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 8), layout="constrained")
@@ -62,7 +60,7 @@ def draw(found: Identification) -> Figure:
     return figure
 
 
-def _shade(axes: Any, found: Identification) -> None:
+def _shade(axes: Any, found: Any) -> None:
     time = found.record.time
     axes.axvspan(time[found.trained], time[-1], color="C1", alpha=0.12, lw=0, label="held out")
     if found.left_out:
@@ -71,7 +69,7 @@ def _shade(axes: Any, found: Identification) -> None:
     axes.grid(alpha=0.3)
 
 
-def _draw_autocorrelation(axes: Any, found: Identification) -> None:
+def _draw_autocorrelation(axes: Any, found: Any) -> None:
     residual = found.residual[found.left_out : found.trained]
     lags = min(100, residual.size // 4)
     rho = autocorrelation(residual, lags)

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from piezoest._checks import FloatArray, finite, fraction
-from piezoest._jit import compiled
-from piezoest.identification import fit as fitting
-from piezoest.identification.result import Identification, Misfit, Whiteness
-from piezoest.models import LinearGain
+from piezoest.estimators.coordinates import coordinates, late
+from piezoest.estimators.fit import Outcome, Problem, best_start, outcome, single_shooting
+from piezoest.identification.data import Data, check_excitation, noise_of, prepare
+from piezoest.identification.residual import Misfit, Whiteness
+from piezoest.identification.result import Identification
+from piezoest.models import ColemanHodgdon
 from piezoest.records import Record
 
 FEWEST_SAMPLES = 50
-# A turn counts when the voltage then runs back by this part of its range.
-TURN = 0.05
-FEWEST_TURNS = 2
-SMALLEST_SIGNAL_TO_NOISE = 10.0
 # Samples off the model by this many (robust) standard deviations are spikes.
 SPIKE = 20.0
 # A model whose loop is not known to this part of itself was not excited by the record.
@@ -28,6 +26,9 @@ UNSETTLED = 4.0
 LONGEST_UNSETTLED = 0.1
 DRIFT_WORTH_A_WORD = 0.5
 WORSE_ON_HELD_OUT = 1.5
+LONGEST_DELAY = 10.0
+# Most passes of a fit over the record, and the relative change at which it has ended.
+MOST_PASSES, TOLERANCE = 60, 1e-8
 
 
 def identify(
@@ -80,31 +81,28 @@ def identify(
     turns = check_excitation(data, noise)
     rate = record.sample_rate
 
-    begins = fitting.starts(data, rate, start_delay, noise)
     left_out = 0 if settle is None else int(fraction("settle", settle, 0.0, 0.5 * trained / rate) * rate)
-    fit = fitting.output_error(data, begins, fit_delay, left_out)
-    if settle is None and (left_out := _unsettled(fit.residual)):
-        fit = fitting.output_error(data, [fit.p, *begins], fit_delay, left_out)
+    fit = _Fit(data, rate, start_delay, fit_delay, noise)
+    end = fit.solved(left_out)
+    if settle is None and (left_out := _unsettled(end.residual)):
+        end = fit.solved(left_out)
 
-    errors = fitting.standard_errors(fit, data)
-    _check_known(fit, errors, data, turns)
-    model = fitting.model_of(fit.p, data)
-    prediction = fitting.simulate(fit.p, data, whole.u)
-    error = np.where(whole.counts, record.displacement - prediction, np.nan)
-    found_delay = float(fit.p[fitting.DELAY])
-    gain, offset = fitting.straight_line(data, found_delay, left_out)
-    line = LinearGain(gain, offset)
-    line_error = np.where(
-        whole.counts, record.displacement - line.simulate(fitting.delayed(whole.u, found_delay)), np.nan
-    )
+    value = end.value
+    model = ColemanHodgdon.from_theta(end.theta[:3], value["offset"])
+    errors = dict(zip(end.parameter_names, end.standard_errors.tolist(), strict=True))
+    _check_known(model, errors, data, turns)
+    start, found_delay = value["initial_state"], value["delay"]
+    voltage = late(whole.u, found_delay)
+    prediction = model.simulate(voltage, initial_state=start, allow_jumps=True)
+    error = whole.measured() - prediction
+    line = data.line(found_delay, left_out)
+    line_error = whole.measured() - line.simulate(voltage)
     known = np.flatnonzero(np.isfinite(error[left_out:])) + left_out
     slope = float(np.polyfit(known / len(record), error[known], 1)[0])
     result = Identification(
         model=model,
-        standard_errors=dict(
-            zip(("alpha", "beta", "gamma", "offset", "delay"), (float(e) for e in errors), strict=True)
-        ),
-        initial_state=fitting.initial_state_of(fit.p, model),
+        standard_errors={name: errors[name] for name in (*model.parameter_names, "offset", "delay")},
+        initial_state=start,
         delay=found_delay,
         delay_estimated=fit_delay,
         train=Misfit.of(error[left_out:trained]),
@@ -119,7 +117,32 @@ def identify(
         prediction=prediction,
         record=record,
     )
-    return _with_advice(result, fit, data, turns)
+    return dataclasses.replace(result, advice=tuple(_advice(result, end, data, turns)))
+
+
+class _Fit:
+    """The output-error fit of a record, with the start state and a delay."""
+
+    def __init__(self, data: Data, sample_rate: float, delay: float, fit_delay: bool, noise: float) -> None:
+        self._data, self._sample_rate, self._delay, self._noise = data, sample_rate, delay, noise
+        self._coordinates = coordinates(ColemanHodgdon, () if fit_delay else ("delay",), delayed=True)
+        self._held = np.empty(0) if fit_delay else np.array([delay])
+        self._limits = ColemanHodgdon.record_limits(data.extent) | {"delay": (0.0, LONGEST_DELAY)}
+        self._last: FloatArray | None = None
+
+    def solved(self, left_out: int) -> Outcome:
+        """Fit all but so many samples at the start, from what was found last, if that is the better start."""
+        problem = Problem(
+            self._data.u, self._data.measured(left_out), self._coordinates, self._held, limits=self._limits
+        )
+        start = best_start(
+            problem, self._sample_rate, None, self._data.loop_about_line(self._delay),
+            {"delay": self._delay}, delay=self._delay, noise=self._noise,
+        )  # fmt: skip
+        if self._last is not None and problem.cost(self._last) < problem.cost(start):
+            start = self._last
+        self._last = single_shooting(problem, start, "linear", 1.0, MOST_PASSES, TOLERANCE).q
+        return outcome(problem, self._last, coloured=True)
 
 
 def _delay_argument(delay: float | str) -> tuple[float, bool]:
@@ -127,10 +150,10 @@ def _delay_argument(delay: float | str) -> tuple[float, bool]:
         if delay != "auto":
             raise ValueError(f"delay must be 'auto' or a number of samples, got {delay!r}")
         return 1.0, True
-    return fraction("delay", finite("delay", delay), 0.0, fitting.LONGEST_DELAY), False
+    return fraction("delay", finite("delay", delay), 0.0, LONGEST_DELAY), False
 
 
-def _checked(record: Record, trained: int) -> tuple[fitting.Data, fitting.Data]:
+def _checked(record: Record, trained: int) -> tuple[Data, Data]:
     """Data of the whole record and of the fitted part, if there is enough in both parts."""
     for name, part in (("fitted", slice(0, trained)), ("held-out", slice(trained, None))):
         usable = int(np.sum(record.usable[part]))
@@ -139,70 +162,8 @@ def _checked(record: Record, trained: int) -> tuple[fitting.Data, fitting.Data]:
                 f"the {name} part of {record.source} has {usable} usable samples, at least {FEWEST_SAMPLES} "
                 "are needed: record longer"
             )
-    whole = fitting.prepare(record.voltage, record.displacement)
-    return whole, fitting.prepare(record.voltage[:trained], record.displacement[:trained])
-
-
-def noise_of(data: fitting.Data) -> float:
-    """Standard deviation of the displacement's noise [µm], from its third differences, robustly."""
-    x = data.x[data.counts]
-    third = np.diff(x, 3)
-    return max(float(1.4826 * np.median(np.abs(third)) / np.sqrt(20.0)), 1e-9 * float(np.ptp(x)), 1e-12)
-
-
-def check_excitation(data: fitting.Data, noise: float) -> FloatArray:
-    """Refuse a voltage that cannot show a hysteresis; return the voltages at its turns."""
-    if data.extent == 0.0:
-        raise ValueError(
-            f"too little excitation: the voltage stays at {data.middle:.6g} V over the fitted part, "
-            "it must move the stage up and down"
-        )
-    turns = turning_voltages(data)
-    if turns.size < FEWEST_TURNS:
-        raise ValueError(
-            f"too little excitation: over the fitted part the voltage moves by {data.extent:.4g} V but "
-            f"turns {turns.size} times, at least {FEWEST_TURNS} are needed: hysteresis shows only at turns"
-        )
-    extent = float(np.ptp(data.x[data.counts]))
-    if extent < SMALLEST_SIGNAL_TO_NOISE * noise:
-        raise ValueError(
-            f"too little excitation: the displacement moves by {extent:.3g} µm in noise of {noise:.3g} µm "
-            f"rms, {extent / noise:.1f} times that, at least {SMALLEST_SIGNAL_TO_NOISE:g} are needed: "
-            "raise the voltage"
-        )
-    gain, _ = fitting.straight_line(data, 0.0)
-    if gain < 0.0:
-        raise ValueError(
-            f"the displacement falls as the voltage rises ({gain:.4g} µm/V): change the sign of one of the "
-            "two columns"
-        )
-    return turns
-
-
-def turning_voltages(data: fitting.Data) -> FloatArray:
-    """Voltages at which it turns and then runs back by more than a twentieth of its range [V]."""
-    turns = np.empty(data.u.size)
-    return turns[: _turns(data.u, TURN * data.extent, turns)]
-
-
-@compiled()
-def _turns(u: Any, threshold: float, turns: Any) -> int:
-    """Voltages at which u turns and then runs back by more than a threshold, into `turns`."""
-    count, direction, extreme = 0, 0.0, u[0]
-    low = high = u[0]
-    for value in u:
-        if direction == 0.0:
-            low, high = min(low, value), max(high, value)
-            if high - low > threshold:
-                direction = 1.0 if value == high else -1.0
-                extreme = value
-        elif direction * (value - extreme) > 0.0:
-            extreme = value
-        elif direction * (extreme - value) > threshold:
-            turns[count] = extreme
-            count += 1
-            direction, extreme = -direction, value
-    return count
+    whole = prepare(record.voltage, record.displacement)
+    return whole, prepare(record.voltage[:trained], record.displacement[:trained])
 
 
 def _unsettled(residual: FloatArray) -> int:
@@ -226,13 +187,10 @@ def _spikes(residual: FloatArray) -> int:
     return int(np.sum(np.abs(known) > SPIKE * deviation)) if deviation > 0.0 else 0
 
 
-def _check_known(fit: fitting.Fit, errors: FloatArray, data: fitting.Data, turns: FloatArray) -> None:
+def _check_known(model: ColemanHodgdon, errors: dict[str, float], data: Data, turns: FloatArray) -> None:
     """Refuse a model of which the record leaves a parameter open."""
-    model = fitting.model_of(fit.p, data)
-    for name, unit, value, error in zip(
-        model.parameter_names, model.parameter_units, model.theta, errors[:3], strict=True
-    ):
-        if error > LARGEST_RELATIVE_ERROR * value:
+    for name, unit, value in zip(model.parameter_names, model.parameter_units, model.theta, strict=True):
+        if (error := errors[name]) > LARGEST_RELATIVE_ERROR * value:
             raise ValueError(
                 f"too little excitation: {name} = {value:.3g} {unit} is known only to ±{error:.2g} "
                 f"({100 * error / value:.0f} %) from {turns.size} turns of the voltage over "
@@ -240,13 +198,7 @@ def _check_known(fit: fitting.Fit, errors: FloatArray, data: fitting.Data, turns
             )
 
 
-def _with_advice(
-    found: Identification, fit: fitting.Fit, data: fitting.Data, turns: FloatArray
-) -> Identification:
-    return dataclasses.replace(found, advice=tuple(_advice(found, fit, data, turns)))
-
-
-def _advice(found: Identification, fit: fitting.Fit, data: fitting.Data, turns: FloatArray) -> list[str]:
+def _advice(found: Identification, end: Outcome, data: Data, turns: FloatArray) -> list[str]:
     rate, model = found.record.sample_rate, found.model
     said = []
     if found.left_out:
@@ -257,7 +209,8 @@ def _advice(found: Identification, fit: fitting.Fit, data: fitting.Data, turns: 
     if abs(data.middle) > 0.1 * data.extent or abs(model.offset) > 0.1 * float(np.ptp(data.x[data.counts])):
         said.append(
             f"The loop is not centred at zero (voltage {data.middle:.3g} V, displacement "
-            f"{fit.p[fitting.CENTRE]:.4g} µm): let HysteresisRLS estimate the offset, as it does by default."
+            f"{model.offset + model.c * data.middle:.4g} µm): let HysteresisRLS estimate the offset, as it "
+            "does by default."
         )
     if found.delay_estimated and found.delay > max(0.1, 2.0 * found.standard_errors["delay"]):
         said.append(
@@ -265,15 +218,15 @@ def _advice(found: Identification, fit: fitting.Fit, data: fitting.Data, turns: 
             f"({1e3 * found.delay / rate:.3g} ms): use "
             f"HysteresisRLS(delay={found.delay:.2g}). At one frequency, lag and loop width look alike."
         )
-    if found.delay > 0.99 * fitting.LONGEST_DELAY:
+    if found.delay > 0.99 * LONGEST_DELAY:
         said.append("The delay is at the end of its range: check that the columns belong together.")
     linear = found.held_out.rms > 0.9 * found.line_held_out.rms
-    if np.any(~fit.free[: fitting.PLACE]) and not linear:
+    if set(end.at_bound) - {"place", "delay"} and not linear:
         said.append(
             "The fit lies on the edge of the admissible parameters: the best model beyond it has no inverse. "
             "Check signs and columns, or the delay."
         )
-    if spikes := _spikes(fit.residual):
+    if spikes := _spikes(end.residual):
         said.append(
             f"{spikes} of the fitted samples {'is' if spikes == 1 else 'are'} off the model by more than "
             f"{SPIKE:g} times what is usual: if these are spikes of the sensor, empty them in the log, for "

@@ -6,114 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from piezoest._checks import FloatArray
+from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.models import ColemanHodgdon, LinearGain
 from piezoest.records import Record
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-WHITENESS_LAGS = 20
-
-
-@dataclass(frozen=True, slots=True)
-class Misfit:
-    """Displacement that a free-running model misses.
-
-    Parameters
-    ----------
-    rms, max : float
-        Root mean square and largest absolute value [µm].
-    """
-
-    rms: float
-    max: float
-
-    @classmethod
-    def of(cls, error: FloatArray) -> Misfit:
-        """Make it of an error [µm]; NaN does not count.
-
-        Parameters
-        ----------
-        error : ndarray, shape (N,)
-            [µm].
-        """
-        known = error[np.isfinite(error)]
-        return cls(float(np.sqrt(np.mean(known**2))), float(np.max(np.abs(known))))
-
-    def to_dict(self) -> dict[str, float]:
-        """Return a JSON-safe dictionary."""
-        return {"rms_um": self.rms, "max_um": self.max}
-
-
-@dataclass(frozen=True, slots=True)
-class Whiteness:
-    """Ljung-Box test of a residual: Q = n(n+2) sum_k rho_k^2/(n-k) over the first lags.
-
-    Parameters
-    ----------
-    lags : int
-        Number of lags m.
-    statistic : float
-        Q, chi-squared with m degrees of freedom if the residual is white.
-    p_value : float
-        Probability of a Q at least as large in white noise.
-    first_autocorrelation : float
-        rho_1.
-
-    Notes
-    -----
-    Source: G. M. Ljung, G. E. P. Box, Biometrika 65 (1978) 297-303.
-    """
-
-    lags: int
-    statistic: float
-    p_value: float
-    first_autocorrelation: float
-
-    @property
-    def is_white(self) -> bool:
-        """Whether the test passes at the 1 % level."""
-        return self.p_value >= 0.01
-
-    @classmethod
-    def of(cls, residual: FloatArray, lags: int = WHITENESS_LAGS) -> Whiteness:
-        """Test a residual; NaN counts as absent.
-
-        Parameters
-        ----------
-        residual : ndarray, shape (N,)
-            In any unit.
-        lags : int
-            Number of lags.
-        """
-        from scipy.special import chdtrc
-
-        rho = autocorrelation(residual, lags)[1:]
-        n = int(np.sum(np.isfinite(residual)))
-        Q = float(n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1))))
-        return cls(lags, Q, float(chdtrc(lags, Q)), float(rho[0]))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary."""
-        return {
-            "test": "Ljung-Box",
-            "lags": self.lags,
-            "statistic": self.statistic,
-            "p_value": self.p_value,
-            "first_autocorrelation": self.first_autocorrelation,
-            "white": self.is_white,
-        }
-
-
-def autocorrelation(residual: FloatArray, lags: int) -> FloatArray:
-    """Autocorrelation at lags 0 to `lags`, shape (lags + 1,); NaN counts as absent."""
-    known = np.isfinite(residual)
-    e = np.where(known, residual - np.mean(residual[known]), 0.0)
-    power = float(e @ e) or 1.0
-    return np.array([float(e[: e.size - k] @ e[k:]) / power for k in range(lags + 1)])
 
 
 def parameter_rows(

@@ -8,12 +8,13 @@ from typing import Any, Literal
 import numpy as np
 
 from piezoest._checks import FloatArray, fraction
-from piezoest._jit import compiled
+from piezoest.compile import Vector, compiled
 from piezoest.equations.coleman_hodgdon import hysteresis_step
-from piezoest.estimators.delay_line import delay_line, delayed
-from piezoest.identification import fit as fitting
-from piezoest.identification.procedure import FEWEST_SAMPLES, check_excitation, identify, noise_of
-from piezoest.identification.result import Misfit, misfits_to_dict, parameter_rows
+from piezoest.estimators.rls import HysteresisRLS
+from piezoest.identification.data import check_excitation, noise_of, prepare
+from piezoest.identification.procedure import FEWEST_SAMPLES, LONGEST_DELAY, identify
+from piezoest.identification.residual import Misfit
+from piezoest.identification.result import misfits_to_dict, parameter_rows
 from piezoest.models import ColemanHodgdon, LinearGain, Model
 from piezoest.records import Record, RecordStream
 
@@ -138,21 +139,24 @@ def identify_stream(
         )
     advice: list[str] = []
     lag = _delay(head, delay, advice)
-    data = fitting.prepare(head.voltage, head.displacement)
+    data = prepare(head.voltage, head.displacement)
     noise = noise_of(data)
     check_excitation(data, noise)
-    estimator = fitting.recursion(data, log.sample_rate, lag, noise)
+    estimator = HysteresisRLS(
+        log.sample_rate, initial_model=data.loop_about_line(lag), memory=None, offset=True, delay=lag,
+        uncertainty=1.0, noise=noise,
+    )  # fmt: skip
     first = 0
     for block in log:
         part = slice(0, max(0, min(block.voltage.size, trained - first)))
         if part.stop:
             estimator.run(block.voltage[part], block.displacement[part], every=part.stop)
         first += block.voltage.size
-    line = LinearGain(*fitting.straight_line(data, lag))
+    line = data.line(lag)
     model = _hysteresis(estimator.model, line)
     judge = _Judge(model, line, lag, samples, trained)
     for block in log:
-        judge.take(block.time, block.voltage, block.displacement)
+        judge.add(block.time, block.voltage, block.displacement)
     held_out, line_held_out = (judge.misfit(held_out=True, of_line=of_line) for of_line in (False, True))
     known = dict(zip(estimator.parameter_names, estimator.standard_errors, strict=True))
     errors = {name: float(known[name]) for name in model.parameter_names}
@@ -195,7 +199,7 @@ def _head(log: RecordStream, length: int) -> Record:
 
 def _delay(head: Record, delay: float | str, advice: list[str]) -> float:
     if delay != "auto":
-        return fraction("delay", delay, 0.0, fitting.LONGEST_DELAY)
+        return fraction("delay", delay, 0.0, LONGEST_DELAY)
     try:
         return identify(head).delay
     except ValueError as error:
@@ -213,15 +217,15 @@ def _hysteresis(model: Model, line: LinearGain) -> ColemanHodgdon:
 
 
 class _Judge:
-    """Free-running errors of a model and of a line, sample by sample in order, and points for figures."""
+    """Free-running errors of a model and of a line, block by block in order, and points for figures."""
 
     def __init__(
         self, model: ColemanHodgdon, line: LinearGain, lag: float, samples: int, trained: int
     ) -> None:
-        self._numbers = np.array([model.a, model.b, model.c, model.offset, line.gain, line.offset])
-        self._fraction, self._line = delay_line(lag)
-        # w_h, the last voltage, the last delayed one.
-        self._state = np.array([0.0, np.nan, 0.0])
+        self._model, self._line, self._lag = model, line, lag
+        # The last voltages, and w_h at the last of them delayed.
+        self._before: FloatArray | None = None
+        self._w_h = 0.0
         # Of model and line, in the fitted part and the held-out one: sum of squares, largest, count.
         self._sums = np.zeros((2, 2, 3))
         self._trained, self._seen = trained, 0
@@ -229,19 +233,46 @@ class _Judge:
         self._points: list[FloatArray] = []
         self.skipped = 0
 
-    def take(self, time: FloatArray, u: FloatArray, x: FloatArray) -> None:
-        """Take a block."""
-        predicted = np.empty_like(u)
-        for start, part in ((0, 0), (max(0, min(u.size, self._trained - self._seen)), 1)):
-            end = u.size if part else max(0, min(u.size, self._trained - self._seen))
-            _run_free(
-                u[start:end], x[start:end], self._numbers, self._fraction, self._line, self._state,
-                self._sums[part], predicted[start:end],
-            )  # fmt: skip
+    def add(self, time: FloatArray, u: FloatArray, x: FloatArray) -> None:
+        """Judge a block."""
+        predicted, by_line = self._predicted(u)
+        usable = np.isfinite(u) & np.isfinite(x)
+        fitted = self._seen + np.arange(u.size) < self._trained
+        for held_out, counts in enumerate((usable & fitted, usable & ~fitted)):
+            for of_line, output in enumerate((predicted, by_line)):
+                error = np.abs(x[counts] - output[counts])
+                squares, largest, count = self._sums[held_out, of_line]
+                largest = np.max(error, initial=largest)
+                # One by one, for the sum not to depend on where the blocks end.
+                squares = np.add.accumulate(np.append(squares, error**2))[-1]
+                self._sums[held_out, of_line] = squares, largest, count + error.size
         kept = slice(-self._seen % self._every, None, self._every)
         self._points.append(np.array([time[kept], u[kept], x[kept], predicted[kept]]))
-        self.skipped += int(np.sum(~(np.isfinite(u) & np.isfinite(x))))
+        self.skipped += int(np.sum(~usable))
         self._seen += u.size
+
+    def _predicted(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Free-running displacement of model and line; NaN before the first known voltage."""
+        known = np.isfinite(u)
+        if self._before is None:
+            if not known.any():
+                return np.full(u.size, np.nan), np.full(u.size, np.nan)
+            self._before = np.full(int(np.ceil(self._lag)) + 2, u[np.argmax(known)])
+            blind = int(np.argmax(known))
+        else:
+            blind = 0
+        # A missing voltage is taken as the last one.
+        path = np.concatenate([self._before, u])
+        path = path[np.maximum.accumulate(np.where(np.isfinite(path), np.arange(path.size), 0))]
+        whole, rest = divmod(self._lag, 1.0)
+        now = np.arange(self._before.size - 1, path.size) - int(whole)
+        voltage = (1.0 - rest) * path[now] + rest * path[now - 1]
+        w_h = np.full(voltage.size, self._w_h)
+        _follow(voltage, w_h, self._model.a, self._model.b)
+        self._w_h, self._before = float(w_h[-1]), path[-self._before.size :]
+        predicted = (self._model.c * voltage + w_h + self._model.offset)[1:]
+        predicted[:blind] = np.nan
+        return predicted, self._line.simulate(voltage[1:])
 
     def misfit(self, *, held_out: bool, of_line: bool = False) -> Misfit:
         """Return the error so far, of the model or of the line, in the fitted part or behind it."""
@@ -259,26 +290,8 @@ class _Judge:
         return np.asarray(np.concatenate(self._points, axis=1)[3])
 
 
-@compiled()
-def _run_free(
-    u: Any, x: Any, numbers: Any, part: float, line: Any, state: Any, sums: Any, predicted: Any
-) -> None:
-    a, b, c, offset, gain, line_offset = numbers
-    for k in range(u.size):
-        # A missing voltage is taken as the last one.
-        now = u[k] if np.isfinite(u[k]) or np.isnan(state[1]) else state[1]
-        if np.isnan(now):
-            predicted[k] = np.nan
-            continue
-        before = state[1]
-        state[1] = now
-        late = delayed(line, part, now)
-        if not np.isnan(before):
-            state[0] = hysteresis_step(state[0], late - state[2], a, b)
-        state[2] = late
-        predicted[k] = c * late + state[0] + offset
-        if np.isfinite(u[k]) and np.isfinite(x[k]):
-            for i, error in enumerate((x[k] - predicted[k], x[k] - gain * late - line_offset)):
-                sums[i, 0] += error * error
-                sums[i, 1] = max(sums[i, 1], abs(error))
-                sums[i, 2] += 1.0
+@compiled
+def _follow(u: Vector, w_h: Vector, a: float, b: float) -> None:
+    """w_h behind the first one, along the voltage."""
+    for k in range(1, u.size):
+        w_h[k] = hysteresis_step(w_h[k - 1], u[k] - u[k - 1], a, b)

@@ -9,12 +9,12 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, fields, finite
+from piezoest._checks import WILDEST, FloatArray, array_1d, fields, finite
 
 
 @functools.cache
-def _field_names(kind: Any) -> tuple[str, ...]:
-    return tuple(field.name for field in dataclasses.fields(kind))
+def _field_names(model: Any) -> tuple[str, ...]:
+    return tuple(field.name for field in dataclasses.fields(model))
 
 
 def _is_needed(field: Any) -> bool:
@@ -38,21 +38,106 @@ def finite_voltage(model: Model, u: FloatArray) -> FloatArray:
     return u
 
 
+class EqualByContent:
+    """Equality of frozen values that hold arrays: of one class, with one `to_dict`."""
+
+    __slots__ = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a JSON-safe dictionary."""
+        raise NotImplementedError
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        return self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash(repr(self.to_dict()))
+
+
+def rising_pair(name: str, thresholds: Any, other: str, weights: Any) -> tuple[FloatArray, FloatArray]:
+    """Rising thresholds and as many weights, as arrays that nobody else can write to."""
+    thresholds = array_1d(name, thresholds).copy()
+    weights = array_1d(other, weights).copy()
+    if thresholds.size != weights.size:
+        raise ValueError(
+            f"{other} must have one value per threshold, got {weights.size} weights for "
+            f"{thresholds.size} thresholds"
+        )
+    if np.any(np.diff(thresholds) <= 0.0):
+        raise ValueError(
+            f"{name} must rise from entry to entry, got {thresholds}: "
+            "sort them together with the weights and merge equal ones"
+        )
+    thresholds.flags.writeable = False
+    weights.flags.writeable = False
+    return thresholds, weights
+
+
+#: Every class of models by its name.
+REGISTERED: dict[str, type[Model]] = {}
+
+
 class Model(ABC):
     """Base of the models of a stage: voltage u [V] to displacement x [µm].
 
-    A model is a frozen dataclass; the fields named in `parameter_names` make up `theta`.
+    A model is a frozen dataclass; the fields named in `parameter_names` make up `theta`, and ``offset`` is
+    its displacement at rest. One with an inverse for compensators names the module of its compiled
+    functions as ``inverse``, see `piezoest.compensators.inverse_kernel`, and has `inverse_settings`.
     """
 
     __slots__ = ()
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        REGISTERED[cls.__name__] = cls
+
     parameter_names: ClassVar[tuple[str, ...]] = ()
     parameter_units: ClassVar[tuple[str, ...]] = ()
+
+    offset: float
+
+    #: Module of the compiled functions of the inverse; None if there is none.
+    inverse: ClassVar[Any] = None
+    #: What to do about a model that is not admissible.
+    remedy: ClassVar[str] = "it has to rise with the voltage"
 
     @property
     @abstractmethod
     def is_admissible(self) -> bool:
         """Whether displacement rises with voltage and the inverse exists."""
+
+    @property
+    def is_in_range(self) -> bool:
+        """Whether no parameter is beyond what its inverse can use: an estimator can run away."""
+        return bool(np.all(np.abs([*self.theta, self.offset]) < WILDEST))
+
+    def inverse_settings(self, sample_rate: float | None) -> dict[str, Any]:
+        """Numbers by name that the compiled functions of the inverse are given.
+
+        Parameters
+        ----------
+        sample_rate : float or None
+            [Hz]; None if it is not known.
+
+        Raises
+        ------
+        ValueError
+            If the model has no inverse, or needs a sample rate.
+        """
+        raise ValueError(f"{type(self).__name__} has no inverse")
+
+    @property
+    def slope(self) -> float:
+        """Slope from rest [µm/V], about."""
+        return self.line[0]
+
+    @property
+    def line(self) -> tuple[float, float]:
+        """Gain [µm/V] and offset [µm] of a line, as far as they are known before anything is measured."""
+        x = self.simulate(np.array([0.0, 1e-3, 0.0, 1.0]))  # type: ignore[attr-defined]
+        return float(x[-1] - x[0]), float(x[0])
 
     @property
     def theta(self) -> FloatArray:
@@ -114,4 +199,9 @@ class Model(ABC):
         values = dict(fields(cls.__name__, data, needed, optional))
         if (name := values.pop("model", cls.__name__)) != cls.__name__:
             raise ValueError(f"data is of a {name}, not of a {cls.__name__}")
-        return cls(**values)
+        return cls(**cls._read(values))
+
+    @classmethod
+    def _read(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """Arguments of the constructor from the fields of a dictionary."""
+        return values

@@ -9,8 +9,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, as_floats, fields, positive
-from piezoest._files import read_json, write_text
+from piezoest._checks import FloatArray, array_1d, as_floats, dictionary, fields, positive
+from piezoest._files import read_object, write_text
 from piezoest.models.coleman_hodgdon import ColemanHodgdon
 
 _FORMAT = 1
@@ -118,7 +118,8 @@ class AmplitudeProfile:
         ValueError
             If it describes no profile, or one of another format.
         """
-        if not isinstance(data, dict) or (data.get("profile"), data.get("format")) != (cls.__name__, _FORMAT):
+        described = dictionary(data)
+        if (described.get("profile"), described.get("format")) != (cls.__name__, _FORMAT):
             raise ValueError(f"data is no {cls.__name__} of format {_FORMAT}: write it with save()")
         fields("profile", data, ("profile", "format", "swings", "theta"), ("model",))
         return cls(data["swings"], data["theta"])
@@ -148,7 +149,4 @@ class AmplitudeProfile:
         ValueError
             If the file holds no profile.
         """
-        data = read_json(path)
-        if not isinstance(data, dict):
-            raise ValueError(f"{path} holds no profile")
-        return cls.from_dict(data)
+        return cls.from_dict(read_object(path, "profile"))

@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, finite
-from piezoest._jit import compiled
-from piezoest.equations import admissible
+from piezoest._checks import WILDEST, FloatArray, array_1d, finite
+from piezoest.compile import Vector, compiled
+from piezoest.equations import admissible, loop_inverse
 from piezoest.equations import coleman_hodgdon as equations
-from piezoest.models._base import Model, finite_voltage
+from piezoest.models._base import finite_voltage
+from piezoest.models.free_running import FreeRunning
 from piezoest.signals import check_continuity
+
+# Distance a fit keeps from gamma = alpha beta and gamma = 2 alpha beta, relative to alpha beta.
+_FIT_MARGIN = 1e-6
+# Least alpha and beta of a fit, relative to their start.
+_LEAST = 1e-6
+# Values of a, times the range of the voltage, among which a fit's start is sought.
+_CURVATURES = (0.5, 2.0, 6.0)
+# What a record can tell from a straight line: log of a times the voltage's range, and b/c.
+_LARGEST_LOG = 4.0
+_RATIOS = (1e-3, 0.4995)
+_RATIOS_OF_START = (0.02, 0.48)
 
 
 @dataclass(frozen=True, slots=True)
-class ColemanHodgdon(Model):
+class ColemanHodgdon(FreeRunning):
     """Coleman-Hodgdon hysteresis: dw/dt = beta u' - alpha w|u'| + gamma |u'| u (1).
 
     The same map in its second form is x = c u + w_h + offset with
@@ -53,6 +66,8 @@ class ColemanHodgdon(Model):
 
     parameter_names: ClassVar[tuple[str, ...]] = ("alpha", "beta", "gamma")
     parameter_units: ClassVar[tuple[str, ...]] = ("1/V", "µm/V", "µm/V²")
+    inverse: ClassVar[Any] = loop_inverse
+    remedy: ClassVar[str] = "use nearest_admissible()"
 
     def __post_init__(self) -> None:
         self._check_finite()
@@ -93,13 +108,32 @@ class ColemanHodgdon(Model):
         """Whether the parameters are thermodynamically admissible and invertible."""
         return bool(admissible.has_inverse(self.alpha, self.beta, self.gamma))
 
+    @property
+    def is_in_range(self) -> bool:
+        """Whether no parameter is beyond what its inverse can use."""
+        return all(abs(v) < WILDEST for v in (self.alpha, self.beta, self.gamma, self.offset))
+
+    def inverse_settings(self, sample_rate: float | None) -> dict[str, Any]:
+        """Second form (4) and offset, whatever the sample rate."""
+        return {"a": self.a, "b": self.b, "c": self.c, "offset": self.offset}
+
+    @property
+    def slope(self) -> float:
+        """Slope from rest [µm/V]."""
+        return self.beta
+
+    @property
+    def line(self) -> tuple[float, float]:
+        """Slope from rest [µm/V] and offset [µm]."""
+        return self.beta, self.offset
+
     def nearest_admissible(self, margin: float = admissible.NEAREST_MARGIN) -> Self:
-        """Nearest admissible model, each parameter measured in parts of its own value.
+        """Nearest admissible model, each parameter measured relative to its own value.
 
         Parameters
         ----------
         margin : float
-            Distance kept from the faces of the set, in parts of gamma (default 1e-6).
+            Distance kept from the faces of the set, relative to gamma (default 1e-6).
 
         Returns
         -------
@@ -115,11 +149,124 @@ class ColemanHodgdon(Model):
             return self
         theta = self.theta
         with np.errstate(all="ignore"):
-            known = admissible.nearest_admissible(theta, np.empty(9), margin)
+            known = admissible.nearest_admissible(theta, margin)
         alpha, beta, gamma = (float(value) for value in theta)
         if not (known and admissible.has_inverse(alpha, beta, gamma)):
             raise ValueError(f"{self} has no admissible model near it: check the units of its parameters")
         return type(self)(alpha, beta, gamma, self.offset)
+
+    # ------------------------------------------------------------ what a fit varies
+
+    state_names: ClassVar[tuple[str, ...]] = ("initial_state",)
+    has_derivative_form: ClassVar[bool] = True
+    linear_coordinates: ClassVar[tuple[str, ...]] = ("offset", "initial_state", "place")
+
+    @classmethod
+    def guess(cls, u: FloatArray, x: FloatArray) -> Self | None:
+        """For some values of a the best b, c and offset, in which x is linear, and of these the best."""
+        counts = np.isfinite(x)
+        extent, middle = float(np.ptp(u)), 0.5 * float(u.max() + u.min())
+        least, best = np.inf, None
+        for curvature in _CURVATURES if extent > 0.0 else ():
+            unit = cls.from_loop(curvature / extent, 1.0, 1.0)
+            at_rest = unit.simulate(u, allow_jumps=True) - u
+            of_state = unit.simulate(u, initial_state=1.0, allow_jumps=True) - u - at_rest
+            columns = np.column_stack([at_rest, u - middle, np.ones_like(u), of_state])[counts]
+            b, c, centre, state = np.linalg.lstsq(columns, x[counts], rcond=None)[0]
+            cost = float(np.sum((columns @ (b, c, centre, state) - x[counts]) ** 2))
+            if c > 0.0 and cost < least:
+                b = float(np.clip(b / c, *_RATIOS_OF_START)) * c
+                least, best = cost, cls.from_loop(curvature / extent, b, c, centre - c * middle)
+        return best
+
+    @classmethod
+    def coordinates(cls, held: Collection[str], within_reach: bool) -> tuple[str, ...]:
+        """Put gamma/(alpha beta) in place of the last of alpha, beta, gamma that is not held.
+
+        Admissible is then a box: a > 0, b > 0 and c >= 2b are bounds. Within reach are start states of
+        at most b/a: ``place``, the part of it, is then varied.
+        """
+        names = super(ColemanHodgdon, cls).coordinates(held, within_reach)
+        replaced = [name for name in cls.parameter_names if name in names][-1:]
+        place = ["initial_state"] if within_reach else []
+        return tuple("ratio" if name in replaced else "place" if name in place else name for name in names)
+
+    @classmethod
+    def complete(cls, value: dict[str, Any]) -> None:
+        """Add the parameter that the ratio stands for, and the start state."""
+        if "gamma" not in value:
+            value["gamma"] = value["ratio"] * value["alpha"] * value["beta"]
+        elif "beta" not in value:
+            value["beta"] = value["gamma"] / (value["alpha"] * value["ratio"])
+        elif "alpha" not in value:
+            value["alpha"] = value["gamma"] / (value["beta"] * value["ratio"])
+        if "place" in value:
+            a, b, _ = cls.constants(value)
+            value["initial_state"] = value["place"] * b / a
+
+    @classmethod
+    def constants(cls, value: Mapping[str, Any]) -> tuple[Any, ...]:
+        """Return (a, b, c)."""
+        return equations.loop_parameters(value["alpha"], value["beta"], value["gamma"])
+
+    @classmethod
+    def free_step(cls, state: Any, u_0: Any, u_1: Any, constants: Any) -> tuple[tuple[Any, ...], Any]:
+        """Return w_h and c u + w_h: (2), (3), exact for a monotone voltage."""
+        w_h = equations.hysteresis_step(state[0], u_1 - u_0, constants[0], constants[1])
+        return (w_h,), constants[2] * u_1 + w_h
+
+    def coordinate_values(self) -> dict[str, float]:
+        """Values of all coordinates, of the nearest admissible model, at rest."""
+        near = self.nearest_admissible()
+        ratio = near.gamma / (near.alpha * near.beta)
+        value = super(ColemanHodgdon, near).coordinate_values() | {"place": 0.0}
+        return value | {"ratio": float(np.clip(ratio, 1.0 + 2.0 * _FIT_MARGIN, 2.0 - 2.0 * _FIT_MARGIN))}
+
+    @classmethod
+    def bounds(cls, start: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """1 < ratio < 2; alpha and beta keep a part of their start."""
+        positive = {name: (_LEAST * start[name], np.inf) for name in ("alpha", "beta") if name in start}
+        return positive | {"ratio": (1.0 + _FIT_MARGIN, 2.0 - _FIT_MARGIN), "place": (-1.0, 1.0)}
+
+    @classmethod
+    def record_limits(cls, extent: float) -> dict[str, tuple[float, float]]:
+        """Limits of a, and of b/c, which is 1 - 1/ratio."""
+        low, high = (1.0 / (1.0 - ratio) for ratio in _RATIOS)
+        largest = float(np.exp(_LARGEST_LOG))
+        return {"alpha": (1.0 / (largest * extent), largest / extent), "ratio": (low, high)}
+
+    @classmethod
+    def sizes(cls, value: Mapping[str, float]) -> dict[str, float]:
+        """Of the ratio what is above one; of displacements b/a, the largest w_h."""
+        curved = value["ratio"] - 1.0
+        largest = curved * value["beta"] / value["alpha"]
+        return {**value, "ratio": curved, "offset": largest, "initial_state": largest}
+
+    @classmethod
+    def check_fixed(cls, fixed: Mapping[str, float]) -> None:
+        """Refuse alpha, beta and gamma that are not above zero or not admissible together."""
+        if any(fixed.get(name, 1.0) <= 0.0 for name in cls.parameter_names):
+            raise ValueError(f"fixed alpha, beta and gamma must be above zero, got {dict(fixed)}")
+        super(ColemanHodgdon, cls).check_fixed(fixed)
+
+    def lifted(self, start: Self, least: float) -> Self:
+        """Lift a and c; b keeps its part of c."""
+        a, c = least * start.a, least * start.c
+        if self.a >= a and self.c >= c:
+            return self
+        a, c = max(self.a, a), max(self.c, c)
+        return type(self).from_loop(a, c * (self.b / self.c), c, self.offset)
+
+    @property
+    def loop(self) -> tuple[float, float, float]:
+        """(a, b, c) (4)."""
+        return self.a, self.b, self.c
+
+    # ------------------------------------------------------------ forward and inverse
+
+    def stage_settings(self) -> dict[str, Any]:
+        """How the model sits in a `SimulatedStage`: see `piezoest.stage.kernel.hysteresis_layouts`."""
+        return {"gain": self.c, "a": self.a, "b": self.b}
 
     def simulate(self, u: FloatArray, *, initial_state: float = 0.0, allow_jumps: bool = False) -> FloatArray:
         """Displacement for a voltage record, exact between samples (u taken monotone there).
@@ -188,16 +335,16 @@ class ColemanHodgdon(Model):
         return finite_voltage(self, u)
 
 
-@compiled()
-def _simulate(u: Any, w_h: float, a: float, b: float, c: float, offset: float, x: Any) -> None:
+@compiled
+def _simulate(u: Vector, w_h: float, a: float, b: float, c: float, offset: float, x: Vector) -> None:
     for k in range(u.size):
         if k > 0:
             w_h = equations.hysteresis_step(w_h, u[k] - u[k - 1], a, b)
         x[k] = c * u[k] + w_h + offset
 
 
-@compiled()
-def _invert(r: Any, w_h: float, a: float, b: float, c: float, offset: float, u: Any) -> None:
+@compiled
+def _invert(r: Vector, w_h: float, a: float, b: float, c: float, offset: float, u: Vector) -> None:
     for k in range(r.size):
         if k == 0:
             u[k] = (r[k] - offset - w_h) / c

@@ -10,18 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, fields, finite, integer, positive
-from piezoest._jit import compiled
+from piezoest.compile import Vector, compiled
 from piezoest.equations.creep import creep_step
+from piezoest.models._base import EqualByContent
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
-class Creep:
+class Creep(EqualByContent):
     """Logarithmic creep as first-order terms: x_creep = sum_i z_i, tau_i z_i' = gains[i] w - z_i.
 
     Parameters
     ----------
     gains : array_like, shape (n,)
-        What each term adds in the end, in parts of the displacement w [1].
+        What each term adds in the end, relative to the displacement w [1].
     time_constants : array_like, shape (n,)
         tau_i [s], above zero.
 
@@ -81,14 +82,6 @@ class Creep:
         count = max(2, round(decades * per_decade) + 1)
         gain = finite("gain_per_decade", gain_per_decade) * decades / (count - 1)
         return cls(np.full(count, gain), np.geomspace(shortest, longest, count))
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Creep):
-            return NotImplemented
-        return self.to_dict() == other.to_dict()
-
-    def __hash__(self) -> int:
-        return hash((*self.gains.tolist(), *self.time_constants.tolist()))
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe dictionary of the two fields."""
@@ -156,8 +149,8 @@ class Creep:
         return x
 
 
-@compiled()
-def _simulate(x: Any, z: Any, gains: Any, decays: Any) -> None:
+@compiled
+def _simulate(x: Vector, z: Vector, gains: Vector, decays: Vector) -> None:
     """`x` comes as w and goes as what creep adds to it; `z` is updated."""
     for k in range(x.size):
         x[k] = creep_step(z, x[k], gains, decays)

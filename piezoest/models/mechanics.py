@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, fields, non_negative, positive
-from piezoest._jit import compiled
+from piezoest.compile import Vector, compiled
 from piezoest.equations.mechanics import mechanics_coefficients, mechanics_step
 
 
@@ -99,8 +99,8 @@ class MassSpringDamper:
         return x
 
 
-@compiled()
-def _simulate(x: Any, state: Any, coefficients: Any) -> None:
+@compiled
+def _simulate(x: Vector, state: Vector, coefficients: Vector) -> None:
     """`x` comes as f and goes as displacement; `state` is updated."""
     for k in range(x.size):
         x[k] = mechanics_step(state, x[k], coefficients)

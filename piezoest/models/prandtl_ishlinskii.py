@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, as_floats, finite, positive
-from piezoest._jit import compiled
-from piezoest.equations import admissible
+from piezoest._checks import FloatArray, array_1d, as_floats, finite, instance, positive
+from piezoest.compile import Record, Vector, compiled
+from piezoest.equations import admissible, play_inverse
 from piezoest.equations.bent_plays import bent_plays_step, prandtl_ishlinskii_voltage
 from piezoest.equations.creep import creep_to_come, unit_creep_step
-from piezoest.models._base import Model, finite_voltage
+from piezoest.layout import new
+from piezoest.models._base import EqualByContent, Model, finite_voltage, rising_pair
 from piezoest.models.creep import Creep
 
-# Rounding allowed for in a given initial state, in parts of the largest threshold.
+# Rounding allowed for in a given initial state, relative to the largest threshold.
 _STATE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
-class PrandtlIshlinskii(Model):
+class PrandtlIshlinskii(Model, EqualByContent):
     """Prandtl-Ishlinskii hysteresis with optional creep and asymmetry.
 
     w = gain u + sum_i weights[i] play_i[u], x = w + creep of w + offset. For asymmetric loops
@@ -77,6 +78,9 @@ class PrandtlIshlinskii(Model):
     bend_weights: FloatArray = dataclasses.field(default_factory=lambda: np.empty((0, 1)))
     sample_rate: float | None = None
 
+    inverse: ClassVar[Any] = play_inverse
+    remedy: ClassVar[str] = "all its slopes must be above zero"
+
     def __init__(
         self,
         gain: float,
@@ -94,8 +98,7 @@ class PrandtlIshlinskii(Model):
                 f"thresholds must be above zero, got {thresholds[0]:g} first: "
                 "add the weight of a threshold of zero to the gain"
             )
-        if creep is not None and not isinstance(creep, Creep):
-            raise ValueError(f"creep must be a Creep or None, got {type(creep).__name__}")
+        instance("creep", creep, Creep | None, "a Creep or None")
         bends, changes = _bends(bends, bend_weights, weights.size)
         object.__setattr__(self, "gain", finite("gain", gain))
         object.__setattr__(self, "thresholds", thresholds)
@@ -106,14 +109,6 @@ class PrandtlIshlinskii(Model):
         object.__setattr__(self, "bend_weights", changes)
         rate = None if sample_rate is None else positive("sample_rate", sample_rate)
         object.__setattr__(self, "sample_rate", rate)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, PrandtlIshlinskii):
-            return NotImplemented
-        return self.to_dict() == other.to_dict()
-
-    def __hash__(self) -> int:
-        return hash((*self.theta.tolist(), self.offset))
 
     @property
     def is_plain(self) -> bool:
@@ -192,23 +187,9 @@ class PrandtlIshlinskii(Model):
         return data
 
     @classmethod
-    def from_dict(cls, data: Any) -> Self:
-        """Make the model from what `to_dict` gave.
-
-        Parameters
-        ----------
-        data : dict
-            The dictionary; ``"model"``, if there, must name this class.
-
-        Raises
-        ------
-        ValueError
-            If a field is missing or unknown, or the dictionary is of another model.
-        """
-        if isinstance(data, dict) and data.get("creep") is not None:
-            data = {**data, "creep": Creep.from_dict(data["creep"])}
-        # Named, for a class with slots is made twice and `super()` then finds the first.
-        return super(PrandtlIshlinskii, cls).from_dict(data)
+    def _read(cls, values: dict[str, Any]) -> dict[str, Any]:
+        creep = values.get("creep")
+        return values if creep is None else {**values, "creep": Creep.from_dict(creep)}
 
     @property
     def is_admissible(self) -> bool:
@@ -220,6 +201,20 @@ class PrandtlIshlinskii(Model):
             rising = np.cumsum(slopes)
         within = np.all(rising > admissible.SMALLEST) and np.all(rising < admissible.LARGEST)
         return bool(within and negative_creep > -1.0)
+
+    def stage_settings(self) -> dict[str, Any]:
+        """How the model sits in a `SimulatedStage`: see `piezoest.stage.kernel.hysteresis_layouts`.
+
+        Raises
+        ------
+        ValueError
+            If it has bends, or creep of its own.
+        """
+        if not self.is_plain:
+            raise ValueError(
+                "hysteresis must have neither bends nor creep of its own: pass creep=model.creep to the stage"
+            )
+        return {"gain": self.gain, "thresholds": self.thresholds, "weights": self.weights}
 
     def simulate(
         self,
@@ -236,7 +231,7 @@ class PrandtlIshlinskii(Model):
             Voltage [V].
         initial_state : array_like, shape (n,) or (n + m,), optional
             Play states [V] before the first sample, and after them those of the creep terms
-            in parts of their gains [µm]; zeros if not given.
+            relative to their gains [µm]; zeros if not given.
         sample_rate : float, optional
             [Hz]; needed with creep only, and there the model's own if not given.
 
@@ -252,8 +247,7 @@ class PrandtlIshlinskii(Model):
             sample rate is missing.
         """
         x = array_1d("u", u).copy()
-        y, z = self._start(initial_state)
-        _simulate(x, y, z, self.gain, self.offset, *self._arrays(sample_rate))
+        self._through(_simulate, x, initial_state, sample_rate)
         return x
 
     def invert(
@@ -271,7 +265,7 @@ class PrandtlIshlinskii(Model):
             Reference displacement [µm].
         initial_state : array_like, shape (n,) or (n + m,), optional
             Play states [V] before the first sample, and after them those of the creep terms
-            in parts of their gains [µm]; zeros if not given.
+            relative to their gains [µm]; zeros if not given.
         sample_rate : float, optional
             [Hz]; needed with creep only, and there the model's own if not given.
 
@@ -293,12 +287,23 @@ class PrandtlIshlinskii(Model):
                 "gain + weights[0] + … + weights[i] must be above zero, with every bend"
             )
         u = array_1d("r", r).copy()
-        y, z = self._start(initial_state)
-        _invert(u, y, z, self.gain, self.offset, *self._arrays(sample_rate))
+        self._through(_invert, u, initial_state, sample_rate)
         return finite_voltage(self, u)
 
-    def _arrays(self, sample_rate: float | None) -> tuple[FloatArray, ...]:
-        """Thresholds, weights, creep gains and decays, bends and their weights, all flat."""
+    @property
+    def slope(self) -> float:
+        """Slope from rest [µm/V], where no play moves."""
+        return self.gain
+
+    def _through(self, loop: Any, record: FloatArray, initial_state: Any, sample_rate: float | None) -> None:
+        """Run a compiled loop over a record, which changes in place."""
+        y, z = self._start(initial_state)
+        settings = self.inverse_settings(sample_rate)
+        layouts = self.inverse.layouts(settings)
+        loop.of(*layouts)(new(layouts[0], y=y, z=z), new(layouts[1], **settings), record)
+
+    def inverse_settings(self, sample_rate: float | None) -> dict[str, Any]:
+        """Gain, offset, thresholds, weights, creep gains and decays, bends and their weights row by row."""
         if self.creep is None:
             gains = decays = np.empty(0)
         else:
@@ -306,7 +311,16 @@ class PrandtlIshlinskii(Model):
             if sample_rate is None:
                 raise ValueError("sample_rate is needed for a model with creep: pass it in Hz")
             gains, decays = self.creep.gains, self.creep.decays(sample_rate)
-        return self.thresholds, self.weights, gains, decays, self.bends, self.bend_weights.ravel()
+        return {
+            "gain": self.gain,
+            "offset": self.offset,
+            "thresholds": self.thresholds,
+            "weights": self.weights,
+            "creep_gains": gains,
+            "decays": decays,
+            "bends": self.bends,
+            "bend_weights": self.bend_weights.ravel(),
+        }
 
     def _start(self, initial_state: FloatArray | None) -> tuple[FloatArray, FloatArray]:
         """Play states (n,) and creep states (m,) to start from, as own arrays."""
@@ -326,25 +340,6 @@ class PrandtlIshlinskii(Model):
                 "by no more than their thresholds do; take it from a simulation"
             )
         return y, z
-
-
-def rising_pair(name: str, thresholds: Any, other: str, weights: Any) -> tuple[FloatArray, FloatArray]:
-    """Rising thresholds and as many weights, as arrays that nobody else can write to."""
-    thresholds = array_1d(name, thresholds).copy()
-    weights = array_1d(other, weights).copy()
-    if thresholds.size != weights.size:
-        raise ValueError(
-            f"{other} must have one value per threshold, got {weights.size} weights for "
-            f"{thresholds.size} thresholds"
-        )
-    if np.any(np.diff(thresholds) <= 0.0):
-        raise ValueError(
-            f"{name} must rise from entry to entry, got {thresholds}: "
-            "sort them together with the weights and merge equal ones"
-        )
-    thresholds.flags.writeable = False
-    weights.flags.writeable = False
-    return thresholds, weights
 
 
 def _bends(bends: Any, weights: Any, plays: int) -> tuple[FloatArray, FloatArray]:
@@ -367,31 +362,30 @@ def _bends(bends: Any, weights: Any, plays: int) -> tuple[FloatArray, FloatArray
     return bends, changes
 
 
-@compiled()
-def _simulate(
-    x: Any, y: Any, z: Any, gain: float, offset: float, thresholds: Any, weights: Any, gains: Any,
-    decays: Any, bends: Any, changes: Any,
-) -> None:  # fmt: skip
-    """`x` comes as voltage and goes as displacement; `y` and `z` are updated."""
-    for k in range(x.size):
-        w = bent_plays_step(y, x[k], gain, thresholds, weights, bends, changes)
-        unit_creep_step(z, w, decays)
-        for i in range(z.size):
-            w = w + gains[i] * z[i]
-        x[k] = w + offset
+@compiled
+def _simulate(state: Record, model: Record, x: Vector) -> None:
+    """`x` comes as voltage and goes as displacement."""
+    for k in range(len(x)):
+        w = bent_plays_step(
+            state.y, x[k], model.gain, model.thresholds, model.weights, model.bends, model.bend_weights
+        )
+        unit_creep_step(state.z, w, model.decays)
+        for i in range(len(state.z)):
+            w = w + model.creep_gains[i] * state.z[i]
+        x[k] = w + model.offset
 
 
-@compiled()
-def _invert(
-    u: Any, y: Any, z: Any, gain: float, offset: float, thresholds: Any, weights: Any, gains: Any,
-    decays: Any, bends: Any, changes: Any,
-) -> None:  # fmt: skip
-    """`u` comes as displacement and goes as voltage; `y` and `z` are updated."""
+@compiled
+def _invert(state: Record, model: Record, u: Vector) -> None:
+    """`u` comes as displacement and goes as voltage."""
+    y, z, gain, thresholds, weights = state.y, state.z, model.gain, model.thresholds, model.weights
     last = 0.0
-    for k in range(u.size):
-        held, share = creep_to_come(z, gains, decays)
-        w = (u[k] - offset - held) / (1.0 + share)
-        last = prandtl_ishlinskii_voltage(y, last, w, gain, thresholds, weights, bends, changes)
-        bent_plays_step(y, last, gain, thresholds, weights, bends, changes)
-        unit_creep_step(z, w, decays)
+    for k in range(len(u)):
+        held, share = creep_to_come(z, model.creep_gains, model.decays)
+        w = (u[k] - model.offset - held) / (1.0 + share)
+        last = prandtl_ishlinskii_voltage(
+            y, last, w, gain, thresholds, weights, model.bends, model.bend_weights
+        )
+        bent_plays_step(y, last, gain, thresholds, weights, model.bends, model.bend_weights)
+        unit_creep_step(z, w, model.decays)
         u[k] = last

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, finite, positive
-from piezoest._jit import compiled
+from piezoest.compile import Vector, compiled
 from piezoest.equations.preisach import preisach_step
-from piezoest.models._base import Model
-from piezoest.models.prandtl_ishlinskii import rising_pair
+from piezoest.models._base import EqualByContent, Model, rising_pair
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
-class Preisach(Model):
+class Preisach(Model, EqualByContent):
     """Preisach hysteresis: x = gain u + sum_i weights[i] relays(play_i[u]) + offset.
 
     The relays of half-width thresholds[i] are spread over the voltage with the density
@@ -77,14 +76,6 @@ class Preisach(Model):
         object.__setattr__(self, "width", positive("width", width))
         object.__setattr__(self, "offset", finite("offset", offset))
 
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Preisach):
-            return NotImplemented
-        return self.to_dict() == other.to_dict()
-
-    def __hash__(self) -> int:
-        return hash((*self.theta.tolist(), self.offset))
-
     @property
     def parameter_names(self) -> tuple[str, ...]:  # type: ignore[override]
         """Names of the entries of `theta`."""
@@ -120,6 +111,16 @@ class Preisach(Model):
         """Whether x rises with u: always, for these parameters."""
         return True
 
+    def stage_settings(self) -> dict[str, Any]:
+        """How the model sits in a `SimulatedStage`: see `piezoest.stage.kernel.hysteresis_layouts`."""
+        return {
+            "gain": self.gain,
+            "thresholds": self.thresholds,
+            "weights": self.weights,
+            "centre": self.centre,
+            "width": self.width,
+        }
+
     def simulate(self, u: FloatArray, *, initial_state: FloatArray | None = None) -> FloatArray:
         """Displacement for a voltage record; exact, whatever the sample rate.
 
@@ -149,10 +150,11 @@ class Preisach(Model):
         return x
 
 
-@compiled()
+@compiled
 def _simulate(
-    x: Any, y: Any, gain: float, thresholds: Any, weights: Any, centre: float, width: float, offset: float
-) -> None:
+    x: Vector, y: Vector, gain: float, thresholds: Vector, weights: Vector, centre: float, width: float,
+    offset: float,
+) -> None:  # fmt: skip
     """`x` comes as voltage and goes as displacement; `y` is updated."""
     for k in range(x.size):
         x[k] = preisach_step(y, x[k], gain, thresholds, weights, centre, width) + offset

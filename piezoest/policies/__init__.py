@@ -1,105 +1,64 @@
-"""Policies of recursive least squares: each a small named rule with its source."""
+"""Policies of recursive least squares: each a small named rule with its source, in a file of its own.
+
+A policy is registered by the import of its file, here.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-import math
-from typing import Any, cast, get_args
+from typing import Any
 
-from piezoest._checks import fields
-from piezoest.policies.covariance import (
-    ChangeDetection,
-    CovarianceResetting,
-    Normalisation,
-    NormBound,
-    Projection,
-)
-from piezoest.policies.forgetting import (
-    DirectionalForgetting,
-    Forgetting,
-    PeriodicForgetting,
-    RandomWalk,
-    VariableForgetting,
-)
-from piezoest.policies.gates import DeadZone, ExcitationGate, OutlierRejection
-from piezoest.policies.memories import AmplitudeMemory
+from piezoest._checks import class_named, fields
+from piezoest.policies.amplitude_memory import AmplitudeMemory as AmplitudeMemory
+from piezoest.policies.base import REGISTERED, Conditions
+from piezoest.policies.base import Policy as Policy
+from piezoest.policies.change_detection import ChangeDetection as ChangeDetection
+from piezoest.policies.covariance_resetting import CovarianceResetting as CovarianceResetting
+from piezoest.policies.dead_zone import DeadZone as DeadZone
+from piezoest.policies.directional_forgetting import DirectionalForgetting as DirectionalForgetting
+from piezoest.policies.excitation_gate import ExcitationGate as ExcitationGate
+from piezoest.policies.forgetting import Forgetting as Forgetting
+from piezoest.policies.norm_bound import NormBound as NormBound
+from piezoest.policies.normalisation import Normalisation as Normalisation
+from piezoest.policies.outlier_rejection import OutlierRejection as OutlierRejection
+from piezoest.policies.periodic_forgetting import PeriodicForgetting as PeriodicForgetting
+from piezoest.policies.projection import Projection as Projection
+from piezoest.policies.random_walk import RandomWalk as RandomWalk
+from piezoest.policies.variable_forgetting import VariableForgetting as VariableForgetting
 
-__all__ = [
-    "AmplitudeMemory",
-    "ChangeDetection",
-    "CovarianceResetting",
-    "DeadZone",
-    "DirectionalForgetting",
-    "ExcitationGate",
-    "Forgetting",
-    "NormBound",
-    "Normalisation",
-    "OutlierRejection",
-    "PeriodicForgetting",
-    "Projection",
-    "RandomWalk",
-    "VariableForgetting",
-]
-
-Policy = (
-    Forgetting
-    | RandomWalk
-    | PeriodicForgetting
-    | NormBound
-    | Normalisation
-    | CovarianceResetting
-    | DeadZone
-    | OutlierRejection
-    | DirectionalForgetting
-    | VariableForgetting
-    | Projection
-    | ChangeDetection
-    | ExcitationGate
-    | AmplitudeMemory
-)
-
-_FORGETTINGS = (Forgetting, RandomWalk, PeriodicForgetting, DirectionalForgetting, VariableForgetting)
+__all__ = sorted(policy.__name__ for policy in REGISTERED.values())
 
 
-def select(policies: tuple[Policy, ...], kind: type[Policy]) -> Policy | None:
-    """Return the one policy of a kind, or None.
+def check_policies(policies: tuple[Policy, ...], at: Conditions) -> tuple[Policy, ...]:
+    """Return policies, if there is one of each, and one way to forget, and all go with their conditions.
 
     Raises
     ------
     ValueError
-        If there are two of the kind, or something that is no policy.
+        If not, naming the policy.
     """
     if not isinstance(policies, tuple | list):
         raise ValueError(f"policies must be a tuple of policies, got {policies!r}")
     for policy in policies:
         if not isinstance(policy, Policy):
             raise ValueError(f"policies must be made of policies, got {policy!r}: see piezoest.policies")
-    found = [policy for policy in policies if isinstance(policy, kind)]
-    if len(found) > 1:
-        raise ValueError(f"policies holds {len(found)} of {kind.__name__}: pass one")
-    return found[0] if found else None
-
-
-def forgetting_of(policies: tuple[Policy, ...]) -> Policy | None:
-    """Return the one policy that forgets, or None.
-
-    Raises
-    ------
-    ValueError
-        If there are two of them.
-    """
-    found = [one for kind in _FORGETTINGS if (one := select(policies, kind)) is not None]
+        same = [other for other in policies if type(other) is type(policy)]
+        if len(same) > 1:
+            raise ValueError(f"policies holds {len(same)} of {type(policy).__name__}: pass one")
+        policy.check(at)
     # `Forgetting` without end is none.
-    found = [one for one in found if not (isinstance(one, Forgetting) and math.isinf(one.memory))]
-    if len(found) > 1:
-        names = " and ".join(type(one).__name__ for one in found)
+    forgetting = [each for each in policies if each.forgets and each != Forgetting()]
+    if len(forgetting) > 1:
+        names = " and ".join(type(each).__name__ for each in forgetting)
         raise ValueError(f"policies: {names} exclude each other: pass one way to forget")
-    return found[0] if found else None
+    return tuple(policies)
 
 
 def policy_to_dict(policy: Policy) -> dict[str, Any]:
     """JSON-safe dictionary of a policy, its name under ``"policy"``."""
-    return {"policy": type(policy).__name__, **dataclasses.asdict(policy)}
+    values = dataclasses.asdict(policy)  # type: ignore[call-overload]
+    plain = {name: value.item() if hasattr(value, "item") else value for name, value in values.items()}
+    return {"policy": type(policy).__name__, **plain}
 
 
 def policy_from_dict(data: Any) -> Policy:
@@ -110,10 +69,9 @@ def policy_from_dict(data: Any) -> Policy:
     ValueError
         If there is no policy of that name, a field is missing or unknown, or a value is refused.
     """
-    kinds = {kind.__name__: kind for kind in get_args(Policy)}
-    name = data.get("policy") if isinstance(data, dict) else data
-    if not isinstance(name, str) or name not in kinds:
-        raise ValueError(f"policy {name!r} is unknown: choose of {sorted(kinds)}")
-    names = [field.name for field in dataclasses.fields(kinds[name])]
-    values = {key: value for key, value in fields(name, data, ["policy", *names]).items() if key != "policy"}
-    return cast(Policy, kinds[name](**values))
+    cls = class_named(data, "policy", REGISTERED.values())
+    names = [field.name for field in dataclasses.fields(cls)]
+    values = dict(fields(cls.__name__, data, ["policy", *names]))
+    del values["policy"]
+    policy: Policy = cls(**values)
+    return policy

@@ -1,4 +1,4 @@
-"""Which column holds what: names, numbers and units, as told or guessed."""
+"""Which column holds what: names, numbers and units, as given or guessed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Column(NamedTuple):
 def choose(
     source: Source, wanted: tuple[str, ...], named: Mapping[str, str], units: Mapping[str, str]
 ) -> dict[str, Column]:
-    """Columns of the wanted quantities, as told, else by name, else by unit.
+    """Columns of the wanted quantities, as given, else by name, else by unit.
 
     Raises
     ------

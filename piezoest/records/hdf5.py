@@ -51,11 +51,8 @@ def _table(h5py: Any, path: Path, file: Any) -> Table:
     def visit(name: str, item: Any) -> None:
         # MATLAB keeps what cells and objects refer to in these; its text is an array of numbers.
         # An array may also have no shape, and no values.
-        if (
-            name.startswith(("#refs#", "#subsystem#"))
-            or not isinstance(item, h5py.Dataset)
-            or item.shape is None
-        ):
+        # A group has none either.
+        if name.startswith(("#refs#", "#subsystem#")) or getattr(item, "shape", None) is None:
             return
         _check_storage(path, name, item)
         if item.dtype.names:

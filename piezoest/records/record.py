@@ -11,7 +11,8 @@ import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, fraction, positive
 from piezoest.records.columns import choose
-from piezoest.records.source import ROWS, open_source
+from piezoest.records.opening import open_source
+from piezoest.records.source import ROWS
 from piezoest.records.stream import FEWEST_ROWS, RecordStream, sane
 from piezoest.records.timing import scan
 from piezoest.records.writing import write_columns

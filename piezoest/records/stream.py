@@ -10,7 +10,8 @@ import numpy as np
 
 from piezoest._checks import WILDEST, FloatArray, integer, positive
 from piezoest.records.columns import BASE_UNITS, Column, choose, has_column
-from piezoest.records.source import ROWS, Rows, Source, open_source
+from piezoest.records.opening import open_source
+from piezoest.records.source import ROWS, Rows, Source
 from piezoest.records.timing import Timing, placed, scan
 
 FEWEST_ROWS = 10

@@ -64,14 +64,14 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
     """
     line = _Line()
     for numbers, time in blocks():
-        line.take(where, place, numbers, time)
+        line.add(where, place, numbers, time)
     if line.known < 2:
         raise ValueError(f"{where}: only {line.known} rows with a time")
     steps = _Steps(line.usual)
     jitter, row = 0.0, 0
     for numbers, time in blocks():
         jitter = max(jitter, line.deviation(row, time))
-        steps.take(where, place, numbers, time)
+        steps.add(where, place, numbers, time)
         row += time.size
     by_step = jitter > LARGEST_JITTER
     if by_step:
@@ -98,7 +98,7 @@ class _Line:
         self.usual = 0.0
         self._sums = np.zeros(4)
 
-    def take(self, where: str, place: str, numbers: Any, time: FloatArray) -> None:
+    def add(self, where: str, place: str, numbers: Any, time: FloatArray) -> None:
         known = np.flatnonzero(np.isfinite(time))
         if known.size:
             before = [self.last_time] if self.known else []
@@ -147,7 +147,7 @@ class _Steps:
         self._uneven = self._jump = ""
         self._largest = -np.inf
 
-    def take(self, where: str, place: str, numbers: Any, time: FloatArray) -> None:
+    def add(self, where: str, place: str, numbers: Any, time: FloatArray) -> None:
         known = np.flatnonzero(np.isfinite(time))
         if known.size:
             rows, times = known + self._rows, time[known]

@@ -13,7 +13,7 @@ from piezoest import _extras
 from piezoest._checks import FloatArray, array_1d
 from piezoest._files import replacing
 from piezoest.records.binary import EXTRA
-from piezoest.records.source import FORMATS, TEXT_ENDINGS
+from piezoest.records.opening import FORMATS, TEXT_ENDINGS
 
 Columns = Mapping[str, FloatArray]
 

@@ -11,9 +11,9 @@ from piezoest import _extras
 from piezoest._checks import FloatArray
 from piezoest._version import __version__
 from piezoest.identification.choice import ModelChoice
-from piezoest.identification.fit import prepare
-from piezoest.identification.procedure import turning_voltages
-from piezoest.identification.result import Identification, Misfit, autocorrelation
+from piezoest.identification.data import prepare, turning_voltages
+from piezoest.identification.residual import Misfit, autocorrelation
+from piezoest.identification.result import Identification
 from piezoest.identification.streamed import StreamedIdentification
 from piezoest.identification.terminal import remarks, residual_sentence
 from piezoest.records import Record
@@ -39,14 +39,15 @@ def write_report(found: Identification | ModelChoice | StreamedIdentification, p
     OSError
         If the file cannot be written.
     """
-    if isinstance(found, ModelChoice):
-        page = _choice_page(found)
-    elif isinstance(found, Identification | StreamedIdentification):
-        page = _page(f"{Path(found.source).name}: what was identified", found)
-    else:
-        raise ValueError(
-            f"found must come from identify, choose_model or identify_stream, got {type(found).__name__}"
-        )
+    match found:
+        case ModelChoice():
+            page = _choice_page(found)
+        case Identification() | StreamedIdentification():
+            page = _page(f"{Path(found.source).name}: what was identified", found)
+        case _:
+            raise ValueError(
+                f"found must come from identify, choose_model or identify_stream, got {type(found).__name__}"
+            )
     page.write(path)
 
 
@@ -75,11 +76,20 @@ def _cards(held: Misfit, line: Misfit) -> list[tuple[str, str]]:
 
 def _add_sections(page: Page, found: Identification | StreamedIdentification) -> None:
     _add_parameters(page, found)
-    record = found.thinned if isinstance(found, StreamedIdentification) else found.record
+    record, _ = _drawn(found)
     _add_loops(page, found, record, found.prediction)
     _add_residual(page, found, record, found.prediction)
     _add_excitation(page, found, record)
     page.footer(f"piezoest {__version__}. Source: {found.source}")
+
+
+def _drawn(found: Identification | StreamedIdentification) -> tuple[Record, str]:
+    """Record that the figures show, and what a sample of it is."""
+    match found:
+        case StreamedIdentification():
+            return found.thinned, "drawn samples"
+        case Identification():
+            return found.record, "samples"
 
 
 def _add_parameters(page: Page, found: Identification | StreamedIdentification) -> None:
@@ -178,7 +188,7 @@ def _add_residual(
     )  # fmt: skip
     bound = 2.58 / np.sqrt(np.sum(np.isfinite(fitted)))
     figure.add_hrect(y0=-bound, y1=bound, fillcolor=BLUE, opacity=0.2, line_width=0, row=1, col=2)
-    unit = "samples" if isinstance(found, Identification) else "drawn samples"
+    _, unit = _drawn(found)
     figure.update_xaxes(title_text=f"lag [{unit}]; band: white noise, 99 %", row=1, col=2)
     figure.update_yaxes(range=[-1.05, 1.05], row=1, col=2)
     page.plot(figure, 380)
@@ -271,11 +281,11 @@ def _choice_page(found: ModelChoice) -> Page:
 def _bars(found: ModelChoice) -> Any:
     names = [item.name for item in found.candidates]
     figure = _plotly("graph_objects").Figure()
-    for part, color in (("train", GREY), ("held_out", BLUE)):
-        values = [getattr(item, part).rms for item in found.candidates]
+    for samples, color in (("train", GREY), ("held_out", BLUE)):
+        values = [getattr(item, samples).rms for item in found.candidates]
         figure.add_bar(
             y=names, x=values, orientation="h", marker_color=color,
-            name={"train": "fitted", "held_out": "held out"}[part],
+            name={"train": "fitted", "held_out": "held out"}[samples],
         )  # fmt: skip
     figure.update_yaxes(autorange="reversed")
     figure.update_xaxes(title_text="free-running error [µm rms]")

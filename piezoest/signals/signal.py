@@ -239,8 +239,8 @@ def check_continuity(
         return
     padding = np.full(NEIGHBOURS_ON_EACH_SIDE, np.nan)
     padded = np.concatenate([padding, increments, padding])
-    around = np.delete(np.arange(2 * NEIGHBOURS_ON_EACH_SIDE + 1), NEIGHBOURS_ON_EACH_SIDE)
-    neighbours = padded[candidates[:, None] + around]
+    offsets = np.delete(np.arange(2 * NEIGHBOURS_ON_EACH_SIDE + 1), NEIGHBOURS_ON_EACH_SIDE)
+    neighbours = padded[candidates[:, None] + offsets]
     present = np.sum(np.isfinite(neighbours), axis=1)
     alike = np.sum(JUMP_RATIO * neighbours >= increments[candidates, None], axis=1)
     jumps = candidates[alike < np.minimum(present, NEIGHBOURS_ALIKE)]

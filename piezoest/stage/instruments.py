@@ -1,7 +1,7 @@
 """The instruments around a stage: converter and amplifier before it, gauge and converter after it.
 
-Each is a frozen description with two vectors made from it, `settings` (constants at a
-sample rate) and `rest_state`, and one function per sample that works on them.
+Each is a frozen description with the numbers made from it, `settings` (constants at a
+sample rate) and `rest` (its state at rest), and one function per sample that works on them.
 """
 
 from __future__ import annotations
@@ -10,70 +10,81 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
 from piezoest._checks import FloatArray, finite, integer, non_negative, positive
+from piezoest.compile import inlined
 from piezoest.equations.filters import biquad_step, butterworth_low_pass
+from piezoest.layout import COUNT, FIXED, MEASURED, Length, Record, numbers, record
 
+# Coefficients of a section that leaves its input as it is.
 _NO_FILTER = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
 
+# The last finite command and the output [V].
+AMPLIFIER = record(command=MEASURED, output=MEASURED, filter=numbers(2))
+AMPLIFIER_SETTINGS = record(
+    minimum=FIXED, maximum=FIXED, resolution=FIXED, largest_change=FIXED, filter=numbers(5, kind=FIXED)
+)
+GAUGE_SETTINGS = record(
+    noise=FIXED, bias=FIXED, minimum=FIXED, maximum=FIXED, resolution=FIXED, filter=numbers(5, kind=FIXED)
+)
 
-@register_jitable
+
+def gauge_layout(delay: int) -> Record:
+    """Layout of a gauge's state: its line is a ring of one value more than the samples of delay."""
+    line = numbers(Length("length", delay + 1), kind=MEASURED)
+    return record(place=COUNT, filter=numbers(2), line=line)
+
+
+@inlined
 def quantise(x: Any, resolution: Any) -> Any:
     """x rounded to the nearest multiple of `resolution`; zero stands for none."""
     return resolution * np.floor(x / resolution + 0.5) if resolution > 0.0 else x
 
 
-@register_jitable
+@inlined
 def clip(x: Any, minimum: Any, maximum: Any) -> Any:
     """x within [minimum, maximum]."""
     return min(max(x, minimum), maximum)
 
 
-@register_jitable
+@inlined
 def finite_or_held(u: Any, held: Any) -> Any:
     """u, or `held` where u is NaN or infinite."""
     return u if np.isfinite(u) else held
 
 
-@register_jitable
+@inlined
 def next_place(place: Any, length: Any) -> Any:
     """The place after `place` in a ring of `length`."""
     return place + 1 if place + 1 < length else 0
 
 
-@register_jitable
-def amplifier_step(state: Any, filter_state: Any, u: Any, settings: Any, filter_coefficients: Any) -> Any:
-    """Voltage at the stage for the commanded `u`; the states are updated in place.
+@inlined
+def amplifier_step(state: Any, settings: Any, u: Any) -> Any:
+    """Voltage at the stage for the commanded `u`.
 
     The order is that of the hardware: converter (range, steps), reconstruction filter,
-    amplifier (range, slew rate). `state` is the last finite command and the output,
-    `settings` (minimum, maximum, resolution, largest change per sample).
+    amplifier (range, slew rate).
     """
-    u = finite_or_held(u, state[0])
-    state[0] = u
-    u = clip(quantise(clip(u, settings[0], settings[1]), settings[2]), settings[0], settings[1])
-    u = clip(biquad_step(filter_state, u, filter_coefficients), settings[0], settings[1])
-    u = clip(u, state[1] - settings[3], state[1] + settings[3])
-    state[1] = u
+    low, high = settings.minimum, settings.maximum
+    u = finite_or_held(u, state.command)
+    state.command = u
+    u = clip(quantise(clip(u, low, high), settings.resolution), low, high)
+    u = clip(biquad_step(state.filter, u, settings.filter), low, high)
+    u = clip(u, state.output - settings.largest_change, state.output + settings.largest_change)
+    state.output = u
     return u
 
 
-@register_jitable
-def gauge_step(
-    filter_state: Any, delay_line: Any, x: Any, noise: Any, settings: Any, filter_coefficients: Any
-) -> Any:
-    """Reading for the displacement `x`; `noise` is standard normal; the states are updated in place.
-
-    `delay_line` is the place in it and a ring of one value more than the samples of delay,
-    `settings` (noise, bias, minimum, maximum, resolution).
-    """
-    x = biquad_step(filter_state, x + settings[1] + settings[0] * noise, filter_coefficients)
-    place = int(delay_line[0])
-    delay_line[1 + place] = x
-    place = next_place(place, delay_line.shape[0] - 1)
-    delay_line[0] = place
-    return clip(quantise(delay_line[1 + place], settings[4]), settings[2], settings[3])
+@inlined
+def gauge_step(state: Any, line: Any, settings: Any, x: Any, noise: Any) -> Any:
+    """Reading for the displacement `x`; `noise` is standard normal."""
+    x = biquad_step(state.filter, x + settings.bias + settings.noise * noise, settings.filter)
+    place = int(state.place)
+    line[place] = x
+    place = next_place(place, len(line))
+    state.place = place
+    return clip(quantise(line[place], settings.resolution), settings.minimum, settings.maximum)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,14 +124,15 @@ class Amplifier:
         if self.cutoff is not None:
             positive("cutoff", self.cutoff)
 
-    def _settings(self, sample_rate: float) -> FloatArray:
-        """Settings (4,) and filter coefficients (5,) of `amplifier_step` at `sample_rate` [Hz]."""
-        head = [self.minimum, self.maximum, self.resolution, self.slew_rate / sample_rate]
-        return np.concatenate((head, _filter("amplifier", self.cutoff, sample_rate)))
-
-    def _rest_state(self) -> FloatArray:
-        """State and filter state (4,) of `amplifier_step` after a long time at 0 V."""
-        return np.zeros(4)
+    def _settings(self, sample_rate: float) -> dict[str, Any]:
+        """Settings of `amplifier_step` at `sample_rate` [Hz]."""
+        return {
+            "minimum": self.minimum,
+            "maximum": self.maximum,
+            "resolution": self.resolution,
+            "largest_change": self.slew_rate / sample_rate,
+            "filter": _filter("amplifier", self.cutoff, sample_rate),
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,19 +177,18 @@ class Gauge:
         non_negative("resolution", self.resolution)
         _check_range("µm", self.minimum, self.maximum)
 
-    def _settings(self, sample_rate: float) -> FloatArray:
-        """Settings (5,) and filter coefficients (5,) of `gauge_step` at `sample_rate` [Hz]."""
-        head = [self.noise, self.bias, self.minimum, self.maximum, self.resolution]
-        return np.concatenate((head, _filter("gauge", self.cutoff, sample_rate)))
+    def _settings(self, sample_rate: float) -> dict[str, Any]:
+        """Settings of `gauge_step` at `sample_rate` [Hz]."""
+        names = ("noise", "bias", "minimum", "maximum", "resolution")
+        values = {name: getattr(self, name) for name in names}
+        return {**values, "filter": _filter("gauge", self.cutoff, sample_rate)}
 
-    def _rest_state(self, x: float, settings: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Filter state (2,) and delay line of `gauge_step` after a long time at x [µm]."""
+    def _rest(self, x: float, sample_rate: float) -> dict[str, Any]:
+        """State of `gauge_step` after a long time at x [µm]."""
         level = x + self.bias
-        _, b1, b2, a1, a2 = settings[5:]
+        _, b1, b2, a1, a2 = _filter("gauge", self.cutoff, sample_rate)
         second = (b2 - a2) * level
-        line = np.full(self.delay + 2, level)
-        line[0] = 0.0
-        return np.array([(b1 - a1) * level + second, second]), line
+        return {"filter": [(b1 - a1) * level + second, second], "line": level}
 
 
 def _check_range(unit: str, minimum: Any, maximum: Any) -> None:
@@ -185,12 +196,12 @@ def _check_range(unit: str, minimum: Any, maximum: Any) -> None:
         raise ValueError(f"minimum and maximum must enclose 0 {unit}, got {minimum} and {maximum}")
 
 
-def _filter(part: str, cutoff: float | None, sample_rate: float) -> FloatArray:
+def _filter(name: str, cutoff: float | None, sample_rate: float) -> FloatArray:
     if cutoff is None:
         return _NO_FILTER
     if cutoff >= 0.5 * sample_rate:
         raise ValueError(
-            f"{part}.cutoff must lie below half the sample rate, got {cutoff:g} Hz at {sample_rate:g} Hz: "
+            f"{name}.cutoff must lie below half the sample rate, got {cutoff:g} Hz at {sample_rate:g} Hz: "
             "raise sample_rate or pass cutoff=None"
         )
     return butterworth_low_pass(cutoff, sample_rate)

@@ -1,7 +1,13 @@
-"""The compiled loops of a simulated stage, over flat vectors.
+"""The compiled loops of a simulated stage: amplifier, hysteresis, creep, mechanics, gauge.
 
-No part acts back on the one before it, so a record passes through the parts one after the
-other, each in its own short loop; sample by sample the result is the same to the bit.
+The parts come one after the other, each in its own short loop, as none acts back on the one before
+it: sample by sample the result is the same to the bit. All stages have one layout but for the hysteresis, the
+number of creep terms and the delay. What a stage does without has numbers that leave the signal as it is.
+
+A model's ``stage_layouts(settings)`` are the layouts of its state and of its numbers (`stage_settings`), of
+which ``gain`` is the slope of its linear term; the former names the module with ``deform(own, settings, u)``,
+the displacement without offset after the next voltage. Models without it are those of `hysteresis_layouts`,
+which one machine code serves.
 """
 
 from __future__ import annotations
@@ -10,149 +16,144 @@ from typing import Any
 
 from numba.extending import register_jitable
 
-from piezoest._jit import UNCOUNTED, compiled
+from piezoest.compile import Record, Vector, compiled, local
 from piezoest.equations.coleman_hodgdon import hysteresis_step
 from piezoest.equations.creep import creep_step
 from piezoest.equations.mechanics import mechanics_step
 from piezoest.equations.play import prandtl_ishlinskii_step
 from piezoest.equations.preisach import preisach_step
-from piezoest.stage.instruments import amplifier_step, gauge_step
+from piezoest.layout import FIXED, MEASURED, NUMBER, Length, numbers, record
+from piezoest.layout import Record as Layout
+from piezoest.stage.instruments import (
+    AMPLIFIER,
+    AMPLIFIER_SETTINGS,
+    GAUGE_SETTINGS,
+    amplifier_step,
+    gauge_layout,
+    gauge_step,
+)
 
-# The state vector, in this order:
-SAMPLE = 5  # voltage or displacement, noise, factor, shape and reading of a single sample
-AMPLIFIER = SAMPLE + 2
-AMPLIFIER_FILTER = AMPLIFIER + 2
-COLEMAN_HODGDON = AMPLIFIER_FILTER + 2  # last voltage, w_h
-MECHANICS = COLEMAN_HODGDON + 2  # displacement, velocity
-GAUGE_FILTER = MECHANICS + 2  # then the plays, the creep terms, the delay line
 
-# The settings vector, in this order:
-AMPLIFIER_SETTINGS = 4
-AMPLIFIER_COEFFICIENTS = AMPLIFIER_SETTINGS + 5
-HYSTERESIS_SETTINGS = AMPLIFIER_COEFFICIENTS + 6  # gain, a, b, centre, width, offset
-MECHANICS_SETTINGS = HYSTERESIS_SETTINGS + 6
-GAUGE_SETTINGS = MECHANICS_SETTINGS + 5
-GAUGE_COEFFICIENTS = GAUGE_SETTINGS + 5  # then thresholds, weights, creep gains, creep decays
+def hysteresis_layouts(settings: dict[str, Any]) -> tuple[Layout, Layout]:
+    """Layouts of state and settings of a sum of a line, plays and w_h; what `settings` leaves out is zero."""
+    plays = Length("plays", len(settings.get("weights", ())))
+    each = numbers(plays, kind=FIXED)
+    # Last voltage [V], w_h [µm], states of the plays [V].
+    state = record(__name__, u=MEASURED, w_h=NUMBER, y=numbers(plays))
+    return state, record(
+        gain=FIXED, a=FIXED, b=FIXED, centre=FIXED, width=FIXED, thresholds=each, weights=each
+    )
+
+
+def state_layout(hysteresis: Layout, terms: int, delay: int) -> Layout:
+    """Layout of the state of a stage with so many creep terms and samples of delay."""
+    return record(
+        amplifier=AMPLIFIER,
+        hysteresis=hysteresis,
+        creep=record(z=numbers(Length("terms", terms))),
+        mechanics=numbers(2),  # displacement [µm] and velocity [µm/s]
+        gauge=gauge_layout(delay),
+    )
+
+
+def settings_layout(hysteresis: Layout, terms: int) -> Layout:
+    """Layout of the settings of a stage with so many creep terms."""
+    each = numbers(Length("terms", terms), kind=FIXED)
+    return record(
+        amplifier=AMPLIFIER_SETTINGS,
+        hysteresis=hysteresis,
+        creep=record(gains=each, decays=each),
+        offset=FIXED,
+        mechanics=numbers(6, kind=FIXED),
+        gauge=GAUGE_SETTINGS,
+    )
 
 
 @register_jitable
-def _amplify(x: Any, state: Any, filter_state: Any, settings: Any, coefficients: Any) -> None:
-    for k in range(x.size):
-        x[k] = amplifier_step(state, filter_state, x[k], settings, coefficients)
+def _amplify(x: Any, state: Any, settings: Any) -> None:
+    for k in range(len(x)):
+        x[k] = amplifier_step(state, settings, x[k])
 
 
 @register_jitable
-def _coleman_hodgdon_step(w_h: Any, du: Any, a: Any, b: Any) -> Any:
-    # The exponentials are left out for the models that have no such part.
-    return hysteresis_step(w_h, du, a, b) if a != 0.0 else 0.0
-
-
-@register_jitable
-def _deform(
-    x: Any, factor: Any, shape: Any, memory: Any, settings: Any, plays: Any, thresholds: Any, weights: Any
-) -> None:
-    """Voltage to displacement without offset: the models are cases of gain u + plays + w_h.
+def deform(own: Any, settings: Any, u: Any) -> Any:
+    """Displacement after the next voltage: the models are cases of gain u + plays + w_h.
 
     A width above zero is that of a Preisach density, through which the plays then go.
-    `factor` scales all of it, `shape` the plays and w_h alone; where they are 1 the result
-    is that of the models, to the bit.
     """
-    every = int(factor.size > 1)  # one value serves all samples
-    every_shape = int(shape.size > 1)
-    for k in range(x.size):
-        u = x[k]
-        if settings[4] > 0.0:
-            w = preisach_step(plays, u, settings[0], thresholds, weights, settings[3], settings[4])
-        else:
-            w = prandtl_ishlinskii_step(plays, u, settings[0], thresholds, weights)
-        memory[1] = _coleman_hodgdon_step(memory[1], u - memory[0], settings[1], settings[2])
-        memory[0] = u
-        w = w + memory[1]
-        x[k] = factor[k * every] * (w + (shape[k * every_shape] - 1.0) * (w - settings[0] * u))
+    y, thresholds, weights = own.y, settings.thresholds, settings.weights
+    if settings.width > 0.0:
+        w = preisach_step(y, u, settings.gain, thresholds, weights, settings.centre, settings.width)
+    else:
+        w = prandtl_ishlinskii_step(y, u, settings.gain, thresholds, weights)
+    if settings.a != 0.0:  # the models without w_h do without its exponential
+        own.w_h = hysteresis_step(own.w_h, u - own.u, settings.a, settings.b)
+    own.u = u
+    return w + own.w_h
 
 
 @register_jitable
-def _creep(x: Any, z: Any, gains: Any, decays: Any, offset: Any) -> None:
-    for k in range(x.size):
+def _deform(x: Any, factor: Any, shape: Any, state: Any, settings: Any) -> None:
+    """Voltage to displacement without offset.
+
+    `factor` scales all of it, `shape` what is not linear; where they are 1 the result is that of the model,
+    to the bit.
+    """
+    # One value serves all samples.
+    every, every_shape = int(len(factor) > 1), int(len(shape) > 1)
+    for k in range(len(x)):
+        u = x[k]
+        w = state.deform(state, settings, u)
+        x[k] = factor[k * every] * (w + (shape[k * every_shape] - 1.0) * (w - settings.gain * u))
+
+
+@register_jitable
+def _creep(x: Any, state: Any, settings: Any, offset: Any) -> None:
+    z, gains, decays = state.z, settings.gains, settings.decays
+    for k in range(len(x)):
         x[k] = x[k] + creep_step(z, x[k], gains, decays) + offset
 
 
 @register_jitable
 def _move(x: Any, state: Any, coefficients: Any) -> None:
-    for k in range(x.size):
+    for k in range(len(x)):
         x[k] = mechanics_step(state, x[k], coefficients)
 
 
 @register_jitable
-def _measure(
-    x: Any, noise: Any, measured: Any, filter_state: Any, line: Any, settings: Any, coefficients: Any
-) -> None:
-    every = int(noise.size > 1)
-    for k in range(x.size):
-        measured[k] = gauge_step(filter_state, line, x[k], noise[k * every], settings, coefficients)
+def _measure(x: Any, noise: Any, measured: Any, state: Any, settings: Any) -> None:
+    every = int(len(noise) > 1)
+    line = state.line
+    for k in range(len(x)):
+        measured[k] = gauge_step(state, line, settings, x[k], noise[k * every])
 
 
-@compiled("void(f8[::1], f8[::1], i8, i8, f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])", **UNCOUNTED)
-def run(
-    state: Any,
-    settings: Any,
-    plays: int,
-    terms: int,
-    x: Any,
-    noise: Any,
-    factor: Any,
-    shape: Any,
-    measured: Any,
-) -> None:
-    """Run a record through a stage of so many plays and creep terms.
+@register_jitable
+def _through(state: Any, settings: Any, x: Any, noise: Any, factor: Any, shape: Any, measured: Any) -> None:
+    """Run a record through the parts.
 
-    `x` (N,) comes as voltage and goes as true displacement; `state` and `measured` (N,) are
-    written; `noise`, `factor` and `shape` are of shape (N,), or (1,) for the same value
-    throughout.
+    `x` (N,) comes as voltage and goes as true displacement; `measured` (N,) is written; `noise`, `factor` and
+    `shape` are of shape (N,), or (1,) for the same value throughout.
     """
-    creep = GAUGE_FILTER + plays
-    line = creep + terms
-    weights = GAUGE_COEFFICIENTS + plays
-    gains = weights + plays
-    decays = gains + terms
-    _amplify(
-        x,
-        state[SAMPLE:AMPLIFIER],
-        state[AMPLIFIER:AMPLIFIER_FILTER],
-        settings[:AMPLIFIER_SETTINGS],
-        settings[AMPLIFIER_SETTINGS:AMPLIFIER_COEFFICIENTS],
-    )
-    _deform(
-        x,
-        factor,
-        shape,
-        state[AMPLIFIER_FILTER:COLEMAN_HODGDON],
-        settings[AMPLIFIER_COEFFICIENTS:HYSTERESIS_SETTINGS],
-        state[GAUGE_FILTER:creep],
-        settings[GAUGE_COEFFICIENTS:weights],
-        settings[weights:gains],
-    )
-    _creep(x, state[creep:line], settings[gains:decays], settings[decays:], settings[HYSTERESIS_SETTINGS - 1])
-    _move(x, state[COLEMAN_HODGDON:MECHANICS], settings[HYSTERESIS_SETTINGS:MECHANICS_SETTINGS])
-    _measure(
-        x,
-        noise,
-        measured,
-        state[MECHANICS:GAUGE_FILTER],
-        state[line:],
-        settings[MECHANICS_SETTINGS:GAUGE_SETTINGS],
-        settings[GAUGE_SETTINGS:GAUGE_COEFFICIENTS],
-    )
+    _amplify(x, state.amplifier, settings.amplifier)
+    _deform(x, factor, shape, state.hysteresis, settings.hysteresis)
+    _creep(x, state.creep, settings.creep, settings.offset)
+    _move(x, state.mechanics, settings.mechanics)
+    _measure(x, noise, measured, state.gauge, settings.gauge)
 
 
-@compiled("UniTuple(f8, 2)(f8[::1], f8[::1], i8, i8, f8, f8, f8, f8)", **UNCOUNTED)
-def step(
-    state: Any, settings: Any, plays: int, terms: int, u: float, noise: float, factor: float, shape: float
-) -> tuple[float, float]:
+@compiled
+def run(
+    state: Record, settings: Record, x: Vector, noise: Vector, factor: Vector, shape: Vector, measured: Vector
+) -> None:
+    """Run a record through a stage."""
+    _through(state, settings, x, noise, factor, shape, measured)
+
+
+@compiled
+def step(state: Record, settings: Record, u: float, noise: float, factor: float, shape: float) -> Any:
     """(measured, true) displacement after one sample: `run` with a record of one."""
-    state[0] = u
-    state[1] = noise
-    state[2] = factor
-    state[3] = shape
-    run(state, settings, plays, terms, state[0:1], state[1:2], state[2:3], state[3:4], state[4:5])
-    return state[4], state[0]
+    x, noises, factors, shapes, measured = local(1), local(1), local(1), local(1), local(1)
+    x[0], noises[0], factors[0], shapes[0] = u, noise, factor, shape
+    _through(state, settings, x, noises, factors, shapes, measured)
+    return measured[0], x[0]

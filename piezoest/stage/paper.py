@@ -14,7 +14,7 @@ from piezoest.models.creep import Creep
 from piezoest.models.mechanics import MassSpringDamper
 from piezoest.models.prandtl_ishlinskii import PrandtlIshlinskii
 from piezoest.stage.instruments import Amplifier, Gauge
-from piezoest.stage.stage import Hysteresis, Schedule, SimulatedStage
+from piezoest.stage.stage import Schedule, SimulatedStage
 
 
 class PaperStage(SimulatedStage):
@@ -85,43 +85,34 @@ class PaperStage(SimulatedStage):
     ) -> None:
         data = _data()
         super().__init__(
-            **around(
-                PrandtlIshlinskii(**_numbers(data["hysteresis"])),
-                Creep(**_numbers(data["creep"])),
+            hysteresis=PrandtlIshlinskii(**_numbers(data["hysteresis"])),
+            creep=Creep(**_numbers(data["creep"])) if creep else None,
+            gain_schedule=gain_schedule,
+            temperature=temperature,
+            seed=seed,
+            **mechanics_and_instruments(
                 positive("sample_rate", sample_rate),
-                seed,
-                gain_schedule=gain_schedule,
-                temperature=temperature,
                 noise=noise,
                 quantisation=quantisation,
                 filters=filters,
-                creep=creep,
                 mechanics=mechanics,
-            )
+            ),
         )
 
 
-def around(
-    hysteresis: Hysteresis,
-    slow: Creep,
+def mechanics_and_instruments(
     sample_rate: float,
-    seed: int,
     *,
-    gain_schedule: Schedule | ArrayLike | None = None,
-    temperature: Schedule | ArrayLike | None = None,
     noise: float | None = None,
     quantisation: bool = True,
     filters: bool = True,
-    creep: bool = True,
     mechanics: bool = True,
 ) -> dict[str, Any]:
-    """Arguments of a `SimulatedStage` with these two and the rest of the paper's stage."""
+    """Arguments of a `SimulatedStage`, but for hysteresis, creep and schedules, as in `PaperStage`."""
     data = _data()
     amplifier, gauge = data["amplifier"], data["gauge"]
     return {
         "sample_rate": sample_rate,
-        "hysteresis": hysteresis,
-        "creep": slow if creep else None,
         "mechanics": MassSpringDamper(**_numbers(data["mechanics"])) if mechanics else None,
         "amplifier": Amplifier(
             minimum=amplifier["minimum"],
@@ -137,9 +128,6 @@ def around(
             minimum=gauge["minimum"],
             maximum=gauge["maximum"],
         ),
-        "gain_schedule": gain_schedule,
-        "temperature": temperature,
-        "seed": seed,
     }
 
 

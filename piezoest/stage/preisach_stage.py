@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from piezoest._checks import positive
 from piezoest.models.creep import Creep
 from piezoest.models.preisach import Preisach
-from piezoest.stage import paper
-from piezoest.stage.stage import SimulatedStage
+from piezoest.stage.paper import mechanics_and_instruments
+from piezoest.stage.stage import Schedule, SimulatedStage
 
 # Chosen, not fitted, and before any estimator was tried on it: a gain of about 0.15 µm/V and a loop
 # about as open as the paper's at 5 µm, a density that halves within the range used, off its
@@ -36,9 +37,10 @@ class PreisachStage(SimulatedStage):
         [Hz]. At twice the filters' cut-off (10 kHz) and below, the filters are left out.
     seed : int
         Start of the random numbers of the gauge's noise.
+    gain_schedule, temperature, creep
+        As in `PaperStage`.
     **rest
-        As in `PaperStage`: gain_schedule, temperature, noise, quantisation, filters, creep,
-        mechanics.
+        As in `PaperStage`: noise, quantisation, filters, mechanics.
 
     Raises
     ------
@@ -54,9 +56,23 @@ class PreisachStage(SimulatedStage):
 
     __slots__ = ()
 
-    def __init__(self, sample_rate: float = 50_000.0, seed: int = 0, **rest: Any) -> None:
+    def __init__(
+        self,
+        sample_rate: float = 50_000.0,
+        seed: int = 0,
+        *,
+        gain_schedule: Schedule | ArrayLike | None = None,
+        temperature: Schedule | ArrayLike | None = None,
+        creep: bool = True,
+        **rest: Any,
+    ) -> None:
         thresholds = WIDEST * (np.arange(WIDTHS) + 0.5) / WIDTHS
         share = np.exp(-thresholds / NARROW)
-        hysteresis = Preisach(GAIN, thresholds, HYSTERETIC_SLOPE * share / share.sum(), CENTRE, WIDTH)
-        sample_rate = positive("sample_rate", sample_rate)
-        super().__init__(**paper.around(hysteresis, CREEP, sample_rate, seed, **rest))
+        super().__init__(
+            hysteresis=Preisach(GAIN, thresholds, HYSTERETIC_SLOPE * share / share.sum(), CENTRE, WIDTH),
+            creep=CREEP if creep else None,
+            gain_schedule=gain_schedule,
+            temperature=temperature,
+            seed=seed,
+            **mechanics_and_instruments(positive("sample_rate", sample_rate), **rest),
+        )

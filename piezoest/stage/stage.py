@@ -5,24 +5,34 @@ from __future__ import annotations
 import copy
 import functools
 from collections.abc import Callable
-from typing import Any, Self, cast
+from typing import Any, Protocol, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, finite, integer, number_or_nan, positive
-from piezoest.models.coleman_hodgdon import ColemanHodgdon
+from piezoest.layout import new
 from piezoest.models.creep import Creep
-from piezoest.models.linear_gain import LinearGain
 from piezoest.models.mechanics import MassSpringDamper
-from piezoest.models.prandtl_ishlinskii import PrandtlIshlinskii
-from piezoest.models.preisach import Preisach
 from piezoest.stage import kernel
 from piezoest.stage.instruments import Amplifier, Gauge
 from piezoest.stage.temperature import TemperatureLaw
 
-Hysteresis = LinearGain | ColemanHodgdon | PrandtlIshlinskii | Preisach
-HYSTERESES = (LinearGain, ColemanHodgdon, PrandtlIshlinskii, Preisach)
+
+class Hysteresis(Protocol):
+    """What a stage needs of a hysteresis model."""
+
+    @property
+    def offset(self) -> float:
+        """Displacement at zero voltage [µm]."""
+
+    def simulate(self, u: FloatArray) -> FloatArray:
+        """Displacement [µm] for a voltage record [V]."""
+
+    def stage_settings(self) -> dict[str, Any]:
+        """Numbers of the hysteresis by name, see `kernel.hysteresis_layouts`; those left out are zero."""
+
+
 Schedule = Callable[[FloatArray], FloatArray]
 
 _ONE = np.ones(1)
@@ -67,7 +77,7 @@ class SimulatedStage:
     Raises
     ------
     ValueError
-        If a value is out of its range, a part is of the wrong kind, or a filter's cut-off is
+        If a value is out of its range, a part is of another class, or a filter's cut-off is
         not below half the sample rate.
     """
 
@@ -79,18 +89,19 @@ class SimulatedStage:
         "_gauge",
         "_generator",
         "_hysteresis",
+        "_layouts",
         "_mechanics",
         "_noisy",
-        "_plays",
         "_rest",
+        "_run_loop",
         "_sample_rate",
         "_schedule",
         "_seed",
         "_settings",
         "_state",
+        "_step_loop",
         "_temperature",
         "_temperature_law",
-        "_terms",
     )
 
     def __init__(
@@ -107,54 +118,54 @@ class SimulatedStage:
         seed: int = 0,
     ) -> None:
         self._sample_rate = positive("sample_rate", sample_rate)
-        self._hysteresis = _part("hysteresis", hysteresis, HYSTERESES)
-        self._creep = creep if creep is None else _part("creep", creep, (Creep,))
-        self._mechanics = (
-            mechanics if mechanics is None else _part("mechanics", mechanics, (MassSpringDamper,))
-        )
-        self._amplifier = Amplifier() if amplifier is None else _part("amplifier", amplifier, (Amplifier,))
-        self._gauge = Gauge() if gauge is None else _part("gauge", gauge, (Gauge,))
-        self._schedule = (
-            None if gain_schedule is None else _schedule("gain_schedule", "factor", gain_schedule)
-        )
-        self._temperature = _temperature(temperature)
-        self._temperature_law = (
-            TemperatureLaw()
-            if temperature_law is None
-            else _part("temperature_law", temperature_law, (TemperatureLaw,))
-        )
+        if not hasattr(type(hysteresis), "stage_settings"):
+            raise ValueError(
+                "hysteresis must be a LinearGain or another model with stage_settings(), "
+                f"got {type(hysteresis).__name__}"
+            )
+        self._hysteresis = hysteresis
+        self._creep: Creep | None = _of_class("creep", creep, Creep)
+        self._mechanics: MassSpringDamper | None = _of_class("mechanics", mechanics, MassSpringDamper)
+        self._amplifier: Amplifier = _of_class("amplifier", amplifier, Amplifier) or Amplifier()
+        self._gauge: Gauge = _of_class("gauge", gauge, Gauge) or Gauge()
+        self._schedule = _schedule("gain_schedule", "factor", gain_schedule)
+        self._temperature = _schedule("temperature", "temperature", _for_all_times(temperature))
+        law: TemperatureLaw | None = _of_class("temperature_law", temperature_law, TemperatureLaw)
+        self._temperature_law = law or TemperatureLaw()
         self._seed = integer("seed", seed)
         self._noisy = self._gauge.noise > 0.0
         self._displacement: float | FloatArray
+        self._step_loop: Any = None
+        self._run_loop: Any = None
         self._build()
         self.reset()
 
     def _build(self) -> None:
-        """Lay the parts out in the flat vectors of the kernel."""
-        fs = self._sample_rate
-        head, thresholds, weights = _hysteresis_settings(self._hysteresis)
-        gains = np.empty(0) if self._creep is None else self._creep.gains
-        decays = np.empty(0) if self._creep is None else self._creep.decays(fs)
-        mechanics = _NO_MECHANICS if self._mechanics is None else self._mechanics.coefficients(fs)
-        amplifier, gauge = self._amplifier._settings(fs), self._gauge._settings(fs)
-        self._plays, self._terms = thresholds.size, gains.size
-        self._settings = np.concatenate(
-            (amplifier, head, mechanics, gauge, thresholds, weights, gains, decays)
+        """Lay the parts out as the compiled loops know them; what is not there does nothing."""
+        fs, offset = self._sample_rate, self._hysteresis.offset
+        hysteresis = self._hysteresis.stage_settings()
+        creep = {} if self._creep is None else {"gains": self._creep.gains, "decays": self._creep.decays(fs)}
+        terms = len(creep.get("gains", ()))
+        layouts = getattr(self._hysteresis, "stage_layouts", kernel.hysteresis_layouts)
+        own_state, own_settings = layouts(hysteresis)
+        settings_layout = kernel.settings_layout(own_settings, terms)
+        state_layout = kernel.state_layout(own_state, terms, self._gauge.delay)
+        self._layouts = state_layout, settings_layout
+        self._settings = new(
+            settings_layout,
+            amplifier=self._amplifier._settings(fs),
+            hysteresis=hysteresis,
+            creep=creep,
+            offset=offset,
+            mechanics=_NO_MECHANICS if self._mechanics is None else self._mechanics.coefficients(fs),
+            gauge=self._gauge._settings(fs),
         )
-        offset = self._hysteresis.offset
-        sample, coleman_hodgdon = np.zeros(kernel.SAMPLE), np.zeros(2)
-        gauge_filter, delay_line = self._gauge._rest_state(offset, gauge)
-        self._rest = np.concatenate(
-            (
-                sample,
-                self._amplifier._rest_state(),
-                coleman_hodgdon,
-                (offset, 0.0),
-                gauge_filter,
-                np.zeros(self._plays + self._terms),
-                delay_line,
-            )
-        )
+        self._rest = new(state_layout, mechanics=(offset, 0.0), gauge=self._gauge._rest(offset, fs))
+
+    def __getstate__(self) -> Any:
+        # Machine code is neither copied nor pickled: it is looked up again.
+        kept, slots = cast(Any, super().__getstate__())
+        return kept, {**slots, "_step_loop": None, "_run_loop": None}
 
     @property
     def sample_rate(self) -> float:
@@ -210,10 +221,12 @@ class SimulatedStage:
         float
             Measured displacement at the end of the sample [µm].
         """
-        factor, shape = (float(values[0]) for values in self._factors(1))
+        factor, shape = self._factors(1)
         noise = self._generator.standard_normal() if self._noisy else 0.0
-        measured, displacement = kernel.step(
-            self._state, self._settings, self._plays, self._terms, number_or_nan(u), noise, factor, shape
+        if self._step_loop is None:
+            self._step_loop = kernel.step.of(*self._layouts)
+        measured, displacement = self._step_loop(
+            self._state, self._settings, number_or_nan(u), noise, factor.item(), shape.item()
         )
         self._count += 1
         self._displacement = displacement
@@ -240,7 +253,9 @@ class SimulatedStage:
         x = array_1d("u", u, allow_nan=True).copy()  # voltage, which the kernel turns into displacement
         measured = np.empty_like(x)
         disturbances = self._disturbances(x.size)
-        kernel.run(self._state, self._settings, self._plays, self._terms, x, *disturbances, measured)
+        if self._run_loop is None:
+            self._run_loop = kernel.run.of(*self._layouts)
+        self._run_loop(self._state, self._settings, x, *disturbances, measured)
         self._displacement = x
         return measured
 
@@ -276,35 +291,17 @@ class SimulatedStage:
         return factor, shape
 
 
-def _part(name: str, value: Any, kinds: tuple[type, ...]) -> Any:
-    if not isinstance(value, kinds):
-        expected = " or ".join(kind.__name__ for kind in kinds)
-        raise ValueError(f"{name} must be a {expected}, got {type(value).__name__}")
+def _of_class(name: str, value: Any, cls: type) -> Any:
+    """Return a part of the stage, or None, as it came."""
+    if value is not None and not isinstance(value, cls):
+        raise ValueError(f"{name} must be a {cls.__name__}, got {type(value).__name__}")
     return value
 
 
-def _hysteresis_settings(model: Hysteresis) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(gain, a, b, centre, width, offset), thresholds and weights: all models are cases of one sum."""
-    none = np.empty(0)
-    if isinstance(model, ColemanHodgdon):
-        return np.array([model.c, model.a, model.b, 0.0, 0.0, model.offset]), none, none
-    head = np.array([model.gain, 0.0, 0.0, 0.0, 0.0, model.offset])
-    if isinstance(model, PrandtlIshlinskii):
-        if not model.is_plain:
-            raise ValueError(
-                "hysteresis must have neither bends nor creep of its own: pass creep=model.creep to the stage"
-            )
-        return head, model.thresholds, model.weights
-    if isinstance(model, Preisach):
-        head[3:5] = model.centre, model.width
-        return head, model.thresholds, model.weights
-    return head, none, none
-
-
-def _schedule(name: str, quantity: str, schedule: Any) -> Schedule:
-    """A schedule as a function of an array of times."""
-    if callable(schedule):
-        return cast(Schedule, schedule)
+def _schedule(name: str, quantity: str, schedule: Any) -> Schedule | None:
+    """A schedule as a function of an array of times; None without one."""
+    if schedule is None or callable(schedule):
+        return cast(Schedule | None, schedule)
     table = np.array(schedule, dtype=np.float64)
     if table.ndim != 2 or table.shape[0] < 1 or table.shape[1] != 2:
         raise ValueError(f"{name} must have shape (M, 2), time and {quantity}, got {table.shape}")
@@ -314,13 +311,11 @@ def _schedule(name: str, quantity: str, schedule: Any) -> Schedule:
     return functools.partial(cast(Any, np.interp), xp=table[:, 0], fp=table[:, 1])
 
 
-def _temperature(temperature: Any) -> Schedule | None:
-    """The schedule of the temperature; a plain number stands for all times."""
-    if temperature is None:
-        return None
-    if not callable(temperature) and np.ndim(temperature) == 0:
-        temperature = [[0.0, finite("temperature", temperature)]]
-    return _schedule("temperature", "temperature", temperature)
+def _for_all_times(temperature: Any) -> Any:
+    """A plain number as a table that holds at all times."""
+    if temperature is None or callable(temperature) or np.ndim(temperature) != 0:
+        return temperature
+    return [[0.0, finite("temperature", temperature)]]
 
 
 def _values(name: str, quantity: str, schedule: Schedule, times: FloatArray) -> FloatArray:

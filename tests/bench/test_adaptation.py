@@ -15,11 +15,12 @@ from typer.testing import CliRunner, Result
 
 import piezoest as pz
 from piezoest.bench import adaptation as bench
-from piezoest.bench import asked, policy_figures
-from piezoest.bench.asked import criteria
+from piezoest.bench import policy_figures, targets
 from piezoest.bench.candidates import candidate
+from piezoest.bench.cases import RIGHT_MODEL
 from piezoest.bench.combinations import COMBINATIONS, Combination
-from piezoest.bench.scenarios import RIGHT_MODEL, SCENARIOS
+from piezoest.bench.scenarios import SCENARIOS
+from piezoest.bench.targets import criteria
 from piezoest.cli import app
 from piezoest.policies import DeadZone, NormBound
 
@@ -186,25 +187,27 @@ def test_criteria() -> None:
     assert criteria([]) == []
 
 
-def test_what_is_asked_is_planned_and_its_rows_are_found() -> None:
-    jobs = asked.jobs_asked(30, {"sample_rate": FS})
+def test_targets_are_planned_and_their_rows_are_found() -> None:
+    jobs = targets.target_jobs(30, {"sample_rate": FS})
     titles = [job.title or "" for job in jobs]
     assert {title: titles.count(title) for title in titles} == {
-        one.title: one.seeds or 30 for one in asked.SITUATIONS
+        one.title: one.seeds or 30 for one in targets.SITUATIONS
     }
-    assert list(asked.describe(titles)) == [one.title for one in asked.SITUATIONS]
+    assert list(targets.describe(titles)) == [one.title for one in targets.SITUATIONS]
     # At the paper's rate and amplitudes, whatever is chosen for the rest.
     triangles = [job for job in jobs if (job.title or "").startswith("triangle")]
     assert {job.overrides["sample_rate"] for job in triangles} == {50_000.0}
     assert {(job.overrides["amplitude"], job.overrides["frequency"]) for job in triangles} == set(
-        asked.TRIANGLES
+        targets.TRIANGLES
     )
-    creepless = next(job for job in jobs if job.title == asked.WITHOUT_CREEP)
+    creepless = next(job for job in jobs if job.title == targets.WITHOUT_CREEP)
     assert (creepless.scenario, creepless.overrides) == ("dwell", {"sample_rate": FS, "creep": False})
     rows = [
-        row(title, name) for title in dict.fromkeys(titles) for name in (asked.DEFAULT, asked.OUTPUT_ERROR)
+        row(title, name)
+        for title in dict.fromkeys(titles)
+        for name in (targets.DEFAULT, targets.OUTPUT_ERROR)
     ]
-    rows += [row(name, fixed) for name in asked.CHANGES for fixed in asked.FIXED]
+    rows += [row(name, fixed) for name in targets.CHANGES for fixed in targets.FIXED]
     found = criteria(rows)
     assert [each["kind"] for each in found] == [
         *["settling"] * 4, *["hindsight"] * 4, *["linear"] * 5, *["rest"] * 4, "divergence",
@@ -213,16 +216,16 @@ def test_what_is_asked_is_planned_and_its_rows_are_found() -> None:
 
 
 def test_the_best_fixed_memory_is_that_with_the_least_settled_error() -> None:
-    names = asked.FIXED
+    names = targets.FIXED
     rows = {
         ("cold-start", names[0]): row("cold-start", names[0], settled_max=0.03),
         ("cold-start", names[1]): row("cold-start", names[1], settled_max=0.01),
         ("cold-start", names[2]): row("cold-start", names[2], settled_max=None),
     }
-    best = asked.best_fixed(rows, "cold-start")
+    best = targets.best_fixed(rows, "cold-start")
     assert best is not None
     assert best["estimator"] == names[1]
-    assert asked.best_fixed(rows, "gain-step") is None
+    assert targets.best_fixed(rows, "gain-step") is None
 
 
 def test_a_dwell_moves_no_parameter_of_the_model_in_use() -> None:

@@ -132,7 +132,7 @@ def test_wrong_rate() -> None:
 @pytest.mark.parametrize(
     ("kind", "arguments", "words"),
     [
-        (faults.Missing, {"part": 1.5}, "part"),
+        (faults.Missing, {"share": 1.5}, "share"),
         (faults.Gap, {"start": -1.0}, "start"),
         (faults.Saturation, {"limit": 0.0}, "limit"),
         (faults.WrongRate, {"factor": 0.0}, "factor"),

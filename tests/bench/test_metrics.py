@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import piezoest as pz
+from piezoest.bench.cases import RIGHT_GAIN, RIGHT_MODEL, Case
 from piezoest.bench.metrics import Metrics, deviation, edges_after, edges_before, measure, settling
-from piezoest.bench.scenarios import RIGHT_GAIN, RIGHT_MODEL, Case
 
 PERIOD = 10
 AMPLITUDE = 5.0  # settled below 0.06

@@ -14,9 +14,10 @@ from typer.testing import CliRunner
 
 from piezoest.bench import campaign, estimators, ranking, verdicts
 from piezoest.bench.candidates import candidate
+from piezoest.bench.cases import RIGHT_MODEL
 from piezoest.bench.ranking import Budget
 from piezoest.bench.runner import COLUMNS, Row, Settings
-from piezoest.bench.scenarios import RIGHT_MODEL, SCENARIOS
+from piezoest.bench.scenarios import SCENARIOS
 from piezoest.bench.store import Store
 from piezoest.bench.tuning import Between, OneOf, Tunable, draws, tunables
 from piezoest.cli import app

@@ -273,7 +273,7 @@ def test_summary(own: str) -> None:
     over = {row["estimator"]: row for row in suite.overview(summary)}
     assert over["HysteresisEKF"]["runs"] == 4
     assert over[f"{own}:Still"]["settling_time"] is None
-    # Still never learns: its error stays what its start makes of it, in parts of 5 µm.
+    # Still never learns: its error stays what its start makes of it, relative to 5 µm.
     assert over[f"{own}:Still"]["settled_max"] == pytest.approx(still["settled_max"]["median"] / 5.0)
 
 

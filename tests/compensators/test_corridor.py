@@ -95,8 +95,10 @@ def test_a_unipolar_stage_with_an_identified_start_settles(every: int) -> None:
     log = 6.5 * np.concatenate([centre * up, centre + np.asarray(pz.signals.triangle(7.0, 5.0, 3, FS))])
     identified = pz.BatchFit(FS)
     identified.run(log, unipolar(1).run(log))
-    estimator = pz.HysteresisRLS(FS, initial_model=identified.model)
-    compensator = pz.InverseCompensator(identified.model, pz.VoltageLimits(0.0, 150.0))
+    model = identified.model
+    assert isinstance(model, pz.ColemanHodgdon)
+    estimator = pz.HysteresisRLS(FS, initial_model=model)
+    compensator = pz.InverseCompensator(model, pz.VoltageLimits(0.0, 150.0))
     errors, voltages = hand_wired(r, unipolar(0), estimator, compensator, every)
     assert per_period(errors[s.size :], 6)[2:].max() < 0.1
     assert voltages.min() >= 0.0

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.equations.lead import lead_coefficients, lead_step
+from piezoest.equations.lead import SETTINGS, STATE, lead_coefficients, lead_step
+from piezoest.layout import Named, new
 
 FS = 50_000.0
 MECHANICS = pz.MassSpringDamper(780.0, 0.02)
@@ -23,8 +24,8 @@ def lead(model: pz.ColemanHodgdon | pz.LinearGain, **options: Any) -> pz.LeadFil
 def test_a_parabola_is_led_exactly(smoothing: float) -> None:
     numbers = lead_coefficients(780.0, 0.02, 3e-5, smoothing, 1.0 / FS)
     t = np.arange(2000) / FS
-    state = np.zeros(3)
-    led = [lead_step(state, r, numbers) for r in (20.0 * t + 300.0 * t**2).tolist()]
+    state, settings = Named(new(STATE), STATE), Named(new(SETTINGS, **numbers), SETTINGS)
+    led = [lead_step(state, r, settings) for r in (20.0 * t + 300.0 * t**2).tolist()]
     omega, lag, v, a = 2.0 * np.pi * 780.0, 2e-5, 20.0 + 600.0 * t[-1], 600.0
     c1, c2 = 0.04 / omega + lag, 1.0 / omega**2 + 0.04 / omega * lag + lag**2 / 2.0
     assert led[-1] == pytest.approx(20.0 * t[-1] + 300.0 * t[-1] ** 2 + c1 * v + c2 * a, abs=1e-9)

@@ -18,7 +18,7 @@ THETA = np.array([0.021, 0.147, 0.0043])
 def test_projection_is_admissible(factors: list[float], seed: int) -> None:
     theta = THETA * np.array(factors)
     L = np.random.default_rng(seed).normal(size=(3, 3)) * THETA[:, None]
-    project_admissible(theta, (L @ L.T).ravel(), 3, 1e-4, 1e-3, 1e-3)
+    project_admissible(theta, L @ L.T, 1e-4, 1e-3, 1e-3)
     assert is_admissible(theta[0], theta[1], theta[2], 1e-4, 1e-3, 0.999e-3) == 1.0
 
 
@@ -30,7 +30,7 @@ def test_projection_is_the_nearest_point(seed: int) -> None:
     L = (np.eye(3) + 0.3 * rng.normal(size=(3, 3))) * THETA[:, None]
     W = np.linalg.inv(L @ L.T)
     projected = theta.copy()
-    project_admissible(projected, (L @ L.T).ravel(), 3, 1e-4, 1e-3, 1e-6)
+    project_admissible(projected, L @ L.T, 1e-4, 1e-3, 1e-6)
 
     def distance(parts: object) -> float:
         difference = np.asarray(parts) * THETA - theta
@@ -60,7 +60,7 @@ def test_further_parameters_move_as_their_correlation_says() -> None:
     theta = np.array([0.02, 0.15, 0.0075, 1.0])
     P = np.diag([0.02, 0.15, 0.004, 1.0]) ** 2
     P[2, 3] = P[3, 2] = 0.5 * 0.004
-    project_admissible(theta, P.ravel(), 4, 1e-4, 1e-3, 1e-3)
+    project_admissible(theta, P, 1e-4, 1e-3, 1e-3)
     assert theta[3] < 1.0
 
 

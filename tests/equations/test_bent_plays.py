@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import piezoest as pz
 from piezoest.equations import bent_plays, turning_points
 from piezoest.equations.play import play
+from piezoest.layout import Named, new
 
 RATE = 1000.0
 
@@ -79,13 +80,13 @@ def test_refuses(fields: dict[str, Any], name: str) -> None:
 @given(seed=st.integers(0, 10_000), scale=st.floats(0.1, 10.0))
 def test_turning_points_hold_all_the_memory_of_plays(seed: int, scale: float) -> None:
     u = np.round(scale * np.cumsum(np.random.default_rng(seed).standard_normal(150)), 1)
-    memory = np.zeros(turning_points.SIZE)
+    memory = Named(new(turning_points.TURNING_POINTS), turning_points.TURNING_POINTS)
     thresholds = np.linspace(0.1, 8.0, 9)
     y = np.zeros(9)
     for value in u.tolist():
         y = play(y, value, thresholds)
-        turning_points.remember(memory, 0, value)
-        np.testing.assert_array_equal([turning_points.recall(memory, 0, r) for r in thresholds], y)
+        turning_points.remember(memory, value)
+        np.testing.assert_array_equal([turning_points.recall(memory, r) for r in thresholds], y)
 
 
 def line(*turns: float) -> Any:

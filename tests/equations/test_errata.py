@@ -10,6 +10,7 @@ import pytest
 from piezoest import ColemanHodgdon
 from piezoest.equations import coleman_hodgdon as ch
 from piezoest.equations import least_squares as ls
+from piezoest.layout import Named, new, numbers, record
 
 TABLE_I = [
     (3.26e-2, 0.136, 5.96e-3),
@@ -67,9 +68,12 @@ def test_a6_to_the_letter_freezes_for_good() -> None:
         P = letter(P, loud)
     np.testing.assert_array_equal(P, frozen)
 
-    theta, flat, work = np.zeros(2), np.diag([1.0, 0.9]).ravel().copy(), np.zeros(4 * (2 + 4))
+    theta, P = np.zeros(2), np.diag([1.0, 0.9])
+    layout = record(theta=numbers(2), P=numbers(2, 2))
+    rates = Named(new(layout), layout)
     for phi in [quiet] * 100 + [loud] * 1000:
-        ls.continuous_update(theta, flat, phi, 0.0, 2, h, 1.0 / memory, 1.0, bound, 1.0, work)
-    assert ls.trace(flat, 2) <= bound
+        ls.continuous_step(theta, P, phi, 0.0, h, 1.0 / memory, 1.0, rates)
+        ls.continuous_correction(theta, P, h, bound, rates)
+    assert ls.trace(P) <= bound
     # What the regressor tells, it keeps telling.
-    assert loud @ flat.reshape(2, 2) @ loud < loud @ frozen @ loud
+    assert loud @ P @ loud < loud @ frozen @ loud

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import casadi
 import numpy as np
 import pytest
-from numba import njit
 
+from piezoest.compile import Record, compiled
 from piezoest.equations import coleman_hodgdon as hysteresis
 from piezoest.equations import kalman
+from piezoest.layout import NUMBER, new, numbers, record
+from tests.equations.three_ways import three_ways
 from tests.reference import kalman as reference
 
 THETA = (0.021, 0.057, 0.204)
@@ -31,27 +32,26 @@ def test_predict_covariance_is_the_textbook(n: int) -> None:
     row = np.array([0.9, -0.2, 0.3, 0.0, 0.0][:n])
     F = np.eye(n)
     F[0] = row
-    flat = P.ravel().copy()
-    kalman.predict_covariance(flat, row, n, q, n, np.empty(n))
-    np.testing.assert_allclose(
-        flat.reshape(n, n), reference.predict_covariance(P, F, np.diag(q)), rtol=1e-13, atol=1e-14
-    )
-    assert np.array_equal(flat.reshape(n, n), flat.reshape(n, n).T)
+    got = P.copy()
+    kalman.predict_covariance(got, row, n, q)
+    expected = reference.predict_covariance(P, F, np.diag(q))
+    np.testing.assert_allclose(got, expected, rtol=1e-13, atol=1e-14)
+    assert np.array_equal(got, got.T)
 
 
 @pytest.mark.parametrize("n", [1, 2, 4, 5])
 def test_update_is_the_textbook(n: int) -> None:
     s, P = state(n), covariance(n)
     h = np.array([1.0, 0.0, 0.0, 21.0, 1.0][:n])
-    flat, gain = P.ravel().copy(), np.empty(n)
+    got, gain = P.copy(), np.empty(n)
     moved = s.copy()
-    S = kalman.update(moved, flat, h, 0.7, 0.04, n, gain, np.empty(2 * n))
+    S = kalman.update(moved, got, h, 0.7, 0.04, gain)
     expected_s, expected_P, K, expected_S = reference.update(s, P, h, 0.7, 0.04)
     assert pytest.approx(expected_S, rel=1e-13) == S
     np.testing.assert_allclose(gain, K, rtol=1e-12)
     np.testing.assert_allclose(moved, expected_s, rtol=1e-12)
-    np.testing.assert_allclose(flat.reshape(n, n), expected_P, rtol=1e-10, atol=1e-13)
-    assert np.array_equal(flat.reshape(n, n), flat.reshape(n, n).T)
+    np.testing.assert_allclose(got, expected_P, rtol=1e-10, atol=1e-13)
+    assert np.array_equal(got, got.T)
 
 
 def test_a_whole_record_is_the_textbook() -> None:
@@ -60,10 +60,10 @@ def test_a_whole_record_is_the_textbook() -> None:
     u = 33.0 * np.sin(np.linspace(0.0, 20.0, 400))
     rng = np.random.default_rng(1)
     s = np.array([0.0, 0.02, 0.06, 0.18])
-    flat = np.diag([1.0, 1e-4, 1e-3, 1e-2]).ravel().copy()
-    expected, P = s.copy(), flat.reshape(n, n).copy()
+    got = np.diag([1.0, 1e-4, 1e-3, 1e-2])
+    expected, P = s.copy(), got.copy()
     plant = np.array([0.3, *THETA])
-    row, gain, work = np.zeros(n), np.empty(n), np.empty(n * n)
+    row, gain = np.zeros(n), np.empty(n)
     for k in range(1, u.size):
         du = u[k] - u[k - 1]
         h = np.array([1.0, 0.0, 0.0, u[k]])
@@ -71,13 +71,13 @@ def test_a_whole_record_is_the_textbook() -> None:
         x = float(h @ plant) + 1e-3 * rng.standard_normal()
         row[:3] = hysteresis.hysteresis_jacobian(s[0], du, s[1], s[2])
         s[0] = hysteresis.hysteresis_step(s[0], du, s[1], s[2])
-        kalman.predict_covariance(flat, row, n, q, n, work)
-        kalman.update(s, flat, h, x - kalman.measure(s, h, n), R, n, gain, work)
+        kalman.predict_covariance(got, row, n, q)
+        kalman.update(s, got, h, x - kalman.measure(s, h), R, gain)
         expected, F = reference.transition(expected, du)
         P = reference.predict_covariance(P, F, np.diag(q))
         expected, P, _, _ = reference.update(expected, P, h, float(x - h @ expected), R)
     np.testing.assert_allclose(s, expected, rtol=1e-8)
-    np.testing.assert_allclose(flat.reshape(n, n), P, rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(got, P, rtol=1e-6, atol=1e-15)
     np.testing.assert_allclose(s[1:], THETA, rtol=0.01)
 
 
@@ -88,7 +88,7 @@ def test_projection_is_the_nearest_point(n: int) -> None:
     g[2], g[3] = -2.0, 1.0
     for least in (0.5, float(g @ s) - 0.01):
         moved = s.copy()
-        said = kalman.project(moved, P.ravel(), g, least, n, np.empty(n))
+        said = kalman.project(moved, P, g, least)
         np.testing.assert_allclose(moved, reference.project(s, P, g, least), rtol=1e-9)
         assert said == float(g @ s < least)
         assert g @ moved >= least - 1e-12
@@ -98,7 +98,7 @@ def test_projection_without_any_variance_stays() -> None:
     s = state(4)
     g = np.array([0.0, 1.0, 0.0, 0.0])
     moved = s.copy()
-    assert kalman.project(moved, np.zeros(16), g, 1.0, 4, np.empty(4)) == 1.0
+    assert kalman.project(moved, np.zeros((4, 4)), g, 1.0) == 1.0
     np.testing.assert_array_equal(moved, s)
 
 
@@ -109,40 +109,45 @@ def test_variance_of_the_product_is_that_of_gaussians() -> None:
     draws = np.random.default_rng(0).multivariate_normal([0.0, 0.0], P[:2, :2], size=400_000)
     sampled = np.var(draws[:, 0] * draws[:, 1])
     travel = 3.0
-    got = kalman.bilinear_variance(P.ravel(), -travel, 0.02, 4) / (travel / 0.02)
+    got = kalman.bilinear_variance(P, -travel, 0.02) / (travel / 0.02)
     assert got == pytest.approx(sampled, rel=0.02)
-    assert kalman.bilinear_variance(P.ravel(), 0.0, 0.02, 4) == 0.0
-    assert np.isfinite(kalman.bilinear_variance(P.ravel(), 1.0, 0.0, 4))
+    assert kalman.bilinear_variance(P, 0.0, 0.02) == 0.0
+    assert np.isfinite(kalman.bilinear_variance(P, 1.0, 0.0))
 
 
-@njit
-def filtered(P: Any, q: Any, R: float, samples: int) -> float:
-    """Run P through so many samples of a sine; the least variance on the way."""
-    n = 4
-    row, h, s = np.zeros(n), np.zeros(n), np.array([0.0, 0.021, 0.057, 0.204])
-    gain, work = np.empty(n), np.empty(n * n)
-    least, u_last = np.inf, 0.0
+FILTER = record(
+    R=NUMBER, least=NUMBER, s=numbers(4), P=numbers(4, 4), q=numbers(4), row=numbers(4), h=numbers(4),
+    gain=numbers(4),
+)  # fmt: skip
+
+
+@compiled
+def filtered(case: Record, samples: int) -> None:
+    """Run P through so many samples of a sine; the least variance on the way goes into `least`."""
+    u_last = 0.0
+    s, P, row = case.s, case.P, case.row
     for k in range(samples):
         u = 33.0 * np.sin(6e-4 * k)
         du = u - u_last
         u_last = u
         row[0], row[1], row[2] = hysteresis.hysteresis_jacobian(s[0], du, s[1], s[2])
         s[0] = hysteresis.hysteresis_step(s[0], du, s[1], s[2])
-        kalman.predict_covariance(P, row, n, q, n, work)
-        h[0], h[3] = 1.0, u
-        kalman.update(s, P, h, 0.0, R, n, gain, work)
-        for i in range(n):
-            least = min(least, P[i * n + i])
-    return float(least)
+        kalman.predict_covariance(P, row, 4, case.q)
+        case.h[0], case.h[3] = 1.0, u
+        kalman.update(s, P, case.h, 0.0, case.R, case.gain)
+        for i in range(4):
+            case.least = min(case.least, P[i, i])
 
 
 @pytest.mark.parametrize("noise", [1.5e-3, 1e-6])
 @pytest.mark.parametrize("walk", [0.0, 0.3])
 def test_stays_symmetric_positive_definite_over_a_million_samples(noise: float, walk: float) -> None:
-    flat = np.diag([1.0, 1e-4, 1e-3, 1e-2]).ravel().copy()
     q = (walk * np.array([1.0, 0.021, 0.057, 0.204])) ** 2 / 50_000.0
-    assert filtered(flat, q, noise**2, 1_000_000) > 0.0
-    P = flat.reshape(4, 4)
+    s, P = np.array([0.0, 0.021, 0.057, 0.204]), np.diag([1.0, 1e-4, 1e-3, 1e-2])
+    case = new(FILTER, R=noise**2, least=np.inf, s=s, P=P, q=q)
+    filtered.of(FILTER)(case, 1_000_000)
+    assert case["least"] > 0.0
+    P = case["P"]
     assert np.array_equal(P, P.T)
     scale = np.sqrt(np.diag(P))
     # Without process noise w_h becomes a function of a and b, and P truly singular: but for
@@ -153,51 +158,42 @@ def test_stays_symmetric_positive_definite_over_a_million_samples(noise: float, 
 # ---------------------------------------------------------------- one source, three ways
 
 
-def predicted(P: Any, row: Any, q: Any) -> Any:
-    kalman.predict_covariance(P, row, 4, q, 4, row * 0.0)
-    return P
+CASE = record(
+    y=NUMBER, least=NUMBER, s=numbers(4), P=numbers(4, 4), h=numbers(4), q=numbers(4), gain=numbers(4)
+)
 
 
-def updated(s: Any, P: Any, h: Any, y: Any) -> Any:
-    kalman.update(s, P, h, y, 0.04, 4, h * 0.0, P * 0.0)
-    return s, P
+@compiled
+def predicted(case: Record) -> None:
+    kalman.predict_covariance(case.P, case.h, 4, case.q)
 
 
-def projected(s: Any, P: Any, g: Any, least: Any) -> Any:
-    kalman.project(s, P, g, least, 4, g * 0.0)
-    return s
+@compiled
+def updated(case: Record) -> None:
+    case.y = kalman.update(case.s, case.P, case.h, case.y, 0.04, case.gain)
 
 
-def widened(P: Any, du: Any, a: Any) -> Any:
-    return kalman.bilinear_variance(P, du, a, 4)
+@compiled
+def projected(case: Record) -> None:
+    case.y = kalman.project(case.s, case.P, case.h, case.least)
 
 
-P4 = covariance(4).ravel()
-CASES: list[tuple[Any, tuple[Any, ...]]] = [
-    (predicted, (P4, np.array([0.9, -0.2, 0.3, 0.0]), np.linspace(0.1, 0.5, 4))),
-    (updated, (state(4), P4, np.array([1.0, 0.0, 0.0, 21.0]), 0.7)),
-    (projected, (state(4), P4, np.array([0.0, 0.0, -2.0, 1.0]), 0.5)),
-    (projected, (state(4), P4, np.array([0.0, 0.0, -2.0, 1.0]), -0.5)),
-    (widened, (P4, -2.0, 0.02)),
+@compiled
+def widened(case: Record) -> None:
+    case.y = kalman.bilinear_variance(case.P, case.y, case.least)
+
+
+CASES: list[tuple[Any, dict[str, Any]]] = [
+    (predicted, {"h": [0.9, -0.2, 0.3, 0.0], "q": np.linspace(0.1, 0.5, 4)}),
+    (updated, {"h": [1.0, 0.0, 0.0, 21.0], "y": 0.7}),
+    (projected, {"h": [0.0, 0.0, -2.0, 1.0], "least": 0.5}),
+    (projected, {"h": [0.0, 0.0, -2.0, 1.0], "least": -0.5}),
+    (widened, {"y": -2.0, "least": 0.02}),
 ]
 
 
-def flat(results: Any) -> Any:
-    return np.concatenate([np.ravel(r) for r in (results if isinstance(results, tuple) else (results,))])
-
-
-def copies(arguments: Any) -> Any:
-    return [a.copy() if isinstance(a, np.ndarray) else a for a in arguments]
-
-
-@pytest.mark.parametrize(("function", "arguments"), CASES)
-def test_numpy_numba_and_casadi_agree(function: Any, arguments: Any) -> None:
-    casadi.GlobalOptions.setNumpyMode(1)
-    plain = flat(function(*copies(arguments)))
-    compiled = flat(njit(function)(*copies(arguments)))
-    symbols = [casadi.SX.sym(f"v{i}", np.size(a)) for i, a in enumerate(arguments)]
-    results = function(*(casadi.SX(symbol) for symbol in symbols))
-    stacked = casadi.vertcat(*(results if isinstance(results, tuple) else (results,)))
-    symbolic = casadi.Function("f", symbols, [stacked])(*arguments).full().ravel()
-    np.testing.assert_allclose(compiled, plain, rtol=1e-14, atol=1e-15)
+@pytest.mark.parametrize(("function", "values"), CASES)
+def test_numpy_numba_and_casadi_agree(function: Any, values: dict[str, Any]) -> None:
+    plain, machine, symbolic = three_ways(function, CASE, s=state(4), P=covariance(4), **values)
+    np.testing.assert_allclose(machine, plain, rtol=1e-14, atol=1e-15)
     np.testing.assert_allclose(symbolic, plain, rtol=1e-14, atol=1e-15)

@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from typing import Any
 
-import casadi
 import numpy as np
 import pytest
-from numba import njit
 
+from piezoest.compile import Record, compiled
 from piezoest.equations import least_squares as ls
+from piezoest.layout import NUMBER, Named, new, numbers, record
+from tests.equations.three_ways import three_ways
 from tests.reference import least_squares as reference
 
 N = 3
+RATES = record(theta=numbers(N), P=numbers(N, N))
+
+
+def continuous_update(theta: Any, P: Any, phi: Any, z: Any, options: tuple[float, ...]) -> None:
+    """One sample of the continuous law; `options`: step, forgetting rate, whether normalised, bound."""
+    h, forgetting_rate, normalised, bound = options
+    rates = Named(new(RATES), RATES)
+    ls.continuous_step(theta, P, phi, z, h, forgetting_rate, normalised, rates)
+    ls.continuous_correction(theta, P, h, bound, rates)
 
 
 def problem(samples: int, seed: int = 0) -> tuple[Any, Any, Any]:
@@ -31,33 +41,32 @@ def test_discrete_update_is_the_textbook() -> None:
     phi, z, _ = problem(200)
     theta, P = start()
     expected_theta, expected_P = start()
-    flat, work = P.ravel().copy(), np.zeros(N)
     for k in range(200):
         before = expected_theta @ phi[k]
-        y, S = ls.discrete_update(theta, flat, phi[k], z[k], N, 0.98, 0.04, np.inf, 1.0, work)
+        y, S = ls.discrete_update(theta, P, phi[k], z[k], 0.98, 0.04, np.inf)
         assert y == pytest.approx(z[k] - before)
         assert pytest.approx(phi[k] @ expected_P @ phi[k] / 0.98 + 0.04) == S
         expected_theta, expected_P = reference.discrete(expected_theta, expected_P, phi[k], z[k], 0.98, 0.04)
     np.testing.assert_allclose(theta, expected_theta, rtol=1e-10)
-    np.testing.assert_allclose(flat.reshape(N, N), expected_P, rtol=1e-9)
-    assert np.array_equal(flat.reshape(N, N), flat.reshape(N, N).T)
+    np.testing.assert_allclose(P, expected_P, rtol=1e-9)
+    assert np.array_equal(P, P.T)
 
 
 def test_without_forgetting_is_lstsq() -> None:
     phi, z, _ = problem(300)
-    theta, flat, work = np.zeros(N), (1e8 * np.eye(N)).ravel(), np.zeros(N)
+    theta, P = np.zeros(N), 1e8 * np.eye(N)
     for k in range(300):
-        ls.discrete_update(theta, flat, phi[k], z[k], N, 1.0, 1.0, np.inf, 1.0, work)
+        ls.discrete_update(theta, P, phi[k], z[k], 1.0, 1.0, np.inf)
     np.testing.assert_allclose(theta, np.linalg.lstsq(phi, z)[0], rtol=1e-7)
-    np.testing.assert_allclose(flat.reshape(N, N), np.linalg.inv(phi.T @ phi), rtol=1e-6)
+    np.testing.assert_allclose(P, np.linalg.inv(phi.T @ phi), rtol=1e-6)
 
 
 def test_forgetting_is_weighted_least_squares() -> None:
     phi, z, _ = problem(300)
     mu = 0.97
-    theta, flat, work = np.zeros(N), (1e8 * np.eye(N)).ravel(), np.zeros(N)
+    theta, P = np.zeros(N), 1e8 * np.eye(N)
     for k in range(300):
-        ls.discrete_update(theta, flat, phi[k], z[k], N, mu, 1.0, np.inf, 1.0, work)
+        ls.discrete_update(theta, P, phi[k], z[k], mu, 1.0, np.inf)
     weight = np.sqrt(mu ** np.arange(299, -1, -1))
     expected = np.linalg.lstsq(phi * weight[:, None], z * weight)[0]
     np.testing.assert_allclose(theta, expected, rtol=1e-7)
@@ -68,15 +77,14 @@ def test_continuous_update_is_the_textbook(normalised: bool) -> None:
     phi, z, _ = problem(100)
     theta, P = start()
     expected_theta, expected_P = start()
-    flat, work = P.ravel().copy(), np.zeros(4 * (N + N * N))
     for k in range(100):
         arguments = (phi[k], z[k])
-        ls.continuous_update(theta, flat, *arguments, N, 0.02, 0.7, float(normalised), np.inf, 1.0, work)
+        continuous_update(theta, P, *arguments, (0.02, 0.7, float(normalised), np.inf))
         expected_theta, expected_P = reference.bogacki_shampine(
             expected_theta, expected_P, 0.02, *arguments, 0.7, normalised
         )
     np.testing.assert_allclose(theta, expected_theta, rtol=1e-11)
-    np.testing.assert_allclose(flat.reshape(N, N), expected_P, rtol=1e-11)
+    np.testing.assert_allclose(P, expected_P, rtol=1e-11)
 
 
 def test_continuous_law_converges_to_the_discrete_one() -> None:
@@ -92,12 +100,11 @@ def test_continuous_law_converges_to_the_discrete_one() -> None:
         h = times / steps
         theta_c, P = start()
         theta_d, _ = start()
-        P_c, P_d = P.ravel().copy(), P.ravel().copy()
-        long, short = np.zeros(4 * (N + N * N)), np.zeros(N)
+        P_c, P_d = P.copy(), P.copy()
         for k in range(steps):
             phi, z = signals((k + 0.5) * h)
-            ls.continuous_update(theta_c, P_c, phi, z, N, h, 0.5, 0.0, np.inf, 1.0, long)
-            ls.discrete_update(theta_d, P_d, phi, z, N, np.exp(-0.5 * h), 1.0 / h, np.inf, 1.0, short)
+            continuous_update(theta_c, P_c, phi, z, (h, 0.5, 0.0, np.inf))
+            ls.discrete_update(theta_d, P_d, phi, z, np.exp(-0.5 * h), 1.0 / h, np.inf)
         differences.append(np.max(np.abs(theta_c - theta_d)) + np.max(np.abs(P_c - P_d)))
     assert differences[2] < 2e-3
     assert differences[0] / differences[1] == pytest.approx(2.0, abs=0.3)
@@ -107,45 +114,36 @@ def test_continuous_law_converges_to_the_discrete_one() -> None:
 @pytest.mark.parametrize("law", ["discrete", "continuous"])
 def test_bound_holds_and_does_not_freeze(law: str) -> None:
     theta, P = start()
-    flat, bound = P.ravel().copy(), 1.5 * np.trace(P)
-    work = np.zeros(4 * (N + N * N))
+    bound = 1.5 * float(np.trace(P))
     quiet, loud = np.array([1e-3, 0.0, 0.0]), np.array([1.0, 1.0, -1.0])
 
     def update(phi: Any) -> None:
         if law == "discrete":
-            ls.discrete_update(theta, flat, phi, 0.0, N, 0.99, 1.0, bound, 1.0, work)
+            ls.discrete_update(theta, P, phi, 0.0, 0.99, 1.0, bound)
         else:
-            ls.continuous_update(theta, flat, phi, 0.0, N, 0.01, 0.05, 1.0, bound, 1.0, work)
+            continuous_update(theta, P, phi, 0.0, (0.01, 0.05, 1.0, bound))
 
     for _ in range(1000):
         update(quiet)
-        assert ls.trace(flat, N) <= bound * (1.0 + 1e-12)
-    full = ls.trace(flat, N)
+        assert ls.trace(P) <= bound * (1.0 + 1e-12)
+    full = ls.trace(P)
     for _ in range(300):
         update(loud)
-    assert ls.trace(flat, N) < full
+    assert ls.trace(P) < full
 
 
 @pytest.mark.parametrize("mu", [1.0, 0.99])
 def test_a_covariance_spoilt_by_rounding_heals(mu: float) -> None:
     """A regressor far beyond the noise leaves P - K phi' P to rounding: phi' P phi may be negative."""
     rng = np.random.default_rng(3)
-    theta, flat, work = np.zeros(N), (1e6 * np.eye(N)).ravel(), np.zeros(N)
+    theta, P = np.zeros(N), 1e6 * np.eye(N)
     true, negative = rng.normal(size=N), 0
     for _ in range(3000):
         phi = 1e5 * rng.normal(size=N)
-        _, S = ls.discrete_update(theta, flat, phi, phi @ true, N, mu, 1.0, np.inf, 1.0, work)
+        _, S = ls.discrete_update(theta, P, phi, phi @ true, mu, 1.0, np.inf)
         negative += S < 0.0
     assert negative < 30
     np.testing.assert_allclose(theta, true, atol=1e-5)
-
-
-def test_disabled_changes_nothing() -> None:
-    theta, P = start()
-    flat, before = P.ravel().copy(), theta.copy()
-    ls.discrete_update(theta, flat, np.ones(N), 3.0, N, 0.9, 1.0, np.inf, 0.0, np.zeros(N))
-    assert np.array_equal(theta, before)
-    assert np.array_equal(flat, P.ravel())
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -153,42 +151,36 @@ def test_floor_is_the_least_eigenvalue(seed: int) -> None:
     A = np.random.default_rng(seed).normal(size=(4, 4))
     P = A @ A.T
     least = np.linalg.eigvalsh(P)[0]
-    assert ls.above_floor(P.ravel(), 4, 0.999 * least, np.zeros(16)) == 1.0
-    assert ls.above_floor(P.ravel(), 4, 1.001 * least, np.zeros(16)) == 0.0
+    assert ls.above_floor(P, 0.999 * least, np.zeros((4, 4))) == 1.0
+    assert ls.above_floor(P, 1.001 * least, np.zeros((4, 4))) == 0.0
 
 
-def test_numpy_numba_and_casadi_agree() -> None:
-    casadi.GlobalOptions.setNumpyMode(1)
+CASE = record(z=NUMBER, S=NUMBER, theta=numbers(N), P=numbers(N, N), phi=numbers(N), rates=RATES)
+
+
+@compiled
+def discrete(case: Record) -> None:
+    _, case.S = ls.discrete_update(case.theta, case.P, case.phi, case.z, 0.98, 0.04, 50.0)
+
+
+@compiled
+def directional(case: Record) -> None:
+    _, case.S = ls.directional_update(case.theta, case.P, case.phi, case.z, 0.98, 0.04, 50.0)
+
+
+@compiled
+def continuous(case: Record) -> None:
+    _, case.S = ls.continuous_step(case.theta, case.P, case.phi, case.z, 0.02, 0.7, 1.0, case.rates)
+    ls.continuous_correction(case.theta, case.P, 0.02, 50.0, case.rates)
+
+
+@pytest.mark.parametrize("law", [discrete, directional, continuous])
+def test_numpy_numba_and_casadi_agree(law: Any) -> None:
     phi, z, _ = problem(1)
-
-    def discrete(theta: Any, P: Any, phi: Any, z: Any, work: Any) -> None:
-        ls.discrete_update(theta, P, phi, z, 3, 0.98, 0.04, 50.0, 1.0, work)
-
-    def continuous(theta: Any, P: Any, phi: Any, z: Any, work: Any) -> None:
-        ls.continuous_update(theta, P, phi, z, 3, 0.02, 0.7, 1.0, 50.0, 1.0, work)
-
-    laws: tuple[Any, ...] = (discrete, continuous)
-    for law in laws:
-        theta, P = start()
-        plain = (theta.copy(), P.ravel().copy())
-        law(*plain, phi[0], z[0], np.zeros(48))
-        compiled = (theta.copy(), P.ravel().copy())
-        njit(law)(*compiled, phi[0], z[0], np.zeros(48))
-        symbols = (
-            casadi.SX.sym("theta", 3),
-            casadi.SX.sym("P", 9),
-            casadi.SX.sym("phi", 3),
-            casadi.SX.sym("z"),
-        )
-        traced = [
-            np.array([symbol[i] for i in range(symbol.numel())], dtype=object) for symbol in symbols[:2]
-        ]
-        law(*traced, symbols[2], symbols[3], np.zeros(48, dtype=object))
-        function = casadi.Function("law", list(symbols), [casadi.vertcat(*part) for part in traced])
-        symbolic = [np.asarray(part).ravel() for part in function(theta, P.ravel(), phi[0], z[0])]
-        for i in range(2):
-            np.testing.assert_allclose(compiled[i], plain[i], rtol=1e-13)
-            np.testing.assert_allclose(symbolic[i], plain[i], rtol=1e-13)
+    theta, P = start()
+    plain, machine, symbolic = three_ways(law, CASE, theta=theta, P=P, phi=phi[0], z=z[0])
+    np.testing.assert_allclose(machine, plain, rtol=1e-13)
+    np.testing.assert_allclose(symbolic, plain, rtol=1e-13)
 
 
 def test_a_variance_walks_up_to_its_ceiling_and_no_further() -> None:

@@ -101,9 +101,9 @@ def test_inverse_is_kuhnens_operator(u: list[float]) -> None:
 def test_numpy_numba_and_casadi_agree(function: Any) -> None:
     casadi.GlobalOptions.setNumpyMode(1)
     y, value = casadi.SX.sym("y", 4), casadi.SX.sym("u")
-    after = casadi.SX(y)
+    after = np.array(casadi.vertsplit(y), dtype=object)
     result = function(after, value, GAIN, THRESHOLDS, WEIGHTS)
-    symbolic = casadi.Function("f", [y, value], [result, after])
+    symbolic = casadi.Function("f", [y, value], [result, casadi.vertcat(*after)])
 
     @njit
     def compiled(y: Any, value: float, gain: float, thresholds: Any, weights: Any) -> Any:

@@ -6,27 +6,24 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit
 
+from piezoest.compile import Record, Vector, compiled
 from piezoest.equations import recent_path
 from piezoest.equations.coleman_hodgdon import hysteresis_step
+from piezoest.layout import Named, new
 
-START = 3  # anywhere in a larger array
 
-
-def followed(u: np.ndarray, rest: float = 0.0, a: float = 0.02) -> np.ndarray:
-    path = np.full(START + recent_path.SIZE + 2, 7.0)
-    recent_path.begin(path, START, rest, a)
+def followed(u: np.ndarray, rest: float = 0.0, a: float = 0.02) -> Named:
+    path = Named(new(recent_path.PATH), recent_path.PATH)
+    recent_path.begin(path, rest, a)
     for value in u:
-        recent_path.follow(path, START, float(value))
-    assert np.all(path[:START] == 7.0)
-    assert np.all(path[-2:] == 7.0)
+        recent_path.follow(path, float(value))
     return path
 
 
-def taken_up(path: np.ndarray, a: float) -> float:
-    recent_path.take_up(path, START, a)
-    return float(recent_path.hysteresis(path, START))
+def with_decay(path: Named, a: float) -> float:
+    recent_path.use_decay(path, a)
+    return float(recent_path.hysteresis(path))
 
 
 def simulated(u: np.ndarray, a: float, rest: float = 0.0) -> float:
@@ -52,7 +49,7 @@ def test_equals_a_model_that_had_been_running(turns: list[float], a: float, rest
     # A way back of a hundredth of a swing is no turn, and what is long gone is left out.
     slack = 2.0 * recent_path.TURN * (np.ptp(u) + abs(rest)) * len(turns)
     path = followed(u, rest)
-    assert abs(taken_up(path, a) - expected) <= slack + 3.0 * recent_path.FORGOTTEN / a
+    assert abs(with_decay(path, a) - expected) <= slack + 3.0 * recent_path.FORGOTTEN / a
 
 
 @pytest.mark.parametrize("before", [0.01, 0.02, 0.04])
@@ -60,7 +57,7 @@ def test_equals_a_model_that_had_been_running(turns: list[float], a: float, rest
 @pytest.mark.parametrize("amplitude", [1.0, 3.0, 30.0])
 def test_steady_loop_is_known_however_long_it_went_on(amplitude: float, a: float, before: float) -> None:
     u = np.concatenate([triangle([amplitude, -amplitude] * 200), np.linspace(-1.0, 0.4, 20)[1:] * amplitude])
-    h = taken_up(followed(u, a=before), a)
+    h = with_decay(followed(u, a=before), a)
     assert h == pytest.approx(simulated(u, a), abs=0.01 * amplitude)
 
 
@@ -70,17 +67,17 @@ def test_turns_out_of_many_small_loops_within_a_large_one(a: float, part: float)
     """Minor loops on a slow wave: the oldest point kept stands far from the middle."""
     t = np.linspace(0.0, 40.0, 4001)
     u = 30.0 * np.sin(2.0 * np.pi * 0.1 * t) + 5.0 * np.sin(2.0 * np.pi * 2.0 * t)
-    assert taken_up(followed(u, a=part * a), a) == pytest.approx(simulated(u, a), abs=1.0)
+    assert with_decay(followed(u, a=part * a), a) == pytest.approx(simulated(u, a), abs=1.0)
 
 
 def test_model_in_use_goes_on_by_itself() -> None:
     """However many turns are dropped, and taken up again it does not move."""
     u = 20.0 + np.cumsum(np.random.default_rng(2).standard_normal(5000))
     path = followed(u, a=0.002)
-    h = float(recent_path.hysteresis(path, START))
-    assert path[START + recent_path.COUNT] > recent_path.MOST // 2
+    h = float(recent_path.hysteresis(path))
+    assert path.count > recent_path.MOST // 2
     assert h == pytest.approx(simulated(u, 0.002), abs=0.2)
-    assert taken_up(path, 0.002) == pytest.approx(h, abs=1e-9)
+    assert with_decay(path, 0.002) == pytest.approx(h, abs=1e-9)
 
 
 def test_jitter_does_not_wash_the_memory_out() -> None:
@@ -89,26 +86,26 @@ def test_jitter_does_not_wash_the_memory_out() -> None:
     u = np.concatenate([swings, jitter])
     path = followed(u)
     before = followed(swings)
-    at = slice(START + recent_path.POINTS, START + recent_path.SIZE)
-    assert np.count_nonzero(path[at] != before[at]) <= 2
+    assert np.count_nonzero(path.points != before.points) <= 2
+
+
+@compiled
+def compiled_with_decay(path: Record, u: Vector, a: float) -> float:
+    recent_path.begin(path, 0.0, 0.02)
+    for value in u:
+        recent_path.follow(path, value)
+    recent_path.use_decay(path, a)
+    return recent_path.hysteresis(path)
 
 
 def test_compiled_equals_plain() -> None:
-    @njit
-    def compiled(u, a):  # type: ignore[no-untyped-def]
-        path = np.zeros(recent_path.SIZE)
-        recent_path.begin(path, 0, 0.0, 0.02)
-        for value in u:
-            recent_path.follow(path, 0, value)
-        recent_path.take_up(path, 0, a)
-        return recent_path.hysteresis(path, 0)
-
     u = np.cumsum(np.random.default_rng(1).standard_normal(3000))
-    assert compiled(u, 0.03) == pytest.approx(taken_up(followed(u), 0.03), rel=1e-12)
+    found = compiled_with_decay.of(recent_path.PATH)(new(recent_path.PATH), u, 0.03)
+    assert found == pytest.approx(with_decay(followed(u), 0.03), rel=1e-12)
 
 
 def test_long_steady_loop_is_known_to_rounding() -> None:
     """What the walk back leaves out is that of a steady loop, too."""
     u = triangle([30.0, -30.0] * 200 + [12.0])
-    assert taken_up(followed(u, a=0.02), 0.02) == pytest.approx(simulated(u, 0.02), abs=1e-9)
-    assert taken_up(followed(u, a=0.02), 0.024) == pytest.approx(simulated(u, 0.024), abs=0.003)
+    assert with_decay(followed(u, a=0.02), 0.02) == pytest.approx(simulated(u, 0.02), abs=1e-9)
+    assert with_decay(followed(u, a=0.02), 0.024) == pytest.approx(simulated(u, 0.024), abs=0.003)

@@ -124,26 +124,72 @@ def change_entry(rng: np.random.Generator, holder: Any) -> None:
         holder.append(odd_value(rng))
 
 
-def change_state(rng: np.random.Generator, state: list[Any]) -> None:
-    """Change one number or a few, exchange or move stretches."""
-    size, what = len(state), rng.random()
-    if what < 0.6:
+Place = tuple[Any, Any]
+
+
+def places(holder: Any) -> list[Place]:
+    """(dictionary or list, key) of every entry within, at any depth."""
+    found: list[Place] = []
+    for key in list(holder) if isinstance(holder, dict) else range(len(holder)):
+        found.append((holder, key))
+        if isinstance(holder[key], dict | list):
+            found += places(holder[key])
+    return found
+
+
+def drawn(rng: np.random.Generator, among: list[Place]) -> Place:
+    """One of them."""
+    return among[int(rng.integers(len(among)))]
+
+
+def shape_of(value: Any) -> tuple[int, ...]:
+    """Shape of a number or of nested lists, as far as it goes."""
+    return (len(value), *shape_of(value[0])) if isinstance(value, list) and value else ()
+
+
+def change_state(rng: np.random.Generator, state: dict[str, Any]) -> None:
+    """Change a number or a few, exchange what has one shape, drop, add, rename, or give another shape."""
+    everywhere, what = places(state), rng.random()
+    single = [(holder, key) for holder, key in everywhere if not isinstance(holder[key], dict | list)]
+    if not single:
+        return
+    if what < 0.5:
         for _ in range(rng.integers(1, 4)):
-            state[rng.integers(size)] = odd_value(rng)
-    elif what < 0.7:
-        k = int(rng.integers(size))
-        if isinstance(state[k], float):
-            state[k] *= float(10.0 ** rng.uniform(-12.0, 12.0)) * float(rng.choice([-1.0, 1.0]))
+            holder, key = drawn(rng, single)
+            holder[key] = odd_value(rng)
+    elif what < 0.65:
+        holder, key = drawn(rng, single)
+        if isinstance(holder[key], float):
+            holder[key] *= float(10.0 ** rng.uniform(-12.0, 12.0)) * float(rng.choice([-1.0, 1.0]))
     elif what < 0.85:
-        length = int(rng.integers(1, max(2, size // 4)))
-        a, b = (int(k) for k in rng.integers(0, max(1, size - length), 2))
-        state[a : a + length], state[b : b + length] = state[b : b + length], state[a : a + length]
-        del state[size:]
+        one, key = drawn(rng, everywhere)
+        shape = shape_of(one[key])
+        same = [
+            (holder, k) for holder, k in everywhere
+            if shape_of(holder[k]) == shape and isinstance(holder[k], dict) == isinstance(one[key], dict)
+        ]  # fmt: skip
+        other, k = drawn(rng, same)
+        one[key], other[k] = copy.deepcopy(other[k]), copy.deepcopy(one[key])
     elif what < 0.95:
-        k = int(rng.integers(size))
-        state[:] = state[k:] + state[:k]
+        named = [(holder, key) for holder, key in everywhere if isinstance(holder, dict)]
+        holder, key = drawn(rng, named)
+        value = holder.pop(key)
+        if rng.random() < 0.5:
+            name = str(rng.choice([key + "_", "theta", "P", "no_such_key", key.upper()]))
+            holder[name] = value
     else:
-        del state[rng.integers(size) :]
+        change_shape(rng, *drawn(rng, everywhere))
+
+
+def change_shape(rng: np.random.Generator, holder: Any, key: Any) -> None:
+    """Another shape for what is there."""
+    value = holder[key]
+    flat: Any = [value, value]
+    if isinstance(value, list):
+        flat = (value[1:], value + value, [value], value[::-1], value[0] if value else 0.0)[rng.integers(5)]
+    elif rng.random() < 0.5:
+        flat = [value]
+    holder[key] = flat
 
 
 def changed(rng: np.random.Generator, data: dict[str, Any]) -> Any:
@@ -151,7 +197,7 @@ def changed(rng: np.random.Generator, data: dict[str, Any]) -> Any:
     data = copy.deepcopy(data)
     for _ in range(rng.integers(1, 3)):
         what = rng.random()
-        if what < 0.55 and isinstance(data.get("state"), list) and data["state"]:
+        if what < 0.55 and isinstance(data.get("state"), dict):
             change_state(rng, data["state"])
         elif what < 0.85 and isinstance(data.get("arguments"), dict):
             holders = containers(data["arguments"])

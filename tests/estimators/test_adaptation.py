@@ -143,7 +143,7 @@ def test_excitation() -> None:
 
 
 def test_wrong_arguments() -> None:
-    with pytest.raises(ValueError, match="RandomWalk and PeriodicForgetting go with memory='period'"):
+    with pytest.raises(ValueError, match="RandomWalk goes with memory='period'"):
         pz.HysteresisRLS(FS, memory=0.4, policies=(pz.policies.RandomWalk(),))
     with pytest.raises(ValueError, match="memory must be above zero"):
         pz.policies.RandomWalk(memory=0.0)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import pickle
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import pytest
 
 import piezoest as pz
 from piezoest.estimators.batch import BatchFit
-from piezoest.estimators.shooting import bend
+from piezoest.estimators.fit import bend
+from piezoest.models import FreeRunning
 
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 RATE = 1000.0
@@ -136,6 +138,47 @@ def test_linear_gain(method: Any) -> None:
     covariance = NOISE**2 * np.linalg.inv(columns.T @ columns)
     np.testing.assert_allclose(fit.standard_errors, np.sqrt(np.diag(covariance)), rtol=0.05)
     assert fit.model == pz.LinearGain(*fit.theta)
+
+
+@dataclass(frozen=True, slots=True)
+class Cubic(FreeRunning):
+    """x = K u + q u³ + offset: a model of its own, which the fit has never seen."""
+
+    gain: float
+    cubic: float
+    offset: float = 0.0
+
+    parameter_names: ClassVar[tuple[str, ...]] = ("gain", "cubic")
+    parameter_units: ClassVar[tuple[str, ...]] = ("µm/V", "µm/V³")
+
+    @property
+    def is_admissible(self) -> bool:
+        return self.gain > 0.0
+
+    @classmethod
+    def guess(cls, u: Any, x: Any) -> Self:
+        return cls(pz.LinearGain.guess(u, x).gain, 0.0)
+
+    @classmethod
+    def free_step(cls, state: Any, u_0: Any, u_1: Any, constants: Any) -> tuple[tuple[Any, ...], Any]:
+        return (), constants[0] * u_1 + constants[1] * u_1**3
+
+    def lifted(self, start: Self, least: float) -> Self:
+        return type(self)(max(self.gain, least * start.gain), self.cubic, self.offset)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_another_model_is_fitted_by_its_face_alone(method: Any) -> None:
+    u, _ = record(1.0)
+    x = 0.15 * u + 2e-5 * u**3 + 3.0 + NOISE * np.random.default_rng(0).standard_normal(u.size)
+    fit = BatchFit(RATE, initial_model=Cubic(0.1, 1e-5), offset=True, method=method).fit(u, x)
+    assert fit.success
+    assert isinstance(fit.model, Cubic)
+    assert np.all(np.abs(fit.theta - [0.15, 2e-5, 3.0]) < 4.0 * fit.standard_errors)
+    columns = np.column_stack([u, u**3, np.ones_like(u)])
+    np.testing.assert_allclose(fit.theta, np.linalg.lstsq(columns, x, rcond=None)[0], rtol=1e-6)
+    with pytest.raises(ValueError, match="Cubic has no form"):
+        pz.MovingHorizon(RATE, initial_model=Cubic(0.1, 1e-5))
 
 
 # ---------------------------------------------------------------- bounds and masks

@@ -62,8 +62,8 @@ def outcome(new: Callable[[], Any], runs: int = RUNS, rate: float = FS) -> Outco
         trace = estimator.run(voltage, x, record=("y", "S"))
         error = estimator.theta[:3] - TRUE.theta
         state_nees = np.nan
-        if isinstance(estimator, pz.HysteresisEKF):
-            state_nees = squared(estimator.state - TRUE_STATE, estimator.state_covariance)
+        if isinstance(estimator, pz.HysteresisEKF | pz.FilterPyEKF | pz.FilterPyUKF):
+            state_nees = squared(estimator.s - TRUE_STATE, estimator.state_covariance)
         nis = np.mean(trace.y[settled] ** 2 / trace.S[settled])
         errors_said, P = estimator.standard_errors[:3], estimator.P[:3, :3]
         rows.append((error, errors_said, squared(error, P), state_nees, nis))

@@ -86,7 +86,7 @@ def test_equals_the_textbook(missing: bool) -> None:
     for k in range(u.size):
         du = u[k] - u[k - 1] if k else 0.0
         Q = np.diag(q)
-        Q[0, 0] += kalman.bilinear_variance(P.ravel(), du, s[1], 4)
+        Q[0, 0] += kalman.bilinear_variance(P, du, s[1])
         s, F = reference.transition(s, du)
         P = reference.predict_covariance(P, F, Q)
         if np.isfinite(x[k]):
@@ -97,7 +97,7 @@ def test_equals_the_textbook(missing: bool) -> None:
         assert trace.S is not None
         assert trace.y[k] == pytest.approx(y, rel=1e-7, abs=1e-12)
         assert trace.S[k] == pytest.approx(S, rel=1e-7)
-    np.testing.assert_allclose(estimator.state, s, rtol=1e-8)
+    np.testing.assert_allclose(estimator.s, s, rtol=1e-8)
     np.testing.assert_allclose(estimator.state_covariance, P, rtol=1e-6, atol=1e-15)
     np.testing.assert_allclose(estimator.theta, [s[1], s[3] - s[2], s[1] * s[3]], rtol=1e-8)
 
@@ -108,7 +108,7 @@ def test_covariance_of_theta_is_that_of_the_state() -> None:
     estimator = pz.HysteresisEKF(2000.0, drift=0.0, mismatch=0.0, noise=1e-3)
     estimator.run(u, x)
     draws = np.random.default_rng(0).multivariate_normal(
-        estimator.state[1:], estimator.state_covariance[1:, 1:], size=200_000
+        estimator.s[1:], estimator.state_covariance[1:, 1:], size=200_000
     )
     theta = np.column_stack([draws[:, 0], draws[:, 2] - draws[:, 1], draws[:, 0] * draws[:, 2]])
     np.testing.assert_allclose(estimator.standard_errors, theta.std(axis=0), rtol=0.02)
@@ -222,12 +222,12 @@ def test_stays_admissible_while_it_learns() -> None:
     for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
         kept.step(u_k, x_k)
         free.step(u_k, x_k)
-        _, a, b, c = kept.state
+        _, a, b, c = kept.s
         assert a > 0.0
         assert b > 0.0
         assert c >= 2.0 * b
         projected += kept.status.projected
-        _, a, b, c = free.state
+        _, a, b, c = free.s
         outside += not (a > 0.0 and b > 0.0 and c >= 2.0 * b)
         assert free.model.is_admissible
     assert outside > 0

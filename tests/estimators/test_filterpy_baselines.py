@@ -69,7 +69,7 @@ def test_filter_is_filterpys_own(kind: Any, base: type) -> None:
     assert states.shape == (200, 4)
     assert covariances.shape == (200, 4, 4)
     assert np.all(np.isfinite(saver["log_likelihood"]))
-    np.testing.assert_array_equal(states[-1], estimator.state)
+    np.testing.assert_array_equal(states[-1], estimator.s)
     np.testing.assert_array_equal(covariances[-1], estimator.state_covariance)
 
 
@@ -77,7 +77,7 @@ def test_what_filterpy_is_told_reaches_the_estimator() -> None:
     estimator = pz.FilterPyEKF(1000.0)
     estimator.filter.x = np.array([0.1, 0.03, 0.05, 0.2])
     np.testing.assert_allclose(estimator.theta, [0.03, 0.15, 0.006])
-    np.testing.assert_array_equal(estimator.state, estimator.filter.x)
+    np.testing.assert_array_equal(estimator.s, estimator.filter.x)
 
 
 def test_unscented_agrees_with_extended() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.estimators import horizon, shooting
+from piezoest.estimators import fit, horizon
 from piezoest.estimators.batch import BatchFit
 from piezoest.estimators.horizon import MovingHorizon
 from piezoest.estimators.thinning import thinned
@@ -38,7 +38,7 @@ def test_finds_the_parameters_within_its_standard_errors() -> None:
 
 def test_solves_once_a_hop_and_holds_between(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[int] = []
-    solve = shooting.single_shooting
+    solve = fit.single_shooting
 
     def counted(*arguments: Any) -> Any:
         calls.append(estimator.status.samples)

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 import piezoest as pz
 from piezoest import policies as p
 from piezoest.equations import admissible
-from piezoest.estimators import ekf_kernel, output_error_kernel, rls_kernel
-from piezoest.estimators import recursive_least_squares as law
 
 FloatArray = NDArray[np.float64]
 
@@ -121,21 +119,20 @@ def test_covariance_that_winds_up_starts_anew() -> None:
 @pytest.mark.parametrize("place", range(3))
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_projection_says_when_it_has_no_model(place: int, bad: float) -> None:
-    theta, P = LOOP.theta, np.eye(3).ravel()
-    assert admissible.project_admissible(theta, P, 3, 2e-4, 1.2e-3, 1e-3)
+    theta, P = LOOP.theta, np.eye(3)
+    assert admissible.project_admissible(theta, P, 2e-4, 1.2e-3, 1e-3)
     theta[place] = bad
     with np.errstate(all="ignore"):
-        assert not admissible.project_admissible(theta, P, 3, 2e-4, 1.2e-3, 1e-3)
-        P[place] = np.nan
-        assert not admissible.project_admissible(np.array([-1.0, 0.1, 5.0]), P, 3, 2e-4, 1.2e-3, 1e-3)
+        assert not admissible.project_admissible(theta, P, 2e-4, 1.2e-3, 1e-3)
+        P[0, place] = np.nan
+        assert not admissible.project_admissible(np.array([-1.0, 0.1, 5.0]), P, 2e-4, 1.2e-3, 1e-3)
 
 
 @pytest.mark.parametrize("kind", ["rls", "rls-line"])
 def test_theta_that_is_no_number_hands_out_the_start(kind: str) -> None:
     estimator = MAKERS[kind]()
     start = estimator.model
-    head = rls_kernel.FRONT + law.HEAD
-    estimator._state[head] = np.nan
+    estimator.state["law"]["theta"][0] = np.nan
     assert slope(estimator.model) == pytest.approx(slope(start))
 
 
@@ -193,17 +190,11 @@ def test_directional_forgetting_has_no_direction_in_almost_nothing() -> None:
 def test_spoilt_covariance_starts_anew(bad: float) -> None:
     u = 33.0 * np.sin(np.arange(300) / 10.0)
     x = LOOP.simulate(u, allow_jumps=True)
-    first_variance = {
-        "rls": rls_kernel.FRONT + law.HEAD + 4,
-        "rls-bare": rls_kernel.FRONT + law.HEAD + 3,
-        "ekf": ekf_kernel.HEAD + 4,
-        "output-error": output_error_kernel.P,
-    }
-    for kind, place in first_variance.items():
+    for kind in ("rls", "rls-bare", "ekf", "output-error"):
         estimator = MAKERS[kind]()
         estimator.run(u, x)
         theta, resets = estimator.theta, estimator.status.resets
-        estimator._state[place] = bad
+        estimator.state["filter" if kind == "ekf" else "law"]["P"][0, 0] = bad
         estimator.step(u[-1] + 0.5, x[-1] + 0.05)
         assert_numbers(estimator)
         assert estimator.status.resets == resets + 1
@@ -264,44 +255,70 @@ def test_any_bits_in_a_bank(kind: str) -> None:
 
 # ---------------------------------------------------------------- settings
 
-FORGETTINGS = (
-    p.RandomWalk(),
-    p.PeriodicForgetting(),
-    p.DirectionalForgetting(),
-    p.VariableForgetting(),
-    None,
+# Each combination is compiled for itself: these few have every policy, and many of them together. What they
+# are drawn with, and all other numbers, are drawn anew for each estimator.
+COMBINATIONS: tuple[dict[str, Any], ...] = (
+    {},
+    {"policies": ()},
+    {"policies": (p.RandomWalk, p.OutlierRejection, p.Projection, p.ChangeDetection, p.AmplitudeMemory)},
+    {"policies": (p.PeriodicForgetting, p.ExcitationGate, p.DeadZone, p.NormBound), "errors": False},
+    {"policies": (p.DirectionalForgetting, p.DeadZone, p.CovarianceResetting), "offset": False},
+    {
+        "policies": (p.VariableForgetting, p.OutlierRejection, p.ExcitationGate, p.Projection),
+        "high_pass": 1.0,
+    },
+    {
+        "policies": (p.Normalisation, p.NormBound, p.DeadZone, p.CovarianceResetting),
+        "time_base": "continuous",
+    },
+    {"policies": (p.PeriodicForgetting, p.NormBound), "line": True, "offset": True},
+    {"policies": (p.Normalisation,), "line": True, "time_base": "continuous", "high_pass": 1.0, "delay": 0.5},
 )
-OTHERS = (
-    p.NormBound(), p.Normalisation(), p.CovarianceResetting(1e-3), p.DeadZone(), p.OutlierRejection(3),
-    p.Projection(), p.ChangeDetection(), p.ExcitationGate(), p.AmplitudeMemory(),
-)  # fmt: skip
+
+
+def size(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number of any size between powers of ten."""
+    return float(10.0 ** rng.uniform(low, high))
+
+
+def drawn_policy(rng: np.random.Generator, cls: Any) -> Any:
+    """A policy of any numbers; ValueError for those that it refuses."""
+    numbers: dict[Any, Any] = {
+        p.AmplitudeMemory: {"places": int(rng.integers(1, 9))},
+        p.CovarianceResetting: {"floor": float(rng.choice([0.0, 1e-3, 0.5]))},
+        p.DeadZone: {"threshold": size(rng, -12.0, 2.0)},
+        p.NormBound: {"limit": size(rng, 0.0, 6.0)},
+        p.OutlierRejection: {"warm_up": int(rng.integers(1, 30))},
+        p.PeriodicForgetting: {"memory": size(rng, -3.0, 3.0)},
+        p.Projection: {"margin": float(rng.uniform(1e-6, 0.4))},
+        p.RandomWalk: {"memory": size(rng, -3.0, 3.0), "drift": size(rng, -3.0, 3.0)},
+    }
+    own = numbers.get(cls, {})
+    return cls(**own) if own and (rng.random() < 0.5 or cls is p.CovarianceResetting) else cls()
 
 
 def drawn(rng: np.random.Generator) -> pz.HysteresisRLS:
-    """`HysteresisRLS` of any legal settings; ValueError for others."""
-
-    def size(low: float, high: float) -> float:
-        return float(10.0 ** rng.uniform(low, high))
-
+    """`HysteresisRLS` of any legal numbers, in one of the combinations; ValueError for others."""
+    options = dict(COMBINATIONS[rng.integers(len(COMBINATIONS))])
     far = rng.random() < 0.5
-    a, ratio = size(-20.0, 20.0) if far else 0.02, rng.uniform(1.0, 2.1)
-    beta = size(-20.0, 20.0) if far else 0.12
-    loop = pz.ColemanHodgdon(a, beta, ratio * a * beta, rng.choice([0.0, size(-5.0, 9.0)]))
-    line = pz.LinearGain(float(rng.choice([-1.0, 1.0])) * size(-20.0, 20.0))
-    chosen = [policy for policy in (rng.choice(np.array(FORGETTINGS, dtype=object)),) if policy is not None]
-    chosen += [policy for policy in OTHERS if rng.random() < 0.3]
+    a, ratio = size(rng, -20.0, 20.0) if far else 0.02, rng.uniform(1.0, 2.1)
+    beta = size(rng, -20.0, 20.0) if far else 0.12
+    loop = pz.ColemanHodgdon(a, beta, ratio * a * beta, rng.choice([0.0, size(rng, -5.0, 9.0)]))
+    line = pz.LinearGain(float(rng.choice([-1.0, 1.0])) * size(rng, -20.0, 20.0))
+    if "policies" in options:
+        options["policies"] = tuple(drawn_policy(rng, cls) for cls in options["policies"])
+        by_swings = any(isinstance(each, p.RandomWalk | p.PeriodicForgetting) for each in options["policies"])
+        options["memory"] = "period" if by_swings else (None, size(rng, -12.0, 12.0))[rng.integers(2)]
+    if "high_pass" in options:
+        options["high_pass"] = size(rng, -6.0, 6.0)
+    if "delay" in options:
+        options["delay"] = float(rng.uniform(0.0, 5.0))
     return pz.HysteresisRLS(
-        size(-3.0, 12.0),
-        initial_model=line if rng.random() < 0.3 else loop,
-        memory=("period", None, size(-12.0, 12.0))[rng.integers(3)],
-        uncertainty=size(-12.0, 12.0) if far else 0.5,
-        noise=size(-12.0, 12.0) if far else 1.5e-3,
-        offset=(True, False, None)[rng.integers(3)],
-        high_pass=None if rng.random() < 0.7 else size(-6.0, 6.0),
-        delay=float(rng.choice([0.0, 0.5, 2.3])),
-        time_base="continuous" if rng.random() < 0.3 else "discrete",
-        errors=bool(rng.random() < 0.7),
-        policies=tuple(chosen),
+        size(rng, -3.0, 12.0),
+        initial_model=line if options.pop("line", False) else loop,
+        uncertainty=size(rng, -12.0, 12.0) if far else 0.5,
+        noise=size(rng, -12.0, 12.0) if far else 1.5e-3,
+        **options,
     )
 
 

@@ -58,21 +58,21 @@ def test_walk_covariance_is_that_of_independent_parts() -> None:
         a_1, b_1, c_1 = coleman_hodgdon.loop_parameters(*moved)
         columns.append([b_1 - b, c_1 - c, b_1 * np.log(a_1 / a)])
     jacobian = np.array(columns).T / step
-    Q = np.zeros(9)
+    Q = np.zeros((3, 3))
     output_error.walk_covariance(b, c, Q)
-    np.testing.assert_allclose(Q.reshape(3, 3), jacobian @ jacobian.T, rtol=1e-4, atol=1e-9)
+    np.testing.assert_allclose(Q, jacobian @ jacobian.T, rtol=1e-4, atol=1e-9)
 
 
 def test_recentre_describes_the_same_decay() -> None:
     rng = np.random.default_rng(0)
     root = rng.standard_normal((5, 5))
-    s, P = np.array([0.3, 1.0, 0.06, 0.1, 0.2]), (root @ root.T).ravel()
+    s, P = np.array([0.3, 1.0, 0.06, 0.1, 0.2]), root @ root.T
     T = np.eye(5)
     T[2, 0] = -0.15
-    expected_s, expected_P = T @ s, T @ P.reshape(5, 5) @ T.T
-    output_error.recentre(s, P, 5, 0.15)
+    expected_s, expected_P = T @ s, T @ P @ T.T
+    output_error.recentre(s, P, 0.15)
     np.testing.assert_allclose(s, expected_s, rtol=1e-14)
-    np.testing.assert_allclose(P.reshape(5, 5), expected_P, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(P, expected_P, rtol=1e-12, atol=1e-14)
 
 
 # ---------------------------------------------------------------- what it learns

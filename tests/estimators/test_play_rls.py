@@ -10,6 +10,7 @@ import pytest
 
 import piezoest as pz
 from piezoest.bench.faults import FAULTS
+from piezoest.estimators import play_rls_kernel as kernel
 
 RATE = 10_000.0
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
@@ -98,6 +99,41 @@ def test_settings_without_asymmetry_or_creep() -> None:
     assert estimator.parameter_names == ("gain", *(f"weights[{i}]" for i in range(8)))
     model: Any = estimator.model
     assert model.is_plain
+
+
+def test_one_machine_code_serves_all_sizes() -> None:
+    u = 30.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(100) / RATE)
+    loops = []
+    for sizes in ({}, {"thresholds": 0, "bends": 0, "creep": ()}, {"thresholds": 40, "bends": 3}):
+        estimator = pz.PrandtlIshlinskiiRLS(RATE, **sizes)
+        estimator.run(u, 0.1 * u)
+        assert np.all(np.isfinite(estimator.theta))
+        loops.append(kernel.run.of(*estimator.layouts))
+    assert loops[0] is loops[1] is loops[2]
+
+
+@pytest.mark.parametrize(
+    ("record", "name", "value", "words"),
+    [
+        ("plays", "half_width", 2.0, "the grid must be as"),
+        ("plays", "slopes", 3.0, "slopes must be as the arguments make it"),
+        ("law", "used", -1.0, "must be zero or more"),
+        ("law", "P", -1.0, "symmetric and positive"),
+        ("line", "position", 9.0, "position must be a whole number"),
+        ("resonance", "coefficients", 0.5, "coefficients must be as"),
+    ],
+)
+def test_saved_numbers_that_cannot_be_are_refused(record: str, name: str, value: float, words: str) -> None:
+    damper = pz.models.MassSpringDamper(700.0, 0.02)
+    data = pz.PrandtlIshlinskiiRLS(RATE, thresholds=4, bends=1, delay=2.5, mechanics=damper).to_dict()
+    pz.PrandtlIshlinskiiRLS.from_dict(data)
+    place: Any = data["state"][record]
+    key: Any = name
+    while isinstance(place[key], list):
+        place, key = place[key], 0
+    place[key] = value
+    with pytest.raises(ValueError, match=words):
+        pz.PrandtlIshlinskiiRLS.from_dict(data)
 
 
 @pytest.mark.parametrize(

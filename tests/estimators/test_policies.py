@@ -77,7 +77,7 @@ def test_same_bits_by_step_run_and_from_a_file(name: str) -> None:
 
 def test_directional_forgetting_is_the_textbook() -> None:
     theta, P, rng = start()
-    flat, expected, information = P.ravel().copy(), theta.copy(), np.linalg.inv(P)
+    expected, information = theta.copy(), np.linalg.inv(P)
     mu, R = 0.9, 0.3
     for _ in range(50):
         phi, z = rng.normal(size=3), rng.normal()
@@ -85,9 +85,9 @@ def test_directional_forgetting_is_the_textbook() -> None:
         q = phi @ covariance @ phi
         expected = expected + covariance @ phi / (R + q) * (z - expected @ phi)
         information = information + (mu - (1.0 - mu) * R / q) * np.outer(phi, phi) / R
-        ls.directional_update(theta, flat, phi, z, 3, mu, R, np.inf, 1.0, np.zeros(3))
+        ls.directional_update(theta, P, phi, z, mu, R, np.inf)
     np.testing.assert_allclose(theta, expected, rtol=1e-8)
-    np.testing.assert_allclose(np.linalg.inv(flat.reshape(3, 3)), information, rtol=1e-7)
+    np.testing.assert_allclose(np.linalg.inv(P), information, rtol=1e-7)
 
 
 def test_directional_forgetting_keeps_what_is_not_excited() -> None:
@@ -213,12 +213,12 @@ def test_amplitudes_are_remembered(tmp_path: Path) -> None:
 
 
 def test_commands_take_a_profile(tmp_path: Path) -> None:
-    from piezoest.cli.compensate_command import _model
+    from piezoest.cli.compensate_command import Stated, _model
     from piezoest.export.commands import _read
 
     path = tmp_path / "profile.json"
     profile_of([30.0, 90.0], [[0.024, 0.14, 0.0046], TRUE.theta]).save(path)
-    assert _model(path, {}, None) == TRUE
+    assert _model(Stated(parameters=path)) == TRUE
     assert _read(path)[0] == TRUE
 
 
@@ -240,7 +240,7 @@ def test_two_ways_to_forget_exclude_each_other() -> None:
         with pytest.raises(ValueError, match="goes with a ColemanHodgdon"):
             made(policy, initial_model=pz.LinearGain(0.1))
     for policy in (p.DirectionalForgetting(), p.ChangeDetection(), p.RandomWalk()):
-        with pytest.raises(ValueError, match="needs a voltage's clock"):
+        with pytest.raises(ValueError, match="needs the swings of a voltage"):
             pz.RecursiveLeastSquares(2, policies=(policy,))
 
 

@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import piezoest as pz
-from piezoest.estimators import rls_loops
+from piezoest.estimators import rls_kernel
+from piezoest.layout import Named, leaves
 from tests.reference import hysteresis_rls as reference
 
 FS = 50_000.0
@@ -254,87 +255,28 @@ def test_without_errors_nothing_else_changes(options: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "kind"),
-    [
-        ({}, (4, rls_loops.USUAL, False)),
-        ({"errors": False, "delay": 1.5}, (4, rls_loops.USUAL, True)),
-        ({"memory": 0.4}, (3, rls_loops.USUAL, False)),
-        ({"memory": 0.4, "errors": False}, (3, rls_loops.BARE, False)),
-        ({"initial_model": pz.LinearGain(0.15), "offset": True}, (2, rls_loops.USUAL, False)),
-        (
-            {"initial_model": pz.LinearGain(0.15), "memory": 0.4, "errors": False, "policies": ()},
-            (1, rls_loops.USUAL, False),
-        ),
-    ],
-)
-def test_loops_compiled_for_less_give_the_same(options: dict[str, Any], kind: tuple[int, int, bool]) -> None:
-    u, x = record(0.2, 1e-3)
-    x[500:510] = np.nan
-    x[2000:2300] = np.inf
-    u[3000:3005] = np.nan
-    states = []
-    for chosen, by_step in ((kind, False), (kind, True), ((0, rls_loops.ALL, True), False)):
-        estimator = pz.HysteresisRLS(FS, **options)
-        assert estimator._kind == kind
-        estimator._kind = chosen
-        if by_step:
-            for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
-                estimator.step(u_k, x_k)
-        else:
-            estimator.run(u, x)
-        states.append(estimator.to_dict()["state"])
-    assert states[0] == states[1] == states[2]
-    assert estimator.status.updates > 5000
-
-
-@pytest.mark.parametrize("errors", [False, True])
-@pytest.mark.parametrize("name", sorted({*pz.policies.__all__} - {"Forgetting"}))
-def test_no_policy_is_lost_to_a_loop_compiled_for_less(name: str, errors: bool) -> None:
-    """Also for policies to come: the loop chosen does what the one that has everything does.
-
-    `Forgetting` comes by `memory`, as in the test above.
-    """
-    in_seconds = {"memory": 0.4, "unit": "second"}
-    told: dict[str, dict[str, Any]] = {
-        "CovarianceResetting": {"floor": 1e-6},
-        "DirectionalForgetting": in_seconds,
-        "VariableForgetting": in_seconds,
-    }
-    policy = getattr(pz.policies, name)(**told.get(name, {}))
-    u, x = record(0.2, 1e-3)
-    x[2000:2300] = np.nan
-    states = []
-    for everything in (False, True):
-        estimator = pz.HysteresisRLS(
-            FS,
-            memory="period" if "Walk" in name or "Periodic" in name else None,
-            policies=(policy,),
-            errors=errors,
-        )
-        if everything:
-            estimator._kind = (0, rls_loops.ALL, True)
-        estimator.run(u, x)
-        states.append(estimator.to_dict()["state"])
-    assert states[0] == states[1]
-    assert estimator.status.updates > 1000
-
-
-@pytest.mark.parametrize(
     "options",
     [
-        {"high_pass": 0.5},
-        {"time_base": "continuous"},
-        {"policies": (pz.policies.RandomWalk(), pz.policies.Projection())},
-        {"policies": (pz.policies.RandomWalk(), pz.policies.ExcitationGate())},
-        {"policies": (pz.policies.RandomWalk(), pz.policies.ChangeDetection())},
-        {"policies": (pz.policies.RandomWalk(), pz.policies.AmplitudeMemory())},
-        {"memory": None, "policies": (pz.policies.DirectionalForgetting(0.4, unit="second"),)},
-        {"memory": None, "policies": (pz.policies.VariableForgetting(0.4, unit="second"),)},
-        {"memory": 0.4, "policies": (pz.policies.CovarianceResetting(1e-6),)},
+        {},
+        {"errors": False, "delay": 1.5},
+        {"memory": 0.4, "errors": False},
+        {"initial_model": pz.LinearGain(0.15), "offset": True},
+        {"time_base": "continuous", "high_pass": 0.5},
     ],
 )
-def test_what_is_off_by_default_gets_the_loop_that_has_it(options: dict[str, Any]) -> None:
-    assert pz.HysteresisRLS(FS, **options)._kind == (0, rls_loops.ALL, True)
+def test_machine_code_does_what_its_source_says(options: dict[str, Any]) -> None:
+    u, x = record(0.02, 1e-3)
+    x[300:310] = u[500] = np.nan
+    x[20:120] = np.inf
+    machine, plain = pz.HysteresisRLS(FS, **options), pz.HysteresisRLS(FS, **options)
+    machine.run(u, x)
+    state, given = Named(plain.state, plain.layout), Named(plain.settings, plain.layouts[1])
+    with np.errstate(all="ignore"):
+        for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+            rls_kernel.sample(state, given, u_k, x_k)
+    for name, _, (one, other) in leaves(machine.layout, machine.state, plain.state):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12, err_msg=name)
+    assert machine.status.updates > 500
 
 
 def test_wrong_arguments() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import itertools
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +15,7 @@ import pytest
 import piezoest as pz
 from piezoest import policies
 from piezoest.estimators import saved_state
+from piezoest.layout import by_name, leaves
 
 RATE = 2000.0
 MUTATIONS = Path(__file__).with_name("mutated_states.py")
@@ -26,10 +29,30 @@ def used(estimator: Any, samples: int = 400) -> Any:
     return estimator
 
 
-def blocks(estimator: Any) -> dict[str, slice]:
-    """Where the blocks of an estimator's state are."""
-    table = estimator._table()
-    return {block.name: part for block, part in saved_state._parts(table, estimator._state.size)}
+def with_value(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """A saved estimator with another value at a path of names, ``"law.theta"``."""
+    data = copy.deepcopy(data)
+    *above, name = path.split(".")
+    holder = data["state"]
+    for each in above:
+        holder = holder[each]
+    assert name in holder
+    holder[name] = value
+    return data
+
+
+def value_at(data: dict[str, Any], path: str) -> Any:
+    """The value at a path of names."""
+    holder = data["state"]
+    for each in path.split("."):
+        holder = holder[each]
+    return holder
+
+
+def covariance_of(estimator: Any) -> str:
+    """Path of the first covariance within a state."""
+    found = leaves(estimator.layout, estimator.state)
+    return next(path for path, kind, _ in found if kind.square)
 
 
 ALL = (
@@ -45,87 +68,103 @@ ALL = (
 
 @pytest.mark.parametrize("value", [1e9, -1e9, -2.0, 0.5])
 @pytest.mark.parametrize(
-    ("estimator", "position", "name"),
+    ("estimator", "path"),
     [
-        (pz.HysteresisRLS(RATE, delay=7.0), 199, "the delay line's position"),
-        (pz.OutputErrorRLS(RATE), 18, "the bank's member in use"),
-        (pz.OutputErrorRLS(RATE), 214, "the delay line's position"),
-        (pz.HysteresisEKF(RATE), 66, "the delay line's position"),
-        (pz.PrandtlIshlinskiiRLS(RATE), 35, "the memory's count"),
-        (pz.PrandtlIshlinskiiRLS(RATE), 2516, "the delay line's position"),
-        (pz.PrandtlIshlinskiiRLS(RATE), 2420, "the grid must be as"),
+        (pz.HysteresisRLS(RATE, delay=7.0), "line.position"),
+        (pz.OutputErrorRLS(RATE), "member"),
+        (pz.OutputErrorRLS(RATE, delay=7.0), "line.position"),
+        (pz.HysteresisEKF(RATE, delay=7.0), "line.position"),
+        (pz.PrandtlIshlinskiiRLS(RATE), "plays.memory.count"),
+        (pz.PrandtlIshlinskiiRLS(RATE, delay=7.0), "line.position"),
     ],
     ids=lambda value: type(value).__name__ if hasattr(value, "step") else None,
 )
-def test_what_becomes_an_index_is_refused(estimator: Any, position: int, name: str, value: float) -> None:
-    data = estimator.to_dict()
-    data["state"][position] = value
-    with pytest.raises(ValueError, match=name):
-        type(estimator).from_dict(data)
+def test_what_becomes_an_index_is_refused(estimator: Any, path: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"state: {path} must be a whole number"):
+        type(estimator).from_dict(with_value(estimator.to_dict(), path, value))
+
+
+def test_lengths_must_be_as_arguments_make_them() -> None:
+    for estimator in (pz.PrandtlIshlinskiiRLS(RATE, thresholds=4), pz.HysteresisRLS(RATE, delay=7.5)):
+        data = estimator.to_dict()
+        lengths = {
+            path: float(value)
+            for path, kind, (value,) in leaves(estimator.layout, estimator.state)
+            if kind.fixed and np.ndim(value) == 0
+        }
+        assert lengths
+        for path, value in itertools.product(lengths, (1e9, -1.0, 0.0, 2.5, 3.0)):
+            if value != lengths[path]:
+                with pytest.raises(ValueError, match=f"state: {path} must be as the arguments make it"):
+                    type(estimator).from_dict(with_value(data, path, value))
 
 
 def test_the_message_says_what_would_be_right() -> None:
     data = pz.HysteresisRLS(RATE, delay=7.0).to_dict()
-    data["state"][199] = 1e9
-    words = "state: the delay line's position must be a whole number from -1 to 7, got 1e.09 at position 199"
-    with pytest.raises(ValueError, match=words):
-        pz.HysteresisRLS.from_dict(data)
+    with pytest.raises(
+        ValueError, match=r"state: line.position must be a whole number from -?\d to 7, got 1e\+09"
+    ):
+        pz.HysteresisRLS.from_dict(with_value(data, "line.position", 1e9))
 
 
 @pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)
-def test_shifted_states_are_refused(estimator: Any) -> None:
-    data = used(estimator.copy()).to_dict()
-    for shift in range(1, len(data["state"])):
-        rolled = data["state"][shift:] + data["state"][:shift]
-        with pytest.raises(ValueError, match="state: "):
-            type(estimator).from_dict(data | {"state": rolled})
+def test_names_and_shapes_must_be_its_own(estimator: Any) -> None:
+    """Every name, in every record within the state: dropped, renamed, added, of another shape or type."""
+    saved = used(estimator.copy()).to_dict()["state"]
+
+    def refused(words: str) -> None:
+        with pytest.raises(ValueError, match=words):
+            saved_state.check(saved, estimator.layout, estimator.state, estimator._rules)
+
+    def refuse(holder: dict[str, Any]) -> None:
+        for name, value in list(holder.items()):
+            if isinstance(value, dict):
+                refuse(value)
+            del holder[name]
+            refused(f"state.* has no '{name}'")
+            holder[name + "_"] = value
+            refused(f"'{name}'")
+            holder[name] = value
+            refused(f"unknown fields.*'{name}_'")
+            del holder[name + "_"]
+            for wrong in (None, "1", [], [value], {"a": 1.0}, np.nan, 10**400, [[1.0], [2.0, 3.0]]):
+                holder[name] = wrong
+                refused("state")
+            holder[name] = value
+
+    refuse(saved)
+    state = saved_state.check(saved, estimator.layout, estimator.state, estimator._rules)
+    assert by_name(estimator.layout, state) == saved
+
+
+@pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)
+def test_a_state_of_other_options_is_refused(estimator: Any) -> None:
+    data = estimator.to_dict()
+    for other in ALL:
+        if other is not estimator:
+            with pytest.raises(ValueError, match="state"):
+                type(estimator).from_dict(data | {"state": other.to_dict()["state"]})
 
 
 @pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)
 def test_a_covariance_must_be_one(estimator: Any) -> None:
     estimator = used(estimator.copy())
-    parts = blocks(estimator)
-    name = next(name for name in ("the covariance P", "the covariance") if name in parts)
-    size = parts[name].stop - parts[name].start
-    n = round(np.sqrt(size))
-    data = estimator.to_dict()
-    P = np.array(data["state"][parts[name]]).reshape(n, n)
+    path, data = covariance_of(estimator), estimator.to_dict()
+    P = np.array(value_at(data, path))
+    n = len(P)
     swapped, negative, lopsided = P[[1, 0, *range(2, n)]], -P, P.copy()
     lopsided[0, 1] += 0.01 * np.sqrt(P[0, 0] * P[1, 1])
     for wrong in (swapped, negative, lopsided):
-        state = list(data["state"])
-        state[parts[name]] = wrong.ravel().tolist()
-        with pytest.raises(ValueError, match=f"state: {name}"):
-            type(estimator).from_dict(data | {"state": state})
-
-
-def test_theta_and_covariance_cannot_change_places() -> None:
-    for estimator in ALL[:2]:
-        estimator = used(estimator.copy())
-        state = estimator.to_dict()["state"]
-        theta, P = (blocks(estimator)[name] for name in ("theta", "the covariance P"))
-        assert P.start == theta.stop
-        changed = state[: theta.start] + state[P] + state[theta] + state[P.stop :]
-        with pytest.raises(ValueError, match="state: the covariance P"):
-            type(estimator).from_dict(estimator.to_dict() | {"state": changed})
+        with pytest.raises(ValueError, match=f"state: {path} must"):
+            type(estimator).from_dict(with_value(data, path, wrong.tolist()))
 
 
 @pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)
 def test_counters_must_agree(estimator: Any) -> None:
-    estimator = used(estimator.copy())
-    data = estimator.to_dict()
-    data["state"][blocks(estimator)["samples"].start] = 1.0
-    data["state"][blocks(estimator)["samples missing"].start] = 2.0
+    data = with_value(used(estimator.copy()).to_dict(), "samples", 1.0)
+    name = "missed" if "missed" in data["state"] else "missing"
     with pytest.raises(ValueError, match="counters"):
-        type(estimator).from_dict(data)
-
-
-@pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)
-def test_tables_cover_their_states(estimator: Any) -> None:
-    starts = [block.start for block in estimator._table().blocks]
-    assert starts[0] == 0
-    assert starts == sorted(starts)
-    assert starts[-1] < estimator._state.size
+        type(estimator).from_dict(with_value(data, name, 2.0))
 
 
 def test_work_space_is_not_saved() -> None:
@@ -133,9 +172,13 @@ def test_work_space_is_not_saved() -> None:
     estimator = pz.HysteresisRLS(RATE, policies=(policies.RandomWalk(), *switched))
     for k in range(3):
         estimator.step(0.1 * k, 0.01 * k)
+    idle = [path for path, kind, _ in leaves(estimator.layout, estimator.state) if kind.idle]
+    assert "law.product" in idle
     saved = estimator.to_dict()
-    assert np.all(np.isfinite(saved["state"]))
-    assert not np.any(np.array(saved["state"])[blocks(estimator)["the work space"]])
+    assert saved["state"] == by_name(estimator.layout, estimator.state)
+    for path in idle:
+        with pytest.raises(KeyError):
+            value_at(saved, path)
 
 
 @pytest.mark.parametrize(

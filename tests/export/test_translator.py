@@ -13,56 +13,73 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezoest.equations import admissible, coleman_hodgdon, least_squares, play
+from piezoest.compile import Record, compiled, like, local_rows
+from piezoest.equations import admissible, coleman_hodgdon, least_squares, play, turning_points
 from piezoest.equations.integrators import NODES, bogacki_shampine
-from piezoest.export import c_text
-from piezoest.export.c_translator import Translator
-from piezoest.export.c_values import Array, Expr, Known, Root, TranslationError, literal
+from piezoest.estimators.delay_line import delay_line, delayed
+from piezoest.export.c_file import File
+from piezoest.export.c_translator import translate
+from piezoest.export.c_values import (
+    Array,
+    Known,
+    Number,
+    Root,
+    Struct,
+    TranslationError,
+    Value,
+    literal,
+    members,
+)
 from piezoest.export.compiled import build_shared
+from piezoest.layout import ABSENT, COVARIANCE, FIXED, NUMBER, Length, new, numbers, record
 
-STATE, LAST, FIRST = 3, 2, 0
-
-
-def array(name: str, size: int | None = None) -> Array:
-    return Array(name, Root(), size=size)
+LAST, FIRST = 2, 0
 
 
-def translate(function: Any, *arguments: Any) -> tuple[str, Translator, str]:
-    """Text of the file, the translator, and the name of the function in C."""
-    translator = Translator(real="double", single=False)
-    made, _ = translator.function(function, list(arguments))
-    functions = "\n".join(c_text._function(f, translator) for f in translator.functions)
-    positions = c_text._enum(translator.positions) if translator.positions else ""
-    text = (
-        f"#include <math.h>\n{positions}{c_text._tables(translator)}{c_text._helpers(translator)}{functions}"
-    )
-    return (
-        text.replace(f"static void {made.name}", f"void {made.name}").replace(
-            f"static double {made.name}", f"double {made.name}"
-        ),
-        translator,
-        made.name,
-    )
+def array(name: str, *shape: int) -> Array:
+    return Array(name, shape, Root(name))
 
 
-def build(folder: Path, function: Any, *arguments: Any) -> Callable[..., Any]:
-    text, _, name = translate(function, *arguments)
+def struct(layout: Any, name: str = "state", **values: Any) -> Struct:
+    return Struct(f"{name}->", layout, new(layout, **values), Root(name), name)
+
+
+def constants(layout: Any, **values: Any) -> Struct:
+    return Struct("", layout, new(layout, **values), Root(""), "settings", constant=True)
+
+
+def reals(*names: str) -> list[Value]:
+    return [Number(name, "real") for name in names]
+
+
+def text_of(function: Any, *arguments: Value) -> tuple[str, str]:
+    """Text of the file, and the name of the function in C."""
+    file = File("test", "double")
+    made, _ = translate(file, function, list(arguments))
+    functions = file.text(f"{made.name}()")
+    types = "".join(text for _, text in file.types.values())
+    head = functions.replace(f"static void {made.name}", f"void {made.name}")
+    head = head.replace(f"static double {made.name}", f"double {made.name}")
+    return f"#include <math.h>\n{types}{head}", made.name
+
+
+def build(folder: Path, function: Any, *arguments: Value) -> Callable[..., Any]:
+    text, name = text_of(function, *arguments)
     (folder / "one.c").write_text(text, encoding="utf-8")
-    build_shared(folder, ["one.c"], folder / f"{name}.so")
-    return getattr(ctypes.CDLL(str(folder / f"{name}.so")), name)
+    build_shared(folder, ["one.c"], folder / f"{name}.so", "-Wall", "-Wextra", "-Werror")
+    made = getattr(ctypes.CDLL(str(folder / f"{name}.so")), name)
+    made.restype = ctypes.c_double
+    return made
 
 
 def pointer(values: Any) -> Any:
-    return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
-
-
-REAL = [Expr(name, "real") for name in "abcde"]
+    return ctypes.c_void_p(values.ctypes.data)
 
 
 @pytest.fixture(scope="module")
 def inverse_increment(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
-    function = build(tmp_path_factory.mktemp("c"), coleman_hodgdon.inverse_increment, *REAL)
-    function.argtypes, function.restype = [ctypes.c_double] * 5, ctypes.c_double  # type: ignore[attr-defined]
+    function = build(tmp_path_factory.mktemp("c"), coleman_hodgdon.inverse_increment, *reals(*"wrabc"))
+    function.argtypes = [ctypes.c_double] * 5  # type: ignore[attr-defined]
     return function
 
 
@@ -79,39 +96,125 @@ def test_inverse_increment_is_the_same(
     )
 
 
-def test_update_in_place_is_the_same(tmp_path: Path) -> None:
-    n = 4
+LAW = record(theta=numbers(4), P=numbers(4, 4, kind=COVARIANCE), phi=numbers(4), y=NUMBER, S=NUMBER)
+GIVEN = record(forgetting=FIXED, noise=FIXED)
+
+
+@compiled
+def learn(law: Record, settings: Record, z: float) -> float:
+    """One sample of recursive least squares."""
+    law.y, law.S = least_squares.discrete_update(
+        law.theta, law.P, law.phi, z, settings.forgetting, settings.noise, 1e9
+    )
+    return law.y
+
+
+def test_update_of_a_record_is_the_same(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
-    L = rng.normal(size=(n, n))
-    theta, P, phi, work = rng.normal(size=n), (L @ L.T).ravel(), rng.normal(size=n), np.zeros(n)
-    arrays = [theta, P, phi]
-    function = build(
-        tmp_path, least_squares.discrete_update, array("theta"), array("P"), array("phi"), Expr("z", "real"),
-        Known(n), *(Expr(name, "real") for name in ("forgetting", "R", "bound", "enable")), array("work"),
-    )  # fmt: skip
-    ours: Any = [values.copy() for values in arrays]
-    update: Any = least_squares.discrete_update
-    y, S = update(*ours, 1.5, n, 0.99, 0.1, 1e9, 1.0, work.copy())
-    results = np.zeros(1), np.zeros(1)
-    function.argtypes = [*[type(pointer(theta))] * 3, *[ctypes.c_double] * 5, *[type(pointer(theta))] * 3]  # type: ignore[attr-defined]
-    function(*map(pointer, arrays), 1.5, 0.99, 0.1, 1e9, 1.0, pointer(work), *map(pointer, results))
-    for mine, theirs in zip(arrays, ours, strict=True):
-        np.testing.assert_array_equal(mine, theirs)
-    assert (results[0][0], results[1][0]) == (y, S)
+    L = rng.normal(size=(4, 4))
+    start = {"theta": rng.normal(size=4), "P": L @ L.T, "phi": rng.normal(size=4)}
+    given_ = {"forgetting": 0.99, "noise": 0.1}
+    ours, theirs, settings = new(LAW, **start), new(LAW, **start), new(GIVEN, **given_)
+    function = build(tmp_path, learn, struct(LAW, "law"), constants(GIVEN, **given_), *reals("z"))
+    function.argtypes = [ctypes.c_void_p, ctypes.c_double]  # type: ignore[attr-defined]
+    for z in rng.normal(size=100).tolist():
+        assert function(pointer(theirs), z) == learn.of(LAW, GIVEN)(ours, settings, z)
+        assert theirs.tobytes() == ours.tobytes()
+
+
+LINE, BEGUN = delay_line(2.3)
+PATH = record(line=LINE, memory=turning_points.TURNING_POINTS, none=ABSENT)
+
+
+@compiled
+def remember(path: Record, u: float, r: float) -> float:
+    """A play behind a delay."""
+    turning_points.remember(path.memory, delayed(path.line, delayed(path.none, u)))
+    return turning_points.recall(path.memory, r)
+
+
+def test_branches_loops_and_lengths_are_the_same(tmp_path: Path) -> None:
+    assert isinstance(LINE.by_name["voltages"].shape[0], Length)  # type: ignore[union-attr]
+    state = new(PATH, line=BEGUN)
+    function = build(tmp_path, remember, struct(PATH, "path", line=BEGUN), *reals("u", "r"))
+    function.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double]  # type: ignore[attr-defined]
+    # What is fixed is no member: the rest stands in the order of C.
+    own = np.concatenate([[0.0] * 42, [-1.0], [0.0] * 3])
+    assert list(members(PATH)) == ["memory", "line"]
+    rng = np.random.default_rng(1)
+    for u in np.cumsum(rng.normal(size=2000)).tolist():
+        assert function(pointer(own), u, 0.7) == remember.of(PATH)(state, u, 0.7)
 
 
 def test_prandtl_ishlinskii_is_the_same(tmp_path: Path) -> None:
     n = 12
     thresholds, weights = np.linspace(0.5, 30.0, n), np.full(n, 0.01)
-    tables = [array("y", n), Expr("w", "real"), Expr("gain", "real"), array("thresholds"), array("weights")]
-    function = build(tmp_path, play.prandtl_ishlinskii_inverse_step, *tables)
+    arguments = [array("y", n), *reals("w", "gain"), array("thresholds", n), array("weights", n)]
+    function = build(tmp_path, play.prandtl_ishlinskii_inverse_step, *arguments)
     y, own = np.zeros(n), np.zeros(n)
-    kind = type(pointer(y))
+    kind = ctypes.c_void_p
     function.argtypes = [kind, ctypes.c_double, ctypes.c_double, kind, kind]  # type: ignore[attr-defined]
-    function.restype = ctypes.c_double  # type: ignore[attr-defined]
     for w in 5.0 * np.sin(np.linspace(0.0, 20.0, 500)):
         theirs = play.prandtl_ishlinskii_inverse_step(y, float(w), 0.1, thresholds, weights)
         assert function(pointer(own), w, 0.1, pointer(thresholds), pointer(weights)) == theirs
+
+
+# ---------------------------------------------------------------- names
+
+
+NESTED = record(swing=record(size=NUMBER, turns=numbers(3)), gain=NUMBER)
+
+
+def follow(state: Any, u: Any) -> None:
+    """Follow u."""
+    swing = state.swing
+    for i in range(len(swing.turns)):
+        swing.turns[i] += u * state.gain
+    _grow(swing)
+
+
+def _grow(swing: Any) -> None:
+    swing.size += 1.0
+
+
+def test_c_has_the_names_of_python() -> None:
+    text, _ = text_of(follow, struct(NESTED), *reals("u"))
+    assert "state->swing.turns[i] += u * state->gain;" in text
+    assert "test_translator_grow(&state->swing);" in text
+    assert "typedef struct {\n    double size;\n    double turns[3];\n} test_swing;" in text
+
+
+def misspelt(state: Any) -> Any:
+    return state.swing.sise
+
+
+def test_a_misspelt_field_is_refused() -> None:
+    with pytest.raises(TranslationError, match=r"state\.swing has no field sise"):
+        text_of(misspelt, struct(NESTED))
+
+
+def read_only(state: Any, unused: Any) -> Any:
+    return state.gain + state.swing.size
+
+
+def test_what_is_not_written_is_const_and_unused_parameters_go() -> None:
+    text, _ = text_of(read_only, struct(NESTED), *reals("x"))
+    assert "(const test_state *state)" in text
+
+
+def room(P: Any, x: Any) -> Any:
+    Q, row = local_rows(2, 2), like(P)
+    for i in range(2):
+        for j in range(2):
+            row[i, j] = P[j, i]
+            Q[i, j] = x * row[i, j]
+    return Q[0, 1]
+
+
+def test_work_space_is_local() -> None:
+    text, _ = text_of(room, array("P", 2, 2), *reals("x"))
+    assert "double Q[2][2];" in text
+    assert "double row[2][2];" in text
 
 
 # ---------------------------------------------------------------- known values
@@ -124,31 +227,21 @@ def choose(x: Any, way: int) -> Any:
 
 
 def test_known_branch_is_all_that_is_left() -> None:
-    text, _, _ = translate(choose, Expr("x", "real"), Known(1))
+    text, _ = text_of(choose, *reals("x"), Known(1))
     assert "if" not in text
     assert "x * 0.75" in text
 
 
-def part_of(state: Any, i: int) -> Any:
-    inner = state[STATE:]
-    inner[i] += 1.0
-    return inner[LAST] * inner.size
+def changed(x: Any, way: int) -> Any:
+    if x > 0.0:
+        way = 4
+    return x * way
 
 
-def test_positions_keep_their_names_and_unused_parameters_go() -> None:
-    text, translator, _ = translate(part_of, array("state", 8), Expr("i", "int"))
-    assert "double *inner = state + TEST_TRANSLATOR_STATE;" in text
-    assert "inner[TEST_TRANSLATOR_LAST] * 5.0" in text
-    assert translator.positions == {"TEST_TRANSLATOR_STATE": 3, "TEST_TRANSLATOR_LAST": 2}
-
-
-def read_only(state: Any, unused: Any) -> Any:
-    return state[0] + state[1]
-
-
-def test_what_is_not_written_is_const() -> None:
-    text, _, _ = translate(read_only, array("state"), Expr("x", "real"))
-    assert "(const double *state)" in text
+def test_a_known_number_that_changes_is_a_variable(tmp_path: Path) -> None:
+    function = build(tmp_path, changed, *reals("x"), Known(3))
+    function.argtypes = [ctypes.c_double, ctypes.c_int]  # type: ignore[attr-defined]
+    assert (function(2.0, 3), function(-2.0, 3)) == (8.0, -6.0)
 
 
 def integrate(x: Any, a: Any) -> Any:
@@ -156,30 +249,70 @@ def integrate(x: Any, a: Any) -> Any:
 
 
 def test_functions_and_tuples_are_passed_through() -> None:
-    text, _, _ = translate(integrate, Expr("x", "real"), Expr("a", "real"))
+    text, _ = text_of(integrate, *reals("x", "a"))
     assert text.count("coleman_hodgdon_inverse_rate(") == 4
 
 
 def where_there_is_one(x: Any, line: Any) -> Any:
     if line is not None and x > 0.0:
-        x += line[0]
+        x += line.gain
     return x if line is None else 2.0 * x
 
 
 def test_what_is_not_handed_over_is_left_out() -> None:
-    without, _, _ = translate(where_there_is_one, Expr("x", "real"), Known(None))
+    without, _ = text_of(where_there_is_one, *reals("x"), Known(None))
     assert "return x;" in without
     assert "line" not in without
-    with_one, _, _ = translate(where_there_is_one, Expr("x", "real"), array("line"))
-    assert "line[0]" in with_one
+    with_one, _ = text_of(where_there_is_one, *reals("x"), struct(NESTED, "line"))
+    assert "line->gain" in with_one
     assert "2.0 * x" in with_one
 
 
+def test_settings_are_numbers_in_the_code() -> None:
+    text, _ = text_of(learn, struct(LAW, "law"), constants(GIVEN, forgetting=0.99, noise=0.1), *reals("z"))
+    assert "0.99, 0.1, 1000000000.0" in text
+    assert "settings" not in text
+
+
 def test_same_function_is_translated_once_for_each_size() -> None:
-    translator = Translator(real="double", single=False)
+    file = File("test", "double")
     for n in (3, 4, 3):
-        translator.function(least_squares.trace, [array("P"), Known(n)])
-    assert [f.name for f in translator.functions] == ["least_squares_trace", "least_squares_trace_2"]
+        translate(file, least_squares.trace, [array("P", n, n)])
+    assert [made.name for made in file.functions.values()] == ["least_squares_trace", "least_squares_trace_2"]
+
+
+# ---------------------------------------------------------------- order
+
+
+def _count(state: Any) -> Any:
+    state.gain += 1.0
+    return state.gain
+
+
+def ignores(none: Any, value: Any) -> Any:
+    return 1.0 if none is None else value
+
+
+def does_it_all_the_same(state: Any) -> Any:
+    one = ignores(None, _count(state))
+    return one + state.gain
+
+
+def test_a_call_in_an_argument_that_is_not_used_is_made(tmp_path: Path) -> None:
+    own = np.array([0.0, 0.0, 0.0, 0.0, 3.0])
+    function = build(tmp_path, does_it_all_the_same, struct(NESTED))
+    assert function(pointer(own)) == 5.0
+
+
+def in_order(state: Any) -> Any:
+    state.gain = state.gain * 10.0 + _count(state) * _count(state) - state.gain
+    return state.gain
+
+
+def test_operands_come_from_left_to_right(tmp_path: Path) -> None:
+    own = np.array([0.0, 0.0, 0.0, 0.0, 3.0])
+    function = build(tmp_path, in_order, struct(NESTED))
+    assert function(pointer(own)) == 30.0 + 4.0 * 5.0 - 5.0
 
 
 @pytest.mark.parametrize(
@@ -234,8 +367,12 @@ def writes(x: Any) -> Any:
     return x[0]
 
 
-def with_an_open_order(x: Any) -> Any:
-    return x[0] + writes(x)
+def with_a_slice(x: Any) -> Any:
+    return x[1:]
+
+
+def with_a_hidden_write(x: Any) -> Any:
+    return x[0] if x[1] > 0.0 else x[0] + writes(x)
 
 
 def with_itself(x: Any) -> Any:
@@ -254,32 +391,34 @@ def with_text(x: Any) -> Any:
         (with_a_power, "write x * x"),
         (with_keywords, "positional"),
         (with_a_default, "default"),
-        (with_an_open_order, "put its result into a name first"),
+        (with_a_slice, "slice"),
+        (with_a_hidden_write, "put it into a name first"),
         (with_itself, "calls itself"),
         (with_text, "title"),
     ],
 )
 def test_what_is_not_in_the_subset_is_refused(function: Any, word: str) -> None:
-    arrays = (with_a_step, with_an_open_order)
-    argument = array("x", 10) if function in arrays else Expr("x", "real")
+    arrays = (with_a_step, with_a_slice, with_a_hidden_write)
+    argument = array("x", 10) if function in arrays else Number("x", "real")
     with pytest.raises(TranslationError, match=re.escape(word)) as refusal:
-        translate(function, argument)
+        text_of(function, argument)
     assert "test_translator.py:" in str(refusal.value)
 
 
 def test_a_condition_must_be_one() -> None:
     with pytest.raises(TranslationError, match="comparison"):
-        translate(with_a_condition_of_a_number, Expr("x", "real"))
+        text_of(with_a_condition_of_a_number, *reals("x"))
 
 
 def test_constant_arrays_cannot_be_written() -> None:
-    translator = Translator(real="double", single=False)
+    layout = record(weights=numbers(3, kind=FIXED))
+    weights = constants(layout, weights=[1.0, 2.0, 3.0]).field("weights")
     with pytest.raises(TranslationError, match="constant"):
-        translator.function(writes, [translator.table("numbers", (1.0, 2.0))])
+        text_of(writes, weights)
 
 
 @given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3))
 def test_nearest_admissible_has_an_inverse(factors: list[float]) -> None:
     theta = np.array([0.02, 0.12, 0.0036]) * factors
-    admissible.nearest_admissible(theta, np.empty(9), admissible.NEAREST_MARGIN)
+    admissible.nearest_admissible(theta, admissible.NEAREST_MARGIN)
     assert admissible.has_inverse(*theta)

@@ -11,7 +11,7 @@ FloatArray = NDArray[np.float64]
 
 
 class OutputErrorFilter:
-    """Kalman filter on (b, c, d, centre, disturbance), in parts of the initial c.
+    """Kalman filter on (b, c, d, centre, disturbance), relative to the initial c.
 
     The voltage's clock is that of a triangle whose turns are seen once it is back by a tenth of its swing.
     """

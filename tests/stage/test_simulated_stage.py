@@ -23,10 +23,13 @@ from piezoest import (
     SimulatedStage,
 )
 from piezoest.equations.filters import biquad_step, butterworth_low_pass
+from piezoest.layout import Named
+from piezoest.stage import kernel
 
 FS = 10_000.0
 COLEMAN_HODGDON = ColemanHodgdon(0.021, 0.147, 4.29e-3, offset=0.3)
 PLAYS = PrandtlIshlinskii(0.1, [1.0, 5.0, 20.0], [0.02, 0.01, 0.03], offset=-0.2)
+BENT = PrandtlIshlinskii(0.1, [1.0], [0.02], bends=[5.0], bend_weights=[[0.01, 0.0]])
 U = 40.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(3000) / FS)
 
 
@@ -197,6 +200,8 @@ def test_gain_schedule() -> None:
     [
         (lambda: SimulatedStage(0.0, PLAYS), "sample_rate must be above zero"),
         (lambda: SimulatedStage(FS, 0.15), "hysteresis must be a LinearGain or .*, got float"),  # type: ignore[arg-type]
+        (lambda: SimulatedStage(FS, LinearGain), "hysteresis must be a LinearGain or .*, got ABCMeta"),  # type: ignore[arg-type]
+        (lambda: SimulatedStage(FS, BENT), "hysteresis must have neither bends nor creep of its own"),
         (lambda: SimulatedStage(FS, PLAYS, gauge=Amplifier()), "gauge must be a Gauge, got Amplifier"),  # type: ignore[arg-type]
         (lambda: SimulatedStage(FS, PLAYS, gauge=Gauge(cutoff=5000.0)), "gauge.cutoff must lie below half"),
         (lambda: SimulatedStage(FS, PLAYS, seed=-1), "seed must be a whole number"),
@@ -212,6 +217,34 @@ def test_gain_schedule() -> None:
 def test_refusals(make: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_any_model_that_says_how_it_sits_in_a_stage_will_do() -> None:
+    class Loop:
+        offset = COLEMAN_HODGDON.offset
+
+        def simulate(self, u: Any) -> Any:
+            return COLEMAN_HODGDON.simulate(u)
+
+        def stage_settings(self) -> dict[str, Any]:
+            return COLEMAN_HODGDON.stage_settings()
+
+    np.testing.assert_array_equal(full_stage(Loop()).run(U), full_stage(COLEMAN_HODGDON).run(U))
+
+
+@pytest.mark.parametrize("hysteresis", [LinearGain(0.15, offset=1.0), COLEMAN_HODGDON, PLAYS])
+def test_compiled_loops_do_what_their_python_does(hysteresis: Any) -> None:
+    for stage in (full_stage(hysteresis), SimulatedStage(FS, hysteresis)):
+        state, settings = map(Named, (stage._state, stage._settings), stage._layouts)
+        x, measured, one = U[:50].copy(), np.empty(50), np.ones(1)
+        kernel.run.function(state, settings, x, np.zeros(1), one, one, measured)
+        alone = kernel.step.function(state, settings, U[50], 0.0, 1.0, 1.0)
+        stage.reset()
+        stage._noisy = False
+        np.testing.assert_allclose(stage.run(U[:50]), measured, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(stage.displacement, x, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(stage.step(U[50]), alone[0], rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(stage.displacement, alone[1], rtol=0.0, atol=1e-12)
 
 
 def test_run_refuses_columns_and_attributes_refuse_typos() -> None:

@@ -83,7 +83,7 @@ def test_gain_schedule_and_temperature_multiply() -> None:
 
 
 def loop(temperature: float | None) -> tuple[float, float]:
-    """Gain [µm/V] and half the opening of the loop, in parts of the amplitude, at some 5 µm."""
+    """Gain [µm/V] and half the opening of the loop, relative to the amplitude, at some 5 µm."""
     stage = PaperStage(noise=0.0, quantisation=False, temperature=temperature)
     u = np.asarray(signals.triangle(32.0, 5.0, 3, 50_000.0))
     stage.run(u)

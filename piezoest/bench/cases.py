@@ -1,0 +1,247 @@
+"""Cases of the bench: a reference, a stage and a start, from a seed and the conditions of a campaign.
+
+The same scenario, seed and conditions give the same case, to the bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from piezoest import signals
+from piezoest._checks import instance, integer, non_negative, positive
+from piezoest.models import ColemanHodgdon, LinearGain
+from piezoest.signals import Signal
+from piezoest.stage import PaperStage, PreisachStage
+
+# Table I, triangle of 5 µm at 5 Hz: what a start would be that is right.
+RIGHT_MODEL = ColemanHodgdon(alpha=2.10e-2, beta=1.47e-1, gamma=4.29e-3)
+RIGHT_GAIN = LinearGain(0.155)
+COLD, WARM = 0.5, 0.1  # a start parameter is off by up to this fraction of its value
+
+AMPLITUDE = 5.0  # µm, of the scenarios with one amplitude
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """What a scenario leaves open.
+
+    Parameters
+    ----------
+    sample_rate : float
+        [Hz]. A lower one means the same on the same time axis, with fewer samples; at 20 kHz and
+        below the stage leaves its filters out, whose delay costs an estimator accuracy.
+    amplitude : float, optional
+        Largest nominal amplitude of the reference [µm]; default 5, and 7.5 where there are two.
+    frequency : float
+        Of the reference [Hz]; signals that are no wave are stretched in time with it.
+    noise : float, optional
+        Standard deviation of the gauge's noise [µm]; default the stage's own.
+    before, after : int
+        Periods before the change, where there is one, and after it.
+    rest : float
+        Length of the dwell [s].
+    drift : float
+        Length of the drift [s].
+    updates : int
+        Updates of the compensator's model in a period of the wave; the default is one a
+        millisecond at 5 Hz.
+    creep : bool
+        Whether the stage creeps.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+
+    sample_rate: float = 50_000.0
+    amplitude: float | None = None
+    frequency: float = 5.0
+    noise: float | None = None
+    before: int = 10
+    after: int = 15
+    rest: float = 60.0
+    drift: float = 30.0
+    updates: int = 200
+    creep: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("sample_rate", "frequency", "rest", "drift"):
+            positive(name, getattr(self, name))
+        if self.amplitude is not None:
+            positive("amplitude", self.amplitude)
+        if self.noise is not None:
+            non_negative("noise", self.noise)
+        integer("before", self.before, 1)
+        integer("after", self.after, 1)
+        integer("updates", self.updates, 1)
+
+    @property
+    def period(self) -> float:
+        """Of the wave, in samples."""
+        return self.sample_rate / self.frequency
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One run: everything but the estimator.
+
+    Parameters
+    ----------
+    scenario : str
+        Name of the scenario.
+    seed : int
+        Start of the random numbers, the stage's noise among them.
+    reference : Signal
+        What the stage has to follow [µm].
+    period : float
+        Samples over which an error is taken.
+    change : int
+        Sample at which something changes; 0 if it is the start itself.
+    amplitude : float
+        Nominal amplitude after the change [µm].
+    start : ColemanHodgdon
+        Model to start from.
+    linear_start : LinearGain
+        The same for linear feed-forward.
+    update_interval : int
+        Samples between two updates of the compensator's model.
+    rest : tuple of int, optional
+        First sample of a dwell and the first after it.
+    noise : float, optional
+        Standard deviation of the gauge's noise [µm]; None for the stage's own.
+    gain_schedule : tuple, optional
+        Time [s] and factor of the stage's hysteresis, see `PaperStage`.
+    creep : bool
+        Whether the stage creeps.
+    stage : type
+        `PaperStage` or `PreisachStage`; ``dataclasses.replace(case, stage=...)`` plays it on the other.
+    """
+
+    scenario: str
+    seed: int
+    reference: Signal
+    period: float
+    change: int
+    amplitude: float
+    start: ColemanHodgdon
+    linear_start: LinearGain
+    update_interval: int
+    rest: tuple[int, int] | None = None
+    noise: float | None = None
+    gain_schedule: tuple[tuple[float, float], ...] | None = None
+    creep: bool = True
+    stage: type[PaperStage] | type[PreisachStage] = PaperStage
+
+    @property
+    def sample_rate(self) -> float:
+        """[Hz]."""
+        return self.reference.sample_rate
+
+    def new_stage(self) -> PaperStage | PreisachStage:
+        """Stage at rest; every one of the same case is identical, its noise included."""
+        return self.stage(
+            self.sample_rate,
+            seed=self.seed,
+            noise=self.noise,
+            gain_schedule=self.gain_schedule,
+            creep=self.creep,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """What a scenario makes its case of.
+
+    Parameters
+    ----------
+    scenario : str
+        Name of the scenario.
+    seed : int
+        Start of the random numbers.
+    rng : numpy.random.Generator
+        Random numbers of this scenario and seed.
+    conditions : Conditions
+        What the scenario leaves open.
+    """
+
+    scenario: str
+    seed: int
+    rng: np.random.Generator
+    conditions: Conditions
+
+    @property
+    def amplitude(self) -> float:
+        """Of a scenario with one amplitude [µm]."""
+        return self.conditions.amplitude or AMPLITUDE
+
+    def triangle(self, periods: float) -> Signal:
+        """Smoothed triangle of `amplitude`.
+
+        Parameters
+        ----------
+        periods : float
+            How many.
+        """
+        given = self.conditions
+        return signals.triangle(self.amplitude, given.frequency, periods, given.sample_rate)
+
+    def case(
+        self, reference: Signal, *, spread: float = WARM, period: float | None = None, **rest: Any
+    ) -> Case:
+        """Make the case: a start is drawn, and the stage is as the conditions say.
+
+        Parameters
+        ----------
+        reference : Signal
+            What the stage has to follow [µm].
+        spread : float
+            A start parameter is off by up to this fraction: `COLD` or `WARM`.
+        period : float, optional
+            Samples over which an error is taken; default a period of the wave.
+        **rest
+            Other fields of `Case`.
+
+        Raises
+        ------
+        ValueError
+            If the reference is not a signal.
+        """
+        instance("reference", reference, Signal, "a Signal: make one of values, sample rate and period")
+        given = self.conditions
+        options = {
+            "change": 0,
+            "amplitude": self.amplitude,
+            "noise": given.noise,
+            "creep": given.creep,
+            **rest,
+        }
+        return Case(
+            scenario=self.scenario,
+            seed=self.seed,
+            reference=reference,
+            period=given.period if period is None else period,
+            start=drawn_start(self.rng, spread),
+            linear_start=LinearGain(RIGHT_GAIN.gain * (1.0 + float(self.rng.uniform(-spread, spread)))),
+            update_interval=max(1, round(given.period / given.updates)),
+            **options,
+        )
+
+
+def drawn_start(rng: np.random.Generator, spread: float) -> ColemanHodgdon:
+    """Start model with each parameter off by up to `spread`; drawn again until it is admissible.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    spread : float
+        Fraction of each parameter's value.
+    """
+    while True:
+        model = ColemanHodgdon.from_theta(RIGHT_MODEL.theta * (1.0 + rng.uniform(-spread, spread, 3)))
+        if model.is_admissible:
+            return model

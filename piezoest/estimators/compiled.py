@@ -1,0 +1,133 @@
+"""What estimators whose samples go through compiled functions share."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, cast
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.estimators.base import EstimatorBase, Trace
+from piezoest.layout import Record, new
+
+# Histories that a compiled loop does not write.
+NONE, NO_ROWS = np.empty(0), np.empty((0, 0))
+
+
+class CompiledEstimator(EstimatorBase):
+    """An estimator whose samples go through compiled functions on named numbers.
+
+    Its `kernel` is a module with functions at module level: ``sample(state, settings, u, x)``, what becomes
+    of one sample; the compiled ``step``, ``run`` and ``step_channels`` around it;
+    ``proposed(state, settings, model)``, the admissible model as known now: gain, or alpha, beta and
+    gamma, and fourth the offset; the compiled ``propose`` around it. A class that has `model` itself does
+    without these two, and cannot be exported to C.
+    """
+
+    __slots__ = ("_run_loop", "_settings", "_settings_layout", "_step_loop")
+
+    #: Module with the compiled functions.
+    kernel: ClassVar[Any]
+    #: Functions within ``kernel.sample`` that no model depends on: a controller leaves them out.
+    unneeded: ClassVar[tuple[Any, ...]] = ()
+
+    _layouts_of: ClassVar[dict[str, str]] = {
+        "_state": "_layout", "_start": "_layout", "_settings": "_settings_layout"
+    }  # fmt: skip
+
+    _settings_layout: Record
+    _settings: Any
+    _step_loop: Any
+    _run_loop: Any
+
+    def _configure(self, layout: Record, values: dict[str, Any]) -> None:
+        """Keep what compiled code is given beside the state: settings that no sample changes."""
+        self._settings_layout = layout
+        self._settings = new(layout, **values)
+        self._step_loop = self._run_loop = None
+
+    def __getstate__(self) -> Any:
+        # Machine code is not pickled: it is looked up again.
+        kept, slots = cast(Any, super().__getstate__())
+        return kept, {**slots, "_step_loop": None, "_run_loop": None}
+
+    @property
+    def settings(self) -> Any:
+        """What compiled code is given beside `state`, by name: a NumPy structured array."""
+        return self._settings
+
+    @property
+    def layouts(self) -> tuple[Record, Record]:
+        """Layouts of `state` and `settings`, for which the compiled functions are made."""
+        return self._layout, self._settings_layout
+
+    def _sample(self, u: float, x: float) -> None:
+        if self._step_loop is None:
+            self._step_loop = self.kernel.step.of(*self.layouts)
+        self._step_loop(self._state, self._settings, u, x)
+
+    def _through(self, u: FloatArray, x: FloatArray, every: int, histories: tuple[FloatArray, ...]) -> None:
+        """Run checked records; every k-th sample goes into those histories that have room."""
+        if self._run_loop is None:
+            self._run_loop = self.kernel.run.of(*self.layouts)
+        self._run_loop(self._state, self._settings, u, x, every, *histories)
+
+    def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
+        rows, n = u.size // every, self.covariance_size
+        theta = np.empty((rows, self.row_size))
+        sizes = {name: rows if name in want else 0 for name in ("y", "S", "P")}
+        y, S, P = np.empty(sizes["y"]), np.empty(sizes["S"]), np.empty((sizes["P"], n * n))
+        self._through(u, x, every, (theta, y, S, P))
+        kept = {"y": y, "S": S, "P": P.reshape(-1, n, n)}
+        return Trace(
+            index=np.arange(every - 1, rows * every, every),
+            theta=self.theta_of(theta),
+            parameter_names=self.parameter_names,
+            **{name: self._shown(name, kept[name], theta) for name in want},
+        )
+
+    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
+        """What `run` shows of a history, y, S or P, that the loop wrote beside its rows of the estimate."""
+        return history
+
+    @property
+    def covariance_size(self) -> int:
+        """Rows of the covariance that compiled loops keep."""
+        return len(self.parameter_names)
+
+    @property
+    def row_size(self) -> int:
+        """Numbers that compiled loops write into a row of their history of the estimate."""
+        return len(self.parameter_names)
+
+    def theta_of(self, rows: FloatArray) -> FloatArray:
+        """Parameters (…, n) of rows of that history.
+
+        Parameters
+        ----------
+        rows : ndarray, shape (…, row_size)
+            As ``kernel.run`` and ``kernel.step_channels`` wrote them.
+        """
+        return rows
+
+    def _proposed(self) -> list[float]:
+        """Numbers of the admissible model as known now: four, see ``kernel.proposed``."""
+        values = np.zeros(4)
+        self.kernel.propose.of(*self.layouts)(self._state, self._settings, values)
+        numbers: list[float] = values.tolist()
+        return numbers
+
+
+class Freezable(CompiledEstimator):
+    """An estimator whose estimate can be held, by the flag ``frozen`` in its state."""
+
+    __slots__ = ()
+
+    @property
+    def frozen(self) -> bool:
+        """Whether the estimate is held; settable. Samples are then counted as held."""
+        return bool(self._state["frozen"])
+
+    @frozen.setter
+    def frozen(self, frozen: bool) -> None:
+        self._state["frozen"] = bool(frozen)

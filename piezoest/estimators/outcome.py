@@ -1,0 +1,96 @@
+"""What `piezoest.track` needs of an estimator, and what every one says of its samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.models import Model
+
+
+@runtime_checkable
+class Estimator(Protocol):
+    """What `piezoest.track` needs of an estimator; any class with these two will do.
+
+    An estimator may also have ``run(u, x)``, which `track` then prefers to a loop of ``step``.
+    """
+
+    @property
+    def model(self) -> Model:
+        """Model as known now."""
+
+    def step(self, u: float, x: float | None) -> None:
+        """Go through one sample.
+
+        Parameters
+        ----------
+        u : float
+            Voltage [V].
+        x : float or None
+            Measured displacement [µm]; None if it is missing.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What happened to the samples an estimator was given.
+
+    Parameters
+    ----------
+    samples : int
+        Samples seen.
+    updates : int
+        Samples that moved the estimate.
+    missing : int
+        Samples without a usable voltage or displacement (None, NaN, infinite).
+    held : int
+        Samples with a measurement that moved nothing: too little excitation to say anything, or an update
+        that would not be a number, or one beyond all measure.
+    resets : int
+        Times the covariance was reset, also where it was lost or an update was left out for that reason.
+    projected : bool
+        Whether `model` is the nearest admissible one and not `theta` itself.
+    last : str
+        What became of the last sample: ``"waiting"``, ``"updated"``, ``"missing"``, ``"held"``
+        or ``"rejected"``.
+    outliers : int
+        Measurements that were rejected as ones the stage cannot have made.
+    """
+
+    samples: int
+    updates: int
+    missing: int
+    held: int
+    resets: int
+    projected: bool
+    last: str
+    outliers: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """History of an estimator over a `run`, every k-th sample.
+
+    Parameters
+    ----------
+    index : ndarray of int, shape (M,)
+        Positions in the record that was run.
+    theta : ndarray, shape (M, n)
+        Parameters after that sample.
+    parameter_names : tuple of str
+        Names of the columns of `theta`.
+    y, S : ndarray or None, shape (M,)
+        Innovation and its variance, if asked for.
+    P : ndarray or None, shape (M, n, n)
+        Covariance, if asked for.
+    """
+
+    index: np.ndarray[Any, np.dtype[np.int64]]
+    theta: FloatArray
+    parameter_names: tuple[str, ...]
+    y: FloatArray | None = None
+    S: FloatArray | None = None
+    P: FloatArray | None = field(default=None, repr=False)

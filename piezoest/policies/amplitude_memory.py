@@ -1,0 +1,263 @@
+"""What was learnt at each swing of the voltage is taken up again on return."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest._checks import FloatArray, fraction, integer, moderate, positive
+from piezoest.compile import inlined
+from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, Field, Length, Named, Record, numbers, record
+from piezoest.models import AmplitudeProfile
+from piezoest.policies.base import Conditions, Policy
+
+# Swings alike before what they teach is stored, and unlike ones before the middle is given up.
+ALIKE, UNLIKE = 2.0, 2.0
+# Of each parameter only the shape is recalled: the offset keeps what the stage's history gave it.
+ALPHA, OFFSET_SLOPE, SHAPE = 0, 3, 3
+# With an alpha below this, relative to the start's, there is no offset to keep.
+LEAST_ALPHA = 1e-9
+# Turns until the voltage swings as announced: the swing at hand may be a mixture of the old and the new.
+MIXED = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class AmplitudeMemory(Policy):
+    """Remember what was learnt at each swing of the voltage, and start from there on return.
+
+    The last paragraph of sec. IV of Eielsen et al. (2012): parameters scheduled by amplitude. At the end
+    of a swing like those before it the mean estimate over the swing is stored with its size; when
+    the size changes and it, or one on either side of it, is known, theta goes to what was stored,
+    interpolated. See `HysteresisRLS.profile` and `AmplitudeProfile`.
+
+    Parameters
+    ----------
+    places : int
+        Amplitudes that are remembered, up to 1000; a further one replaces the nearest.
+    tolerance : float
+        Sizes that differ by less, in parts, are the same amplitude.
+    uncertainty : float
+        Standard deviation of what was stored when it is taken up, relative to the initial model.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+
+    needs_swings = needs_discrete = needs_loop = True
+
+    places: int = 8
+    tolerance: float = 0.1
+    uncertainty: float = 0.05
+
+    def __post_init__(self) -> None:
+        integer("places", self.places, 1, 1000)
+        positive("tolerance", fraction("tolerance", self.tolerance, 0.0, 0.5))
+        moderate("uncertainty", self.uncertainty)
+
+    def numbers(self, at: Conditions) -> dict[str, float]:
+        """Tolerance, and variance of what is recalled."""
+        return {"tolerance": self.tolerance, "variance": self.uncertainty**2}
+
+    def keeps(self, n: int) -> Field:
+        """Sizes stored (0: none) and their theta, and what leads to the next.
+
+        Size of swing at which theta stands, voltage in its middle, where the last swing began, swings of that
+        size in a row, swings of another one, turns for which an announcement holds; the travel in the sums of
+        theta, and these.
+        """
+        places = Length("places", self.places)
+        return record(
+            size=DISTANCE, middle=MEASURED, began=MEASURED, steady=COUNT, odd=COUNT, announced=COUNT,
+            travelled=AMOUNT, sums=numbers(n),
+            sizes=numbers(places, kind=DISTANCE), thetas=numbers(places, n),
+        )  # fmt: skip
+
+
+@register_jitable
+def recall(own: Any, tolerance: Any, size: Any, theta: Any) -> bool:
+    """Theta stored for a size of swing into `theta`, interpolated; False where it is not known."""
+    below = above = -1
+    low, high = 0.0, 0.0
+    for i in range(len(own.sizes)):
+        known = own.sizes[i]
+        if known > low and known <= size * (1.0 + tolerance):
+            below = i
+            low = known
+        if known >= size * (1.0 - tolerance) and (above < 0 or known < high):
+            above = i
+            high = known
+    if below < 0 or above < 0:
+        return False
+    weight = 0.0
+    if high > low:
+        weight = min(max((size - low) / (high - low), 0.0), 1.0)
+    n = len(theta)
+    kept = theta[OFFSET_SLOPE] / theta[ALPHA] if n > SHAPE and abs(theta[ALPHA]) > LEAST_ALPHA else 0.0
+    for i in range(min(n, SHAPE)):
+        theta[i] = own.thetas[below, i] + weight * (own.thetas[above, i] - own.thetas[below, i])
+    if n > SHAPE:
+        theta[OFFSET_SLOPE] = kept * theta[ALPHA]
+    return True
+
+
+@register_jitable
+def _store(own: Any, tolerance: Any, size: Any) -> None:
+    """Put the mean theta of the swing at hand where its size belongs."""
+    nearest, distance, empty = 0, 1e300, -1
+    for i in range(len(own.sizes)):
+        known = own.sizes[i]
+        if known == 0.0:
+            if empty < 0:
+                empty = i
+        elif abs(known - size) < distance:
+            nearest = i
+            distance = abs(known - size)
+    same = distance <= tolerance * size
+    if not same and empty >= 0:
+        nearest = empty
+    rate = 0.5 if same else 1.0
+    own.sizes[nearest] += rate * (size - own.sizes[nearest])
+    for i in range(len(own.sums)):
+        own.thetas[nearest, i] += rate * (own.sums[i] / own.travelled - own.thetas[nearest, i])
+
+
+@register_jitable
+def _size_after_turn(own: Any, swing: Any, tolerance: Any) -> Any:
+    """Store what a steady swing taught; the size of swing to expect now, 0 if it is as before."""
+    size = abs(swing.turned - own.began)
+    middle = 0.5 * (swing.turned + own.began)
+    own.began = swing.turned
+    own.announced = max(own.announced - 1.0, 0.0)
+    expected = 0.0
+    if abs(size - own.size) <= tolerance * own.size:
+        own.steady += 1.0
+        own.odd = 0.0
+        own.middle = middle
+        if own.steady >= ALIKE and own.travelled > 0.0:
+            _store(own, tolerance, size)
+    elif own.announced == 0.0:
+        own.steady = 0.0
+        own.odd += 1.0
+        expected = 2.0 * abs(swing.turned - own.middle)
+        if own.odd >= UNLIKE or own.size == 0.0:
+            expected = size
+            own.middle = middle
+            own.odd = 0.0
+    clear_sums(own)
+    return expected
+
+
+@register_jitable
+def clear_sums(own: Any) -> None:
+    """Begin a new mean of theta."""
+    own.travelled = 0.0
+    for i in range(len(own.sums)):
+        own.sums[i] = 0.0
+
+
+@register_jitable
+def _visit(own: Any, swing: Any, theta: Any, fraction: Any, tolerance: Any) -> bool:
+    """At a turn store what a steady swing taught, or recall what is known of a new size (True then).
+
+    Only there: amid a swing another theta would throw the inverse.
+    """
+    if swing.usual == 0.0:
+        own.began = swing.turned
+        return False
+    new_size = 0.0
+    if swing.since == 0.0:
+        new_size = _size_after_turn(own, swing, tolerance)
+    own.travelled += fraction
+    for i in range(len(theta)):
+        own.sums[i] += fraction * theta[i]
+    if new_size == 0.0 or abs(new_size - own.size) <= tolerance * own.size:
+        return False
+    own.size = new_size
+    own.steady = 0.0
+    return recall(own, tolerance, new_size, theta)
+
+
+@register_jitable
+def enlarge(P: Any, variance: Any) -> None:
+    """Let no variance of P be below `variance`."""
+    if P is None:
+        return
+    for i in range(len(P)):
+        P[i, i] = np.fmax(P[i, i], variance)
+
+
+@inlined
+def prepare(own: Any, fixed: Any, state: Any, settings: Any) -> None:
+    """Look at the swing, and start from what is known of it."""
+    if fixed is None:
+        return
+    law = state.law
+    if _visit(own, state.swing, law.theta, state.fraction, fixed.tolerance):
+        enlarge(law.P, fixed.variance)
+        enlarge(state.error_covariance, fixed.variance)
+        law.resets += 1.0
+
+
+def profile_of(own: Any, scale: FloatArray) -> AmplitudeProfile:
+    """What is stored, as an `AmplitudeProfile`; `scale` of the parameters.
+
+    Raises
+    ------
+    ValueError
+        If the policy is not among those of the estimator.
+    """
+    _check_is_on(own)
+    known = np.flatnonzero(own["sizes"] > 0.0)
+    sizes, first = np.unique(own["sizes"][known], return_index=True)
+    return AmplitudeProfile(sizes, own["thetas"][known[first], :SHAPE] * scale[:SHAPE])
+
+
+def store_profile(own: Any, scale: FloatArray, profile: AmplitudeProfile) -> None:
+    """Remember a profile, and nothing else.
+
+    Raises
+    ------
+    ValueError
+        If the policy is not among those of the estimator, it is no profile, or there is no room for it.
+    """
+    _check_is_on(own)
+    if not isinstance(profile, AmplitudeProfile):
+        raise ValueError(f"profile must be an AmplitudeProfile, got {profile!r}")
+    count, places = profile.swings.size, own["sizes"].size
+    if count > places:
+        raise ValueError(f"profile holds {count} swings, AmplitudeMemory has {places} places")
+    own["sizes"], own["thetas"] = 0.0, 0.0
+    own["sizes"][:count] = profile.swings
+    own["thetas"][:count, :SHAPE] = profile.theta / scale[:SHAPE]
+
+
+def announce(layout: Record, state: Any, settings: Any, amplitude: float) -> bool:
+    """Recall what is known of an amplitude [µm]; False if that is nothing."""
+    own, law = state["policies"]["amplitude_memory"], state["law"]
+    scale = settings["parameter_scale"]
+    profile = profile_of(own, scale)
+    if profile.swings.size == 0:
+        positive("amplitude", amplitude)
+        return False
+    fixed = settings["policies"]["amplitude_memory"]
+    size = profile.swing_for(amplitude)
+    memory = Named(own, cast(Any, layout.by_name["policies"]).by_name["amplitude_memory"])
+    if not recall(memory, float(fixed["tolerance"]), size, law["theta"]):
+        return False
+    for covariance in (law["P"], state["error_covariance"]):
+        enlarge(covariance if covariance.size else None, fixed["variance"])
+    own["size"], own["steady"], own["announced"] = size, 0.0, MIXED
+    clear_sums(memory)
+    own["began"] = state["swing"]["turned"]
+    law["resets"] += 1.0
+    return True
+
+
+def _check_is_on(own: Any) -> None:
+    if own.dtype.names is None:
+        raise ValueError("this needs policies.AmplitudeMemory(): add it to the policies of HysteresisRLS")

@@ -1,0 +1,49 @@
+"""No update where the regressor says nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from piezoest._checks import non_negative
+from piezoest.compile import inlined
+from piezoest.policies.base import Policy
+
+
+@dataclass(frozen=True, slots=True)
+class DeadZone(Policy):
+    """Leave the estimate and its covariance alone where the regressor says nothing.
+
+    Without it a dwell lets forgetting grow P on no information (wind-up).
+
+    Parameters
+    ----------
+    threshold : float
+        Least phi' P0 phi, in units of the noise variance, that counts as information.
+
+    Raises
+    ------
+    ValueError
+        If threshold is negative.
+
+    Notes
+    -----
+    Source: P. A. Ioannou, J. Sun, Robust Adaptive Control, Prentice Hall 1996, ch. 8.
+    """
+
+    threshold: float = 1e-9
+
+    def __post_init__(self) -> None:
+        non_negative("threshold", self.threshold)
+
+
+@inlined
+def permits(own: Any, fixed: Any, state: Any, settings: Any) -> Any:
+    """Whether the regressor is outside the dead zone."""
+    if fixed is None:
+        return True
+    phi, P_0 = state.phi, settings.law.P_0
+    information = 0.0
+    for i in range(len(phi)):
+        information += phi[i] * phi[i] * P_0[i, i]
+    return information > fixed.threshold * settings.law.noise

@@ -1,0 +1,93 @@
+"""Forgetting along the present regressor alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from piezoest.compile import inlined
+from piezoest.policies.base import Conditions, Policy
+from piezoest.policies.forgetting import Forgetting, Unit, check_memory
+from piezoest.policies.periodic_forgetting import weight
+
+
+@dataclass(frozen=True, slots=True)
+class DirectionalForgetting(Policy):
+    """Forget only along the present regressor: what the data do not renew is kept.
+
+    R. Kulhavy, Automatica 23 (1987) 589-600; L. Cao, H. Schwartz, Automatica 36 (2000) 1725-1731.
+    See `piezoest.equations.least_squares.directional_update`.
+
+    Parameters
+    ----------
+    memory : float
+        Time constant along the regressor, in units of `unit`.
+    unit : {"period", "second"}
+        Of memory: the reference's own period, or seconds (the unit of `step` in
+        `RecursiveLeastSquares`).
+
+    Raises
+    ------
+    ValueError
+        If memory is not above zero or less than 0.001 periods, or the unit is another.
+    """
+
+    forgets = needs_discrete = True
+
+    memory: float = 1.0
+    unit: Unit = "period"
+
+    def __post_init__(self) -> None:
+        check_memory(self.memory, self.unit)
+
+    @property
+    def counts_periods(self) -> bool:
+        """Whether its memory is counted in periods of the reference."""
+        return self.unit == "period"
+
+    def check(self, at: Conditions) -> None:
+        """Refuse a memory in periods where there are none."""
+        check_unit(self, self.unit, at)
+
+    def law(self, at: Conditions) -> dict[str, float]:
+        """Factor over a step of the law, where it is one in time."""
+        return law_of(self.memory, self.unit, at)
+
+    def numbers(self, at: Conditions) -> dict[str, float]:
+        """Memory in periods; zero where it is one in time."""
+        return {"periods": self.memory if self.unit == "period" else 0.0}
+
+
+def check_unit(policy: Policy, unit: str, at: Conditions) -> None:
+    """Refuse a memory in periods where nobody follows the swings of a voltage.
+
+    Raises
+    ------
+    ValueError
+        Naming what it needs.
+    """
+    Policy.check(policy, at)
+    if unit == "period" and not at.has_swings:
+        raise ValueError(f"policies: {policy!r} needs the swings of a voltage: see HysteresisRLS")
+
+
+def law_of(memory: float, unit: str, at: Conditions) -> dict[str, float]:
+    """Numbers of the law for a memory in seconds; none for one in periods, which is set sample by sample."""
+    return Forgetting(memory).law(at) if unit == "second" else {}
+
+
+@inlined
+def forget_by_period(swing: Any, periods: Any, state: Any, settings: Any) -> None:
+    """Forget by the period at hand, where a memory is counted in periods and there are swings."""
+    if swing is None:
+        return
+    if periods > 0.0:
+        state.law.forgetting = weight(state, settings, periods)
+
+
+@inlined
+def prepare(own: Any, fixed: Any, state: Any, settings: Any) -> None:
+    """Forget by the period at hand; the law takes the directional update where this policy is on."""
+    if fixed is None:
+        return
+    forget_by_period(state.swing, fixed.periods, state, settings)

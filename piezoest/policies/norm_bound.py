@@ -1,0 +1,41 @@
+"""A bound on the covariance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from piezoest._checks import finite
+from piezoest.policies.base import Conditions, Policy
+
+
+@dataclass(frozen=True, slots=True)
+class NormBound(Policy):
+    """Bound R0 on the trace of the covariance (A6): P is not updated where that would pass it.
+
+    To the letter (A6) freezes P for as long as ||P|| > R0, which is for good once it
+    happened; here only an update that would pass the bound is left out.
+
+    Parameters
+    ----------
+    limit : float
+        R0, as a multiple of the trace of the initial covariance.
+
+    Raises
+    ------
+    ValueError
+        If limit is below 1: the initial covariance itself must satisfy the bound.
+    """
+
+    limit: float = 100.0
+
+    def __post_init__(self) -> None:
+        if finite("limit", self.limit) < 1.0:
+            raise ValueError(
+                f"limit must be at least 1, got {self.limit}: the initial covariance must satisfy the bound"
+            )
+
+    def law(self, at: Conditions) -> dict[str, float]:
+        """Bound on the trace of P of the law."""
+        return {"bound": float(self.limit * np.trace(at.P_0))}

@@ -1,0 +1,117 @@
+"""Forgetting that shortens where the model no longer fits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import fraction, positive
+from piezoest.compile import inlined
+from piezoest.equations import innovation_energy, least_squares
+from piezoest.policies.base import Conditions, Policy
+from piezoest.policies.directional_forgetting import check_unit, forget_by_period, law_of
+from piezoest.policies.forgetting import LEAST_KEPT, LEAST_WEIGHT, Unit, check_memory
+from piezoest.policies.periodic_forgetting import weight
+
+
+@dataclass(frozen=True, slots=True)
+class VariableForgetting(Policy):
+    """Exponential forgetting whose memory shortens as the innovation's energy rises.
+
+    T. Fortescue, L. Kershenbaum, B. Ydstie, Automatica 17 (1981) 831-835. See
+    `piezoest.equations.least_squares.variable_forgetting`. `HysteresisRLS` takes the innovation's
+    usual variance over the memory for that of the noise: much of it is the model's own error.
+
+    Parameters
+    ----------
+    memory : float
+        Time constant while the innovation is as usual, in units of `unit`.
+    shortest : float
+        Least time constant, relative to memory.
+    unit : {"period", "second"}
+        Of memory: the reference's own period, or seconds (the unit of `step` in
+        `RecursiveLeastSquares`).
+
+    Raises
+    ------
+    ValueError
+        If memory is not above zero or less than 0.001 periods, shortest not within (0, 1], or the
+        unit is another.
+    """
+
+    forgets = needs_discrete = True
+    follows = frozenset({"energy"})
+
+    memory: float = 1.0
+    shortest: float = 0.1
+    unit: Unit = "period"
+
+    def __post_init__(self) -> None:
+        check_memory(self.memory, self.unit)
+        positive("shortest", fraction("shortest", self.shortest))
+
+    def least_factor(self, step: float) -> float:
+        """Least weight that the past keeps over one step: exp(-step/(shortest memory)), at least 0.001.
+
+        Parameters
+        ----------
+        step : float
+            Time between samples, in the unit of `memory`.
+        """
+        return max(float(np.exp(-step / (self.shortest * self.memory))), LEAST_WEIGHT)
+
+    @property
+    def counts_periods(self) -> bool:
+        """Whether its memory is counted in periods of the reference."""
+        return self.unit == "period"
+
+    def check(self, at: Conditions) -> None:
+        """Refuse a memory in periods where there are none."""
+        check_unit(self, self.unit, at)
+
+    def law(self, at: Conditions) -> dict[str, float]:
+        """Factor over a step of the law, where it is one in time."""
+        return law_of(self.memory, self.unit, at)
+
+    def numbers(self, at: Conditions) -> dict[str, float]:
+        """Memories in periods, usual and shortest, zero where they are in time; and the least factor then."""
+        periods = self.memory if self.unit == "period" else 0.0
+        return {
+            "periods": periods,
+            "shortest": self.shortest,
+            "least": max(self.least_factor(at.step), LEAST_KEPT),
+        }
+
+
+@inlined
+def _least(swing: Any, fixed: Any, state: Any, settings: Any) -> Any:
+    """Least weight of the past over a sample."""
+    if swing is None:
+        return fixed.least
+    if fixed.periods > 0.0:
+        return weight(state, settings, fixed.periods * fixed.shortest)
+    return fixed.least
+
+
+@inlined
+def _nominal(energy: Any, forgetting: Any) -> Any:
+    """Factor that gives the memory wanted at the innovation's usual energy, where that is followed."""
+    if energy is None:
+        return forgetting
+    return innovation_energy.nominal(energy, forgetting)
+
+
+@inlined
+def prepare(own: Any, fixed: Any, state: Any, settings: Any) -> None:
+    """Forget by the period at hand, and sooner by the innovation's energy."""
+    if fixed is None:
+        return
+    forget_by_period(state.swing, fixed.periods, state, settings)
+    law = state.law
+    forgetting = _nominal(state.energy, law.forgetting)
+    y = law.z - least_squares.predicted_output(law.theta, state.phi)
+    quadratic = least_squares.covariance_times(law.P, state.phi, law.product)
+    least = _least(state.swing, fixed, state, settings)
+    law.forgetting = least_squares.variable_forgetting(y, quadratic, law.noise, forgetting, least)

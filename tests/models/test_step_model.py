@@ -1,0 +1,95 @@
+"""A model that two functions of one sample describe, compiled: simulated, inverted, in a stage, fitted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest.compile import inlined
+from piezoest.models import StepModel, model_from_dict
+
+RATE = 1000.0
+R = pz.signals.triangle(5.0, 5.0, periods=2, sample_rate=RATE).values
+
+
+@dataclass(frozen=True, slots=True)
+class Slack(StepModel):
+    """A line through a play, and a line beside it."""
+
+    gain: float
+    slack: float
+    width: float
+    offset: float = 0.0
+
+    parameter_names = ("gain", "slack", "width")
+    parameter_units = ("µm/V", "µm/V", "V")
+    state_names = ("play",)
+
+
+@inlined
+def displacement(state: Any, u_0: Any, u: Any, constants: Any) -> Any:
+    state[0] = np.fmax(u - constants[2], np.fmin(u + constants[2], state[0]))
+    return constants[0] * u + constants[1] * state[0]
+
+
+@inlined
+def voltage(state: Any, u_0: Any, x: Any, constants: Any) -> Any:
+    inside = (x - constants[1] * state[0]) / constants[0]
+    below = (x - constants[1] * constants[2]) / (constants[0] + constants[1])
+    above = (x + constants[1] * constants[2]) / (constants[0] + constants[1])
+    return min(max(inside, below), above)
+
+
+MODEL = Slack(0.15, 0.03, 5.0, offset=0.3)
+# The same operator.
+PLAYS = pz.PrandtlIshlinskii(0.15, [5.0], [0.03], 0.3)
+
+
+def test_it_is_simulated_and_inverted() -> None:
+    np.testing.assert_allclose(MODEL.simulate(8.0 * R), PLAYS.simulate(8.0 * R), atol=1e-12)
+    np.testing.assert_allclose(MODEL.invert(R), PLAYS.invert(R), atol=1e-12)
+    with pytest.raises(ValueError, match="above zero"):
+        Slack(0.15, -0.03, 5.0).invert(R)
+    with pytest.raises(ValueError, match="width must be finite"):
+        Slack(0.15, 0.03, np.nan)
+    assert model_from_dict(MODEL.to_dict()) == MODEL
+
+
+def test_a_compensator_and_a_stage_are_made_of_it() -> None:
+    stage = pz.SimulatedStage(RATE, MODEL)
+    u = pz.InverseCompensator(MODEL).run(R)
+    np.testing.assert_allclose(u, MODEL.invert(R), atol=1e-12)
+    np.testing.assert_allclose(stage.run(u), R, atol=1e-12)
+    stage.reset()
+    np.testing.assert_allclose([stage.step(value) for value in u[:50].tolist()], R[:50], atol=1e-12)
+
+
+def test_a_compensator_goes_over_to_it_without_a_bump() -> None:
+    """Its play then stands where the voltage's turning points have left it."""
+    both = []
+    for model in (MODEL, PLAYS):
+        compensator = pz.InverseCompensator(pz.LinearGain(0.17))
+        before = compensator.run(R[:333])
+        compensator.model = model
+        both.append([*before, *compensator.run(R[333:])])
+        assert not compensator.status.projected
+    np.testing.assert_allclose(both[0], both[1], atol=1e-9)
+    assert np.abs(np.diff(both[0])).max() < 2.0 * np.abs(np.diff(R)).max() / 0.15
+
+
+def test_gain_and_temperature_change_it_as_any_other() -> None:
+    u = 8.0 * R
+    options: dict[str, Any] = {"gain_schedule": [[0.0, 1.0], [0.4, 1.2]], "temperature": 40.0}
+    stages = [pz.SimulatedStage(RATE, model, **options) for model in (MODEL, PLAYS)]
+    np.testing.assert_allclose(stages[0].run(u), stages[1].run(u), atol=1e-12)
+
+
+def test_a_fit_finds_it() -> None:
+    fit = pz.BatchFit(RATE, initial_model=Slack(0.1, 0.05, 3.0), offset=True)
+    fit.run(8.0 * R, MODEL.simulate(8.0 * R))
+    np.testing.assert_allclose(fit.model.theta, MODEL.theta, rtol=1e-3)
+    assert fit.model.offset == pytest.approx(0.3, abs=1e-3)

@@ -1,0 +1,278 @@
+"""A policy that is asked for is carried out, or refused: never silently ignored."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import importlib.util
+import inspect
+import itertools
+import json
+import linecache
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest import policies as p
+from piezoest.estimators import recursive_least_squares_kernel as law_kernel
+from piezoest.layout import ABSENT, new, record
+from piezoest.policies import base
+
+RATE = 2000.0
+TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
+AT = base.Conditions(1.0, np.eye(3), by_period=True, has_swings=True, has_loop=True)
+
+# Numbers with which a policy has something to do in the record below, where its own, and any near, have not.
+SETTINGS: dict[str, dict[str, Any]] = {
+    "CovarianceResetting": {"floor": 0.5},
+    "DeadZone": {"threshold": 10.0},
+    "DirectionalForgetting": {"memory": 0.4, "unit": "second"},
+    "ExcitationGate": {"least": 1e-3},
+    "NormBound": {"limit": 1.0},
+    "Projection": {"margin": 0.4},
+    "VariableForgetting": {"memory": 0.4, "unit": "second"},
+}
+OPTIONS: dict[str, dict[str, Any]] = {
+    "RandomWalk": {"memory": "period"},
+    "PeriodicForgetting": {"memory": "period"},
+    "Normalisation": {"time_base": "continuous"},
+    "NormBound": {"memory": 0.1},
+}
+ALL = sorted(policy.__name__ for policy in base.REGISTERED.values())
+
+
+def eventful() -> tuple[Any, Any]:
+    """A record with a spike, a dwell, other amplitudes and another gain: something for every policy."""
+    waves = [pz.signals.triangle(volts, 5.0, 4, RATE).values for volts in (33.0, 15.0, 33.0)]
+    u = np.concatenate([waves[0], np.full(200, waves[0][-1]), *waves[1:]])
+    x = TRUE.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
+    x[u.size // 2 :] *= 0.7
+    x[700] += 5.0
+    return u, x
+
+
+def near(policy: Any) -> Iterator[Any]:
+    """The policy, and others with one number up to a thousand times as large or as small."""
+    yield policy
+    for name, factor in itertools.product(policy.numbers(AT), (0.1, 10.0, 0.01, 100.0, 1e-3, 1e3)):
+        if hasattr(policy, name):
+            with contextlib.suppress(ValueError):
+                yield dataclasses.replace(policy, **{name: getattr(policy, name) * factor})
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_policy_is_carried_out(name: str) -> None:
+    """Also those to come: with it an estimator does something else than without."""
+    options = OPTIONS.get(name, {})
+    memory = 0.4 if name == "Forgetting" else None
+    u, x = eventful()
+    others = {"policies": (), **options, "memory": options.get("memory")}
+    by_period = others["memory"] == "period"
+    without = pz.HysteresisRLS(RATE, **{"memory": None, "policies": ()} if by_period else others)
+    without.run(u, x)
+
+    def differs(*policies: Any) -> bool:
+        with_it = pz.HysteresisRLS(RATE, **{"memory": memory, **options, "policies": policies})
+        with_it.run(u, x)
+        same = np.array_equal(with_it.theta, without.theta[: with_it.theta.size])
+        return with_it.status.updates > 10 and not same
+
+    policy = getattr(p, name)(**SETTINGS.get(name, {}))
+    candidates = [()] if name == "Forgetting" else ((each,) for each in near(policy))
+    assert any(differs(*each) for each in candidates), (
+        f"{policy!r} changes nothing, nor with numbers up to a thousand times as large or as small: it "
+        "does nothing, or eventful() has nothing for it"
+    )
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_policy_has_something_that_carries_it_out(name: str) -> None:
+    cls = base.REGISTERED[base.field_name(getattr(p, name))]
+    base.check_is_carried_out(cls)
+    source = inspect.getsource(sys.modules[cls.__module__])
+    for hook in base.HOOKS:
+        assert (f"\ndef {hook}(" in source) == (hook in base.hooks_of(cls))
+
+
+def test_what_is_off_is_absent() -> None:
+    kept, given, values = base.layouts((p.DeadZone(2.0), p.AmplitudeMemory(places=3)), AT)
+    assert [name for name, _ in given.fields] == list(base.REGISTERED)
+    assert {name for name, field in given.fields if field != ABSENT} == {"dead_zone", "amplitude_memory"}
+    assert {name for name, field in kept.fields if field != ABSENT} == {"amplitude_memory"}
+    settings = new(given, **values)
+    assert settings["dead_zone"]["threshold"] == 2.0
+    assert new(kept)["amplitude_memory"]["sizes"].shape == (3,)
+
+
+# ---------------------------------------------------------------- policies of one's own
+
+Maker = Callable[..., Any]
+
+
+@pytest.fixture
+def policy_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Maker]:
+    """Makes a policy of one's own in a file of its own; all is forgotten afterwards."""
+    registered, chained = dict(base.REGISTERED), dict(base._chained)
+    monkeypatch.setattr(base, "note_source", lambda function: None)
+    files: list[str] = []
+
+    def make(name: str, functions: str = "", body: str = "gain: float = 2.0", file: str = "") -> Any:
+        module = file or f"own_{name.lower()}"
+        path = tmp_path / f"{module}.py"
+        path.write_text(
+            "from dataclasses import dataclass\n"
+            "from piezoest.policies.base import Policy\n"
+            f"@dataclass(frozen=True)\nclass {name}(Policy):\n    {body}\n{functions}\n",
+            encoding="utf-8",
+        )
+        spec = importlib.util.spec_from_file_location(module, path)
+        assert spec is not None
+        assert spec.loader is not None
+        files.append(module)
+        monkeypatch.setitem(sys.modules, module, importlib.util.module_from_spec(spec))
+        spec.loader.exec_module(sys.modules[module])
+        return getattr(sys.modules[module], name)
+
+    yield make
+    for store, before in ((base.REGISTERED, registered), (base._chained, chained)):
+        store.clear()
+        store.update(before)  # type: ignore[arg-type]
+
+
+def hook(name: str, body: str, arguments: str = "own, fixed, state, settings") -> str:
+    return f"def {name}({arguments}):\n    {body}\n"
+
+
+def test_a_policy_that_does_nothing_is_refused(policy_file: Maker) -> None:
+    policy = policy_file("Idle")
+    with pytest.raises(ValueError, match="Idle does nothing: its file has none of prepare, permits"):
+        base.layouts((policy(),), AT)
+
+
+def test_a_misspelt_hook_is_refused(policy_file: Maker) -> None:
+    policy = policy_file("Hasty", hook("prepair", "pass") + hook("permits", "return True"))
+    with pytest.raises(ValueError, match="Hasty: prepair are no hooks, these are prepare, permits"):
+        base.layouts((policy(),), AT)
+
+
+def test_a_hook_with_other_arguments_is_refused(policy_file: Maker) -> None:
+    hooks = hook("prepare", "pass") + hook("permits", "return True", "own, numbers, state, settings")
+    policy = policy_file("Renamed", hooks)
+    with pytest.raises(ValueError, match="Renamed: permits must have the arguments own, fixed"):
+        base.layouts((policy(),), AT)
+
+
+def test_a_hook_that_is_no_plain_function_is_refused(policy_file: Maker) -> None:
+    odd = "\n\nclass Called:\n    def __call__(self, own, fixed, state, settings):\n        return True\n"
+    policy = policy_file("Called", hook("prepare", "pass") + odd + "\n\npermits = Called()\n")
+    with pytest.raises(ValueError, match="permits must be a plain function, marked @inlined"):
+        base.layouts((policy(),), AT)
+
+
+@pytest.mark.parametrize("number", [np.float64(0.5), np.float32(0.5), np.array(0.5)])
+def test_numbers_of_numpy_are_numbers(number: Any) -> None:
+    policy = p.DeadZone(number)
+    assert policy.numbers(AT) == {"threshold": 0.5}
+    assert json.loads(json.dumps(p.policy_to_dict(policy))) == p.policy_to_dict(p.DeadZone(0.5))
+
+
+def test_numbers_of_the_law_are_enough(policy_file: Maker) -> None:
+    policy = policy_file("Quick", body="def law(self, at):\n        return {'forgetting': 0.5}")
+    estimators = [pz.RecursiveLeastSquares(1, policies=each) for each in ((), (policy(),))]
+    for estimator in estimators:
+        for z in (1.0, 2.0, 3.0):
+            estimator.update(z, [1.0])
+    assert estimators[0].theta[0] == pytest.approx(2.0, rel=1e-4)
+    assert estimators[1].theta[0] == pytest.approx((1.0 + 2.0 * 2.0 + 4.0 * 3.0) / 7.0, rel=1e-4)
+
+
+def test_a_policy_defined_after_the_estimators_is_refused(policy_file: Maker) -> None:
+    policy = policy_file("Late", hook("prepare", "pass"))
+    for make in (
+        lambda: pz.HysteresisRLS(RATE, memory=None, policies=(policy(),)),
+        lambda: pz.RecursiveLeastSquares(2, policies=(policy(),)),
+    ):
+        with pytest.raises(ValueError, match=r"Late was defined after the estimators.* not call its prepare"):
+            make()
+    # Others go on as they are.
+    estimator = pz.RecursiveLeastSquares(2, policies=(p.DeadZone(),))
+    estimator.update(1.0, [1.0, 1.0])
+    assert estimator.theta.sum() == pytest.approx(1.0, rel=1e-3)
+
+
+def test_a_hook_that_was_changed_afterwards_is_refused(policy_file: Maker) -> None:
+    policy = policy_file("Changing", hook("prepare", "pass"))
+    base.chain("prepare")
+    base.check_is_carried_out(policy)
+    policy_file("Changing", hook("prepare", "state.law.noise = 2.0"))
+    with pytest.raises(ValueError, match="Changing was defined after"):
+        base.check_is_carried_out(policy)
+
+
+def test_names_and_files_are_a_policy_s_own(policy_file: Maker) -> None:
+    policy_file("First", hook("prepare", "pass"))
+    with pytest.raises(TypeError, match="must have a name and a file of its own"):
+        policy_file("DeadZone", hook("prepare", "pass"))
+    with pytest.raises(TypeError, match=r"there is own_first\.First"):
+        policy_file("Second", hook("prepare", "pass"), file="own_first")
+
+
+# ---------------------------------------------------------------- chains
+
+
+def test_hooks_are_called_in_order_with_their_own_numbers(policy_file: Maker) -> None:
+    says = "if fixed is not None:\n        state.calls.append((NAME, own, fixed.gain))"
+    for name in ("Zebra", "Ant", "Mole"):
+        policy_file(name, hook("prepare", says.replace("NAME", repr(name))))
+    state = SimpleNamespace(calls=[], policies=SimpleNamespace(zebra=1, ant=2, mole=3))
+    settings = SimpleNamespace(
+        policies=SimpleNamespace(zebra=SimpleNamespace(gain=5.0), ant=None, mole=SimpleNamespace(gain=7.0))
+    )
+    for name in base.REGISTERED:
+        for each in (state.policies, settings.policies):
+            each.__dict__.setdefault(name, None)
+    base.chain("prepare")(state, settings)
+    assert state.calls == [("Zebra", 1, 5.0), ("Mole", 3, 7.0)]
+
+
+def test_all_policies_are_asked_for_their_permission(policy_file: Maker) -> None:
+    for name in ("Yes", "No", "Maybe"):
+        policy_file(name, hook("permits", f"state.asked.append({name!r}); return fixed"))
+    for answers in ((True, True, True), (True, False, True), (False, True, False)):
+        given = dict(zip(("yes", "no", "maybe"), answers, strict=True))
+        off = dict.fromkeys(base.REGISTERED)
+        state = SimpleNamespace(asked=[], policies=SimpleNamespace(**off))
+        settings = SimpleNamespace(policies=SimpleNamespace(**off | given))
+        assert base.chain("permits")(state, settings) is all(answers)
+        assert state.asked == ["Yes", "No", "Maybe"]
+
+
+def test_a_hook_that_nobody_has_is_an_empty_chain(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(base, "REGISTERED", {})
+    monkeypatch.setattr(base, "_chained", {})
+    assert base.chain("prepare")(None, None) is None
+    assert base.chain("permits")(None, None) is True
+
+
+def test_chains_have_a_text_for_tracebacks_and_translators() -> None:
+    for name in base.HOOKS:
+        chain = getattr(law_kernel, name)
+        lines = linecache.getlines(chain.__code__.co_filename)
+        assert lines[0] == f"def {name}(state, settings):\n"
+        called = [each for each, policy in base.REGISTERED.items() if name in base.hooks_of(policy)]
+        places = [next(k for k, line in enumerate(lines) if f"{each}_{name}(" in line) for each in called]
+        assert places == sorted(places)
+
+
+def test_all_policies_are_saved_by_their_fields() -> None:
+    for cls in base.REGISTERED.values():
+        policy: Any = cls(**SETTINGS.get(cls.__name__, {}))
+        assert p.policy_from_dict(p.policy_to_dict(policy)) == policy
+        assert isinstance(record(own=policy.keeps(3)).dtype, np.dtype)
+        assert dataclasses.fields(policy) is not None

@@ -1,0 +1,322 @@
+"""Compiled functions on named numbers: machine code and Python do the same, and nothing else compiles."""
+
+from __future__ import annotations
+
+import itertools
+import pickle
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numba import TypingError, njit, types
+from numba.core import config
+from numba.core.errors import LoweringError
+from numba.extending import register_jitable
+
+from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, local, local_rows, nth
+from piezoest.compiled_records import record_type
+from piezoest.layout import (
+    ABSENT,
+    COUNT,
+    FIXED,
+    NUMBER,
+    Length,
+    Named,
+    by_name,
+    new,
+    numbers,
+    record,
+)
+from piezoest.layout import Record as Layout
+
+INNER = record(count=COUNT, theta=numbers(3), P=numbers(2, 3))
+
+
+def layout_of(plays: int | None = 4, places: int = 2) -> Layout:
+    """Records in records, arrays, and sizes that users choose; without `plays` they are absent."""
+    memory = ABSENT if plays is None else record(
+        u=numbers(Length("plays", plays)), thetas=numbers(Length("places", places), 3), last=NUMBER
+    )  # fmt: skip
+    return record(total=NUMBER, law=INNER, memory=memory, tail=numbers(2), rates=ABSENT)
+
+
+GAIN = record(gain=FIXED, scale=numbers(3, kind=FIXED))
+GAINS: dict[str, Any] = {"gain": 0.5, "scale": [1.0, 2.0, 3.0]}
+
+
+@inlined
+def remember(memory: Any, x: Any) -> Any:
+    if memory is None:
+        return x
+    for i in range(len(memory.u)):
+        memory.u[i] += x + i
+    for i in range(len(memory.thetas)):
+        for j in range(3):
+            memory.thetas[i, j] += 10.0 * i + j * x
+    memory.last = x
+    return 2.0 * x
+
+
+@register_jitable
+def squares(theta: Any, P: Any) -> Any:
+    """Room on the stack: of the size of an array, and of sizes written out."""
+    copy, row, rows = like(theta), local(3), local_rows(2, 3)
+    total = 0.0
+    for i in range(len(theta)):
+        copy[i] = theta[i] * theta[i]
+        row[i] = P[0, i] + P[1, i]
+    for i in range(2):
+        for j in range(3):
+            rows[i, j] = copy[j] + row[j]
+            total += rows[i, j]
+    return total
+
+
+@register_jitable
+def sample(state: Any, given: Any, x: Any) -> None:
+    law = state.law
+    law.count += 1.0
+    for i in range(len(law.theta)):
+        law.theta[i] += given.gain * given.scale[i] * x
+        for j in range(len(law.P)):
+            law.P[j, i] = law.theta[i] - j
+    state.tail[1] = remember(state.memory, x)
+    state.total += squares(law.theta, law.P) + state.tail[1]
+
+
+@compiled
+def step(state: Record, given: Record, x: float) -> float:
+    """Every way to reach a number."""
+    sample(state, given, x)
+    return state.total
+
+
+@compiled
+def step_channels(states: Record, given: Record, x: Matrix, first: int, stop: int, history: Cube) -> None:
+    for c in range(first, stop):
+        state = nth(states, c)
+        for k in range(x.shape[0]):
+            sample(state, given, x[k, c])
+            history[k, c, 0] = state.total
+
+
+@compiled
+def tripled(x: Vector, factor: int) -> None:
+    for i in range(len(x)):
+        x[i] *= factor
+
+
+@compiled
+def misspelt(state: Record) -> None:
+    state.law.thetta[0] = 1.0
+
+
+@compiled
+def misspelt_number(state: Record) -> None:
+    state.law.countt = 1.0
+
+
+@compiled
+def absent_used(state: Record) -> None:
+    state.law.count = state.rates[0]
+
+
+@compiled
+def whole_array(state: Record) -> None:
+    state.law.theta = state.law.theta
+
+
+@compiled
+def wrong_index(state: Record) -> None:
+    state.law.count = state.law.theta[0, 0]
+
+
+@compiled
+def stack_of_unknown_size(state: Record) -> None:
+    room = like(state.memory.u)
+    room[0] = 1.0
+
+
+@compiled
+def calls_of_its_module(state: Record) -> None:
+    state.total = state.doubled(state.total)
+
+
+@inlined
+def doubled(x: Any) -> Any:
+    return 2.0 * x
+
+
+# ---------------------------------------------------------------- the same as Python
+
+LAYOUTS = (layout_of(4), layout_of(7, 0), layout_of(0, 3), layout_of(None))
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_machine_code_does_what_python_does(layout: Layout) -> None:
+    machine, plain, given = new(layout), new(layout), new(GAIN, **GAINS)
+    entry = step.of(layout, GAIN)
+    for x in (0.5, -2.0, 3.25):
+        total = entry(machine, given, x)
+        assert total == step.function(Named(plain, layout), Named(given, GAIN), x)
+        assert by_name(layout, machine) == by_name(layout, plain)
+    assert machine["law"]["count"] == 3.0
+
+
+@settings(max_examples=25)
+@given(plays=st.integers(0, 9), places=st.integers(0, 9), x=st.floats(-1e3, 1e3))
+def test_any_length_goes_through_one_machine_code(plays: int, places: int, x: float) -> None:
+    layout = layout_of(plays, places)
+    machine, plain, given = new(layout), new(layout), new(GAIN, **GAINS)
+    step.of(layout, GAIN)(machine, given, x)
+    step.function(Named(plain, layout), Named(given, GAIN), x)
+    assert machine.tobytes() == plain.tobytes()
+    assert step.of(layout, GAIN) is step.of(layout_of(4), GAIN)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_one_of_many_records(layout: Layout) -> None:
+    given, x = new(GAIN, **GAINS), np.arange(20.0).reshape(4, 5)
+    many, plain = (np.repeat(new(layout)[np.newaxis], 5) for _ in range(2))
+    histories = np.zeros((2, 4, 5, 1))
+    step_channels.of(layout, GAIN)(many, given, x, 1, 4, histories[0])
+    step_channels.function(Named(plain, layout), Named(given, GAIN), x, 1, 4, histories[1])
+    assert many.tobytes() == plain.tobytes()
+    assert np.array_equal(histories[0], histories[1])
+    for c in range(5):
+        alone = new(layout)
+        if 1 <= c < 4:
+            for k in range(4):
+                step.of(layout, GAIN)(alone, given, x[k, c])
+        assert many[c].tobytes() == alone.tobytes()
+
+
+def test_without_machine_code_the_function_itself_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    layout = layout_of(3)
+    machine, plain, given = new(layout), new(layout), new(GAIN, **GAINS)
+    step.of(layout, GAIN)(machine, given, 1.5)
+    monkeypatch.setattr(config, "DISABLE_JIT", True)
+    monkeypatch.setattr(step, "_entries", {})
+    step.of(layout, GAIN)(plain, given, 1.5)
+    assert plain.tobytes() == machine.tobytes()
+
+
+def test_functions_without_records_are_called_as_they_are() -> None:
+    x = np.arange(3.0)
+    tripled(x, 3)
+    assert x.tolist() == [0.0, 3.0, 6.0]
+
+
+def test_a_record_s_functions_are_those_of_its_module() -> None:
+    layout = Layout(layout_of().fields, __name__)
+    state = new(layout, total=3.0)
+    calls_of_its_module.of(layout)(state)
+    assert state["total"] == 6.0
+    with pytest.raises(TypingError, match="doubled"):
+        calls_of_its_module.of(layout_of())
+
+
+def test_compiled_functions_are_pickled_by_name() -> None:
+    assert pickle.loads(pickle.dumps(step)) is step
+
+
+# ---------------------------------------------------------------- what does not compile
+
+
+@pytest.mark.parametrize(
+    ("function", "words"),
+    [
+        (misspelt, "thetta"),
+        (misspelt_number, "countt"),
+        (absent_used, "none"),
+        (whole_array, "theta cannot be assigned whole"),
+        (wrong_index, "getitem"),
+        (stack_of_unknown_size, "like"),
+    ],
+)
+def test_does_not_compile(function: Any, words: str) -> None:
+    with pytest.raises((TypingError, LoweringError), match=words):
+        function.of(layout_of())
+
+
+def test_as_many_layouts_as_records() -> None:
+    with pytest.raises(TypeError, match="step has 2 records, got 1 layouts"):
+        step.of(GAIN)
+
+
+# ---------------------------------------------------------------- one machine code, one layout
+
+
+def several() -> list[Layout]:
+    """Layouts that differ in one name, size, place or presence."""
+    fields = dict(INNER.fields)
+    return [
+        INNER,
+        record(**{**fields, "counts": NUMBER}),
+        record(**{("counted" if name == "count" else name): field for name, field in INNER.fields}),
+        record(**{**fields, "theta": numbers(4)}),
+        record(**{**fields, "P": numbers(3, 2)}),
+        record(**{**fields, "P": numbers(6)}),
+        record(**{**fields, "theta": numbers(Length("n", 3))}),
+        record(**{**fields, "theta": ABSENT}),
+        record(**{**fields, "count": record(count=COUNT)}),
+        record(**dict(reversed(INNER.fields))),
+        Layout(INNER.fields, "math"),
+    ]
+
+
+def test_no_two_layouts_share_machine_code() -> None:
+    for one, other in itertools.combinations(several(), 2):
+        assert record_type(one) != record_type(other)
+        nested = (record(law=one, tail=NUMBER), record(law=other, tail=NUMBER))
+        assert record_type(nested[0]) != record_type(nested[1])
+    entries = {id(step.of(layout, GAIN)) for layout in LAYOUTS}
+    assert len(entries) == 2  # with and without a memory, whatever its lengths
+
+
+def test_machine_code_does_not_go_by_what_numbers_can_be() -> None:
+    changed = record(**{**dict(INNER.fields), "count": NUMBER})
+    assert record_type(changed) == record_type(INNER)
+
+
+def test_what_is_absent_costs_nothing() -> None:
+    """Neither a number of room nor an instruction."""
+
+    def instructions(layout: Layout) -> int:
+        kinds = (record_type(layout), record_type(GAIN), types.float64)
+        anew: Any = njit(_nrt=False, error_model="numpy")(step.function)  # what was kept cannot be looked at
+        anew.compile(kinds)
+        assembler = anew.inspect_asm(kinds)
+        return sum(line.startswith("\t") for line in assembler.splitlines())
+
+    bare = record(total=NUMBER, law=INNER, memory=ABSENT, tail=numbers(2))
+    assert bare.dtype.itemsize == layout_of(None).dtype.itemsize
+    assert instructions(layout_of(None)) < 0.8 * instructions(layout_of(4))
+    assert instructions(record(**dict(layout_of(None).fields), other=ABSENT)) <= 1.02 * instructions(
+        layout_of(None)
+    )
+
+
+@compiled
+def asks_no_further(state: Record) -> None:
+    state.memory.last = 1.0
+
+
+@compiled
+def misspells(state: Record) -> None:
+    state.totl = 1.0
+
+
+@pytest.mark.parametrize(("function", "words"), [
+    (asks_no_further, r"asks_no_further is not compiled: .*None, for it is absent .*test_compile\.py, line"),
+    (misspells, r"misspells is not compiled: .*totl.*test_compile\.py, line"),
+])  # fmt: skip
+@pytest.mark.skipif(bool(vars(config)["DISABLE_JIT"]), reason="nothing is compiled")
+def test_what_cannot_be_compiled_says_where(function: Any, words: str) -> None:
+    with pytest.raises(TypingError) as caught:
+        function.of(layout_of(plays=None))
+    (note,) = caught.value.__notes__
+    assert re.search(words, note)

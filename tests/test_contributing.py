@@ -1,0 +1,104 @@
+"""The worked examples of CONTRIBUTING.md: each section "Adding a …" is carried out in a copy of the package.
+
+The first line of a fenced block says where it goes: ``# new file PATH``, ``# added to PATH``, for its end, or
+``# added to PATH, below LINE``. The last block of a section is a test file; it is run as plain Python, for to
+compile the copy would take a minute. So are the tests that find by themselves what was added.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PLACE = re.compile(r"# (new file|added to) (\S+?)(?:, below (.+))?")
+
+
+def examples(text: str) -> dict[str, list[str]]:
+    """Fenced blocks of Python of each section whose heading begins with "Adding"."""
+    sections = re.split(r"^## ", text, flags=re.MULTILINE)[1:]
+    titled = {title: body for title, _, body in (section.partition("\n") for section in sections)}
+    fenced = re.compile(r"^```python\n(.*?)^```$", flags=re.MULTILINE | re.DOTALL)
+    return {title: fenced.findall(body) for title, body in titled.items() if title.startswith("Adding ")}
+
+
+def apply(block: str, folder: Path) -> Path:
+    """Write a block to where its first line says; returns the file."""
+    comment, _, code = block.partition("\n")
+    place = PLACE.fullmatch(comment)
+    assert place is not None, f"a block must begin with its place, got {comment!r}"
+    how, name, line = place.groups()
+    path = folder / name
+    assert path.exists() == (how == "added to"), f"{comment}: {name} is there, or is not"
+    old = path.read_text() if path.exists() else ""
+    if line is None:
+        new = f"{old}\n\n{code}" if old else code
+    else:
+        assert old.count(f"{line}\n") == 1, f"{comment}: the line must stand there once"
+        new = old.replace(f"{line}\n", f"{line}\n{code}")
+    path.write_text(new)
+    return path
+
+
+# Tests that find what was added, and its name.
+FOUND_BY = {
+    "Adding a policy": (
+        "VarianceLimit",
+        "tests/test_package.py", "tests/bench/test_adaptation.py", "tests/policies/test_base.py",
+    ),
+    "Adding a model": ("Backlash", "tests/test_package.py"),
+    "Adding an estimator": ("SlopeFilter", "tests/test_package.py", "tests/estimators/test_conformance.py"),
+}  # fmt: skip
+EXAMPLES = examples((ROOT / "CONTRIBUTING.md").read_text())
+
+
+def test_there_are_examples() -> None:
+    assert {"Adding a scenario", *FOUND_BY} == set(EXAMPLES)
+    assert all(len(blocks) >= 2 for blocks in EXAMPLES.values())
+
+
+def run(folder: Path, *arguments: str) -> None:
+    """Run tests of the copy, without compiling."""
+    environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("title", EXAMPLES)
+def test_an_example_does_what_it_says(title: str, tmp_path: Path) -> None:
+    without = shutil.ignore_patterns("__pycache__", "_build", "gallery", "generated", "figures", "data")
+    for name in ("piezoest", "tests", "docs"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=without)
+    for name in ("pyproject.toml", "README.md"):
+        shutil.copy(ROOT / name, tmp_path)
+    test = [apply(block, tmp_path) for block in EXAMPLES[title]][-1]
+    run(tmp_path, str(test))
+    if title in FOUND_BY:
+        name, *files = FOUND_BY[title]
+        run(tmp_path, *files, "-k", name)
+
+
+def test_blocks_go_where_they_say(tmp_path: Path) -> None:
+    (tmp_path / "old.py").write_text("a = 1\nb = 2\n")
+    apply("# new file new.py\nc = 3\n", tmp_path)
+    apply("# added to old.py, below a = 1\nd = 4\n", tmp_path)
+    apply("# added to old.py\ne = 5\n", tmp_path)
+    assert (tmp_path / "new.py").read_text() == "c = 3\n"
+    assert (tmp_path / "old.py").read_text() == "a = 1\nd = 4\nb = 2\n\n\ne = 5\n"
+    for wrong in ("c = 3\n", "# new file old.py\n", "# added to none.py\n", "# added to old.py, below z\n"):
+        with pytest.raises(AssertionError):
+            apply(wrong, tmp_path)

@@ -1,0 +1,171 @@
+"""Layouts: names, what numbers can be, sizes that users choose, and what is absent."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+from piezoest.layout import (
+    ABSENT,
+    COUNT,
+    FIXED,
+    NUMBER,
+    WORK,
+    Length,
+    Named,
+    Record,
+    by_name,
+    leaves,
+    new,
+    numbers,
+    record,
+    size_of,
+)
+
+LAW = record(updates=COUNT, theta=numbers(3), P=numbers(3, 3), rates=ABSENT)
+
+
+def lengthy(plays: int) -> Record:
+    """A layout with sizes that users choose, in a record within."""
+    memory = record(u=numbers(Length("plays", plays)), thetas=numbers(Length("plays", plays), 2), last=NUMBER)
+    return record(memory=memory, law=LAW, work=WORK, level=ABSENT)
+
+
+def test_numbers_stand_where_names_say() -> None:
+    layout = lengthy(4)
+    state = new(layout, law={"theta": [1.0, 2.0, 3.0]}, memory={"last": 7.0}, work=5.0)
+    assert state.shape == ()
+    assert state["law"]["theta"].tolist() == [1.0, 2.0, 3.0]
+    assert state["memory"]["last"] == 7.0
+    assert state["memory"]["plays"] == 4.0
+    assert not state["law"]["P"].any()
+    state["law"]["P"][1, 2] = 9.0
+    assert state["law"]["P"][1, 2] == 9.0
+    assert size_of(layout) == 1 + (1 + 3 + 9) + (1 + 1 + 4 + 8) == state.nbytes // 8
+
+
+def test_what_compiled_code_cannot_place_stands_last() -> None:
+    layout = lengthy(4)
+    assert [name for name, _ in layout.fields] == ["law", "work", "level", "memory"]
+    assert [name for name, _ in layout.by_name["memory"].fields] == ["plays", "last", "u", "thetas"]  # type: ignore[union-attr]
+    assert LAW.is_fixed
+    assert not layout.is_fixed
+
+
+def test_what_is_absent_takes_no_room() -> None:
+    law = record(updates=COUNT, theta=numbers(3), P=numbers(3, 3))
+    assert size_of(law) == size_of(LAW)
+    assert new(LAW, rates=None)["rates"].size == 0
+    assert "rates" not in by_name(LAW, new(LAW))
+    assert "rates" not in {name for name, _, _ in leaves(LAW, new(LAW))}
+
+
+def test_unknown_names_are_refused() -> None:
+    with pytest.raises(KeyError, match="thetta"):
+        new(LAW, thetta=[1.0, 2.0, 3.0])
+    with pytest.raises(KeyError, match="updatse"):
+        new(lengthy(2), law={"updatse": 1.0})
+    with pytest.raises(ValueError, match=r"\['plays'\] are names of fields and of lengths"):
+        record(plays=COUNT, u=numbers(Length("plays", 3)))
+
+
+def test_wrong_shapes_are_refused() -> None:
+    with pytest.raises(ValueError, match="broadcast"):
+        new(LAW, theta=[1.0, 2.0])
+
+
+def test_saved_numbers_have_names_and_no_work_space() -> None:
+    state = new(lengthy(2), work=5.0, law={"updates": 3.0})
+    saved = by_name(lengthy(2), state)
+    assert saved == {
+        "law": {"updates": 3.0, "theta": [0.0] * 3, "P": [[0.0] * 3] * 3},
+        "memory": {"plays": 2.0, "last": 0.0, "u": [0.0] * 2, "thetas": [[0.0] * 2] * 2},
+    }
+
+
+def test_leaves_are_all_numbers_with_their_paths() -> None:
+    layout = lengthy(2)
+    first, second = new(layout, work=1.0), new(layout, work=2.0)
+    found = {name: (kind, arrays) for name, kind, arrays in leaves(layout, first, second)}
+    assert list(found) == [
+        "law.updates", "law.theta", "law.P", "work",
+        "memory.plays", "memory.last", "memory.u", "memory.thetas",
+    ]  # fmt: skip
+    assert found["law.updates"][0] == COUNT
+    assert found["memory.plays"][0] == FIXED
+    assert [float(array) for array in found["work"][1]] == [1.0, 2.0]
+    assert sum(np.size(arrays[0]) for _, arrays in found.values()) == size_of(layout)
+
+
+def test_layouts_are_values() -> None:
+    layout = lengthy(4)
+    for same in (lengthy(4), copy.deepcopy(layout), pickle.loads(pickle.dumps(layout))):
+        assert same == layout
+        assert hash(same) == hash(layout)
+    others = (lengthy(5), record(**dict(layout.fields[:-1])), Record(layout.fields, "piezoest.layout"))
+    assert len({layout, *others}) == 4
+
+
+def test_hashes_of_another_process_are_not_pickled() -> None:
+    layout = lengthy(4)
+    assert hash(layout)
+    program = (
+        "import pickle, sys\n"
+        "from piezoest.layout import Record\n"
+        "layout = pickle.loads(sys.stdin.buffer.read())\n"
+        "assert hash(layout) == hash(Record(layout.fields, layout.functions))\n"
+    )
+    for seed in ("1", "2"):
+        done = subprocess.run(
+            [sys.executable, "-c", program], input=pickle.dumps(layout), check=False, capture_output=True,
+            env={"PYTHONPATH": ":".join(sys.path), "PYTHONHASHSEED": seed},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+
+
+def test_named_reads_and_writes_the_array() -> None:
+    layout = lengthy(2)
+    state = new(layout, work=5.0)
+    named: Any = Named(state, layout)
+    assert type(named.work) is float
+    assert named.level is None
+    assert named.law.rates is None
+    named.law.theta[1] = 3.0
+    named.memory.last = 4.0
+    assert state["law"]["theta"][1] == 3.0
+    assert state["memory"]["last"] == 4.0
+    for misspelt in (lambda: named.law.thetta, lambda: setattr(named.law, "thetta", 1.0)):
+        with pytest.raises((ValueError, KeyError, AttributeError), match="thetta"):
+            misspelt()
+
+
+def test_named_calls_functions_of_the_module_that_a_record_names() -> None:
+    named: Any = Named(new(Record(LAW.fields, "math")), Record(LAW.fields, "math"))
+    assert named.hypot(3.0, 4.0) == 5.0
+    assert named.updates == 0.0
+
+
+def test_named_without_a_layout_goes_by_the_array() -> None:
+    named: Any = Named(new(lengthy(2), law={"updates": 3.0}))
+    assert named.law.updates == 3.0
+    assert named.level is named.law.rates is None
+    named.memory.thetas[1, 1] = 2.0
+    assert named.memory.thetas[1].tolist() == [0.0, 2.0]
+
+
+def test_an_array_of_length_zero_is_there() -> None:
+    layout = record(u=numbers(Length("plays", 0)), rates=ABSENT)
+    named: Any = Named(new(layout), layout)
+    assert named.u.shape == (0,)
+    assert named.rates is None
+
+
+def test_a_length_has_one_count() -> None:
+    with pytest.raises(ValueError, match="two counts"):
+        record(a=numbers(Length("n", 3)), b=numbers(Length("n", 4)))
