@@ -1,4 +1,4 @@
-"""Tables and sentences of the pages `adaptation_asked` and `adaptation_policies`, from docs/data.
+"""Tables and sentences of the pages `adaptation_targets` and `adaptation_policies`, from docs/data.
 
 No number is typed by hand. Runs at the start of every Sphinx build; by itself:
 python docs/adaptation_page.py
@@ -13,13 +13,13 @@ from typing import Any
 from paper_page import table, write_pieces
 from which_estimator_page import listed, percent, replacements, short
 
-from piezoest.bench import asked
+from piezoest.bench import targets
 from piezoest.bench.combinations import COMBINATIONS
 from piezoest.bench.scenarios import SCENARIOS
 
 DOCS = Path(__file__).resolve().parent
 DATA = DOCS / "data"
-ASKED, POLICIES = DOCS / "generated" / "adaptation_asked", DOCS / "generated" / "adaptation_policies"
+TARGETS, POLICIES = DOCS / "generated" / "adaptation_targets", DOCS / "generated" / "adaptation_policies"
 WORST = 5  # runs of the Monte Carlo that are shown
 
 Document = dict[str, Any]
@@ -37,7 +37,7 @@ def write(app: Any = None) -> None:
         **monte_carlo_pieces(read("monte_carlo")),
         **soak_pieces(read("soak")),
     }
-    write_pieces(ASKED, pieces)
+    write_pieces(TARGETS, pieces)
     write_pieces(POLICIES, policies_pieces(read("policies")))
 
 
@@ -64,12 +64,12 @@ def criteria_pieces(document: Document, fixed: Document) -> dict[str, str]:
         "paper_rate": paper_rate(rows),
         "numbers": replacements(
             {
-                **origin(document, "asked"),
-                "asked seeds": document["seeds"],
-                "asked few": min(document["seeds"], asked.FEW),
-                "asked rate": f"{document['conditions']['sample_rate']:g} Hz",
-                "asked paper rate": f"{asked.PAPER_RATE:g} Hz",
-                "asked memories": listed([f"{memory:g}" for memory in asked.FIXED_MEMORIES]),
+                **origin(document, "target"),
+                "target seeds": document["seeds"],
+                "target few": min(document["seeds"], targets.FEW),
+                "target rate": f"{document['conditions']['sample_rate']:g} Hz",
+                "target paper rate": f"{targets.PAPER_RATE:g} Hz",
+                "target memories": listed([f"{memory:g}" for memory in targets.FIXED_MEMORIES]),
             }
         ),
     }
@@ -98,9 +98,9 @@ def reasons(document: Document, rows: dict[tuple[str, str], Document], fixed: Do
     missed = {one["kind"] for one in document["criteria"] if not one["met"]}
     sentences = []
     if "settling" in missed or "hindsight" in missed:
-        for name in asked.CHANGES:
-            row = rows[name, asked.DEFAULT]
-            best = asked.best_fixed(rows, name)
+        for name in targets.CHANGES:
+            row = rows[name, targets.DEFAULT]
+            best = targets.best_fixed(rows, name)
             said = "" if best is None else (
                 f", with the best fixed memory, ``{best['estimator']}``, {percent(best['settled_soon'])}"
             )  # fmt: skip
@@ -116,7 +116,7 @@ def reasons(document: Document, rows: dict[tuple[str, str], Document], fixed: Do
 
 def diverged(document: Document, rows: dict[tuple[str, str], Document]) -> str:
     """Where the default did worse than linear feed-forward after the first period, with nobody to watch."""
-    mine = {name: row for (name, estimator), row in rows.items() if estimator == asked.DEFAULT}
+    mine = {name: row for (name, estimator), row in rows.items() if estimator == targets.DEFAULT}
     counts = listed(
         [f"{row['diverged']} of {row['runs']} runs of *{n}*" for n, row in mine.items() if row["diverged"]]
     )
@@ -140,7 +140,7 @@ def below_linear(fixed: Document) -> str:
 
 def at_rest(rows: dict[tuple[str, str], Document]) -> list[str]:
     """What moves the parameters during a rest, and the error after it."""
-    with_it, without = (rows[name, asked.DEFAULT] for name in ("dwell", asked.WITHOUT_CREEP))
+    with_it, without = (rows[name, targets.DEFAULT] for name in ("dwell", targets.WITHOUT_CREEP))
     linear = rows["dwell", "linear feed-forward"]
     later = [percent(row["rest_excursion_later"]["q95"]) for row in (with_it, without)]
     first = [short(row["first_after_rest"]["median"]) for row in (with_it, without)]
@@ -158,12 +158,12 @@ def at_rest(rows: dict[tuple[str, str], Document]) -> list[str]:
 def paper_rate(rows: dict[tuple[str, str], Document]) -> str:
     """How many runs settle in time where the stage has its filters, in a sentence."""
     shares = []
-    for triangle in asked.TRIANGLES:
-        row = rows[asked.triangle_title(*triangle), asked.DEFAULT]
+    for triangle in targets.TRIANGLES:
+        row = rows[targets.triangle_title(*triangle), targets.DEFAULT]
         shares.append(f"{percent(row['settled_soon'])} ({triangle[0]:g} µm at {triangle[1]:g} Hz)")
     return (
-        f"At {asked.PAPER_RATE:g} Hz the stage has the paper's filters, and their delay costs: from "
-        f"a cold start the default settles within {asked.SOON} periods in {listed(shares)} of the runs.\n"
+        f"At {targets.PAPER_RATE:g} Hz the stage has the paper's filters, and their delay costs: from "
+        f"a cold start the default settles within {targets.SOON} periods in {listed(shares)} of the runs.\n"
     )
 
 
@@ -178,12 +178,12 @@ def pair(values: Document, say: Any) -> str:
 def spread_table(document: Document, rows: dict[tuple[str, str], Document]) -> str:
     """What the runs were like, with the defaults and linear feed-forward."""
     heading = [
-        "scenario", "estimator", "runs", f"settled within {asked.SOON}", "settles, periods", "worst",
+        "scenario", "estimator", "runs", f"settled within {targets.SOON}", "settles, periods", "worst",
         "settled", "over linear", "diverged",
     ]  # fmt: skip
     body = []
     for name in document["scenarios"]:
-        for estimator in ("linear feed-forward", asked.DEFAULT, asked.OUTPUT_ERROR):
+        for estimator in ("linear feed-forward", targets.DEFAULT, targets.OUTPUT_ERROR):
             row = rows.get((name, estimator))
             if row is None:
                 continue
@@ -201,17 +201,17 @@ def hindsight_table(rows: dict[tuple[str, str], Document]) -> str:
     """Settled error of each fixed memory, beside the default's."""
     body = [
         [
-            estimator.removeprefix(asked.DEFAULT).strip("()") or "default",
+            estimator.removeprefix(targets.DEFAULT).strip("()") or "default",
             *(
                 f"{nm(rows[name, estimator]['settled_max']['median'])}; "
                 f"{percent(rows[name, estimator]['settled_soon'])}"
-                for name in asked.CHANGES
+                for name in targets.CHANGES
             ),
         ]
-        for estimator in (asked.DEFAULT, *asked.FIXED)
+        for estimator in (targets.DEFAULT, *targets.FIXED)
     ]
-    title = f"Settled error (median); part of the runs that settle within {asked.SOON} periods"
-    return table(title, ["HysteresisRLS", *asked.CHANGES], body)
+    title = f"Settled error (median); part of the runs that settle within {targets.SOON} periods"
+    return table(title, ["HysteresisRLS", *targets.CHANGES], body)
 
 
 # ---------------------------------------------------------------- Monte Carlo
@@ -340,7 +340,8 @@ def policies_pieces(document: Document) -> dict[str, str]:
     rows = {(row["scenario"], row["estimator"]): row for row in document["summary"]}
     scenarios = list(document["scenarios"])
     body = []
-    for one in COMBINATIONS:
+    measured = [one for one in COMBINATIONS if (scenarios[0], one.estimator) in rows]
+    for one in measured:
         for said, quantity, say in (
             ("settles", "settling_periods", short), ("worst", "worst_error", nm_alone),
             ("settled", "settled_max", nm_alone),
@@ -348,7 +349,7 @@ def policies_pieces(document: Document) -> dict[str, str]:
             name = f"{one.name}: {one.said}" if said == "settles" else ""
             values = [rows[scenario, one.estimator][quantity]["median"] for scenario in scenarios]
             body.append([name, said, *(say(value) for value in values)])
-    written = [[one.name, one.said, f"``{one.estimator}``"] for one in COMBINATIONS]
+    written = [[one.name, one.said, f"``{one.estimator}``"] for one in measured]
     return {
         "table": table("Settles: periods; worst and settled error: nm; medians", ["", "", *scenarios], body),
         "combinations": table("As they were written", ["policy", "with", "estimator"], written),

@@ -48,7 +48,7 @@ def numbers(document: dict[str, Any]) -> str:
     parts = document["parts"]
     zones = {(row["case"], row["stage"]): row["numbers"]["left"]["median"] for row in document["dead_zones"]}
     small = {(row["case"], row["stage"]): row["numbers"]["rms_um"] for row in document["small_triangle"]}
-    plain, told = (small[case, "PaperStage"]["median"] for case in ("as it is", "sensor's delay told"))
+    plain, with_delay = (small[case, "PaperStage"]["median"] for case in ("as it is", "sensor's delay told"))
     again = {row["case"]: row["numbers"] for row in document["amplitudes"] if row["stage"] == "PaperStage"}[
         OURS
     ]
@@ -60,7 +60,7 @@ def numbers(document: dict[str, Any]) -> str:
         "plain zones": percent(zones["none", "PreisachStage"]),
         "zones on the sum": percent(zones["on the sum of the plays", "PreisachStage"]),
         "zones on each": percent(zones["on each play", "PreisachStage"]),
-        "gauge": f"{nm(math.sqrt(max(plain**2 - told**2, 0.0)))} nm",
+        "gauge": f"{nm(math.sqrt(max(plain**2 - with_delay**2, 0.0)))} nm",
         "rise": f"{nm(again['second_rise_um']['median'])} nm",
         "rest": f"{nm(again['second_rest_um']['median'])} nm",
         "again settled": f"{nm(again['second_settled_um']['median'])} nm",
@@ -124,7 +124,7 @@ def settled(rows: Rows) -> Table:
 def amplitudes(rows: Rows) -> Table:
     heading = ["stage", "estimator", "first time: rise", "rest of the period", "settled"]
     heading += ["second time: rise", "rest of the period", "settled"]
-    names = [f"{time}_{part}_um" for time in ("first", "second") for part in ("rise", "rest", "settled")]
+    names = [f"{time}_{motion}_um" for time in ("first", "second") for motion in ("rise", "rest", "settled")]
     return heading, [
         [row["stage"], row["case"], *(spread(row["numbers"], name) for name in names)] for row in rows
     ]

@@ -97,8 +97,8 @@ def escape_symbols(line: str) -> str:
     """
     parts = re.split(r"(``.*?``|`.*?`)", line)
     return "".join(
-        part if part.startswith("`") else re.sub(r"\||(?<![\w*\\])\*(?=\w)(?!.*\w\*)", r"\\\g<0>", part)
-        for part in parts
+        piece if piece.startswith("`") else re.sub(r"\||(?<![\w*\\])\*(?=\w)(?!.*\w\*)", r"\\\g<0>", piece)
+        for piece in parts
     )
 
 

@@ -138,12 +138,12 @@ def delays() -> list[dict[str, Any]]:
     rows = []
     for lag in LAGS:
         row: dict[str, Any] = {"lag_samples": lag}
-        for name, told in (("untold", 0.0), ("told", float(lag))):
+        for name, delay in (("untold", 0.0), ("told", float(lag))):
             record = pz.track(
                 r,
                 stage=LateStage(lag),
                 compensator=pz.InverseCompensator(START),
-                estimator=pz.HysteresisRLS(RATE, initial_model=START, delay=told),
+                estimator=pz.HysteresisRLS(RATE, initial_model=START, delay=delay),
             )
             row[f"{name}_um"] = float(record.max_error(last_periods=2))
         rows.append(row)

@@ -13,7 +13,7 @@ from typing import Any
 
 from paper_page import table, write_pieces
 
-from piezoest.bench.scenarios import Conditions
+from piezoest.bench.cases import Conditions
 
 DOCS = Path(__file__).resolve().parent
 DATA = DOCS / "data"
@@ -254,9 +254,9 @@ def listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def percent(part: float | None) -> str:
-    """A part in per cent."""
-    return "—" if part is None else f"{100.0 * part:.3g} %"
+def percent(share: float | None) -> str:
+    """A share in per cent."""
+    return "—" if share is None else f"{100.0 * share:.3g} %"
 
 
 def short(value: float | None) -> str:
