@@ -23,7 +23,8 @@ $(BIN)/python:
 	  echo "make: piezoest needs Python 3.11 or later, '$(PYTHON)' is $$("$(PYTHON)" -V 2>&1): name another: make PYTHON=python3.12" >&2; exit 1; }
 	"$(PYTHON)" -m venv $(VENV)
 
-# One stamp for each set of extras; all are renewed when pyproject.toml changes.
+# One stamp for each set of extras; all are renewed when pyproject.toml changes. A contributor's set holds all
+# the others: targets that run side by side after `make venv` install nothing, so they cannot disturb each other.
 $(VENV)/.installed: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable .
 	@touch $@
@@ -31,6 +32,11 @@ $(VENV)/.installed: pyproject.toml | $(BIN)/python
 $(VENV)/.installed-%: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable ".[$*]"
 	@touch $@
+
+SETS := test lint docs docs-live bench
+$(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet --editable ".[dev]"
+	@touch $@ $(VENV)/.installed $(SETS:%=$(VENV)/.installed-%)
 
 .PRECIOUS: $(VENV)/.installed-%
 
