@@ -13,7 +13,7 @@ from rich.console import Console
 
 from piezoest._errors import INTERRUPTED, Group
 from piezoest._files import write_text
-from piezoest.bench import adaptation_command, rank_command, suite_command
+from piezoest.bench import adaptation_command, rank_command, safety_command, suite_command
 from piezoest.bench.origin import origin
 from piezoest.bench.shared import Html, check_html, json_target, progress, write_html
 
@@ -30,6 +30,7 @@ app.callback(invoke_without_command=True)(suite_command.suite)
 app.command(epilog=suite_command.COMPARE_EPILOG)(suite_command.compare)
 app.command(epilog=rank_command.EPILOG)(rank_command.rank)
 app.command(epilog=adaptation_command.EPILOG)(adaptation_command.adaptation)
+app.command(epilog=safety_command.EPILOG)(safety_command.safety)
 
 
 @app.command(

@@ -206,17 +206,19 @@ class Saturation(FaultyStage):
     stage : object
         See `FaultyStage`.
     limit : float
-        Largest reading of either sign [µm].
+        Largest reading to either side of the centre [µm].
+    centre : float
+        Middle of its range [µm].
     seed : int
         Not used: the fault is certain.
     """
 
-    def __init__(self, stage: Any, limit: float, *, seed: int = 0) -> None:
-        self._limit = positive("limit", limit)
+    def __init__(self, stage: Any, limit: float, centre: float = 0.0, *, seed: int = 0) -> None:
+        self._limit, self._centre = positive("limit", limit), finite("centre", centre)
         super().__init__(stage, seed=seed)
 
     def _reading(self, x: FloatArray) -> FloatArray:
-        return np.clip(x, -self._limit, self._limit)
+        return np.clip(x, self._centre - self._limit, self._centre + self._limit)
 
 
 class Factor(FaultyStage):

@@ -86,6 +86,29 @@ def write_tables(rows: Iterable[Row], folder: Path, format: str | None = None) -
     return paths
 
 
+def write_table(rows: Iterable[Row], path: Path, columns: Mapping[str, type]) -> None:
+    """Write rows of any columns as one table, Parquet or CSV by the name of the file.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        What they have beside the columns is left out.
+    path : Path
+        Ends in .parquet or .csv.
+    columns : mapping of str to type
+        Names in their order: str, int, float or bool.
+
+    Raises
+    ------
+    ValueError
+        If the name ends in something else, or pyarrow is not installed for Parquet.
+    """
+    writer = _parquet if checked_format(path.suffix[1:]) == "parquet" else _csv
+    with writer(path, columns) as write:
+        for row in rows:
+            write({name: row.get(name) for name in columns})
+
+
 def read_runs(folder: Path) -> list[Row]:
     """Rows of the table `runs`, without the errors of each period.
 

@@ -1,4 +1,4 @@
-"""A second stage to judge by: a Preisach plane with creep, of no model's own kind."""
+"""A second stage to judge by: a Preisach plane with creep, of plays under a bell."""
 
 from __future__ import annotations
 
@@ -28,7 +28,9 @@ class PreisachStage(SimulatedStage):
     """A simulated stage that is neither Coleman-Hodgdon nor Prandtl-Ishlinskii.
 
     Its hysteresis is a `Preisach` operator whose relays lie in a bell-shaped density around
-    20 V: the loop is asymmetric and minor loops differ with their place. Creep is logarithmic
+    20 V: the loop is asymmetric and minor loops differ with their place. The density separates, so
+    that each width of relay is a function of one play: the stage is of the family of the
+    estimators that learn plays, and no independent judge of these. Creep is logarithmic
     over four decades. Mechanics and instruments are those of `PaperStage`.
 
     Parameters

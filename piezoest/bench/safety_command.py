@@ -1,0 +1,188 @@
+"""`piezoest bench safety`."""
+
+from __future__ import annotations
+
+import ast
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from piezoest._errors import INTERRUPTED
+from piezoest._files import write_text
+from piezoest._options import grouped
+from piezoest.bench.origin import origin
+from piezoest.bench.shared import json_target, progress
+from piezoest.bench.suite_command import Json
+
+if TYPE_CHECKING:
+    from piezoest.bench.zoo.tasks import Task
+
+FOLDER = Path("bench-results-safety")
+EPILOG = (
+    "Examples: piezoest bench safety --runs 2000; piezoest bench safety --set fault=none; "
+    "piezoest bench safety --show 17; piezoest bench safety --map --runs 3 -c my_module:MyController"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Which:
+    """What is run."""
+
+    runs: Annotated[
+        int, typer.Option(min=1, help="Rigs, one for each seed; with --map, seeds for each of its places.")
+    ] = 200
+    seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 0
+    controller: Annotated[
+        str | None,
+        typer.Option(
+            "--controller",
+            "-c",
+            metavar="NAME|MODULE:NAME",
+            help="Called with (sample_rate, limits=...); parts: estimator, inverse and supervisor by hand.",
+        ),
+    ] = None
+    given: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="In the place of what is drawn; may be repeated."),
+    ] = None
+    settling: Annotated[
+        bool, typer.Option("--map", help="How soon it settles, over amplitude, frequency and family.")
+    ] = False
+    show: Annotated[
+        int | None, typer.Option(metavar="SEED", min=0, help="Run this one alone, and draw it.")
+    ] = None  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Written:
+    """Where results go."""
+
+    output: Annotated[
+        Path,
+        typer.Option("--out", "-o", metavar="DIR", help="Folder of the results, and of finished runs."),
+    ] = FOLDER
+    table: Annotated[
+        str | None, typer.Option(help="parquet or csv; default Parquet where pyarrow is installed.")
+    ] = None
+
+
+@grouped
+def safety(
+    which: Which,
+    written: Written,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Processes; default one for each core.")
+    ] = None,
+    json_to: Json = None,
+) -> None:
+    """A controller on a zoo of rigs: stages of many kinds, and what goes wrong with them, at random.
+
+    Each run is a function of its seed. A run is safe if the voltage is finite, within its limits, rests at
+    none of them without need, and the error stays below 1.5 times that of the best straight line. Stopped and
+    started again, it goes on where it was.
+    """
+    from piezoest.bench.suite_command import counting, usage
+
+    target = json_target(json_to)
+    began = time.perf_counter()
+    with usage():
+        with progress() as say:
+            say("loading (compiles once after the installation)")
+            from piezoest.bench import tables
+            from piezoest.bench.campaign import store_in
+            from piezoest.bench.zoo import contenders, tasks
+
+            name = which.controller or contenders.DEFAULT
+            contenders.contender(name)
+            given = _given(which.given or [])
+        if which.show is not None:
+            _show(name, which.show, given, written.output)
+            return
+        with progress() as say:
+            say("drawing")
+            planned = _plan(which, name, given)
+            format = tables.checked_format(written.table)
+        try:
+            with store_in(written.output) as store, counting("runs") as count:
+                tasks.carry_out_all(planned, store, workers, count)
+                rows = list(store.rows(task.key for task in planned))
+        except KeyboardInterrupt:
+            Console(stderr=True).print(f"stopped: the same command goes on from {written.output}")
+            raise typer.Exit(INTERRUPTED) from None
+    document = {"suite": "safety", **origin(began), "controller": name, "given": given}
+    document |= _write(which.settling, rows, written.output, format)
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    write_text(written.output / ("map.json" if which.settling else "safety.json"), text)
+    if json_to == "-":
+        typer.echo(text)
+        return
+    from piezoest.bench.zoo import report
+
+    (report.print_map if which.settling else report.print_summary)(document, Console())
+    typer.echo(f"Results: {written.output}")
+    if target is not None:
+        write_text(target, text)
+        typer.echo(f"JSON: {target}")
+
+
+def _given(pairs: list[str]) -> dict[str, Any]:
+    """Values by name, numbers as numbers."""
+    found: dict[str, Any] = {}
+    for pair in pairs:
+        name, separator, text = pair.partition("=")
+        if not separator:
+            raise ValueError(f"--set {pair}: write it as name=value")
+        try:
+            found[name] = ast.literal_eval(text)
+        except (ValueError, SyntaxError):
+            found[name] = text
+    return found
+
+
+def _plan(which: Which, controller: str, given: dict[str, Any]) -> list[Task]:
+    from piezoest.bench.zoo import draw, settling, tasks
+
+    seeds = range(which.seed, which.seed + which.runs)
+    if which.settling:
+        if given:
+            raise ValueError("--map draws its rigs itself: leave out --set")
+        return tasks.cells(controller, settling.cells(seeds))
+    draw(which.seed, **given)  # a wrong name is told now
+    return tasks.runs(controller, seeds, given)
+
+
+def _write(settling: bool, rows: list[dict[str, Any]], folder: Path, format: str) -> dict[str, Any]:
+    """Write the table, and sum it up."""
+    from piezoest.bench.tables import write_table
+    from piezoest.bench.zoo import columns, summary
+
+    if settling:
+        write_table(columns.tidy_cells(rows), folder / f"map.{format}", columns.CELL_COLUMNS)
+        return summary.summarise_cells(rows)
+    write_table(rows, folder / f"runs.{format}", columns.COLUMNS)
+    return summary.summarise(rows)
+
+
+def _show(controller: str, seed: int, given: dict[str, Any], folder: Path) -> None:
+    """Run one seed again, print its row and draw it."""
+    from piezoest.bench.zoo import draw, play
+    from piezoest.bench.zoo.contenders import contender
+    from piezoest.bench.zoo.figure import write_figure
+    from piezoest.bench.zoo.report import number
+
+    rig = draw(seed, **given)
+    row, both = play(rig, contender(controller), traces=True)
+    for name, value in row.items():
+        typer.echo(f"{name:>16} {number(value)}")
+    for event in both.events:
+        said = ("name", "action", "reason")
+        parts = [str(getattr(event, name)) for name in said if getattr(event, name, None)]
+        typer.echo(f"{event.time:>15.4g}s {': '.join(parts)}")
+    path = folder / f"run-{seed}.png"
+    write_figure(rig, row, both, path)
+    typer.echo(f"Figure: {path}")

@@ -1,0 +1,75 @@
+"""Controllers by name, as the command line gives them."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import inspect
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import piezoest
+from piezoest.bench.machine import fingerprint
+from piezoest.bench.zoo.controllers import Parts
+from piezoest.bench.zoo.running import Factory
+
+PARTS = "parts"
+NEEDED = ("step", "run", "learn")
+DEFAULT = "AdaptiveFeedforward" if hasattr(piezoest, "AdaptiveFeedforward") else PARTS
+
+
+def contender(name: str) -> Factory:
+    """Maker of a controller.
+
+    Parameters
+    ----------
+    name : str
+        "parts", a class of the package, or a class or function of one's own as ``module:name``. It is called
+        as ``name(sample_rate, limits=limits)``.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or a class has no ``step``, ``run`` and ``learn``.
+    """
+    found = _found(name)
+    if inspect.isclass(found) and (missing := [each for each in NEEDED if not hasattr(found, each)]):
+        raise ValueError(f"{name} has no {' and no '.join(missing)}: it is no controller")
+    return functools.partial(_made, found)
+
+
+def _made(make: Any, sample_rate: float, limits: Any) -> Any:
+    return make(sample_rate, limits=limits)
+
+
+def _found(name: str) -> Any:
+    if name == PARTS:
+        return Parts
+    module, separator, attribute = name.partition(":")
+    if not separator:
+        if not hasattr(piezoest, name):
+            raise ValueError(f"controller {name}: choose {PARTS}, a class of piezoest, or module:name")
+        return getattr(piezoest, name)
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"controller {name}: {error}") from None
+
+
+def code_of(name: str) -> str:
+    """Fingerprint of this package and, for a controller of one's own, of its file.
+
+    Parameters
+    ----------
+    name : str
+        As `contender` reads it.
+    """
+    source = inspect.getsourcefile(_found(name)) if ":" in name else None
+    if source is None:
+        return fingerprint()
+    return f"{fingerprint()}-{hashlib.sha256(Path(source).read_bytes()).hexdigest()[:16]}"

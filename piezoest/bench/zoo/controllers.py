@@ -1,0 +1,98 @@
+"""Controllers to try the zoo with, and to compare with: a line, and the library's parts wired by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.compensators import InverseCompensator, VoltageLimits
+from piezoest.estimators.rls import HysteresisRLS
+from piezoest.supervisor import Event, Supervisor
+
+
+class Line:
+    """u = (r - centre)/gain within the limits; learns nothing.
+
+    Parameters
+    ----------
+    gain, centre : float
+        [µm/V] and [µm].
+    limits : VoltageLimits
+        Of the voltage.
+    """
+
+    def __init__(self, gain: float, centre: float, limits: VoltageLimits) -> None:
+        self._gain, self._centre, self._limits = gain, centre, limits
+        self.events: tuple[Event, ...] = ()
+        self.status: dict[str, Any] = {"model": "line"}
+
+    def step(self, r: float) -> float:
+        """Voltage for a reference."""
+        u = (r - self._centre) / self._gain
+        return min(max(u, self._limits.minimum), self._limits.maximum)
+
+    def run(self, r: FloatArray) -> FloatArray:
+        """Voltages for references, shape (N,)."""
+        return np.clip((r - self._centre) / self._gain, self._limits.minimum, self._limits.maximum)
+
+    def learn(self, u: Any, x: Any) -> None:
+        """Leave everything as it is."""
+
+
+class Parts:
+    """`InverseCompensator`, `HysteresisRLS` and `Supervisor` in a ring, with all their defaults.
+
+    Parameters
+    ----------
+    sample_rate : float
+        [Hz].
+    limits : VoltageLimits
+        Of the voltage.
+    update_interval : int
+        Samples between two models.
+    """
+
+    def __init__(self, sample_rate: float, limits: VoltageLimits, *, update_interval: int = 50) -> None:
+        self._estimator = HysteresisRLS(sample_rate)
+        self._compensator = InverseCompensator(self._estimator.model, limits)
+        self._guard = Supervisor(sample_rate)
+        self._interval = update_interval
+        self._r: list[FloatArray] = []
+        self._u: list[FloatArray] = []
+        self._x: list[FloatArray] = []
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What the supervisor did."""
+        return self._guard.events
+
+    @property
+    def status(self) -> dict[str, Any]:
+        """Model in use."""
+        return {"model": "line" if self._guard.holding else "coleman-hodgdon"}
+
+    def step(self, r: float) -> float:
+        """Voltage for a reference."""
+        self._r.append(np.array([r]))
+        return float(self._compensator.step(r))
+
+    def run(self, r: FloatArray) -> FloatArray:
+        """Voltages for references, shape (N,)."""
+        self._r.append(r)
+        return self._compensator.run(r)
+
+    def learn(self, u: Any, x: Any) -> None:
+        """Take up voltages and readings, and now and then a model."""
+        self._u.append(np.array(u, ndmin=1, dtype=float))
+        self._x.append(np.array(x, ndmin=1, dtype=float))
+        if sum(part.size for part in self._u) < self._interval:
+            return
+        r, u, x = (np.concatenate(parts) for parts in (self._r, self._u, self._x))
+        self._r, self._u, self._x = [], [], []
+        self._estimator.absorb(u, x)
+        present = self._compensator.model
+        model = self._guard.review(r, u, x, present, self._estimator.model)
+        if model is not present:
+            self._compensator.model = model

@@ -1,0 +1,220 @@
+"""Hysteresis families, drawn so that the loop over the whole reach has a given width and slope.
+
+Width is the largest opening of the loop between the limits of the voltage, at one voltage, over its stroke.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.bench.zoo.backlash import Backlash
+from piezoest.bench.zoo.bouc_wen import BoucWen
+from piezoest.bench.zoo.duhem import Duhem
+from piezoest.bench.zoo.relays import Relays
+from piezoest.models import ColemanHodgdon, PrandtlIshlinskii, Preisach
+from piezoest.stage import PaperStage
+
+# Least slope anywhere of the loop, relative to the mean slope: what is less has no inverse to speak of.
+STEEP = 0.04
+TRIES = 200
+POINTS = 401
+PLAYS = 24
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """Limits of the voltage [V].
+
+    Parameters
+    ----------
+    low, high : float
+        [V].
+    """
+
+    low: float
+    high: float
+
+    @property
+    def middle(self) -> float:
+        """[V]."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def half(self) -> float:
+        """Half of the range [V]."""
+        return 0.5 * (self.high - self.low)
+
+    def cycle(self, points: int = POINTS) -> FloatArray:
+        """Voltage from rest to the upper limit, and down and up twice: the last two swings are the loop."""
+        up = np.linspace(self.low, self.high, points)
+        start = np.linspace(0.0, self.high, points)
+        return np.concatenate((start, up[::-1], up, up[::-1], up))
+
+
+Make = Callable[..., Any]  # make(gain=, share=) is a model
+
+
+def _bouc_wen(rng: Any, reach: Reach) -> Make:
+    return partial(
+        BoucWen,
+        width=reach.half * rng.uniform(0.3, 0.9),
+        power=float(rng.choice([1.0, 1.5, 2.0])),
+        fullness=rng.uniform(-0.2, 0.9),
+    )
+
+
+def _duhem(rng: Any, reach: Reach) -> Make:
+    size = 0.2 * reach.half
+    return partial(
+        Duhem,
+        scale=reach.half,
+        centre=reach.middle,
+        rate_up=rng.uniform(0.8, 4.0) / reach.half,
+        rate_down=rng.uniform(0.8, 4.0) / reach.half,
+        top=size * rng.uniform(0.6, 1.4),
+        bottom=size * rng.uniform(0.6, 1.4),
+        tilt=rng.uniform(-0.3, 0.3),
+        bend=rng.uniform(-0.2, 0.2),
+    )
+
+
+def _backlash(rng: Any, reach: Reach) -> Make:
+    return partial(
+        Backlash,
+        width=reach.half * rng.uniform(0.1, 0.4),
+        dead=reach.half * rng.uniform(0.0, 0.06),
+        place=reach.middle + reach.half * rng.uniform(-0.4, 0.4),
+    )
+
+
+def _relays(rng: Any, reach: Reach) -> Make:
+    margin = 0.03 * reach.half
+    return partial(
+        Relays,
+        low=reach.low - margin,
+        high=reach.high + margin,
+        half_width=reach.half * rng.uniform(0.0, 0.3),
+        half_width_spread=reach.half * rng.uniform(0.1, 0.3),
+        place=reach.middle + reach.half * rng.uniform(-0.3, 0.3),
+        place_spread=reach.half * rng.uniform(0.25, 0.6),
+    )
+
+
+def _paper(rng: Any, reach: Reach) -> Make:
+    model: Any = PaperStage().hysteresis
+    stretch = reach.half / rng.uniform(40.0, 100.0)
+    return partial(_plays, thresholds=stretch * model.thresholds, weights=model.weights / model.gain)
+
+
+def _plays(gain: float, share: float, thresholds: FloatArray, weights: FloatArray) -> PrandtlIshlinskii:
+    return PrandtlIshlinskii(gain, thresholds, gain * share * weights)
+
+
+def _preisach(rng: Any, reach: Reach) -> Make:
+    thresholds = reach.half * rng.uniform(0.5, 0.9) * (np.arange(PLAYS) + 0.5) / PLAYS
+    narrow = reach.half * rng.uniform(0.15, 0.4)
+    return partial(
+        _bell,
+        thresholds=thresholds,
+        weights=np.exp(-thresholds / narrow),
+        centre=reach.middle + reach.half * rng.uniform(-0.3, 0.3),
+        width=reach.half * rng.uniform(0.4, 1.0),
+    )
+
+
+def _bell(
+    gain: float, share: float, thresholds: FloatArray, weights: FloatArray, centre: float, width: float
+) -> Preisach:
+    return Preisach(gain, thresholds, gain * share * weights / weights.sum(), centre, width)
+
+
+def _coleman_hodgdon(rng: Any, reach: Reach) -> Make:
+    return partial(_ratio, a=rng.uniform(0.8, 4.0) / reach.half)
+
+
+def _ratio(gain: float, share: float, a: float) -> ColemanHodgdon:
+    return ColemanHodgdon.from_loop(a, max(share, 1e-9) * gain, gain)
+
+
+# `preisach` is a sum of plays under a bell: of the play estimators' own family, and no independent witness;
+# so are `paper` and `coleman-hodgdon` of theirs. The others are nobody's.
+FAMILIES: dict[str, Callable[[Any, Reach], Make]] = {
+    "bouc-wen": _bouc_wen,
+    "duhem": _duhem,
+    "backlash": _backlash,
+    "relays": _relays,
+    "paper": _paper,
+    "preisach": _preisach,
+    "coleman-hodgdon": _coleman_hodgdon,
+}
+
+
+def draw_family(family: str, rng: np.random.Generator, reach: Reach, *, width: float, gain: float) -> Any:
+    """Draw a model of a family.
+
+    Parameters
+    ----------
+    family : str
+        Name in `FAMILIES`.
+    rng : numpy.random.Generator
+        Where its shape comes from.
+    reach : Reach
+        Limits of the voltage.
+    width : float
+        Of the loop over the reach, relative to its stroke.
+    gain : float
+        Mean slope over the reach [µm/V].
+
+    Raises
+    ------
+    ValueError
+        If the family is unknown, or no shape that was tried gives a loop of that width.
+    """
+    if family not in FAMILIES:
+        raise ValueError(f"family must be one of {', '.join(FAMILIES)}, got {family!r}")
+    u = reach.cycle()
+    for _ in range(TRIES):
+        make = FAMILIES[family](rng, reach)
+        line, loop = make(gain=1.0, share=0.0).simulate(u), make(gain=1.0, share=1.0).simulate(u)
+        h = loop - line
+        stroke, opening, range_h = np.ptp(line[-POINTS:]), _opening(h), h[-1] - h[-POINTS]
+        if opening <= width * range_h:
+            continue
+        share = width * stroke / (opening - width * range_h)
+        x = line + share * h
+        slope = (x[-1] - x[-POINTS]) / (u[-1] - u[-POINTS])
+        if np.all(_slopes(u, x) > STEEP * slope):
+            return make(gain=gain / slope, share=share)
+    raise ValueError(f"no {family} with a loop of {100.0 * width:.1f} % of its stroke was found")
+
+
+def _opening(h: FloatArray) -> float:
+    """Falling branch over the rising one that follows, at its widest; the cycle comes back on its grid."""
+    falling, rising = h[-2 * POINTS : -POINTS][::-1], h[-POINTS:]
+    return float(np.max(falling - rising))
+
+
+def _slopes(u: FloatArray, x: FloatArray) -> FloatArray:
+    du = np.diff(u)
+    moved = du != 0.0
+    return np.diff(x)[moved] / du[moved]
+
+
+def width_of(model: Any, reach: Reach) -> float:
+    """Width of a model's loop over the reach, relative to its stroke.
+
+    Parameters
+    ----------
+    model : object with ``simulate(u)``
+        From `draw_family`.
+    reach : Reach
+        Limits of the voltage.
+    """
+    x = model.simulate(reach.cycle())
+    return _opening(x) / float(np.ptp(x[-POINTS:]))

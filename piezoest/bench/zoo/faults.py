@@ -1,0 +1,316 @@
+"""What goes wrong on a rig of the zoo: which fault, from when to when, and what it does to the run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.bench.faulty_stages import Factor, Gap, Missing, OffsetStep, Saturation, Spikes, Stuck
+from piezoest.bench.zoo.references import Reference
+from piezoest.bench.zoo.wrong import FOREVER, Dead, Drift, ForATime, FrozenAmplifier, Hum, StuckStage
+
+NONE, START, TRANSIENT, PERMANENT = "none", "from-start", "transient", "permanent"
+SETPOINT_NOISE = 1e-4  # µm, of a reference that rests
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A fault of a run.
+
+    Parameters
+    ----------
+    kind : str
+        Name in `FAULTS`, or "none".
+    start, stop : int
+        First sample with it, and the first one without; `stop` is the run's length if it stays.
+    size : float
+        What it is about: a factor, or µm.
+    lasting : bool
+        Whether it stays.
+    """
+
+    kind: str = NONE
+    start: int = 0
+    stop: int = 0
+    size: float = 0.0
+    lasting: bool = False
+
+    @property
+    def mode(self) -> str:
+        """From the start or later, and whether it stays, as one word."""
+        if self.kind == NONE:
+            return NONE
+        return TRANSIENT if not self.lasting else START if self.start == 0 else PERMANENT
+
+    def within(self, n: int) -> Any:
+        """Which of n samples have it."""
+        k = np.arange(n)
+        return (k >= self.start) & (k < self.stop)
+
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """What a fault has to know of its rig.
+
+    Parameters
+    ----------
+    sample_rate : float
+        [Hz].
+    reference : Reference
+        As it would be without the fault.
+    noise : float
+        Standard deviation of the gauge's noise [µm].
+    stroke : float
+        Of the stage over the whole reach [µm].
+    seed : int
+        Start of the random numbers.
+    """
+
+    sample_rate: float
+    reference: Reference
+    noise: float
+    stroke: float
+    seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of fault.
+
+    Parameters
+    ----------
+    modes : tuple of str
+        Of "from-start" (and it stays), "transient" and "permanent" (from a moment on).
+    size : callable, optional
+        Draws the size from (random numbers, `Around`).
+    stage : callable, optional
+        Makes the faulty stage of (stage, `Fault`, `Around`).
+    lies : bool
+        Whether readings say something else than where the stage is.
+    silent : bool
+        Whether readings say nothing at all about the stage.
+    """
+
+    modes: tuple[str, ...] = (TRANSIENT, PERMANENT)
+    size: Callable[[Any, Around], float] = lambda rng, around: 0.0
+    stage: Callable[[Any, Fault, Around], Any] = lambda stage, fault, around: stage
+    lies: bool = False
+    silent: bool = False
+
+
+def _times(fault: Fault, around: Around) -> tuple[float, float]:
+    """Start and duration [s], half a sample early: whatever rounding does, the sample is the one meant."""
+    start = max(fault.start - 0.5, 0.0) / around.sample_rate
+    if fault.lasting:
+        return start, FOREVER
+    return start, (fault.stop - max(fault.start, 0.5)) / around.sample_rate
+
+
+def _for_a_time(make: Callable[[Any, Fault, Around], Any]) -> Callable[[Any, Fault, Around], Any]:
+    """Let a fault that has no moments of its own hold while it should."""
+    return lambda stage, fault, around: ForATime(make(stage, fault, around), *_times(fault, around))
+
+
+def _swing(around: Around) -> float:
+    return 2.0 * around.reference.amplitude
+
+
+def _zero(rng: Any, around: Around) -> float:
+    """20 µm, or the whole stroke where that is no size for the stage."""
+    usual = around.stroke > 10.0 and rng.random() < 0.6
+    return float((20.0 if usual else around.stroke) * rng.choice([-1.0, 1.0]))
+
+
+ALL = (START, TRANSIENT, PERMANENT)
+
+FAULTS: dict[str, Kind] = {
+    "amplifier-frozen": Kind(
+        ALL, stage=lambda stage, fault, around: FrozenAmplifier(stage, *_times(fault, around))
+    ),
+    "stage-stuck": Kind(
+        ALL, stage=lambda stage, fault, around: StuckStage(
+            stage, *_times(fault, around), around.noise, seed=around.seed
+        ),
+    ),
+    "sensor-constant": Kind(
+        ALL, stage=lambda stage, fault, around: Stuck(stage, *_times(fault, around)), lies=True, silent=True
+    ),
+    "sensor-noise": Kind(
+        ALL, size=lambda rng, around: around.reference.centre + rng.uniform(-1.0, 1.0) * around.stroke,
+        stage=lambda stage, fault, around: Dead(
+            stage, *_times(fault, around), fault.size, 0.002 * _swing(around), seed=around.seed
+        ),
+        lies=True, silent=True,
+    ),
+    "sensor-saturated": Kind(
+        ALL, size=lambda rng, around: 0.6 * around.reference.amplitude,
+        stage=_for_a_time(
+            lambda stage, fault, around: Saturation(stage, fault.size, around.reference.centre)
+        ),
+        lies=True,
+    ),
+    "sensor-factor": Kind(
+        ALL, size=lambda rng, around: float(rng.choice([-1.0, 1e-3, 1e3])),
+        stage=_for_a_time(lambda stage, fault, around: Factor(stage, fault.size)), lies=True,
+    ),
+    "zero-off": Kind(
+        ALL, size=_zero,
+        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)), lies=True,
+    ),
+    "zero-off-shifted": Kind(
+        ALL, size=_zero,
+        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)),
+    ),
+    "spikes": Kind(
+        ALL, size=lambda rng, around: _swing(around) * rng.choice([0.3, 1.0, 5.0]),
+        stage=_for_a_time(
+            lambda stage, fault, around: Spikes(
+                stage, 0.01 * around.sample_rate, fault.size, seed=around.seed
+            )
+        ),
+        lies=True,
+    ),
+    "dropouts": Kind(
+        ALL, size=lambda rng, around: float(rng.choice([0.01, 0.2, 0.5])),
+        stage=_for_a_time(lambda stage, fault, around: Missing(stage, fault.size, seed=around.seed)),
+    ),
+    "gap": Kind(ALL, stage=lambda stage, fault, around: Gap(stage, *_times(fault, around)), silent=True),
+    "hum": Kind(
+        ALL, size=lambda rng, around: _usual(0.2, around) if rng.random() < 0.5 else 0.05 * _swing(around),
+        stage=_for_a_time(lambda stage, fault, around: Hum(stage, fault.size, seed=around.seed)), lies=True,
+    ),
+    "drift": Kind(
+        ALL, size=lambda rng, around: _swing(around) * rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.3),
+        stage=lambda stage, fault, around: Drift(
+            stage, fault.size * around.sample_rate / max(fault.stop - fault.start, 1), *_times(fault, around)
+        ),
+    ),
+    "gain-step": Kind((TRANSIENT, PERMANENT), size=lambda rng, around: float(rng.choice([0.7, 1.3]))),
+    "amplitude-drop": Kind((TRANSIENT, PERMANENT), size=lambda rng, around: rng.uniform(0.1, 0.4)),
+    "glitch": Kind(
+        (TRANSIENT,), size=lambda rng, around: _usual(rng.choice([1.0, 2.0, 10.0]), around),
+        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)), lies=True,
+    ),
+    "dwell": Kind((TRANSIENT,)),
+}  # fmt: skip
+
+
+def _usual(size: float, around: Around) -> float:
+    """A size [µm] for a stroke of about 30 µm, in proportion where the stroke is far from that."""
+    return float(size) if 3.0 < around.stroke < 300.0 else float(size) * around.stroke / 30.0
+
+
+def draw_fault(kind: str, mode: str | None, rng: Any, around: Around) -> Fault:
+    """Draw when a fault is there and how large it is.
+
+    Parameters
+    ----------
+    kind : str
+        Name in `FAULTS`, or "none".
+    mode : str, optional
+        One of its modes; drawn if not given.
+    rng : numpy.random.Generator
+        Where it comes from.
+    around : Around
+        The rig.
+
+    Raises
+    ------
+    ValueError
+        If the kind is unknown or has no such mode.
+    """
+    if kind == NONE:
+        return Fault()
+    if kind not in FAULTS:
+        raise ValueError(f"fault must be none or one of {', '.join(FAULTS)}, got {kind!r}")
+    modes = FAULTS[kind].modes
+    drawn = str(rng.choice(modes))
+    mode = drawn if mode is None else mode
+    if mode not in modes:
+        raise ValueError(f"{kind} is {', '.join(modes)}, got {mode!r}")
+    reference = around.reference
+    n = reference.values.size
+    size = FAULTS[kind].size(rng, around)
+    moment = reference.begins + round(rng.uniform(0.35, 0.5) * (n - reference.begins))
+    lasts = round(rng.uniform(1.5, 4.0) * reference.cycle)
+    early = rng.random() < 0.2
+    if kind == "glitch":
+        return Fault(kind, 0, 1, size)
+    if mode == START:
+        return Fault(kind, 0, n, size, lasting=True)
+    if mode == PERMANENT:
+        return Fault(kind, moment, n, size, lasting=True)
+    start = 0 if early and START in modes else moment
+    return Fault(kind, start, min(start + lasts, start + (n - moment) // 2), size)
+
+
+def changed_reference(fault: Fault, around: Around) -> FloatArray:
+    """Reference of the run with its fault, shape (N,) [µm].
+
+    Parameters
+    ----------
+    fault : Fault
+        From `draw_fault`.
+    around : Around
+        The rig.
+    """
+    reference = around.reference
+    r, within = reference.values, fault.within(reference.values.size)
+    if fault.kind == "zero-off-shifted":
+        return r + fault.size * within
+    if fault.kind == "dwell":
+        rng = np.random.default_rng(around.seed)
+        held = r[fault.start] + SETPOINT_NOISE * rng.standard_normal(fault.stop - fault.start)
+        return np.concatenate((r[: fault.start], held, r[fault.start :]))[: r.size]
+    if fault.kind == "amplitude-drop":
+        # At the next way through the middle, so that nothing jumps.
+        through = np.flatnonzero(np.diff(np.sign(r - reference.centre)) != 0.0)
+        ends = [int(through[np.argmin(np.abs(through - k))]) + 1 for k in (fault.start, fault.stop)]
+        small = np.arange(r.size) >= ends[0]
+        if not fault.lasting:
+            small &= np.arange(r.size) < ends[1]
+        return np.where(small, reference.centre + fault.size * (r - reference.centre), r)
+    return r
+
+
+def gain_schedule(fault: Fault, sample_rate: float) -> list[list[float]] | None:
+    """Factor of the gain over time, for a `SimulatedStage`; None without.
+
+    Parameters
+    ----------
+    fault : Fault
+        From `draw_fault`.
+    sample_rate : float
+        [Hz].
+    """
+    if fault.kind != "gain-step":
+        return None
+    rows = [[0.0, 1.0], [(fault.start - 1) / sample_rate, 1.0], [fault.start / sample_rate, fault.size]]
+    if not fault.lasting:
+        rows += [[fault.stop / sample_rate, fault.size], [(fault.stop + 1) / sample_rate, 1.0]]
+    return rows
+
+
+def coordinates(fault: Fault, n: int) -> tuple[float, FloatArray]:
+    """Factor and zero (N,) [µm] of the gauge, where it alone says where the reference is.
+
+    A reference is in the coordinates of the gauge. A gauge that has been wrong from the start, or whose zero
+    has moved for good, is right by definition; one that was right and goes wrong is not.
+
+    Parameters
+    ----------
+    fault : Fault
+        From `draw_fault`.
+    n : int
+        Samples of the run.
+    """
+    zero = np.zeros(n)
+    if fault.kind == "zero-off-shifted" or (fault.kind == "zero-off" and fault.lasting):
+        zero = fault.size * fault.within(n)
+    if fault.kind == "sensor-factor" and fault.mode == START:
+        return fault.size, zero
+    return 1.0, zero

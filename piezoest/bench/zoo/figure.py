@@ -1,0 +1,89 @@
+"""A picture of one run: reference and displacement, voltage, error and loop, beside the line's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from piezoest._files import save_figure
+from piezoest.bench.zoo.playing import Both, Row
+from piezoest.bench.zoo.rig import Rig
+
+POINTS = 20_000  # that are drawn, at most
+LINE, RUN = "#0072B2", "#D55E00"
+
+
+def write_figure(rig: Rig, row: Row, both: Both, path: Path) -> None:
+    """Draw a run as PNG.
+
+    Parameters
+    ----------
+    rig : Rig
+        What was run.
+    row : dict
+        Its row.
+    both : Both
+        Traces of the controller and of the line.
+    path : Path
+        To write to.
+    """
+    from matplotlib.figure import Figure
+
+    every = max(1, both.line.reference.size // POINTS)
+    time = np.arange(both.line.reference.size)[::every] / rig.sample_rate
+    figure = Figure(figsize=(13.0, 9.0), layout="constrained")
+    panels: Any = figure.subplot_mosaic(
+        [["way", "way", "loop"], ["voltage", "voltage", "loop"], ["error", "error", "last"]]
+    )
+    way, voltage, error = (panels[name] for name in ("way", "voltage", "error"))
+    way.plot(time, both.line.reference[::every], color="k", lw=0.6, label="reference")
+    for name, run, colour in (("line", both.line, LINE), ("controller", both.run, RUN)):
+        if run is None:
+            continue
+        style = {"color": colour, "lw": 0.7}
+        way.plot(time, run.displacement[::every], label=name, **style)
+        voltage.plot(time, run.voltage[::every], **style)
+        error.plot(time, run.error[::every], **style)
+        panels["loop"].plot(run.voltage[::every], run.displacement[::every], **{**style, "lw": 0.4})
+        last = slice(-min(2 * rig.plain.cycle, run.error.size), None)
+        panels["last"].plot(np.arange(run.error.size)[last] / rig.sample_rate, run.error[last], **style)
+    way.legend(loc="upper right", fontsize=8)
+    for axes in (way, voltage, error):
+        axes.axvline(row["judged_from"] or 0.0, color="0.5", lw=0.8)
+        if rig.fault.mode != "none":
+            axes.axvspan(row["fault_start"], row["fault_stop"], color="0.9", zorder=0)
+        axes.set_xlabel("time [s]")
+    way.set_ylabel("displacement [µm]")
+    voltage.set_ylabel("voltage [V]")
+    error.set_ylabel("error [µm]")
+    panels["loop"].set(xlabel="voltage [V]", ylabel="displacement [µm]")
+    panels["last"].set(xlabel="time [s]", title="error of the last two cycles", ylabel="[µm]")
+    _zoom(error, row, both)
+    figure.suptitle(_title(rig, row), fontsize=10)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    save_figure(figure, path, dpi=100, metadata={"Software": None})
+
+
+def _zoom(axes: Any, row: Row, both: Both) -> None:
+    """Show the errors that are judged, not those of the start."""
+    judged = [row.get("worst"), row.get("line_worst")]
+    largest = max([each for each in judged if each] or [0.0])
+    if both.run is not None and largest > 0.0:
+        axes.set_ylim(-1.2 * largest, 1.2 * largest)
+
+
+def _title(rig: Rig, row: Row) -> str:
+    def number(name: str) -> str:
+        return "—" if row.get(name) is None else f"{row[name]:.3g}"
+
+    return (
+        f"seed {rig.seed}: {rig.family}, {rig.plain.kind} of {rig.plain.amplitude:.3g} µm at "
+        f"{rig.plain.frequency:.3g} Hz, {rig.sample_rate:g} Hz in blocks of {rig.block}, "
+        f"{rig.gain:.3g} µm/V, {rig.reach.low:g} to {rig.reach.high:g} V, mechanics {rig.around.mechanics}, "
+        f"delay {rig.around.delay}\nfault {rig.fault.kind} {rig.fault.mode} {rig.fault.size:.3g}; ratio "
+        f"{number('ratio')}, rms {number('ratio_rms')}, last {number('last_ratio')}, after "
+        f"{number('after_ratio')}, rest at a limit {number('rail')} quarter swings; "
+        f"{row.get('failure') or row.get('named') or 'nothing said'}"
+    )

@@ -1,0 +1,47 @@
+"""What the zoo's own hysteresis families share: a line and a loop around it.
+
+x = gain (u + share h) + offset, with h [V] the part that depends on the voltage's past. Each family is one
+module: a class that holds its numbers and, beside it, the compiled ``deform`` of one sample.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from piezoest._checks import FloatArray
+from piezoest.layout import Record
+from piezoest.stage import SimulatedStage
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loop:
+    """Base of the families; to be simulated only, none has an inverse.
+
+    Parameters
+    ----------
+    gain : float
+        Slope of the line [µm/V].
+    share : float
+        Of the loop, relative to the line.
+    offset : float
+        Displacement where both are zero [µm].
+    """
+
+    gain: float = 1.0
+    share: float = 1.0
+    offset: float = 0.0
+
+    wipes_out: ClassVar[bool] = False  # whether a larger swing deletes what smaller ones left behind
+
+    def stage_settings(self) -> dict[str, Any]:
+        """Numbers by name, see `piezoest.stage.kernel`."""
+        raise NotImplementedError
+
+    def stage_layouts(self, settings: dict[str, Any]) -> tuple[Record, Record]:
+        """Layouts of state and settings of the hysteresis in a stage."""
+        raise NotImplementedError
+
+    def simulate(self, u: FloatArray) -> FloatArray:
+        """Displacement [µm] for a voltage record [V], from rest at 0 V."""
+        return SimulatedStage(1.0, self).run(u)

@@ -1,0 +1,68 @@
+"""One run: a rig and a controller in, a row out."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple, overload
+
+import numpy as np
+
+from piezoest.bench.adaptation import json_safe
+from piezoest.bench.zoo.judging import judge, named
+from piezoest.bench.zoo.line import fit_line
+from piezoest.bench.zoo.rig import Rig
+from piezoest.bench.zoo.running import Factory, Traces, run_controller, run_line
+
+Row = dict[str, Any]
+
+
+class Both(NamedTuple):
+    """Traces of the controller, None if it failed, and of the line; and what the controller said."""
+
+    run: Traces | None
+    line: Traces
+    events: tuple[Any, ...] = ()
+
+
+@overload
+def play(rig: Rig, factory: Factory, *, traces: Literal[False] = False) -> Row: ...
+
+
+@overload
+def play(rig: Rig, factory: Factory, *, traces: Literal[True]) -> tuple[Row, Both]: ...
+
+
+def play(rig: Rig, factory: Factory, *, traces: bool = False) -> Row | tuple[Row, Both]:
+    """Let a controller drive a rig, and judge it beside the best straight line.
+
+    Parameters
+    ----------
+    rig : Rig
+        From `piezoest.bench.zoo.draw`.
+    factory : callable
+        ``factory(sample_rate, limits)`` makes a controller, with ``step(r)``, ``run(r)`` and ``learn(u, x)``.
+    traces : bool
+        Whether to give the traces, too.
+
+    Returns
+    -------
+    dict
+        What was drawn and what came of it, flat and JSON-safe; what the controller raised is its ``failure``.
+    Both
+        With `traces` only.
+    """
+    line = fit_line(rig)
+    by_line = run_line(rig, line)
+    row = {**rig.to_dict(), "line_gain": line.gain, "line_centre": line.centre, "failure": None}
+    run: Traces | None = None
+    controller: Any = None
+    try:
+        controller = factory(rig.sample_rate, rig.limits)
+        with np.errstate(all="ignore"):
+            run, seconds = run_controller(rig, controller)
+            row |= judge(rig, run, line, by_line)
+            row |= named(rig, controller)
+        row["microseconds"] = 1e6 * seconds / run.reference.size
+    except Exception as error:
+        row["failure"] = f"{type(error).__name__}: {error}"
+    row = dict(json_safe(row))
+    return (row, Both(run, by_line, tuple(getattr(controller, "events", ())))) if traces else row

@@ -1,0 +1,120 @@
+"""Runs on the zoo for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from piezoest.bench.zoo.settling import SEGMENTS
+
+KEY = (
+    "Ratio: largest error after two swings, over the largest of 1.5 times that of the best straight line, "
+    "three times the noise and 0.2 % of the swing; rms: the same of root mean squares; last: of the last "
+    "cycle; after: from two swings after a transient fault, or after the beginning of one that stays. At a "
+    "limit: the voltage rests there for more than a quarter swing though the line's lies well within. Runs "
+    "in which no reading ever says anything have no ratio that counts."
+)
+
+
+def print_summary(summary: dict[str, Any], console: Any) -> None:
+    """Print what runs say together.
+
+    Parameters
+    ----------
+    summary : dict
+        From `piezoest.bench.zoo.summary.summarise`.
+    console : rich.console.Console
+        To print on.
+    """
+    _table(
+        console, "Violations",
+        ("criterion", f"of {summary['runs']}", f"of {summary['healthy_runs']} healthy"),
+        [(name, count, summary["healthy"][name]) for name, count in summary["violations"].items()],
+    )  # fmt: skip
+    quantiles = summary["quantiles"]
+    _table(
+        console, "Ratios", ("", *next(iter(quantiles.values()))),
+        [(name, *map(number, each.values())) for name, each in quantiles.items()],
+    )  # fmt: skip
+    _crossed(console, summary["by_family"])
+    columns = ("runs", "over", "over_rms", "over_last", "over_after", "at_limit")
+    _table(
+        console, "By fault: runs with a ratio above 1, or at a limit; how many were named, and when",
+        ("fault", "mode", "runs", "over", "rms", "last", "after", "limit", "median", "named", "s"),
+        [
+            (row["fault"], row["mode"], *(row[name] for name in columns), number(row["ratio"]),
+             row["named"], number(row["named_after"]))
+            for row in summary["by_fault"]
+        ],
+    )  # fmt: skip
+    console.print("The worst:", highlight=False)
+    for row in summary["worst"]:
+        console.print(_told(row), highlight=False, markup=False, soft_wrap=True)
+    console.print(KEY, highlight=False, markup=False, soft_wrap=True)
+    console.print(f"Controller: {number(summary['microseconds'])} µs per sample, median.", highlight=False)
+
+
+def _told(row: dict[str, Any]) -> str:
+    """A run in a line, its seed first."""
+    what = f"  {row['seed']:>6} {row['family']}, {row['reference']}, fault {row['fault']} {row['mode']}"
+    if row["failure"] is not None:
+        return f"{what}: {row['failure']}"
+    numbers = ("ratio", "last_ratio", "after_ratio", "rail")
+    said = ", ".join(f"{name.replace('_', ' ')} {number(row[name])}" for name in numbers)
+    return f"{what}: {said}; {row['driver'] or 'nobody'} drove"
+
+
+def _crossed(console: Any, groups: list[dict[str, Any]]) -> None:
+    """Families by references: runs with a ratio above 1, of all."""
+    references = sorted({row["reference"] for row in groups})
+    families = sorted({row["family"] for row in groups})
+    cells = {(row["family"], row["reference"]): f"{row['over']}/{row['runs']}" for row in groups}
+    _table(
+        console, "Runs with a ratio above 1, of all", ("family", *references),
+        [(family, *(cells.get((family, each), "") for each in references)) for family in families],
+    )  # fmt: skip
+
+
+def print_map(summary: dict[str, Any], console: Any) -> None:
+    """Print shares of runs that settled within two periods.
+
+    Parameters
+    ----------
+    summary : dict
+        From `piezoest.bench.zoo.summary.summarise_cells`.
+    console : rich.console.Console
+        To print on.
+    """
+    changes = [name for name, _, _ in SEGMENTS]
+    for title, names in (("by_family", ("family",)), ("by_place", ("amplitude", "frequency"))):
+        _table(
+            console, f"Settled within two periods [%], and median of the periods, {title.replace('_', ' ')}",
+            (*names, *changes),
+            [
+                (*(number(row[name]) for name in names), *(
+                    f"{100.0 * row[change]:.0f} ({number(row[f'{change} periods'])})" for change in changes
+                ))
+                for row in summary[title]
+            ],
+        )  # fmt: skip
+    console.print(f"{summary['runs']} runs, {summary['failures']} failed.", highlight=False)
+
+
+def number(value: Any) -> str:
+    """A value with three digits; a dash for none."""
+    if value is None:
+        return "—"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def _table(console: Any, title: str, heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False)
+    for k, head in enumerate(heads):
+        table.add_column(head, justify="left" if k == 0 else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*(escape(str(cell)) for cell in row))
+    console.print(table)

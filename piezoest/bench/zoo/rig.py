@@ -1,0 +1,230 @@
+"""A rig of the zoo: a stage of some family, what is around it, a reference and at most one fault."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.bench.zoo.families import Reach
+from piezoest.bench.zoo.faults import (
+    FAULTS,
+    START,
+    TRANSIENT,
+    Around,
+    Fault,
+    changed_reference,
+    coordinates,
+    gain_schedule,
+)
+from piezoest.bench.zoo.references import Reference
+from piezoest.bench.zoo.wrong import Drift, Hum
+from piezoest.compensators import VoltageLimits
+from piezoest.models import Creep, MassSpringDamper
+from piezoest.stage import Amplifier, Gauge, SimulatedStage
+
+# Mechanics by name. The lag is a stage so damped that only its slow pole is left: a first-order low-pass.
+MECHANICS: dict[str, tuple[float, float]] = {
+    "none": (0.0, 0.0),
+    "200 Hz": (200.0, 0.01),
+    "400 Hz": (400.0, 0.01),
+    "780 Hz": (780.0, 0.02),
+}
+LAG_DAMPING = 2.0
+SLOW_POLE = LAG_DAMPING - (LAG_DAMPING**2 - 1.0) ** 0.5  # of the lag, relative to its natural frequency
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surroundings:
+    """What lies between a controller and the hysteresis.
+
+    Parameters
+    ----------
+    mechanics : str
+        Name in `MECHANICS`, or "lag".
+    lag : float
+        Corner of the lag [Hz]; 0 without.
+    delay : int
+        Of the reading, in samples.
+    noise : float
+        Standard deviation of the gauge's noise [µm].
+    resolution : float
+        Of the gauge [µm]; 0 for none.
+    volts : float
+        Step of the amplifier's converter [V]; 0 for none.
+    slew_rate : float
+        Of the amplifier [V/s].
+    creep : float
+        Share of the displacement for each decade of time; 0 for none.
+    hum : float
+        Amplitude of 50 Hz on the reading [µm].
+    drift : float
+        Of the stage [µm/s].
+    """
+
+    mechanics: str = "none"
+    lag: float = 0.0
+    delay: int = 0
+    noise: float = 0.0
+    resolution: float = 0.0
+    volts: float = 0.0
+    slew_rate: float = np.inf
+    creep: float = 0.0
+    hum: float = 0.0
+    drift: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rig:
+    """One rig, and what it is to do.
+
+    Parameters
+    ----------
+    seed : int
+        Start of all its random numbers.
+    family : str
+        Name in `piezoest.bench.zoo.families.FAMILIES`.
+    model : object
+        The hysteresis.
+    reach : Reach
+        Limits of the voltage.
+    sample_rate, gain, width : float
+        [Hz]; mean slope over the reach [µm/V]; width of the loop, relative.
+    around : Surroundings
+        Mechanics and instruments.
+    plain : Reference
+        Without the fault.
+    fault : Fault
+        Or none.
+    block : int
+        Samples that are handed over at a time; 1 is one by one, by `step`.
+    """
+
+    seed: int
+    family: str
+    model: Any
+    reach: Reach
+    sample_rate: float
+    gain: float
+    width: float
+    around: Surroundings
+    plain: Reference
+    fault: Fault
+    block: int
+
+    @property
+    def limits(self) -> VoltageLimits:
+        """Limits of the voltage, as a controller gets them."""
+        return VoltageLimits(self.reach.low, self.reach.high)
+
+    @property
+    def stroke(self) -> float:
+        """Of the stage over the whole reach [µm]."""
+        return 2.0 * self.reach.half * self.gain
+
+    @property
+    def facts(self) -> Around:
+        """What a fault has to know."""
+        return Around(self.sample_rate, self.plain, self.around.noise, self.stroke, self.seed)
+
+    @property
+    def reference(self) -> FloatArray:
+        """What the controller is to follow, fault and all, shape (N,) [µm]."""
+        return changed_reference(self.fault, self.facts)
+
+    @property
+    def coordinates(self) -> tuple[float, FloatArray]:
+        """Factor and zero of the gauge that the reference is meant in, see `faults.coordinates`."""
+        return coordinates(self.fault, self.plain.values.size)
+
+    @property
+    def noise(self) -> float:
+        """What nobody can foresee of a reading: noise, hum and steps, as a standard deviation [µm]."""
+        own = self.around
+        return float(np.sqrt(own.noise**2 + own.hum**2 / 2.0 + own.resolution**2 / 12.0))
+
+    @property
+    def judged_from(self) -> int:
+        """First sample that is judged: two swings after the beginning, or after a fault at the start."""
+        plain, fault = self.plain, self.fault
+        ends = fault.stop if fault.mode == TRANSIENT and fault.start == 0 else 0
+        return min(max(plain.begins, ends) + plain.two_swings, plain.values.size)
+
+    @property
+    def fair(self) -> bool:
+        """Whether a controller can know anything about the stage: not where no reading ever says anything."""
+        return not (self.fault.mode == START and FAULTS[self.fault.kind].silent)
+
+    def stage(self, *, healthy: bool = False) -> Any:
+        """Make the stage, at rest.
+
+        Parameters
+        ----------
+        healthy : bool
+            Without fault, noise, hum and drift; mechanics, creep and amplifier stay.
+        """
+        own, fs = self.around, self.sample_rate
+        stage: Any = SimulatedStage(
+            fs,
+            self.model,
+            creep=Creep.logarithmic(own.creep, shortest=0.01, longest=10.0) if own.creep else None,
+            mechanics=self._mechanics(),
+            amplifier=Amplifier(
+                self.reach.low, self.reach.high, resolution=own.volts, slew_rate=own.slew_rate
+            ),
+            gauge=Gauge() if healthy else Gauge(noise=own.noise, delay=own.delay, resolution=own.resolution),
+            gain_schedule=None if healthy else gain_schedule(self.fault, fs),
+            seed=self.seed,
+        )
+        if healthy:
+            return stage
+        if own.drift:
+            stage = Drift(stage, own.drift)
+        if own.hum:
+            stage = Hum(stage, own.hum, seed=self.seed)
+        if self.fault.kind in FAULTS:
+            stage = FAULTS[self.fault.kind].stage(stage, self.fault, self.facts)
+        return stage
+
+    def _mechanics(self) -> MassSpringDamper | None:
+        if self.around.mechanics == "lag":
+            return MassSpringDamper(self.around.lag / SLOW_POLE, LAG_DAMPING)
+        frequency, damping = MECHANICS[self.around.mechanics]
+        return MassSpringDamper(frequency, damping) if frequency else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """All that was drawn, flat: columns of a row."""
+        own, plain, fault = self.around, self.plain, self.fault
+        return {
+            "seed": self.seed,
+            "family": self.family,
+            "gain": self.gain,
+            "width": self.width,
+            "low": self.reach.low,
+            "high": self.reach.high,
+            "sample_rate": self.sample_rate,
+            "mechanics": own.mechanics,
+            "lag": own.lag,
+            "delay": own.delay,
+            "sensor_noise": own.noise,
+            "resolution": own.resolution,
+            "volts": own.volts,
+            "slew_rate": own.slew_rate,
+            "creep": own.creep,
+            "hum": own.hum,
+            "drift": own.drift,
+            "reference": plain.kind,
+            "amplitude": plain.amplitude,
+            "centre": plain.centre,
+            "frequency": plain.frequency,
+            "samples": plain.values.size,
+            "block": self.block,
+            "fault": fault.kind,
+            "mode": fault.mode,
+            "fault_size": fault.size,
+            "fault_start": fault.start / self.sample_rate,
+            "fault_stop": fault.stop / self.sample_rate,
+            "fair": self.fair,
+        }

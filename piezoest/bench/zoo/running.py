@@ -1,0 +1,115 @@
+"""One controller on one rig: what went in and what came out, sample by sample."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.bench.zoo.line import FittedLine
+from piezoest.bench.zoo.rig import Rig
+
+Factory = Callable[..., Any]  # factory(sample_rate, limits) is a controller
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Traces:
+    """A run, each of shape (N,).
+
+    Parameters
+    ----------
+    reference, voltage, measured, displacement : ndarray
+        r [µm], u [V], reading [µm], true displacement [µm]; r and it in the gauge's coordinates.
+    """
+
+    reference: FloatArray
+    voltage: FloatArray
+    measured: FloatArray
+    displacement: FloatArray
+
+    @property
+    def error(self) -> FloatArray:
+        """r - x [µm], shape (N,)."""
+        return self.reference - self.displacement
+
+
+def run_controller(rig: Rig, controller: Any) -> tuple[Traces, float]:
+    """Let a controller drive a rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        From `piezoest.bench.zoo.draw`.
+    controller : object
+        With ``step(r)`` and ``run(r)``, which give the voltage, and ``learn(u, x)``.
+
+    Returns
+    -------
+    Traces
+    float
+        Time that the controller took [s].
+    """
+    r, stage = rig.reference, rig.stage()
+    u, x, true = np.empty_like(r), np.empty_like(r), np.empty_like(r)
+    drive = _by_sample if rig.block == 1 else _by_block
+    seconds = drive(controller, stage, r, u, x, true, rig.block)
+    return Traces(r, u, x, _seen(rig, true)), seconds
+
+
+def run_line(rig: Rig, line: FittedLine) -> Traces:
+    """Let a straight line drive the same rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        From `piezoest.bench.zoo.draw`.
+    line : FittedLine
+        From `fit_line`.
+    """
+    r, stage = rig.reference, rig.stage()
+    u = np.clip(line.voltage(r), rig.reach.low, rig.reach.high)
+    x = stage.run(u)
+    return Traces(r, u, x, _seen(rig, np.asarray(stage.displacement)))
+
+
+def _seen(rig: Rig, true: FloatArray) -> FloatArray:
+    factor, zero = rig.coordinates
+    return factor * true + zero
+
+
+def _by_sample(
+    controller: Any, stage: Any, r: FloatArray, u: FloatArray, x: FloatArray, true: FloatArray, block: int
+) -> float:
+    seconds, clock = 0.0, time.perf_counter
+    for k, wanted in enumerate(r.tolist()):
+        began = clock()
+        voltage = float(controller.step(wanted))
+        seconds += clock() - began
+        reading = stage.step(voltage)
+        u[k], x[k] = voltage, reading
+        true[k : k + 1] = stage.displacement  # a number, or an array of one
+        began = clock()
+        controller.learn(voltage, reading)
+        seconds += clock() - began
+    return seconds
+
+
+def _by_block(
+    controller: Any, stage: Any, r: FloatArray, u: FloatArray, x: FloatArray, true: FloatArray, block: int
+) -> float:
+    seconds, clock = 0.0, time.perf_counter
+    for start in range(0, r.size, block):
+        part = slice(start, min(start + block, r.size))
+        began = clock()
+        u[part] = controller.run(r[part])
+        seconds += clock() - began
+        x[part] = stage.run(u[part])
+        true[part] = stage.displacement
+        began = clock()
+        controller.learn(u[part], x[part])
+        seconds += clock() - began
+    return seconds

@@ -1,0 +1,164 @@
+"""How soon a controller settles: over amplitude, frequency and family, after each kind of change.
+
+A run goes through `SEGMENTS`: a cold start, smaller and much smaller waves, the first ones again, and a gain
+that steps. It is settled from the period on after which the largest error of each stays within 1.2 % of the
+amplitude, or three times the noise.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from piezoest import signals
+from piezoest._checks import FloatArray
+from piezoest.bench.adaptation import json_safe
+from piezoest.bench.zoo.drawing import draw
+from piezoest.bench.zoo.families import FAMILIES
+from piezoest.bench.zoo.faults import Fault
+from piezoest.bench.zoo.references import Reference
+from piezoest.bench.zoo.rig import Rig
+from piezoest.bench.zoo.running import Factory, run_controller
+
+AMPLITUDES = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # µm
+FREQUENCIES = (1.0, 3.0, 10.0, 30.0)  # Hz
+SETTLED, NOISES = 0.012, 3.0
+PERIOD = 1000  # samples: the sample rate goes with the frequency
+REACH = 100.0  # V, to both sides
+GAINS = (0.05, 0.5)  # µm/V
+FREE = 1.3  # reach over what the amplitude needs, at least
+NOISE = (2e-4, 2e-3)  # µm
+STEPS = 2.0**16  # of both converters
+
+# Name, factor of the amplitude, and periods; the last one starts with a step of the gain.
+SEGMENTS = (
+    ("cold-start", 1.0, 10), ("switch", 0.6, 8), ("drop", 0.2, 8), ("switch-back", 1.0, 8),
+    ("gain-step", 1.0, 10),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A place of the map, and a seed.
+
+    Parameters
+    ----------
+    family : str
+        Name in `piezoest.bench.zoo.families.FAMILIES`.
+    amplitude, frequency : float
+        [µm] and [Hz].
+    seed : int
+        Of what is drawn.
+    """
+
+    family: str
+    amplitude: float
+    frequency: float
+    seed: int
+
+
+def cells(
+    seeds: Sequence[int] = range(20),
+    *,
+    amplitudes: Sequence[float] = AMPLITUDES,
+    frequencies: Sequence[float] = FREQUENCIES,
+    families: Sequence[str] = tuple(FAMILIES),
+) -> list[Cell]:
+    """All places of the map.
+
+    Parameters
+    ----------
+    seeds : sequence of int
+        For each place.
+    amplitudes, frequencies : sequence of float
+        [µm] and [Hz].
+    families : sequence of str
+        Names in `FAMILIES`.
+    """
+    return [Cell(*each) for each in itertools.product(families, amplitudes, frequencies, seeds)]
+
+
+def cell_rig(cell: Cell) -> Rig:
+    """Rig of a cell: an ideal one but for noise and steps, and for the gain that changes in the end.
+
+    Parameters
+    ----------
+    cell : Cell
+        From `cells`.
+    """
+    rng = np.random.default_rng([cell.seed, 24])
+    gain = float(np.exp(rng.uniform(*np.log([max(GAINS[0], FREE * cell.amplitude / REACH), GAINS[1]]))))
+    sample_rate = PERIOD * cell.frequency
+    rig = draw(
+        cell.seed, family=cell.family, limits="±100", gain=gain, sample_rate=sample_rate,
+        reference="triangle", amplitude=cell.amplitude, frequency=cell.frequency, waves=12,
+        mechanics="none", delay=0, slew=np.inf,
+        noise=float(np.exp(rng.uniform(*np.log(NOISE)))),
+        resolution=2.0 * REACH * gain / STEPS, volts=2.0 * REACH / STEPS, creep=0.0,
+        hum=0.0, drift=0.0, fault="none",
+        block=int(rng.choice([10, 50])),
+    )  # fmt: skip
+    values = _values(cell)
+    begins = values.size - SEGMENTS[-1][2] * PERIOD
+    size = float(rng.choice([0.7, 1.3])) if FREE * cell.amplitude < 0.6 * gain * REACH else 1.3
+    return replace(
+        rig,
+        plain=Reference("triangle", values, cell.amplitude, 0.0, cell.frequency, float(PERIOD), PERIOD, 0),
+        fault=Fault("gain-step", begins, values.size, size, lasting=True),
+    )
+
+
+def _values(cell: Cell) -> FloatArray:
+    parts = [
+        signals.triangle(factor * cell.amplitude, cell.frequency, periods, PERIOD * cell.frequency).values
+        for _, factor, periods in SEGMENTS
+    ]
+    return np.concatenate(parts)
+
+
+def settle(cell: Cell, factory: Factory) -> dict[str, Any]:
+    """Run a controller over a cell.
+
+    Parameters
+    ----------
+    cell : Cell
+        From `cells`.
+    factory : callable
+        ``factory(sample_rate, limits)`` makes a controller.
+
+    Returns
+    -------
+    dict
+        With ``segments``: for each its name, the periods until it settled (None if it did not), the
+        largest error of its last period [µm] and what was allowed.
+    """
+    rig = cell_rig(cell)
+    row: dict[str, Any] = {**asdict(cell), "gain": rig.gain, "width": rig.width, "block": rig.block,
+                           "noise": rig.noise, "failure": None, "segments": []}  # fmt: skip
+    try:
+        controller = factory(rig.sample_rate, rig.limits)
+        with np.errstate(all="ignore"):
+            run, _ = run_controller(rig, controller)
+    except Exception as error:
+        return {**row, "failure": f"{type(error).__name__}: {error}"}
+    worst = np.abs(run.error).reshape(-1, PERIOD).max(axis=1)
+    first = 0
+    for name, factor, periods in SEGMENTS:
+        allowed = max(SETTLED * factor * cell.amplitude, NOISES * rig.noise)
+        part = worst[first : first + periods]
+        late = np.flatnonzero(~(part <= allowed))
+        after = int(late[-1]) + 1 if late.size else 0
+        row["segments"].append(
+            {
+                "change": name,
+                "periods": after if after < periods else None,
+                "error": float(part[-1]),
+                "allowed": allowed,
+            }
+        )
+        first += periods
+    return dict(json_safe(row))

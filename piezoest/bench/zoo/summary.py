@@ -1,0 +1,145 @@
+"""What many runs say together: violations, quantiles, tables and the worst."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from piezoest.bench.adaptation import json_safe
+from piezoest.bench.zoo.playing import Row
+from piezoest.bench.zoo.settling import SEGMENTS
+
+QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
+RATIOS = ("ratio", "ratio_rms", "last_ratio", "last_ratio_rms", "after_ratio", "after_ratio_rms")
+SOON = 2  # periods
+
+
+def _over(column: str) -> Callable[[Row], bool]:
+    return lambda row: row.get(column) is not None and row[column] > 1.0 and bool(row["fair"])
+
+
+# Name of a criterion and whether a row violates it.
+CRITERIA: dict[str, Callable[[Row], bool]] = {
+    "failed": lambda row: row["failure"] is not None,
+    "not finite": lambda row: row.get("finite") is False,
+    "outside the limits": lambda row: row.get("within_limits") is False,
+    "rests at a limit": lambda row: bool(row.get("rests_at_rail")),
+    **{column: _over(column) for column in RATIOS},
+}
+
+
+def summarise(rows: Iterable[Row], worst: int = 10) -> dict[str, Any]:
+    """Sum up runs on the zoo.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        From `piezoest.bench.zoo.play`.
+    worst : int
+        How many of the worst to name.
+
+    Returns
+    -------
+    dict
+        JSON-safe: ``violations`` and ``healthy`` violations (without a fault) of each criterion,
+        ``quantiles`` of the ratios, groups ``by_family``, ``by_reference`` and ``by_fault``, and ``worst``.
+    """
+    rows = list(rows)
+    healthy = [row for row in rows if row["fault"] == "none"]
+    ranked = sorted((row for row in rows if row["fair"]), key=_badness, reverse=True)
+    columns = ("seed", "family", "reference", "fault", "mode", "ratio", "last_ratio", "after_ratio", "rail",
+               "driver", "failure")  # fmt: skip
+    return dict(
+        json_safe(
+            {
+                "runs": len(rows),
+                "violations": {name: sum(map(broken, rows)) for name, broken in CRITERIA.items()},
+                "healthy": {name: sum(map(broken, healthy)) for name, broken in CRITERIA.items()},
+                "healthy_runs": len(healthy),
+                "quantiles": {name: _quantiles(rows, name) for name in RATIOS},
+                "by_family": _groups(rows, "family", "reference"),
+                "by_fault": _groups(rows, "fault", "mode"),
+                "worst": [{name: row.get(name) for name in columns} for row in ranked[:worst]],
+                "microseconds": _median(row.get("microseconds") for row in rows),
+            }
+        )
+    )
+
+
+def _badness(row: Row) -> float:
+    """How far a run is from safe; what has no ratio, for it raised or is not finite, is the worst."""
+    if row["failure"] is not None or not row["finite"] or not row["within_limits"]:
+        return np.inf
+    return max(row["ratio"] or 0.0, row["rail"])
+
+
+def _quantiles(rows: Sequence[Row], column: str) -> dict[str, Any]:
+    values = [row[column] for row in rows if row["fair"] and row.get(column) is not None]
+    return {f"{100 * q:g} %": float(np.quantile(values, q)) if values else None for q in QUANTILES}
+
+
+def _median(values: Iterable[Any]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.median(known)) if known else None
+
+
+def _groups(rows: Sequence[Row], first: str, second: str) -> list[dict[str, Any]]:
+    """For each pair of two columns: runs, those over the ratio or at a limit, and what was said."""
+    found: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        found.setdefault((row[first], row[second]), []).append(row)
+    return [
+        {
+            first: key[0],
+            second: key[1],
+            "runs": len(group),
+            "over": sum(map(CRITERIA["ratio"], group)),
+            "over_rms": sum(map(CRITERIA["ratio_rms"], group)),
+            "over_last": sum(map(CRITERIA["last_ratio"], group)),
+            "over_after": sum(map(CRITERIA["after_ratio"], group)),
+            "at_limit": sum(map(CRITERIA["rests at a limit"], group)),
+            "ratio": _quantiles(group, "ratio")["50 %"],
+            "named": sum(row.get("named_after") is not None for row in group),
+            "named_after": _median(row.get("named_after") for row in group),
+        }
+        for key, group in sorted(found.items())
+    ]
+
+
+def summarise_cells(rows: Iterable[Row]) -> dict[str, Any]:
+    """Sum up the map: shares of runs that settled soon.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        From `piezoest.bench.zoo.settling.settle`.
+    """
+    rows = list(rows)
+    places = sorted({(row["amplitude"], row["frequency"]) for row in rows})
+    return {
+        "runs": len(rows),
+        "failures": sum(row["failure"] is not None for row in rows),
+        "by_family": [
+            {"family": family, **_shares([row for row in rows if row["family"] == family])}
+            for family in sorted({row["family"] for row in rows})
+        ],
+        "by_place": [
+            {"amplitude": place[0], "frequency": place[1],
+             **_shares([row for row in rows if (row["amplitude"], row["frequency"]) == place])}
+            for place in places
+        ],
+    }  # fmt: skip
+
+
+def _shares(rows: Sequence[Row]) -> dict[str, Any]:
+    """Share of runs that settled within `SOON` periods of each change, and median of the periods."""
+    found: dict[str, Any] = {}
+    for k, (name, _, _) in enumerate(SEGMENTS):
+        periods = [row["segments"][k]["periods"] if row["segments"] else None for row in rows]
+        soon = [each is not None and each <= SOON for each in periods]
+        found[name] = float(np.mean(soon))
+        median = float(np.median([np.inf if each is None else each for each in periods]))
+        found[f"{name} periods"] = None if np.isinf(median) else median
+    return found

@@ -1,0 +1,286 @@
+"""The zoo: what a run is, how it is judged, and `piezoest bench safety`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from piezoest.bench.store import Store
+from piezoest.bench.tables import write_table
+from piezoest.bench.zoo import columns, draw, play, settling, summary, tasks
+from piezoest.bench.zoo.contenders import contender
+from piezoest.bench.zoo.controllers import Line, Parts
+from piezoest.bench.zoo.families import FAMILIES
+from piezoest.bench.zoo.faults import FAULTS
+from piezoest.bench.zoo.line import fit_line
+from piezoest.bench.zoo.references import SHAPES
+from piezoest.bench.zoo.rig import Rig
+from piezoest.cli import app
+
+SHORT: dict[str, Any] = {
+    "family": "backlash", "limits": "±100", "gain": 0.15, "width": 0.15, "sample_rate": 1000.0,
+    "frequency": 10.0, "amplitude": 10.0, "waves": 14, "reference": "triangle", "delay": 0, "noise": 1e-3,
+    "hum": 0.0, "drift": 0.0, "creep": 0.0, "mechanics": "none", "slew": np.inf, "resolution": 0.0,
+    "volts": 0.0, "block": 20, "fault": "none",
+}  # fmt: skip
+
+OWN = """
+import os
+from piezoest.bench.zoo.controllers import Line
+
+def weak(sample_rate, limits):
+    return Line(0.3, 0.0, limits)
+
+class Breaks(Line):
+    def __init__(self, sample_rate, limits):
+        super().__init__(0.15, 0.0, limits)
+
+    def run(self, r):
+        raise RuntimeError("no idea")
+
+class Dies(Breaks):
+    def run(self, r):
+        os._exit(3)
+"""
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    name = f"own_controllers_{tmp_path.name}"
+    (tmp_path / f"{name}.py").write_text(OWN, encoding="utf-8")
+    return name
+
+
+def bench(*arguments: object) -> Result:
+    words = ["bench", "safety", *(str(argument) for argument in arguments)]
+    return CliRunner().invoke(app, words, env={"COLUMNS": "160"})
+
+
+def best_line(rig: Rig) -> Any:
+    line = fit_line(rig)
+    return lambda sample_rate, limits: Line(line.gain, line.centre, limits)
+
+
+def without_time(row: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in row.items() if name != "microseconds"}
+
+
+class Wild(Line):
+    """NaN, and volts beyond all limits."""
+
+    def run(self, r: Any) -> Any:
+        u = np.array(super().run(r))
+        u[0], u[-1] = np.nan, 1e3
+        return u
+
+
+def test_what_is_drawn_is_within_reason() -> None:
+    seen: dict[str, set[Any]] = {"family": set(), "reference": set(), "fault": set(), "mechanics": set()}
+    for seed in range(120):
+        rig = draw(seed)
+        row = rig.to_dict()
+        for name, values in seen.items():
+            values.add(row[name])
+        assert 0.08 <= rig.width <= 0.25
+        assert 6 * rig.plain.wave < row["samples"] < 220_000
+        assert rig.judged_from < row["samples"]
+        assert np.all(np.isfinite(rig.reference))
+        assert np.max(np.abs(rig.plain.values - rig.plain.centre)) >= 0.99 * rig.plain.amplitude
+        assert 0 <= rig.fault.start <= rig.fault.stop <= row["samples"]
+    assert seen["family"] == set(FAMILIES)
+    assert seen["reference"] == set(SHAPES)
+    assert len(seen["fault"]) > 0.7 * len(FAULTS)
+    assert len(seen["mechanics"]) == 5
+
+
+@pytest.mark.parametrize("block", [1, 7, 200])
+def test_a_row_is_a_function_of_its_seed(block: int) -> None:
+    given = {**SHORT, "fault": "spikes", "mode": "transient", "block": block}
+    rows = [without_time(play(draw(5, **given), Parts)) for _ in range(2)]
+    assert rows[0] == rows[1]
+    assert rows[0]["failure"] is None
+    assert without_time(play(draw(6, **given), Parts)) != rows[0]
+
+
+def test_blocks_change_nothing_for_what_does_not_learn() -> None:
+    rows = [
+        play(draw(5, **{**SHORT, "block": block}), lambda fs, lim: Line(0.15, 0.0, lim)) for block in (1, 9)
+    ]
+    assert rows[0]["worst"] == rows[1]["worst"]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_best_line_is_as_good_as_itself(seed: int) -> None:
+    rig = draw(seed, sample_rate=1000.0, block=50)
+    row = play(rig, best_line(rig))
+    assert row["worst"] == row["line_worst"]
+    if row["fair"]:
+        assert row["ratio"] <= 1.0 / 1.5 + 1e-12
+    assert not row["rests_at_rail"]
+
+
+@pytest.mark.parametrize("limits", ["±100", "0..150", "0..10", "-20..120"])
+def test_no_other_line_is_much_better(limits: str) -> None:
+    given = {**SHORT, "limits": limits, "family": "paper", "gain": 2.0 if limits == "0..10" else 0.15}
+    given["amplitude"] = 5.0
+    rig = draw(3, **given)
+    line = fit_line(rig)
+    least = play(rig, best_line(rig))["rms"]
+    for factor, shift in ((1.1, 0.0), (0.9, 0.0), (1.0, 0.3), (1.0, -0.3)):
+
+        def other(fs: float, limits: Any, factor: float = factor, shift: float = shift) -> Line:
+            return Line(factor * line.gain, line.centre + shift, limits)
+
+        assert play(rig, other)["rms"] > 0.98 * least
+
+
+def test_what_is_not_finite_or_outside_the_limits_is_seen() -> None:
+    rig = draw(1, **SHORT)
+    row = play(rig, lambda fs, limits: Wild(0.15, 0.0, limits))
+    assert row["finite"] is False
+    assert row["within_limits"] is False
+    assert row["failure"] is None
+
+
+def test_a_rest_at_a_limit_is_seen() -> None:
+    rig = draw(1, **SHORT)
+    row, traces = play(rig, lambda fs, limits: Line(0.01, 0.0, limits), traces=True)
+    assert row["rests_at_rail"]
+    assert row["rail"] > 2.0
+    assert row["ratio"] > 1.0
+    assert traces.run is not None
+    np.testing.assert_array_equal(traces.run.error, traces.run.reference - traces.run.displacement)
+    assert row["worst"] == pytest.approx(np.max(np.abs(traces.run.error[rig.judged_from :])))
+
+
+def test_beyond_the_stroke_a_limit_is_where_to_be() -> None:
+    rig = draw(1, **{**{k: v for k, v in SHORT.items() if k != "amplitude"}, "reference": "beyond"})
+    assert rig.plain.amplitude > 15.0
+    row = play(rig, best_line(rig))
+    assert not row["rests_at_rail"]
+    assert row["line_worst"] > 1.0
+
+
+def test_after_a_transient_fault_two_swings_pass() -> None:
+    rig = draw(1, **{**SHORT, "fault": "gap", "mode": "transient"})
+    row, traces = play(rig, best_line(rig), traces=True)
+    assert traces.run is not None
+    first = rig.fault.stop + rig.plain.two_swings
+    assert row["after_worst"] == np.max(np.abs(traces.run.error[first:]))
+    rig = draw(1, **{**SHORT, "fault": "gain-step", "mode": "permanent"})
+    row, traces = play(rig, best_line(rig), traces=True)
+    assert traces.run is not None
+    first = rig.fault.start + rig.plain.two_swings
+    assert row["after_worst"] == np.max(np.abs(traces.run.error[first:]))
+    assert play(draw(1, **SHORT), Parts)["after_worst"] is None
+
+
+def test_the_parts_settle_on_their_own_family() -> None:
+    row = play(draw(2, **{**SHORT, "family": "coleman-hodgdon"}), Parts)
+    assert row["last_ratio"] < 0.7
+    assert row["driver"] in ("line", "coleman-hodgdon")
+
+
+def test_the_map_counts_periods() -> None:
+    cell = settling.Cell("paper", 5.0, 10.0, 1)
+    rig = settling.cell_rig(cell)
+
+    class Exact(Line):
+        def run(self, r: Any) -> Any:
+            return np.interp(r, x, u)
+
+    # A stage without hysteresis, whose inverse is known: all settles at once, but for the gain's step.
+    u = np.linspace(-100.0, 100.0, 2001)
+    x = rig.gain * u
+    ideal = settling.settle(cell, lambda fs, limits: Exact(rig.gain, 0.0, limits))
+    assert [segment["change"] for segment in ideal["segments"]] == [name for name, _, _ in settling.SEGMENTS]
+    assert ideal["segments"][-1]["periods"] is None
+    assert rig.reference.size == sum(periods for _, _, periods in settling.SEGMENTS) * settling.PERIOD
+    learnt = settling.settle(settling.Cell("coleman-hodgdon", 5.0, 10.0, 1), Parts)
+    assert learnt["segments"][0]["periods"] is not None
+    found = summary.summarise_cells([ideal, learnt])
+    assert found["runs"] == 2
+    assert {row["family"] for row in found["by_family"]} == {"paper", "coleman-hodgdon"}
+    assert len(settling.cells(range(2), families=("paper",))) == 2 * 6 * 4
+
+
+def test_rows_go_into_a_table(tmp_path: Path) -> None:
+    row = {**play(draw(2, **SHORT), Parts), "key": "k", "controller": "parts"}
+    assert set(row) == set(columns.COLUMNS)
+    write_table([row], tmp_path / "runs.csv", columns.COLUMNS)
+    heads, values = (tmp_path / "runs.csv").read_text(encoding="utf-8").splitlines()
+    assert heads.split(",") == list(columns.COLUMNS)
+    assert values.startswith("k,parts,2,backlash")
+
+
+def test_the_command_goes_on_where_it_was(tmp_path: Path) -> None:
+    options = ("--workers", 1, "--out", tmp_path, "--table", "csv", "--controller", "parts")
+    given = [f"--set={name}={value}" for name, value in SHORT.items() if name not in ("slew", "fault")]
+    first = bench("--runs", 2, *options, *given)
+    assert first.exit_code == 0, first.output
+    assert "0 of 2 runs" in first.output
+    before = (tmp_path / "runs.jsonl").read_text(encoding="utf-8")
+    second = bench("--runs", 3, *options, *given, "--json", tmp_path / "all.json")
+    assert "2 of 3 runs" in second.output
+    assert (tmp_path / "runs.jsonl").read_text(encoding="utf-8").startswith(before)
+    document = json.loads((tmp_path / "safety.json").read_text(encoding="utf-8"))
+    assert document == json.loads((tmp_path / "all.json").read_text(encoding="utf-8"))
+    assert document["runs"] == 3
+    assert document["violations"]["failed"] == document["violations"]["not finite"] == 0
+    assert len((tmp_path / "runs.csv").read_text(encoding="utf-8").splitlines()) == 4
+    assert "The worst" in second.output
+
+
+def test_the_command_draws_a_run(tmp_path: Path) -> None:
+    given = [f"--set={name}={value}" for name, value in SHORT.items() if name != "slew"]
+    result = bench("--show", 3, "--out", tmp_path, "-c", "parts", *given)
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "run-3.png").stat().st_size > 20_000
+    assert "backlash" in result.output
+
+
+def test_controllers_of_ones_own(own: str, tmp_path: Path) -> None:
+    given = [f"--set={name}={value}" for name, value in SHORT.items() if name != "slew"]
+    result = bench("--runs", 2, "--workers", 1, "-c", f"{own}:Breaks", "--out", tmp_path / "a", *given)
+    assert result.exit_code == 0, result.output
+    document = json.loads((tmp_path / "a" / "safety.json").read_text(encoding="utf-8"))
+    assert document["violations"]["failed"] == 2
+    assert document["worst"][0]["failure"] == "RuntimeError: no idea"
+    assert contender(f"{own}:weak")(1000.0, draw(1, **SHORT).limits).step(0.3) == pytest.approx(1.0)
+
+
+def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
+    planned = tasks.runs(f"{own}:Dies", range(2), SHORT)
+    cell = tasks.cells(f"{own}:Dies", settling.cells([0], families=["paper"])[:1])
+    for task in (*planned, *cell):
+        assert tasks.died(task)["failure"] == "the process died"
+        assert tasks.died(task)["key"] == task.key
+    assert summary.summarise(map(tasks.died, planned))["violations"]["failed"] == 2
+    assert summary.summarise_cells(map(tasks.died, cell))["failures"] == 1
+    with Store(tmp_path / "runs.jsonl") as store:
+        assert all(store.append(tasks.died(task)) for task in (*planned, *cell))
+        assert tasks.carry_out_all(tasks.runs("parts", range(1), SHORT), store, 1) == 1
+        assert tasks.carry_out_all(tasks.runs("parts", range(1), SHORT), store, 1) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["-c", "Nothing"], "controller Nothing"),
+        (["-c", "HysteresisRLS"], "it is no controller"),
+        (["-c", "parts", "--set", "colour"], "write it as name=value"),
+        (["-c", "parts", "--set", "colour=red"], "choose of amplitude"),
+        (["-c", "parts", "--map", "--set", "gain=1"], "leave out --set"),
+    ],
+)
+def test_what_cannot_be_run_is_said(arguments: list[str], said: str, tmp_path: Path) -> None:
+    result = bench(*arguments, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert said in " ".join(result.output.replace("│", " ").split())

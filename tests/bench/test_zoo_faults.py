@@ -1,0 +1,155 @@
+"""What goes wrong on the rigs of the zoo does what it says, one by one and together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from piezoest._checks import FloatArray
+from piezoest.bench.zoo import draw
+from piezoest.bench.zoo.faults import FAULTS, START, TRANSIENT
+from piezoest.bench.zoo.rig import Rig
+
+SHORT: dict[str, Any] = {
+    "family": "coleman-hodgdon", "limits": "±100", "gain": 0.15, "sample_rate": 1000.0, "frequency": 20.0,
+    "amplitude": 5.0, "waves": 20, "reference": "triangle", "delay": 0, "noise": 1e-3, "hum": 0.0,
+    "drift": 0.0, "creep": 0.0, "mechanics": "none", "slew": np.inf, "resolution": 0.0, "volts": 0.0,
+}  # fmt: skip
+MODES = [(kind, mode) for kind, each in FAULTS.items() for mode in each.modes]
+
+
+def seen(rig: Rig, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Reading and true displacement."""
+    stage = rig.stage()
+    x = stage.run(u)
+    return x, np.asarray(stage.displacement)
+
+
+def drive(rig: Rig) -> FloatArray:
+    return np.clip(rig.reference / 0.15, -99.0, 99.0)
+
+
+@pytest.mark.parametrize(("kind", "mode"), MODES)
+def test_step_run_and_pieces_give_the_same_bits(kind: str, mode: str) -> None:
+    given = {**SHORT, "hum": 0.1, "drift": 0.3, "delay": 2, "resolution": 1e-3}
+    rig = draw(11, fault=kind, mode=mode, **given)
+    u = drive(rig)
+    x, true = seen(rig, u)
+    stage, single, piece = rig.stage(), rig.stage(), rig.stage()
+    stage.run(u)
+    stage.reset()
+    np.testing.assert_array_equal(stage.run(u), x)
+    steps = [(single.step(float(v)), float(np.ravel(single.displacement)[0])) for v in u]
+    np.testing.assert_array_equal(steps, np.column_stack((x, true)))
+    parts = []
+    for k in range(0, u.size, 37):
+        read = piece.run(u[k : k + 37])
+        parts.append(np.column_stack((read, piece.displacement)))
+    np.testing.assert_array_equal(np.concatenate(parts), np.column_stack((x, true)))
+
+
+@pytest.mark.parametrize(("kind", "mode"), MODES)
+def test_it_is_there_when_it_should_be_and_only_then(kind: str, mode: str) -> None:
+    rig, sound = draw(11, fault=kind, mode=mode, **SHORT), draw(11, fault="none", **SHORT)
+    u = drive(sound)
+    fault, n = rig.fault, u.size
+    assert (fault.start == 0) == (mode == START or (mode == TRANSIENT and fault.start == 0))
+    assert fault.lasting == (mode != TRANSIENT)
+    assert 0 <= fault.start < fault.stop <= n
+    x, true = seen(rig, u)
+    x_sound, true_sound = seen(sound, u)
+    np.testing.assert_array_equal(x[: fault.start], x_sound[: fault.start])
+    np.testing.assert_array_equal(true[: fault.start], true_sound[: fault.start])
+    changed = (
+        not np.array_equal(rig.reference, sound.reference)
+        or not np.array_equal(x, x_sound)
+        or not np.array_equal(true, true_sound)
+    )
+    assert changed
+    if not fault.lasting and kind not in ("drift", "dwell"):
+        # A loop that is left open closes again.
+        np.testing.assert_allclose(x[fault.stop + 300 :], x_sound[fault.stop + 300 :], atol=1e-3)
+        np.testing.assert_allclose(true[-60:], true_sound[-60:], atol=1e-3)
+
+
+def one(kind: str, mode: str = "permanent", **given: Any) -> tuple[Rig, FloatArray, FloatArray, Any]:
+    rig = draw(11, fault=kind, mode=mode, **{**SHORT, "noise": 0.0, **given})
+    x, true = seen(rig, drive(rig))
+    return rig, x, true, rig.fault.within(x.size)
+
+
+def test_what_each_fault_is() -> None:
+    rig, x, true, within = one("amplifier-frozen")
+    assert np.ptp(true[within]) == 0.0
+    assert np.ptp(true[~within]) > 5.0
+    rig, x, true, within = one("stage-stuck", noise=1e-3)
+    assert np.ptp(true[within]) == 0.0
+    assert 0.0 < np.std(x[within]) < 3e-3
+    rig, x, true, within = one("sensor-constant")
+    assert np.ptp(x[within]) == 0.0
+    assert np.ptp(true[within]) > 5.0
+    rig, x, true, within = one("sensor-noise")
+    assert 0.0 < np.std(x[within]) < 0.1
+    rig, x, true, within = one("sensor-saturated")
+    assert np.max(np.abs(x[within])) == pytest.approx(0.6 * 5.0)
+    rig, x, true, within = one("sensor-factor")
+    np.testing.assert_allclose(x[within], rig.fault.size * true[within])
+    rig, x, true, within = one("zero-off")
+    np.testing.assert_allclose(x - true, rig.fault.size * within)
+    rig, x, true, within = one("spikes")
+    assert 0.0 < np.mean(x[within] != true[within]) < 0.05
+    rig, x, true, within = one("dropouts")
+    assert np.mean(np.isnan(x[within])) == pytest.approx(rig.fault.size, abs=0.1)
+    rig, x, true, within = one("gap", "transient")
+    np.testing.assert_array_equal(np.isnan(x), within)
+    rig, x, true, within = one("hum")
+    assert np.std((x - true)[within]) == pytest.approx(rig.fault.size / np.sqrt(2.0), rel=0.05)
+    rig, x, true, within = one("glitch", "transient")
+    assert x[0] - true[0] == pytest.approx(rig.fault.size)
+    np.testing.assert_array_equal(x[1:], true[1:])
+
+
+def test_faults_of_the_stage_and_of_the_reference() -> None:
+    sound = draw(11, fault="none", **{**SHORT, "noise": 0.0})
+    u = drive(sound)
+    _, true_sound = seen(sound, u)
+    rig = draw(11, fault="gain-step", mode="permanent", **{**SHORT, "noise": 0.0})
+    _, true = seen(rig, u)
+    start = rig.fault.start
+    np.testing.assert_allclose(true[start:], rig.fault.size * true_sound[start:])
+    rig = draw(11, fault="drift", mode="permanent", **{**SHORT, "noise": 0.0})
+    _, true = seen(rig, u)
+    assert true[-1] - true_sound[-1] == pytest.approx(rig.fault.size, rel=0.01)
+    rig = draw(11, fault="zero-off-shifted", mode="permanent", **SHORT)
+    np.testing.assert_allclose(rig.reference - sound.reference, rig.fault.size * rig.fault.within(u.size))
+    rig = draw(11, fault="amplitude-drop", mode="permanent", **SHORT)
+    assert np.max(np.abs(rig.reference[-100:])) < 0.45 * 5.0
+    assert np.max(np.abs(np.diff(rig.reference))) < 1.1 * np.max(np.abs(np.diff(sound.reference)))
+    rig = draw(11, fault="dwell", **SHORT)
+    held = rig.reference[rig.fault.start : rig.fault.stop]
+    assert np.std(held) == pytest.approx(1e-4, rel=0.3)
+    assert np.max(np.abs(np.diff(rig.reference))) < 1.1 * np.max(np.abs(np.diff(sound.reference)))
+
+
+def test_whose_coordinates_count() -> None:
+    """A gauge that was never right is right; one that goes wrong is wrong."""
+    always = draw(11, fault="sensor-factor", mode=START, **SHORT)
+    assert always.coordinates[0] == always.fault.size
+    later = draw(11, fault="sensor-factor", mode="permanent", **SHORT)
+    assert later.coordinates[0] == 1.0
+    for mode, moved in ((START, True), ("permanent", True), (TRANSIENT, False)):
+        assert draw(11, fault="zero-off", mode=mode, **SHORT).coordinates[1].any() == moved
+    assert draw(11, fault="zero-off-shifted", mode=TRANSIENT, **SHORT).coordinates[1].any()
+    assert not draw(11, fault="sensor-noise", mode=START, **SHORT).fair
+    assert draw(11, fault="sensor-noise", mode="permanent", **SHORT).fair
+
+
+def test_a_fault_that_is_unknown_is_refused() -> None:
+    with pytest.raises(ValueError, match="fault must be none or one of"):
+        draw(0, fault="gremlins")
+    with pytest.raises(ValueError, match="dwell is transient"):
+        draw(0, fault="dwell", mode="permanent")
+    with pytest.raises(ValueError, match="colour: choose of"):
+        draw(0, colour="red")
