@@ -8,6 +8,7 @@ from .compensators import (
     LinearCompensator,
     VoltageLimits,
 )
+from .controller.adaptive_feedforward import AdaptiveFeedforward
 from .estimators.bank import EstimatorBank
 from .estimators.base import Estimator, Status, Trace
 from .estimators.batch import BatchFit
@@ -44,6 +45,7 @@ from .tracking import TrackingRecord, track
 from .warming import warmup
 
 __all__ = [
+    "AdaptiveFeedforward",
     "Amplifier",
     "AmplitudeProfile",
     "BatchFit",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, integer
+from piezoest._checks import FloatArray, array_1d, integer, number_or_nan
 from piezoest.estimators.base import EstimatorBase
 from piezoest.estimators.compiled import NONE
 from piezoest.signals import check_continuity
@@ -28,8 +28,8 @@ class TrackingRecord:
         not know better).
     parameters : ndarray, shape (M, n)
         Parameters of the compensator's model, a row for each `update_interval` samples; n = 0
-        without an estimator. Where a model had another number of them than the last, as a start
-        of another kind, those of the next one stand. `theta` has a row for each sample.
+        without an estimator, or with a controller. Where a model had another number of them than the
+        last, as a start of another kind, those of the next one stand. `theta` has a row for each sample.
     parameter_names : tuple of str
         Names of the columns of `theta`.
     sample_rate : float
@@ -178,14 +178,15 @@ def track(
     r: Any,
     *,
     stage: Any,
-    compensator: Any,
+    compensator: Any = None,
     estimator: Any = None,
+    controller: Any = None,
     update_interval: int = 50,
     sample_rate: float | None = None,
     allow_jumps: bool = False,
     supervisor: Supervisor | bool | None = True,
 ) -> TrackingRecord:
-    """Let a stage follow a reference, and the compensator learn from the estimator.
+    """Let a stage follow a reference, and the compensator learn from the estimator, or a controller from all.
 
     Parameters
     ----------
@@ -198,6 +199,9 @@ def track(
         it is called as ``step(r, x)`` with the measurement before.
     estimator : object with ``step(u, x)`` and ``model``, optional
         Such as `HysteresisRLS`; without one the compensator's model stays.
+    controller : object with ``step(r) -> u`` and ``learn(u, x)``, optional
+        Such as `AdaptiveFeedforward`, in the place of compensator, estimator and guard: it goes round the
+        ring sample by sample, and the record has no parameters.
     update_interval : int
         Samples between two updates of the compensator's model (default 50: 1 ms at 50 kHz).
     sample_rate : float, optional
@@ -217,16 +221,17 @@ def track(
     Raises
     ------
     ValueError
-        If r is not a finite 1-D array or jumps, no sample rate is known or two of them differ, or
-        supervisor is none of these.
+        If r is not a finite 1-D array or jumps, no sample rate is known or two of them differ,
+        supervisor is none of these, or there is a controller beside a compensator, or neither.
 
     Notes
     -----
     Feed-forward needs no measurement within an interval, so objects that also have ``run``
     are run an interval at a time; the result is that of a loop of ``step``.
     """
+    _check_driver(compensator, estimator, controller, supervisor)
     reference = array_1d("r", r, minimum_length=1)
-    rate = _sample_rate(r, stage, estimator, sample_rate)
+    rate = _sample_rate(sample_rate, r=r, stage=stage, estimator=estimator, controller=controller)
     if not allow_jumps:
         check_continuity(reference, rate, "r")
     interval = integer("update_interval", update_interval, 1)
@@ -239,6 +244,9 @@ def track(
     known, theta, names = None, NONE, ()
     for start in range(0, N, interval):
         part = slice(start, min(start + interval, N))
+        if controller is not None:
+            _drive(part, stage, controller, reference, voltage, measured, displacement)
+            continue
         _turn(part, stage, compensator, reference, voltage, measured, displacement)
         if estimator is not None:
             present = compensator.model
@@ -256,6 +264,18 @@ def track(
     return TrackingRecord(
         reference, voltage, measured, displacement, parameters, names, rate, period, interval
     )
+
+
+def _check_driver(compensator: Any, estimator: Any, controller: Any, supervisor: Any) -> None:
+    """Refuse two that give the voltage, and none."""
+    if controller is None:
+        if compensator is None:
+            raise ValueError("nothing gives the voltage: pass compensator= or controller=")
+        return
+    others = {"compensator": compensator, "estimator": estimator}
+    others["supervisor"] = None if isinstance(supervisor, bool) else supervisor
+    if given := [name for name, value in others.items() if value is not None]:
+        raise ValueError(f"controller does without {' and '.join(given)}: leave out one or the other")
 
 
 def _guard(supervisor: Any, rate: float) -> Supervisor | None:
@@ -288,6 +308,18 @@ def _turn(
         true[k] = getattr(stage, "displacement", x[k])
 
 
+def _drive(
+    part: slice, stage: Any, controller: Any, r: FloatArray, u: FloatArray, x: FloatArray, true: FloatArray
+) -> None:
+    """One interval of the reference through a controller, which learns from each sample."""
+    for k in range(part.start, part.stop):
+        u[k] = controller.step(float(r[k]))
+        measured = stage.step(float(u[k]))
+        x[k] = number_or_nan(measured)
+        controller.learn(float(u[k]), measured)
+        true[k] = getattr(stage, "displacement", x[k])
+
+
 def _of_one_kind(history: list[FloatArray]) -> FloatArray:
     """Parameters as rows; a model of another kind than the last is shown as the next of its kind."""
     size = history[-1].size
@@ -312,12 +344,9 @@ def feed(estimator: Any, u: FloatArray, x: FloatArray) -> None:
         estimator.step(float(u[k]), float(x[k]))
 
 
-def _sample_rate(r: Any, stage: Any, estimator: Any, given: float | None) -> float:
-    named = {
-        "sample_rate": given,
-        "r": getattr(r, "sample_rate", None),
-        "stage": getattr(stage, "sample_rate", None),
-        "estimator": getattr(estimator, "sample_rate", None),
+def _sample_rate(given: float | None, **parts: Any) -> float:
+    named = {"sample_rate": given} | {
+        name: getattr(part, "sample_rate", None) for name, part in parts.items()
     }
     known = {name: float(rate) for name, rate in named.items() if rate is not None}
     if not known:

@@ -11,10 +11,23 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, nth, own_copy, put_back
+from piezoest.compile import (
+    Cube,
+    Matrix,
+    Record,
+    Vector,
+    compiled,
+    inlined,
+    like,
+    local,
+    nth,
+    own_copy,
+    put_back,
+)
 from piezoest.equations import admissible, kalman
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators.delay_line import delayed
+from piezoest.estimators.model_writing import write_loop
 from piezoest.estimators.samples import HELD, MISSING, OUTCOME, UPDATED, keep_outcome
 from piezoest.layout import (
     ABSENT,
@@ -45,6 +58,7 @@ LEAST, LEAST_MARGIN = 1e-2, 1e-3
 def state_layout(n: int, line: Field, *, offset: bool, project: bool) -> Layout:
     """Layout of the state of a filter of n states; `line` is the storage of the delay."""
     return record(
+        __name__,
         samples=COUNT,
         missing=COUNT,
         updates=COUNT,
@@ -346,6 +360,14 @@ def proposed(state: Any, settings: Any, model: Any) -> None:
     """(alpha, beta, gamma, offset) or (gain, -, -, offset) into `model`, admissible."""
     _propose_line(state, settings, settings.gain, model)
     _propose_loop(state, settings, settings.least, model)
+
+
+@register_jitable
+def write_model(state: Any, settings: Any, model: Any) -> float:
+    """Write the model as known now into settings of its inverse; what became of them, see `model_writing`."""
+    found = local(4)
+    proposed(state, settings, found)
+    return write_loop(found, settings.least is not None, model)
 
 
 @compiled

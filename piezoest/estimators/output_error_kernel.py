@@ -12,11 +12,12 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, local_rows, nth
+from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, local, local_rows, nth
 from piezoest.equations import believing, kalman, least_squares, sensor_noise, swing
 from piezoest.equations import output_error as equations
 from piezoest.estimators.delay_line import delayed
 from piezoest.estimators.derivative_form import learn_anew
+from piezoest.estimators.model_writing import write_loop
 from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED, WAITING, keep_outcome
 from piezoest.layout import (
     ABSENT,
@@ -60,6 +61,7 @@ def layout(members: int, *, rejects: bool, line: Field) -> Layout:
         s=numbers(SIZE, kind=PARAMETER), P=numbers(SIZE, SIZE, kind=COVARIANCE), gain=numbers(SIZE),
     )  # fmt: skip
     return record(
+        __name__,
         primed=FLAG, u_last=MEASURED, x_last=MEASURED, travel=AMOUNT, gap=COUNT, samples=COUNT, missed=COUNT,
         outliers=COUNT, frozen=FLAG, rested=COUNT, centre=record(u=MEASURED, x=MEASURED),
         # The regressors, those of the last update, and the bank's members of then and now.
@@ -308,6 +310,14 @@ def proposed(state: Any, settings: Any, model: Any) -> None:
     model[3] = (s[3] + s[4] - c * state.centre.u) * unit + state.centre.x
     if state.primed == 0.0:
         model[3] = settings.start_offset
+
+
+@register_jitable
+def write_model(state: Any, settings: Any, model: Any) -> float:
+    """Write the model as known now into settings of its inverse; what became of them, see `model_writing`."""
+    found = local(4)
+    proposed(state, settings, found)
+    return write_loop(found, True, model)
 
 
 @compiled

@@ -16,6 +16,7 @@ from piezoest.equations.swing import SWING, follow, half_period
 from piezoest.equations.turning_points import remember
 from piezoest.estimators import play_grid
 from piezoest.estimators.delay_line import delayed
+from piezoest.estimators.model_writing import write_plays
 from piezoest.estimators.play_grid import ENOUGH_TURNS, LEVEL_START, begin_window, output, regressor
 from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED, WAITING, keep_outcome
 from piezoest.layout import (
@@ -64,6 +65,7 @@ def layout(plan: play_grid.Plan, line: Field, resonance: Field) -> Layout:
         used=numbers(size, kind=PARAMETER), force=numbers(size, kind=AMOUNT), work=numbers(size, kind=WORK),
     )  # fmt: skip
     return record(
+        __name__,
         samples=COUNT, missing=COUNT, outliers=COUNT, updates=COUNT, held=COUNT, resets=COUNT,
         last=OUTCOME, frozen=FLAG, primed=FLAG, y=NUMBER, S=AMOUNT,
         x_last=MEASURED, gap=COUNT, gap_travel=AMOUNT, offset=PARAMETER,
@@ -346,6 +348,10 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         begin_window(state.window, state.plays)
     else:
         _learn(state, settings, x)
+
+
+# For a controller.
+write_model = write_plays
 
 
 @compiled

@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, nth
+from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, local, nth
 from piezoest.equations import admissible, believing, least_squares, sensor_noise, swing
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations.innovation_energy import ENERGY
@@ -16,6 +16,7 @@ from piezoest.estimators import derivative_form as form
 from piezoest.estimators import level
 from piezoest.estimators import recursive_least_squares_kernel as law
 from piezoest.estimators.delay_line import delayed
+from piezoest.estimators.model_writing import write_loop
 from piezoest.estimators.samples import HELD, MISSING, REJECTED, UPDATED, WAITING, keep_outcome
 from piezoest.layout import (
     ABSENT,
@@ -69,6 +70,7 @@ def layout(n: int, follows: set[str], law_layout: Field, policies: Field, line: 
         products=where("products", numbers(n, n, kind=COVARIANCE)),
     )  # fmt: skip
     return record(
+        __name__,
         # The last good sample, and the voltage's path since: integrals of |du|, u |du| and du.
         primed=FLAG, u_last=MEASURED, x_last=MEASURED, travel=AMOUNT, moment=NUMBER, rise=NUMBER, gap=COUNT,
         samples=COUNT, missed=COUNT, outliers=COUNT, frozen=FLAG,
@@ -375,6 +377,14 @@ def step_channels(
                 for i in range(len(state.law.theta)):
                     theta[row, c, i] = state.law.theta[i] * settings.parameter_scale[i]
                 row, due = row + 1, every
+
+
+@register_jitable
+def write_model(state: Any, settings: Any, model: Any) -> float:
+    """Write the model as known now into settings of its inverse; what became of them, see `model_writing`."""
+    found = local(4)
+    proposed(state, settings, found)
+    return write_loop(found, settings.loop is not None, model)
 
 
 @compiled

@@ -1,0 +1,1 @@
+"""Adaptive feed-forward as one object: the line, the candidates, the readings, the start."""

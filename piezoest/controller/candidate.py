@@ -1,0 +1,98 @@
+"""A candidate: a compiled estimator, the model it last handed over, and what that model has missed.
+
+The model in use runs free along the voltage that was written: what it misses of the readings is what the
+stage would have missed of the reference, had this model driven. Estimator and model work in units in which
+the line has gain one: z = (x - zero)/unit is a voltage, so that nothing need be known of µm/V beforehand.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest.equations import recent_path
+from piezoest.equations.turning_points import TURNING_POINTS, remember
+from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
+from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, Record, record
+
+# What a score remembers, in swings.
+MEMORY = 0.6
+# The largest miss of late counts like a root mean square so many times smaller.
+PEAK = 2.5
+
+# Weight and mean square of the misses, the largest of late; where the model stands, what changes of it owe.
+SCORE = record(weight=AMOUNT, square=AMOUNT, peak=AMOUNT, z=MEASURED, owed=NUMBER)
+
+
+def layouts(estimator: tuple[Record, Record], inverse: tuple[Record, Record]) -> tuple[Record, Record]:
+    """Layouts of state and settings."""
+    state = record(
+        voltage=MEASURED, usable=FLAG, handed=COUNT, score=SCORE,
+        path=recent_path.PATH, memory=TURNING_POINTS, inverse=inverse[0], estimator=estimator[0],
+    )  # fmt: skip
+    settings = record(integrated=FIXED, by_path=FIXED, inverse=inverse[1], estimator=estimator[1])
+    return state, settings
+
+
+@register_jitable
+def begin(state: Any, settings: Any, u: Any) -> None:
+    """Begin at rest at a voltage."""
+    state.voltage = u
+    recent_path.begin(state.path, u, 1.0)
+    remember(state.memory, u)
+    state.inverse.place(state, settings)
+
+
+@register_jitable
+def advance(state: Any, settings: Any, u: Any) -> None:
+    """Let the model follow the voltage that was written."""
+    recent_path.follow(state.path, u)
+    remember(state.memory, u)
+    state.inverse.follow(state, settings, np.nan, u)
+    state.voltage = u
+    state.score.z = state.inverse.expected(state, settings)
+
+
+@register_jitable
+def learn(state: Any, settings: Any, u: Any, z: Any) -> None:
+    """Give the estimator a sample; z is NaN where there is nothing to learn from."""
+    state.estimator.sample(state.estimator, settings.estimator, u, z)
+
+
+@register_jitable
+def judge(score: Any, miss: Any, swings: Any) -> None:
+    """Count a miss, after a travel of so many swings."""
+    score.weight = min(score.weight + swings, MEMORY)
+    share = min(swings / score.weight, 1.0) if score.weight > 0.0 else 0.0
+    score.square += share * (miss * miss - score.square)
+    score.peak = max(np.abs(miss), score.peak * (1.0 - share))
+
+
+@register_jitable
+def missed(score: Any) -> float:
+    """What has been missed of late, as a root mean square."""
+    return max(np.sqrt(score.square), score.peak / PEAK)
+
+
+@register_jitable
+def hand_over(state: Any, settings: Any) -> None:
+    """Use the estimator's model of now."""
+    found = state.estimator.write_model(state.estimator, settings.estimator, settings.inverse)
+    if found == NO_MODEL:
+        return
+    if found == TO_BE_PLACED:
+        state.inverse.place(state, settings)
+    z = state.inverse.expected(state, settings)
+    if state.usable != 0.0:
+        state.score.owed += state.score.z - z
+    state.usable = 1.0
+    state.handed += 1.0
+    state.score.z = z
+
+
+@register_jitable
+def voltage(state: Any, settings: Any, z: Any) -> float:
+    """Voltage at which the model stands at z."""
+    return state.inverse.wanted(state, settings, z)

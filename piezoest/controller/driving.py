@@ -1,0 +1,105 @@
+"""Which model drives, the line or a candidate, by what each has missed of late; changes without a bump."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest.controller import candidate, slots
+from piezoest.controller import line as lines
+
+# What a change of model owes is paid within this fraction of a swing of the reference; at first more slowly.
+PAID, FIRST_PAID = 1.0 / 16.0, 1.0 / 4.0
+# Another model drives if it has missed less than this fraction of what the present one has.
+BETTER = 0.8
+# Swings between two changes of the model that drives; after a fall back to the line twice as many each time.
+PATIENCE, LONGEST_PATIENCE = 0.25, 128.0
+# Swings after which a model that drives has shown what it does.
+SEEN = 0.6
+# Misses below this fraction of a swing are all alike.
+ALIKE = 5e-4
+
+
+@register_jitable
+def line_z(state: Any) -> float:
+    """Where the line stands at the voltage written."""
+    return (lines.at(state.line, state.u) - state.zero) / state.unit
+
+
+@register_jitable
+def _expected(state: Any) -> float:
+    """Where the model that drives stands at the voltage written."""
+    return slots.expected(state.candidates, state.driving, line_z(state))
+
+
+@register_jitable
+def kept(reference: Any, travelled: Any, swing: Any) -> float:
+    """The fraction of what is owed that is left after a travel of the reference."""
+    paid = PAID if reference.turns > 1.0 else FIRST_PAID
+    return max(0.0, 1.0 - travelled / (paid * swing)) if swing > 0.0 else 1.0
+
+
+@register_jitable
+def _stands(state: Any) -> float:
+    """Where the reference stands for the model that drives: where the model does, and what is owed."""
+    return _expected(state) + slots.owed(state.candidates, state.driving, state.owed)
+
+
+@register_jitable
+def drive(state: Any, number: Any) -> None:
+    """Let another model drive, without a bump."""
+    z = _stands(state)
+    state.switches += number != state.driving
+    state.driving = number
+    slots.owe(state.candidates, number, z)
+    if number == 0.0:
+        state.owed = z - line_z(state)
+
+
+@register_jitable
+def _choose(state: Any) -> float:
+    """The model that has missed least of late, if it is clearly better than the present one."""
+    line = candidate.missed(state.score)
+    noise = state.readings.noise / (state.unit * state.unit)
+    floor = noise + (ALIKE * state.travel.swing) ** 2
+    best, least = 0.0, np.inf
+    present = np.inf
+    for number in range(5):
+        miss = slots.missed(state.candidates, number * 1.0, line if number == 0 else np.inf)
+        if number == state.driving:
+            present = miss
+        if miss < least:
+            best, least = number * 1.0, miss
+    better = least * least + floor < BETTER * BETTER * (present * present + floor)
+    return best if better and state.since >= state.patience else state.driving
+
+
+@register_jitable
+def _disappoints(state: Any) -> bool:
+    """Whether the stage misses the reference by more than the line did when it drove.
+
+    A model can be right and still shake a resonance, which every model then misses alike.
+    """
+    missed = candidate.missed(state.score)
+    if state.driving == 0.0:
+        state.line_missed = missed if state.since > SEEN else state.line_missed
+        return False
+    state.line_missed = min(state.line_missed, missed)
+    floor = 2.0 * np.sqrt(state.readings.noise) / np.abs(state.unit)
+    return state.since > SEEN and candidate.missed(state.outcome) > state.line_missed + floor
+
+
+@register_jitable
+def reconsider(state: Any) -> None:
+    """Let the best model drive; after each fall back to the line the models have to wait longer."""
+    chosen = 0.0 if _disappoints(state) else _choose(state)
+    if chosen == state.driving:
+        return
+    if chosen == 0.0:
+        state.patience = min(2.0 * state.patience, LONGEST_PATIENCE)
+    elif state.driving == 0.0 and state.since > 4.0 * state.patience:
+        state.patience = PATIENCE
+    state.since = state.outcome.weight = state.outcome.peak = 0.0
+    drive(state, chosen)

@@ -1,0 +1,90 @@
+"""The compiled inside of `AdaptiveFeedforward`: what it remembers, and what Python calls.
+
+`plan` changes nothing that hysteresis remembers: `take` does, by the voltage that was written.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from piezoest.compile import Record, Vector, compiled
+from piezoest.controller import candidate
+from piezoest.controller import line as lines
+from piezoest.controller import readings as reading
+from piezoest.controller import start as starts
+from piezoest.controller import travel as travels
+from piezoest.controller.learning import take
+from piezoest.controller.voltage import plan
+from piezoest.layout import AMOUNT, COUNT, FIXED, MEASURED, NUMBER, record, whole
+from piezoest.layout import Record as Layout
+
+# Half-width of the corridor, as a fraction of half the recent swing of the reference.
+WIDTH = 0.3
+
+
+def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Layout]:
+    """Layouts of state and settings."""
+    state = record(
+        samples=COUNT, missing=COUNT, saturated=COUNT, slewed=COUNT,
+        # What it is doing; voltages planned since the last one was written.
+        stage=whole(0.0, 2.0), pending=COUNT,
+        # Reference planned for, voltage planned, voltage written.
+        r=MEASURED, planned=MEASURED, u=MEASURED,
+        # Farthest way from the start's voltage that was answered; travel of the reference with the voltage at
+        # a limit for nothing, in swings.
+        confirmed=AMOUNT, railed=AMOUNT,
+        # The model that drives, 0 for the line; what changes of the line owe; swings since another one drove,
+        # those that one drives at least, changes so far.
+        driving=whole(0.0, 4.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,
+        # z = (x - zero)/unit is what candidates know of a reading.
+        unit=NUMBER, zero=MEASURED,
+        # Travel of the voltage since the last believed reading, and since models were handed over.
+        gone=AMOUNT, handed=AMOUNT,
+        # Faults noted so far, counting their ends, and the last one.
+        noticed=COUNT, notice=whole(0.0, 5.0),
+        # What the line misses, what it missed when it drove, what the stage misses of the reference.
+        score=candidate.SCORE, line_missed=AMOUNT, outcome=candidate.SCORE,
+        travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,
+        start=starts.START, candidates=candidates,
+    )  # fmt: skip
+    settings = record(
+        minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED, line_only=FIXED,
+        start=starts.SETTINGS, candidates=candidate_settings,
+    )  # fmt: skip
+    return state, settings
+
+
+@compiled
+def step(state: Record, settings: Record, r: float) -> Any:
+    """Voltage for one sample of the reference."""
+    return plan(state, settings, r)
+
+
+@compiled
+def learn(state: Record, settings: Record, u: float, x: float) -> None:
+    """Learn from one sample."""
+    take(state, settings, state.r, u, x)
+
+
+@compiled
+def run(state: Record, settings: Record, r: Vector, u: Vector) -> None:
+    """Voltages `u` for a reference `r`, were each written as planned; for a copy of the state."""
+    for k in range(len(r)):
+        u[k] = plan(state, settings, r[k])
+        take(state, settings, r[k], u[k], np.nan)
+
+
+@compiled
+def learn_all(state: Record, settings: Record, r: Vector, u: Vector, x: Vector) -> None:
+    """Learn from samples that were planned together."""
+    for k in range(len(r)):
+        take(state, settings, r[k], u[k], x[k])
+
+
+@compiled
+def begin(state: Record, settings: Record, u: float) -> None:
+    """Begin with a state of zeros, at rest at a voltage."""
+    state.u = state.planned = u
+    starts.begin(state.start, u)

@@ -1,0 +1,234 @@
+"""From the voltage that was written and its reading to all that is learnt."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST
+from piezoest.controller import candidate, driving, slots
+from piezoest.controller import line as lines
+from piezoest.controller import readings as reading
+from piezoest.controller import start as starts
+from piezoest.controller import travel as travels
+from piezoest.controller.voltage import APPROACH, RUN, SEEK
+
+# Models are handed over after this fraction of a swing; legs of the line before another model drives.
+HAND_OVER, FIRST_LEGS = 1.0 / 64.0, 2.0
+# The way to the reference is over within this fraction of its length, or after so many readings.
+NEAR, LONGEST = 0.05, 1e4
+# At a limit the stage may stand beyond the reference for this travel of it, in swings; or short of it.
+RAILED, RESTED = 0.25, 4.0
+# No miss counts for more than so many swings.
+FARTHEST = 3.0
+
+
+@register_jitable
+def _begin_learning(state: Any, settings: Any) -> None:
+    """The gain is known: all models begin with the line through the present point."""
+    start = state.start
+    if state.unit == 0.0:
+        state.unit = start.gain
+        state.zero = start.now - start.gain * start.voltage
+        slots.begin(state.candidates, settings.candidates, start.origin)
+        slots.advance(state.candidates, settings.candidates, start.voltage)
+    lines.begin(state.line, start.gain, start.voltage, start.now)
+    least = np.abs(start.target - start.from_u)
+    travels.begin(state.reference, state.r, least * np.abs(start.gain))
+    travels.begin(state.travel, start.voltage, least)
+    state.stage = APPROACH
+    start.samples = 0.0
+    state.confirmed = max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
+    state.gone = state.handed = 0.0
+    state.railed, state.patience = 0.0, driving.PATIENCE
+    reading.forget(state.readings)
+
+
+@register_jitable
+def _hand_over(state: Any, settings: Any) -> None:
+    """Take up the estimators' models of now, and choose which drives; without a bump."""
+    slots.hand_over(state.candidates, settings.candidates)
+    if settings.line_only == 0.0 and state.line.legs >= FIRST_LEGS:
+        driving.reconsider(state)
+
+
+@register_jitable
+def _notice(state: Any, fault: Any) -> None:
+    """Note a fault, or its end, for the log."""
+    state.noticed += 1.0
+    state.notice = fault
+
+
+@register_jitable
+def _follow_zero(state: Any) -> None:
+    """Readings run at a distance from the line for long: they are right, and their zero may have moved."""
+    readings, line = state.readings, state.line
+    if readings.fault != reading.NONE or readings.off < reading.OFF_FOR:
+        return
+    recent = readings.recent
+    jump = recent.mean_x - lines.at(line, recent.mean_u)
+    slope = lines.slope(recent) / line.gain
+    plain = 0.5 < slope < 2.0 and lines.explained(recent) > lines.EXPLAINED
+    if not plain and line.agreed >= reading.TRUSTED:
+        return
+    if plain:
+        state.zero += jump
+        _notice(state, reading.MOVED)
+    lines.forget(line.now)
+    line.before.count = 0.0
+    line.centre += jump
+    state.owed -= jump / state.unit
+    readings.off = readings.spikes = 0.0
+
+
+@register_jitable
+def _name_silence(state: Any) -> None:
+    """Where no voltage was answered there is no response."""
+    silent = state.start.tries > 0.0 and state.start.stage != starts.DONE
+    fault = reading.NO_RESPONSE if silent else reading.NONE
+    if fault != state.readings.fault:
+        state.readings.fault = fault
+        _notice(state, fault)
+
+
+@register_jitable
+def _score(state: Any, u: Any, x: Any, z: Any) -> None:
+    """Take a believed reading into the line's points and all scores."""
+    swings = travels.progress(state.travel, state.gone)
+    state.gone = 0.0
+    state.since += swings
+    lines.add(state.line.now, u, x, 1e9)
+    bound = FARTHEST * state.travel.swing
+    miss = z - driving.line_z(state) - state.owed
+    candidate.judge(state.score, min(max(miss, -bound), bound), swings)
+    slots.judge(state.candidates, z, swings, bound)
+    off = (x - state.r) / state.unit
+    candidate.judge(state.outcome, min(max(off, -bound), bound), swings)
+
+
+@register_jitable
+def _leave_limit(state: Any, settings: Any, x: Any, moved: Any) -> None:
+    """At a limit nothing is learnt: where the stage stands beyond the reference, all begins anew."""
+    way = (x - state.r) * state.line.gain
+    beyond = (state.u <= settings.minimum and way < 0.0) or (state.u >= settings.maximum and way > 0.0)
+    state.railed = state.railed + moved if state.u <= settings.minimum or state.u >= settings.maximum else 0.0
+    if state.railed > (RAILED if beyond else RESTED) * state.reference.swing:
+        state.stage = SEEK
+        state.driving = 0.0
+        state.readings.fault = reading.NONE
+        starts.begin(state.start, state.u)
+
+
+@register_jitable
+def _learn_from(state: Any, settings: Any, x: Any) -> None:
+    """Take a reading, NaN where it cannot be believed, after the voltage has been followed."""
+    z = (x - state.zero) / state.unit
+    if np.isfinite(x):
+        _score(state, state.u, x, z)
+    slots.learn(state.candidates, settings.candidates, state.u, z)
+
+
+@register_jitable
+def _begin_swings(state: Any, r: Any, u: Any, least: Any) -> None:
+    """Begin to count swings where the reference has been reached."""
+    travels.begin(state.reference, r, 0.5 * least * np.abs(state.line.gain))
+    travels.begin(state.travel, u, 0.5 * least)
+    state.gone = state.handed = 0.0
+
+
+@register_jitable
+def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any) -> float:
+    """Take a reading on the way to the reference; nobody doubts it yet, but for single ones."""
+    if not np.abs(x) < WILDEST:
+        return np.nan
+    start, line = state.start, state.line
+    x = reading.middle(state.readings, x)
+    way = np.abs(u - start.origin)
+    if way >= state.confirmed and way > 0.0:
+        # Only on new ground: on the way back hysteresis would pass for gain.
+        state.confirmed = way
+        gain = (x - start.zero) / (u - start.origin)
+        line.gain = gain if gain * line.gain > 0.0 else line.gain
+    line.centre = x - line.gain * u
+    start.samples += 1.0
+    target = lines.voltage(line, r)
+    missing = np.abs(target - u)
+    at_limit = (u <= settings.minimum and target < u) or (u >= settings.maximum and target > u)
+    if missing <= NEAR * np.abs(u - start.origin) or at_limit or start.samples > LONGEST:
+        state.stage = RUN
+        lines.begin(line, line.gain, u, x)
+        _begin_swings(state, r, u, np.abs(start.target - start.from_u))
+    return x
+
+
+@register_jitable
+def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -> float:
+    """The reading where it can be believed, NaN where not; what is wrong is noted, and the line drives."""
+    before = state.readings.fault
+    raw = x
+    x = reading.believed(state.readings, state.line, state.travel, u, x, gone)
+    _follow_zero(state)
+    if state.readings.fault != before:
+        _notice(state, state.readings.fault)
+        if state.readings.fault != reading.NONE:
+            driving.drive(state, 0.0)
+    _leave_limit(state, settings, raw, moved)
+    return x
+
+
+@register_jitable
+def _draw_line(state: Any) -> None:
+    """Draw the line anew where the reference has turned; what that changes is owed."""
+    line, travel = state.line, state.travel
+    before = driving.line_z(state)
+    if state.reference.turned_now != 0.0:
+        lines.turn(line)
+    elif not lines.grow(line, np.abs(travel.furthest - travel.turned)):
+        return
+    state.owed += before - driving.line_z(state)
+
+
+@register_jitable
+def _is_due(state: Any, gone: Any) -> bool:
+    """Whether the voltage has travelled far enough for other models."""
+    return gone > 0.0 and state.handed >= HAND_OVER * state.travel.swing
+
+
+@register_jitable
+def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
+    """Learn from a voltage that was written and a reading."""
+    state.samples += 1.0
+    if not np.abs(u) < WILDEST:
+        return
+    state.pending = 0.0
+    state.u = u
+    state.r = r if np.abs(r) < WILDEST else state.r
+    r = state.r
+    if state.stage == SEEK:
+        starts.learn(state.start, settings.start, u, x)
+        if state.unit != 0.0:
+            slots.advance(state.candidates, settings.candidates, u)
+        _name_silence(state)
+        if state.start.stage == starts.DONE:
+            _begin_learning(state, settings)
+        return
+    moved = travels.follow(state.reference, r)
+    kept = driving.kept(state.reference, moved, state.reference.swing)
+    state.owed *= kept
+    slots.pay(state.candidates, kept)
+    gone = travels.follow(state.travel, u)
+    if state.stage == RUN:
+        _draw_line(state)
+    state.gone += gone
+    state.handed += gone
+    slots.advance(state.candidates, settings.candidates, u)
+    if state.stage == APPROACH:
+        x = _approach(state, settings, r, u, x)
+    else:
+        x = _believe(state, settings, u, x, gone, moved)
+    _learn_from(state, settings, x)
+    if state.stage == RUN and state.readings.fault == reading.NONE and _is_due(state, gone):
+        state.handed = 0.0
+        _hand_over(state, settings)

@@ -1,0 +1,81 @@
+"""What a controller is made of: limits that are checked, layouts, numbers to begin with."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from piezoest._checks import instance
+from piezoest.compensators.limits import VoltageLimits
+from piezoest.controller import candidate, kernel, slots
+from piezoest.estimators.compiled import CompiledEstimator
+from piezoest.layout import Field, Record, new
+
+# Least range and largest size of the voltage [V].
+LEAST_RANGE, LARGEST_VOLTAGE = 1e-6, 1e6
+
+
+def checked_limits(limits: Any, sample_rate: float) -> Any:
+    """Refuse limits that keep no stage whole.
+
+    Raises
+    ------
+    ValueError
+        If they are infinite, out of all range, or of another sample rate.
+    """
+    expected = "VoltageLimits(minimum, maximum): give the voltages that the stage bears"
+    limits = instance("limits", limits, VoltageLimits, expected)
+    low, high = limits.minimum, limits.maximum
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise ValueError(
+            f"limits must be finite, got {low:g} V to {high:g} V: they are what keeps a stage whole while "
+            "nothing is known of it; give the voltages that stage and amplifier bear"
+        )
+    if max(-low, high) > LARGEST_VOLTAGE or high - low < LEAST_RANGE:
+        raise ValueError(
+            f"limits must lie within ±{LARGEST_VOLTAGE:g} V and {LEAST_RANGE:g} V apart, got {low:g} V to "
+            f"{high:g} V: check the unit"
+        )
+    if limits.sample_rate is not None and limits.sample_rate != sample_rate:
+        raise ValueError(
+            f"limits are for {limits.sample_rate:g} Hz, sample_rate is {sample_rate:g} Hz: give both the same"
+        )
+    return limits
+
+
+def _settings_of(sample_rate: float, limits: VoltageLimits) -> dict[str, Any]:
+    """Settings of the kernel but for corridor and candidates."""
+    width = limits.maximum - limits.minimum
+    return {
+        "minimum": limits.minimum,
+        "maximum": limits.maximum,
+        "largest_step": limits.largest_step,
+        "doubling": max(5.0, 4e-3 * sample_rate),
+        "start": {
+            "way": 0.02 * width,
+            "longest": 0.25 * width,
+            "ramp": max(6.0, 4e-3 * sample_rate),
+            "window": max(4.0, 2e-3 * sample_rate),
+            "lowest": limits.minimum,
+            "highest": limits.maximum,
+        },
+    }
+
+
+def room(
+    sample_rate: float, limits: VoltageLimits, corridor: float, estimators: tuple[CompiledEstimator, ...]
+) -> tuple[tuple[Record, Record], tuple[Any, Any]]:
+    """Layouts of state and settings, and both as they are before the start."""
+    states: list[Field] = []
+    settings: list[Field] = []
+    values, given = {}, {}
+    for name, estimator in zip(slots.NAMES, estimators, strict=False):
+        inverse = estimator.model.inverse_settings(sample_rate)
+        pair = candidate.layouts(estimator.layouts, estimator.model.inverse.layouts(inverse))
+        states.append(pair[0])
+        settings.append(pair[1])
+        values[name] = {"estimator": estimator.state}
+        given[name] = {"estimator": estimator.settings, "inverse": inverse, "by_path": 1.0}
+    layouts = kernel.layouts(slots.layout(states), slots.layout(settings))
+    fixed = _settings_of(sample_rate, limits) | {"corridor": corridor, "candidates": given}
+    return layouts, (new(layouts[0], candidates=values), new(layouts[1], **fixed))

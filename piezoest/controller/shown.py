@@ -1,0 +1,214 @@
+"""What a controller shows of itself: what happened, who drives, and models in µm."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from piezoest.controller import candidate, slots
+from piezoest.controller.readings import FAULTS
+from piezoest.equations import loop_inverse, play_inverse
+from piezoest.layout import Named
+from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
+from piezoest.supervisor import Event
+
+STAGES = ("seeking", "approaching", "running")
+# What each fault means.
+MEANINGS = {
+    "no response": "the readings do not answer the voltage",
+    "reversed": "the readings go the wrong way",
+    "scaled": "the readings answer far more or far less than before",
+    "saturated": "the readings stand still at a level",
+    "zero moved": "the readings have moved by a constant, which is followed",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerStatus:
+    """What happened to the samples that a controller was given.
+
+    Parameters
+    ----------
+    samples : int
+        Samples learnt from.
+    missing : int
+        Samples without a usable reference, at which the last one held.
+    stage : str
+        ``"seeking"`` (finds out the gain), ``"approaching"`` (goes to the reference) or ``"running"``.
+    driving : str
+        ``"line"``, or the name of the estimator whose model drives.
+    fault : str
+        What is wrong with the readings; empty if nothing.
+    saturated, slewed : int
+        Samples at which the voltage range or the slew rate was in the way.
+    switches : int
+        How many times another model took over.
+    """
+
+    samples: int
+    missing: int
+    stage: str
+    driving: str
+    fault: str
+    saturated: int
+    slewed: int
+    switches: int
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A model that can drive.
+
+    Parameters
+    ----------
+    name : str
+        ``"line"``, or that of its estimator.
+    missed : float or None
+        What it has missed of the readings of late, root mean square [µm]; None if nothing is known.
+    drives : bool
+        Whether it drives.
+    model : Model or None
+        In µm and V; None until there is one.
+    """
+
+    name: str
+    missed: float | None
+    drives: bool
+    model: Model | None
+
+
+def fault_name(number: Any) -> str:
+    """Name of a fault, empty if there is none.
+
+    Parameters
+    ----------
+    number : float
+        As the state has it.
+    """
+    return FAULTS[int(number)]
+
+
+def stage_name(number: Any) -> str:
+    """Name of a stage of the work.
+
+    Parameters
+    ----------
+    number : float
+        As the state has it.
+    """
+    return STAGES[int(number)]
+
+
+def event(state: Any, sample_rate: float) -> Event:
+    """Return what was noticed last.
+
+    Parameters
+    ----------
+    state : ndarray
+        Of the controller.
+    sample_rate : float
+        [Hz].
+    """
+    number, time = state["notice"], float(state["samples"]) / sample_rate
+    name = fault_name(number)
+    if not name:
+        return Event(time, "resumed", "the readings follow the voltage again")
+    action = "fell back" if number == state["readings"]["fault"] else "went on"
+    return Event(time, action, f"{name}: {MEANINGS.get(name, 'the readings cannot be believed')}")
+
+
+def misses(state: Any) -> list[float | None]:
+    """Return what the line and each candidate has missed of late [µm]; None if nothing is known.
+
+    Parameters
+    ----------
+    state : ndarray
+        Of the controller.
+    """
+    unit, every = abs(float(state["unit"])), state["candidates"]
+    used = [name for name in slots.NAMES if every[name].dtype.names is not None]
+    found: list[float | None] = []
+    for score in (state["score"], *(every[name]["score"] for name in used)):
+        missed = unit * float(candidate.missed(Named(score)))
+        found.append(missed if score["weight"] > 0.0 and math.isfinite(missed) else None)
+    return found
+
+
+def line(state: Any) -> LinearGain | None:
+    """Return the straight line; None until its gain is known.
+
+    Parameters
+    ----------
+    state : ndarray
+        Of the controller.
+    """
+    gain, centre = float(state["line"]["gain"]), float(state["line"]["centre"])
+    known = gain != 0.0 and math.isfinite(gain) and math.isfinite(centre)
+    return LinearGain(gain, centre) if known else None
+
+
+def model(start: Model, state: Any, settings: Any, name: str) -> Model | None:
+    """Return the model in use of a candidate, in µm and V; None until there is one.
+
+    Parameters
+    ----------
+    start : Model
+        One of its kind.
+    state, settings : ndarray
+        Of the controller.
+    name : str
+        Of the candidate's slot.
+    """
+    if state["candidates"][name]["usable"] == 0.0:
+        return None
+    numbers = settings["candidates"][name]["inverse"]
+    return in_micrometres(start, numbers, state["unit"], state["zero"])
+
+
+def in_micrometres(start: Model, numbers: Any, unit: float, zero: float) -> Model:
+    """Return a model in µm and V from the numbers of its inverse in volts.
+
+    Parameters
+    ----------
+    start : Model
+        One of its kind.
+    numbers : ndarray
+        Settings of its inverse, by name.
+    unit, zero : float
+        Of z = (x - zero)/unit [µm/V], [µm].
+
+    Raises
+    ------
+    ValueError
+        If the numbers make no model.
+    """
+    return _KINDS[start.inverse](start, numbers, float(unit), float(zero))
+
+
+def _loop(start: Any, numbers: Any, unit: float, zero: float) -> Model:
+    a, b, c = float(numbers["a"]), float(numbers["b"]), float(numbers["c"])
+    offset = unit * float(numbers["offset"]) + zero
+    if b == 0.0:
+        return LinearGain(unit * c, offset)
+    return ColemanHodgdon.from_loop(a, unit * b, unit * c, offset)
+
+
+def _plays(start: Any, numbers: Any, unit: float, zero: float) -> Model:
+    thresholds, bends, gains = numbers["thresholds"], numbers["bends"], numbers["creep_gains"]
+    changes = numbers["bend_weights"].reshape(bends.size, -1 if bends.size else 1)
+    return PrandtlIshlinskii(
+        unit * float(numbers["gain"]),
+        thresholds,
+        unit * numbers["weights"],
+        unit * float(numbers["offset"]) + zero,
+        creep=dataclasses.replace(start.creep, gains=gains) if gains.size else None,
+        bends=bends,
+        bend_weights=unit * changes,
+        sample_rate=start.sample_rate,
+    )
+
+
+_KINDS: dict[Any, Callable[..., Model]] = {loop_inverse: _loop, play_inverse: _plays}

@@ -1,0 +1,160 @@
+"""Finding out what the stage does, from nothing: the voltage goes a few per cent of its range, twice.
+
+At rest the first readings say where the stage stands; one wrong one among them does not count. Then the
+voltage goes a small way and rests until the reading has come to rest too, and once more. The gain is what
+lies between two rests, where neither delay nor lag counts, if both ways were answered alike; else, as with
+backlash, the way is doubled.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST
+from piezoest.layout import AMOUNT, COUNT, FIXED, MEASURED, NUMBER, numbers, record, whole
+
+# At rest; the voltage goes a way; it rests there; the gain is known; no answer.
+REST, GO, WAIT, DONE, SILENT = (float(i) for i in range(5))
+FIRST = 5
+
+START = record(
+    stage=whole(0.0, 4.0),
+    # Voltage planned, where all began, the way on from there; whether one way has been answered.
+    voltage=MEASURED, origin=MEASURED, from_u=MEASURED, target=MEASURED, way=NUMBER, ways=COUNT,
+    # Samples of the stage; where the reading stood at first and at the last rest, its noise.
+    samples=COUNT, zero=MEASURED, from_x=MEASURED, noise=AMOUNT,
+    # Sums over a window of readings, scatter within, their mean; windows so far.
+    sum=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT, now=MEASURED, windows=COUNT,
+    # Gain of the last way [µm/V], of the one before.
+    gain=NUMBER, gain_before=NUMBER, tries=COUNT, first=numbers(FIRST, kind=MEASURED),
+)  # fmt: skip
+# First and longest way [V], samples of a way, of a window; the limits.
+SETTINGS = record(way=FIXED, longest=FIXED, ramp=FIXED, window=FIXED, lowest=FIXED, highest=FIXED)
+
+# An answer is clear above so many times the noise at rest, and the scatter within a window; two are alike
+# within this factor.
+CLEAR, SCATTERS, ALIKE = 6.0, 3.0, 1.6
+# At rest the means of two windows differ by less than this fraction of the answer; so many are enough.
+STILL, MOST_WINDOWS = 0.03, 30.0
+# Windows before the first repetition; then twice as many each time.
+PAUSE = 10.0
+
+
+@register_jitable
+def begin(start: Any, u: Any) -> None:
+    """Begin at rest at a voltage."""
+    start.voltage = start.origin = u
+    start.stage = REST
+    start.samples = start.ways = start.tries = 0.0
+
+
+@register_jitable
+def _go(start: Any, settings: Any, u: Any) -> None:
+    """Begin the next way; back to where there is room if there is none ahead."""
+    start.stage, start.samples = GO, 0.0
+    start.from_u = u
+    ahead = u + start.way
+    if not settings.lowest <= ahead <= settings.highest:
+        start.way = -start.way
+    start.target = min(max(u + start.way, settings.lowest), settings.highest)
+
+
+@register_jitable
+def _settle_rest(start: Any, settings: Any, u: Any) -> None:
+    """Where the stage stands at rest: the middle reading; the noise from the others."""
+    first = start.first
+    for i in range(1, FIRST):
+        value, j = first[i], i
+        while j > 0 and first[j - 1] > value:
+            first[j] = first[j - 1]
+            j -= 1
+        first[j] = value
+    start.from_x = start.zero = first[FIRST // 2]
+    # The farthest one may be wrong.
+    start.noise = 0.6 * min(first[FIRST - 1] - first[1], first[FIRST - 2] - first[0])
+    start.way = settings.way if settings.highest - u >= u - settings.lowest else -settings.way
+    _go(start, settings, u)
+
+
+@register_jitable
+def _move(start: Any, settings: Any) -> None:
+    """The next voltage of a way, which begins and ends gently."""
+    start.samples += 1.0
+    share = min(start.samples / settings.ramp, 1.0)
+    start.voltage = start.from_u + share * share * (3.0 - 2.0 * share) * (start.target - start.from_u)
+    if share >= 1.0:
+        start.stage, start.voltage = WAIT, start.target
+        start.sum = start.squares = start.summed = start.windows = 0.0
+
+
+@register_jitable
+def _has_come_to_rest(start: Any, settings: Any, x: Any) -> bool:
+    """Whether the stage has come to rest; `start.now` is then where it stands."""
+    start.summed += 1.0
+    start.sum += x
+    start.squares += (x - start.from_x) ** 2
+    if start.summed < settings.window:
+        return False
+    before, start.now = start.now, start.sum / start.summed
+    start.scatter = np.sqrt(max(0.0, start.squares / start.summed - (start.now - start.from_x) ** 2))
+    start.windows += 1.0
+    start.sum = start.squares = start.summed = 0.0
+    still = np.abs(start.now - before) < STILL * np.abs(start.now - start.from_x) + 0.5 * start.noise
+    return start.windows > 1.0 and (still or start.windows >= MOST_WINDOWS)
+
+
+@register_jitable
+def _judge(start: Any, settings: Any, u: Any) -> None:
+    """What the way has shown: done if two were answered alike, else another, twice as long."""
+    answer = start.now - start.from_x
+    start.gain_before, start.gain = start.gain, answer / (u - start.from_u) if u != start.from_u else 0.0
+    clear = (
+        u != start.from_u
+        and np.abs(answer) > CLEAR * start.noise
+        and np.abs(answer) > SCATTERS * start.scatter
+    )
+    alike = start.ways > 0.0 and 1.0 / ALIKE < start.gain / start.gain_before < ALIKE
+    longest = np.abs(start.way) >= settings.longest
+    start.from_x = start.now
+    if start.target == start.origin and start.ways == 0.0 and start.tries > 0.0:
+        start.stage, start.samples = SILENT, 0.0
+        return
+    if clear and (alike or longest):
+        start.stage = DONE
+        return
+    if longest:
+        # Back to where all began: nothing rests at a limit.
+        start.stage, start.samples, start.ways = GO, 0.0, 0.0
+        start.tries += 1.0
+        start.from_u, start.target = u, start.origin
+        return
+    if start.ways > 0.0 or not clear:
+        start.way *= 2.0
+    start.ways += clear
+    _go(start, settings, u)
+
+
+@register_jitable
+def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
+    """Take the reading at a voltage, NaN for none, and choose the next voltage."""
+    known = np.abs(x) < WILDEST
+    if start.stage == GO:
+        _move(start, settings)
+    elif not known:
+        return
+    elif start.stage == REST:
+        start.first[int(start.samples)] = x
+        start.samples += 1.0
+        if start.samples >= FIRST:
+            _settle_rest(start, settings, u)
+    elif start.stage == WAIT and u == start.target:
+        if _has_come_to_rest(start, settings, x):
+            _judge(start, settings, u)
+    elif start.stage == SILENT:
+        start.samples += 1.0
+        # Less and less often: the stage is not to be shaken for nothing.
+        if start.samples >= PAUSE * settings.window * 2.0 ** min(start.tries, 20.0):
+            start.stage, start.samples, start.way = REST, 0.0, settings.way

@@ -1,0 +1,169 @@
+"""The estimators that work for a controller, made for its range of voltages.
+
+A controller gives them its readings in volts, z = (x - zero)/unit, so that the stage has a gain of about one
+and nothing needs to be known of µm/V beforehand. What they begin with must be made for that, which is why a
+controller makes them itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from piezoest._checks import class_named, dictionary, instance
+from piezoest.controller import slots
+from piezoest.equations import loop_inverse, play_inverse
+from piezoest.estimators.compiled import CompiledEstimator
+from piezoest.estimators.ekf import HysteresisEKF
+from piezoest.estimators.output_error import OutputErrorRLS
+from piezoest.estimators.play_rls import PrandtlIshlinskiiRLS
+from piezoest.estimators.rls import HysteresisRLS
+from piezoest.models import ColemanHodgdon
+
+# factory(sample_rate, initial_model=, noise=) is an estimator, as the classes of estimators are.
+Factory = Callable[..., Any]
+
+DEFAULT: tuple[Factory, ...] = (HysteresisRLS, OutputErrorRLS, PrandtlIshlinskiiRLS)
+KNOWN = (HysteresisRLS, OutputErrorRLS, PrandtlIshlinskiiRLS, HysteresisEKF)
+# Inverses whose numbers a controller can hand over.
+INVERSES = (loop_inverse, play_inverse)
+# Gain of a first model that was made for volts, about.
+LEAST, MOST = 0.1, 10.0
+# Standard deviation of the readings' noise, relative to half the range of the voltage.
+NOISE = 1e-4
+
+
+def default_estimators(sample_rate: float, half_range: float) -> tuple[CompiledEstimator, ...]:
+    """The three that a controller has by default.
+
+    Parameters
+    ----------
+    sample_rate : float
+        [Hz].
+    half_range : float
+        Half the range of the voltage [V].
+    """
+    return made(DEFAULT, sample_rate, half_range)
+
+
+def made(factories: Any, sample_rate: float, half_range: float) -> tuple[CompiledEstimator, ...]:
+    """Estimators for a range of voltages.
+
+    Parameters
+    ----------
+    factories : tuple of callable
+        Up to four, called as ``factory(sample_rate, initial_model=..., noise=...)``.
+    sample_rate : float
+        [Hz].
+    half_range : float
+        Half the range of the voltage [V].
+
+    Raises
+    ------
+    ValueError
+        If there are too many, or one makes no estimator that a controller can use.
+    """
+    hint = "a tuple of classes: pass (HysteresisRLS,), or () for the straight line alone"
+    factories = tuple(instance("estimators", factories, tuple | list, hint))
+    if len(factories) > len(slots.NAMES):
+        raise ValueError(f"estimators must be at most {len(slots.NAMES)}, got {len(factories)}: choose")
+    start = ColemanHodgdon(alpha=2.0 / half_range, beta=0.8, gamma=2.4 / half_range)
+    given = {"initial_model": start, "noise": NOISE * half_range}
+    return tuple(_made(f"estimators[{i}]", factories[i], sample_rate, given) for i in range(len(factories)))
+
+
+def _made(name: str, factory: Any, sample_rate: float, given: dict[str, Any]) -> CompiledEstimator:
+    if not callable(factory):
+        raise ValueError(
+            f"{name} must be a class, as HysteresisRLS, or functools.partial(HysteresisRLS, memory=0.4), "
+            f"got {type(factory).__name__}: a controller makes its estimators itself, for a gain of one"
+        )
+    try:
+        estimator = factory(sample_rate, **given)
+    except TypeError as error:
+        raise ValueError(
+            f"{name} must go by factory(sample_rate, initial_model=..., noise=...): {error}"
+        ) from error
+    checked(name, estimator)
+    gain = estimator.model.line[0]
+    if estimator.status.samples or not LEAST < gain < MOST:
+        raise ValueError(
+            f"{name} must begin anew from the initial_model that it is given, of a gain of about one, "
+            f"got {estimator.model} after {estimator.status.samples} samples: pass it on"
+        )
+    return estimator
+
+
+def checked(name: str, estimator: Any) -> None:
+    """Refuse what a controller cannot use.
+
+    Raises
+    ------
+    ValueError
+        Naming it.
+    """
+    kernel = getattr(estimator, "kernel", None)
+    if not isinstance(estimator, CompiledEstimator) or not hasattr(kernel, "write_model"):
+        raise ValueError(
+            f"{name} must make a compiled estimator with `write_model`, as "
+            f"{', '.join(cls.__name__ for cls in KNOWN)}, got {type(estimator).__name__}"
+        )
+    if estimator.model.inverse not in INVERSES:
+        raise ValueError(f"{name} has a model without a known inverse: {type(estimator.model).__name__}")
+
+
+def names(estimators: tuple[CompiledEstimator, ...]) -> tuple[str, ...]:
+    """Names of the line and of the estimators; the second one of a class is numbered.
+
+    Parameters
+    ----------
+    estimators : tuple
+        In their order.
+    """
+    found = ["line"]
+    for estimator in estimators:
+        name, number = type(estimator).__name__, 2
+        while name in found:
+            name, number = f"{type(estimator).__name__} {number}", number + 1
+        found.append(name)
+    return tuple(found)
+
+
+def saved(estimator: CompiledEstimator) -> dict[str, Any]:
+    """Return class and arguments as a JSON-safe dictionary.
+
+    Parameters
+    ----------
+    estimator : CompiledEstimator
+        As it was made.
+    """
+    return {name: value for name, value in estimator.to_dict().items() if name != "state"}
+
+
+def revived(data: Any, state: Any) -> CompiledEstimator:
+    """Return an estimator as it was made.
+
+    Parameters
+    ----------
+    data : dict
+        What `saved` gave.
+    state : dict
+        Its state by name within a saved controller, which is checked.
+
+    Raises
+    ------
+    ValueError
+        If it is none that can be.
+    """
+    cls = class_named(dictionary(data), "estimator", _known(CompiledEstimator))
+    estimator: CompiledEstimator = cls.from_dict({**data, "state": state})
+    checked("estimator", estimator)
+    estimator.reset()
+    return estimator
+
+
+def _known(cls: Any) -> Iterator[Any]:
+    """All compiled estimators, those of users too."""
+    for inner in cls.__subclasses__():
+        yield inner
+        yield from _known(inner)

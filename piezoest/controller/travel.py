@@ -1,0 +1,75 @@
+"""How far a signal goes from one turn to the next: the unit in which a controller counts.
+
+Hysteresis forgets by travel and knows no time: what is learnt, scored and handed over counts in swings.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest.layout import COUNT, DISTANCE, FLAG, MEASURED, SIGN, record
+
+# Direction of travel, furthest value in it, where this leg began, length of the last leg; size of a usual
+# swing, least one before two turns were seen; turns so far, the last value, whether it has just turned;
+# samples of this leg and of the last one.
+TRAVEL = record(
+    direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE, swing=DISTANCE, least=DISTANCE,
+    turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, usual=COUNT,
+)  # fmt: skip
+
+# A way back of this fraction of a swing is a turn; so many turns show a swing.
+TURN, SHOWN = 0.05, 2.0
+# No swing counts for less than this fraction of the one before: noise at rest would.
+LEAST = 0.02
+
+
+@register_jitable
+def begin(travel: Any, value: Any, least: Any) -> None:
+    """Begin, or begin anew, at a value; no swing is smaller than `least` until two turns were seen."""
+    travel.furthest = travel.turned = travel.last = value
+    travel.direction = travel.leg = travel.turns = travel.count = travel.usual = 0.0
+    travel.swing = travel.least = least
+
+
+@register_jitable
+def follow(travel: Any, value: Any) -> float:
+    """Follow the signal to its next value; how far it has gone since the last one."""
+    gone = np.abs(value - travel.last)
+    travel.last = value
+    travel.turned_now = 0.0
+    travel.count += 1.0
+    way = value - travel.furthest
+    if travel.direction * way >= 0.0:
+        if travel.direction == 0.0:
+            travel.direction = np.sign(way)
+        travel.furthest = value
+    elif np.abs(way) > TURN * travel.swing:
+        leg = np.abs(travel.furthest - travel.turned)
+        travel.turns += 1.0
+        swing = max(leg, travel.leg, LEAST * travel.swing, travel.least if travel.turns < SHOWN else 0.0)
+        travel.turned_now = 1.0
+        travel.usual, travel.count = travel.count, 0.0
+        travel.swing, travel.leg = swing, leg
+        travel.turned = travel.furthest
+        travel.furthest = value
+        travel.direction = -travel.direction
+    travel.swing = max(travel.swing, np.abs(value - travel.turned))
+    return gone
+
+
+@register_jitable
+def progress(travel: Any, gone: Any) -> float:
+    """What a sample counts, about one in all for a leg: half by travel, half by time, rests soon nothing."""
+    usual = max(travel.usual, 8.0)
+    return 0.5 * in_swings(travel, gone) + (
+        0.5 / max(usual, travel.count) if travel.count < 2.0 * usual else 0.0
+    )
+
+
+@register_jitable
+def in_swings(travel: Any, gone: Any) -> float:
+    """A distance as a fraction of a usual swing."""
+    return min(gone / travel.swing, 1.0) if travel.swing > 0.0 else 0.0

@@ -1,0 +1,83 @@
+"""From the reference to the voltage: seeking the gain, on the way to the reference, by a model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST
+from piezoest.controller import driving, slots
+from piezoest.controller import line as lines
+from piezoest.controller import readings as reading
+
+# The gain is sought; the voltage goes to where the reference needs it; all is learnt.
+SEEK, APPROACH, RUN = 0.0, 1.0, 2.0
+# The corridor reaches no farther from the line than so many times what the line has missed of late.
+WIDER = 1.3
+# A model's voltage moves no faster than so many times the line's.
+RATE = 5.0
+# On the way to the reference the voltage goes no farther than so many times the way that was answered; it
+# becomes so much longer in the time that a doubling may take.
+AHEAD, GROWTH = 1.5, 0.7
+
+
+@register_jitable
+def _feed_forward(state: Any, settings: Any, r: Any) -> float:
+    """Voltage of the model that drives, in the corridor around the line."""
+    line = state.line
+    swing = max(state.reference.swing, np.abs(r - state.reference.turned))
+    kept = driving.kept(state.reference, np.abs(r - state.reference.last), swing)
+    straight = wanted = lines.voltage(line, r - state.owed * kept * state.unit)
+    if state.pending <= 1.0 and state.readings.fault == reading.NONE and state.driving > 0.0:
+        z = (r - state.zero) / state.unit - slots.owed(state.candidates, state.driving, 0.0) * kept
+        wanted = slots.voltage(state.candidates, settings.candidates, state.driving, z, straight)
+        # Near a turn the inverse of a wide loop leaps, which would shake a resonance.
+        ahead = straight - lines.voltage(line, state.reference.last - state.owed * state.unit)
+        most = (RATE - 1.0) * np.abs(ahead)
+        wanted = min(max(wanted, state.u + ahead - most), state.u + ahead + most)
+    if not np.abs(wanted) < WILDEST:
+        wanted = straight
+    room = np.abs(settings.corridor * 0.5 * swing / line.gain)
+    # No model can gain more on the line than the line has missed of late.
+    missed = np.abs(state.unit) * state.score.peak + 3.0 * np.sqrt(state.readings.noise)
+    room = min(room, WIDER * missed / np.abs(line.gain))
+    return min(max(wanted, straight - room), straight + room)
+
+
+@register_jitable
+def _nearer(state: Any, settings: Any, target: Any) -> float:
+    """The next voltage on the way to a target: what is known of the stage doubles its range step by step."""
+    start = state.start
+    span = max(np.abs(state.u - start.origin), np.abs(start.target - start.from_u))
+    doubling = max(settings.doubling, start.windows * settings.start.window)
+    way = max(span, state.confirmed / AHEAD) * GROWTH / doubling
+    u = state.u + min(max(target - state.u, -way), way)
+    room = AHEAD * state.confirmed
+    return min(max(u, start.origin - room), start.origin + room)
+
+
+@register_jitable
+def plan(state: Any, settings: Any, r: Any) -> float:
+    """Voltage for the next sample of the reference."""
+    state.pending += 1.0
+    if not np.abs(r) < WILDEST:
+        r = state.r
+        state.missing += 1.0
+    state.r = r
+    if state.stage == SEEK:
+        wanted = state.start.voltage
+    elif state.stage == APPROACH:
+        wanted = _nearer(state, settings, lines.voltage(state.line, r))
+    else:
+        wanted = _feed_forward(state, settings, r)
+    if not np.abs(wanted) < WILDEST:
+        wanted = state.u
+    step = settings.largest_step
+    slewed = min(max(wanted, state.u - step), state.u + step)
+    given = min(max(slewed, settings.minimum), settings.maximum)
+    state.slewed += slewed != wanted
+    state.saturated += given != slewed
+    state.planned = given
+    return given

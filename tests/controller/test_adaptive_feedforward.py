@@ -1,0 +1,488 @@
+"""Adaptive feed-forward as one object: what it promises whatever comes in, and what it shows."""
+
+from __future__ import annotations
+
+import copy
+import functools
+import json
+import logging
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+from piezoest.controller import shown, team
+from piezoest.controller.readings import FAULTS
+
+ROOT = Path(__file__).resolve().parents[2]
+FS = 5000.0
+LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
+LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+BOTH: Any = pytest.mark.parametrize("estimators", [(), None], ids=["line", "default"])
+NO_NUMBERS: tuple[Any, ...] = (np.nan, None, np.inf, -np.inf, 1e300, "x", np.ma.masked, [], (1.0, "x"), 1j)
+
+
+def controller(estimators: Any = (), limits: pz.VoltageLimits = LIMITS, **options: Any) -> Any:
+    return pz.AdaptiveFeedforward(FS, limits=limits, estimators=estimators, **options)
+
+
+def triangle(periods: int = 6, amplitude: float = 5.0) -> FloatArray:
+    return pz.signals.triangle(amplitude, 10.0, periods, FS).values
+
+
+def drive(driver: Any, stage: Any, r: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Voltage and reading of a ring, sample by sample."""
+    u, x = np.empty_like(r), np.empty_like(r)
+    for k, r_k in enumerate(r.tolist()):
+        u[k] = driver.step(r_k)
+        x[k] = stage.step(u[k])
+        driver.learn(float(u[k]), float(x[k]))
+    return u, x
+
+
+def same(first: Any, second: Any) -> bool:
+    """Whether two controllers are the same to the last bit, but for their work space."""
+    return bool(first.to_dict() == second.to_dict())
+
+
+# ---------------------------------------------------------------- whatever comes in
+
+ANY = st.one_of(
+    st.floats(-10.0, 10.0), st.floats(allow_nan=True, allow_infinity=True), st.sampled_from(NO_NUMBERS)
+)
+
+
+@BOTH
+@hypothesis.given(
+    before=st.integers(0, 400),
+    samples=st.lists(st.tuples(ANY, ANY, ANY, st.booleans()), min_size=1, max_size=40),
+    slew_rate=st.sampled_from([None, 1e3]),
+)
+@hypothesis.settings(derandomize=True, deadline=None, max_examples=60)
+def test_the_voltage_is_finite_and_within_limits(
+    estimators: Any, before: int, samples: list[Any], slew_rate: float | None
+) -> None:
+    limits = pz.VoltageLimits(-20.0, 100.0, slew_rate, None if slew_rate is None else FS)
+    driver = controller(estimators, limits)
+    drive(driver, pz.SimulatedStage(FS, LOOP), triangle()[:before])
+    for r, u, x, as_planned in samples:
+        planned = driver.step(r)
+        assert -20.0 <= planned <= 100.0
+        if not isinstance(u, list | tuple):
+            driver.learn(planned if as_planned else u, x)
+    for name in driver.state.dtype.names:
+        if driver.state[name].dtype.names is None:
+            assert np.all(np.isfinite(driver.state[name])), name
+    assert same(driver, read_back(driver))
+    assert driver.status.stage in shown.STAGES
+    assert all(each.missed is None or each.missed >= 0.0 for each in driver.candidates)
+
+
+def test_what_is_no_number_is_missing() -> None:
+    driver, other = controller(), controller()
+    stage = pz.SimulatedStage(FS, LOOP)
+    drive(driver, stage, triangle(2))
+    other = driver.copy()
+    for bad in NO_NUMBERS:
+        u = driver.step(bad)
+        assert u == other.step(None)
+        driver.learn(u, bad)
+        other.learn(u, None)
+    assert driver.state.tobytes() == other.state.tobytes()
+    assert driver.status.missing == len(NO_NUMBERS)
+
+
+@BOTH
+def test_readings_that_are_missing_do_not_matter(estimators: Any) -> None:
+    driver, stage = controller(estimators), pz.SimulatedStage(FS, LOOP)
+    r, rng = triangle(20), np.random.default_rng(0)
+    x = np.empty_like(r)
+    for k, r_k in enumerate(r.tolist()):
+        u = driver.step(r_k)
+        x[k] = stage.step(u)
+        driver.learn(u, np.nan if rng.random() < 0.3 else x[k])
+    assert driver.status.stage == "running"
+    assert np.abs(r - x)[-1000:].max() < (0.6 if estimators == () else 0.1)
+
+
+# ---------------------------------------------------------------- blocks
+
+
+@BOTH
+def test_blocks_of_one_are_samples(estimators: Any) -> None:
+    single, blocks = controller(estimators), controller(estimators)
+    r = triangle(3)
+    r[700:703] = np.nan
+    u, x = drive(single, pz.SimulatedStage(FS, LOOP), r)
+    for k in range(r.size):
+        planned = blocks.run(r[k : k + 1])
+        assert planned[0] == u[k]
+        blocks.learn(planned, x[k : k + 1])
+    assert same(single, blocks)
+    assert single.status.missing == 3
+
+
+@BOTH
+def test_blocks_are_planned_and_followed(estimators: Any) -> None:
+    driver, stage = controller(estimators), pz.SimulatedStage(FS, LOOP)
+    r = triangle(20)
+    x = np.empty_like(r)
+    for start in range(0, r.size, 25):
+        part = slice(start, start + 25)
+        before = driver.settings.tobytes()
+        u = driver.run(r[part])
+        assert driver.settings.tobytes() == before
+        x[part] = stage.run(u)
+        driver.learn(u, x[part])
+    assert driver.status.samples == r.size
+    assert np.abs(r - x)[-1000:].max() < (0.6 if estimators == () else 0.1)
+
+
+def test_a_block_wants_its_own_length() -> None:
+    driver = controller()
+    with pytest.raises(ValueError, match="planned by run"):
+        driver.learn(np.zeros(3), np.zeros(3))
+    u = driver.run(np.zeros(5))
+    with pytest.raises(ValueError, match=r"must have 5 samples, .* got 4 and 4"):
+        driver.learn(u[:4], u[:4])
+    with pytest.raises(ValueError, match=r"u must have shape \(N,\)"):
+        driver.learn(0.0, 0.0)
+    driver.learn(u.tolist(), [0.0, None, np.nan, np.inf, 0.0])
+    assert driver.status.samples == 5
+    with pytest.raises(ValueError, match="planned by run"):
+        driver.learn(u, u)
+    with pytest.raises(ValueError, match="r must have shape"):
+        driver.run(np.zeros((2, 2)))
+    driver.run(np.zeros(5))  # never written
+    driver.learn(driver.step(0.0), 0.0)
+    assert driver.status.samples == 6
+
+
+def test_the_block_is_its_own() -> None:
+    driver, other = controller(), controller()
+    r = triangle(1)
+    given = r.copy()
+    u = driver.run(given)
+    given[:] = np.nan
+    other.learn(other.run(r), u)
+    driver.learn(u, u)
+    assert same(driver, other)
+
+
+# ---------------------------------------------------------------- copies, files, reset
+
+
+def copied(driver: Any) -> Any:
+    return driver.copy()
+
+
+def read_back(driver: Any) -> Any:
+    return pz.AdaptiveFeedforward.from_dict(json.loads(json.dumps(driver.to_dict(), allow_nan=False)))
+
+
+def unpickled(driver: Any) -> Any:
+    return pickle.loads(pickle.dumps(driver))
+
+
+@BOTH
+@pytest.mark.parametrize("again", [copied, copy.copy, copy.deepcopy, read_back, unpickled])
+@pytest.mark.parametrize("after", [0, 30, 300, 2500])
+def test_a_copy_goes_on_bit_for_bit(estimators: Any, again: Callable[[Any], Any], after: int) -> None:
+    driver, stage, r = controller(estimators), pz.SimulatedStage(FS, LOOP), triangle()
+    drive(driver, stage, r[:after])
+    other = again(driver)
+    assert same(driver, other)
+    before = other.state.tobytes(), other.settings.tobytes()
+    beside = copy.deepcopy(stage)
+    u, _ = drive(driver, stage, r[after : after + 500])
+    assert (other.state.tobytes(), other.settings.tobytes()) == before
+    np.testing.assert_array_equal(drive(other, beside, r[after : after + 500])[0], u)
+    assert same(driver, other)
+
+
+def test_a_block_that_waits_is_kept() -> None:
+    driver = controller()
+    r = triangle(1)
+    r[3] = np.nan
+    u = driver.run(r)
+    other = read_back(driver)
+    driver.learn(u, u)
+    other.learn(u, u)
+    assert same(driver, other)
+
+
+@BOTH
+def test_reset_is_a_new_one(estimators: Any) -> None:
+    driver = controller(estimators)
+    drive(driver, pz.SimulatedStage(FS, LOOP), triangle())
+    assert driver.status.stage == "running"
+    driver.reset()
+    assert same(driver, controller(estimators))
+    assert driver.events == ()
+    driver.reset(voltage=30.0)
+    assert driver.voltage == driver.step(0.0) == 30.0
+    for wrong in (61.0, np.nan, "x"):
+        with pytest.raises(ValueError, match="voltage must"):
+            driver.reset(wrong)
+
+
+def changed(data: dict[str, Any], *path: Any, value: Any) -> dict[str, Any]:
+    data = copy.deepcopy(data)
+    inner = data
+    for key in path[:-1]:
+        inner = inner[key]
+    inner[path[-1]] = value
+    return data
+
+
+WRONG: dict[str, tuple[tuple[Any, ...], Any]] = {
+    "not of a AdaptiveFeedforward": (("controller",), "HysteresisRLS"),
+    "format 2": (("format",), 2),
+    "unknown fields": (("more",), 1),
+    "sample_rate must": (("sample_rate",), -1.0),
+    "limits must be finite": (("limits", "maximum"), np.inf),
+    "limits has unknown": (("limits", "more"), 1.0),
+    "corridor must": (("corridor",), 2.0),
+    "estimators must be a list": (("estimators",), None),
+    "at most 4": (("estimators",), [{}] * 5),
+    "estimator None is unknown": (("estimators",), [{}]),
+    "state has no": (("state",), {}),
+    "finite": (("state", "line", "gain"), np.nan),
+    "driving must be a whole number": (("state", "driving"), 7.0),
+    "readings at rest": (("state", "start"), {"stage": 0.0, "samples": 9.0}),
+    "models must be a dictionary": (("models",), None),
+    "planned must": (("planned",), "x"),
+    "events must be a list": (("events",), None),
+    "events must be .time": (("events",), [[1.0, 2.0, 3.0]]),
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_a_damaged_file_is_refused(message: str) -> None:
+    driver = controller()
+    drive(driver, pz.SimulatedStage(FS, LOOP), triangle(1))
+    data = driver.to_dict()
+    path, value = WRONG[message]
+    if path[-1] == "start":
+        value = data["state"]["start"] | value
+    with pytest.raises(ValueError, match=message):
+        pz.AdaptiveFeedforward.from_dict(changed(data, *path, value=value))
+    with pytest.raises(ValueError, match="dictionary"):
+        pz.AdaptiveFeedforward.from_dict(7)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("state", "candidates", "first", "estimator", "samples"), -1.0),
+        (("state", "candidates", "third", "estimator", "plays"), {}),
+        (("models", "third", "thresholds"), [1.0]),
+        (("models", "third", "plays"), 1e6),
+        (("models", "first", "a"), np.nan),
+        (("models", "first"), None),
+        (("estimators", 0, "arguments"), {}),
+    ],
+)
+def test_a_damaged_estimator_is_refused(path: tuple[Any, ...], value: Any) -> None:
+    driver = controller(None)
+    drive(driver, pz.SimulatedStage(FS, LOOP), triangle())
+    data = driver.to_dict()
+    with pytest.raises(ValueError, match=r"must|has no"):
+        pz.AdaptiveFeedforward.from_dict(changed(data, *path, value=value))
+
+
+# ---------------------------------------------------------------- arguments
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"limits": None}, "limits must be VoltageLimits"),
+        ({"limits": (-1.0, 1.0)}, "limits must be VoltageLimits"),
+        ({"limits": pz.VoltageLimits()}, "limits must be finite"),
+        ({"limits": pz.VoltageLimits(minimum=0.0)}, "limits must be finite"),
+        ({"limits": pz.VoltageLimits(0.0, 1e7)}, "limits must lie within"),
+        ({"limits": pz.VoltageLimits(0.0, 1e-9)}, "limits must lie within"),
+        ({"limits": pz.VoltageLimits(0.0, 1.0, sample_rate=1.0)}, "limits are for 1 Hz"),
+        ({"corridor": 1.5}, "corridor must"),
+        ({"corridor": "wide"}, "corridor must"),
+        ({"estimators": pz.HysteresisRLS}, "estimators must be a tuple"),
+        ({"estimators": (pz.HysteresisRLS(FS),)}, r"estimators\[0\] must be a class"),
+        ({"estimators": (pz.HysteresisRLS,) * 5}, "at most 4, got 5"),
+        ({"estimators": (pz.BatchFit,)}, r"estimators\[0\] must (make|go)"),
+        ({"estimators": (lambda rate: None,)}, "initial_model=..., noise=..."),
+        ({"estimators": (lambda rate, **given: None,)}, "must make a compiled estimator"),
+        ({"estimators": (lambda rate, **given: pz.HysteresisRLS(rate, initial_model=pz.LinearGain(0.01)),)},
+         "of a gain of about one"),
+    ],
+)  # fmt: skip
+def test_wrong_arguments_are_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        pz.AdaptiveFeedforward(FS, **({"limits": LIMITS} | options))
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, "fast", None])
+def test_a_wrong_sample_rate_is_refused(rate: Any) -> None:
+    with pytest.raises(ValueError, match="sample_rate"):
+        pz.AdaptiveFeedforward(rate, limits=LIMITS)
+
+
+def test_limits_are_asked_for() -> None:
+    with pytest.raises(TypeError, match="limits"):
+        pz.AdaptiveFeedforward(FS)  # type: ignore[call-arg]
+
+
+def test_estimators_are_made_for_volts() -> None:
+    factories = (pz.HysteresisRLS, functools.partial(pz.HysteresisRLS, memory=0.4), pz.HysteresisEKF)
+    made = team.made(factories, FS, 50.0)
+    assert team.names(made) == ("line", "HysteresisRLS", "HysteresisRLS 2", "HysteresisEKF")
+    assert all(0.5 < each.model.line[0] < 2.0 for each in made)
+    assert made[1].to_dict()["arguments"]["memory"] == 0.4
+
+
+@pytest.mark.slow
+def test_other_estimators_drive() -> None:
+    driver = controller((pz.HysteresisEKF, functools.partial(pz.HysteresisRLS, memory=0.4)))
+    r = triangle(20)
+    _, x = drive(driver, pz.SimulatedStage(FS, LOOP), r)
+    assert np.abs(r - x)[-1000:].max() < 0.1
+    assert driver.status.driving in ("HysteresisEKF", "HysteresisRLS")
+    assert same(driver, read_back(driver))
+
+
+# ---------------------------------------------------------------- what it shows
+
+
+@BOTH
+def test_the_model_is_in_micrometres(estimators: Any) -> None:
+    driver = controller(estimators)
+    assert driver.model is None
+    assert [each.model for each in driver.candidates] == [None] * (1 if estimators == () else 4)
+    assert all(each.missed is None for each in driver.candidates)
+    u, x = drive(driver, pz.SimulatedStage(FS, LOOP), triangle(20) + 3.0)
+    missed = {each.name: each.missed for each in driver.candidates}
+    for each in driver.candidates:
+        error = each.model.simulate(u) - x
+        assert np.sqrt(np.mean(error[-500:] ** 2)) < (0.6 if each.name == "line" else 0.05), each
+        assert each.missed is not None
+    assert missed["line"] > 0.2
+    (driving,) = [each for each in driver.candidates if each.drives]
+    assert driving.name == driver.status.driving
+    assert driving.model == driver.model
+    if estimators is None:
+        assert driving.name != "line"
+        kinds = [type(each.model) for each in driver.candidates]
+        assert kinds == [pz.LinearGain, pz.ColemanHodgdon, pz.ColemanHodgdon, pz.PrandtlIshlinskii]
+
+
+def test_the_status_counts() -> None:
+    limits = pz.VoltageLimits(0.0, 20.0, slew_rate=2e3, sample_rate=FS)
+    driver = controller(limits=limits)
+    assert driver.status == shown.ControllerStatus(0, 0, "seeking", "line", "", 0, 0, 0)
+    u, _ = drive(driver, pz.SimulatedStage(FS, LOOP), triangle(4))
+    assert u.min() >= 0.0
+    assert u.max() <= 20.0
+    assert driver.status.samples == u.size
+    assert driver.status.saturated > 100
+    assert driver.voltage == u[-1]
+    assert (driver.sample_rate, driver.limits) == (FS, limits)
+
+
+def test_faults_have_a_name(caplog: pytest.LogCaptureFixture) -> None:
+    driver, stage, r = controller(), pz.SimulatedStage(FS, LOOP), triangle(20)
+    with caplog.at_level(logging.INFO, logger="piezoest"):
+        for k, r_k in enumerate(r.tolist()):
+            u = driver.step(r_k)
+            x = stage.step(u)
+            driver.learn(u, -x if 4000 <= k < 6000 else x)
+    assert [event.action for event in driver.events[:2]] == ["fell back", "resumed"]
+    fell, resumed, *more = driver.events
+    assert {event.action for event in more} <= {"went on"}
+    assert fell.reason.startswith("reversed: ")
+    assert 0.8 < fell.time < 0.9
+    assert 1.2 < resumed.time < 1.5
+    assert [line.levelno for line in caplog.records[:2]] == [logging.WARNING, logging.INFO]
+    assert "reversed" in caplog.text
+    assert driver.status.fault == ""
+    assert read_back(driver).events == driver.events
+
+
+def test_every_fault_has_a_meaning() -> None:
+    page = (ROOT / "docs" / "adaptive_feedforward.rst").read_text(encoding="utf-8")
+    names = set(FAULTS) - {""}
+    assert set(shown.MEANINGS) == names
+    assert {name for name in names if f"* - ``{name}``" not in page} == set()
+
+
+# ---------------------------------------------------------------- what it is for
+
+
+@pytest.mark.parametrize("gain", [0.0015, 0.15, 3.0, 20.0, -0.2])
+@BOTH
+def test_the_gain_need_not_be_known(estimators: Any, gain: float) -> None:
+    scale = gain / LOOP.c
+    driver, inner = controller(estimators), pz.SimulatedStage(FS, LOOP)
+
+    class Scaled:
+        def step(self, u: float) -> float:
+            return float(scale * inner.step(u))
+
+    r = triangle(20, amplitude=25.0 * abs(gain))
+    _, x = drive(driver, Scaled(), r)
+    assert driver.status.stage == "running"
+    assert np.abs(r - x)[-1000:].max() < (0.16 if estimators == () else 0.03) * 25.0 * abs(gain)
+    assert driver.model is not None
+    assert driver.model.line[0] * gain > 0.0
+
+
+@pytest.mark.parametrize("limits", [(0.0, 100.0), (10.0, 110.0), (-100.0, 0.0)])
+@BOTH
+def test_the_range_may_have_one_sign(estimators: Any, limits: tuple[float, float]) -> None:
+    driver = controller(estimators, pz.VoltageLimits(*limits))
+    middle = 0.5 * LOOP.c * sum(limits)
+    r = pz.signals.sine(5.0, 10.0, 20, FS).values + middle
+    u, x = drive(driver, pz.SimulatedStage(FS, LOOP), r)
+    assert limits[0] <= u.min()
+    assert u.max() <= limits[1]
+    assert np.abs(r - x)[-1000:].max() < (0.7 if estimators == () else 0.1)
+
+
+def test_track_drives_the_ring() -> None:
+    r = pz.signals.triangle(5.0, 10.0, 20, FS)
+    records = {}
+    for name, estimators in {"line": (), "default": None}.items():
+        stage = pz.PaperStage(FS, seed=0)
+        records[name] = pz.track(r, stage=stage, controller=controller(estimators))
+    assert records["default"].max_error(last_periods=2) < 0.1 * records["line"].max_error(last_periods=2)
+    record = records["default"]
+    assert record.parameter_names == ()
+    assert record.theta.shape == (len(r), 0)
+    driver, stage = controller(None), pz.PaperStage(FS, seed=0)
+    u, x = drive(driver, stage, r.values)
+    np.testing.assert_array_equal(record.voltage, u)
+    np.testing.assert_array_equal(record.measured, x)
+    assert "max error" in record.table()
+
+
+def test_track_wants_one_driver() -> None:
+    r = pz.signals.triangle(5.0, 10.0, 1, FS)
+    driver, stage = controller(), pz.PaperStage(FS, seed=0)
+    others: dict[str, Any] = {
+        "compensator": pz.LinearCompensator(pz.LinearGain(0.15)),
+        "estimator": pz.HysteresisRLS(FS),
+        "supervisor": pz.Supervisor(FS),
+    }
+    for name, other in others.items():
+        with pytest.raises(ValueError, match=f"does without {name}"):
+            pz.track(r, stage=stage, controller=driver, **{name: other})
+    with pytest.raises(ValueError, match="pass compensator= or controller="):
+        pz.track(r, stage=stage)
+    with pytest.raises(ValueError, match="sample rates differ"):
+        pz.track(r, stage=stage, controller=pz.AdaptiveFeedforward(2.0 * FS, limits=LIMITS, estimators=()))
