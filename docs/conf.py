@@ -18,6 +18,7 @@ import faults_page
 import paper_page
 import performance_page
 import real_data_page
+import safety_page
 import tuning_page
 import which_estimator_page
 
@@ -64,6 +65,8 @@ html_theme_options = {
 }
 html_sidebars: dict[str, list[str]] = {
     "start": [],
+    "adaptive_feedforward": [],
+    "safety": [],
     "your_own_stage": [],
     "real_data": [],
     "tuning": [],
@@ -126,5 +129,6 @@ def setup(app: Any) -> None:
     app.connect("builder-inited", real_data_page.write)
     app.connect("builder-inited", adaptation_page.write)
     app.connect("builder-inited", faults_page.write)
+    app.connect("builder-inited", safety_page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

@@ -1,0 +1,122 @@
+"""The page *On anybody's rig*: what it says follows from its data, and its data from the runs."""
+
+from __future__ import annotations
+
+import copy
+import importlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from piezoest.bench.zoo.families import FAMILIES
+from piezoest.bench.zoo.faults import FAULTS
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def program(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
+    return importlib.import_module("safety")
+
+
+@pytest.fixture
+def page(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    return importlib.import_module("safety_page")
+
+
+@pytest.fixture
+def document() -> dict[str, Any]:
+    return dict(json.loads((ROOT / "docs" / "data" / "safety.json").read_text(encoding="utf-8")))
+
+
+def row(seed: int, ratio: float | None = 0.5, **given: Any) -> dict[str, Any]:
+    """A row with what is summed up."""
+    numbers = dict.fromkeys(("amplitude", "gain", "width", "sensor_noise", "creep"), 1.0)
+    return {
+        **numbers, "seed": seed, "family": "duhem", "reference": "sine", "fault": "none", "mode": "none",
+        "mechanics": "none", "sample_rate": 1000.0, "frequency": 5.0, "block": 1, "delay": 0, "low": 0.0,
+        "high": 100.0, "fair": True, "failure": None, "finite": True, "within_limits": True, "rail": 0.0,
+        "rests_at_rail": False, "ratio": ratio, "last_ratio": ratio, **given,
+    }  # fmt: skip
+
+
+def test_often_counts_calls_in_half_a_wave_and_the_delay(program: Any) -> None:
+    # 100 samples in a leg: 6 in a block are 16.7 calls, 7 are 14.3; 6 samples late is below a sixteenth.
+    assert program.often(row(0, block=6, delay=6))
+    assert not program.often(row(0, block=7))
+    assert not program.often(row(0, delay=7))
+
+
+def test_sums_count_what_is_judged_only(program: Any) -> None:
+    rows = [
+        row(0), row(1, 2.0, fault="gap", mode="permanent"),
+        row(2, 9.0, fault="gap", mode="from-start", fair=False),
+        row(3, 3.0, block=50), row(4, None),
+    ]  # fmt: skip
+    found = program.summed_up(rows)
+    assert found["all"]["runs"] == 5
+    assert found["all"]["judged"] == 3
+    assert found["all"]["violations"]["ratio"] == 2
+    assert found["all"]["quantiles"]["ratio"]["100 %"] == 3.0
+    assert found["all"]["curve"][0] == 0.5
+    assert len(found["all"]["curve"]) == len(program.LEVELS)
+    assert found["healthy"]["runs"] == 3
+    assert found["often"]["runs"] == 4
+    assert [(each["fault"], each["judged"], each["over"]) for each in found["by_fault"]] == [
+        ("gap", 1, 1), ("none", 2, 1),
+    ]  # fmt: skip
+    assert [each["seed"] for each in found["worst"]][:2] == [3, 1]
+    assert program.drawn(rows)["fault"] == {"gap": 2, "none": 3}
+
+
+def test_the_line_alone_has_no_estimator(program: Any) -> None:
+    from piezoest import VoltageLimits
+    from piezoest.bench.zoo.contenders import contender
+
+    controller = contender(program.CONTROLLERS["line"])(1000.0, VoltageLimits(0.0, 100.0))
+    assert controller.to_dict()["estimators"] == []
+
+
+def test_everything_drawn_is_described(page: Any) -> None:
+    assert set(page.FAMILIES) == set(FAMILIES)
+    assert set(page.FAULTS) == {"none", *FAULTS}
+
+
+def test_the_page_is_small_and_says_whether_the_promise_is_kept(page: Any, document: dict[str, Any]) -> None:
+    assert (ROOT / "docs" / "data" / "safety.json").stat().st_size < 100_000
+    broken, kept = copy.deepcopy(document), copy.deepcopy(document)
+    for each, count in ((broken, 2), (kept, 0)):
+        for group in page.GROUPS:
+            each["controller"][group]["violations"].update(ratio=count, failed=0)
+    assert "not kept yet" in "".join(page.verdict(broken))
+    said = "".join(page.verdict(kept))
+    assert "promise is kept" in said
+    assert "not kept" not in said
+    kept["controller"]["all"]["violations"]["failed"] = 3
+    assert "raised an error: 3" in page.verdict(kept)[0]
+
+
+def test_the_page_names_where_it_fails_most(page: Any) -> None:
+    rows = [
+        {"fault": name, "judged": judged, "over": over}
+        for name, judged, over in (("a", 10, 1), ("b", 10, 5), ("c", 2, 2), ("d", 10, 0))
+    ]
+    assert page.most(rows, "fault") == ["*b* (5 of 10)", "*a* (1 of 10)"]
+
+
+def test_pieces_hold_for_few_runs(page: Any, program: Any, document: dict[str, Any]) -> None:
+    """Also where most of the kinds have not been drawn, and a run raised."""
+    rows = [row(0), row(1, None, failure="ValueError: no", finite=None, within_limits=None)]
+    summed = {name: program.summed_up(rows) for name in page.WHO}
+    texts = page.pieces({**document, "runs": 2, "drawn": program.drawn(rows), **summed})
+    assert "ValueError: no" in texts["worst"]
+    assert "``" not in texts["show"]
+
+
+def test_the_figure_is_drawn(program: Any, document: dict[str, Any], tmp_path: Path) -> None:
+    program.draw(document, tmp_path / "figures" / "safety.png")
+    assert 10_000 < (tmp_path / "figures" / "safety.png").stat().st_size < 120_000
