@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import functools
 import importlib
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -295,8 +294,3 @@ class Named:
 
     def __getitem__(self, i: int) -> Named:
         return Named(self._array[i], self._layout)
-
-
-def size_of(layout: Record) -> int:
-    """How many numbers a layout has."""
-    return math.prod((layout.dtype.itemsize // 8,))

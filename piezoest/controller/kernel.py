@@ -50,7 +50,7 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         start=starts.START, candidates=candidates,
     )  # fmt: skip
     settings = record(
-        minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED, line_only=FIXED,
+        minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED,
         start=starts.SETTINGS, candidates=candidate_settings,
     )  # fmt: skip
     return state, settings

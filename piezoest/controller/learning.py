@@ -50,7 +50,7 @@ def _begin_learning(state: Any, settings: Any) -> None:
 def _hand_over(state: Any, settings: Any) -> None:
     """Take up the estimators' models of now, and choose which drives; without a bump."""
     slots.hand_over(state.candidates, settings.candidates)
-    if settings.line_only == 0.0 and state.line.legs >= FIRST_LEGS:
+    if state.line.legs >= FIRST_LEGS:
         driving.reconsider(state)
 
 

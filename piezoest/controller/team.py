@@ -33,19 +33,6 @@ LEAST, MOST = 0.1, 10.0
 NOISE = 1e-4
 
 
-def default_estimators(sample_rate: float, half_range: float) -> tuple[CompiledEstimator, ...]:
-    """The three that a controller has by default.
-
-    Parameters
-    ----------
-    sample_rate : float
-        [Hz].
-    half_range : float
-        Half the range of the voltage [V].
-    """
-    return made(DEFAULT, sample_rate, half_range)
-
-
 def made(factories: Any, sample_rate: float, half_range: float) -> tuple[CompiledEstimator, ...]:
     """Estimators for a range of voltages.
 

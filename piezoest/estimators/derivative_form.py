@@ -12,7 +12,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.compile import inlined
-from piezoest.equations import filters, sensor_noise
+from piezoest.equations import believing, filters, sensor_noise
 from piezoest.models import Model
 from piezoest.policies.base import Conditions, Policy
 from piezoest.policies.random_walk import SLOWEST
@@ -123,6 +123,21 @@ def learn_anew(belief: Any) -> None:
     if belief is None:
         return
     belief.seen = 0.0
+
+
+@inlined
+def is_believable(belief: Any, rejection: Any, state: Any, estimate: Any, unit: Any, x: Any) -> Any:
+    """Whether x is a reading that the stage can have made, after the last good one.
+
+    `estimate` is the law's, whose second number is the slope of the model, in the unit [µm/V].
+    """
+    if belief is None:
+        return True
+    dx = x_from_centre(state.centre, x) - state.x_last
+    if believing.stands_still(belief, dx, state.travel, state.swing.size):
+        return False
+    slope = abs(estimate[1]) * unit
+    return believing.believable(belief, dx, slope, state.travel, rejection.warm_up)
 
 
 @inlined

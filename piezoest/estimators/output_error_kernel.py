@@ -16,7 +16,7 @@ from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, li
 from piezoest.equations import believing, kalman, least_squares, sensor_noise, swing
 from piezoest.equations import output_error as equations
 from piezoest.estimators.delay_line import delayed
-from piezoest.estimators.derivative_form import learn_anew
+from piezoest.estimators.derivative_form import is_believable, learn_anew
 from piezoest.estimators.model_writing import write_loop
 from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED, WAITING, keep_outcome
 from piezoest.layout import (
@@ -225,18 +225,6 @@ def _at_rest(state: Any, settings: Any, fraction: Any) -> Any:
     return fraction < max(RESTING * (1.0 + state.gap) / usual, SLOWEST)
 
 
-@inlined
-def _believable(belief: Any, rejection: Any, state: Any, settings: Any, x: Any) -> Any:
-    """Whether x is a reading that the stage can have made, after the last good one."""
-    if belief is None:
-        return True
-    dx = x - state.centre.x - state.x_last
-    if believing.stands_still(belief, dx, state.travel, state.swing.size):
-        return False
-    slope = abs(state.law.s[1]) * settings.unit
-    return believing.believable(belief, dx, slope, state.travel, rejection.warm_up)
-
-
 @register_jitable
 def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     """One raw sample."""
@@ -262,7 +250,8 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     jumped = state.gap > settings.longest_gap
     if jumped:
         learn_anew(state.belief)
-    if measured and not _believable(state.belief, settings.policies.outlier_rejection, state, settings, x):
+    rejection = settings.policies.outlier_rejection
+    if measured and not is_believable(state.belief, rejection, state, law.s, settings.unit, x):
         state.outliers += 1.0
         law.last = REJECTED
         measured = False

@@ -102,18 +102,6 @@ def settings_layout(n: int, *, has_loop: bool, high_pass: bool, policies: Field)
 
 
 @inlined
-def _believable(belief: Any, rejection: Any, state: Any, settings: Any, x: Any) -> Any:
-    """Whether x is a reading that the stage can have made, after the last good one."""
-    if belief is None:
-        return True
-    dx = form.x_from_centre(state.centre, x) - state.x_last
-    if believing.stands_still(belief, dx, state.travel, state.swing.size):
-        return False
-    slope = abs(state.law.theta[1]) * settings.slope
-    return believing.believable(belief, dx, slope, state.travel, rejection.warm_up)
-
-
-@inlined
 def _decay(state: Any, settings: Any) -> Any:
     """alpha [1/V] as estimated, kept to what its model may have."""
     return max(state.law.theta[0], LEAST) * abs(settings.loop.decay_scale)
@@ -217,7 +205,8 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         # is taken between the good samples on its two sides.
         u = form.u_from_centre(state.centre, u)
         _move(state, settings, u)
-    if measured and not _believable(state.belief, settings.policies.outlier_rejection, state, settings, x):
+    rejection, theta = settings.policies.outlier_rejection, state.law.theta
+    if measured and not form.is_believable(state.belief, rejection, state, theta, settings.slope, x):
         state.outliers += 1.0
         outcome.last = REJECTED
         measured = False
