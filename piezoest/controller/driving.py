@@ -10,14 +10,21 @@ from numba.extending import register_jitable
 from piezoest.controller import candidate, slots
 from piezoest.controller import line as lines
 
-# What a change of model owes is paid within this fraction of a swing of the reference; at first more slowly.
-PAID, FIRST_PAID = 1.0 / 16.0, 1.0 / 4.0
+# What a change of model owes is paid within this fraction of a swing of the reference: faster, a loop through
+# the models would feed a resonance.
+PAID = 1.0 / 4.0
+# ... of the leg so far, which counts for at least this fraction of the swing.
+LEAST_LEG = 0.1
 # Another model drives if it has missed less than this fraction of what the present one has.
 BETTER = 0.8
 # Swings between two changes of the model that drives; after a fall back to the line twice as many each time.
 PATIENCE, LONGEST_PATIENCE = 0.25, 128.0
-# Swings after which a model that drives has shown what it does.
-SEEN = 0.6
+# Swings after which a model that drives has shown what it does; before which the miss may be the last one's.
+SEEN, CALM = 0.6, 0.1
+# A model that has driven for so many times the patience halves it; swings that count for it from then on.
+SHOWN, PROVEN = 4.0, 1.0
+# A model that drives falls back at once where the stage misses by so many times what the line has missed.
+TRIP = 2.0
 # Misses below this fraction of a swing are all alike.
 ALIKE = 5e-4
 
@@ -37,8 +44,12 @@ def _expected(state: Any) -> float:
 @register_jitable
 def kept(reference: Any, travelled: Any, swing: Any) -> float:
     """The fraction of what is owed that is left after a travel of the reference."""
-    paid = PAID if reference.turns > 1.0 else FIRST_PAID
-    return max(0.0, 1.0 - travelled / (paid * swing)) if swing > 0.0 else 1.0
+    if reference.turns <= 1.0:
+        # Nobody knows the swing yet: the way from rest may be much longer.
+        paid = PAID * max(np.abs(reference.last - reference.turned), LEAST_LEG * swing)
+    else:
+        paid = PAID * swing
+    return max(0.0, 1.0 - travelled / paid) if paid > 0.0 else 1.0
 
 
 @register_jitable
@@ -77,6 +88,12 @@ def _choose(state: Any) -> float:
 
 
 @register_jitable
+def _floor(state: Any) -> float:
+    """What the noise alone misses, about, in volts."""
+    return 2.0 * np.sqrt(state.readings.noise) / np.abs(state.unit)
+
+
+@register_jitable
 def _disappoints(state: Any) -> bool:
     """Whether the stage misses the reference by more than the line did when it drove.
 
@@ -84,22 +101,36 @@ def _disappoints(state: Any) -> bool:
     """
     missed = candidate.missed(state.score)
     if state.driving == 0.0:
-        state.line_missed = missed if state.since > SEEN else state.line_missed
+        if state.since > SEEN:
+            state.line_missed, state.line_peak = missed, state.score.peak
         return False
     state.line_missed = min(state.line_missed, missed)
-    floor = 2.0 * np.sqrt(state.readings.noise) / np.abs(state.unit)
-    return state.since > SEEN and candidate.missed(state.outcome) > state.line_missed + floor
+    return state.since > SEEN and candidate.missed(state.outcome) > state.line_missed + _floor(state)
+
+
+@register_jitable
+def watch(state: Any, off: Any) -> None:
+    """Fall back to the line at once where the stage is farther off than it ever was under the line."""
+    if state.driving > 0.0 and off > TRIP * state.line_peak + 3.0 * _floor(state) and state.since > CALM:
+        _change(state, 0.0)
+
+
+@register_jitable
+def _change(state: Any, chosen: Any) -> None:
+    """Let another model drive; after each fall back to the line the models have to wait longer."""
+    if chosen == 0.0:
+        state.patience = min(2.0 * state.patience, LONGEST_PATIENCE)
+    state.since = state.outcome.weight = state.outcome.peak = 0.0
+    drive(state, chosen)
 
 
 @register_jitable
 def reconsider(state: Any) -> None:
-    """Let the best model drive; after each fall back to the line the models have to wait longer."""
+    """Let the best model drive."""
     chosen = 0.0 if _disappoints(state) else _choose(state)
-    if chosen == state.driving:
-        return
-    if chosen == 0.0:
-        state.patience = min(2.0 * state.patience, LONGEST_PATIENCE)
-    elif state.driving == 0.0 and state.since > 4.0 * state.patience:
-        state.patience = PATIENCE
-    state.since = state.outcome.weight = state.outcome.peak = 0.0
-    drive(state, chosen)
+    if chosen != state.driving:
+        _change(state, chosen)
+    elif chosen > 0.0 and state.since > SHOWN * state.patience:
+        # It has driven well for long.
+        state.patience = max(0.5 * state.patience, PATIENCE)
+        state.since = PROVEN

@@ -28,8 +28,8 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
     """Layouts of state and settings."""
     state = record(
         samples=COUNT, missing=COUNT, saturated=COUNT, slewed=COUNT,
-        # What it is doing; voltages planned since the last one was written.
-        stage=whole(0.0, 2.0), pending=COUNT,
+        # What it is doing; voltages planned since the last one was written; samples that waited for a block.
+        stage=whole(0.0, 2.0), pending=COUNT, block=AMOUNT,
         # Reference planned for, voltage planned, voltage written.
         r=MEASURED, planned=MEASURED, u=MEASURED,
         # Farthest way from the start's voltage that was answered; travel of the reference with the voltage at
@@ -45,7 +45,7 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         # Faults noted so far, counting their ends, and the last one.
         noticed=COUNT, notice=whole(0.0, 5.0),
         # What the line misses, what it missed when it drove, what the stage misses of the reference.
-        score=candidate.SCORE, line_missed=AMOUNT, outcome=candidate.SCORE,
+        score=candidate.SCORE, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
         travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,
         start=starts.START, candidates=candidates,
     )  # fmt: skip
@@ -79,6 +79,7 @@ def run(state: Record, settings: Record, r: Vector, u: Vector) -> None:
 @compiled
 def learn_all(state: Record, settings: Record, r: Vector, u: Vector, x: Vector) -> None:
     """Learn from samples that were planned together."""
+    state.block = max(0.9 * state.block, len(r) - 1.0)
     for k in range(len(r)):
         take(state, settings, r[k], u[k], x[k])
 

@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import candidate, driving, slots
+from piezoest.controller import candidate, driving, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
@@ -16,11 +16,12 @@ from piezoest.controller import travel as travels
 from piezoest.controller.voltage import APPROACH, RUN, SEEK
 
 # Models are handed over after this fraction of a swing; legs of the line before another model drives.
-HAND_OVER, FIRST_LEGS = 1.0 / 64.0, 2.0
+HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 2.0
 # The way to the reference is over within this fraction of its length, or after so many readings.
 NEAR, LONGEST = 0.05, 1e4
-# At a limit the stage may stand beyond the reference for this travel of it, in swings; or short of it.
-RAILED, RESTED = 0.25, 4.0
+# At a limit the stage may stand beyond the reference for this travel of it, in swings, before all begins
+# anew; the line follows sooner.
+RESTED, BEYOND = 4.0, 0.1
 # No miss counts for more than so many swings.
 FARTHEST = 3.0
 
@@ -43,6 +44,7 @@ def _begin_learning(state: Any, settings: Any) -> None:
     state.confirmed = max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
     state.gone = state.handed = 0.0
     state.railed, state.patience = 0.0, driving.PATIENCE
+    state.owed = 0.0
     reading.forget(state.readings)
 
 
@@ -94,7 +96,7 @@ def _name_silence(state: Any) -> None:
 
 
 @register_jitable
-def _score(state: Any, u: Any, x: Any, z: Any) -> None:
+def _score(state: Any, settings: Any, u: Any, x: Any, z: Any) -> None:
     """Take a believed reading into the line's points and all scores."""
     swings = travels.progress(state.travel, state.gone)
     state.gone = 0.0
@@ -104,21 +106,28 @@ def _score(state: Any, u: Any, x: Any, z: Any) -> None:
     miss = z - driving.line_z(state) - state.owed
     candidate.judge(state.score, min(max(miss, -bound), bound), swings)
     slots.judge(state.candidates, z, swings, bound)
-    off = (x - state.r) / state.unit
-    candidate.judge(state.outcome, min(max(off, -bound), bound), swings)
+    if settings.minimum < u < settings.maximum:
+        # No model is to blame for a limit.
+        off = (x - state.r) / state.unit
+        candidate.judge(state.outcome, min(max(off, -bound), bound), swings)
+        driving.watch(state, np.abs(off))
 
 
 @register_jitable
-def _leave_limit(state: Any, settings: Any, x: Any, moved: Any) -> None:
-    """At a limit nothing is learnt: where the stage stands beyond the reference, all begins anew."""
+def _is_beyond(state: Any, settings: Any, x: Any) -> bool:
+    """Whether the voltage is at a limit with the stage beyond the reference: what is known is wrong."""
     way = (x - state.r) * state.line.gain
-    beyond = (state.u <= settings.minimum and way < 0.0) or (state.u >= settings.maximum and way > 0.0)
-    state.railed = state.railed + moved if state.u <= settings.minimum or state.u >= settings.maximum else 0.0
-    if state.railed > (RAILED if beyond else RESTED) * state.reference.swing:
-        state.stage = SEEK
-        state.driving = 0.0
-        state.readings.fault = reading.NONE
-        starts.begin(state.start, state.u)
+    low, high = state.u <= settings.minimum, state.u >= settings.maximum
+    return (low and way < 0.0) or (high and way > 0.0)
+
+
+@register_jitable
+def _leave_limit(state: Any, beyond: Any, moved: Any) -> None:
+    """Where the stage stands beyond the reference for long, though the line has followed: begin anew."""
+    state.railed = state.railed + moved if beyond and state.readings.fault == reading.NONE else 0.0
+    if state.railed > RESTED * state.reference.swing:
+        state.stage, state.driving = SEEK, 0.0
+        starts.begin_again(state.start, state.u)
 
 
 @register_jitable
@@ -126,7 +135,7 @@ def _learn_from(state: Any, settings: Any, x: Any) -> None:
     """Take a reading, NaN where it cannot be believed, after the voltage has been followed."""
     z = (x - state.zero) / state.unit
     if np.isfinite(x):
-        _score(state, state.u, x, z)
+        _score(state, settings, state.u, x, z)
     slots.learn(state.candidates, settings.candidates, state.u, z)
 
 
@@ -143,22 +152,25 @@ def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any) -> float:
     """Take a reading on the way to the reference; nobody doubts it yet, but for single ones."""
     if not np.abs(x) < WILDEST:
         return np.nan
-    start, line = state.start, state.line
+    start, line, recent = state.start, state.line, state.readings.recent
     x = reading.middle(state.readings, x)
+    lines.add(recent, u, x, settings.doubling)
     way = np.abs(u - start.origin)
     if way >= state.confirmed and way > 0.0:
         # Only on new ground: on the way back hysteresis would pass for gain.
         state.confirmed = way
-        gain = (x - start.zero) / (u - start.origin)
+        gain = (recent.mean_x - start.zero) / (recent.mean_u - start.origin)
         line.gain = gain if gain * line.gain > 0.0 else line.gain
-    line.centre = x - line.gain * u
+    line.centre = recent.mean_x - line.gain * recent.mean_u
     start.samples += 1.0
     target = lines.voltage(line, r)
     missing = np.abs(target - u)
     at_limit = (u <= settings.minimum and target < u) or (u >= settings.maximum and target > u)
     if missing <= NEAR * np.abs(u - start.origin) or at_limit or start.samples > LONGEST:
         state.stage = RUN
-        lines.begin(line, line.gain, u, x)
+        lines.begin(line, line.gain, recent.mean_u, recent.mean_x)
+        # What is left of the way is paid on the run.
+        state.owed = (r - lines.at(line, u)) / state.unit
         _begin_swings(state, r, u, np.abs(start.target - start.from_u))
     return x
 
@@ -168,26 +180,19 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
     """The reading where it can be believed, NaN where not; what is wrong is noted, and the line drives."""
     before = state.readings.fault
     raw = x
-    x = reading.believed(state.readings, state.line, state.travel, u, x, gone)
+    x = reading.believed(state.readings, state.line, state.travel, redraw.memory(state, settings), u, x, gone)
     _follow_zero(state)
     if state.readings.fault != before:
         _notice(state, state.readings.fault)
         if state.readings.fault != reading.NONE:
             driving.drive(state, 0.0)
-    _leave_limit(state, settings, raw, moved)
+            redraw.hold(state)
+    beyond = _is_beyond(state, settings, raw)
+    _leave_limit(state, beyond, moved)
+    far = state.railed > BEYOND * state.reference.swing or redraw.is_young(state)
+    if far and state.readings.fault == reading.NONE:
+        redraw.follow(state)
     return x
-
-
-@register_jitable
-def _draw_line(state: Any) -> None:
-    """Draw the line anew where the reference has turned; what that changes is owed."""
-    line, travel = state.line, state.travel
-    before = driving.line_z(state)
-    if state.reference.turned_now != 0.0:
-        lines.turn(line)
-    elif not lines.grow(line, np.abs(travel.furthest - travel.turned)):
-        return
-    state.owed += before - driving.line_z(state)
 
 
 @register_jitable
@@ -215,12 +220,10 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
             _begin_learning(state, settings)
         return
     moved = travels.follow(state.reference, r)
-    kept = driving.kept(state.reference, moved, state.reference.swing)
-    state.owed *= kept
-    slots.pay(state.candidates, kept)
+    redraw.pay(state, settings, moved)
     gone = travels.follow(state.travel, u)
-    if state.stage == RUN:
-        _draw_line(state)
+    if state.stage == RUN and state.readings.fault == reading.NONE:
+        redraw.draw(state)
     state.gone += gone
     state.handed += gone
     slots.advance(state.candidates, settings.candidates, u)

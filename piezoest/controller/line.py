@@ -17,18 +17,12 @@ from piezoest.layout import AMOUNT, COUNT, MEASURED, NUMBER, record
 POINTS = record(
     count=AMOUNT, mean_u=MEASURED, mean_x=MEASURED, square=AMOUNT, square_x=AMOUNT, product=NUMBER
 )
-# The line; legs it rests on, turns since the last one, legs of late that agreed with it; length of the first
-# leg when it was looked at last; points of this leg and of the last one.
+# The line; the one before the last turn; legs it rests on, turns since the last one, legs of late that agreed
+# with it; length of the first leg when it was looked at last; points of this leg and of the last one.
 LINE = record(
-    gain=NUMBER,
-    centre=NUMBER,
-    legs=COUNT,
-    small=COUNT,
-    agreed=AMOUNT,
-    looked=AMOUNT,
-    now=POINTS,
-    before=POINTS,
-)
+    gain=NUMBER, centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER, legs=COUNT, small=COUNT, agreed=AMOUNT,
+    looked=AMOUNT, now=POINTS, before=POINTS,
+)  # fmt: skip
 
 # Points of which a line explains less than this share teach nothing about its gain; it changes by no more
 # than this factor at once, later by less.
@@ -44,8 +38,8 @@ ALIKE = 1.6
 @register_jitable
 def begin(line: Any, gain: Any, u: Any, x: Any) -> None:
     """Begin with a gain and a line through one point."""
-    line.gain = gain
-    line.centre = x - gain * u
+    line.gain = line.held_gain = gain
+    line.centre = line.held_centre = x - gain * u
     line.agreed = line.legs = line.looked = line.before.count = 0.0
     forget(line.now)
 
@@ -115,6 +109,7 @@ def turn(line: Any) -> None:
         return
     line.small = 0.0
     line.legs += 1.0
+    line.held_gain, line.held_centre = line.gain, line.centre
     ratio = slope(now) / line.gain
     agrees = explained(now) > EXPLAINED and 1.0 / ALIKE < ratio < ALIKE
     line.agreed = line.agreed + 1.0 if agrees else 0.5 * line.agreed
@@ -141,3 +136,18 @@ def grow(line: Any, leg: Any) -> bool:
     line.looked = leg
     _draw(line, now.mean_u, now.mean_x, now.square, now.square_x, now.product)
     return True
+
+
+@register_jitable
+def hold(line: Any) -> None:
+    """Return to the line before the last turn, and forget the points since."""
+    line.gain, line.centre = line.held_gain, line.held_centre
+    forget(line.now)
+    line.before.count = 0.0
+
+
+@register_jitable
+def follow(line: Any, recent: Any) -> None:
+    """Lay the line through the middle of the points of late."""
+    if recent.count >= 4.0:
+        line.centre = recent.mean_x - line.gain * recent.mean_u

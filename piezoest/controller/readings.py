@@ -142,13 +142,16 @@ def middle(readings: Any, x: Any) -> float:
 
 
 @register_jitable
-def believed(readings: Any, line: Any, travel: Any, u: Any, x: Any, gone: Any) -> float:
-    """The reading where it can be believed, NaN where not; `gone` is the voltage's travel since the last."""
+def believed(readings: Any, line: Any, travel: Any, memory: Any, u: Any, x: Any, gone: Any) -> float:
+    """The reading where it can be believed, NaN where not; `gone` is the voltage's travel since the last.
+
+    `memory` is about how many samples a leg takes.
+    """
     if not np.abs(x) < WILDEST:
         return np.nan
     middle = _follow(readings, x, gone)
     swings = travels.in_swings(travel, gone)
-    lines.add(readings.recent, u, middle, max(RECENT * travel.usual, 16.0))
+    lines.add(readings.recent, u, middle, max(RECENT * memory, 16.0))
     noise = np.sqrt(readings.noise)
     bound = FAR * np.abs(line.gain) * travel.swing + 8.0 * noise
     far = np.abs(x - lines.at(line, u)) > bound

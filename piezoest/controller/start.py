@@ -1,9 +1,10 @@
-"""Finding out what the stage does, from nothing: the voltage goes a few per cent of its range, twice.
+"""Finding out what the stage does, from nothing: the voltage goes a small way, and a longer one.
 
 At rest the first readings say where the stage stands; one wrong one among them does not count. Then the
-voltage goes a small way and rests until the reading has come to rest too, and once more. The gain is what
-lies between two rests, where neither delay nor lag counts, if both ways were answered alike; else, as with
-backlash, the way is doubled.
+voltage goes half a per cent of its range and rests until the reading has come to rest too. An answer that
+drowns in noise or in steps of the converter doubles the way; one that is clear is checked by a way four times
+as long. The gain is what lies between two rests, where neither delay nor lag counts, if both ways were
+answered alike; else, as with backlash, the way is doubled.
 """
 
 from __future__ import annotations
@@ -26,19 +27,27 @@ START = record(
     voltage=MEASURED, origin=MEASURED, from_u=MEASURED, target=MEASURED, way=NUMBER, ways=COUNT,
     # Samples of the stage; where the reading stood at first and at the last rest, its noise.
     samples=COUNT, zero=MEASURED, from_x=MEASURED, noise=AMOUNT,
-    # Sums over a window of readings, scatter within, their mean; windows so far.
-    sum=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT, now=MEASURED, windows=COUNT,
+    # Sums over a window of readings, scatter within, its mean and that of the last two; windows so far; the
+    # last reading and the smallest change of one: the step of its converter.
+    sum=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT, mean=MEASURED, now=MEASURED, windows=COUNT,
+    last=MEASURED, step=AMOUNT,
+    # Sum of the windows' answers; how late the stage answers [samples].
+    total=NUMBER, lag=AMOUNT,
     # Gain of the last way [µm/V], of the one before.
     gain=NUMBER, gain_before=NUMBER, tries=COUNT, first=numbers(FIRST, kind=MEASURED),
 )  # fmt: skip
 # First and longest way [V], samples of a way, of a window; the limits.
 SETTINGS = record(way=FIXED, longest=FIXED, ramp=FIXED, window=FIXED, lowest=FIXED, highest=FIXED)
 
-# An answer is clear above so many times the noise at rest, and the scatter within a window; two are alike
-# within this factor.
-CLEAR, SCATTERS, ALIKE = 6.0, 3.0, 1.6
+# An answer is clear above so many times the noise at rest, the scatter within a window, and the step of the
+# converter; two are alike within this factor.
+CLEAR, SCATTERS, STEPS, ALIKE = 6.0, 3.0, 10.0, 1.6
+# The voltage written follows the one planned within this fraction of a way.
+FOLLOWS = 0.125
+# The way that checks an answer is so many times as long.
+CHECK = 4.0
 # At rest the means of two windows differ by less than this fraction of the answer; so many are enough.
-STILL, MOST_WINDOWS = 0.03, 30.0
+STILL, MOST_WINDOWS = 0.08, 30.0
 # Windows before the first repetition; then twice as many each time.
 PAUSE = 10.0
 
@@ -49,6 +58,13 @@ def begin(start: Any, u: Any) -> None:
     start.voltage = start.origin = u
     start.stage = REST
     start.samples = start.ways = start.tries = 0.0
+
+
+@register_jitable
+def begin_again(start: Any, u: Any) -> None:
+    """Begin anew at a voltage where the stage may not be at rest yet."""
+    begin(start, u)
+    start.stage = SILENT
 
 
 @register_jitable
@@ -87,7 +103,7 @@ def _move(start: Any, settings: Any) -> None:
     start.voltage = start.from_u + share * share * (3.0 - 2.0 * share) * (start.target - start.from_u)
     if share >= 1.0:
         start.stage, start.voltage = WAIT, start.target
-        start.sum = start.squares = start.summed = start.windows = 0.0
+        start.sum = start.squares = start.summed = start.windows = start.total = 0.0
 
 
 @register_jitable
@@ -98,11 +114,15 @@ def _has_come_to_rest(start: Any, settings: Any, x: Any) -> bool:
     start.squares += (x - start.from_x) ** 2
     if start.summed < settings.window:
         return False
-    before, start.now = start.now, start.sum / start.summed
-    start.scatter = np.sqrt(max(0.0, start.squares / start.summed - (start.now - start.from_x) ** 2))
+    before, start.mean = start.mean, start.sum / start.summed
+    start.now = 0.5 * (before + start.mean)
+    start.scatter = np.sqrt(max(0.0, start.squares / start.summed - (start.mean - start.from_x) ** 2))
     start.windows += 1.0
+    start.total += start.mean - start.from_x
     start.sum = start.squares = start.summed = 0.0
-    still = np.abs(start.now - before) < STILL * np.abs(start.now - start.from_x) + 0.5 * start.noise
+    # What rings or is noise differs by chance.
+    chance = 3.0 * start.scatter * np.sqrt(2.0 / settings.window) + 0.5 * start.noise
+    still = np.abs(start.mean - before) < STILL * np.abs(start.now - start.from_x) + chance
     return start.windows > 1.0 and (still or start.windows >= MOST_WINDOWS)
 
 
@@ -113,9 +133,13 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     start.gain_before, start.gain = start.gain, answer / (u - start.from_u) if u != start.from_u else 0.0
     clear = (
         u != start.from_u
-        and np.abs(answer) > CLEAR * start.noise
+        and np.abs(answer) > max(CLEAR * start.noise, STEPS * start.step)
         and np.abs(answer) > SCATTERS * start.scatter
     )
+    if clear:
+        # The area above the answer: the time constant of a lag, whatever rings around it.
+        late = settings.window * (start.windows - start.total / answer)
+        start.lag = min(max(late, 0.0), start.windows * settings.window)
     alike = start.ways > 0.0 and 1.0 / ALIKE < start.gain / start.gain_before < ALIKE
     longest = np.abs(start.way) >= settings.longest
     start.from_x = start.now
@@ -131,8 +155,8 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
         start.tries += 1.0
         start.from_u, start.target = u, start.origin
         return
-    if start.ways > 0.0 or not clear:
-        start.way *= 2.0
+    start.way *= CHECK if clear and start.ways == 0.0 else 2.0
+    start.way = np.sign(start.way) * min(np.abs(start.way), settings.longest)
     start.ways += clear
     _go(start, settings, u)
 
@@ -141,8 +165,15 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
 def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
     """Take the reading at a voltage, NaN for none, and choose the next voltage."""
     known = np.abs(x) < WILDEST
+    if known:
+        change = np.abs(x - start.last)
+        start.last = x
+        if change > 0.0 and start.samples + start.windows > 1.0:
+            start.step = min(start.step, change) if start.step > 0.0 else change
     if start.stage == GO:
-        _move(start, settings)
+        # In a block that was planned at rest the voltage does not follow yet.
+        if np.abs(u - start.voltage) <= FOLLOWS * np.abs(start.target - start.from_u):
+            _move(start, settings)
     elif not known:
         return
     elif start.stage == REST:

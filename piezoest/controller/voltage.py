@@ -18,9 +18,9 @@ SEEK, APPROACH, RUN = 0.0, 1.0, 2.0
 WIDER = 1.3
 # A model's voltage moves no faster than so many times the line's.
 RATE = 5.0
-# On the way to the reference the voltage goes no farther than so many times the way that was answered; it
-# becomes so much longer in the time that a doubling may take.
-AHEAD, GROWTH = 1.5, 0.7
+# On the way to the reference the voltage goes no farther than so many times the way that was answered; a
+# doubling takes so many times as long as the stage takes to answer.
+AHEAD, LATE = 2.0, 3.0
 
 
 @register_jitable
@@ -48,14 +48,16 @@ def _feed_forward(state: Any, settings: Any, r: Any) -> float:
 
 @register_jitable
 def _nearer(state: Any, settings: Any, target: Any) -> float:
-    """The next voltage on the way to a target: what is known of the stage doubles its range step by step."""
+    """The next voltage on the way to a target: faster and faster from where all began, gently at the end."""
     start = state.start
     span = max(np.abs(state.u - start.origin), np.abs(start.target - start.from_u))
-    doubling = max(settings.doubling, start.windows * settings.start.window)
-    way = max(span, state.confirmed / AHEAD) * GROWTH / doubling
-    u = state.u + min(max(target - state.u, -way), way)
-    room = AHEAD * state.confirmed
-    return min(max(u, start.origin - room), start.origin + room)
+    doubling = max(settings.doubling, LATE * start.lag)
+    end = start.origin + AHEAD * np.sign(target - start.origin) * state.confirmed
+    left = target - state.u
+    if np.abs(target - start.origin) > np.abs(end - start.origin):
+        left = end - state.u
+    way = min(max(span, state.confirmed / AHEAD), np.abs(left)) / doubling
+    return state.u + min(max(left, -way), way)
 
 
 @register_jitable
