@@ -14,8 +14,9 @@ from piezoest._checks import positive
 from piezoest._files import replacing
 from piezoest._version import __version__
 from piezoest.compensators import Compensator
-from piezoest.export.c_code import CCode, Precision, c, filled
+from piezoest.export.c_code import c
 from piezoest.export.compiled import build_shared
+from piezoest.export.generated import CCode, Precision, filled
 from piezoest.models import LinearGain
 
 # A file's date would make two equal units differ.

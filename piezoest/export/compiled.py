@@ -13,11 +13,12 @@ from typing import Any, Self
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d
-from piezoest.export.c_code import CCode, filled
+from piezoest.export.generated import CCode, filled
 from piezoest.export.ring import Ring
 
 # Without contraction to fused multiply-add the result is the library's to the last bit.
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
+_NUMBERS = {"double": (ctypes.c_double, np.float64), "float": (ctypes.c_float, np.float32)}
 
 
 def compiler() -> str:
@@ -48,6 +49,22 @@ def build_shared(folder: Path, sources: list[str], target: Path, *flags: str) ->
         raise ValueError(f"the C compiler failed: {' '.join(command)}\n{done.stderr}")
 
 
+def _load(code: CCode, kind: str) -> tuple[Any, Any, Any]:
+    """Library around code of that kind, its numbers in C and in NumPy."""
+    if code.kind != kind:
+        names = {"controller": "CompiledController", "feedforward": "CompiledFeedforward"}
+        raise ValueError(f"code is that of a {code.kind}: use {names[code.kind]}")
+    # The loader keeps the library open after its file is gone.
+    with tempfile.TemporaryDirectory(prefix="piezoest_", ignore_cleanup_errors=True) as place:
+        folder = Path(place)
+        code.write(folder)
+        loop = filled(f"{kind}_loop.c", name=code.name, real=code.precision)
+        (folder / "loop.c").write_text(loop, encoding="utf-8")
+        build_shared(folder, [f"{code.name}.c", "loop.c"], folder / "controller.so")
+        library = ctypes.CDLL(str(folder / "controller.so"))
+    return (library, *_NUMBERS[code.precision])
+
+
 class CompiledController(Ring):
     """Generated code, compiled by this computer's C compiler, with the face of `Controller`.
 
@@ -62,24 +79,14 @@ class CompiledController(Ring):
     Raises
     ------
     ValueError
-        If there is no C compiler.
+        If there is no C compiler, or the code is that of an `AdaptiveFeedforward`.
     """
 
     __slots__ = ("_library", "_pointer", "_real", "code")
 
     def __init__(self, code: CCode) -> None:
         self.code = code
-        # The loader keeps the library open after its file is gone.
-        with tempfile.TemporaryDirectory(prefix="piezoest_", ignore_cleanup_errors=True) as place:
-            folder = Path(place)
-            code.write(folder)
-            loop = filled("loop.c", name=code.name, real=code.precision)
-            (folder / "loop.c").write_text(loop, encoding="utf-8")
-            build_shared(folder, [f"{code.name}.c", "loop.c"], folder / "controller.so")
-            self._library = ctypes.CDLL(str(folder / "controller.so"))
-        double = code.precision == "double"
-        real = ctypes.c_double if double else ctypes.c_float
-        self._real = np.float64 if double else np.float32
+        self._library, real, self._real = _load(code, "controller")
         self._pointer = ctypes.POINTER(real)
         self._library.one.argtypes = (real, real, self._pointer)
         self._library.limit.argtypes = (real, real)
@@ -153,3 +160,85 @@ class CompiledController(Ring):
     def copy(self) -> Self:
         """Return another one, in the state that was exported."""
         return type(self)(self.code)
+
+
+class CompiledFeedforward:
+    """Generated code of an `AdaptiveFeedforward`, compiled by this computer's C compiler.
+
+    For checks of the code against the library and against logs from a target. Each object has
+    a state of its own.
+
+    Parameters
+    ----------
+    code : CCode
+        What `c` returned.
+
+    Raises
+    ------
+    ValueError
+        If there is no C compiler, or the code is not that of an `AdaptiveFeedforward`.
+    """
+
+    __slots__ = ("_library", "_pointer", "_real", "code")
+
+    def __init__(self, code: CCode) -> None:
+        self.code = code
+        self._library, real, self._real = _load(code, "feedforward")
+        self._pointer = ctypes.POINTER(real)
+        self._library.many.argtypes = (ctypes.c_size_t, *[self._pointer] * 4)
+        self._library.anew.argtypes = (real,)
+        self.reset()
+
+    def reset(self, voltage: float | None = None) -> None:
+        """Return to the state that was exported, or begin anew.
+
+        Parameters
+        ----------
+        voltage : float, optional
+            Voltage at which the stage rests, to begin anew [V]. Default: what was exported.
+
+        Raises
+        ------
+        ValueError
+            If the voltage is not within the limits.
+        """
+        if voltage is None:
+            self._library.begin()
+        elif not self._library.anew(voltage):
+            raise ValueError(f"voltage must lie within the limits, got {voltage:g} V")
+
+    def run(self, r: Any, u: Any, x: Any) -> FloatArray:
+        """Voltages for a log, as ``step(r)`` and ``learn(u, x)`` go through it.
+
+        Parameters
+        ----------
+        r, u, x : array_like, shape (N,)
+            Reference [µm], voltage written [V] and displacement measured then [µm]; NaN where there is none.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Voltage [V].
+
+        Raises
+        ------
+        ValueError
+            If the arrays are not one-dimensional, or of several lengths.
+        """
+        given = {"r": r, "u": u, "x": x}
+        log = [array_1d(name, values, allow_nan=True) for name, values in given.items()]
+        if len({values.size for values in log}) > 1:
+            raise ValueError(f"r, u and x must have the same length, got {[values.size for values in log]}")
+        with np.errstate(over="ignore"):
+            log = [values.astype(self._real) for values in log]
+        voltage = np.empty_like(log[0])
+        places = [values.ctypes.data_as(self._pointer) for values in (*log, voltage)]
+        self._library.many(voltage.size, *places)
+        return voltage.astype(np.float64)
+
+    @property
+    def status(self) -> tuple[int, int, int]:
+        """Numbers of stage, model that drives, and fault, as the header names them."""
+        found = (ctypes.c_int * 3)()
+        self._library.show(found)
+        return found[0], found[1], found[2]
