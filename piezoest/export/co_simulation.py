@@ -71,6 +71,8 @@ def fmu(
     path = Path(path)
     if path.suffix != ".fmu":
         raise ValueError(f"path must end in .fmu, got {path}")
+    if not isinstance(compensator, Compensator):
+        raise ValueError(f"compensator must be one, got {compensator!r}: c() exports an AdaptiveFeedforward")
     rate = _sample_rate(estimator, compensator, sample_rate)
     code = c(estimator, compensator, name=name, precision=precision, update_interval=update_interval)
     guid = str(uuid.uuid5(_NAMESPACE, f"{code.source}{code.header}{rate!r}"))

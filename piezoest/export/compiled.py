@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d
+from piezoest._checks import FloatArray, array_1d, number_or_nan
 from piezoest.export.generated import CCode, filled
 from piezoest.export.ring import Ring
 
@@ -165,8 +165,8 @@ class CompiledController(Ring):
 class CompiledFeedforward:
     """Generated code of an `AdaptiveFeedforward`, compiled by this computer's C compiler.
 
-    For checks of the code against the library and against logs from a target. Each object has
-    a state of its own.
+    For checks of the code against the library and against logs from a target; `piezoest.track` takes it as
+    ``controller``. Each object has a state of its own.
 
     Parameters
     ----------
@@ -179,13 +179,13 @@ class CompiledFeedforward:
         If there is no C compiler, or the code is not that of an `AdaptiveFeedforward`.
     """
 
-    __slots__ = ("_library", "_pointer", "_real", "code")
+    __slots__ = ("_library", "code")
 
     def __init__(self, code: CCode) -> None:
         self.code = code
-        self._library, real, self._real = _load(code, "feedforward")
-        self._pointer = ctypes.POINTER(real)
-        self._library.many.argtypes = (ctypes.c_size_t, *[self._pointer] * 4)
+        self._library, real, _ = _load(code, "feedforward")
+        self._library.step.argtypes, self._library.step.restype = (real,), real
+        self._library.learn.argtypes = (real, real)
         self._library.anew.argtypes = (real,)
         self.reset()
 
@@ -207,38 +207,37 @@ class CompiledFeedforward:
         elif not self._library.anew(voltage):
             raise ValueError(f"voltage must lie within the limits, got {voltage:g} V")
 
-    def run(self, r: Any, u: Any, x: Any) -> FloatArray:
-        """Voltages for a log, as ``step(r)`` and ``learn(u, x)`` go through it.
+    def step(self, r: float | None) -> float:
+        """Voltage for the next sample of the reference.
 
         Parameters
         ----------
-        r, u, x : array_like, shape (N,)
-            Reference [µm], voltage written [V] and displacement measured then [µm]; NaN where there is none.
+        r : float or None
+            Reference displacement [µm]; None and NaN hold the last one.
 
         Returns
         -------
-        ndarray, shape (N,)
-            Voltage [V].
-
-        Raises
-        ------
-        ValueError
-            If the arrays are not one-dimensional, or of several lengths.
+        float
+            Voltage [V], within the limits.
         """
-        given = {"r": r, "u": u, "x": x}
-        log = [array_1d(name, values, allow_nan=True) for name, values in given.items()]
-        if len({values.size for values in log}) > 1:
-            raise ValueError(f"r, u and x must have the same length, got {[values.size for values in log]}")
-        with np.errstate(over="ignore"):
-            log = [values.astype(self._real) for values in log]
-        voltage = np.empty_like(log[0])
-        places = [values.ctypes.data_as(self._pointer) for values in (*log, voltage)]
-        self._library.many(voltage.size, *places)
-        return voltage.astype(np.float64)
+        voltage: float = self._library.step(number_or_nan(r))
+        return voltage
+
+    def learn(self, u: float, x: float | None) -> None:
+        """Learn from the voltage that was written and what was measured then.
+
+        Parameters
+        ----------
+        u : float
+            Voltage [V].
+        x : float or None
+            Measured displacement [µm]; None or NaN where there is none.
+        """
+        self._library.learn(number_or_nan(u), number_or_nan(x))
 
     @property
     def status(self) -> tuple[int, int, int]:
-        """Numbers of stage, model that drives, and fault, as the header names them."""
+        """Numbers of the stage of the work, the model that drives and the fault, as the header names them."""
         found = (ctypes.c_int * 3)()
         self._library.show(found)
         return found[0], found[1], found[2]

@@ -11,7 +11,6 @@ from piezoest.controller import kernel, saved
 from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
 from piezoest.controller.readings import FAULTS
 from piezoest.controller.shown import STAGES
-from piezoest.export.c_file import File
 from piezoest.export.c_translator import call
 from piezoest.export.c_values import Number, Root, Struct, literal
 from piezoest.export.generated import CCode, estimator_lines, file_of, rendered
@@ -44,11 +43,9 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
 
     step, learn = call_of(kernel.step, "r"), call_of(kernel.learn, "u", "x")
     begin = call_of(kernel.begin, "voltage")
-    begun = (
-        ""
-        if now.values.tobytes() == anew.values.tobytes()
-        else _BEGUN.format(name=name, start=_start(file, anew))
-    )
+    begun = ""
+    if anew.values.tobytes() != now.values.tobytes():
+        begun = _BEGUN.format(name=name, start=file.start(anew.layout, anew.values))
     limits = controller.limits
     return rendered(
         file,
@@ -65,7 +62,7 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
             "faults": _numbered(each or "none" for each in FAULTS),
         },
         {
-            "start": _start(file, now),
+            "start": file.start(now.layout, now.values),
             "begun": begun,
             "anew": "begun" if begun else "start",
             "functions": file.text(f"{step} {learn} {begin}"),
@@ -85,10 +82,6 @@ def _reset(controller: AdaptiveFeedforward) -> AdaptiveFeedforward:
     return controller
 
 
-def _start(file: File, state: Struct) -> str:
-    return file.start(state.layout, state.values)
-
-
 def _numbered(names: Iterable[str]) -> str:
     return ", ".join(f"{number} {name}" for number, name in enumerate(names))
 
@@ -104,16 +97,12 @@ def _state(controller: AdaptiveFeedforward) -> Struct:
     return Struct("state->", layout, values, Root("state"), "state")
 
 
-def _settled(settings: Record) -> Record:
+def _settled(field: Field, name: str = "") -> Field:
     """Layout of settings that stay as they are, but for the models."""
-    every = (
-        (name, saved.changeable(field) if name == "inverse" else _fixed(field))
-        for name, field in settings.fields
-    )
-    return Record(tuple(every), settings.functions)
-
-
-def _fixed(field: Field) -> Field:
     if isinstance(field, Record):
-        return _settled(field)
-    return Numbers(field.shape, FIXED) if isinstance(field, Numbers) and field != ABSENT else field
+        if name == "inverse":
+            return saved.changeable(field)
+        return Record(tuple((name, _settled(inner, name)) for name, inner in field.fields), field.functions)
+    if isinstance(field, Numbers):
+        return Numbers(field.shape, FIXED) if field != ABSENT else field
+    return FIXED
