@@ -12,6 +12,7 @@ import pytest
 
 import piezoest as pz
 from piezoest.bench.zoo import draw
+from piezoest.bench.zoo.faults import NONE
 from piezoest.controller.readings import FAULTS
 from piezoest.controller.shown import STAGES
 from piezoest.export.compiled import compiler
@@ -43,20 +44,26 @@ def single() -> Any:
     return pz.export.CompiledFeedforward(pz.export.c(controller("default"), precision="float"))
 
 
-def rig(seed: int) -> Any:
-    return draw(seed, limits="±100", sample_rate=FS, block=1, frequency=20.0, waves=14.0)
+def rig(family: str, mechanics: str = "none") -> Any:
+    return draw(
+        0, family=family, mechanics=mechanics, limits="±100", gain=0.2, sample_rate=FS, reference="triangle",
+        amplitude=8.0, frequency=20.0, waves=14.0, block=1, fault=NONE, noise=0.004, creep=0.0, volts=0.0,
+        delay=0, resolution=0.0, slew=np.inf, hum=0.0, drift=0.0,
+    )  # fmt: skip
 
 
-def drive(library: Any, board: Any, seed: int, count: int = 10**6) -> set[tuple[int, int, int]]:
-    """Let both go round one rig, with samples that are missing: same voltages; all that status shows."""
-    rng, stage, seen = np.random.default_rng(seed), rig(seed).stage(), set()
-    for r in rig(seed).reference.tolist()[:count]:
+def drive(library: Any, board: Any, own: Any, wrong: Any = float, count: int = 10**6) -> set[Any]:
+    """Let both go round a rig, readings `wrong` for a while, some missing: same voltages; each status."""
+    rng, stage, seen = np.random.default_rng(0), own.stage(), set()
+    x: Any
+    for k, r in enumerate(own.reference.tolist()[:count]):
         missing, other = rng.random(2) < 0.01
         r = np.nan if missing else r
         u = library.step(r)
         assert board.step(r) == u
         written = 0.9 * u if other else u
-        x = None if missing else stage.step(written)
+        x = float(stage.step(written))
+        x = None if missing else wrong(x) if 3000 < k < 4500 else x
         for each in (library, board):
             each.learn(written, x)
         seen.add(board.status)
@@ -72,10 +79,17 @@ def drive(library: Any, board: Any, seed: int, count: int = 10**6) -> set[tuple[
 def test_voltages_are_the_librarys_over_all_stages_and_faults(pair: tuple[Any, Any]) -> None:
     library, board = pair
     seen = set()
-    for seed in (0, 2, 11, 14, 19, 21, 25):  # sensors that stand still, amplifiers that hang, gains that jump
+    for own, wrong in (
+        (rig("bouc-wen"), lambda x: 3.0),
+        (rig("preisach", "lag"), lambda x: -x),
+        (rig("relays", "400 Hz"), lambda x: 9.0 * x),
+        (rig("backlash"), lambda x: 0.02 * x),
+        (rig("coleman-hodgdon"), lambda x: x + 5.0),
+        (rig("duhem", "200 Hz"), float),
+    ):
         library.reset()
         board.reset()
-        seen |= drive(library, board, seed)
+        seen |= drive(library, board, own, wrong)
     stages, models, faults = (set(values) for values in zip(*seen, strict=True))
     assert stages == {0, 1, 2}
     assert models == set(range(len(library.candidates)))
@@ -86,7 +100,7 @@ def test_it_begins_anew_at_another_voltage(pair: tuple[Any, Any]) -> None:
     library, board = pair
     library.reset(-40.0)
     board.reset(-40.0)
-    drive(library, board, 14, 2000)
+    drive(library, board, rig("duhem"), count=2000)
     for outside in (-101.0, 100.5, np.nan):
         with pytest.raises(ValueError, match="limits"):
             board.reset(outside)
@@ -96,17 +110,17 @@ def test_it_begins_anew_at_another_voltage(pair: tuple[Any, Any]) -> None:
 
 def test_it_goes_on_from_where_it_was_exported() -> None:
     library = controller("line", pz.VoltageLimits(-100.0, 100.0, 2e4, FS))
-    stage = rig(14).stage()
-    for r in rig(14).reference[:1500].tolist():
+    stage = rig("duhem").stage()
+    for r in rig("duhem").reference[:1500].tolist():
         u = library.step(r)
         library.learn(u, stage.step(u))
     board = pz.export.CompiledFeedforward(pz.export.c(library, name="stage"))
     assert board.status[0] == 2
-    drive(library, board, 14, 1000)
+    drive(library, board, rig("duhem"), count=1000)
     library.reset(20.0)
     board.reset(20.0)
     assert board.status[0] == 0
-    drive(library, board, 14, 2500)
+    drive(library, board, rig("duhem"), count=2500)
 
 
 def test_track_takes_it_as_a_controller() -> None:
@@ -131,7 +145,7 @@ def test_float_follows_as_well(single: Any) -> None:
         errors.append(pz.track(r, stage=stage, controller=driver).max_error(4))
     assert single.status[0] == 2
     assert single.status[1] > 0
-    assert errors[1] == pytest.approx(errors[0], rel=0.1)
+    assert errors[1] == pytest.approx(errors[0], rel=0.3)
 
 
 def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> None:
@@ -211,9 +225,9 @@ int main(void)
 
 
 def test_sanitizers_are_silent(tmp_path: Path) -> None:
-    library, stage = controller("default"), rig(2).stage()
-    pairs = np.zeros((rig(2).reference.size, 2))
-    for k, r in enumerate(rig(2).reference.tolist()):
+    library, stage = controller("default"), rig("bouc-wen").stage()
+    pairs = np.zeros((rig("bouc-wen").reference.size, 2))
+    for k, r in enumerate(rig("bouc-wen").reference.tolist()):
         u = library.step(r)
         pairs[k] = r, stage.step(u)
         library.learn(u, pairs[k, 1])
