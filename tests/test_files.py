@@ -21,7 +21,7 @@ import pytest
 
 from piezoest.bench import origin, suite, tables
 from piezoest.bench.runner import COLUMNS
-from piezoest.export.c_code import CCode
+from piezoest.export.generated import CCode
 from piezoest.export.tables import Table
 from piezoest.models import AmplitudeProfile
 from piezoest.records import write_columns

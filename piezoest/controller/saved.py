@@ -92,7 +92,7 @@ def read_models(data: Any, layout: Record, settings: Any) -> Any:
     fields("models", data, _used(layout))
     for name in _used(layout):
         inverse = settings["candidates"][name]["inverse"]
-        kept = _changeable(_inverse(layout, name))
+        kept = changeable(_inverse(layout, name))
         settings["candidates"][name]["inverse"] = saved_state.check(
             data[name], kept, inverse, lambda state: ()
         )
@@ -111,7 +111,7 @@ def _inverse(layout: Record, name: str) -> Any:
     return candidates.by_name[name].by_name["inverse"]
 
 
-def _changeable(layout: Record) -> Record:
+def changeable(layout: Record) -> Record:
     """The layout with numbers that may be others than at the start, but for its lengths."""
     every = ((name, field if name in layout.lengths else _changed(field)) for name, field in layout.fields)
     return Record(tuple(every), layout.functions)

@@ -1,7 +1,8 @@
-from .c_code import CCode, c
+from .c_code import c
 from .co_simulation import fmu
-from .compiled import CompiledController
+from .compiled import CompiledController, CompiledFeedforward
+from .generated import CCode
 from .ring import Controller
 from .tables import Table, table
 
-__all__ = ["CCode", "CompiledController", "Controller", "Table", "c", "fmu", "table"]
+__all__ = ["CCode", "CompiledController", "CompiledFeedforward", "Controller", "Table", "c", "fmu", "table"]

@@ -2,34 +2,21 @@
 
 from __future__ import annotations
 
-import keyword
-import re
-from dataclasses import dataclass
-from importlib import resources
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from piezoest._checks import integer
-from piezoest._files import write_text
-from piezoest._version import __version__
 from piezoest.compensators import Compensator, inverse_kernel
+from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
 from piezoest.equations import turning_points
 from piezoest.estimators.compiled import CompiledEstimator
-from piezoest.export import ring
-from piezoest.export.c_file import File
-from piezoest.export.c_printer import comment
-from piezoest.export.c_translator import translate
+from piezoest.export import feedforward, ring
+from piezoest.export.c_translator import call
 from piezoest.export.c_values import Array, Known, Number, Root, Struct, Value, literal
+from piezoest.export.generated import CCode, Precision, estimator_lines, file_of, rendered
 from piezoest.layout import new, record
 from piezoest.models import ColemanHodgdon, Model, PrandtlIshlinskii
-
-Precision = Literal["double", "float"]
-
-LICENCE = """Copyright (c) The piezoest developers. MIT licence: permission is granted, free of charge, to
-use, copy, modify, merge, publish, distribute, sublicense and sell this code, provided that this notice
-stays in it. It comes as is, without warranty of any kind."""
 
 _CHANGE = """\
 /* Use another model, without a bump; freeze before, or the next one learnt replaces it. An inadmissible
@@ -45,86 +32,36 @@ _NO_ADOPT = "(void)state;\n    (void)parameters;\n    return 0;"
 _LEARN = "if (state->ring.started != {zero}) {{\n        {learn};\n    }}"
 
 _FIXED = "it fixed: c(None, InverseCompensator(estimator.model))"
-# What rounding cannot tell apart is more in float, and what is beyond all measure is less.
-_FLOAT = {
-    ("piezoest.equations.bent_plays", "SAME"): 1e-5,
-    ("piezoest.equations.least_squares", "LARGEST"): 1e36,
-    ("piezoest.equations.least_squares", "TRACE_WEIGHT"): 1e18,
-    ("piezoest.equations.kalman", "LARGEST"): 1e36,
-    ("piezoest.equations.kalman", "LARGEST_TRACE"): 1e18,
-    ("piezoest.equations.admissible", "LARGEST"): 1e18,
-    ("piezoest.equations.admissible", "SMALLEST"): 1e-18,
-}
-
-
-@dataclass(frozen=True, slots=True)
-class CCode:
-    """A generated controller.
-
-    Parameters
-    ----------
-    name : str
-        Prefix of all public names, and name of the files.
-    header, source : str
-        Text of ``NAME.h`` and ``NAME.c``.
-    precision : str
-        ``"double"`` or ``"float"``.
-    learns : bool
-        Whether there is an estimator in it.
-    """
-
-    name: str
-    header: str
-    source: str
-    precision: str
-    learns: bool
-
-    def write(self, directory: str | Path) -> tuple[Path, Path]:
-        """Write header and source into a folder, which is made if need be.
-
-        Parameters
-        ----------
-        directory : str or Path
-            The folder.
-
-        Returns
-        -------
-        tuple of Path
-            Header and source.
-        """
-        folder = Path(directory)
-        folder.mkdir(parents=True, exist_ok=True)
-        paths = folder / f"{self.name}.h", folder / f"{self.name}.c"
-        for path, content in zip(paths, (self.header, self.source), strict=True):
-            write_text(path, content)
-        return paths
+_INTERVAL = 50
 
 
 def c(
     estimator: Any,
-    compensator: Compensator,
+    compensator: Compensator | None = None,
     *,
     name: str = "piezoest_controller",
     precision: Precision = "double",
-    update_interval: int = 50,
+    update_interval: int = _INTERVAL,
 ) -> CCode:
-    """Generate a controller in C99 that does what `Controller` does with the same two objects.
+    """Generate a controller in C99: an `AdaptiveFeedforward`, or what `Controller` does with two objects.
 
-    One header, one source; no allocation, no library but ``math.h`` (exp, fabs, sqrt); all state
-    in one struct. The code is translated from the functions that the library itself runs.
+    One header, one source; no allocation, no library but ``math.h``; all state in one struct. The code
+    is translated from the functions that the library itself runs.
 
     Parameters
     ----------
-    estimator : HysteresisRLS, HysteresisEKF, OutputErrorRLS or None
+    estimator : AdaptiveFeedforward, HysteresisRLS, HysteresisEKF, OutputErrorRLS or None
         In its present state; None for feed-forward with a fixed model.
-    compensator : InverseCompensator or LinearCompensator
-        In its present state, with its limits. A `PrandtlIshlinskii` model in it stays fixed.
+    compensator : InverseCompensator or LinearCompensator, optional
+        In its present state, with its limits. A `PrandtlIshlinskii` model in it stays fixed. Left out with
+        an `AdaptiveFeedforward`, which has its own.
     name : str
         Prefix of all public names, and name of the files.
     precision : {"double", "float"}
         Type of the numbers.
     update_interval : int
-        Samples between two changes of the compensator's model (default 50: 1 ms at 50 kHz).
+        Samples between two changes of the compensator's model (default 50: 1 ms at 50 kHz). An
+        `AdaptiveFeedforward` goes by travel and has none.
 
     Returns
     -------
@@ -136,10 +73,12 @@ def c(
         If an object is of a kind that cannot be exported, the name is no identifier, or the
         precision is unknown.
     """
-    if not name.isidentifier() or not name.isascii() or keyword.iskeyword(name) or name.startswith("_"):
-        raise ValueError(f"name must be an identifier of C, got {name!r}: use letters, digits and _")
-    if precision not in ("double", "float"):
-        raise ValueError(f"precision must be 'double' or 'float', got {precision!r}")
+    if isinstance(estimator, AdaptiveFeedforward):
+        if compensator is not None or update_interval != _INTERVAL:
+            raise ValueError(
+                "an AdaptiveFeedforward is exported alone: leave out compensator and update_interval"
+            )
+        return feedforward.code(estimator, name, precision)
     interval = integer("update_interval", update_interval, 1)
     if not isinstance(compensator, Compensator):
         raise ValueError(
@@ -158,12 +97,6 @@ def c(
 def _has_kernel(estimator: Any) -> bool:
     """Whether the compiled functions that it names take its samples and propose its model."""
     return isinstance(estimator, CompiledEstimator) and hasattr(estimator.kernel, "proposed")
-
-
-def filled(template: str, **texts: str) -> str:
-    """Text of a template, with each ``@name@`` replaced."""
-    path = resources.files("piezoest.export").joinpath("templates", template)
-    return re.sub("@([a-z_]+)@", lambda found: texts[found[1]], path.read_text(encoding="utf-8"))
 
 
 def _described(model: Model) -> str:
@@ -187,7 +120,7 @@ class _Generator:
         if not changes:
             # Only another model's plays would be set from it.
             unneeded = (*unneeded, turning_points.remember)
-        self.file = File(name, precision, unneeded, _FLOAT if precision == "float" else {})
+        self.file = file_of(name, precision, unneeded)
         model = compensator.model if estimator is None else estimator.model
         self.hysteretic = isinstance(model, ColemanHodgdon)
         if estimator is not None and not changes:
@@ -235,50 +168,40 @@ class _Generator:
         return Struct("", layout, values, Root(""), "settings", constant=True)
 
     def _call(self, function: Any, *arguments: Value) -> str:
-        """Text of a call of a translated function with the state."""
-        made, _ = translate(self.file, function, [self.state, *arguments])
-        return f"{made.name}({', '.join(root.name for _, root, _ in made.parameters)})"
+        return call(self.file, function, [self.state, *arguments])
 
     def code(self) -> CCode:
         """Put the pieces together."""
         file, give, adopt, learn = self.file, self.give, self.adopt, self.learn
         zero, one = literal(0.0, file.single), literal(1.0, file.single)
         model = "alpha [1/V], beta [um/V], gamma [um/V^2]" if self.hysteretic else "gain [um/V], 0, 0"
-        same = {
-            "head": "\n".join(comment([*self._provenance(), "", *LICENCE.splitlines()])),
-            "name": file.prefix, "real": file.real,
-        }  # fmt: skip
-        header = filled(
-            "controller.h",
-            guard=f"{file.prefix.upper()}_H",
-            types="\n".join(text for _, text in file.types.values()),
-            model=model,
-            change=_CHANGE if adopt else _NO_CHANGE,
-            **same,
+        return rendered(
+            file,
+            "controller",
+            self._provenance(),
+            {"model": model, "change": _CHANGE if adopt else _NO_CHANGE},
+            {
+                "start": file.start(self.state.layout, self.state.values),
+                "functions": file.text(f"{give} {adopt} {learn}"),
+                "learn": _LEARN.format(zero=zero, learn=learn) if learn else "(void)x;",
+                "give": give,
+                "adopt": _ADOPT.format(real=file.real, adopt=adopt) if adopt else _NO_ADOPT,
+                "zero": zero,
+                "one": one,
+            },
+            learns=self.estimator is not None,
         )
-        source = filled(
-            "controller.c",
-            start=file.start(self.state.layout, self.state.values),
-            functions=file.text(f"{give} {adopt} {learn}"),
-            learn=_LEARN.format(zero=zero, learn=learn) if learn else "(void)x;",
-            give=give,
-            adopt=_ADOPT.format(real=file.real, adopt=adopt) if adopt else _NO_ADOPT,
-            zero=zero,
-            one=one,
-            **same,
-        )
-        return CCode(file.prefix, header, source, file.real, self.estimator is not None)
 
     def _provenance(self) -> list[str]:
         """What the code was made from."""
-        estimator = "none" if self.estimator is None else type(self.estimator).__name__
         lines = [
-            f"Generated by piezoest {__version__}; regenerate it instead of editing it.",
             f"Compensator: {type(self.compensator).__name__}, {_described(self.compensator.model)}.",
             f"Limits: {self.compensator.limits}.",
-            f"Estimator: {estimator}.",
         ]
-        if self.estimator is not None:
-            lines += [f"    {key} = {v}" for key, v in self.estimator.to_dict()["arguments"].items()]
-            lines.append(f"Model handed over every {self.interval} samples.")
-        return lines
+        if self.estimator is None:
+            return [*lines, "Estimator: none."]
+        return [
+            *lines,
+            *estimator_lines(self.estimator.to_dict()),
+            f"Model handed over every {self.interval} samples.",
+        ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
 import math
 import operator
@@ -38,7 +39,8 @@ _RESERVED = frozenset(
     """auto break case char const continue default do double else enum extern float for goto if inline
     int long register restrict return short signed sizeof static struct switch typedef union unsigned void
     volatile while
-    exp expf sqrt sqrtf fabs fabsf expm1 sign larger smaller larger_number smaller_number exp_minus_one
+    exp expf sqrt sqrtf fabs fabsf pow powf expm1 isfinite
+    sign larger smaller larger_number smaller_number exp_minus_one squared
     gamma y0 y1 yn j0 j1 jn index signal""".split()  # noqa: SIM905
 )
 _BUILTIN = {made.__name__: made for made in (abs, min, max, int, float, bool, len, isinstance)}
@@ -52,7 +54,7 @@ _MATHEMATICS: dict[Any, tuple[str, Callable[..., float]]] = {
     np.sign: ("sign", np.sign), max: ("larger", max), min: ("smaller", min),
     np.fmax: ("larger_number", np.fmax), np.fmin: ("smaller_number", np.fmin),
 }  # fmt: skip
-_LIBRARY = ("fabs", "exp", "sqrt")
+_LIBRARY = ("fabs", "exp", "sqrt", "pow")
 
 
 class Expressions(ast.NodeVisitor):
@@ -193,12 +195,20 @@ class Expressions(ast.NodeVisitor):
         if left.is_number and left.is_known and right.is_number and right.is_known:
             return Known(compute(left.value, right.value))
         if sign == "**":
-            raise Refused("a power: write x * x")
+            return self.power(left, right)
         kind, a, b = self.alike(left, right, "real" if sign == "/" else "int")
-        if sign == "//" or (sign == "%" and kind == "real"):
+        if sign in ("//", "%") and kind == "real":
             raise Refused(f"{sign} on numbers that are not whole cannot be translated to C")
-        text = f"{a.within(strength)} {sign} {b.within(strength + 1)}"
+        text = f"{a.within(strength)} {sign[:1]} {b.within(strength + 1)}"
         return Number.joined(text, kind, strength, a, b)
+
+    def power(self, base: Value, exponent: Value) -> Value:
+        """A square, or a power of a real exponent; others have no product that is known to be Numba's."""
+        if not exponent.is_whole:
+            return self.applied("pow", [base, exponent])
+        if not exponent.is_known or exponent.value != 2 or base.is_whole:
+            raise Refused("a power: write x * x")
+        return self.applied("squared", [base])
 
     def alike(self, left: Value, right: Value, kind: str = "int") -> tuple[str, Number, Number]:
         """Two values as numbers of one kind: whole, if both are and `kind` is, or else real."""
@@ -223,10 +233,19 @@ class Expressions(ast.NodeVisitor):
         )
 
     def visit_Compare(self, node: ast.Compare) -> Value:
-        """One comparison; several in a row are refused."""
-        if len(node.ops) != 1:
-            raise Refused("compare two values, and join comparisons by `and`")
-        (left, right), op = self.arguments([node.left, node.comparators[0]]), node.ops[0]
+        """A comparison; several in a row are joined by `and`."""
+        if len(node.ops) == 1:
+            return self.compare(node.ops[0], *self.arguments([node.left, node.comparators[0]]))
+        before = len(self.out)
+        values = self.arguments([node.left, *node.comparators])
+        if len(self.out) > before or any(getattr(value, "impure", False) for value in values):
+            raise Refused("a call between several comparisons that writes: put it into a name first")
+        return self.joined(ast.And(), [
+            functools.partial(self.compare, op, values[i], values[i + 1]) for i, op in enumerate(node.ops)
+        ])  # fmt: skip
+
+    def compare(self, op: ast.cmpop, left: Value, right: Value) -> Value:
+        """One comparison."""
         if type(op) in (ast.Is, ast.IsNot):
             if not right.is_known or right.value is not None:
                 raise Refused("`is` compares with None only")
@@ -241,13 +260,17 @@ class Expressions(ast.NodeVisitor):
         return Number.joined(f"{a.within(Binds.SUM)} {sign} {b.within(Binds.SUM)}", "bool", strength, a, b)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> Value:
-        """And, or; what is known drops out, and what stands behind it is not looked at."""
-        stops = type(node.op) is ast.Or
+        """And, or."""
+        return self.joined(node.op, [functools.partial(self.value, item) for item in node.values])
+
+    def joined(self, op: ast.boolop, items: list[Callable[[], Value]]) -> Value:
+        """Conditions joined; what is known drops out, and what stands behind it is not looked at."""
+        stops = type(op) is ast.Or
         sign, strength = ("||", Binds.OR) if stops else ("&&", Binds.AND)
         parts: list[Number] = []
-        for item in node.values:
+        for item in items:
             before = len(self.out)
-            test = self.value(item).truth()
+            test = item().truth()
             if parts and len(self.out) > before:
                 raise Refused("a call behind `and` or `or` that needs statements: put it into a name first")
             if test.is_known and test.value != stops:
@@ -305,10 +328,14 @@ class Expressions(ast.NodeVisitor):
     def mathematics(self, called: Any, arguments: list[Value]) -> Value:
         """A function of math.h, or a helper beside it."""
         name, compute = _MATHEMATICS[called]
-        if len(arguments) > 2:
-            raise Refused("min and max take two numbers")
+        while len(arguments) > 2:  # min and max: from left to right
+            arguments = [self.mathematics(called, arguments[:2]), *arguments[2:]]
         if all(argument.is_known for argument in arguments):
             return Known(float(compute(*(a.value for a in arguments))))
+        return self.applied(name, arguments)
+
+    def applied(self, name: str, arguments: list[Value]) -> Number:
+        """Call of a function of math.h or of a helper by its name."""
         numbers = [self.number(argument, "real") for argument in arguments]
         if name in _LIBRARY:
             name = f"{name}f" if self.single else name
@@ -317,6 +344,11 @@ class Expressions(ast.NodeVisitor):
         return Number.joined(
             f"{name}({', '.join(number.text for number in numbers)})", "real", Binds.PRIMARY, *numbers
         )
+
+    def finite(self, value: Value) -> Value:
+        """``np.isfinite(value)``."""
+        number = self.number(value, "real")
+        return Number.joined(f"isfinite({number.text})", "bool", Binds.PRIMARY, number)
 
     def converted(self, value: Value) -> Value:
         """``int(value)``."""
@@ -337,6 +369,7 @@ _SPECIAL: dict[Any, Callable[..., Value]] = {
     isinstance: lambda body, value, kind: Known(value.is_number),  # what is calculated with is a number
     bool: lambda body, value: value.truth(),
     int: Expressions.converted,
+    np.isfinite: Expressions.finite,
     float: lambda body, value: Known(float(value.value)) if value.is_known else body.number(value, "real"),
     like: lambda body, value: Room(value.shape),
     local: lambda body, size: Room((size.value,)),

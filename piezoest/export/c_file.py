@@ -20,6 +20,7 @@ _HELPERS = {
     "larger_number": "return a >= b || b != b ? a : b;",
     "smaller_number": "return a <= b || b != b ? a : b;",
     "exp_minus_one": "return expm1(x);",
+    "squared": "return x * x;",
 }
 # exp(x) - 1 loses its digits near zero. In double it is math.h's expm1, the one that the library runs:
 # with exponential forgetting the ring makes 1e-10 of a difference in the last digit. In float a power

@@ -47,6 +47,13 @@ def translate(file: File, function: Any, arguments: list[Value]) -> tuple[Functi
     return file.functions[key], _flat(settled)
 
 
+def call(file: File, function: Any, arguments: list[Value]) -> str:
+    """Text of a call of the translated function."""
+    made, flat = translate(file, function, arguments)
+    given: list[Any] = [flat[place] for place, _, _ in made.parameters]
+    return f"{made.name}({', '.join(getattr(each, 'address', each.text) for each in given)})"
+
+
 def _translated(file: File, source: Source, arguments: list[Value]) -> Function:
     body = Body(file, source)
     for name, value in zip(source.parameters, arguments, strict=True):
@@ -153,15 +160,16 @@ class Body(Expressions):
         return False
 
     def visit_For(self, node: ast.For) -> None:
-        """For over a range that counts by one."""
+        """For over a range that counts up."""
         called: Any = node.iter
         if type(called) is not ast.Call or getattr(called.func, "id", "") != "range":
             raise Refused("for needs range(...)")
         if type(node.target) is not ast.Name or node.orelse:
             raise Refused("for needs one name and no else")
         values = self.arguments(called.args)
-        if len(values) == 3:
-            raise Refused("range with a step: count from 0 and compute the position")
+        step = values.pop() if len(values) == 3 else Known(1)
+        if not (step.is_known and step.is_whole and step.value > 0):
+            raise Refused("range with a step that is not known to be above 0")
         start, stop = values if len(values) == 2 else (Known(0), values[0])
         if start.is_known and stop.is_known and start.value >= stop.value:
             return
@@ -171,7 +179,8 @@ class Body(Expressions):
         i = "turn" if node.target.id == "_" else self.safe(node.target.id)
         self.names[node.target.id] = Number(i, "int", uses=frozenset({i}))
         body = self.block(node.body)
-        head = f"for (int {i} = {first.text}; {i} < {last.text}; ++{i})"
+        on = f"++{i}" if step.value == 1 else f"{i} += {step.value}"
+        head = f"for (int {i} = {first.text}; {i} < {last.text}; {on})"
         self.out.append(Statement(head, first.uses | last.uses, body=body, loop=True, own=i))
 
     def visit_While(self, node: ast.While) -> None:

@@ -164,11 +164,11 @@ class Array(Value):
         """One number of it."""
         if len(places) != len(self.shape):
             raise Refused(f"an array of {len(self.shape)} axes has {len(places)} positions")
-        if self.values is not None and all(place.is_known for place in places):
-            known = tuple(place.value for place in places)
-            inside = all(place < count for place, count in zip(known, self.shape, strict=True))
+        if self.values is not None and (self.values.size == 0 or all(place.is_known for place in places)):
+            known = tuple(place.value for place in places if place.is_known)
+            inside = all(place < count for place, count in zip(known, self.shape, strict=False))
             # Beyond the end stands what no array of this size reaches.
-            return Known(float(self.values[known]) if inside else np.nan)
+            return Known(float(self.values[known]) if inside and self.values.size else np.nan)
         uses = frozenset().union(*(number(place, False, "int").uses for place in places))
         uses |= frozenset() if self.values is not None else {self.root.name}
         return Number(f"{self.text}{text}", "real", uses=uses, reads=self.values is None)

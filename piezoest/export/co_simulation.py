@@ -14,8 +14,9 @@ from piezoest._checks import positive
 from piezoest._files import replacing
 from piezoest._version import __version__
 from piezoest.compensators import Compensator
-from piezoest.export.c_code import CCode, Precision, c, filled
+from piezoest.export.c_code import c
 from piezoest.export.compiled import build_shared
+from piezoest.export.generated import CCode, Precision, filled
 from piezoest.models import LinearGain
 
 # A file's date would make two equal units differ.
@@ -70,6 +71,8 @@ def fmu(
     path = Path(path)
     if path.suffix != ".fmu":
         raise ValueError(f"path must end in .fmu, got {path}")
+    if not isinstance(compensator, Compensator):
+        raise ValueError(f"compensator must be one, got {compensator!r}: c() exports an AdaptiveFeedforward")
     rate = _sample_rate(estimator, compensator, sample_rate)
     code = c(estimator, compensator, name=name, precision=precision, update_interval=update_interval)
     guid = str(uuid.uuid5(_NAMESPACE, f"{code.source}{code.header}{rate!r}"))

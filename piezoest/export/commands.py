@@ -47,13 +47,19 @@ class Stated:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Code:
+class Written:
     """What the code is to be like."""
 
     name: Annotated[str, typer.Option(help="Prefix of all names, and name of the files.")] = (
         "piezoest_controller"
     )
     precision: Annotated[str, typer.Option(help="double or float.")] = "double"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Code(Written):
+    """What the code of an estimator and a compensator is to be like."""
+
     update_interval: Annotated[int, typer.Option(min=1, help="Samples between two changes of the model.")] = (
         50
     )
@@ -79,6 +85,40 @@ def c(
     from piezoest.export.c_code import c as generate
 
     for path in generate(*_pair(source, stated), **asdict(code)).write(output):
+        typer.echo(path)
+
+
+@app.command(
+    epilog="Examples: piezoest export adaptive -o firmware --sample-rate 50000 --minimum 0 --maximum 150; "
+    "with --estimators rls,ekf, or --estimators none for the straight line alone"
+)
+@grouped
+def adaptive(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for header and source.")],
+    sample_rate: Annotated[float, typer.Option(help="Samples per second of the controller.")],
+    minimum: Annotated[float, typer.Option(help="Least voltage that stage and amplifier bear [V].")],
+    maximum: Annotated[float, typer.Option(help="Largest one [V].")],
+    written: Written,
+    slew_rate: Annotated[float | None, typer.Option(help="Largest change of voltage [V/s].")] = None,
+    estimators: Annotated[
+        str, typer.Option(help="Of rls, output-error, plays and ekf, with commas; none for the line alone.")
+    ] = "rls,output-error,plays",
+) -> None:
+    """Write an AdaptiveFeedforward in C99, which needs no model: it finds out what the stage does."""
+    import piezoest as pz
+    from piezoest.export.c_code import c as generate
+
+    known: dict[str, Any] = {
+        "rls": pz.HysteresisRLS, "output-error": pz.OutputErrorRLS, "plays": pz.PrandtlIshlinskiiRLS,
+        "ekf": pz.HysteresisEKF,
+    }  # fmt: skip
+    names = [] if estimators == "none" else estimators.split(",")
+    if unknown := [name for name in names if name not in known]:
+        raise ValueError(f"--estimators must be none or of {', '.join(known)}, got {unknown[0]!r}")
+    limits = pz.VoltageLimits(minimum, maximum, slew_rate, sample_rate)
+    factories = tuple(known[name] for name in names)
+    controller = pz.AdaptiveFeedforward(sample_rate, limits=limits, estimators=factories)
+    for path in generate(controller, **asdict(written)).write(output):
         typer.echo(path)
 
 

@@ -12,12 +12,13 @@ from typing import Any, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d
-from piezoest.export.c_code import CCode, filled
+from piezoest._checks import FloatArray, array_1d, number_or_nan
+from piezoest.export.generated import CCode, filled
 from piezoest.export.ring import Ring
 
 # Without contraction to fused multiply-add the result is the library's to the last bit.
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
+_NUMBERS = {"double": (ctypes.c_double, np.float64), "float": (ctypes.c_float, np.float32)}
 
 
 def compiler() -> str:
@@ -48,6 +49,22 @@ def build_shared(folder: Path, sources: list[str], target: Path, *flags: str) ->
         raise ValueError(f"the C compiler failed: {' '.join(command)}\n{done.stderr}")
 
 
+def _load(code: CCode, kind: str) -> tuple[Any, Any, Any]:
+    """Library around code of that kind, its numbers in C and in NumPy."""
+    if code.kind != kind:
+        names = {"controller": "CompiledController", "feedforward": "CompiledFeedforward"}
+        raise ValueError(f"code is that of a {code.kind}: use {names[code.kind]}")
+    # The loader keeps the library open after its file is gone.
+    with tempfile.TemporaryDirectory(prefix="piezoest_", ignore_cleanup_errors=True) as place:
+        folder = Path(place)
+        code.write(folder)
+        loop = filled(f"{kind}_loop.c", name=code.name, real=code.precision)
+        (folder / "loop.c").write_text(loop, encoding="utf-8")
+        build_shared(folder, [f"{code.name}.c", "loop.c"], folder / "controller.so")
+        library = ctypes.CDLL(str(folder / "controller.so"))
+    return (library, *_NUMBERS[code.precision])
+
+
 class CompiledController(Ring):
     """Generated code, compiled by this computer's C compiler, with the face of `Controller`.
 
@@ -62,24 +79,14 @@ class CompiledController(Ring):
     Raises
     ------
     ValueError
-        If there is no C compiler.
+        If there is no C compiler, or the code is that of an `AdaptiveFeedforward`.
     """
 
     __slots__ = ("_library", "_pointer", "_real", "code")
 
     def __init__(self, code: CCode) -> None:
         self.code = code
-        # The loader keeps the library open after its file is gone.
-        with tempfile.TemporaryDirectory(prefix="piezoest_", ignore_cleanup_errors=True) as place:
-            folder = Path(place)
-            code.write(folder)
-            loop = filled("loop.c", name=code.name, real=code.precision)
-            (folder / "loop.c").write_text(loop, encoding="utf-8")
-            build_shared(folder, [f"{code.name}.c", "loop.c"], folder / "controller.so")
-            self._library = ctypes.CDLL(str(folder / "controller.so"))
-        double = code.precision == "double"
-        real = ctypes.c_double if double else ctypes.c_float
-        self._real = np.float64 if double else np.float32
+        self._library, real, self._real = _load(code, "controller")
         self._pointer = ctypes.POINTER(real)
         self._library.one.argtypes = (real, real, self._pointer)
         self._library.limit.argtypes = (real, real)
@@ -153,3 +160,84 @@ class CompiledController(Ring):
     def copy(self) -> Self:
         """Return another one, in the state that was exported."""
         return type(self)(self.code)
+
+
+class CompiledFeedforward:
+    """Generated code of an `AdaptiveFeedforward`, compiled by this computer's C compiler.
+
+    For checks of the code against the library and against logs from a target; `piezoest.track` takes it as
+    ``controller``. Each object has a state of its own.
+
+    Parameters
+    ----------
+    code : CCode
+        What `c` returned.
+
+    Raises
+    ------
+    ValueError
+        If there is no C compiler, or the code is not that of an `AdaptiveFeedforward`.
+    """
+
+    __slots__ = ("_library", "code")
+
+    def __init__(self, code: CCode) -> None:
+        self.code = code
+        self._library, real, _ = _load(code, "feedforward")
+        self._library.step.argtypes, self._library.step.restype = (real,), real
+        self._library.learn.argtypes = (real, real)
+        self._library.anew.argtypes = (real,)
+        self.reset()
+
+    def reset(self, voltage: float | None = None) -> None:
+        """Return to the state that was exported, or begin anew.
+
+        Parameters
+        ----------
+        voltage : float, optional
+            Voltage at which the stage rests, to begin anew [V]. Default: what was exported.
+
+        Raises
+        ------
+        ValueError
+            If the voltage is not within the limits.
+        """
+        if voltage is None:
+            self._library.begin()
+        elif not self._library.anew(voltage):
+            raise ValueError(f"voltage must lie within the limits, got {voltage:g} V")
+
+    def step(self, r: float | None) -> float:
+        """Voltage for the next sample of the reference.
+
+        Parameters
+        ----------
+        r : float or None
+            Reference displacement [µm]; None and NaN hold the last one.
+
+        Returns
+        -------
+        float
+            Voltage [V], within the limits.
+        """
+        voltage: float = self._library.step(number_or_nan(r))
+        return voltage
+
+    def learn(self, u: float, x: float | None) -> None:
+        """Learn from the voltage that was written and what was measured then.
+
+        Parameters
+        ----------
+        u : float
+            Voltage [V].
+        x : float or None
+            Measured displacement [µm]; None or NaN where there is none.
+        """
+        self._library.learn(number_or_nan(u), number_or_nan(x))
+
+    @property
+    def status(self) -> tuple[int, int, int]:
+        """Numbers of the stage of the work, the model that drives and the fault, as the header names them."""
+        found = (ctypes.c_int * 3)()
+        self._library.show(found)
+        return found[0], found[1], found[2]

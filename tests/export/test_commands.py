@@ -55,6 +55,21 @@ def test_model_learns_on(model: Path, kind: str) -> None:
     assert f"Hysteresis{kind.upper()}" in Path("out/stage.c").read_text()
 
 
+def test_an_adaptive_feedforward_needs_no_model(tmp_path: Path) -> None:
+    own = ("-o", tmp_path, "--sample-rate", 10_000, "--minimum", -20, "--maximum", 120, "--name", "stage")
+    result = run("adaptive", *own, "--estimators", "ekf,rls", "--slew-rate", 5000)
+    assert result.exit_code == 0, result.output
+    limits = pz.VoltageLimits(-20.0, 120.0, 5000.0, 10_000.0)
+    kinds = pz.HysteresisEKF, pz.HysteresisRLS
+    controller = pz.AdaptiveFeedforward(10_000.0, limits=limits, estimators=kinds)
+    assert (tmp_path / "stage.c").read_text() == pz.export.c(controller, name="stage").source
+    assert run("adaptive", *own, "--estimators", "none").exit_code == 0
+    assert "Model that drives: 0 line. */" in (tmp_path / "stage.h").read_text()
+    refused = run("adaptive", *own, "--estimators", "kalman")
+    assert refused.exit_code == 1
+    assert "kalman" in refused.stderr
+
+
 @pytest.mark.parametrize(
     ("part", "value", "words"),
     [

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import piezoest as pz
 from piezoest.equations import kalman
 from piezoest.equations import least_squares as ls
-from piezoest.export import c_code
+from piezoest.export import generated
 from piezoest.export.compiled import compiler
 
 FloatArray = NDArray[np.float64]
@@ -102,4 +102,4 @@ def test_many_bits(kind: str, precision: str) -> None:
     ],
 )
 def test_what_is_beyond_all_measure_is_within_float(module: str, name: str, value: float) -> None:
-    assert c_code._FLOAT[f"piezoest.equations.{module}", name] < float(np.finfo(np.float32).max) < value
+    assert generated.COARSER[f"piezoest.equations.{module}", name] < float(np.finfo(np.float32).max) < value

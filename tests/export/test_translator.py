@@ -332,6 +332,30 @@ def test_literals(value: float, double: str, single: str) -> None:
     assert float(double) == value if np.isfinite(value) else True
 
 
+# ---------------------------------------------------------------- arithmetic
+
+
+@compiled
+def arithmetic(u: float, x: float) -> float:
+    """All at once."""
+    total = 0.0
+    for i in range(1, 12, 3):
+        place, rest = i // 4, i % 4
+        total += (u + place) ** 2 - rest * 2.0**x
+    inside = -1.0 < u - x <= x < 3.0
+    total += max(u, x, 0.5, total) if inside and np.isfinite(u) else min(x, u, -0.5)
+    return total
+
+
+def test_arithmetic_is_the_same(tmp_path: Path) -> None:
+    function = build(tmp_path, arithmetic, *reals("u", "x"))
+    function.argtypes = [ctypes.c_double] * 2  # type: ignore[attr-defined]
+    every = np.array([-np.inf, -2.0, -0.7, 0.0, 0.3, 1.0, 2.9, 3.0, 17.0])
+    for u in every.tolist():
+        for x in every[1:].tolist():
+            np.testing.assert_array_equal(function(u, x), arithmetic(u, x))
+
+
 # ---------------------------------------------------------------- refusals
 
 
@@ -340,7 +364,7 @@ def with_a_list(x: Any) -> Any:
 
 
 def with_a_step(x: Any) -> None:
-    for i in range(0, 10, 2):
+    for i in range(0, 10, int(x[0])):
         x[i] = 0.0
 
 

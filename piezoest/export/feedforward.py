@@ -1,0 +1,108 @@
+"""An `AdaptiveFeedforward` in C99: its kernel, translated, with the models in use among its state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from piezoest.controller import kernel, saved
+from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
+from piezoest.controller.readings import FAULTS
+from piezoest.controller.shown import STAGES
+from piezoest.export.c_translator import call
+from piezoest.export.c_values import Number, Root, Struct, literal
+from piezoest.export.generated import CCode, estimator_lines, file_of, rendered
+from piezoest.layout import ABSENT, FIXED, Field, Numbers, Record
+
+# Where that is not what was exported.
+_BEGUN = """
+/* Before anything was known. */
+static const {name}_state begun_state = {start};
+"""
+
+
+def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
+    """Generate the code of a controller in its present state.
+
+    Raises
+    ------
+    ValueError
+        If the name is no identifier, or the precision unknown.
+    """
+    data = controller.to_dict()
+    estimators = saved.read_estimators(data["estimators"], data["state"])
+    file = file_of(name, precision, tuple(each for known in estimators for each in known.unneeded))
+    now, anew = _state(controller), _state(_reset(controller))
+    file.struct(now.layout, "state")
+
+    def call_of(function: Any, *numbers: str) -> str:
+        given = [Number(each, "real") for each in numbers]
+        return call(file, function, [now, now.field("settings"), *given])
+
+    step, learn = call_of(kernel.step, "r"), call_of(kernel.learn, "u", "x")
+    begin = call_of(kernel.begin, "voltage")
+    begun = ""
+    if anew.values.tobytes() != now.values.tobytes():
+        begun = _BEGUN.format(name=name, start=file.start(anew.layout, anew.values))
+    limits = controller.limits
+    return rendered(
+        file,
+        "feedforward",
+        [
+            f"AdaptiveFeedforward at {controller.sample_rate:g} Hz, corridor {data['corridor']:g}.",
+            f"Limits: {limits}.",
+            *(line for each in data["estimators"] for line in estimator_lines(each)),
+        ],
+        {
+            "limits": f"{limits.minimum:g} V to {limits.maximum:g} V",
+            "stages": _numbered(STAGES),
+            "models": _numbered(each.name for each in controller.candidates),
+            "faults": _numbered(each or "none" for each in FAULTS),
+        },
+        {
+            "start": file.start(now.layout, now.values),
+            "begun": begun,
+            "anew": "begun" if begun else "start",
+            "functions": file.text(f"{step} {learn} {begin}"),
+            "minimum": literal(limits.minimum, file.single),
+            "maximum": literal(limits.maximum, file.single),
+            "step": step,
+            "learn": learn,
+            "begin": begin,
+        },
+        learns=bool(estimators),
+    )
+
+
+def _reset(controller: AdaptiveFeedforward) -> AdaptiveFeedforward:
+    controller = controller.copy()
+    controller.reset()
+    return controller
+
+
+def _numbered(names: Iterable[str]) -> str:
+    return ", ".join(f"{number} {name}" for number, name in enumerate(names))
+
+
+def _state(controller: AdaptiveFeedforward) -> Struct:
+    """All that changes: the state, and beside it the settings, of which the models in use change."""
+    state, settings = controller.layouts
+    layout = Record((*state.fields, ("settings", _settled(settings))), state.functions)
+    values = np.zeros((), layout.dtype)
+    for name, _ in state.fields:
+        values[name] = controller.state[name]
+    values["settings"] = controller.settings
+    return Struct("state->", layout, values, Root("state"), "state")
+
+
+def _settled(field: Field, name: str = "") -> Field:
+    """Layout of settings that stay as they are, but for the models."""
+    if isinstance(field, Record):
+        if name == "inverse":
+            return saved.changeable(field)
+        return Record(tuple((name, _settled(inner, name)) for name, inner in field.fields), field.functions)
+    if isinstance(field, Numbers):
+        return Numbers(field.shape, FIXED) if field != ABSENT else field
+    return FIXED

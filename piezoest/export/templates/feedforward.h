@@ -1,0 +1,42 @@
+@head@
+#ifndef @guard@
+#define @guard@
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* All that changes while the controller runs, by its names in Python; the whole is @name@_state. */
+@types@
+/* Go on from where the controller was exported: before the first step. */
+void @name@_init(@name@_state *state);
+
+/* Begin anew, knowing nothing, with the stage at rest at a voltage [V]. Returns 0, and changes nothing,
+ * unless it is within the limits, @limits@. */
+int @name@_reset(@name@_state *state, @real@ voltage);
+
+/* Voltage [V], within the limits, for the next sample of the reference r [um]; NaN or infinity holds the last
+ * one. */
+@real@ @name@_step(@name@_state *state, @real@ r);
+
+/* Learn from the voltage u [V] that was written and the displacement x [um] measured then, NaN where there is
+ * none: once after each step. */
+void @name@_learn(@name@_state *state, @real@ u, @real@ x);
+
+/* Voltage given out last [V]. */
+@real@ @name@_get_voltage(const @name@_state *state);
+
+/* Stage of the work: @stages@. */
+int @name@_get_stage(const @name@_state *state);
+
+/* Model that drives: @models@. */
+int @name@_get_driving(const @name@_state *state);
+
+/* Fault of the readings: @faults@. */
+int @name@_get_fault(const @name@_state *state);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,269 @@
+"""An exported `AdaptiveFeedforward`: the library's voltages to the last bit, whatever happens on a rig."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest.bench.zoo import draw
+from piezoest.bench.zoo.faults import NONE
+from piezoest.controller.readings import FAULTS
+from piezoest.controller.shown import STAGES
+from piezoest.export.compiled import compiler
+
+FS = 1e4
+LIMITS = pz.VoltageLimits(-100.0, 100.0)
+ESTIMATORS: dict[str, Any] = {"line": (), "default": None, "ekf": (pz.HysteresisEKF,)}
+STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-O1")
+
+try:
+    compiler()
+except ValueError as absent:
+    pytest.skip(str(absent), allow_module_level=True)
+
+
+def controller(estimators: str, limits: pz.VoltageLimits = LIMITS) -> Any:
+    return pz.AdaptiveFeedforward(FS, limits=limits, estimators=ESTIMATORS[estimators])
+
+
+@pytest.fixture(scope="module", params=ESTIMATORS)
+def pair(request: pytest.FixtureRequest) -> tuple[Any, Any]:
+    """A controller, and what is exported of it."""
+    library = controller(request.param)
+    return library, pz.export.CompiledFeedforward(pz.export.c(library))
+
+
+@pytest.fixture(scope="module")
+def single() -> Any:
+    return pz.export.CompiledFeedforward(pz.export.c(controller("default"), precision="float"))
+
+
+def rig(family: str, mechanics: str = "none") -> Any:
+    return draw(
+        0, family=family, mechanics=mechanics, limits="±100", gain=0.2, sample_rate=FS, reference="triangle",
+        amplitude=8.0, frequency=20.0, waves=14.0, block=1, fault=NONE, noise=0.004, creep=0.0, volts=0.0,
+        delay=0, resolution=0.0, slew=np.inf, hum=0.0, drift=0.0,
+    )  # fmt: skip
+
+
+def drive(library: Any, board: Any, own: Any, wrong: Any = float, count: int = 10**6) -> set[Any]:
+    """Let both go round a rig, readings `wrong` for a while, some missing: same voltages; each status."""
+    rng, stage, seen = np.random.default_rng(0), own.stage(), set()
+    x: Any
+    for k, r in enumerate(own.reference.tolist()[:count]):
+        missing, other = rng.random(2) < 0.01
+        r = np.nan if missing else r
+        u = library.step(r)
+        assert board.step(r) == u
+        written = 0.9 * u if other else u
+        x = float(stage.step(written))
+        x = None if missing else wrong(x) if 3000 < k < 4500 else x
+        for each in (library, board):
+            each.learn(written, x)
+        seen.add(board.status)
+        shown = STAGES[board.status[0]], FAULTS[board.status[2]]
+        assert shown == (library.status.stage, library.status.fault)
+        assert library.candidates[board.status[1]].drives
+    return seen
+
+
+# ---------------------------------------------------------------- parity
+
+
+def test_voltages_are_the_librarys_over_all_stages_and_faults(pair: tuple[Any, Any]) -> None:
+    library, board = pair
+    seen = set()
+    for own, wrong in (
+        (rig("bouc-wen"), lambda x: 3.0),
+        (rig("preisach", "lag"), lambda x: -x),
+        (rig("relays", "400 Hz"), lambda x: 9.0 * x),
+        (rig("backlash"), lambda x: 0.02 * x),
+        (rig("coleman-hodgdon"), lambda x: x + 5.0),
+        (rig("duhem", "200 Hz"), float),
+    ):
+        library.reset()
+        board.reset()
+        seen |= drive(library, board, own, wrong)
+    stages, models, faults = (set(values) for values in zip(*seen, strict=True))
+    assert stages == {0, 1, 2}
+    assert models == set(range(len(library.candidates)))
+    assert len(faults) >= 4
+
+
+def test_it_begins_anew_at_another_voltage(pair: tuple[Any, Any]) -> None:
+    library, board = pair
+    library.reset(-40.0)
+    board.reset(-40.0)
+    drive(library, board, rig("duhem"), count=2000)
+    for outside in (-101.0, 100.5, np.nan):
+        with pytest.raises(ValueError, match="limits"):
+            board.reset(outside)
+    r = [1.0, 2.0, 1.0]
+    np.testing.assert_array_equal([board.step(each) for each in r], [library.step(each) for each in r])
+
+
+def test_it_goes_on_from_where_it_was_exported() -> None:
+    library = controller("line", pz.VoltageLimits(-100.0, 100.0, 2e4, FS))
+    stage = rig("duhem").stage()
+    for r in rig("duhem").reference[:1500].tolist():
+        u = library.step(r)
+        library.learn(u, stage.step(u))
+    board = pz.export.CompiledFeedforward(pz.export.c(library, name="stage"))
+    assert board.status[0] == 2
+    drive(library, board, rig("duhem"), count=1000)
+    library.reset(20.0)
+    board.reset(20.0)
+    assert board.status[0] == 0
+    drive(library, board, rig("duhem"), count=2500)
+
+
+def test_track_takes_it_as_a_controller() -> None:
+    r = pz.signals.triangle(5.0, 20.0, 4, FS)
+    voltages = []
+    library = controller("line")
+    for driver in (library, pz.export.CompiledFeedforward(pz.export.c(library))):
+        record = pz.track(r, stage=pz.PaperStage(FS, seed=0), controller=driver)
+        voltages.append(record.voltage)
+    np.testing.assert_array_equal(voltages[0], voltages[1])
+
+
+# ---------------------------------------------------------------- float
+
+
+def test_float_follows_as_well(single: Any) -> None:
+    r = pz.signals.triangle(5.0, 20.0, 20, FS)
+    errors = []
+    for driver in (controller("default"), single):
+        stage = pz.PaperStage(FS, seed=0)
+        driver.reset(0.0)
+        errors.append(pz.track(r, stage=stage, controller=driver).max_error(4))
+    assert single.status[0] == 2
+    assert single.status[1] > 0
+    assert errors[1] == pytest.approx(errors[0], rel=0.3)
+
+
+def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> None:
+    rng = np.random.default_rng(1)
+    wild = np.array([np.nan, np.inf, -np.inf, 1e308, -1e308, 1e30, -1e30, 9e8, -9e8, 1e5, 0.0, 1e-45])
+    n, stages = 6000, set()
+    for gain in (1e-6, 0.15, 1e4):
+        single.reset(0.0)
+        r = 40.0 * gain * np.sin(np.arange(n) * 0.01)
+        odd = np.where(np.arange(n) > 2000, rng.random((3, n)) < 0.02, False)
+        u = 0.0
+        for k in range(n):
+            u = single.step(rng.choice(wild) if odd[0, k] else r[k])
+            assert -100.0 <= u <= 100.0
+            x = gain * (u + 0.01 * rng.normal())
+            single.learn(rng.choice(wild) if odd[1, k] else u, rng.choice(wild) if odd[2, k] else x)
+            stages.add(single.status[0])
+    assert stages == {0, 1, 2}
+
+
+# ---------------------------------------------------------------- the text
+
+
+@pytest.mark.parametrize("cc", ["gcc", "clang"])
+@pytest.mark.parametrize("precision", ["double", "float"])
+@pytest.mark.parametrize("estimators", ESTIMATORS)
+def test_compiles_without_a_warning(estimators: str, precision: Any, cc: str, tmp_path: Path) -> None:
+    if shutil.which(cc) is None:
+        pytest.skip(f"{cc} is not installed: make tools")
+    library = controller(estimators)
+    code = pz.export.c(library, name="stage", precision=precision)
+    assert code == pz.export.c(library, name="stage", precision=precision)
+    for word in ("malloc", "calloc", "goto"):
+        assert word not in code.source
+    code.write(tmp_path)
+    command = [cc, *STRICT, "-c", "stage.c", "-o", "stage.o"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    if shutil.which("nm") is None:
+        return
+    needed = subprocess.run(["nm", "-u", "stage.o"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    names = {line.split()[-1].split("@")[0].rstrip("f") for line in needed.stdout.splitlines()}
+    own = {"exp", "expm1", "pow", "sqrt", "exp2", "ldexp"}
+    assert names <= own | {"memcpy", "memmove", "memset", "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
+    held = subprocess.run(["nm", "stage.o"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert not {line.split()[-2] for line in held.stdout.splitlines()} & set("bBdDC"), "global state"
+
+
+def test_names_are_those_of_python() -> None:
+    code = pz.export.c(controller("ekf"))
+    for words in ("&state->settings", "&state->line", "    double noise;"):
+        assert words in code.header + code.source
+    assert "HysteresisEKF" in code.header
+    assert "0 none, 1 no response, 2 reversed" in code.header
+    assert "-100 V to 100 V" in code.header
+
+
+DRIVER = """#include "stage.h"
+#include <stdio.h>
+
+int main(void)
+{
+    static stage_state state;
+    double pair[2];
+
+    stage_init(&state);
+    while (fread(pair, sizeof(double), 2, stdin) == 2) {
+        volatile double u = stage_step(&state, pair[0]);
+        if (!(u >= -100.0 && u <= 100.0)) {
+            return 3;
+        }
+        stage_learn(&state, u, pair[1]);
+    }
+    return stage_get_stage(&state);
+}
+"""
+
+
+def test_sanitizers_are_silent(tmp_path: Path) -> None:
+    library, stage = controller("default"), rig("bouc-wen").stage()
+    pairs = np.zeros((rig("bouc-wen").reference.size, 2))
+    for k, r in enumerate(rig("bouc-wen").reference.tolist()):
+        u = library.step(r)
+        pairs[k] = r, stage.step(u)
+        library.learn(u, pairs[k, 1])
+    library.reset()
+    pz.export.c(library, name="stage").write(tmp_path)
+    (tmp_path / "driver.c").write_text(DRIVER)
+    flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O0"]
+    command = [compiler(), "-std=c99", *flags, "driver.c", "stage.c", "-o", "driver", "-lm"]
+    built = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    if built.returncode != 0:
+        pytest.skip(f"the compiler has no sanitizers: {built.stderr.strip().splitlines()[-1]}")
+    pairs[4000:4003] = [[np.inf, 1.0], [0.0, 1e30], [1e30, -np.inf]]
+    done = subprocess.run([str(tmp_path / "driver")], input=pairs.tobytes(), capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (2, b"")
+
+
+# ---------------------------------------------------------------- refusals
+
+
+def test_what_does_not_go_together_is_refused() -> None:
+    library = controller("line")
+    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    inverse = pz.InverseCompensator(start, LIMITS)
+    with pytest.raises(ValueError, match="leave out"):
+        pz.export.c(library, inverse)
+    with pytest.raises(ValueError, match="leave out"):
+        pz.export.c(library, update_interval=20)
+    with pytest.raises(ValueError, match="AdaptiveFeedforward"):
+        pz.export.fmu(library, None, "stage.fmu")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="name"):
+        pz.export.c(library, name="double-u")
+    with pytest.raises(ValueError, match="precision"):
+        pz.export.c(library, precision="half")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="CompiledFeedforward"):
+        pz.export.CompiledController(pz.export.c(library))
+    with pytest.raises(ValueError, match="CompiledController"):
+        pz.export.CompiledFeedforward(pz.export.c(None, inverse))
+    with pytest.raises(ValueError, match="compensator"):
+        pz.export.c(pz.HysteresisRLS(FS))
