@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from typing import Any
 
 import numpy as np
 
 from piezoest._checks import FloatArray, instance
-from piezoest.compensators import InverseCompensator, LinearCompensator
+from piezoest.compensators import InverseCompensator, LinearCompensator, VoltageLimits
+from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
 from piezoest.estimators.bank import EstimatorBank
 from piezoest.estimators.base import EstimatorBase
 from piezoest.estimators.ekf import HysteresisEKF
@@ -20,16 +22,18 @@ from piezoest.stage import PaperStage
 
 
 def warmup(*used: Any) -> float:
-    """Compile and load the kernels of estimators, compensators and stages.
+    """Compile and load the kernels of estimators, compensators, stages and controllers.
 
-    The first process after an installation compiles, which takes about a minute; every later one
-    loads from the disk in a second. Call it before a live loop starts.
+    The first process after an installation compiles, which takes about a minute, and up to another one for a
+    controller; every later one loads from the disk in a second. Call it before a live loop starts, or once
+    after the installation.
 
     Parameters
     ----------
-    *used : estimator or EstimatorBank
+    *used : estimator, EstimatorBank, AdaptiveFeedforward or the class AdaptiveFeedforward
         Those that the loop will use: what is compiled goes by their settings. They are left as they
-        are. Estimators as they are by default are warmed up in any case.
+        are. Estimators as they are by default are warmed up in any case, a controller if it is asked for:
+        the class stands for one as it is by default, for any sample rate and limits.
 
     Returns
     -------
@@ -39,16 +43,20 @@ def warmup(*used: Any) -> float:
     Raises
     ------
     ValueError
-        If one of them is neither.
+        If one of them is none of these.
 
     Examples
     --------
     >>> import piezoest as pz
     >>> seconds = pz.warmup(pz.HysteresisRLS(50_000.0, delay=1.0))
+    >>> seconds = pz.warmup(pz.AdaptiveFeedforward)  # the next one is there at once
     """
-    for learner in used:
-        expected = "estimators of piezoest or an EstimatorBank: warm up one of your own by a step of it"
-        instance("used", learner, EstimatorBase | EstimatorBank, expected)
+    expected = (
+        "estimators of piezoest, an EstimatorBank or a controller: warm up one of your own by a step of it"
+    )
+    for each in used:
+        if each is not AdaptiveFeedforward:
+            instance("used", each, EstimatorBase | EstimatorBank | AdaptiveFeedforward, expected)
     began = time.perf_counter()
     sample_rate = 50_000.0
     u = np.linspace(0.0, 1.0, 8)
@@ -82,14 +90,30 @@ def warmup(*used: Any) -> float:
     return time.perf_counter() - began
 
 
+@functools.singledispatch
 def _use(learner: Any, u: FloatArray, x: FloatArray) -> None:
     """Do with a copy what a loop may do."""
-    if isinstance(learner, EstimatorBank):
-        bank = EstimatorBank(learner.channel(0), 2)
-        bank.step(u[:2], x[:2])
-        bank.run(np.column_stack([u, u]), np.column_stack([x, x]))
-        return
     copy = learner.copy()
     copy.step(0.0, 0.0)
     copy.run(u, x)
     _ = copy.model
+
+
+@_use.register
+def _(learner: EstimatorBank, u: FloatArray, x: FloatArray) -> None:
+    bank = EstimatorBank(learner.channel(0), 2)
+    bank.step(u[:2], x[:2])
+    bank.run(np.column_stack([u, u]), np.column_stack([x, x]))
+
+
+@_use.register
+def _(learner: AdaptiveFeedforward, u: FloatArray, x: FloatArray) -> None:
+    controller = learner.copy()
+    controller.learn(controller.step(0.0), 0.0)
+    controller.learn(controller.run(x), x)
+
+
+@_use.register(type)
+def _(learner: Any, u: FloatArray, x: FloatArray) -> None:
+    # What is compiled goes neither by sample rate nor by limits.
+    _use(learner(50_000.0, limits=VoltageLimits(0.0, 100.0)), u, x)

@@ -57,17 +57,23 @@ THETA = ("--alpha", 0.02, "--beta", 0.12, "--gamma", 0.0036)
 
 
 def test_demo_reduces_the_error_by_ninety_percent(tmp_path: Path) -> None:
-    from piezoest.demo import run_demo
+    from piezoest.demo import LIMITS, run_demo
 
     said: list[str] = []
     result = run_demo(progress=said.append)
     assert result.seconds < 10.0
     assert result.reduction >= 0.9
-    assert len(said) == 4
+    assert len(said) == 5
     errors = result.adaptive.max_error_per_period()
     assert errors[0] > 5.0 * errors[-1]
     # The start is wrong: without adaptation it is worse than the straight line.
     assert result.fixed.max_error(2) > result.linear.max_error(2)
+    # The controller starts from nothing, and finds what the other one finds.
+    assert result.controller_reduction >= 0.9
+    assert result.learnt["beta"] == pytest.approx(result.adaptive.theta[-1, 1], rel=0.05)
+    assert (
+        LIMITS.minimum <= result.controller.voltage.min() < result.controller.voltage.max() <= LIMITS.maximum
+    )
     result.plot().savefig(tmp_path / "figure.png")
 
 
@@ -76,7 +82,13 @@ def test_demo_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     result = run("demo", "--periods", 5)
     assert result.exit_code == 0
     assert "settled" in result.stdout
-    assert "reduces" in result.stdout
+    for word in (
+        "reduces",
+        "│ AdaptiveFeedforward",
+        "from a wrong start: alpha 0.035 →",
+        "from nothing: alpha 0.02",
+    ):
+        assert word in result.stdout
     assert Path("piezoest_demo.png").stat().st_size > 10_000
 
 

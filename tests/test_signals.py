@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import operator
 from collections.abc import Callable
 from typing import Any
 
@@ -313,10 +314,56 @@ def test_signal_arithmetic() -> None:
     np.testing.assert_array_equal(r.repeat(3).values, np.tile(r.values, 3))
     assert r.repeat(3).period == 200.0
     assert signals.sine(1.0, 7.0, 2, 1000.0).repeat(2).period is None, "the phase breaks at the joint"
-    with pytest.raises(TypeError):
-        r + 3.0
     with pytest.raises(ValueError, match="other must have the same sample rate, 1000 Hz, got 500 Hz"):
         r.then(signals.dwell(0.0, 1.0, 500.0))
+
+
+def test_a_number_shifts_a_signal() -> None:
+    r = signals.sine(1.0, 5.0, 2, 1000.0)
+    for up in (r + 40.0, 40 + r, r - np.float64(-40.0), r + np.uint8(40)):
+        np.testing.assert_array_equal(up.values, r.shifted(40.0).values)
+        assert (up.period, up.sample_rate, up.name) == (200.0, 1000.0, "sine")
+    np.testing.assert_array_equal((r - np.uint8(3)).values, r.shifted(-3.0).values)
+    np.testing.assert_array_equal((3.0 - r).values, 3.0 - r.values)
+    assert (3.0 - r).period == 200.0
+    kinds = {type(each).__name__ for each in (r + r.values, r.values + r, r - r.values, r.values - r)}
+    assert kinds == {"ndarray"}, "sample by sample, as ever"
+    for wrong in ("40", None, [40.0], 40j):
+        for pair in ((r, wrong), (wrong, r)):
+            for combine in (operator.add, operator.sub):
+                with pytest.raises(TypeError, match=r"operand|concatenate"):
+                    combine(*pair)
+    with pytest.raises(TypeError, match="operand"):
+        r - r
+    with pytest.raises(ValueError, match="offset must be finite, got nan"):
+        r + float("nan")
+
+
+# --- the way to the first value ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("start", [0.0, 12.0, 45.0, 80.0])
+def test_a_lead_in_goes_smoothly_from_rest_to_the_first_value(start: float) -> None:
+    r = signals.triangle(5.0, 5.0, 2, 1000.0) + 45.0
+    led = r.with_lead_in(0.3, start=start)
+    assert (led.period, led.sample_rate, led.name) == (200.0, 1000.0, "triangle")
+    assert len(led) == 300 + len(r)
+    np.testing.assert_array_equal(led.values[300:], r.values)
+    way = led.values[:301]
+    assert way[0] == start
+    steps = np.diff(way) * np.sign(45.0 - start)
+    assert np.all(steps >= 0.0), "in one direction, so never beyond its ends"
+    assert np.all(steps[[0, -1]] <= 1e-4 * abs(45.0 - start)), "at rest at both ends"
+    # The steepest of all ways that are at rest at both ends, and whose acceleration is zero there, is 15/8.
+    assert steps.max() <= 1.875 * abs(45.0 - start) / 300
+    assert led.require_continuous() is led
+
+
+def test_a_lead_in_is_no_part_of_the_settled_periods() -> None:
+    r = signals.sine(1.0, 5.0, 3, 1000.0).with_lead_in(0.05, start=-2.0)
+    assert r.period is not None
+    np.testing.assert_array_equal(r.values[-400:], signals.sine(1.0, 5.0, 2, 1000.0).values)
+    assert signals.chirp(1.0, 1.0, 5.0, 1.0, 1000.0).with_lead_in(0.1).period is None
 
 
 # --- jumps ------------------------------------------------------------------------------------------------
@@ -462,6 +509,9 @@ def test_the_verdict_ignores_unit_and_direction_of_time(scale: float, offset: fl
         (lambda: signals.from_array([1.0, np.nan], FS), "values holds 1 values that are NaN"),
         (lambda: signals.from_array(np.zeros((5, 1)), FS), r"pass values\[:, 0\]"),
         (lambda: signals.from_array([1.0], FS, period=0.0), "period must be above zero"),
+        (lambda: signals.dwell(1.0, 0.1, FS).with_lead_in(0.0), "duration must be above zero, got 0"),
+        (lambda: signals.dwell(1.0, 0.1, FS).with_lead_in(1e-6), "duration must cover at least one sample"),
+        (lambda: signals.dwell(1.0, 0.1, FS).with_lead_in(0.1, start=np.nan), "start must be finite"),
         (lambda: check_continuity([0.0, np.inf], FS, "u"), "u holds 1 values"),
     ],
 )

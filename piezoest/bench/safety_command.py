@@ -170,13 +170,15 @@ def _write(settling: bool, rows: list[dict[str, Any]], folder: Path, format: str
 
 def _show(controller: str, seed: int, given: dict[str, Any], folder: Path) -> None:
     """Run one seed again, print its row and draw it."""
+    from piezoest.bench.quiet import quiet
     from piezoest.bench.zoo import draw, play
     from piezoest.bench.zoo.contenders import contender
     from piezoest.bench.zoo.figure import write_figure
     from piezoest.bench.zoo.report import number
 
     rig = draw(seed, **given)
-    row, both = play(rig, contender(controller), traces=True)
+    with quiet():  # its events are printed
+        row, both = play(rig, contender(controller), traces=True)
     for name, value in row.items():
         typer.echo(f"{name:>16} {number(value)}")
     for event in both.events:

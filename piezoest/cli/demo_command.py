@@ -28,7 +28,8 @@ def demo(
 ) -> None:
     """Compare linear feed-forward with adaptive compensation on a simulated stage.
 
-    A smoothed triangle of 5 µm at 5 Hz, noise and quantisation on, from wrong start parameters.
+    A smoothed triangle of 5 µm at 5 Hz, noise and quantisation on, from wrong start parameters; and with
+    AdaptiveFeedforward, which is told the limits of the voltage and nothing else.
     """
     with errors(debug):
         check_figure(output)
@@ -45,12 +46,13 @@ def demo(
 def _print_demo(result: Demo) -> None:
     from rich.table import Table
 
-    from piezoest.demo import AMPLITUDE, FREQUENCY, SETTLED_PERIODS
+    from piezoest.demo import AMPLITUDE, ESTIMATOR, FREQUENCY, LIMITS, SETTLED_PERIODS
 
     ways = (
         ("linear, gain estimated", result.linear),
         ("inverse, not adapted", result.fixed),
         ("inverse, adaptive", result.adaptive),
+        ("AdaptiveFeedforward", result.controller),
     )
     table = Table(title=f"Largest error [µm]: {AMPLITUDE:g} µm at {FREQUENCY:g} Hz, simulated stage")
     table.add_column("compensation")
@@ -64,10 +66,17 @@ def _print_demo(result: Demo) -> None:
     console.print(table)
     names = result.adaptive.parameter_names
     first, last = result.adaptive.theta[0], result.adaptive.theta[-1]
-    learnt = ", ".join(f"{name} {a:.4g} → {b:.4g}" for name, a, b in zip(names, first, last, strict=True))
-    console.print(f"Learnt: {learnt}", highlight=False, soft_wrap=True)
-    console.print(
-        f"Adaptive compensation reduces the settled error of linear feed-forward by "
-        f"[bold]{100.0 * result.reduction:.1f} %[/bold] ({result.seconds:.1f} s for the three runs).",
-        highlight=False, soft_wrap=True,
-    )  # fmt: skip
+    from_wrong = ", ".join(f"{name} {a:.4g} → {b:.4g}" for name, a, b in zip(names, first, last, strict=True))
+    from_nothing = ", ".join(f"{name} {value:.4g}" for name, value in result.learnt.items())
+    for said in (
+        f"Learnt from a wrong start: {from_wrong}",
+        f"Learnt from nothing: {from_nothing}",
+        "Adaptive compensation reduces the settled error of linear feed-forward by "
+        f"[bold]{100.0 * result.reduction:.1f} %[/bold], AdaptiveFeedforward by "
+        f"[bold]{100.0 * result.controller_reduction:.1f} %[/bold] "
+        f"({result.seconds:.1f} s for the four runs).",
+        f"AdaptiveFeedforward is told nothing but the limits of the voltage, {LIMITS.minimum:g} V to "
+        f"{LIMITS.maximum:g} V. Here it learns by {ESTIMATOR.__name__} alone, which compiles sooner than "
+        "the estimators that it has by default.",
+    ):
+        console.print(said, highlight=False, soft_wrap=True)

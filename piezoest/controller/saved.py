@@ -32,8 +32,10 @@ def check_head(name: str, data: Any) -> None:
         Naming what it is.
     """
     instance("data", data, dict, "a dictionary that to_dict() gave")
-    if data.get("controller") != name:
-        raise ValueError(f"data is of a {data.get('controller')!r}, not of a {name}")
+    if "controller" not in data:
+        raise ValueError('data has no "controller": pass what to_dict() of a controller gave')
+    if data["controller"] != name:
+        raise ValueError(f"data is of a {data['controller']!r}, not of a {name}")
     if data.get("format") != FORMAT:
         raise ValueError(f"data has format {data.get('format')!r}, this version reads {FORMAT}")
     fields("data", data, _FIELDS)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, finite, integer, non_negative, positive
 from piezoest.signals._arguments import below_half, number_of_samples
-from piezoest.signals.signal import Signal
+from piezoest.signals.signal import Signal, smooth_rise
 
 
 def dwell(level: float, duration: float, sample_rate: float) -> Signal:
@@ -333,6 +333,4 @@ def _butterworth(cutoff: float, order: int, sample_rate: float) -> FloatArray:
 
 def _faded_in(cycle: FloatArray, n: int) -> FloatArray:
     """Return the `n` samples before the start of a periodic signal, faded in from rest."""
-    s = np.arange(n) / max(n, 1)
-    weight = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)  # zero slope and curvature at both ends
-    return np.asarray(weight * cycle[np.arange(-n, 0) % cycle.size])
+    return np.asarray(smooth_rise(n) * cycle[np.arange(-n, 0) % cycle.size])

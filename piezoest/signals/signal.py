@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
 from piezoest._checks import FloatArray, array_1d, finite, integer, non_negative, positive
+from piezoest.signals._arguments import number_of_samples
 
 # An increment is a jump when it is both a visible part of the range and out of proportion to what
 # happens around it (see check_continuity).
@@ -25,8 +26,9 @@ class Signal:
     """Samples with a sample rate, and a period if there is one.
 
     Behaves as an array where one is wanted (`np.asarray(signal)`, `signal - x`, slices, iteration in plain
-    floats). `signal.then(other)` and `signal + other` append; `2 * signal` scales; `signal.shifted(1.0)` adds
-    an offset. Signals compare by identity.
+    floats). `signal.then(other)` and `signal + other` append; `2 * signal` scales; `signal + 40.0`, as
+    `signal.shifted(40.0)`, adds an offset; `signal.with_lead_in(0.2)` begins at rest. Signals compare by
+    identity.
 
     Parameters
     ----------
@@ -142,11 +144,63 @@ class Signal:
         name = self.name if self.name == other.name else f"{self.name} + {other.name}"
         return Signal(np.concatenate([self.values, other.values]), self.sample_rate, period, name)
 
+    def with_lead_in(self, duration: float, start: float = 0.0) -> Signal:
+        """Return a smooth way from a displacement to the first value, followed by this signal.
+
+        The way goes in one direction and never beyond its ends, where it is at rest: velocity and
+        acceleration are zero.
+
+        Parameters
+        ----------
+        duration : float
+            Of the way, s; the number of samples is rounded.
+        start : float
+            Where the way begins, such as where the stage rests, in the unit of the values.
+
+        Returns
+        -------
+        Signal
+            Its period is that of this signal: the interval over which errors are compared.
+
+        Raises
+        ------
+        ValueError
+            If `duration` covers no sample or `start` is not a finite number.
+
+        Examples
+        --------
+        >>> import piezoest as pz
+        >>> r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=2, sample_rate=1000.0) + 40.0
+        >>> r = r.with_lead_in(0.2, start=12.0)
+        >>> float(r[0]), float(r[200]), len(r)
+        (12.0, 40.0, 600)
+        """
+        n = number_of_samples("duration", positive("duration", duration), self.sample_rate)
+        start = finite("start", start)
+        way = start + (self.values[0] - start) * smooth_rise(n)
+        return Signal(np.concatenate([way, self.values]), self.sample_rate, self.period, self.name)
+
     def __add__(self, other: object) -> Signal:
-        """Append another signal (`then`); an offset is added with `shifted`."""
+        """Append another signal (`then`), or add a number to every value (`shifted`)."""
+        if isinstance(other, Real):
+            return self.shifted(finite("offset", other))
         if not isinstance(other, Signal):
             return NotImplemented
         return self.then(other)
+
+    __radd__ = __add__
+
+    def __sub__(self, offset: object) -> Signal:
+        """Subtract a number from every value."""
+        if not isinstance(offset, Real):
+            return NotImplemented
+        return self.shifted(-finite("offset", offset))
+
+    def __rsub__(self, offset: object) -> Signal:
+        """Subtract every value from a number; `np.float64(2) - signal` is NumPy's, a plain array."""
+        if not isinstance(offset, Real):
+            return NotImplemented
+        return -self + offset
 
     def __mul__(self, factor: object) -> Signal:
         """Scale by a number; `np.float64(2) * signal` is NumPy's product, a plain array."""
@@ -189,6 +243,23 @@ class Signal:
         """
         check_continuity(self.values, self.sample_rate, self.name, allowed_step=allowed_step)
         return self
+
+
+def smooth_rise(n: int) -> FloatArray:
+    """Rise from 0 towards 1, which the sample after these would be; slope and curvature zero at both ends.
+
+    Parameters
+    ----------
+    n : int
+        Samples of the rise.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        From 0 upwards.
+    """
+    s = np.arange(n) / max(n, 1)
+    return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 
 
 def check_continuity(

@@ -11,6 +11,7 @@ from typing import Any
 
 from piezoest.bench.adaptation import json_safe
 from piezoest.bench.executors import in_processes
+from piezoest.bench.quiet import quiet
 from piezoest.bench.store import Store
 from piezoest.bench.zoo.contenders import code_of, contender
 from piezoest.bench.zoo.drawing import draw
@@ -49,6 +50,7 @@ class Task:
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
+@quiet()
 def carry_out(task: Task) -> Row:
     """Run a task.
 

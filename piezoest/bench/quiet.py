@@ -1,0 +1,21 @@
+"""Warnings of a campaign's runs, which are in its table and not on the screen."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Iterator
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Keep what piezoest logs from the screen, where Python puts warnings that nobody has asked for.
+
+    Handlers that somebody has set up are given them as before.
+    """
+    log, nobody = logging.getLogger("piezoest"), logging.NullHandler()
+    log.addHandler(nobody)
+    try:
+        yield
+    finally:
+        log.removeHandler(nobody)
