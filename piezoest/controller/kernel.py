@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba.extending import register_jitable
 
 from piezoest.compile import Record, Vector, compiled
 from piezoest.controller import candidate
@@ -43,7 +44,7 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
-        noticed=COUNT, notice=whole(0.0, 5.0),
+        noticed=COUNT, notice=whole(0.0, 6.0),
         # What the line misses, what it missed when it drove, what the stage misses of the reference.
         score=candidate.SCORE, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
         travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,
@@ -84,8 +85,21 @@ def learn_all(state: Record, settings: Record, r: Vector, u: Vector, x: Vector) 
         take(state, settings, r[k], u[k], x[k])
 
 
+@register_jitable
+def _begin(state: Any, settings: Any, u: Any) -> None:
+    state.u = state.planned = u
+    starts.begin(state.start, u)
+    state.start.given = 1.0 if settings.start.gain != 0.0 else 0.0
+
+
 @compiled
 def begin(state: Record, settings: Record, u: float) -> None:
     """Begin with a state of zeros, at rest at a voltage."""
-    state.u = state.planned = u
-    starts.begin(state.start, u)
+    _begin(state, settings, u)
+
+
+@compiled
+def begin_at(state: Record, settings: Record, u: float, x: float) -> None:
+    """Begin with a state of zeros, at rest at a voltage where the sensor reads x."""
+    _begin(state, settings, u)
+    starts.rest_at(state.start, settings.start, u, x)

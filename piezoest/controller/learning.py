@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import candidate, driving, redraw, slots
+from piezoest.controller import candidate, driving, given, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
@@ -57,13 +57,6 @@ def _hand_over(state: Any, settings: Any) -> None:
 
 
 @register_jitable
-def _notice(state: Any, fault: Any) -> None:
-    """Note a fault, or its end, for the log."""
-    state.noticed += 1.0
-    state.notice = fault
-
-
-@register_jitable
 def _follow_zero(state: Any) -> None:
     """Readings run at a distance from the line for long: they are right, and their zero may have moved."""
     readings, line = state.readings, state.line
@@ -77,7 +70,7 @@ def _follow_zero(state: Any) -> None:
         return
     if plain:
         state.zero += jump
-        _notice(state, reading.MOVED)
+        reading.notice(state, reading.MOVED)
     lines.forget(line.now)
     line.before.count = 0.0
     line.centre += jump
@@ -92,7 +85,7 @@ def _name_silence(state: Any) -> None:
     fault = reading.NO_RESPONSE if silent else reading.NONE
     if fault != state.readings.fault:
         state.readings.fault = fault
-        _notice(state, fault)
+        reading.notice(state, fault)
 
 
 @register_jitable
@@ -156,23 +149,29 @@ def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any) -> float:
     x = reading.middle(state.readings, x)
     lines.add(recent, u, x, settings.doubling)
     way = np.abs(u - start.origin)
-    if way >= state.confirmed and way > 0.0:
+    if start.given != 0.0:
+        given.compare(state, settings)
+    elif way >= state.confirmed and way > 0.0:
         # Only on new ground: on the way back hysteresis would pass for gain.
         state.confirmed = way
         gain = (recent.mean_x - start.zero) / (recent.mean_u - start.origin)
         line.gain = gain if gain * line.gain > 0.0 else line.gain
+    if state.stage == SEEK:
+        return np.nan
     line.centre = recent.mean_x - line.gain * recent.mean_u
     start.samples += 1.0
     target = lines.voltage(line, r)
     missing = np.abs(target - u)
     at_limit = (u <= settings.minimum and target < u) or (u >= settings.maximum and target > u)
-    if missing <= NEAR * np.abs(u - start.origin) or at_limit or start.samples > LONGEST:
-        state.stage = RUN
+    there = (missing <= NEAR * np.abs(u - start.origin) or at_limit) and start.given == 0.0
+    if there or (start.samples > LONGEST and start.doubted == 0.0):
+        state.stage, start.given, start.doubted = RUN, 0.0, 0.0
         lines.begin(line, line.gain, recent.mean_u, recent.mean_x)
         # What is left of the way is paid on the run.
         state.owed = (r - lines.at(line, u)) / state.unit
         _begin_swings(state, r, u, np.abs(start.target - start.from_u))
-    return x
+    # Nobody learns in the unit of a gain that may be wrong.
+    return x if start.given == 0.0 else np.nan
 
 
 @register_jitable
@@ -183,7 +182,7 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
     x = reading.believed(state.readings, state.line, state.travel, redraw.memory(state, settings), u, x, gone)
     _follow_zero(state)
     if state.readings.fault != before:
-        _notice(state, state.readings.fault)
+        reading.notice(state, state.readings.fault)
         if state.readings.fault != reading.NONE:
             driving.drive(state, 0.0)
             redraw.hold(state)

@@ -23,6 +23,7 @@ MEANINGS = {
     "scaled": "the readings answer far more or far less than before",
     "saturated": "the readings stand still at a level",
     "zero moved": "the readings have moved by a constant, which is followed",
+    "gain": "the stage answers with {gain_before:.3g} µm/V, not {gain:.3g}: the gain is sought",
 }
 
 
@@ -117,7 +118,8 @@ def event(state: Any, sample_rate: float) -> Event:
     if not name:
         return Event(time, "resumed", "the readings follow the voltage again")
     action = "fell back" if number == state["readings"]["fault"] else "went on"
-    return Event(time, action, f"{name}: {MEANINGS.get(name, 'the readings cannot be believed')}")
+    start = {each: float(state["start"][each]) + 0.0 for each in ("gain", "gain_before")}
+    return Event(time, action, f"{name}: {MEANINGS[name].format_map(start)}")
 
 
 def misses(state: Any) -> list[float | None]:

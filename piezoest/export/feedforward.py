@@ -52,6 +52,7 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
         "feedforward",
         [
             f"AdaptiveFeedforward at {controller.sample_rate:g} Hz, corridor {data['corridor']:g}.",
+            *([f"Gain: about {data['gain']:g} um/V."] if data["gain"] else []),
             f"Limits: {limits}.",
             *(line for each in data["estimators"] for line in estimator_lines(each)),
         ],

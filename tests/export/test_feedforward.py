@@ -123,6 +123,16 @@ def test_it_goes_on_from_where_it_was_exported() -> None:
     drive(library, board, rig("duhem"), count=2500)
 
 
+@pytest.mark.parametrize("gain", [0.2, -0.2])
+def test_a_gain_that_is_known_need_not_be_right(gain: float) -> None:
+    library = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), gain=gain)
+    code = pz.export.c(library)
+    assert f"Gain: about {gain:g} um/V." in code.header
+    seen = drive(library, pz.export.CompiledFeedforward(code), rig("duhem", "lag"))
+    assert {stage for stage, _, _ in seen} == {0, 1, 2}
+    assert any(event.reason.startswith("gain") for event in library.events) == (gain < 0.0)
+
+
 def test_track_takes_it_as_a_controller() -> None:
     r = pz.signals.triangle(5.0, 20.0, 4, FS)
     voltages = []
