@@ -55,6 +55,9 @@ class AdaptiveFeedforward(Face):
         The same as displacement over the whole range of the limits [µm].
     model : Model, optional
         The same as a model, of which its slope counts. At most one of the three.
+    feedback : float, optional
+        Integral gain of a feedback from the readings that are believed [1/s], as of `IntegralFeedback`; it
+        corrects no more than the corridor's width. Default: none.
 
     Raises
     ------
@@ -99,11 +102,13 @@ class AdaptiveFeedforward(Face):
         gain: float | None = None,
         stroke: float | None = None,
         model: Any = None,
+        feedback: float | None = None,
     ) -> None:
         sample_rate, limits = moderate("sample_rate", sample_rate), making.checked_limits(limits, sample_rate)
         factories = team.DEFAULT if estimators is None else estimators
         half_range = 0.5 * (limits.maximum - limits.minimum)
-        options = making.options(corridor, making.known_gain(gain, stroke, model, limits))
+        known = making.known_gain(gain, stroke, model, limits)
+        options = making.options(sample_rate, corridor, known, feedback)
         self._make(sample_rate, limits, options, team.made(factories, sample_rate, half_range))
 
     def _make(self, sample_rate: float, limits: VoltageLimits, options: Any, estimators: Any) -> None:
@@ -300,7 +305,8 @@ class AdaptiveFeedforward(Face):
         limits = making.checked_limits(saved.read_limits(data["limits"]), sample_rate)
         controller = cls.__new__(cls)
         estimators = saved.read_estimators(data["estimators"], data["state"])
-        controller._make(sample_rate, limits, making.options(data["corridor"], data["gain"]), estimators)
+        options = making.options(sample_rate, data["corridor"], data["gain"], data["feedback"])
+        controller._make(sample_rate, limits, options, estimators)
         controller._load(data)
         return controller
 

@@ -41,6 +41,8 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         driving=whole(0.0, 4.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,
         # z = (x - zero)/unit is what candidates know of a reading.
         unit=NUMBER, zero=MEASURED,
+        # Correction of the reference by feedback [µm].
+        feedback=NUMBER,
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
@@ -51,7 +53,7 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         start=starts.START, candidates=candidates,
     )  # fmt: skip
     settings = record(
-        minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED,
+        minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED, feedback=FIXED,
         start=starts.SETTINGS, candidates=candidate_settings,
     )  # fmt: skip
     return state, settings

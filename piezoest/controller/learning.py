@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import candidate, driving, given, redraw, slots
+from piezoest.controller import candidate, driving, feedback, given, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
@@ -119,7 +119,7 @@ def _leave_limit(state: Any, beyond: Any, moved: Any) -> None:
     """Where the stage stands beyond the reference for long, though the line has followed: begin anew."""
     state.railed = state.railed + moved if beyond and state.readings.fault == reading.NONE else 0.0
     if state.railed > RESTED * state.reference.swing:
-        state.stage, state.driving = SEEK, 0.0
+        state.stage, state.driving, state.feedback = SEEK, 0.0, 0.0
         starts.begin_again(state.start, state.u)
 
 
@@ -230,6 +230,8 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         x = _approach(state, settings, r, u, x)
     else:
         x = _believe(state, settings, u, x, gone, moved)
+        if state.stage == RUN and np.isfinite(x):
+            feedback.follow(state, settings, x)
     _learn_from(state, settings, x)
     if state.stage == RUN and state.readings.fault == reading.NONE and _is_due(state, gone):
         state.handed = 0.0

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from piezoest._checks import WILDEST, finite, fraction, instance, moderate
+from piezoest._checks import WILDEST, finite, fraction, instance, moderate, non_negative
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import candidate, kernel, slots
+from piezoest.controller.feedback import FASTEST
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import Field, Record, new
 from piezoest.models import Model
@@ -75,7 +76,7 @@ def _gain(name: str, value: Any) -> float:
     return number
 
 
-def options(corridor: Any, gain: Any) -> dict[str, float]:
+def options(sample_rate: float, corridor: Any, gain: Any, feedback: Any) -> dict[str, float]:
     """Return what users choose beside limits and estimators, checked.
 
     Raises
@@ -83,7 +84,17 @@ def options(corridor: Any, gain: Any) -> dict[str, float]:
     ValueError
         If a value is out of its range.
     """
-    return {"corridor": fraction("corridor", corridor), "gain": finite("gain", gain) and _gain("gain", gain)}
+    feedback = 0.0 if feedback is None else non_negative("feedback", feedback)
+    if feedback > FASTEST * sample_rate:
+        raise ValueError(
+            f"feedback must be at most {FASTEST * sample_rate:g} 1/s, {FASTEST:g} of sample_rate, got "
+            f"{feedback:g}: it is to be far slower than the stage"
+        )
+    return {
+        "corridor": fraction("corridor", corridor),
+        "gain": finite("gain", gain) and _gain("gain", gain),
+        "feedback": feedback,
+    }
 
 
 def rest(limits: VoltageLimits, voltage: Any) -> float:
@@ -122,6 +133,7 @@ def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, f
         "largest_step": limits.largest_step,
         "doubling": max(5.0, 4e-3 * sample_rate),
         "corridor": options["corridor"],
+        "feedback": options["feedback"] / sample_rate,
         "start": {
             "gain": options["gain"],
             "way": 0.005 * width,

@@ -25,16 +25,18 @@ AHEAD, LATE = 2.0, 3.0
 
 @register_jitable
 def _feed_forward(state: Any, settings: Any, r: Any) -> float:
-    """Voltage of the model that drives, in the corridor around the line."""
+    """Voltage of the model that drives, in the corridor around the line, for reference and feedback."""
     line = state.line
     swing = max(state.reference.swing, np.abs(r - state.reference.turned))
     kept = driving.kept(state.reference, np.abs(r - state.reference.last), swing)
+    back = state.feedback
+    r += back
     straight = wanted = lines.voltage(line, r - state.owed * kept * state.unit)
     if state.pending <= 1.0 and state.readings.fault == reading.NONE and state.driving > 0.0:
         z = (r - state.zero) / state.unit - slots.owed(state.candidates, state.driving, 0.0) * kept
         wanted = slots.voltage(state.candidates, settings.candidates, state.driving, z, straight)
         # Near a turn the inverse of a wide loop leaps, which would shake a resonance.
-        ahead = straight - lines.voltage(line, state.reference.last - state.owed * state.unit)
+        ahead = straight - lines.voltage(line, state.reference.last + back - state.owed * state.unit)
         most = (RATE - 1.0) * np.abs(ahead)
         wanted = min(max(wanted, state.u + ahead - most), state.u + ahead + most)
     if not np.abs(wanted) < WILDEST:
