@@ -148,11 +148,36 @@ class AdaptiveFeedforward(Face):
         self._compiled()  # before a live loop, not at its first sample
 
     def _compiled(self) -> tuple[Any, ...]:
-        """Machine code: to plan and to learn from a sample, a block."""
+        """Machine code: to plan and to learn from a sample, a block; to home."""
         if self._loops is None:
-            every = (kernel.step, kernel.learn, kernel.run, kernel.learn_all)
+            every = (kernel.step, kernel.learn, kernel.run, kernel.learn_all, kernel.home)
             self._loops = tuple(loop.of(*self._layouts) for loop in every)
         return self._loops
+
+    def home(self, amplitude: float | None = None, frequency: float = 1.0, cycles: int = 10) -> None:
+        """Begin a sweep of the voltage that erases what hysteresis remembers.
+
+        After a power cut, or writes of which nobody knows the outcome, the models and the stage remember
+        different things. The next steps ignore the reference: the voltage swings about the rest voltage, or
+        about the middle of the limits where that has no room for it, less and less far; `status` says
+        ``"homing"``. Then it approaches the reference, or seeks the gain if that is not known.
+
+        Parameters
+        ----------
+        amplitude : float, optional
+            Of the first swing [V]. Default: half the range of the limits, which erases everything.
+        frequency : float
+            [Hz]; lower where the slew rate asks for it.
+        cycles : int
+            How many, 1 to 10 000: with ten each swing is a tenth less than the one before.
+
+        Raises
+        ------
+        ValueError
+            If one is out of its range, or the amplitude has no room.
+        """
+        given = making.sweep(self._limits, self._sample_rate, amplitude, frequency, cycles)
+        self._compiled()[4](self._state, self._settings, *given)
 
     # ------------------------------------------------------------ sample by sample, block by block
 
@@ -211,8 +236,10 @@ class AdaptiveFeedforward(Face):
 
         Parameters
         ----------
-        u : float, or array_like, shape (N,)
-            Voltage [V] of the last `step`; of the last `run`, as an array.
+        u : float or None, or array_like, shape (N,)
+            Voltage [V] of the last `step`; of the last `run`, as an array. None or NaN says that nobody
+            knows whether it was written: if that matters, the straight line drives until the models have
+            shown again what they do.
         x : float or None, or array_like, shape (N,)
             Measured displacement [µm]; None, NaN or infinity where there is none. What is no number counts
             as missing, as in `HysteresisRLS.step`: a stream must not stop.

@@ -64,8 +64,9 @@ class Face:
         """What happened so far, and how it stands: a frozen record.
 
         ``samples`` learnt from, ``missing`` references, ``stage`` of the work (``"seeking"``,
-        ``"approaching"``, ``"running"``), ``driving`` (``"line"`` or the name of an estimator), ``fault`` of
-        the readings (empty if none), samples ``saturated`` and ``slewed``, ``switches`` of the model.
+        ``"approaching"``, ``"running"``, ``"homing"``), ``driving`` (``"line"`` or the name of an estimator),
+        ``fault`` of the readings (empty if none), samples ``saturated`` and ``slewed``, ``switches`` of the
+        model.
         """
         state = self._state
         counted = ("samples", "missing", "saturated", "slewed", "switches")

@@ -8,12 +8,12 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import candidate, driving, feedback, given, redraw, slots
+from piezoest.controller import candidate, doubt, driving, feedback, given, homing, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.voltage import APPROACH, RUN, SEEK
+from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK
 
 # Models are handed over after this fraction of a swing; legs of the line before another model drives.
 HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 2.0
@@ -201,10 +201,46 @@ def _is_due(state: Any, gone: Any) -> bool:
 
 
 @register_jitable
+def begin_homing(state: Any, settings: Any, amplitude: Any, turn: Any, cycles: Any) -> bool:
+    """Begin to erase what hysteresis remembers; whether it can be."""
+    if not homing.begin(state.homing, settings, state.u, amplitude, turn, cycles):
+        return False
+    if state.unit != 0.0:
+        doubt.all_models(state)
+    state.stage, state.feedback = HOME, 0.0
+    reading.forget(state.readings)
+    return True
+
+
+@register_jitable
+def _home(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """Follow the sweep; behind it the way to the reference begins, or the gain is sought."""
+    start, line, recent = state.start, state.line, state.readings.recent
+    if state.unit != 0.0:
+        slots.advance(state.candidates, settings.candidates, u)
+        slots.learn(state.candidates, settings.candidates, u, np.nan)
+    if np.abs(x) < WILDEST:
+        lines.add(recent, u, reading.middle(state.readings, x), settings.doubling)
+    if not homing.follow(state.homing):
+        return
+    if state.unit == 0.0:
+        state.stage = SEEK
+        starts.begin_again(start, u)
+        return
+    here = lines.at(line, u)
+    if recent.count > 0.0:
+        here = recent.mean_x + line.gain * (u - recent.mean_u)
+    starts.rest_at(start, settings.start, u, here, line.gain)
+    _begin_learning(state, settings)
+
+
+@register_jitable
 def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     """Learn from a voltage that was written and a reading."""
     state.samples += 1.0
     if not np.abs(u) < WILDEST:
+        if state.stage == RUN:
+            doubt.lose_write(state)
         return
     state.pending = 0.0
     state.u = u
@@ -217,6 +253,9 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         _name_silence(state)
         if state.start.stage == starts.DONE:
             _begin_learning(state, settings)
+        return
+    if state.stage == HOME:
+        _home(state, settings, u, x)
         return
     moved = travels.follow(state.reference, r)
     redraw.pay(state, settings, moved)

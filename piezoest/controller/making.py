@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from piezoest._checks import WILDEST, finite, fraction, instance, moderate, non_negative
+from piezoest._checks import WILDEST, finite, fraction, instance, integer, moderate, non_negative, positive
 from piezoest.compensators.limits import VoltageLimits
-from piezoest.controller import candidate, kernel, slots
+from piezoest.controller import candidate, homing, kernel, slots
 from piezoest.controller.feedback import FASTEST
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import Field, Record, new
@@ -111,6 +111,29 @@ def rest(limits: VoltageLimits, voltage: Any) -> float:
             f"voltage must lie within the limits, {limits.minimum:g} V to {limits.maximum:g} V, got {u:g} V"
         )
     return u
+
+
+def sweep(
+    limits: VoltageLimits, sample_rate: float, amplitude: Any, frequency: Any, cycles: Any
+) -> tuple[float, float, float]:
+    """Return amplitude [V], cycles of a sample and cycles of a sweep that erases hysteresis.
+
+    Raises
+    ------
+    ValueError
+        If one is out of its range.
+    """
+    most = 0.5 * (limits.maximum - limits.minimum)
+    amplitude = most if amplitude is None else positive("amplitude", amplitude)
+    if amplitude > most:
+        raise ValueError(f"amplitude must be at most {most:g} V, half the range, got {amplitude:g} V")
+    frequency = moderate("frequency", frequency)
+    if frequency > homing.FASTEST * sample_rate:
+        raise ValueError(
+            f"frequency must be at most {homing.FASTEST * sample_rate:g} Hz, {homing.FASTEST:g} of "
+            f"sample_rate, got {frequency:g} Hz"
+        )
+    return amplitude, frequency / sample_rate, float(integer("cycles", cycles, 1, int(homing.MOST)))
 
 
 def measured(name: str, value: Any) -> float:

@@ -20,9 +20,9 @@ from piezoest.layout import AMOUNT, COUNT, MEASURED, record, whole
 # Faults: none; no response; response the wrong way round; far too large or too small; the reading stops at a
 # level; the reading's zero has moved.
 NONE, NO_RESPONSE, REVERSED, SCALED, SATURATED, MOVED = (float(i) for i in range(6))
-# What is noted beside: the stage answers otherwise than the user's gain says.
-OTHER_GAIN = 6.0
-FAULTS = ("", "no response", "reversed", "scaled", "saturated", "zero moved", "gain")
+# What is noted beside: the stage answers otherwise than the user's gain says; a write may have been lost.
+OTHER_GAIN, UNKNOWN = 6.0, 7.0
+FAULTS = ("", "no response", "reversed", "scaled", "saturated", "zero moved", "gain", "unknown voltage")
 
 READINGS = record(
     fault=whole(0.0, 5.0),

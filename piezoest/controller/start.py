@@ -84,13 +84,13 @@ def _go(start: Any, settings: Any, u: Any) -> None:
 
 
 @register_jitable
-def rest_at(start: Any, settings: Any, u: Any, x: Any) -> None:
-    """The stage rests, and reads x: go the first way, or none where the user knows the gain."""
+def rest_at(start: Any, settings: Any, u: Any, x: Any, gain: Any) -> None:
+    """The stage rests, and reads x: go the first way, or none where the gain is known and not zero."""
     start.from_x = start.zero = start.now = x
     start.way = settings.way if settings.highest - u >= u - settings.lowest else -settings.way
     _go(start, settings, u)
-    if start.given != 0.0:
-        start.stage, start.gain = DONE, settings.gain
+    if gain != 0.0:
+        start.stage, start.gain = DONE, gain
         start.voltage = start.origin = u
         start.total = 0.0
 
@@ -107,7 +107,14 @@ def _settle_rest(start: Any, settings: Any, u: Any) -> None:
         first[j] = value
     # The farthest one may be wrong.
     start.noise = 0.6 * min(first[FIRST - 1] - first[1], first[FIRST - 2] - first[0])
-    rest_at(start, settings, u, first[FIRST // 2])
+    rest_at(start, settings, u, first[FIRST // 2], start.given * settings.gain)
+
+
+@register_jitable
+def smooth(from_u: Any, target: Any, share: Any) -> float:
+    """The voltage after a share of a way that begins and ends gently."""
+    share = min(share, 1.0)
+    return from_u + share * share * (3.0 - 2.0 * share) * (target - from_u)
 
 
 @register_jitable
@@ -115,7 +122,7 @@ def _move(start: Any, settings: Any) -> None:
     """The next voltage of a way, which begins and ends gently."""
     start.samples += 1.0
     share = min(start.samples / settings.ramp, 1.0)
-    start.voltage = start.from_u + share * share * (3.0 - 2.0 * share) * (start.target - start.from_u)
+    start.voltage = smooth(start.from_u, start.target, share)
     if share >= 1.0:
         start.stage, start.voltage = WAIT, start.target
         start.sum = start.squares = start.summed = start.windows = start.total = 0.0

@@ -8,12 +8,12 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import driving, slots
+from piezoest.controller import driving, homing, slots
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 
-# The gain is sought; the voltage goes to where the reference needs it; all is learnt.
-SEEK, APPROACH, RUN = 0.0, 1.0, 2.0
+# The gain is sought; the voltage goes to where the reference needs it; all is learnt; hysteresis is erased.
+SEEK, APPROACH, RUN, HOME = 0.0, 1.0, 2.0, 3.0
 # The corridor reaches no farther from the line than so many times what the line has missed of late.
 WIDER = 1.3
 # A model's voltage moves no faster than so many times the line's.
@@ -74,6 +74,8 @@ def plan(state: Any, settings: Any, r: Any) -> float:
         wanted = state.start.voltage
     elif state.stage == APPROACH:
         wanted = _nearer(state, settings, lines.voltage(state.line, r))
+    elif state.stage == HOME:
+        wanted = homing.voltage(state.homing, state.u)
     else:
         wanted = _feed_forward(state, settings, r)
     if not np.abs(wanted) < WILDEST:
