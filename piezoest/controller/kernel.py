@@ -40,6 +40,8 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         driving=whole(0.0, 4.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,
         # z = (x - zero)/unit is what candidates know of a reading.
         unit=NUMBER, zero=MEASURED,
+        # Half the swing that they began with; zero before [V].
+        scale=AMOUNT,
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.

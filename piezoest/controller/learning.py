@@ -22,6 +22,12 @@ NEAR, LONGEST = 0.05, 1e4
 # At a limit the stage may stand beyond the reference for this travel of it, in swings, before all begins
 # anew; the line follows sooner.
 RESTED, BEYOND = 4.0, 0.1
+# The models begin where the voltage is farther from where all began than this fraction of half the range, in
+# a unit that is usual then.
+WIDE, USUAL = 0.12, 0.4
+# Else in the second leg when it has gone this fraction of the first, if that was so many times as long as the
+# way of the start, or after the second leg. Their unit is no smaller than this fraction of that way.
+PASSED, LARGE, SMALLEST = 0.7, 4.0, 0.25
 # No miss counts for more than so many swings.
 FARTHEST = 3.0
 
@@ -33,8 +39,6 @@ def _begin_learning(state: Any, settings: Any) -> None:
     if state.unit == 0.0:
         state.unit = start.gain
         state.zero = start.now - start.gain * start.voltage
-        slots.begin(state.candidates, settings.candidates, start.origin)
-        slots.advance(state.candidates, settings.candidates, start.voltage)
     lines.begin(state.line, start.gain, start.voltage, start.now)
     least = np.abs(start.target - start.from_u)
     travels.begin(state.reference, state.r, least * np.abs(start.gain))
@@ -49,9 +53,35 @@ def _begin_learning(state: Any, settings: Any) -> None:
 
 
 @register_jitable
+def _size_up(state: Any, settings: Any, u: Any) -> None:
+    """Let the models begin when the voltage has shown how far it swings: in that unit they learn soonest."""
+    travel, models, numbers = state.travel, state.candidates, settings.candidates
+    origin, half_range = state.start.origin, 0.5 * (settings.maximum - settings.minimum)
+    if np.abs(u - origin) > WIDE * half_range:
+        # On the first way from rest all is known that models and estimators remember.
+        state.scale = USUAL * half_range
+        slots.begin(models, numbers, origin, origin, state.scale)
+        slots.learn(models, numbers, origin, (state.start.zero - state.zero) / state.unit)
+        slots.advance(models, numbers, u)
+        return
+    if state.stage == APPROACH or travel.turns == 0.0:
+        return
+    leg, way = np.abs(u - travel.turned), np.abs(state.start.target - state.start.from_u)
+    early = leg > PASSED * travel.leg > PASSED * LARGE * way
+    if early or travel.turns > 1.0:
+        # Early, the second leg is expected to go on as far again.
+        state.scale = max(travel.leg if early else 0.5 * travel.leg, SMALLEST * way)
+        slots.begin(models, numbers, origin, travel.turned + travel.direction * state.scale, state.scale)
+        slots.advance(models, numbers, travel.turned)
+        slots.advance(models, numbers, u)
+        slots.shift(models, numbers, (state.readings.last - state.zero) / state.unit)
+
+
+@register_jitable
 def _hand_over(state: Any, settings: Any) -> None:
     """Take up the estimators' models of now, and choose which drives; without a bump."""
-    slots.hand_over(state.candidates, settings.candidates)
+    if state.scale > 0.0:
+        slots.hand_over(state.candidates, settings.candidates)
     if state.line.legs >= FIRST_LEGS:
         driving.reconsider(state)
 
@@ -105,7 +135,8 @@ def _score(state: Any, settings: Any, u: Any, x: Any, z: Any) -> None:
     bound = FARTHEST * state.travel.swing
     miss = z - driving.line_z(state) - state.owed
     candidate.judge(state.score, min(max(miss, -bound), bound), swings)
-    slots.judge(state.candidates, z, swings, bound)
+    if state.scale > 0.0:
+        slots.judge(state.candidates, z, swings, bound)
     if settings.minimum < u < settings.maximum:
         # No model is to blame for a limit.
         off = (x - state.r) / state.unit
@@ -136,7 +167,8 @@ def _learn_from(state: Any, settings: Any, x: Any) -> None:
     z = (x - state.zero) / state.unit
     if np.isfinite(x):
         _score(state, settings, state.u, x, z)
-    slots.learn(state.candidates, settings.candidates, state.u, z)
+    if state.scale > 0.0:
+        slots.learn(state.candidates, settings.candidates, state.u, z)
 
 
 @register_jitable
@@ -213,7 +245,7 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     r = state.r
     if state.stage == SEEK:
         starts.learn(state.start, settings.start, u, x)
-        if state.unit != 0.0:
+        if state.scale > 0.0:
             slots.advance(state.candidates, settings.candidates, u)
         _name_silence(state)
         if state.start.stage == starts.DONE:
@@ -226,7 +258,10 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         redraw.draw(state)
     state.gone += gone
     state.handed += gone
-    slots.advance(state.candidates, settings.candidates, u)
+    if state.scale > 0.0:
+        slots.advance(state.candidates, settings.candidates, u)
+    else:
+        _size_up(state, settings, u)
     if state.stage == APPROACH:
         x = _approach(state, settings, r, u, x)
     else:
