@@ -61,7 +61,7 @@ PARTS: dict[str, Callable[[Row], bool]] = {
 
 def judged(rows: Sequence[Row], column: str = "ratio") -> list[float]:
     """Ratios that count."""
-    return [row[column] for row in rows if row["fair"] and row.get(column) is not None]
+    return [row[column] for row in rows if row.get(column) is not None]
 
 
 def part(rows: Sequence[Row]) -> Row:

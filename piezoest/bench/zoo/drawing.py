@@ -19,6 +19,7 @@ USUAL_AMPLITUDE = (0.2, 10.0)  # µm
 FREQUENCY = (0.5, 50.0)  # Hz
 WIDTH = (0.08, 0.25)
 SAMPLES, MOST = 30_000, 200_000
+BLOCKS = 4  # of a run, at least
 BY_SAMPLE, ONE_BY_ONE = 25_000, 0.15  # samples of a run that may be handed over one by one; how often
 
 
@@ -93,6 +94,8 @@ def draw(seed: int, **given: Any) -> Rig:
     fault = draw_fault(kind, pick("mode", None), np.random.default_rng([seed, 22]), facts)
     block = 1 if rng.random() < ONE_BY_ONE else round(pick.log(1.0, 500.0))
     block = block if plain.values.size <= BY_SAMPLE else max(block, 10)
+    # Of a run that is one block nothing can be learnt.
+    block = min(block, plain.values.size // BLOCKS)
     block = integer("block", pick("block", block), 1)
     pick.check()
     return Rig(

@@ -1,5 +1,7 @@
 """What a controller has to be better than: the best straight line for the healthy stage, held throughout.
 
+It is drawn in hindsight; see `learnt_line` for the one that somebody could have had.
+
 u = (r - centre)/gain, where displacement = gain u + centre is the least-squares line of a healthy twin
 that is driven over the same reference; in the coordinates of the gauge.
 """

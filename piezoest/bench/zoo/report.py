@@ -8,11 +8,12 @@ from typing import Any
 from piezoest.bench.zoo.settling import SEGMENTS
 
 KEY = (
-    "Ratio: largest error after two swings, over the largest of 1.5 times that of the best straight line, "
-    "three times the noise and 0.2 % of the swing; rms: the same of root mean squares; last: of the last "
-    "cycle; after: from two swings after a transient fault, or after the beginning of one that stays. At a "
-    "limit: the voltage rests there for more than a quarter swing though the line's lies well within. Runs "
-    "in which no reading ever says anything have no ratio that counts."
+    "Ratio: largest error after two swings, over the largest of 1.5 times that of the straight line, three "
+    "times the noise and 0.2 % of the swing; rms: the same of root mean squares; cycle: the largest of all "
+    "cycles, each with the line's error in that very cycle; last: of the last cycle; "
+    "after: from two swings after a transient fault, or after the beginning of one that stays. The line is "
+    "the worse one of two: that drawn in hindsight, and that learnt leg by leg. At a limit: the voltage "
+    "rests there for more than a quarter swing though the line's lies well within."
 )
 
 

@@ -11,7 +11,6 @@ from piezoest._checks import FloatArray
 from piezoest.bench.zoo.families import Reach
 from piezoest.bench.zoo.faults import (
     FAULTS,
-    START,
     TRANSIENT,
     Around,
     Fault,
@@ -147,15 +146,20 @@ class Rig:
 
     @property
     def judged_from(self) -> int:
-        """First sample that is judged: two swings after the beginning, or after a fault at the start."""
+        """First sample that is judged: after the beginning, or a fault at the start, and time to learn."""
         plain, fault = self.plain, self.fault
         ends = fault.stop if fault.mode == TRANSIENT and fault.start == 0 else 0
-        return min(max(plain.begins, ends) + plain.two_swings, plain.values.size)
+        return min(max(plain.begins, ends) + self.learning, plain.values.size)
 
     @property
-    def fair(self) -> bool:
-        """Whether a controller can know anything about the stage: not where no reading ever says anything."""
-        return not (self.fault.mode == START and FAULTS[self.fault.kind].silent)
+    def learning(self) -> int:
+        """Samples that learning may take: two swings, and the block at whose end the first reading comes."""
+        return self.plain.two_swings + (self.block if self.block > 1 else 0)
+
+    def seen(self, true: FloatArray) -> FloatArray:
+        """True displacements, shape (N,) [µm], in the gauge's coordinates."""
+        factor, zero = self.coordinates
+        return factor * true + zero
 
     def stage(self, *, healthy: bool = False) -> Any:
         """Make the stage, at rest.
@@ -226,5 +230,4 @@ class Rig:
             "fault_size": fault.size,
             "fault_start": fault.start / self.sample_rate,
             "fault_stop": fault.stop / self.sample_rate,
-            "fair": self.fair,
         }

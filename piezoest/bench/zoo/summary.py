@@ -12,12 +12,20 @@ from piezoest.bench.zoo.playing import Row
 from piezoest.bench.zoo.settling import SEGMENTS
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
-RATIOS = ("ratio", "ratio_rms", "last_ratio", "last_ratio_rms", "after_ratio", "after_ratio_rms")
+RATIOS = (
+    "ratio",
+    "ratio_rms",
+    "cycle_ratio",
+    "last_ratio",
+    "last_ratio_rms",
+    "after_ratio",
+    "after_ratio_rms",
+)
 SOON = 2  # periods
 
 
 def _over(column: str) -> Callable[[Row], bool]:
-    return lambda row: row.get(column) is not None and row[column] > 1.0 and bool(row["fair"])
+    return lambda row: row.get(column) is not None and row[column] > 1.0
 
 
 # Name of a criterion and whether a row violates it.
@@ -48,7 +56,7 @@ def summarise(rows: Iterable[Row], worst: int = 10) -> dict[str, Any]:
     """
     rows = list(rows)
     healthy = [row for row in rows if row["fault"] == "none"]
-    ranked = sorted((row for row in rows if row["fair"]), key=_badness, reverse=True)
+    ranked = sorted(rows, key=_badness, reverse=True)
     columns = ("seed", "family", "reference", "fault", "mode", "ratio", "last_ratio", "after_ratio", "rail",
                "driver", "failure")  # fmt: skip
     return dict(
@@ -76,7 +84,7 @@ def _badness(row: Row) -> float:
 
 
 def _quantiles(rows: Sequence[Row], column: str) -> dict[str, Any]:
-    values = [row[column] for row in rows if row["fair"] and row.get(column) is not None]
+    values = [row[column] for row in rows if row.get(column) is not None]
     return {f"{100 * q:g} %": float(np.quantile(values, q)) if values else None for q in QUANTILES}
 
 
