@@ -98,13 +98,21 @@ def test_single_wrong_readings_are_left_out() -> None:
 
 
 def test_a_small_way_changes_no_slope() -> None:
-    """While the reference rests there is nothing to draw a line through."""
-    rig = rig_with("dwell", "transient")
+    """While the reference rests there is nothing to draw a line through, but to hold its level by."""
+    rig = rig_with("dwell", "transient", waves=20)
     run = learnt(rig)[0]
     rests = slice(rig.fault.start + rig.plain.cycle + rig.block, rig.fault.stop)
     assert rests.stop - rests.start > 20
-    assert np.ptp(run.voltage[rests]) < 0.1
+    assert np.abs(run.error[rests]).max() < 0.5 < np.abs(run.error[rig.fault.start])
     assert np.abs(run.error[-100:]).max() < 1.3 * np.abs(learnt(rig_with())[0].error[-100:]).max()
+
+
+def test_it_never_stays_where_it_does_not_belong() -> None:
+    """A line that has gone to a limit comes back."""
+    rig = rig_with("zero-off", "permanent", amplitude=3.0, gain=0.4)
+    run = learnt(rig)[0]
+    assert abs(rig.fault.size) == 20.0
+    assert np.abs(run.error[-100:]).max() < 1.0
 
 
 def test_the_worse_line_of_both_counts() -> None:

@@ -17,7 +17,8 @@ COLUMNS: dict[str, type] = {
     "rail": float, "rests_at_rail": bool, "swing": float, "noise": float, "floor": float,
     "judged_from": float, **{f"{part}{name}": float for part in ("", "last_", "after_") for name in ERRORS},
     "cycle_ratio": float, "settled": float, "events": int, "named": str, "named_first": str,
-    "named_after": float, "driver": str, "status": str, "microseconds": float,
+    "named_after": float, "named_right": bool, "named_periods": float,
+    "recovery": bool, "recovered": int, "driver": str, "status": str, "microseconds": float,
 }  # fmt: skip
 
 CELL_COLUMNS: dict[str, type] = {

@@ -47,6 +47,18 @@ class Fault:
         return TRANSIENT if not self.lasting else START if self.start == 0 else PERMANENT
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """What a controller is to call it; empty if it need not be noticed.
+
+        Of what is there from the start only a stage that does not answer can be noticed: else the readings
+        have never been different.
+        """
+        kind = FAULTS.get(self.kind, Kind())
+        if self.mode == START:
+            return kind.names if kind.hides and STILL[0] in kind.names else ()
+        return kind.names
+
+    @property
     def right(self) -> bool:
         """Whether the gauge is right by definition, since the reference is in its coordinates."""
         return (self.kind == "zero-off" and self.lasting) or (
@@ -100,6 +112,8 @@ class Kind:
         Whether nothing can be learnt meanwhile: readings say nothing or lie, or the stage stands still.
     partly : bool
         Whether some readings are wrong and the others right.
+    names : tuple of str
+        What a controller may call it; empty if it need not be noticed.
     """
 
     modes: tuple[str, ...] = (TRANSIENT, PERMANENT)
@@ -107,6 +121,7 @@ class Kind:
     stage: Callable[[Any, Fault, Around], Any] = lambda stage, fault, around: stage
     hides: bool = False
     partly: bool = False
+    names: tuple[str, ...] = ()
 
 
 def _times(fault: Fault, around: Around) -> tuple[float, float]:
@@ -133,41 +148,49 @@ def _zero(rng: Any, around: Around) -> float:
 
 
 ALL = (START, TRANSIENT, PERMANENT)
+STILL, FACTORS = (
+    ("no response", "saturated"),
+    ("reversed", "scaled"),
+)  # readings stand still, or are multiplied
+ANY = (*STILL, *FACTORS, "zero moved")
 
 FAULTS: dict[str, Kind] = {
     "amplifier-frozen": Kind(
-        ALL, stage=lambda stage, fault, around: FrozenAmplifier(stage, *_times(fault, around)), hides=True
+        ALL, stage=lambda stage, fault, around: FrozenAmplifier(stage, *_times(fault, around)), hides=True,
+        names=STILL,
     ),
     "stage-stuck": Kind(
         ALL, stage=lambda stage, fault, around: StuckStage(
             stage, *_times(fault, around), around.noise, seed=around.seed
         ),
-        hides=True,
+        hides=True, names=STILL,
     ),
     "sensor-constant": Kind(
-        ALL, stage=lambda stage, fault, around: Stuck(stage, *_times(fault, around)), hides=True
+        ALL, stage=lambda stage, fault, around: Stuck(stage, *_times(fault, around)), hides=True, names=STILL
     ),
     "sensor-noise": Kind(
         ALL, size=lambda rng, around: around.reference.centre + rng.uniform(-1.0, 1.0) * around.stroke,
         stage=lambda stage, fault, around: Dead(
             stage, *_times(fault, around), fault.size, 0.002 * _swing(around), seed=around.seed
         ),
-        hides=True,
+        hides=True, names=ANY,
     ),
     "sensor-saturated": Kind(
         ALL, size=lambda rng, around: 0.6 * around.reference.amplitude,
         stage=_for_a_time(
             lambda stage, fault, around: Saturation(stage, fault.size, around.reference.centre)
         ),
-        partly=True,
+        partly=True, names=("saturated",),
     ),
     "sensor-factor": Kind(
         ALL, size=lambda rng, around: float(rng.choice([-1.0, 1e-3, 1e3])),
         stage=_for_a_time(lambda stage, fault, around: Factor(stage, fault.size)), hides=True,
+        names=FACTORS,
     ),
     "zero-off": Kind(
         ALL, size=_zero,
         stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)), hides=True,
+        names=("zero moved",),
     ),
     "zero-off-shifted": Kind(
         ALL, size=_zero,

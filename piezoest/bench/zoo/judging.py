@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,12 +10,12 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo.faults import PERMANENT, TRANSIENT
 from piezoest.bench.zoo.line import FittedLine
+from piezoest.bench.zoo.naming import recovery, settled
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Traces
 
 ALLOWED, NOISES, NEGLIGIBLE = 1.5, 3.0, 0.002  # of the line's error, of the noise, of the swing
 AT_LIMIT, WITHIN = 1e-6, 0.01  # of the voltage's range: on a limit, and clearly within both
-LAST = 3  # cycles that a settled error is taken over
 ERRORS = ("worst", "rms", "line_worst", "line_rms", "learnt_worst", "learnt_rms", "ratio", "ratio_rms")
 
 
@@ -64,10 +64,7 @@ def judge(rig: Rig, run: Traces, lines: Lines) -> dict[str, Any]:
     for name, window in windows.items():
         row |= _compared(name, error[window], [each[window] for each in errors_line], floor)
     row["cycle_ratio"] = _in_each_cycle(cycle, error[first:], [each[first:] for each in errors_line], floor)
-    ends = [error[max(first, n - (k + 1) * cycle) : n - k * cycle] for k in range(LAST)]
-    worst = [float(part.max()) for part in ends if part.size]
-    row["settled"] = float(np.median(worst)) if worst else None
-    return row
+    return {**row, "settled": settled(error[first:], cycle), **recovery(rig, error, floor)}
 
 
 def _after(rig: Rig) -> slice:
@@ -131,43 +128,3 @@ def _rail(rig: Rig, run: Traces, lines: Lines) -> Any:
     rests = ((u <= low + AT_LIMIT * span) | (u >= high - AT_LIMIT * span)) & inside
     count = np.cumsum(rests)
     return count - np.maximum.accumulate(np.where(rests, 0, count))
-
-
-def named(rig: Rig, controller: Any) -> dict[str, Any]:
-    """What a controller said: names of its events, how soon after the fault, and what drove at last.
-
-    Parameters
-    ----------
-    rig : Rig
-        From `piezoest.bench.zoo.draw`.
-    controller : object
-        With ``events`` and ``status``, if it has them.
-    """
-    events = list(getattr(controller, "events", ()))
-    status = getattr(controller, "status", {})
-    status = status if isinstance(status, dict) else {}
-    start = rig.fault.start / rig.sample_rate
-    names = [(float(event.time), _name(event)) for event in events]
-    later = (
-        [(time - start, name) for time, name in names if time >= start] if rig.fault.mode != "none" else []
-    )
-    return {
-        "events": len(events),
-        "named": "; ".join(_distinct(name for _, name in names)),
-        "named_first": later[0][1] if later else None,
-        "named_after": later[0][0] if later else None,
-        "driver": next((_short(status[key]) for key in ("driver", "drives", "model") if key in status), None),
-        "status": "; ".join(f"{key}={_short(value)}" for key, value in status.items()),
-    }
-
-
-def _name(event: Any) -> str:
-    return str(getattr(event, "name", None) or getattr(event, "action", ""))
-
-
-def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)[:80]
-
-
-def _distinct(names: Iterable[str]) -> list[str]:
-    return list(dict.fromkeys(names))

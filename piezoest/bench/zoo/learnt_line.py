@@ -14,7 +14,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo.faults import truthful
-from piezoest.bench.zoo.line import FittedLine
+from piezoest.bench.zoo.line import FittedLine, slope_of
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Traces
 
@@ -92,13 +92,11 @@ def _first(rig: Rig, u: float, x: float) -> FittedLine:
 
 
 def _redrawn(rig: Rig, line: FittedLine, u: FloatArray, x: FloatArray, hindsight: float) -> FittedLine:
-    """The line through true readings; the same one where they say too little."""
-    if u.size < FEWEST * _leg(rig) or rig.gain * np.ptp(u) < LEAST * 2.0 * rig.plain.amplitude:
+    """The line through true readings: the same one if they are few, of the same slope if they are close."""
+    if u.size < FEWEST * _leg(rig):
         return line
-    mean_u, mean_x = float(u.mean()), float(x.mean())
-    du = u - mean_u
-    mean_slope = rig.coordinates[0] * rig.gain
-    least, most = sorted((1.0, hindsight / mean_slope))
-    slope = float(du @ (x - mean_x) / (du @ du)) / mean_slope
-    gain = mean_slope * min(max(slope, least / STEEPEST), most * STEEPEST)
-    return FittedLine(gain, mean_x - gain * mean_u)
+    mean_slope, gain = rig.coordinates[0] * rig.gain, line.gain
+    if abs(mean_slope) * np.ptp(u) > LEAST * 2.0 * rig.plain.amplitude:
+        least, most = sorted((1.0, hindsight / mean_slope))
+        gain = mean_slope * min(max(slope_of(u, x) / mean_slope, least / STEEPEST), most * STEEPEST)
+    return FittedLine(gain, float(x.mean() - gain * u.mean()))
