@@ -13,7 +13,7 @@ from typer.testing import CliRunner, Result
 from piezoest.bench.store import Store
 from piezoest.bench.tables import write_table
 from piezoest.bench.zoo import columns, draw, play, settling, summary, tasks
-from piezoest.bench.zoo.contenders import contender
+from piezoest.bench.zoo.contenders import CANDIDATES, CHANGED, DEFAULT, contender
 from piezoest.bench.zoo.controllers import Line, Parts
 from piezoest.bench.zoo.families import FAMILIES
 from piezoest.bench.zoo.faults import FAULTS
@@ -257,6 +257,18 @@ def test_controllers_of_ones_own(own: str, tmp_path: Path) -> None:
     assert contender(f"{own}:weak")(1000.0, draw(1, **SHORT).limits).step(0.3) == pytest.approx(1.0)
 
 
+def test_the_default_controller_changed() -> None:
+    known = {name: contender(name).args[0].keywords for name in CHANGED}  # type: ignore[attr-defined]
+    assert known["line"] == {"estimators": ()}
+    assert known["no-corridor"] == {"corridor": 1.0}
+    alone = {name: given["estimators"] for name, given in known.items() if given.get("estimators")}
+    assert {name: (each.__name__,) for name, (each,) in alone.items()} == {name: (name,) for name in alone}
+    assert {*CANDIDATES} < {*alone}
+    # What is compared with the best of its estimators has these.
+    default = contender(DEFAULT)(1000.0, draw(1, **SHORT).limits)
+    assert [each["estimator"] for each in default.to_dict()["estimators"]] == [*CANDIDATES]
+
+
 def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
     planned = tasks.runs(f"{own}:Dies", range(2), SHORT)
     cell = tasks.cells(f"{own}:Dies", settling.cells([0], families=["paper"])[:1])
@@ -275,7 +287,7 @@ def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (["-c", "Nothing"], "controller Nothing"),
-        (["-c", "HysteresisRLS"], "it is no controller"),
+        (["-c", "LinearGain"], "it is no controller"),
         (["-c", "parts", "--set", "colour"], "write it as name=value"),
         (["-c", "parts", "--set", "colour=red"], "choose of amplitude"),
         (["-c", "parts", "--map", "--set", "gain=1"], "leave out --set"),

@@ -23,8 +23,8 @@ COLUMNS: dict[str, type] = {
 
 CELL_COLUMNS: dict[str, type] = {
     "key": str, "controller": str, "family": str, "amplitude": float, "frequency": float, "seed": int,
-    "gain": float, "width": float, "block": int, "noise": float, "failure": str, "change": str,
-    "periods": int, "error": float, "allowed": float,
+    "gain": float, "width": float, "block": int, "noise": float, "mechanics": str, "asked": bool,
+    "failure": str, "change": str, "periods": int, "error": float, "allowed": float,
 }  # fmt: skip
 
 

@@ -24,13 +24,15 @@ from piezoest.compensators import VoltageLimits
 from piezoest.models import Creep, MassSpringDamper
 from piezoest.stage import Amplifier, Gauge, SimulatedStage
 
-# Mechanics by name. The lag is a stage so damped that only its slow pole is left: a first-order low-pass.
+# Mechanics by name: natural frequency [Hz] and damping. The lag is a stage so damped that only its slow pole
+# is left: a first-order low-pass.
 MECHANICS: dict[str, tuple[float, float]] = {
     "none": (0.0, 0.0),
     "200 Hz": (200.0, 0.01),
     "400 Hz": (400.0, 0.01),
     "780 Hz": (780.0, 0.02),
 }
+DAMPING = 0.01  # of a resonance that is given as its frequency
 LAG_DAMPING = 2.0
 SLOW_POLE = LAG_DAMPING - (LAG_DAMPING**2 - 1.0) ** 0.5  # of the lag, relative to its natural frequency
 
@@ -42,7 +44,7 @@ class Surroundings:
     Parameters
     ----------
     mechanics : str
-        Name in `MECHANICS`, or "lag".
+        Name in `MECHANICS`, another frequency as in "523 Hz", or "lag".
     lag : float
         Corner of the lag [Hz]; 0 without.
     delay : int
@@ -73,6 +75,15 @@ class Surroundings:
     creep: float = 0.0
     hum: float = 0.0
     drift: float = 0.0
+
+    @property
+    def resonance(self) -> tuple[float, float]:
+        """Natural frequency [Hz], 0 for none, and damping of the mechanics."""
+        if self.mechanics == "lag":
+            return self.lag / SLOW_POLE, LAG_DAMPING
+        if self.mechanics in MECHANICS:
+            return MECHANICS[self.mechanics]
+        return float(self.mechanics.removesuffix(" Hz")), DAMPING
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -193,9 +204,7 @@ class Rig:
         return stage
 
     def _mechanics(self) -> MassSpringDamper | None:
-        if self.around.mechanics == "lag":
-            return MassSpringDamper(self.around.lag / SLOW_POLE, LAG_DAMPING)
-        frequency, damping = MECHANICS[self.around.mechanics]
+        frequency, damping = self.around.resonance
         return MassSpringDamper(frequency, damping) if frequency else None
 
     def to_dict(self) -> dict[str, Any]:
