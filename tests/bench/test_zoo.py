@@ -290,7 +290,9 @@ def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
         (["-c", "LinearGain"], "it is no controller"),
         (["-c", "parts", "--set", "colour"], "write it as name=value"),
         (["-c", "parts", "--set", "colour=red"], "choose of amplitude"),
-        (["-c", "parts", "--map", "--set", "gain=1"], "leave out --set"),
+        (["-c", "parts", "--map", "--set", "gain=1"], "--map draws its rigs itself"),
+        (["--singles", "--set", "gain=1"], "--singles draws its rigs itself"),
+        (["--singles", "--map"], "leave out --set, and one of two maps"),
     ],
 )
 def test_what_cannot_be_run_is_said(arguments: list[str], said: str, tmp_path: Path) -> None:
