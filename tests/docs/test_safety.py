@@ -74,7 +74,7 @@ def test_sums_count_what_is_judged_only(program: Any) -> None:
 
 
 def test_faults_that_were_named_and_forgotten_are_counted(program: Any, page: Any) -> None:
-    stuck = {"fault": "stage-stuck", "mode": "transient"}
+    stuck: dict[str, Any] = {"fault": "stage-stuck", "mode": "transient"}
     rows = [
         row(0, **stuck, named_right=True, named_periods=2.0, recovery=True, recovered=1),
         row(1, **stuck, named_right=True, named_periods=4.0, recovery=True, recovered=3),
