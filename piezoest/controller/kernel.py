@@ -33,8 +33,8 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         # Reference planned for, voltage planned, voltage written.
         r=MEASURED, planned=MEASURED, u=MEASURED,
         # Farthest way from the start's voltage that was answered; travel of the reference with the voltage at
-        # a limit for nothing, in swings.
-        confirmed=AMOUNT, railed=AMOUNT,
+        # a limit, and with a voltage that stood still.
+        confirmed=AMOUNT, railed=AMOUNT, frozen=AMOUNT,
         # The model that drives, 0 for the line; what changes of the line owe; swings since another one drove,
         # those that one drives at least, changes so far.
         driving=whole(0.0, 4.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,

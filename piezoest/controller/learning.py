@@ -19,8 +19,8 @@ from piezoest.controller.voltage import APPROACH, RUN, SEEK
 HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 2.0
 # The way to the reference is over within this fraction of its length, or after so many readings.
 NEAR, LONGEST = 0.05, 1e4
-# At a limit the stage may stand beyond the reference for this travel of it, in swings, before all begins
-# anew; the line follows sooner.
+# The voltage may rest at a limit for this travel of the reference, in swings, before all begins anew; where
+# the stage stands beyond the reference there, the line follows sooner.
 RESTED, BEYOND = 4.0, 0.1
 # The models begin where the voltage is farther from where all began than this fraction of half the range, in
 # a unit that is usual then.
@@ -28,6 +28,11 @@ WIDE, USUAL = 0.12, 0.4
 # Else in the second leg when it has gone this fraction of the first, if that was so many times as long as the
 # way of the start, or after the second leg. Their unit is no smaller than this fraction of that way.
 PASSED, LARGE, SMALLEST = 0.7, 4.0, 0.25
+# Readings of a moved zero have at least this slope relative to the line's; they are near the reference by
+# so many swings if it has moved, too.
+LEAST_SLOPE, NEAR_IT = 0.2, 0.6
+# The voltage stands still for this travel of the reference, in swings: it is frozen.
+FROZEN = 0.4
 # No miss counts for more than so many swings.
 FARTHEST = 3.0
 
@@ -95,15 +100,26 @@ def _notice(state: Any, fault: Any) -> None:
 
 @register_jitable
 def _follow_zero(state: Any) -> None:
-    """Readings run at a distance from the line for long: they are right, and their zero may have moved."""
+    """Readings run at a distance from the line: their zero has moved, for good or not.
+
+    If the reference has moved with it, or the line is not sure, the line follows at once. Else it holds for
+    long, for the gauge may come back; then the gauge is believed.
+    """
     readings, line = state.readings, state.line
-    if readings.fault != reading.NONE or readings.off < reading.OFF_FOR:
+    if readings.off < reading.OFF_FOR:
         return
     recent = readings.recent
     jump = recent.mean_x - lines.at(line, recent.mean_u)
     slope = lines.slope(recent) / line.gain
     plain = 0.5 < slope < 2.0 and lines.explained(recent) > lines.EXPLAINED
-    if not plain and line.agreed >= reading.TRUSTED:
+    sure = line.agreed >= reading.TRUSTED
+    known = readings.fault == reading.NONE or readings.fault == reading.MOVED
+    if not plain and (sure or not known or slope < LEAST_SLOPE):
+        return
+    near = np.abs(readings.last - state.r) < NEAR_IT * np.abs(line.gain) * state.travel.swing
+    if sure and not near and readings.off < reading.HELD_FOR:
+        if known:
+            readings.fault = reading.MOVED
         return
     if plain:
         state.zero += jump
@@ -111,14 +127,26 @@ def _follow_zero(state: Any) -> None:
     lines.forget(line.now)
     line.before.count = 0.0
     line.centre += jump
+    line.held_centre += jump
     state.owed -= jump / state.unit
     readings.off = readings.spikes = 0.0
+    if readings.fault == reading.MOVED:
+        readings.fault = reading.NONE
+
+
+@register_jitable
+def _watch_voltage(state: Any, settings: Any, gone: Any, moved: Any) -> None:
+    """An amplifier that does not move its voltage with the reference answers nothing."""
+    within = settings.minimum < state.u < settings.maximum
+    state.frozen = state.frozen + moved if gone == 0.0 and within else 0.0
+    if state.frozen > FROZEN * state.reference.swing and state.readings.fault == reading.NONE:
+        state.readings.fault, state.readings.good = reading.NO_RESPONSE, 0.0
 
 
 @register_jitable
 def _name_silence(state: Any) -> None:
     """Where no voltage was answered there is no response."""
-    silent = state.start.tries > 0.0 and state.start.stage != starts.DONE
+    silent = state.start.tries >= 1.0 and state.start.stage != starts.DONE
     fault = reading.NO_RESPONSE if silent else reading.NONE
     if fault != state.readings.fault:
         state.readings.fault = fault
@@ -153,12 +181,13 @@ def _is_beyond(state: Any, settings: Any, x: Any) -> bool:
 
 
 @register_jitable
-def _leave_limit(state: Any, beyond: Any, moved: Any) -> None:
-    """Where the stage stands beyond the reference for long, though the line has followed: begin anew."""
-    state.railed = state.railed + moved if beyond and state.readings.fault == reading.NONE else 0.0
+def _leave_limit(state: Any, settings: Any, moved: Any) -> None:
+    """Where the voltage rests at a limit for long, all that is known may be wrong: begin anew."""
+    rests = state.u <= settings.minimum or state.u >= settings.maximum
+    state.railed = state.railed + moved if rests and state.readings.fault == reading.NONE else 0.0
     if state.railed > RESTED * state.reference.swing:
         state.stage, state.driving = SEEK, 0.0
-        starts.begin_again(state.start, state.u)
+        starts.begin_again(state.start, settings.start, state.u)
 
 
 @register_jitable
@@ -212,16 +241,19 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
     """The reading where it can be believed, NaN where not; what is wrong is noted, and the line drives."""
     before = state.readings.fault
     raw = x
+    if not settings.minimum < u < settings.maximum:
+        state.line.clipped = 1.0
     x = reading.believed(state.readings, state.line, state.travel, redraw.memory(state, settings), u, x, gone)
     _follow_zero(state)
+    _watch_voltage(state, settings, gone, moved)
     if state.readings.fault != before:
         _notice(state, state.readings.fault)
         if state.readings.fault != reading.NONE:
             driving.drive(state, 0.0)
             redraw.hold(state)
     beyond = _is_beyond(state, settings, raw)
-    _leave_limit(state, beyond, moved)
-    far = state.railed > BEYOND * state.reference.swing or redraw.is_young(state)
+    _leave_limit(state, settings, moved)
+    far = (beyond and state.railed > BEYOND * state.reference.swing) or redraw.is_young(state)
     if far and state.readings.fault == reading.NONE:
         redraw.follow(state)
     return x
