@@ -9,13 +9,11 @@ from typing import Any, Self, cast
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, finite, fraction, moderate, number_or_nan
+from piezoest._checks import FloatArray, array_1d, moderate, number_or_nan
 from piezoest.compensators.limits import VoltageLimits
-from piezoest.controller import kernel, making, saved, shown, slots, team
-from piezoest.controller.shown import Candidate, ControllerStatus
-from piezoest.layout import Record, by_name, from_bytes, write
-from piezoest.models import Model
-from piezoest.supervisor import Event
+from piezoest.controller import kernel, making, saved, shown, team
+from piezoest.controller.face import Face
+from piezoest.layout import by_name, from_bytes, write
 
 # Events that are kept.
 MOST_EVENTS = 1000
@@ -25,7 +23,7 @@ _COUNTED = ("missing", "saturated", "slewed", "planned")
 _log = logging.getLogger(__name__)
 
 
-class AdaptiveFeedforward:
+class AdaptiveFeedforward(Face):
     """Lets a stage follow a reference of which nothing is known but the voltage that it bears.
 
     It finds out the gain by two small steps of the voltage, goes to where the reference is, and then learns
@@ -50,12 +48,22 @@ class AdaptiveFeedforward:
     corridor : float
         How far the voltage goes from the straight line at most, as a fraction of half the recent swing,
         0 to 1.
+    gain : float, optional
+        What the stage does [µm/V], about; below zero if it falls with the voltage. The start seeks nothing
+        then: the way to the reference checks it, and what is a factor of three off is sought after all.
+    stroke : float, optional
+        The same as displacement over the whole range of the limits [µm].
+    model : Model, optional
+        The same as a model, of which its slope counts. At most one of the three.
+    feedback : float, optional
+        Integral gain of a feedback from the readings that are believed [1/s], as of `IntegralFeedback`; it
+        corrects no more than the corridor's width. Default: none.
 
     Raises
     ------
     ValueError
-        If a value is out of its range, the limits are infinite or of another sample rate, or an estimator is
-        none that a controller can use.
+        If a value is out of its range, the limits are infinite or of another sample rate, an estimator is
+        none that a controller can use, or the gain is given twice.
 
     Notes
     -----
@@ -79,10 +87,7 @@ class AdaptiveFeedforward:
     'running'
     """
 
-    __slots__ = (
-        "_corridor", "_estimators", "_events", "_layouts", "_limits", "_loops", "_names", "_planned",
-        "_sample_rate", "_settings", "_start", "_state",
-    )  # fmt: skip
+    __slots__ = ("_loops", "_options", "_planned", "_start")
 
     _loops: tuple[Any, ...] | None
     _planned: FloatArray | None
@@ -94,53 +99,84 @@ class AdaptiveFeedforward:
         limits: VoltageLimits,
         estimators: Any = None,
         corridor: float = kernel.WIDTH,
+        gain: float | None = None,
+        stroke: float | None = None,
+        model: Any = None,
+        feedback: float | None = None,
     ) -> None:
         sample_rate, limits = moderate("sample_rate", sample_rate), making.checked_limits(limits, sample_rate)
         factories = team.DEFAULT if estimators is None else estimators
-        self._make(sample_rate, limits, corridor, team.made(factories, sample_rate))
+        known = making.known_gain(gain, stroke, model, limits)
+        options = making.options(sample_rate, corridor, known, feedback)
+        self._make(sample_rate, limits, options, team.made(factories, sample_rate))
 
-    def _make(self, sample_rate: float, limits: VoltageLimits, corridor: float, estimators: Any) -> None:
+    def _make(self, sample_rate: float, limits: VoltageLimits, options: Any, estimators: Any) -> None:
         """Make room for estimators that are known to be good ones."""
-        self._sample_rate, self._limits = sample_rate, limits
-        self._corridor = fraction("corridor", corridor)
+        self._sample_rate, self._limits, self._options = sample_rate, limits, options
         self._estimators, self._names = estimators, team.names(estimators)
-        self._layouts, self._start = making.room(sample_rate, limits, self._corridor, estimators)
+        self._layouts, self._start = making.room(sample_rate, limits, options, estimators)
         self._state, self._settings = self._start[0].copy(), self._start[1].copy()
         self._loops = None
         self.reset()
 
-    def reset(self, voltage: float | None = None) -> None:
-        """Return to the state after construction: nothing is known.
+    def reset(self, voltage: float | None = None, displacement: float | None = None) -> None:
+        """Return to the state after construction: nothing is known but what was said then.
 
         Parameters
         ----------
         voltage : float, optional
             Voltage at which the stage rests [V], within the limits. Default: the one nearest to 0 V.
+        displacement : float, optional
+            What the sensor reads there [µm]. Default: the first readings say it.
 
         Raises
         ------
         ValueError
-            If the voltage is none within the limits.
+            If the voltage is none within the limits, or the displacement no number of µm.
         """
-        u = self._limits.rest if voltage is None else finite("voltage", voltage)
-        if not self._limits.minimum <= u <= self._limits.maximum:
-            raise ValueError(
-                f"voltage must lie within the limits, {self._limits.minimum:g} V to "
-                f"{self._limits.maximum:g} V, got {u:g} V"
-            )
+        u = making.rest(self._limits, voltage)
+        x = None if displacement is None else making.measured("displacement", displacement)
         write(self._state, self._start[0])
         write(self._settings, self._start[1])
-        self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
+        self._events = deque(maxlen=MOST_EVENTS)
         self._planned = None
-        kernel.begin.of(*self._layouts)(self._state, self._settings, u)
+        if x is None:
+            kernel.begin.of(*self._layouts)(self._state, self._settings, u)
+        else:
+            kernel.begin_at.of(*self._layouts)(self._state, self._settings, u, x)
         self._compiled()  # before a live loop, not at its first sample
 
     def _compiled(self) -> tuple[Any, ...]:
-        """Machine code: to plan and to learn from a sample, a block."""
+        """Machine code: to plan and to learn from a sample, a block; to home."""
         if self._loops is None:
-            every = (kernel.step, kernel.learn, kernel.run, kernel.learn_all)
+            every = (kernel.step, kernel.learn, kernel.run, kernel.learn_all, kernel.home)
             self._loops = tuple(loop.of(*self._layouts) for loop in every)
         return self._loops
+
+    def home(self, amplitude: float | None = None, frequency: float = 1.0, cycles: int = 10) -> None:
+        """Begin a sweep of the voltage that erases what hysteresis remembers.
+
+        After a power cut, or writes of which nobody knows the outcome, the models and the stage remember
+        different things. The next steps ignore the reference: the voltage swings about the rest voltage, or
+        about the middle of the limits where that has no room for it, less and less far; `status` says
+        ``"homing"``. Then it approaches the reference, or seeks the gain if that is not known.
+
+        Parameters
+        ----------
+        amplitude : float, optional
+            Of the first swing [V]. Default: half the range of the limits, which erases everything.
+        frequency : float
+            [Hz]; lower where the slew rate asks for it.
+        cycles : int
+            How many, 1 to 10 000: with ten each swing is a tenth less than the one before.
+
+        Raises
+        ------
+        ValueError
+            If one is out of its range, or the amplitude has no room.
+        """
+        given = making.sweep(self._limits, self._sample_rate, amplitude, frequency, cycles)
+        self._compiled()[4](self._state, self._settings, *given)
 
     # ------------------------------------------------------------ sample by sample, block by block
 
@@ -201,8 +237,10 @@ class AdaptiveFeedforward:
 
         Parameters
         ----------
-        u : float, or array_like, shape (N,)
-            Voltage [V] of the last `step`; of the last `run`, as an array.
+        u : float or None, or array_like, shape (N,)
+            Voltage [V] of the last `step`; of the last `run`, as an array. None or NaN says that nobody
+            knows whether it was written: if that matters, the straight line drives until the models have
+            shown again what they do.
         x : float or None, or array_like, shape (N,)
             Measured displacement [µm]; None, NaN or infinity where there is none. What is no number counts
             as missing, as in `HysteresisRLS.step`: a stream must not stop.
@@ -246,94 +284,6 @@ class AdaptiveFeedforward:
         level = logging.WARNING if event.action == "fell back" else logging.INFO
         _log.log(level, "%s at %.6g s, %s", event.action, event.time, event.reason)
 
-    # ------------------------------------------------------------ what it shows
-
-    @property
-    def sample_rate(self) -> float:
-        """[Hz]."""
-        return self._sample_rate
-
-    @property
-    def limits(self) -> VoltageLimits:
-        """Limits that the voltage never leaves."""
-        return self._limits
-
-    @property
-    def voltage(self) -> float:
-        """Voltage given out last [V]."""
-        return float(self._state["planned"])
-
-    @property
-    def state(self) -> Any:
-        """All that changes but the models in use, by name: ``state["line"]["gain"]``."""
-        return self._state
-
-    @property
-    def settings(self) -> Any:
-        """What compiled code is given beside `state`, the models in use among it, by name."""
-        return self._settings
-
-    @property
-    def layouts(self) -> tuple[Record, Record]:
-        """Layouts of `state` and `settings`, for which the compiled functions are made."""
-        return self._layouts
-
-    @property
-    def status(self) -> ControllerStatus:
-        """What happened so far, and how it stands: a frozen record.
-
-        ``samples`` learnt from, ``missing`` references, ``stage`` of the work (``"seeking"``,
-        ``"approaching"``, ``"running"``), ``driving`` (``"line"`` or the name of an estimator), ``fault`` of
-        the readings (empty if none), samples ``saturated`` and ``slewed``, ``switches`` of the model.
-        """
-        state = self._state
-        counted = ("samples", "missing", "saturated", "slewed", "switches")
-        return ControllerStatus(
-            stage=shown.stage_name(state["stage"]),
-            driving=self._names[int(state["driving"])],
-            fault=shown.fault_name(state["readings"]["fault"]),
-            **{name: int(state[name]) for name in counted},
-        )
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """What was noticed of the readings, oldest first, the last thousand.
-
-        ``time`` is that of the sample [s]. ``action`` is ``"fell back"`` (a fault: the line drives and nobody
-        learns), ``"resumed"`` (it is over) or ``"went on"`` (what moved is followed); ``reason`` begins with
-        the fault's name. Of several in one block the last is kept.
-        """
-        return tuple(self._events)
-
-    @property
-    def candidates(self) -> tuple[Candidate, ...]:
-        """All models that can drive, the line first: frozen records.
-
-        Each has a ``name``, ``missed`` (what it has missed of late, root mean square [µm]; None if nothing is
-        known), ``drives`` and ``model``.
-        """
-        driving = int(self._state["driving"])
-        misses = shown.misses(self._state)
-        return tuple(
-            Candidate(name, misses[i], i == driving, self._model(i)) for i, name in enumerate(self._names)
-        )
-
-    @property
-    def model(self) -> Model | None:
-        """The model that drives, in µm and V; None until the gain is known.
-
-        A `LinearGain`, `ColemanHodgdon` or `PrandtlIshlinskii`. While it takes over from another one, the
-        voltage is not its own yet.
-        """
-        return self._model(int(self._state["driving"]))
-
-    def _model(self, number: int) -> Model | None:
-        """The line, or the model of an estimator."""
-        if number == 0:
-            return shown.line(self._state)
-        start = self._estimators[number - 1].model
-        return shown.model(start, self._state, self._settings, slots.NAMES[number - 1])
-
     # ------------------------------------------------------------ copies and files
 
     def copy(self) -> Self:
@@ -355,7 +305,7 @@ class AdaptiveFeedforward:
             "format": saved.FORMAT,
             "sample_rate": self._sample_rate,
             "limits": saved.limits(self._limits),
-            "corridor": self._corridor,
+            **self._options,
             "estimators": [team.saved(estimator) for estimator in self._estimators],
             "state": by_name(self._layouts[0], self._state),
             "models": saved.models(self._layouts[1], self._settings),
@@ -383,7 +333,8 @@ class AdaptiveFeedforward:
         limits = making.checked_limits(saved.read_limits(data["limits"]), sample_rate)
         controller = cls.__new__(cls)
         estimators = saved.read_estimators(data["estimators"], data["state"])
-        controller._make(sample_rate, limits, data["corridor"], estimators)
+        options = making.options(sample_rate, data["corridor"], data["gain"], data["feedback"])
+        controller._make(sample_rate, limits, options, estimators)
         controller._load(data)
         return controller
 

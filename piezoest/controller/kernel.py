@@ -8,14 +8,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba.extending import register_jitable
 
 from piezoest.compile import Record, Vector, compiled
-from piezoest.controller import candidate
+from piezoest.controller import candidate, homing
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.learning import take
+from piezoest.controller.learning import begin_homing, take
 from piezoest.controller.voltage import plan
 from piezoest.layout import AMOUNT, COUNT, FIXED, MEASURED, NUMBER, record, whole
 from piezoest.layout import Record as Layout
@@ -29,7 +30,7 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
     state = record(
         samples=COUNT, missing=COUNT, saturated=COUNT, slewed=COUNT,
         # What it is doing; voltages planned since the last one was written; samples that waited for a block.
-        stage=whole(0.0, 2.0), pending=COUNT, block=AMOUNT,
+        stage=whole(0.0, 3.0), pending=COUNT, block=AMOUNT,
         # Reference planned for, voltage planned, voltage written.
         r=MEASURED, planned=MEASURED, u=MEASURED,
         # Farthest way from the start's voltage that was answered; travel of the reference with the voltage at
@@ -42,17 +43,19 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         unit=NUMBER, zero=MEASURED,
         # Half the swing that they began with; zero before [V].
         scale=AMOUNT,
+        # Correction of the reference by feedback [µm].
+        feedback=NUMBER,
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
-        noticed=COUNT, notice=whole(0.0, 5.0),
+        noticed=COUNT, notice=whole(0.0, 7.0),
         # What the line misses, what it missed when it drove, what the stage misses of the reference.
         score=candidate.SCORE, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
         travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,
-        start=starts.START, candidates=candidates,
+        start=starts.START, homing=homing.HOMING, candidates=candidates,
     )  # fmt: skip
     settings = record(
-        minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED,
+        minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED, feedback=FIXED,
         start=starts.SETTINGS, candidates=candidate_settings,
     )  # fmt: skip
     return state, settings
@@ -86,8 +89,27 @@ def learn_all(state: Record, settings: Record, r: Vector, u: Vector, x: Vector) 
         take(state, settings, r[k], u[k], x[k])
 
 
+@register_jitable
+def _begin(state: Any, settings: Any, u: Any) -> None:
+    state.u = state.planned = u
+    starts.begin(state.start, u)
+    state.start.given = 1.0 if settings.start.gain != 0.0 else 0.0
+
+
 @compiled
 def begin(state: Record, settings: Record, u: float) -> None:
     """Begin with a state of zeros, at rest at a voltage."""
-    state.u = state.planned = u
-    starts.begin(state.start, u)
+    _begin(state, settings, u)
+
+
+@compiled
+def begin_at(state: Record, settings: Record, u: float, x: float) -> None:
+    """Begin with a state of zeros, at rest at a voltage where the sensor reads x."""
+    _begin(state, settings, u)
+    starts.rest_at(state.start, settings.start, u, x, settings.start.gain)
+
+
+@compiled
+def home(state: Record, settings: Record, amplitude: float, turn: float, cycles: float) -> Any:
+    """Begin a decaying sweep, `turn` of a cycle each sample; whether it can be."""
+    return begin_homing(state, settings, amplitude, turn, cycles)

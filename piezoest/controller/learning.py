@@ -8,12 +8,12 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import candidate, driving, redraw, slots
+from piezoest.controller import candidate, doubt, driving, feedback, given, homing, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.voltage import APPROACH, RUN, SEEK
+from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK
 
 # Models are handed over after this fraction of a swing; legs of the line before another model drives.
 HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 2.0
@@ -92,13 +92,6 @@ def _hand_over(state: Any, settings: Any) -> None:
 
 
 @register_jitable
-def _notice(state: Any, fault: Any) -> None:
-    """Note a fault, or its end, for the log."""
-    state.noticed += 1.0
-    state.notice = fault
-
-
-@register_jitable
 def _follow_zero(state: Any) -> None:
     """Readings run at a distance from the line: their zero has moved, for good or not.
 
@@ -123,7 +116,7 @@ def _follow_zero(state: Any) -> None:
         return
     if plain:
         state.zero += jump
-        _notice(state, reading.MOVED)
+        reading.notice(state, reading.MOVED)
     lines.forget(line.now)
     line.before.count = 0.0
     line.centre += jump
@@ -150,7 +143,7 @@ def _name_silence(state: Any) -> None:
     fault = reading.NO_RESPONSE if silent else reading.NONE
     if fault != state.readings.fault:
         state.readings.fault = fault
-        _notice(state, fault)
+        reading.notice(state, fault)
 
 
 @register_jitable
@@ -186,7 +179,7 @@ def _leave_limit(state: Any, settings: Any, moved: Any) -> None:
     rests = state.u <= settings.minimum or state.u >= settings.maximum
     state.railed = state.railed + moved if rests and state.readings.fault == reading.NONE else 0.0
     if state.railed > RESTED * state.reference.swing:
-        state.stage, state.driving = SEEK, 0.0
+        state.stage, state.driving, state.feedback = SEEK, 0.0, 0.0
         starts.begin_again(state.start, settings.start, state.u)
 
 
@@ -217,23 +210,29 @@ def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any) -> float:
     x = reading.middle(state.readings, x)
     lines.add(recent, u, x, settings.doubling)
     way = np.abs(u - start.origin)
-    if way >= state.confirmed and way > 0.0:
+    if start.given != 0.0:
+        given.compare(state, settings)
+    elif way >= state.confirmed and way > 0.0:
         # Only on new ground: on the way back hysteresis would pass for gain.
         state.confirmed = way
         gain = (recent.mean_x - start.zero) / (recent.mean_u - start.origin)
         line.gain = gain if gain * line.gain > 0.0 else line.gain
+    if state.stage == SEEK:
+        return np.nan
     line.centre = recent.mean_x - line.gain * recent.mean_u
     start.samples += 1.0
     target = lines.voltage(line, r)
     missing = np.abs(target - u)
     at_limit = (u <= settings.minimum and target < u) or (u >= settings.maximum and target > u)
-    if missing <= NEAR * np.abs(u - start.origin) or at_limit or start.samples > LONGEST:
-        state.stage = RUN
+    there = (missing <= NEAR * np.abs(u - start.origin) or at_limit) and start.given == 0.0
+    if there or (start.samples > LONGEST and start.doubted == 0.0):
+        state.stage, start.given, start.doubted = RUN, 0.0, 0.0
         lines.begin(line, line.gain, recent.mean_u, recent.mean_x)
         # What is left of the way is paid on the run.
         state.owed = (r - lines.at(line, u)) / state.unit
         _begin_swings(state, r, u, np.abs(start.target - start.from_u))
-    return x
+    # Nobody learns in the unit of a gain that may be wrong.
+    return x if start.given == 0.0 else np.nan
 
 
 @register_jitable
@@ -247,7 +246,7 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
     _follow_zero(state)
     _watch_voltage(state, settings, gone, moved)
     if state.readings.fault != before:
-        _notice(state, state.readings.fault)
+        reading.notice(state, state.readings.fault)
         if state.readings.fault != reading.NONE:
             driving.drive(state, 0.0)
             redraw.hold(state)
@@ -266,10 +265,46 @@ def _is_due(state: Any, gone: Any) -> bool:
 
 
 @register_jitable
+def begin_homing(state: Any, settings: Any, amplitude: Any, turn: Any, cycles: Any) -> bool:
+    """Begin to erase what hysteresis remembers; whether it can be."""
+    if not homing.begin(state.homing, settings, state.u, amplitude, turn, cycles):
+        return False
+    if state.unit != 0.0:
+        doubt.all_models(state)
+    state.stage, state.feedback = HOME, 0.0
+    reading.forget(state.readings)
+    return True
+
+
+@register_jitable
+def _home(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """Follow the sweep; behind it the way to the reference begins, or the gain is sought."""
+    start, line, recent = state.start, state.line, state.readings.recent
+    if state.scale > 0.0:
+        slots.advance(state.candidates, settings.candidates, u)
+        slots.learn(state.candidates, settings.candidates, u, np.nan)
+    if np.abs(x) < WILDEST:
+        lines.add(recent, u, reading.middle(state.readings, x), settings.doubling)
+    if not homing.follow(state.homing):
+        return
+    if state.unit == 0.0:
+        state.stage = SEEK
+        starts.begin_again(start, settings.start, u)
+        return
+    here = lines.at(line, u)
+    if recent.count > 0.0:
+        here = recent.mean_x + line.gain * (u - recent.mean_u)
+    starts.rest_at(start, settings.start, u, here, line.gain)
+    _begin_learning(state, settings)
+
+
+@register_jitable
 def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     """Learn from a voltage that was written and a reading."""
     state.samples += 1.0
     if not np.abs(u) < WILDEST:
+        if state.stage == RUN:
+            doubt.lose_write(state)
         return
     state.pending = 0.0
     state.u = u
@@ -282,6 +317,9 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         _name_silence(state)
         if state.start.stage == starts.DONE:
             _begin_learning(state, settings)
+        return
+    if state.stage == HOME:
+        _home(state, settings, u, x)
         return
     moved = travels.follow(state.reference, r)
     redraw.pay(state, settings, moved)
@@ -298,6 +336,8 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         x = _approach(state, settings, r, u, x)
     else:
         x = _believe(state, settings, u, x, gone, moved)
+        if state.stage == RUN and np.isfinite(x):
+            feedback.follow(state, settings, x)
     _learn_from(state, settings, x)
     if state.stage == RUN and state.readings.fault == reading.NONE and _is_due(state, gone):
         state.handed = 0.0

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from piezoest._checks import instance
+from piezoest._checks import WILDEST, finite, fraction, instance, integer, moderate, non_negative, positive
 from piezoest.compensators.limits import VoltageLimits
-from piezoest.controller import candidate, kernel, slots
+from piezoest.controller import candidate, homing, kernel, slots
+from piezoest.controller.feedback import FASTEST
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import Field, Record, new
+from piezoest.models import Model
 
 # Least range and largest size of the voltage [V].
 LEAST_RANGE, LARGEST_VOLTAGE = 1e-6, 1e6
@@ -43,15 +45,120 @@ def checked_limits(limits: Any, sample_rate: float) -> Any:
     return limits
 
 
-def _settings_of(sample_rate: float, limits: VoltageLimits) -> dict[str, Any]:
-    """Settings of the kernel but for corridor and candidates."""
+def known_gain(gain: Any, stroke: Any, model: Any, limits: VoltageLimits) -> float:
+    """Return the gain that a user knows [µm/V]; zero if none is given.
+
+    Raises
+    ------
+    ValueError
+        If it is given twice, or is none.
+    """
+    given = {"gain": gain, "stroke": stroke, "model": model}
+    names = [name for name, value in given.items() if value is not None]
+    if len(names) > 1:
+        raise ValueError(f"{' and '.join(names)} all say the gain: pass one of them")
+    if gain is not None:
+        return _gain("gain", gain)
+    if stroke is not None:
+        return _gain("stroke", stroke) / (limits.maximum - limits.minimum)
+    if model is not None:
+        model = instance("model", model, Model, "a model, as LinearGain(0.15)")
+        return _gain("slope of model", model.line[0])
+    return 0.0
+
+
+def _gain(name: str, value: Any) -> float:
+    """A number other than zero, in the units of this library."""
+    number = finite(name, value)
+    if number == 0.0:
+        raise ValueError(f"{name} must not be zero: leave it out if it is not known")
+    moderate(f"size of {name}", abs(number))
+    return number
+
+
+def options(sample_rate: float, corridor: Any, gain: Any, feedback: Any) -> dict[str, float]:
+    """Return what users choose beside limits and estimators, checked.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+    feedback = 0.0 if feedback is None else non_negative("feedback", feedback)
+    if feedback > FASTEST * sample_rate:
+        raise ValueError(
+            f"feedback must be at most {FASTEST * sample_rate:g} 1/s, {FASTEST:g} of sample_rate, got "
+            f"{feedback:g}: it is to be far slower than the stage"
+        )
+    return {
+        "corridor": fraction("corridor", corridor),
+        "gain": finite("gain", gain) and _gain("gain", gain),
+        "feedback": feedback,
+    }
+
+
+def rest(limits: VoltageLimits, voltage: Any) -> float:
+    """Return the voltage at which a stage rests; None for the one nearest to 0 V.
+
+    Raises
+    ------
+    ValueError
+        If it is none within the limits.
+    """
+    u = limits.rest if voltage is None else finite("voltage", voltage)
+    if not limits.minimum <= u <= limits.maximum:
+        raise ValueError(
+            f"voltage must lie within the limits, {limits.minimum:g} V to {limits.maximum:g} V, got {u:g} V"
+        )
+    return u
+
+
+def sweep(
+    limits: VoltageLimits, sample_rate: float, amplitude: Any, frequency: Any, cycles: Any
+) -> tuple[float, float, float]:
+    """Return amplitude [V], cycles of a sample and cycles of a sweep that erases hysteresis.
+
+    Raises
+    ------
+    ValueError
+        If one is out of its range.
+    """
+    most = 0.5 * (limits.maximum - limits.minimum)
+    amplitude = most if amplitude is None else positive("amplitude", amplitude)
+    if amplitude > most:
+        raise ValueError(f"amplitude must be at most {most:g} V, half the range, got {amplitude:g} V")
+    frequency = moderate("frequency", frequency)
+    if frequency > homing.FASTEST * sample_rate:
+        raise ValueError(
+            f"frequency must be at most {homing.FASTEST * sample_rate:g} Hz, {homing.FASTEST:g} of "
+            f"sample_rate, got {frequency:g} Hz"
+        )
+    return amplitude, frequency / sample_rate, float(integer("cycles", cycles, 1, int(homing.MOST)))
+
+
+def measured(name: str, value: Any) -> float:
+    """Return a displacement, or a voltage, that can be.
+
+    Raises
+    ------
+    ValueError
+        If it is no number, or beyond all stages.
+    """
+    return fraction(name, value, -0.5 * WILDEST, 0.5 * WILDEST)
+
+
+def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, float]) -> dict[str, Any]:
+    """Settings of the kernel but for the candidates."""
     width = limits.maximum - limits.minimum
     return {
         "minimum": limits.minimum,
         "maximum": limits.maximum,
         "largest_step": limits.largest_step,
         "doubling": max(5.0, 4e-3 * sample_rate),
+        "corridor": options["corridor"],
+        "feedback": options["feedback"] / sample_rate,
         "start": {
+            "gain": options["gain"],
             "way": 0.005 * width,
             "longest": 0.1 * width,
             "ramp": max(4.0, 7e-3 * sample_rate),
@@ -63,7 +170,10 @@ def _settings_of(sample_rate: float, limits: VoltageLimits) -> dict[str, Any]:
 
 
 def room(
-    sample_rate: float, limits: VoltageLimits, corridor: float, estimators: tuple[CompiledEstimator, ...]
+    sample_rate: float,
+    limits: VoltageLimits,
+    options: dict[str, float],
+    estimators: tuple[CompiledEstimator, ...],
 ) -> tuple[tuple[Record, Record], tuple[Any, Any]]:
     """Layouts of state and settings, and both as they are before the start."""
     states: list[Field] = []
@@ -77,5 +187,5 @@ def room(
         values[name] = {"estimator": estimator.state}
         given[name] = {"estimator": estimator.settings, "inverse": inverse, "by_path": 1.0}
     layouts = kernel.layouts(slots.layout(states), slots.layout(settings))
-    fixed = _settings_of(sample_rate, limits) | {"corridor": corridor, "candidates": given}
+    fixed = _settings_of(sample_rate, limits, options) | {"candidates": given}
     return layouts, (new(layouts[0], candidates=values), new(layouts[1], **fixed))

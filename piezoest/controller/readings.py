@@ -20,7 +20,9 @@ from piezoest.layout import AMOUNT, COUNT, MEASURED, record, whole
 # Faults: none; no response; response the wrong way round; far too large or too small; the reading stops at a
 # level; the reading's zero has moved.
 NONE, NO_RESPONSE, REVERSED, SCALED, SATURATED, MOVED = (float(i) for i in range(6))
-FAULTS = ("", "no response", "reversed", "scaled", "saturated", "zero moved")
+# What is noted beside: the stage answers otherwise than the user's gain says; a write may have been lost.
+OTHER_GAIN, UNKNOWN = 6.0, 7.0
+FAULTS = ("", "no response", "reversed", "scaled", "saturated", "zero moved", "gain", "unknown voltage")
 
 READINGS = record(
     fault=whole(0.0, 5.0),
@@ -131,6 +133,13 @@ def _name(readings: Any) -> float:
         return SATURATED if readings.fault == NONE else readings.fault
     over = OVER_STOPPED if readings.fault == SATURATED else OVER
     return NONE if readings.good > over else readings.fault
+
+
+@register_jitable
+def notice(state: Any, number: Any) -> None:
+    """Note a fault, its end, or what else was noticed, for the log."""
+    state.noticed += 1.0
+    state.notice = number
 
 
 @register_jitable

@@ -15,7 +15,7 @@ from piezoest.layout import Named
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
 from piezoest.supervisor import Event
 
-STAGES = ("seeking", "approaching", "running")
+STAGES = ("seeking", "approaching", "running", "homing")
 # What each fault means.
 MEANINGS = {
     "no response": "the readings do not answer the voltage",
@@ -23,6 +23,8 @@ MEANINGS = {
     "scaled": "the readings answer far more or far less than before",
     "saturated": "the readings stand still at a level",
     "zero moved": "the readings have moved by a constant, which is followed",
+    "gain": "the stage answers with {gain_before:.3g} µm/V, not {gain:.3g}: the gain is sought",
+    "unknown voltage": "nobody knows what was written, and the line drives until the models have shown again",
 }
 
 
@@ -37,7 +39,8 @@ class ControllerStatus:
     missing : int
         Samples without a usable reference, at which the last one held.
     stage : str
-        ``"seeking"`` (finds out the gain), ``"approaching"`` (goes to the reference) or ``"running"``.
+        ``"seeking"`` (finds out the gain), ``"approaching"`` (goes to the reference), ``"running"`` or
+        ``"homing"`` (sweeps).
     driving : str
         ``"line"``, or the name of the estimator whose model drives.
     fault : str
@@ -117,7 +120,8 @@ def event(state: Any, sample_rate: float) -> Event:
     if not name:
         return Event(time, "resumed", "the readings follow the voltage again")
     action = "fell back" if number == state["readings"]["fault"] else "went on"
-    return Event(time, action, f"{name}: {MEANINGS.get(name, 'the readings cannot be believed')}")
+    start = {each: float(state["start"][each]) + 0.0 for each in ("gain", "gain_before")}
+    return Event(time, action, f"{name}: {MEANINGS[name].format_map(start)}")
 
 
 def misses(state: Any) -> list[float | None]:

@@ -4,7 +4,7 @@ At rest the first readings say where the stage stands; one wrong one among them 
 voltage goes half a per cent of its range and rests until the reading has come to rest too. An answer that
 drowns in noise or in steps of the converter doubles the way; one that is clear is checked by a way four times
 as long. The gain is what lies between two rests, where neither delay nor lag counts, if both ways were
-answered alike; else, as with backlash, the way is doubled.
+answered alike; else, as with backlash, the way is doubled. A gain that the user knows is not sought.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.controller.readings import median
-from piezoest.layout import AMOUNT, COUNT, FIXED, MEASURED, NUMBER, numbers, record, whole
+from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, numbers, record, whole
 
 # At rest; the voltage goes a way; it rests there; the gain is known; no answer.
 REST, GO, WAIT, DONE, SILENT = (float(i) for i in range(5))
@@ -32,13 +32,18 @@ START = record(
     # last two readings and the smallest change of one: the step of its converter.
     sum=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT, mean=MEASURED, now=MEASURED, windows=COUNT,
     before=MEASURED, last=MEASURED, step=AMOUNT,
-    # Sum of the windows' answers; how late the stage answers [samples].
+    # Sum of the windows' answers, or of what an answer lacks of the user's gain; how late the stage answers
+    # [samples].
     total=NUMBER, lag=AMOUNT,
     # Gain of the last way [µm/V], of the one before; ways for nothing; samples without the voltage.
     gain=NUMBER, gain_before=NUMBER, tries=AMOUNT, stuck=COUNT, first=numbers(FIRST, kind=MEASURED),
+    # Whether the gain is the user's, and not confirmed yet; the farthest way, readings that spoke against it.
+    given=FLAG, farthest=AMOUNT, doubted=COUNT,
 )  # fmt: skip
-# First and longest way [V], samples of a way, of a window; the limits.
-SETTINGS = record(way=FIXED, longest=FIXED, ramp=FIXED, window=FIXED, lowest=FIXED, highest=FIXED)
+# First and longest way [V], samples of a way, of a window; the limits; the user's gain, zero for none.
+SETTINGS = record(
+    way=FIXED, longest=FIXED, ramp=FIXED, window=FIXED, lowest=FIXED, highest=FIXED, gain=FIXED
+)  # fmt: skip
 
 # An answer is clear above so many times the noise at rest, the scatter within a window, and the step of the
 # converter; two are alike within this factor.
@@ -84,6 +89,18 @@ def _go(start: Any, settings: Any, u: Any) -> None:
 
 
 @register_jitable
+def rest_at(start: Any, settings: Any, u: Any, x: Any, gain: Any) -> None:
+    """The stage rests, and reads x: go the first way, or none where the gain is known and not zero."""
+    start.from_x = start.zero = start.now = x
+    start.way = settings.way if settings.highest - u >= u - settings.lowest else -settings.way
+    _go(start, settings, u)
+    if gain != 0.0:
+        start.stage, start.gain = DONE, gain
+        start.voltage = start.origin = u
+        start.total = 0.0
+
+
+@register_jitable
 def _settle_rest(start: Any, settings: Any, u: Any) -> None:
     """Where the stage stands at rest: the middle reading; the noise from the others."""
     first = start.first
@@ -93,19 +110,26 @@ def _settle_rest(start: Any, settings: Any, u: Any) -> None:
             first[j] = first[j - 1]
             j -= 1
         first[j] = value
-    start.from_x = start.zero = first[FIRST // 2]
     # The farthest one may be wrong.
     start.noise = 0.6 * min(first[FIRST - 1] - first[1], first[FIRST - 2] - first[0])
-    start.way = settings.way if settings.highest - u >= u - settings.lowest else -settings.way
-    _go(start, settings, u)
+    rest_at(start, settings, u, first[FIRST // 2], start.given * settings.gain)
+
+
+@register_jitable
+def smooth(from_u: Any, target: Any, share: Any) -> float:
+    """The voltage after a share of a way that begins and ends gently."""
+    share = min(share, 1.0)
+    return from_u + share * share * (3.0 - 2.0 * share) * (target - from_u)
 
 
 @register_jitable
 def _move(start: Any, settings: Any) -> None:
     """The next voltage of a way, which begins and ends gently."""
     start.samples += 1.0
-    share = min(start.samples / settings.ramp, 1.0)
-    start.voltage = start.from_u + share * share * (3.0 - 2.0 * share) * (start.target - start.from_u)
+    # A way back from afar takes longer.
+    longer = max(1.0, np.abs(start.target - start.from_u) / settings.longest)
+    share = min(start.samples / (longer * settings.ramp), 1.0)
+    start.voltage = smooth(start.from_u, start.target, share)
     if share >= 1.0:
         start.stage, start.voltage = WAIT, start.target
         start.sum = start.squares = start.summed = start.windows = start.total = 0.0

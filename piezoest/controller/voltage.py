@@ -8,12 +8,12 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import driving, slots
+from piezoest.controller import driving, homing, slots
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 
-# The gain is sought; the voltage goes to where the reference needs it; all is learnt.
-SEEK, APPROACH, RUN = 0.0, 1.0, 2.0
+# The gain is sought; the voltage goes to where the reference needs it; all is learnt; hysteresis is erased.
+SEEK, APPROACH, RUN, HOME = 0.0, 1.0, 2.0, 3.0
 # The corridor reaches no farther from the line than so many times what the line has missed of late.
 WIDER = 1.3
 # A model's voltage moves no faster than so many times the line's.
@@ -25,16 +25,18 @@ AHEAD, LATE = 2.0, 3.0
 
 @register_jitable
 def _feed_forward(state: Any, settings: Any, r: Any) -> float:
-    """Voltage of the model that drives, in the corridor around the line."""
+    """Voltage of the model that drives, in the corridor around the line, for reference and feedback."""
     line = state.line
     swing = max(state.reference.swing, np.abs(r - state.reference.turned))
     kept = driving.kept(state.reference, np.abs(r - state.reference.last), swing)
+    back = state.feedback
+    r += back
     straight = wanted = lines.voltage(line, r - state.owed * kept * state.unit)
     if state.pending <= 1.0 and state.readings.fault == reading.NONE and state.driving > 0.0:
         z = (r - state.zero) / state.unit - slots.owed(state.candidates, state.driving, 0.0) * kept
         wanted = slots.voltage(state.candidates, settings.candidates, state.driving, z, straight)
         # Near a turn the inverse of a wide loop leaps, which would shake a resonance.
-        ahead = straight - lines.voltage(line, state.reference.last - state.owed * state.unit)
+        ahead = straight - lines.voltage(line, state.reference.last + back - state.owed * state.unit)
         most = (RATE - 1.0) * np.abs(ahead)
         wanted = min(max(wanted, state.u + ahead - most), state.u + ahead + most)
     if not np.abs(wanted) < WILDEST:
@@ -72,6 +74,8 @@ def plan(state: Any, settings: Any, r: Any) -> float:
         wanted = state.start.voltage
     elif state.stage == APPROACH:
         wanted = _nearer(state, settings, lines.voltage(state.line, r))
+    elif state.stage == HOME:
+        wanted = homing.voltage(state.homing, state.u)
     else:
         wanted = _feed_forward(state, settings, r)
     if not np.abs(wanted) < WILDEST:

@@ -187,6 +187,7 @@ class CompiledFeedforward:
         self._library.step.argtypes, self._library.step.restype = (real,), real
         self._library.learn.argtypes = (real, real)
         self._library.anew.argtypes = (real,)
+        self._library.home.argtypes = (real, real, real)
         self.reset()
 
     def reset(self, voltage: float | None = None) -> None:
@@ -223,17 +224,35 @@ class CompiledFeedforward:
         voltage: float = self._library.step(number_or_nan(r))
         return voltage
 
-    def learn(self, u: float, x: float | None) -> None:
+    def learn(self, u: float | None, x: float | None) -> None:
         """Learn from the voltage that was written and what was measured then.
 
         Parameters
         ----------
-        u : float
-            Voltage [V].
+        u : float or None
+            Voltage [V]; None or NaN where nobody knows what was written.
         x : float or None
             Measured displacement [µm]; None or NaN where there is none.
         """
         self._library.learn(number_or_nan(u), number_or_nan(x))
+
+    def home(self, amplitude: float, frequency: float = 1.0, cycles: int = 10) -> None:
+        """Begin a sweep that erases what hysteresis remembers; see `AdaptiveFeedforward.home`.
+
+        Parameters
+        ----------
+        amplitude, frequency : float
+            Of the first swing [V]; [Hz].
+        cycles : int
+            How many.
+
+        Raises
+        ------
+        ValueError
+            If the amplitude has no room, or a number is out of its range.
+        """
+        if not self._library.home(number_or_nan(amplitude), number_or_nan(frequency), number_or_nan(cycles)):
+            raise ValueError(f"no sweep of {amplitude} V at {frequency} Hz within {cycles} cycles can be")
 
     @property
     def status(self) -> tuple[int, int, int]:

@@ -43,6 +43,8 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
 
     step, learn = call_of(kernel.step, "r"), call_of(kernel.learn, "u", "x")
     begin = call_of(kernel.begin, "voltage")
+    turn = f"frequency * {literal(1.0 / controller.sample_rate, file.single)}"
+    home = call_of(kernel.home, "amplitude", turn, "cycles")
     begun = ""
     if anew.values.tobytes() != now.values.tobytes():
         begun = _BEGUN.format(name=name, start=file.start(anew.layout, anew.values))
@@ -52,6 +54,8 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
         "feedforward",
         [
             f"AdaptiveFeedforward at {controller.sample_rate:g} Hz, corridor {data['corridor']:g}.",
+            *([f"Gain: about {data['gain']:g} um/V."] if data["gain"] else []),
+            *([f"Feedback: {data['feedback']:g} 1/s."] if data["feedback"] else []),
             f"Limits: {limits}.",
             *(line for each in data["estimators"] for line in estimator_lines(each)),
         ],
@@ -65,12 +69,13 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
             "start": file.start(now.layout, now.values),
             "begun": begun,
             "anew": "begun" if begun else "start",
-            "functions": file.text(f"{step} {learn} {begin}"),
+            "functions": file.text(f"{step} {learn} {begin} {home}"),
             "minimum": literal(limits.minimum, file.single),
             "maximum": literal(limits.maximum, file.single),
             "step": step,
             "learn": learn,
             "begin": begin,
+            "home": home,
         },
         learns=bool(estimators),
     )

@@ -123,6 +123,44 @@ def test_it_goes_on_from_where_it_was_exported() -> None:
     drive(library, board, rig("duhem"), count=2500)
 
 
+@pytest.mark.parametrize("gain", [0.2, -0.2])
+def test_a_gain_that_is_known_need_not_be_right(gain: float) -> None:
+    library = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), gain=gain, feedback=5.0)
+    code = pz.export.c(library)
+    assert f"Gain: about {gain:g} um/V." in code.header
+    assert "Feedback: 5 1/s." in code.header
+    seen = drive(library, pz.export.CompiledFeedforward(code), rig("duhem", "lag"))
+    assert {stage for stage, _, _ in seen} == {0, 1, 2}
+    assert any(event.reason.startswith("gain") for event in library.events) == (gain < 0.0)
+
+
+@pytest.mark.parametrize("begin", [0, 2500])
+def test_it_homes(begin: int) -> None:
+    library = pz.AdaptiveFeedforward(FS, limits=pz.VoltageLimits(-100.0, 100.0, 2e4, FS), estimators=())
+    board, own = pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem")
+    drive(library, board, own, count=begin)
+    for each in (library, board):
+        each.home(40.0, 50.0, 4)
+    seen = drive(library, board, own, count=3000)
+    assert {stage for stage, _, _ in seen} == ({0, 1, 2, 3} if begin == 0 else {1, 2, 3})
+    for wrong in ((101.0, 50.0, 4), (40.0, 1e4, 4), (40.0, 50.0, 0), (np.nan, 50.0, 4)):
+        with pytest.raises(ValueError, match="no sweep"):
+            board.home(*wrong)
+
+
+def test_writes_that_may_be_lost_are_told() -> None:
+    library = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(pz.HysteresisEKF,))
+    board, own = pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem")
+    stage = own.stage()
+    for k, r in enumerate(own.reference.tolist()):
+        u = library.step(r)
+        assert board.step(r) == u
+        x = float(stage.step(u))
+        for each in (library, board):
+            each.learn(None if 4000 < k < 4030 else u, x)
+    assert [event.reason.split(":")[0] for event in library.events].count("unknown voltage") == 1
+
+
 def test_track_takes_it_as_a_controller() -> None:
     r = pz.signals.triangle(5.0, 20.0, 4, FS)
     voltages = []

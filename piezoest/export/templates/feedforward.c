@@ -31,6 +31,11 @@ void @name@_learn(@name@_state *state, @real@ u, @real@ x)
     @learn@;
 }
 
+int @name@_home(@name@_state *state, @real@ amplitude, @real@ frequency, @real@ cycles)
+{
+    return @home@;
+}
+
 @real@ @name@_get_voltage(const @name@_state *state)
 {
     return state->planned;

@@ -20,8 +20,13 @@ int @name@_reset(@name@_state *state, @real@ voltage);
 @real@ @name@_step(@name@_state *state, @real@ r);
 
 /* Learn from the voltage u [V] that was written and the displacement x [um] measured then, NaN where there is
- * none: once after each step. */
+ * none, or nobody knows what was written: once after each step. */
 void @name@_learn(@name@_state *state, @real@ u, @real@ x);
+
+/* Begin a sweep of the voltage that erases what hysteresis remembers: from an amplitude [V], at a frequency
+ * [Hz], within so many cycles, to nothing; the steps ignore the reference meanwhile. Returns 0, and changes
+ * nothing, if the amplitude is above half the range, or a number is out of range. */
+int @name@_home(@name@_state *state, @real@ amplitude, @real@ frequency, @real@ cycles);
 
 /* Voltage given out last [V]. */
 @real@ @name@_get_voltage(const @name@_state *state);

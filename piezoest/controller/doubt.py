@@ -1,0 +1,43 @@
+"""Where nobody knows what the hysteresis remembers: the line drives, and all models have to show again."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest.controller import driving
+from piezoest.controller import readings as reading
+
+# A voltage that may not have been written does not matter below this fraction of a swing.
+NOTHING = 1.0 / 64.0
+
+
+@register_jitable
+def _forget(slot: Any) -> None:
+    if slot is not None:
+        slot.score.weight = 0.0
+
+
+@register_jitable
+def all_models(state: Any) -> None:
+    """Let the line drive, and forget how well each model has done."""
+    driving.drive(state, 0.0)
+    state.since = state.score.weight = state.outcome.weight = state.outcome.peak = 0.0
+    _forget(state.candidates.first)
+    _forget(state.candidates.second)
+    _forget(state.candidates.third)
+    _forget(state.candidates.fourth)
+
+
+@register_jitable
+def lose_write(state: Any) -> None:
+    """Nobody knows whether the voltage was written: it is the planned one, or still the last one."""
+    state.pending = 0.0
+    if np.abs(state.planned - state.u) < NOTHING * state.travel.swing:
+        return
+    if state.since > 0.0:
+        # Once for all that are lost in a row.
+        reading.notice(state, reading.UNKNOWN)
+    all_models(state)

@@ -1,0 +1,117 @@
+"""What a controller shows to its user; nothing is changed here."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from piezoest.compensators.limits import VoltageLimits
+from piezoest.controller import shown, slots
+from piezoest.controller.shown import Candidate, ControllerStatus
+from piezoest.layout import Record
+from piezoest.models import Model
+from piezoest.supervisor import Event
+
+
+class Face:
+    """All that can be read of a controller."""
+
+    __slots__ = (
+        "_estimators", "_events", "_layouts", "_limits", "_names", "_sample_rate", "_settings", "_state",
+    )  # fmt: skip
+
+    _estimators: Any
+    _events: deque[Event]
+    _layouts: tuple[Record, Record]
+    _limits: VoltageLimits
+    _names: tuple[str, ...]
+    _sample_rate: float
+    _settings: Any
+    _state: Any
+
+    @property
+    def sample_rate(self) -> float:
+        """[Hz]."""
+        return self._sample_rate
+
+    @property
+    def limits(self) -> VoltageLimits:
+        """Limits that the voltage never leaves."""
+        return self._limits
+
+    @property
+    def voltage(self) -> float:
+        """Voltage given out last [V]."""
+        return float(self._state["planned"])
+
+    @property
+    def state(self) -> Any:
+        """All that changes but the models in use, by name: ``state["line"]["gain"]``."""
+        return self._state
+
+    @property
+    def settings(self) -> Any:
+        """What compiled code is given beside `state`, the models in use among it, by name."""
+        return self._settings
+
+    @property
+    def layouts(self) -> tuple[Record, Record]:
+        """Layouts of `state` and `settings`, for which the compiled functions are made."""
+        return self._layouts
+
+    @property
+    def status(self) -> ControllerStatus:
+        """What happened so far, and how it stands: a frozen record.
+
+        ``samples`` learnt from, ``missing`` references, ``stage`` of the work (``"seeking"``,
+        ``"approaching"``, ``"running"``, ``"homing"``), ``driving`` (``"line"`` or the name of an estimator),
+        ``fault`` of the readings (empty if none), samples ``saturated`` and ``slewed``, ``switches`` of the
+        model.
+        """
+        state = self._state
+        counted = ("samples", "missing", "saturated", "slewed", "switches")
+        return ControllerStatus(
+            stage=shown.stage_name(state["stage"]),
+            driving=self._names[int(state["driving"])],
+            fault=shown.fault_name(state["readings"]["fault"]),
+            **{name: int(state[name]) for name in counted},
+        )
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What was noticed of the readings, oldest first, the last thousand.
+
+        ``time`` is that of the sample [s]. ``action`` is ``"fell back"`` (a fault: the line drives and nobody
+        learns), ``"resumed"`` (it is over) or ``"went on"`` (what moved is followed); ``reason`` begins with
+        the fault's name. Of several in one block the last is kept.
+        """
+        return tuple(self._events)
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All models that can drive, the line first: frozen records.
+
+        Each has a ``name``, ``missed`` (what it has missed of late, root mean square [µm]; None if nothing is
+        known), ``drives`` and ``model``.
+        """
+        driving = int(self._state["driving"])
+        misses = shown.misses(self._state)
+        return tuple(
+            Candidate(name, misses[i], i == driving, self._model(i)) for i, name in enumerate(self._names)
+        )
+
+    @property
+    def model(self) -> Model | None:
+        """The model that drives, in µm and V; None until the gain is known.
+
+        A `LinearGain`, `ColemanHodgdon` or `PrandtlIshlinskii`. While it takes over from another one, the
+        voltage is not its own yet.
+        """
+        return self._model(int(self._state["driving"]))
+
+    def _model(self, number: int) -> Model | None:
+        """The line, or the model of an estimator."""
+        if number == 0:
+            return shown.line(self._state)
+        start = self._estimators[number - 1].model
+        return shown.model(start, self._state, self._settings, slots.NAMES[number - 1])

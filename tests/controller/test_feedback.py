@@ -1,0 +1,129 @@
+"""Integral feedback within the controller: what it removes, and how far a wrong sensor can drive it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+
+FS = 1000.0
+LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
+LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+WAVE = 5.0 * np.sin(2.0 * np.pi * 2.0 * np.arange(5000) / FS)
+
+
+def controller(feedback: float | None, limits: pz.VoltageLimits = LIMITS, **options: Any) -> Any:
+    return pz.AdaptiveFeedforward(FS, limits=limits, estimators=(), feedback=feedback, **options)
+
+
+def drive(
+    driver: Any, r: FloatArray, drift: Callable[[float], float], noise: tuple[float, float] = (0.0, 0.0)
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Voltage, displacement and correction of a stage that drifts; noise of reference and reading."""
+    stage, rng = pz.SimulatedStage(FS, LOOP), np.random.default_rng(0)
+    u, x, i = np.empty_like(r), np.empty_like(r), np.empty_like(r)
+    for k, r_k in enumerate(r.tolist()):
+        u[k] = driver.step(r_k + noise[0] * rng.normal())
+        x[k] = stage.step(u[k]) + drift(k / FS)
+        driver.learn(u[k], x[k] + noise[1] * rng.normal())
+        i[k] = driver.state["feedback"]
+    return u, x, i
+
+
+def creep(t: float) -> float:
+    return 0.6 * float(np.log10(1.0 + max(t - 5.0, 0.0) / 0.1))
+
+
+def none(t: float) -> float:
+    return 0.0
+
+
+@pytest.mark.parametrize("gain", [1.0, 10.0])
+def test_creep_in_a_dwell_is_taken_back(gain: float) -> None:
+    r = np.concatenate([WAVE, np.full(12000, 3.0)])
+    errors = []
+    for feedback in (None, gain):
+        _, x, i = drive(controller(feedback), r, creep, (0.0, 0.01))
+        errors.append(np.abs(r - x)[-2000:].max())
+        assert np.any(i) == (feedback is not None)
+    assert errors[0] > 0.8
+    assert errors[1] < 0.1 * errors[0]
+
+
+@pytest.mark.parametrize("noise", [(0.0, 0.0), (0.02, 0.02), (0.2, 0.2)])
+@pytest.mark.parametrize("moved", [True, False])
+def test_a_long_dwell_ends_where_it_should(noise: tuple[float, float], moved: bool) -> None:
+    r = np.concatenate([WAVE if moved else [], np.full(60_000, 3.0)])
+    u, x, _ = drive(controller(10.0), r, none, noise)
+    assert np.abs(u)[-30_000:].max() < 25.0
+    assert np.abs(r - x)[-10_000:].max() < 0.01 + 5.0 * noise[0]
+    assert abs(np.mean((r - x)[-10_000:])) < 0.005 + 0.1 * noise[0]
+
+
+def test_none_changes_nothing() -> None:
+    r = np.tile(WAVE, 2)
+    first, second = (drive(controller(feedback), r, none)[0] for feedback in (None, 0))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_it_goes_no_farther_than_the_corridor() -> None:
+    """A sensor that lies slowly."""
+    r = np.concatenate([WAVE, np.full(10_000, 0.0)])
+    _, _, i = drive(controller(20.0, corridor=0.2), r, lambda t: 2.0 * max(t - 5.0, 0.0))
+    assert np.abs(i).max() == pytest.approx(0.2 * 5.0, rel=0.1)
+
+
+def test_at_a_limit_it_does_not_wind_up() -> None:
+    limits = pz.VoltageLimits(-60.0, 20.0)
+    driver = controller(5.0, limits)
+    r = np.concatenate([WAVE - 3.0, np.full(5000, 6.0), np.tile(WAVE - 3.0, 4)])
+    u, x, i = drive(driver, r, none)
+    held = slice(6000, 10_000)
+    assert np.all(u[held] == 20.0)
+    assert np.ptp(i[held]) < 0.1
+    assert np.abs(r - x)[-5000:].max() < 0.8
+
+
+def test_a_fault_holds_it() -> None:
+    driver = controller(5.0)
+    r = np.tile(WAVE, 4)
+    _, _, i = drive(driver, r, lambda t: np.nan if 12.0 < t < 16.0 else 0.0)
+    assert np.ptp(i[12_100:15_900]) == 0.0
+    assert np.ptp(i) > 0.0
+
+
+def test_a_stage_that_answers_late_does_not_swing() -> None:
+    driver, x, share, r = controller(200.0), 0.0, 1.0 - np.exp(-1.0 / (0.02 * FS)), np.full(20_000, 5.0)
+    far = np.empty_like(r)
+    for k, r_k in enumerate(r.tolist()):
+        u = driver.step(r_k)
+        x += share * (0.15 * u - x)
+        driver.learn(u, x)
+        far[k] = abs(x - r_k)
+    assert far[-5000:].max() < 0.01
+
+
+def test_it_is_kept() -> None:
+    driver = controller(3.0)
+    drive(driver, WAVE, lambda t: 0.1 * t)
+    assert driver.state["feedback"] != 0.0
+    data = json.loads(json.dumps(driver.to_dict()))
+    assert data["feedback"] == 3.0
+    other = pz.AdaptiveFeedforward.from_dict(data)
+    drive(driver, WAVE, none)
+    drive(other, WAVE, none)
+    assert driver.to_dict() == other.to_dict()
+    driver.reset()
+    assert driver.to_dict() == controller(3.0).to_dict()
+
+
+@pytest.mark.parametrize("wrong", [-1.0, np.nan, np.inf, "x", 251.0])
+def test_a_wrong_gain_is_refused(wrong: Any) -> None:
+    with pytest.raises(ValueError, match="feedback must"):
+        controller(wrong)

@@ -1,0 +1,310 @@
+"""Erasing what hysteresis remembers, and writes of which nobody knows the outcome."""
+
+from __future__ import annotations
+
+import copy
+import json
+from typing import Any
+
+import hypothesis
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+from piezoest.controller import shown
+
+FS = 5000.0
+LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
+LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+PLAYS = pz.PrandtlIshlinskii(0.1, [2.0, 6.0, 12.0, 20.0, 30.0], [0.02, 0.02, 0.015, 0.01, 0.01])
+SINE = pz.signals.sine(3.0, 10.0, 1, FS).values
+
+
+def controller(limits: pz.VoltageLimits = LIMITS, estimators: Any = (), **options: Any) -> Any:
+    return pz.AdaptiveFeedforward(FS, limits=limits, estimators=estimators, **options)
+
+
+def drive(driver: Any, stage: Any, r: FloatArray) -> tuple[FloatArray, FloatArray, list[str]]:
+    """Voltage, displacement, and what the controller was doing when it gave the voltage."""
+    u, x, doing = np.empty_like(r), np.empty_like(r), []
+    for k, r_k in enumerate(r.tolist()):
+        doing.append(driver.status.stage)
+        u[k] = driver.step(r_k)
+        x[k] = stage.step(float(u[k]))
+        driver.learn(float(u[k]), float(x[k]))
+    return u, x, doing
+
+
+def read_back(driver: Any) -> Any:
+    return pz.AdaptiveFeedforward.from_dict(json.loads(json.dumps(driver.to_dict(), allow_nan=False)))
+
+
+# ---------------------------------------------------------------- the sweep
+
+SWEEPS: dict[str, tuple[pz.VoltageLimits, dict[str, Any], tuple[float, float]]] = {
+    "all of it": (LIMITS, {"frequency": 20.0}, (0.0, 60.0)),
+    "about the rest": (pz.VoltageLimits(-20.0, 100.0), {"amplitude": 20.0, "frequency": 20.0}, (0.0, 20.0)),
+    "about the middle": (
+        pz.VoltageLimits(-20.0, 100.0),
+        {"amplitude": 30.0, "frequency": 20.0},
+        (40.0, 30.0),
+    ),
+    "one sign": (pz.VoltageLimits(0.0, 100.0), {"frequency": 20.0, "cycles": 3}, (50.0, 50.0)),
+    "slow": (pz.VoltageLimits(-60.0, 60.0, 2000.0, FS), {"amplitude": 40.0, "frequency": 60.0}, (0.0, 40.0)),
+}
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_the_voltage_swings_less_and_less(name: str) -> None:
+    limits, options, (middle, amplitude) = SWEEPS[name]
+    driver, stage = controller(limits), pz.SimulatedStage(FS, LOOP)
+    drive(driver, stage, np.tile(SINE, 3) + 0.15 * middle)
+    before = driver.voltage
+    driver.home(**options)
+    u, _, doing = drive(driver, stage, np.full(30_000, 0.15 * middle + 1.0))
+    swept = u[: doing.index("approaching")]
+    assert set(doing[: swept.size]) == {"homing"}
+    assert doing[-1] == "running"
+    assert np.abs(swept - middle).max() == pytest.approx(max(amplitude, abs(before - middle)), rel=0.01)
+    assert abs(swept[-1] - middle) < 0.001 * amplitude
+    # It begins and ends gently, and keeps the slew rate.
+    steps = np.abs(np.diff(swept, prepend=before))
+    assert max(steps[0], steps[-1]) < 0.05 * steps.max()
+    assert steps.max() <= limits.largest_step
+    turned = np.flatnonzero(np.diff(np.sign(np.diff(swept))) != 0.0)
+    extremes = np.abs(swept[turned + 1] - middle)
+    extremes = extremes[extremes > 0.01 * amplitude][-2 * options.get("cycles", 10) + 2 :]
+    assert np.all(np.diff(extremes) < 0.0)
+    # Nothing was in the way of the sweep itself.
+    again = controller(limits)
+    again.home(**options)
+    drive(again, pz.SimulatedStage(FS, LOOP), np.zeros(swept.size))
+    assert (again.status.slewed, again.status.saturated) == (0, 0)
+
+
+def test_it_erases_what_the_stage_remembers() -> None:
+    displacements = []
+    for extreme in (50.0, -50.0):
+        driver, stage = controller(), pz.SimulatedStage(FS, PLAYS)
+        stage.run(np.concatenate([np.linspace(0.0, extreme, 200), np.linspace(extreme, 0.0, 200)]))
+        assert abs(stage.step(0.0)) > 0.5
+        driver.home(frequency=20.0)
+        while driver.status.stage == "homing":
+            driver.learn(driver.step(0.0), stage.step(driver.voltage))
+        displacements.append(stage.step(0.0))
+    assert np.abs(displacements).max() < 0.1
+
+
+def test_the_models_know_the_stage_again() -> None:
+    """One that drove before is right again after a sweep, whatever the stage went through meanwhile."""
+    driver, stage = controller(estimators=None), pz.SimulatedStage(FS, PLAYS)
+    drive(driver, stage, np.tile(SINE, 60))
+    assert driver.status.driving != "line"
+    driver, stage = read_back(driver), pz.SimulatedStage(FS, PLAYS)
+    stage.run(np.concatenate([np.linspace(0.0, -50.0, 200), np.linspace(-50.0, 0.0, 200)]))
+    driver.learn(0.0, None)
+    driver.home(frequency=20.0)
+    assert driver.status.driving == "line"
+    r = np.tile(SINE, 20)
+    drive(driver, stage, np.zeros(2 * r.size)[:2624])
+    _, x, doing = drive(driver, stage, r)
+    assert doing[-1] == "running"
+    assert driver.status.driving != "line"
+    assert np.abs(r - x)[-1000:].max() < 0.05
+    assert driver.events == ()
+
+
+@pytest.mark.parametrize("gain", [None, 0.2])
+def test_without_a_gain_it_seeks_then(gain: float | None) -> None:
+    driver, stage = controller(gain=gain), pz.SimulatedStage(FS, LOOP)
+    driver.home(30.0, 20.0, 3)
+    r = np.tile(SINE, 20)
+    _, x, doing = drive(driver, stage, r)
+    assert list(dict.fromkeys(doing)) == ["homing", "seeking", "approaching", "running"]
+    assert np.abs(r - x)[-1000:].max() < 0.5
+
+
+def test_readings_that_are_missing_do_not_matter() -> None:
+    driver, stage = controller(), pz.SimulatedStage(FS, LOOP)
+    drive(driver, stage, np.tile(SINE, 10))
+    driver.home(20.0, 50.0, 5)
+    while driver.status.stage == "homing":
+        stage.step(driver.step(0.0))
+        driver.learn(driver.voltage, None)
+    assert driver.status.stage == "approaching"
+    _, x, doing = drive(driver, stage, np.tile(SINE, 10))
+    assert doing[-1] == "running"
+    assert np.abs(np.tile(SINE, 10) - x)[-500:].max() < 0.5
+
+
+@pytest.mark.parametrize("after", [0, 100, 400, 900])
+def test_it_goes_on_in_copies_files_and_blocks(after: int) -> None:
+    driver, stage = controller(), pz.SimulatedStage(FS, LOOP)
+    drive(driver, stage, np.tile(SINE, 4))
+    driver.home(20.0, 40.0, 5)
+    drive(driver, stage, np.zeros(after))
+    r = np.tile(SINE, 3)
+    others = [driver.copy(), read_back(driver), driver.copy()]
+    stages = [copy.deepcopy(stage) for _ in others]
+    u = drive(driver, stage, r)[0]
+    for other, own in list(zip(others, stages, strict=True))[:2]:
+        np.testing.assert_array_equal(drive(other, own, r)[0], u)
+        assert other.to_dict() == driver.to_dict()
+    blocks = others[2]
+    left = max(0, 700 - after)  # the way there and five cycles of 125 samples, about
+    for start in range(0, left - left % 25, 25):
+        planned = blocks.run(r[start : start + 25])
+        np.testing.assert_allclose(planned, u[start : start + 25], atol=1e-12)
+        blocks.learn(planned, stages[2].run(planned))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"amplitude": 0.0}, "amplitude must be above zero"),
+        ({"amplitude": 61.0}, "amplitude must be at most 60 V, half the range, got 61 V"),
+        ({"amplitude": np.nan}, "amplitude must be finite"),
+        ({"frequency": 0.0}, "frequency must"),
+        ({"frequency": 400.0}, "frequency must be at most 312.5 Hz"),
+        ({"cycles": 0}, "cycles must"),
+        ({"cycles": 1.5}, "cycles must"),
+        ({"cycles": 10**6}, "cycles must"),
+    ],
+)
+def test_a_sweep_that_cannot_be_is_refused(options: dict[str, Any], message: str) -> None:
+    driver = controller()
+    before = driver.to_dict()
+    with pytest.raises(ValueError, match=message):
+        driver.home(**options)
+    assert driver.to_dict() == before
+
+
+# ---------------------------------------------------------------- writes that may be lost
+
+
+def learnt(estimators: Any = (pz.OutputErrorRLS,)) -> tuple[Any, Any]:
+    """A controller that a model drives, and its stage."""
+    driver, stage = controller(estimators=estimators), pz.SimulatedStage(FS, LOOP)
+    drive(driver, stage, np.tile(SINE, 20))
+    assert driver.status.driving == "OutputErrorRLS"
+    return driver, stage
+
+
+def test_a_write_that_may_be_lost_makes_the_line_drive() -> None:
+    driver, stage = learnt()
+    before = len(driver.events)
+    # Several in a row: the planned voltage and the last one that is known part.
+    r = SINE[:40].tolist()
+    planned = []
+    for r_k in r:
+        planned.append(driver.step(r_k))
+        driver.learn(None, stage.step(planned[-1]))
+    assert driver.status.driving == "line"
+    assert len(driver.events) == before + 1
+    assert driver.events[-1].action == "went on"
+    assert driver.events[-1].reason.startswith("unknown voltage: ")
+    assert driver.candidates[1].missed is None
+    assert np.abs(np.diff(planned)).max() < 2.0 * np.abs(np.diff(drive(driver, stage, SINE)[0])).max()
+    rest = np.tile(SINE, 20)
+    _, x, _ = drive(driver, stage, rest)
+    assert driver.status.driving == "OutputErrorRLS"
+    assert np.abs(rest - x)[-500:].max() < 0.05
+
+
+def test_one_that_changes_nothing_does_not_matter() -> None:
+    driver, stage = learnt()
+    r = np.concatenate([np.tile(SINE, 2), SINE[:125], np.full(50, SINE[124])])  # at rest at the top
+    drive(driver, stage, r)
+    before = driver.events
+    known = driver.copy()
+    u = driver.step(SINE[124])
+    driver.learn(None, stage.step(u))
+    known.learn(known.step(SINE[124]), np.nan)
+    assert driver.status.driving == "OutputErrorRLS"
+    assert driver.events == before
+    assert driver.step(SINE[124]) == pytest.approx(known.step(SINE[124]), abs=0.01)
+
+
+def test_steps_without_a_write_leave_the_model() -> None:
+    driver, stage = learnt()
+    drive(driver, stage, SINE[:60])
+    modelled, line = driver.copy(), driver.copy()
+    assert modelled.step(SINE[60]) == driver.step(SINE[60])
+    line.state["driving"] = 0.0
+    assert driver.step(SINE[60]) == line.step(SINE[60])  # the second one: nobody knows of the first
+
+
+def test_nothing_is_lost_before_it_runs() -> None:
+    driver = controller()
+    for _ in range(20):
+        driver.step(1.0)
+        driver.learn(None, 0.0)
+    assert driver.status.stage == "seeking"
+    assert driver.events == ()
+
+
+# ---------------------------------------------------------------- whatever is called
+
+VALUE: Any = st.one_of(
+    st.floats(-10.0, 10.0),
+    st.floats(allow_nan=True, allow_infinity=True),
+    st.sampled_from([None, "x", 1e300]),
+)
+CALL = st.one_of(
+    st.tuples(st.just("step"), VALUE),
+    st.tuples(st.just("learn"), st.one_of(VALUE, st.just("planned")), VALUE),
+    st.tuples(st.just("ring"), st.integers(1, 120)),
+    st.tuples(st.just("home"), st.floats(0.01, 60.0), st.floats(1.0, 300.0), st.integers(1, 5)),
+    st.tuples(st.just("reset"), st.floats(-20.0, 100.0), st.one_of(st.none(), st.floats(-50.0, 50.0))),
+    st.tuples(st.just("block"), st.integers(1, 60), st.booleans()),
+    st.tuples(st.just("file")),
+)
+
+
+@hypothesis.given(
+    calls=st.lists(CALL, min_size=1, max_size=30),
+    before=st.sampled_from([0, 50, 400]),
+    known=st.sampled_from([{}, {"gain": 0.2}, {"gain": -5.0}, {"stroke": 1e-3, "feedback": 20.0}]),
+    slew_rate=st.sampled_from([None, 1e3]),
+)
+@hypothesis.settings(derandomize=True, deadline=None, max_examples=150)
+def test_whatever_is_called_the_voltage_is_finite_and_within_limits(
+    calls: list[Any], before: int, known: dict[str, float], slew_rate: float | None
+) -> None:
+    limits = pz.VoltageLimits(-20.0, 100.0, slew_rate, None if slew_rate is None else FS)
+    driver, stage = controller(limits, **{"feedback": 5.0, **known}), pz.SimulatedStage(FS, LOOP)
+    voltages = [0.0]
+
+    def ring(count: int) -> None:
+        for r in np.tile(SINE, 2)[:count].tolist():
+            voltages.append(driver.step(r))
+            driver.learn(voltages[-1], stage.step(voltages[-1]))
+
+    ring(before)
+    for name, *values in calls:
+        if name == "step":
+            voltages.append(driver.step(values[0]))
+        elif name == "learn":
+            driver.step(0.0)
+            driver.learn(driver.voltage if values[0] == "planned" else values[0], values[1])
+        elif name == "ring":
+            ring(values[0])
+        elif name == "block":
+            u = driver.run(SINE[: values[0]])
+            voltages.extend(u.tolist())
+            if values[1]:
+                driver.learn(u, 0.15 * u)
+            else:
+                driver.step(0.0)
+        elif name == "file":
+            driver = read_back(driver)
+        else:
+            getattr(driver, name)(*values)
+    ring(20)
+    assert np.all(np.isfinite(voltages))
+    assert min(voltages) >= -20.0
+    assert max(voltages) <= 100.0
+    assert driver.status.stage in shown.STAGES
+    assert read_back(driver).to_dict() == driver.to_dict()

@@ -1,0 +1,204 @@
+"""What a user knows of a stage: its gain, where it stands; and what a controller does if that is wrong."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+
+FS = 5000.0
+LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
+LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+SINE = pz.signals.sine(5.0, 10.0, 10, FS).values
+
+
+def controller(estimators: Any = (), **options: Any) -> Any:
+    return pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=estimators, **options)
+
+
+def loop() -> Callable[[float], float]:
+    return pz.SimulatedStage(FS, LOOP).step
+
+
+def lag(time_constant: float, gain: float = 0.15) -> Callable[[float], float]:
+    """A stage that is late by a time constant [s]."""
+    x, share = 0.0, 1.0 - np.exp(-1.0 / (time_constant * FS))
+
+    def step(u: float) -> float:
+        nonlocal x
+        x += share * (gain * u - x)
+        return float(x)
+
+    return step
+
+
+def backlash(width: float) -> Callable[[float], float]:
+    """A play of a width [V] on either side."""
+    place = 0.0
+
+    def step(u: float) -> float:
+        nonlocal place
+        place = min(max(place, u - width), u + width)
+        return 0.15 * place
+
+    return step
+
+
+def drive(
+    driver: Any, stage: Any, r: FloatArray, noise: float = 0.0
+) -> tuple[FloatArray, FloatArray, list[str]]:
+    """Voltage, displacement, stage of the work at each sample."""
+    u, x, stages = np.empty_like(r), np.empty_like(r), []
+    rng = np.random.default_rng(0)
+    for k, r_k in enumerate(r.tolist()):
+        u[k] = driver.step(r_k)
+        x[k] = stage(float(u[k]))
+        driver.learn(float(u[k]), float(x[k] + noise * rng.normal()))
+        stages.append(driver.status.stage)
+    return u, x, stages
+
+
+# ---------------------------------------------------------------- the gain
+
+
+@pytest.mark.parametrize(
+    "known", [{"gain": 0.2}, {"gain": 0.1}, {"gain": 0.3}, {"stroke": 20.0}, {"model": LOOP}], ids=str
+)
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.3])
+def test_nothing_is_sought_where_the_gain_is_known(known: dict[str, Any], noise: float) -> None:
+    driver = controller(**known)
+    _, x, stages = drive(driver, loop(), SINE, noise)
+    assert stages.index("approaching") == 4
+    assert stages.index("running") < 300
+    assert "seeking" not in stages[4:]
+    assert np.abs(SINE - x)[-1000:].max() < 0.65
+    assert driver.events == ()
+
+
+@pytest.mark.parametrize("gain", [-0.2, 2.0, 1e-4, 300.0])
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_a_gain_that_is_wrong_is_sought(gain: float, noise: float) -> None:
+    driver = controller(gain=gain)
+    u, x, stages = drive(driver, loop(), SINE, noise)
+    (event,) = driver.events
+    assert event.action == "went on"
+    assert event.reason.startswith("gain: the stage answers with ")
+    assert event.reason.endswith(f"V, not {gain:.3g}: the gain is sought")
+    before = u[: int(event.time * FS)]
+    assert np.abs(before).max() < 0.05 * 120.0  # it has not run away
+    assert stages[int(event.time * FS)] == "seeking"
+    assert driver.model.line[0] == pytest.approx(0.2, rel=0.3)
+    assert np.abs(SINE - x)[-1000:].max() < 0.65
+
+
+def test_learning_begins_anew_with_the_gain_that_was_found() -> None:
+    driver = controller(None, gain=-1.0)
+    _, x, _ = drive(driver, loop(), np.tile(SINE, 2))
+    assert [event.action for event in driver.events] == ["went on"]
+    assert driver.status.driving != "line"
+    assert np.abs(SINE - x[SINE.size :])[-1000:].max() < 0.1
+
+
+@pytest.mark.parametrize("time_constant", [2e-3, 6e-3, 0.03, 0.1])
+def test_a_stage_that_lags_is_waited_for(time_constant: float) -> None:
+    driver, r = controller(gain=0.15), np.full(6000, 5.0)
+    _, x, stages = drive(driver, lag(time_constant), r)
+    assert "seeking" not in stages[4:]
+    assert stages[-1] == "running"
+    assert x.max() < 5.5
+    assert abs(x[-1] - 5.0) < 0.4
+
+
+def test_a_little_backlash_is_waited_for_and_much_is_sought() -> None:
+    driver = controller(gain=0.15)
+    assert "seeking" not in drive(driver, backlash(0.8), SINE)[2][4:]
+    driver = controller(gain=0.15)
+    _, x, _ = drive(driver, backlash(6.0), SINE)
+    assert driver.events[0].reason.startswith("gain: the stage answers with 0 µm/V, not 0.15")
+    assert np.abs(SINE - x)[-1000:].max() < 2.5
+
+
+def test_a_stage_that_does_not_answer_is_named() -> None:
+    driver = controller(gain=0.15)
+    u, _, stages = drive(driver, lambda u: 1.0, np.tile(SINE, 2))
+    assert driver.status.fault == "no response"
+    assert stages[-1] == "seeking"
+    assert np.abs(u).max() < 0.6 * 60.0
+
+
+def test_without_readings_the_voltage_hardly_moves() -> None:
+    driver = controller(gain=0.15)
+    driver.reset(displacement=0.0)
+    u, _, _ = drive(driver, lambda u: np.nan, SINE)
+    assert 0.0 < np.abs(u).max() <= 0.011 * 120.0
+
+
+@pytest.mark.parametrize("again", [1, 4, 60, 2000])
+def test_it_is_kept_in_copies_and_files(again: int) -> None:
+    driver, stage = controller(gain=0.17), pz.SimulatedStage(FS, LOOP)
+    drive(driver, stage.step, SINE[:again])
+    data = json.loads(json.dumps(driver.to_dict()))
+    assert data["gain"] == 0.17
+    other = pz.AdaptiveFeedforward.from_dict(data)
+    u = [(each.step(r), each.learn(each.voltage, 0.1 * r))[0] for r in SINE[:50] for each in (driver, other)]
+    assert u[::2] == u[1::2]
+    assert driver.to_dict() == other.to_dict()
+    with pytest.raises(ValueError, match="gain must"):
+        pz.AdaptiveFeedforward.from_dict(data | {"gain": np.nan})
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"gain": 0.1, "stroke": 20.0}, "gain and stroke all say the gain: pass one of them"),
+        ({"gain": 0.1, "stroke": 20.0, "model": LOOP}, "gain and stroke and model all say"),
+        ({"gain": 0.0}, "gain must not be zero"),
+        ({"gain": np.nan}, "gain must be finite"),
+        ({"gain": "x"}, "gain must be one number"),
+        ({"gain": 1e30}, "size of gain must lie within"),
+        ({"stroke": 0.0}, "stroke must not be zero"),
+        ({"stroke": np.inf}, "stroke must be finite"),
+        ({"model": 0.1}, "model must be a model, as LinearGain"),
+    ],
+)
+def test_what_says_no_gain_is_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        controller(**options)
+
+
+# ---------------------------------------------------------------- where it stands
+
+
+@pytest.mark.parametrize("gain", [None, 0.2])
+def test_the_readings_at_rest_need_not_be_waited_for(gain: float | None) -> None:
+    driver, stage = controller(gain=gain), pz.SimulatedStage(FS, LOOP)
+    driver.reset(10.0, float(stage.run(np.linspace(0.0, 10.0, 50))[-1]))
+    assert driver.step(0.0) == 10.0
+    driver.learn(10.0, np.nan)
+    u, x, stages = drive(driver, stage.step, SINE)
+    assert u[1] != 10.0
+    assert stages[0] == ("seeking" if gain is None else "approaching")
+    assert np.abs(SINE - x)[-1000:].max() < 0.65
+    driver.reset()
+    assert driver.to_dict() == controller(gain=gain).to_dict()
+
+
+def test_where_it_stands_may_be_wrong() -> None:
+    """Two ways are answered alike, whatever the first one began with."""
+    driver = controller()
+    driver.reset(displacement=3.0)
+    _, x, _ = drive(driver, loop(), SINE)
+    assert np.abs(SINE - x)[-1000:].max() < 0.65
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, "x", 1e12])
+def test_a_wrong_displacement_is_refused(wrong: Any) -> None:
+    driver = controller()
+    with pytest.raises(ValueError, match="displacement must"):
+        driver.reset(0.0, wrong)
