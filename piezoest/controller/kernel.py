@@ -48,7 +48,7 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
-        noticed=COUNT, notice=whole(0.0, 7.0),
+        noticed=COUNT, notice=whole(0.0, 8.0), shaken=COUNT,
         # What the line misses, what it missed when it drove, what the stage misses of the reference.
         score=candidate.SCORE, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
         travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,

@@ -20,9 +20,20 @@ from piezoest.layout import AMOUNT, COUNT, MEASURED, record, whole
 # Faults: none; no response; response the wrong way round; far too large or too small; the reading stops at a
 # level; the reading's zero has moved.
 NONE, NO_RESPONSE, REVERSED, SCALED, SATURATED, MOVED = (float(i) for i in range(6))
-# What is noted beside: the stage answers otherwise than the user's gain says; a write may have been lost.
-OTHER_GAIN, UNKNOWN = 6.0, 7.0
-FAULTS = ("", "no response", "reversed", "scaled", "saturated", "zero moved", "gain", "unknown voltage")
+# What is noted beside: the stage answers otherwise than the user's gain says; a write may have been lost;
+# models shake the stage.
+OTHER_GAIN, UNKNOWN, SHAKEN = 6.0, 7.0, 8.0
+FAULTS = (
+    "",
+    "no response",
+    "reversed",
+    "scaled",
+    "saturated",
+    "zero moved",
+    "gain",
+    "unknown voltage",
+    "shaken",
+)
 
 READINGS = record(
     fault=whole(0.0, 5.0),
@@ -127,6 +138,8 @@ def _name(readings: Any) -> float:
     if readings.large > LARGE_FOR:
         return SCALED
     if readings.weak > WEAK_FOR:
+        if readings.fault == SCALED or readings.fault == NO_RESPONSE:
+            return readings.fault
         follows = lines.explained(readings.recent) > 0.8 and readings.still == 0.0
         return SCALED if follows else NO_RESPONSE
     if readings.stopped != 0.0:

@@ -22,9 +22,11 @@ MEANINGS = {
     "reversed": "the readings go the wrong way",
     "scaled": "the readings answer far more or far less than before",
     "saturated": "the readings stand still at a level",
-    "zero moved": "the readings have moved by a constant, which is followed",
+    "zero moved": "the readings have moved by a constant",
     "gain": "the stage answers with {gain_before:.3g} µm/V, not {gain:.3g}: the gain is sought",
     "unknown voltage": "nobody knows what was written, and the line drives until the models have shown again",
+    "shaken": "models made it worse than the line, as where a resonance is shaken: a slower or smoother "
+    "reference helps",
 }
 
 
