@@ -1,11 +1,12 @@
-"""The default controller, and the straight line alone, on the rigs that `piezoest bench safety` draws.
+"""The default controller, and what is left of it without its parts, on the rigs of `piezoest bench safety`.
 
 Every run follows from its seed. Finished runs are kept in the folder; started again, the same command does
 the rest. What is written sums them up and is as small for many runs as for few.
 
-    python benchmarks/safety.py [--runs N] [--workers N] [--out DIR] [--json FILE] [--figure FILE]
+    python benchmarks/safety.py [--runs N] [--others N] [--map N] [--singles N] [--workers N] [--out DIR]
+                                [--json FILE] [--figure FILE]
 
-A run takes some seconds with the controller, and about one with the line.
+A run takes about half a second.
 """
 
 from __future__ import annotations
@@ -25,22 +26,37 @@ from piezoest.bench.adaptation import json_safe
 from piezoest.bench.campaign import store_in
 from piezoest.bench.origin import origin, put
 from piezoest.bench.suite_command import counting
-from piezoest.bench.zoo import judging
-from piezoest.bench.zoo.contenders import DEFAULT
+from piezoest.bench.zoo import judging, naming, settling, summary
+from piezoest.bench.zoo.contenders import DEFAULT, PARTS
+from piezoest.bench.zoo.contest import contest, summarise_contest
 from piezoest.bench.zoo.summary import CRITERIA, summarise
-from piezoest.bench.zoo.tasks import carry_out_all, runs
+from piezoest.bench.zoo.tasks import Task, carry_out_all, cells, runs
 
 Row = dict[str, Any]
 
-CONTROLLERS = {"controller": DEFAULT, "line": "straight_line:straight_line"}
+CONTROLLERS = {"controller": DEFAULT, "no_corridor": "no-corridor", "line": "line", "parts": PARTS}
 # A leg is half a wave of the reference. Called less often, or told later, nobody can follow it closely.
 CALLS, LATE = 16.0, 1.0 / 16.0
 FEATURES = ("family", "reference", "fault", "mode", "mechanics")
 SPANS = ("amplitude", "frequency", "gain", "width", "sample_rate", "delay", "block", "sensor_noise", "creep")
 # Levels of the curve of a distribution; many where it ends, which is what matters.
 LEVELS = (*np.linspace(0.0, 0.9, 46), *np.linspace(0.9, 0.99, 19)[1:], *np.linspace(0.99, 1.0, 21)[1:])
-COLOURS = {"controller": "#D55E00", "line": "#0072B2"}
-NAMES = {"controller": "AdaptiveFeedforward", "line": "the straight line alone"}
+# How a fault was named, and how soon it was forgotten.
+TOLD = (
+    "fault",
+    "mode",
+    "to_name",
+    "named",
+    "named_periods",
+    "to_recover",
+    "recovered_first",
+    "recovered_soon",
+)
+COLOURS = {"controller": "#D55E00", "no_corridor": "#CC79A7", "line": "#0072B2", "parts": "#888888"}
+NAMES = {
+    "controller": "AdaptiveFeedforward", "no_corridor": "without corridor",
+    "line": "without candidates", "parts": "estimator and inverse by hand",
+}  # fmt: skip
 STYLES = {"all": "-", "healthy": "--", "often": ":"}
 GROUPS = {"all": "all runs", "healthy": "healthy rigs", "often": "called often"}
 
@@ -61,19 +77,19 @@ PARTS: dict[str, Callable[[Row], bool]] = {
 
 def judged(rows: Sequence[Row], column: str = "ratio") -> list[float]:
     """Ratios that count."""
-    return [row[column] for row in rows if row["fair"] and row.get(column) is not None]
+    return [row[column] for row in rows if row.get(column) is not None]
 
 
-def part(rows: Sequence[Row]) -> Row:
-    """Violations, quantiles and the curve of a group."""
+def part(rows: Sequence[Row], *, curve: bool = True) -> Row:
+    """Violations, quantiles and, if it is drawn, the curve of a group."""
     found = summarise(rows)
     ratios = judged(rows)
     return {
         "runs": len(rows),
         "judged": len(ratios),
         "violations": found["violations"],
-        "quantiles": {name: found["quantiles"][name] for name in ("ratio", "last_ratio")},
-        "curve": [float(f"{value:.4g}") for value in np.quantile(ratios, LEVELS)] if ratios else [],
+        "quantiles": {name: found["quantiles"][name] for name in ("ratio", "cycle_ratio", "last_ratio")},
+        "curve": np.quantile(ratios, LEVELS).tolist() if ratios and curve else [],
     }
 
 
@@ -90,7 +106,7 @@ def table(rows: Sequence[Row], *names: str) -> list[Row]:
                 **dict(zip(names, key, strict=True)),
                 "runs": len(group),
                 "judged": len(ratios),
-                "median": float(f"{np.median(ratios):.4g}") if ratios else None,
+                "median": float(np.median(ratios)) if ratios else None,
                 "over": sum(map(CRITERIA["ratio"], group)),
                 "over_last": sum(map(CRITERIA["last_ratio"], group)),
             }
@@ -98,20 +114,43 @@ def table(rows: Sequence[Row], *names: str) -> list[Row]:
     return found
 
 
-def summed_up(rows: Sequence[Row]) -> Row:
-    """All that the page shows of one controller."""
+def groups(rows: Sequence[Row]) -> Row:
+    """What the page shows of each contender; of all runs together the curve is drawn."""
+    return {
+        **{
+            name: part([row for row in rows if belongs(row)], curve=name == "all")
+            for name, belongs in PARTS.items()
+        },
+        "worst": summarise(rows)["worst"],
+    }
+
+
+def tables(rows: Sequence[Row]) -> Row:
+    """What it shows of the line, too."""
     marked = [{**row, "often": often(row)} for row in rows]
     return {
-        **{name: part([row for row in marked if belongs(row)]) for name, belongs in PARTS.items()},
+        **groups(rows),
         "by_fault": table(marked, "fault"),
-        "by_mode": table(marked, "fault", "mode"),
         "by_family_and_reference": table(marked, "family", "reference"),
         "by_family": table(marked, "family"),
         "by_reference": table(marked, "reference"),
         "by_mechanics": table(marked, "mechanics"),
         "by_often": table(marked, "often"),
-        "worst": summarise(marked)["worst"],
     }
+
+
+def summed_up(rows: Sequence[Row]) -> Row:
+    """All that it shows of the controller."""
+    told = [row for row in summarise(rows)["by_fault"] if row["fault"] != "none"]
+    return {
+        **tables(rows),
+        **{name: part([row for row in rows if belongs(row)]) for name, belongs in PARTS.items()},
+        "by_mode": table(rows, "fault", "mode"),
+        "told": [{name: row[name] for name in TOLD} for row in told],
+    }
+
+
+SHOWN = {"controller": summed_up, "no_corridor": groups, "line": tables, "parts": groups}
 
 
 def drawn(rows: Sequence[Row]) -> Row:
@@ -125,10 +164,9 @@ def drawn(rows: Sequence[Row]) -> Row:
     }
 
 
-def played(controller: str, seeds: range, folder: Path, workers: int | None) -> list[Row]:
-    """Rows of a controller, of which those that are known are not made again."""
-    tasks = runs(controller, seeds)
-    with store_in(folder) as store, counting(f"runs of {controller}") as count:
+def played(what: str, tasks: Sequence[Task], folder: Path, workers: int | None) -> list[Row]:
+    """Rows of some runs, of which those that are known are not made again."""
+    with store_in(folder) as store, counting(f"runs of {what}") as count:
         carry_out_all(tasks, store, workers, count)
         return list(store.rows(task.key for task in tasks))
 
@@ -157,9 +195,21 @@ def draw(document: Row, path: Path) -> None:
     save_figure(figure, path, dpi=110, metadata={"Software": None})
 
 
+def short(value: Any) -> Any:
+    """All numbers of a document with four digits: more would say nothing."""
+    if isinstance(value, dict):
+        return {name: short(each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [short(each) for each in value]
+    return float(f"{value:.4g}") if isinstance(value, float) else value
+
+
 def main(given: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--runs", type=int, default=2000, help="rigs, one for each seed")
+    parser.add_argument("--others", type=int, help="rigs for what it is compared with; default as many")
+    parser.add_argument("--map", type=int, default=0, help="seeds for each place of the map")
+    parser.add_argument("--singles", type=int, default=0, help="seeds for each family and reference")
     parser.add_argument("--seed", type=int, default=0, help="the first one")
     parser.add_argument("--workers", type=int, help="processes; default one for each core")
     parser.add_argument("--out", type=Path, default=Path("bench-results-safety"), help="of finished runs")
@@ -170,29 +220,43 @@ def main(given: Sequence[str] | None = None) -> int:
         parser.error("--runs must be at least 1")
 
     began = time.perf_counter()
-    # Where the controller of the comparison is found, also by the processes of the workers.
-    if (here := str(Path(__file__).resolve().parent)) not in sys.path:
-        sys.path.insert(0, here)
-    seeds = range(arguments.seed, arguments.seed + arguments.runs)
+    others = min(arguments.runs, arguments.others or arguments.runs)
+
+    def play(what: str, tasks: Sequence[Task]) -> list[Row]:
+        return played(what, tasks, arguments.out, arguments.workers)
+
     rows = {
-        name: played(controller, seeds, arguments.out, arguments.workers)
+        name: play(
+            controller,
+            runs(
+                controller,
+                range(arguments.seed, arguments.seed + (arguments.runs if name == "controller" else others)),
+            ),
+        )
         for name, controller in CONTROLLERS.items()
     }
+    on_map = play("the map", cells(DEFAULT, settling.cells(range(arguments.map))))
+    alone = play("single estimators", contest(DEFAULT, range(arguments.singles)))
     document = {
         "suite": "safety",
         **origin(began),
         "runs": arguments.runs,
+        "others": others,
         "seed": arguments.seed,
         "controllers": CONTROLLERS,
         "criteria": {
             "line": judging.ALLOWED, "noise": judging.NOISES, "swing": judging.NEGLIGIBLE,
-            "calls": CALLS, "late": LATE,
+            "calls": CALLS, "late": LATE, "back": naming.BACK, "soon": summary.SOON,
+            "enough": summary.ENOUGH, "settled": settling.SETTLED, "slow": settling.SLOW,
+            "large": settling.LARGE,
         },
         "drawn": drawn(rows["controller"]),
         "levels": [round(float(level), 6) for level in LEVELS],
-        **{name: summed_up(each) for name, each in rows.items()},
+        **{name: SHOWN[name](each) for name, each in rows.items()},
+        "map": {"seeds": arguments.map, **summary.summarise_cells(on_map)} if on_map else None,
+        "singles": summarise_contest(alone, DEFAULT) if alone else None,
     }  # fmt: skip
-    document = json.loads(json.dumps(json_safe(document)))
+    document = short(json.loads(json.dumps(json_safe(document))))
     put(document, arguments.json)
     if arguments.figure is not None:
         draw(document, arguments.figure)

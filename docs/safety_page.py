@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from paper_page import table, write_pieces
+from safety_more_page import besides, of_all, places, singles, told
 from which_estimator_page import listed, percent, replacements, short
 
 DOCS = Path(__file__).resolve().parent
@@ -20,15 +21,20 @@ TARGET = DOCS / "generated" / "safety"
 Document = dict[str, Any]
 
 GROUPS = {"all": "all", "healthy": "healthy", "often": "called often"}
-WHO = {"controller": "controller", "line": "line alone"}
+WHO = {
+    "controller": "controller", "no_corridor": "without corridor", "line": "without candidates",
+    "parts": "by hand",
+}  # fmt: skip
 CRITERIA = {
     "failed": "raised an error",
     "not finite": "a voltage that is not finite",
     "outside the limits": "a voltage outside its limits",
     "rests at a limit": "rests at a limit without need",
     "ratio": "ratio above 1",
+    "cycle_ratio": "ratio above 1 in any one cycle",
     "last_ratio": "ratio above 1 in the last cycle",
 }
+RATIOS = {"ratio": "after two swings", "cycle_ratio": "any one cycle", "last_ratio": "last cycle"}
 FAMILIES = {
     "backlash": "a play, and a dead zone behind it",
     "bouc-wen": "Bouc-Wen, with the power and the roundness of its loop drawn",
@@ -83,6 +89,11 @@ def pieces(document: Document) -> dict[str, str]:
         "violations": violations(document),
         "quantiles": quantiles(document),
         "faults": faults(document),
+        "told": told(document),
+        "map": places(document, "by_family", "family"),
+        "places": places(document, "by_place", "amplitude", "frequency"),
+        "other_places": places(document, "other_places", "amplitude", "frequency"),
+        "singles": singles(document),
         "controller": crossed(document, "controller"),
         "line": crossed(document, "line"),
         "mechanics": mechanics(document),
@@ -107,6 +118,12 @@ def numbers(document: Document) -> str:
             "safety swing": f"{100.0 * criteria['swing']:g} %",
             "safety calls": f"{criteria['calls']:g}",
             "safety late": f"1/{1.0 / criteria['late']:g}",
+            "safety others": document["others"],
+            "safety back": f"{criteria['back']:g}",
+            "safety soon": criteria["soon"],
+            "safety settled": percent(criteria["settled"]),
+            "safety slow": percent(criteria["slow"]),
+            "safety large": f"{criteria['large']:g}",
         }
     )
 
@@ -151,14 +168,9 @@ def share(row: Document) -> float | None:
     return row["over"] / row["judged"] if row["judged"] else None
 
 
-def of_all(count: int, runs: int) -> str:
-    """A count, of how many, and in per cent."""
-    return f"{count} of {runs} ({percent(count / runs)})" if runs else "—"
-
-
 def verdict(document: Document) -> list[str]:
     """Whether the promise is kept and where it is not, in sentences."""
-    mine, other = document["controller"], document["line"]
+    mine = document["controller"]
     said = [hard(mine["all"])]
     over = mine["all"]["violations"]["ratio"]
     if not over:
@@ -166,7 +178,7 @@ def verdict(document: Document) -> list[str]:
             f"No ratio of the {mine['all']['judged']} runs that are judged is above 1: as to errors the "
             "promise is kept here. That is no proof for rigs that were not drawn."
         )
-        return said
+        return said + besides(document)
     counts = {name: of_all(mine[name]["violations"]["ratio"], mine[name]["judged"]) for name in GROUPS}
     said.append(
         f"**The promise is not kept yet.** The ratio is above 1 in {counts['all']} runs; on healthy rigs in "
@@ -178,17 +190,18 @@ def verdict(document: Document) -> list[str]:
         f"{of_all(mine['all']['violations']['last_ratio'], mine['all']['judged'])} runs, on healthy rigs in "
         f"{of_all(mine['healthy']['violations']['last_ratio'], mine['healthy']['judged'])}."
     )
-    said.append(
-        "The straight line alone, which has to find its gain too, is above 1 in "
-        f"{of_all(other['all']['violations']['ratio'], other['all']['judged'])} runs, on healthy rigs in "
-        f"{of_all(other['healthy']['violations']['ratio'], other['healthy']['judged'])}."
-    )
+    others = [
+        f"{title} in {of_all(document[who]['all']['violations']['ratio'], document[who]['all']['judged'])}"
+        for who, title in WHO.items()
+        if who != "controller"
+    ]
+    said.append(f"Of the others the ratio is above 1: {listed(others)}.")
     for title, column in (
         ("fault", "fault"), ("family", "family"), ("reference", "reference"), ("mechanics", "mechanics"),
     ):  # fmt: skip
         if found := most([row for row in mine[f"by_{column}"] if row[column] != "none"], column):
             said.append(f"By {title} it fails most often with {listed(found)}.")
-    return said
+    return said + besides(document)
 
 
 def hard(group: Document) -> str:
@@ -213,19 +226,15 @@ def most(rows: Sequence[Document], column: str) -> list[str]:
 
 def violations(document: Document) -> str:
     """Counts of each criterion."""
-    parts = [(who, group) for who in WHO for group in GROUPS]
-    body = [
-        [
-            title,
-            *(
-                f"{document[who][group]['violations'][name]}/"
-                f"{document[who][group]['judged' if 'ratio' in name else 'runs']}"
-                for who, group in parts
-            ),
-        ]
-        for name, title in CRITERIA.items()
-    ]
-    heading = ["criterion", *(f"{WHO[who]}, {GROUPS[group]}" for who, group in parts)]
+    body = []
+    for who, title in WHO.items():
+        for group, which in GROUPS.items():
+            of = document[who][group]
+            counts = (
+                f"{of['violations'][name]}/{of['judged' if 'ratio' in name else 'runs']}" for name in CRITERIA
+            )
+            body.append([title, which, *counts])
+    heading = ["", "runs", *CRITERIA.values()]
     return table("Runs that violate a criterion, of all that are judged by it", heading, body)
 
 
@@ -235,7 +244,7 @@ def quantiles(document: Document) -> str:
         [WHO[who], GROUPS[group], title, *map(short, document[who][group]["quantiles"][name].values())]
         for who in WHO
         for group in GROUPS
-        for name, title in (("ratio", "after two swings"), ("last_ratio", "last cycle"))
+        for name, title in RATIOS.items()
     ]
     levels = list(document["controller"]["all"]["quantiles"]["ratio"])
     return table("Quantiles of the ratio", ["", "runs", "ratio", *levels], body)
@@ -252,12 +261,12 @@ def faults(document: Document) -> str:
             [
                 name, FAULTS.get(name, ""), str(row["judged"]), short(row["median"]), percent(share(row)),
                 *(counted(modes.get((name, mode))) for mode in ("from-start", "transient", "permanent")),
-                short(line[name]["median"]), percent(share(line[name])),
+                cell(line.get(name)),
             ]
         )  # fmt: skip
     heading = [
         "fault", "what it is", "runs", "median", "above 1", "from the start", "for a time", "for good",
-        "line: median", "line: above 1",
+        "line: median; above 1",
     ]  # fmt: skip
     return table("By fault: median of the ratio, and runs above 1", heading, body)
 
@@ -294,7 +303,7 @@ def mechanics(document: Document) -> str:
         line = {row[column]: row for row in document["line"][f"by_{column}"]}
         for row in document["controller"][f"by_{column}"]:
             word = {True: "yes", False: "no"}.get(row[column], row[column])
-            body.append([title.format(word), cell(row), percent(share(row)), cell(line[row[column]])])
+            body.append([title.format(word), cell(row), percent(share(row)), cell(line.get(row[column]))])
     heading = ["runs with", "median; above 1", "above 1", "line: median; above 1"]
     return table("By mechanics, and by how often the controller is called", heading, body)
 
@@ -314,7 +323,15 @@ def worst(document: Document) -> str:
         "seed", "family", "reference", "fault", "ratio", "last cycle", "after the fault",
         "at a limit [quarter swings]", "drove last", "error",
     ]  # fmt: skip
-    return table(f"The worst {len(body)} runs of the controller", heading, body)
+    others = "".join(
+        f"- {title}: "
+        + ", ".join(f"{row['seed']} ({short(row['ratio'])})" for row in document[who]["worst"])
+        + "\n"
+        for who, title in WHO.items()
+        if who != "controller"
+    )
+    mine = table(f"The worst {len(body)} runs of the controller", heading, body)
+    return f"{mine}\nThe worst of the others, seeds with their ratios:\n\n{others}"
 
 
 def show(document: Document) -> str:

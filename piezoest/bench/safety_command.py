@@ -34,7 +34,8 @@ class Which:
     """What is run."""
 
     runs: Annotated[
-        int, typer.Option(min=1, help="Rigs, one for each seed; with --map, seeds for each of its places.")
+        int,
+        typer.Option(min=1, help="Rigs, one for each seed; with --map and --singles, seeds for each place."),
     ] = 200
     seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 0
     controller: Annotated[
@@ -43,7 +44,8 @@ class Which:
             "--controller",
             "-c",
             metavar="NAME|MODULE:NAME",
-            help="Called with (sample_rate, limits=...); parts: estimator, inverse and supervisor by hand.",
+            help="Called with (sample_rate, limits=...). line, no-corridor or an estimator: the default one, "
+            "changed; parts: estimator, inverse and supervisor by hand.",
         ),
     ] = None
     given: Annotated[
@@ -53,9 +55,18 @@ class Which:
     settling: Annotated[
         bool, typer.Option("--map", help="How soon it settles, over amplitude, frequency and family.")
     ] = False
+    singles: Annotated[
+        bool,
+        typer.Option("--singles", help="Each family and reference, beside each estimator of it alone."),
+    ] = False
     show: Annotated[
         int | None, typer.Option(metavar="SEED", min=0, help="Run this one alone, and draw it.")
     ] = None  # fmt: skip
+
+    @property
+    def title(self) -> str:
+        """What its files are called."""
+        return "map" if self.settling else "singles" if self.singles else "safety"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,15 +126,16 @@ def safety(
             Console(stderr=True).print(f"stopped: the same command goes on from {written.output}")
             raise typer.Exit(INTERRUPTED) from None
     document = {"suite": "safety", **origin(began), "controller": name, "given": given}
-    document |= _write(which.settling, rows, written.output, format)
+    document |= _write(which, name, rows, written.output, format)
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    write_text(written.output / ("map.json" if which.settling else "safety.json"), text)
+    write_text(written.output / f"{which.title}.json", text)
     if json_to == "-":
         typer.echo(text)
         return
     from piezoest.bench.zoo import report
 
-    (report.print_map if which.settling else report.print_summary)(document, Console())
+    shown = {"map": report.print_map, "singles": report.print_contest}
+    shown.get(which.title, report.print_summary)(document, Console())
     typer.echo(f"Results: {written.output}")
     if target is not None:
         write_text(target, text)
@@ -145,26 +157,32 @@ def _given(pairs: list[str]) -> dict[str, Any]:
 
 
 def _plan(which: Which, controller: str, given: dict[str, Any]) -> list[Task]:
-    from piezoest.bench.zoo import draw, settling, tasks
+    from piezoest.bench.zoo import contest, draw, settling, tasks
 
     seeds = range(which.seed, which.seed + which.runs)
-    if which.settling:
-        if given:
-            raise ValueError("--map draws its rigs itself: leave out --set")
+    if which.settling or which.singles:
+        if given or (which.settling and which.singles):
+            raise ValueError(f"--{which.title} draws its rigs itself: leave out --set, and one of two maps")
+        if which.singles:
+            return contest.contest(controller, seeds)
         return tasks.cells(controller, settling.cells(seeds))
     draw(which.seed, **given)  # a wrong name is told now
     return tasks.runs(controller, seeds, given)
 
 
-def _write(settling: bool, rows: list[dict[str, Any]], folder: Path, format: str) -> dict[str, Any]:
+def _write(
+    which: Which, controller: str, rows: list[dict[str, Any]], folder: Path, format: str
+) -> dict[str, Any]:
     """Write the table, and sum it up."""
     from piezoest.bench.tables import write_table
-    from piezoest.bench.zoo import columns, summary
+    from piezoest.bench.zoo import columns, contest, summary
 
-    if settling:
+    if which.settling:
         write_table(columns.tidy_cells(rows), folder / f"map.{format}", columns.CELL_COLUMNS)
         return summary.summarise_cells(rows)
-    write_table(rows, folder / f"runs.{format}", columns.COLUMNS)
+    write_table(rows, folder / f"{'singles' if which.singles else 'runs'}.{format}", columns.COLUMNS)
+    if which.singles:
+        return contest.summarise_contest(rows, controller)
     return summary.summarise(rows)
 
 

@@ -13,7 +13,7 @@ from piezoest._checks import FloatArray, array_1d, moderate, number_or_nan
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import kernel, making, saved, shown, team
 from piezoest.controller.face import Face
-from piezoest.layout import by_name, write
+from piezoest.layout import by_name, from_bytes, write
 
 # Events that are kept.
 MOST_EVENTS = 1000
@@ -42,9 +42,9 @@ class AdaptiveFeedforward(Face):
         Up to four, called as ``factory(sample_rate, initial_model=..., noise=...)``: classes of estimators
         (`HysteresisRLS`, `OutputErrorRLS`, `HysteresisEKF`, `PrandtlIshlinskiiRLS`), or a
         ``functools.partial`` of one. Default: the first, the second and the last of these; ``()`` is the
-        straight line alone. Estimators are made here, since they work in volts: they are given the readings
-        as z = (x - zero)/unit, in which the stage has a gain of about one, and an initial model and a noise
-        for that.
+        straight line alone. Estimators are made here, since they are given voltages and readings in units
+        of half a swing, in which the stage has a gain of about one, and an initial model and a noise for
+        that.
     corridor : float
         How far the voltage goes from the straight line at most, as a fraction of half the recent swing,
         0 to 1.
@@ -106,10 +106,9 @@ class AdaptiveFeedforward(Face):
     ) -> None:
         sample_rate, limits = moderate("sample_rate", sample_rate), making.checked_limits(limits, sample_rate)
         factories = team.DEFAULT if estimators is None else estimators
-        half_range = 0.5 * (limits.maximum - limits.minimum)
         known = making.known_gain(gain, stroke, model, limits)
         options = making.options(sample_rate, corridor, known, feedback)
-        self._make(sample_rate, limits, options, team.made(factories, sample_rate, half_range))
+        self._make(sample_rate, limits, options, team.made(factories, sample_rate))
 
     def _make(self, sample_rate: float, limits: VoltageLimits, options: Any, estimators: Any) -> None:
         """Make room for estimators that are known to be good ones."""
@@ -224,8 +223,10 @@ class AdaptiveFeedforward(Face):
         """
         r = array_1d("r", r, allow_nan=True).copy()
         u = np.empty_like(r)
-        ahead = self._state.copy()
-        self._compiled()[2](ahead, self._settings.copy(), r, u)
+        # A copy through bytes: NumPy's own goes through a nested structure field by field.
+        given = zip(self._layouts, (self._state, self._settings), strict=True)
+        ahead, settings = (from_bytes(layout, array.tobytes()) for layout, array in given)
+        self._compiled()[2](ahead, settings, r, u)
         for name in _COUNTED:
             self._state[name] = ahead[name]
         self._planned = r

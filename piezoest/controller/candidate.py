@@ -2,7 +2,8 @@
 
 The model in use runs free along the voltage that was written: what it misses of the readings is what the
 stage would have missed of the reference, had this model driven. Estimator and model work in units in which
-the line has gain one: z = (x - zero)/unit is a voltage, so that nothing need be known of µm/V beforehand.
+the line has gain one and the voltage swings from about -1 to 1, so that nothing need be known of the stage
+beforehand; what they give to others is z = (x - zero)/unit, a voltage.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ SCORE = record(weight=AMOUNT, square=AMOUNT, peak=AMOUNT, z=MEASURED, owed=NUMBE
 def layouts(estimator: tuple[Record, Record], inverse: tuple[Record, Record]) -> tuple[Record, Record]:
     """Layouts of state and settings."""
     state = record(
+        # The voltage is centre + scale times the model's, and z is shift + scale times where it stands.
+        scale=AMOUNT, centre=MEASURED, shift=MEASURED,
         voltage=MEASURED, usable=FLAG, handed=COUNT, score=SCORE,
         path=recent_path.PATH, memory=TURNING_POINTS, inverse=inverse[0], estimator=estimator[0],
     )  # fmt: skip
@@ -37,28 +40,43 @@ def layouts(estimator: tuple[Record, Record], inverse: tuple[Record, Record]) ->
 
 
 @register_jitable
-def begin(state: Any, settings: Any, u: Any) -> None:
-    """Begin at rest at a voltage."""
-    state.voltage = u
-    recent_path.begin(state.path, u, 1.0)
-    remember(state.memory, u)
+def begin(state: Any, settings: Any, u: Any, centre: Any, scale: Any) -> None:
+    """Begin at rest at a voltage; the swing has a centre, and `scale` is half of it."""
+    state.scale, state.centre, state.shift = scale, centre, 0.0
+    state.voltage = (u - centre) / scale
+    recent_path.begin(state.path, state.voltage, 1.0)
+    remember(state.memory, state.voltage)
     state.inverse.place(state, settings)
+
+
+@register_jitable
+def _expected(state: Any, settings: Any) -> float:
+    """Where the model stands, as z."""
+    return state.shift + state.scale * state.inverse.expected(state, settings)
+
+
+@register_jitable
+def shift(state: Any, settings: Any, z: Any) -> None:
+    """Let the model stand at z."""
+    state.shift += z - _expected(state, settings)
 
 
 @register_jitable
 def advance(state: Any, settings: Any, u: Any) -> None:
     """Let the model follow the voltage that was written."""
-    recent_path.follow(state.path, u)
-    remember(state.memory, u)
-    state.inverse.follow(state, settings, np.nan, u)
-    state.voltage = u
-    state.score.z = state.inverse.expected(state, settings)
+    v = (u - state.centre) / state.scale
+    recent_path.follow(state.path, v)
+    remember(state.memory, v)
+    state.inverse.follow(state, settings, np.nan, v)
+    state.voltage = v
+    state.score.z = _expected(state, settings)
 
 
 @register_jitable
 def learn(state: Any, settings: Any, u: Any, z: Any) -> None:
     """Give the estimator a sample; z is NaN where there is nothing to learn from."""
-    state.estimator.sample(state.estimator, settings.estimator, u, z)
+    v = (u - state.centre) / state.scale
+    state.estimator.sample(state.estimator, settings.estimator, v, (z - state.shift) / state.scale)
 
 
 @register_jitable
@@ -84,7 +102,7 @@ def hand_over(state: Any, settings: Any) -> None:
         return
     if found == TO_BE_PLACED:
         state.inverse.place(state, settings)
-    z = state.inverse.expected(state, settings)
+    z = _expected(state, settings)
     if state.usable != 0.0:
         state.score.owed += state.score.z - z
     state.usable = 1.0
@@ -95,4 +113,4 @@ def hand_over(state: Any, settings: Any) -> None:
 @register_jitable
 def voltage(state: Any, settings: Any, z: Any) -> float:
     """Voltage at which the model stands at z."""
-    return state.inverse.wanted(state, settings, z)
+    return state.centre + state.scale * state.inverse.wanted(state, settings, (z - state.shift) / state.scale)

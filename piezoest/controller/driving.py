@@ -9,6 +9,7 @@ from numba.extending import register_jitable
 
 from piezoest.controller import candidate, slots
 from piezoest.controller import line as lines
+from piezoest.controller import readings as reading
 
 # What a change of model owes is paid within this fraction of a swing of the reference: faster, a loop through
 # the models would feed a resonance.
@@ -25,6 +26,8 @@ SEEN, CALM = 0.6, 0.1
 SHOWN, PROVEN = 4.0, 1.0
 # A model that drives falls back at once where the stage misses by so many times what the line has missed.
 TRIP = 2.0
+# So often is no chance: it is said, once.
+OFTEN = 3.0
 # Misses below this fraction of a swing are all alike.
 ALIKE = 5e-4
 
@@ -113,6 +116,9 @@ def watch(state: Any, off: Any) -> None:
     """Fall back to the line at once where the stage is farther off than it ever was under the line."""
     if state.driving > 0.0 and off > TRIP * state.line_peak + 3.0 * _floor(state) and state.since > CALM:
         _change(state, 0.0)
+        state.shaken += 1.0
+        if state.shaken == OFTEN:
+            reading.notice(state, reading.SHAKEN)
 
 
 @register_jitable

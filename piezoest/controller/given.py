@@ -55,15 +55,15 @@ def compare(state: Any, settings: Any) -> None:
     elif start.doubted > 2.0 * longest:
         start.given = start.doubted = 0.0
         if clear:
-            _forget(state, answered)
+            _forget(state, settings, answered)
 
 
 @register_jitable
-def _forget(state: Any, answered: Any) -> None:
+def _forget(state: Any, settings: Any, answered: Any) -> None:
     """Seek the gain."""
     start = state.start
     start.gain_before = answered
-    state.unit = state.line.gain = 0.0
+    state.unit = state.scale = state.line.gain = 0.0
     state.stage = SEEK
-    starts.begin_again(start, state.u)
+    starts.begin_again(start, settings.start, state.u)
     reading.notice(state, reading.OTHER_GAIN)

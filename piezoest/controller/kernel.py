@@ -34,19 +34,21 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         # Reference planned for, voltage planned, voltage written.
         r=MEASURED, planned=MEASURED, u=MEASURED,
         # Farthest way from the start's voltage that was answered; travel of the reference with the voltage at
-        # a limit for nothing, in swings.
-        confirmed=AMOUNT, railed=AMOUNT,
+        # a limit, and with a voltage that stood still.
+        confirmed=AMOUNT, railed=AMOUNT, frozen=AMOUNT,
         # The model that drives, 0 for the line; what changes of the line owe; swings since another one drove,
         # those that one drives at least, changes so far.
         driving=whole(0.0, 4.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,
         # z = (x - zero)/unit is what candidates know of a reading.
         unit=NUMBER, zero=MEASURED,
+        # Half the swing that they began with; zero before [V].
+        scale=AMOUNT,
         # Correction of the reference by feedback [µm].
         feedback=NUMBER,
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
-        noticed=COUNT, notice=whole(0.0, 7.0),
+        noticed=COUNT, notice=whole(0.0, 8.0), shaken=COUNT,
         # What the line misses, what it missed when it drove, what the stage misses of the reference.
         score=candidate.SCORE, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
         travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,

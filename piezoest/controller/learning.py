@@ -19,9 +19,20 @@ from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK
 HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 2.0
 # The way to the reference is over within this fraction of its length, or after so many readings.
 NEAR, LONGEST = 0.05, 1e4
-# At a limit the stage may stand beyond the reference for this travel of it, in swings, before all begins
-# anew; the line follows sooner.
+# The voltage may rest at a limit for this travel of the reference, in swings, before all begins anew; where
+# the stage stands beyond the reference there, the line follows sooner.
 RESTED, BEYOND = 4.0, 0.1
+# The models begin where the voltage is farther from where all began than this fraction of half the range, in
+# a unit that is usual then.
+WIDE, USUAL = 0.12, 0.4
+# Else in the second leg when it has gone this fraction of the first, if that was so many times as long as the
+# way of the start, or after the second leg. Their unit is no smaller than this fraction of that way.
+PASSED, LARGE, SMALLEST = 0.7, 4.0, 0.25
+# Readings of a moved zero have at least this slope relative to the line's; they are near the reference by
+# so many swings if it has moved, too.
+LEAST_SLOPE, NEAR_IT = 0.2, 0.6
+# The voltage stands still for this travel of the reference, in swings: it is frozen.
+FROZEN = 0.4
 # No miss counts for more than so many swings.
 FARTHEST = 3.0
 
@@ -33,8 +44,6 @@ def _begin_learning(state: Any, settings: Any) -> None:
     if state.unit == 0.0:
         state.unit = start.gain
         state.zero = start.now - start.gain * start.voltage
-        slots.begin(state.candidates, settings.candidates, start.origin)
-        slots.advance(state.candidates, settings.candidates, start.voltage)
     lines.begin(state.line, start.gain, start.voltage, start.now)
     least = np.abs(start.target - start.from_u)
     travels.begin(state.reference, state.r, least * np.abs(start.gain))
@@ -49,24 +58,61 @@ def _begin_learning(state: Any, settings: Any) -> None:
 
 
 @register_jitable
+def _size_up(state: Any, settings: Any, u: Any) -> None:
+    """Let the models begin when the voltage has shown how far it swings: in that unit they learn soonest."""
+    travel, models, numbers = state.travel, state.candidates, settings.candidates
+    origin, half_range = state.start.origin, 0.5 * (settings.maximum - settings.minimum)
+    if np.abs(u - origin) > WIDE * half_range:
+        # On the first way from rest all is known that models and estimators remember.
+        state.scale = USUAL * half_range
+        slots.begin(models, numbers, origin, origin, state.scale)
+        slots.learn(models, numbers, origin, (state.start.zero - state.zero) / state.unit)
+        slots.advance(models, numbers, u)
+        return
+    if state.stage == APPROACH or travel.turns == 0.0:
+        return
+    leg, way = np.abs(u - travel.turned), np.abs(state.start.target - state.start.from_u)
+    early = leg > PASSED * travel.leg > PASSED * LARGE * way
+    if early or travel.turns > 1.0:
+        # Early, the second leg is expected to go on as far again.
+        state.scale = max(travel.leg if early else 0.5 * travel.leg, SMALLEST * way)
+        slots.begin(models, numbers, origin, travel.turned + travel.direction * state.scale, state.scale)
+        slots.advance(models, numbers, travel.turned)
+        slots.advance(models, numbers, u)
+        slots.shift(models, numbers, (state.readings.last - state.zero) / state.unit)
+
+
+@register_jitable
 def _hand_over(state: Any, settings: Any) -> None:
     """Take up the estimators' models of now, and choose which drives; without a bump."""
-    slots.hand_over(state.candidates, settings.candidates)
+    if state.scale > 0.0:
+        slots.hand_over(state.candidates, settings.candidates)
     if state.line.legs >= FIRST_LEGS:
         driving.reconsider(state)
 
 
 @register_jitable
 def _follow_zero(state: Any) -> None:
-    """Readings run at a distance from the line for long: they are right, and their zero may have moved."""
+    """Readings run at a distance from the line: their zero has moved, for good or not.
+
+    If the reference has moved with it, or the line is not sure, the line follows at once. Else it holds for
+    long, for the gauge may come back; then the gauge is believed.
+    """
     readings, line = state.readings, state.line
-    if readings.fault != reading.NONE or readings.off < reading.OFF_FOR:
+    if readings.off < reading.OFF_FOR:
         return
     recent = readings.recent
     jump = recent.mean_x - lines.at(line, recent.mean_u)
     slope = lines.slope(recent) / line.gain
     plain = 0.5 < slope < 2.0 and lines.explained(recent) > lines.EXPLAINED
-    if not plain and line.agreed >= reading.TRUSTED:
+    sure = line.agreed >= reading.TRUSTED
+    known = readings.fault == reading.NONE or readings.fault == reading.MOVED
+    if not plain and (sure or not known or slope < LEAST_SLOPE):
+        return
+    near = np.abs(readings.last - state.r) < NEAR_IT * np.abs(line.gain) * state.travel.swing
+    if sure and not near and readings.off < reading.HELD_FOR:
+        if known:
+            readings.fault = reading.MOVED
         return
     if plain:
         state.zero += jump
@@ -74,14 +120,26 @@ def _follow_zero(state: Any) -> None:
     lines.forget(line.now)
     line.before.count = 0.0
     line.centre += jump
+    line.held_centre += jump
     state.owed -= jump / state.unit
     readings.off = readings.spikes = 0.0
+    if readings.fault == reading.MOVED:
+        readings.fault = reading.NONE
+
+
+@register_jitable
+def _watch_voltage(state: Any, settings: Any, gone: Any, moved: Any) -> None:
+    """An amplifier that does not move its voltage with the reference answers nothing."""
+    within = settings.minimum < state.u < settings.maximum
+    state.frozen = state.frozen + moved if gone == 0.0 and within else 0.0
+    if state.frozen > FROZEN * state.reference.swing and state.readings.fault == reading.NONE:
+        state.readings.fault, state.readings.good = reading.NO_RESPONSE, 0.0
 
 
 @register_jitable
 def _name_silence(state: Any) -> None:
     """Where no voltage was answered there is no response."""
-    silent = state.start.tries > 0.0 and state.start.stage != starts.DONE
+    silent = state.start.tries >= 1.0 and state.start.stage != starts.DONE
     fault = reading.NO_RESPONSE if silent else reading.NONE
     if fault != state.readings.fault:
         state.readings.fault = fault
@@ -98,7 +156,8 @@ def _score(state: Any, settings: Any, u: Any, x: Any, z: Any) -> None:
     bound = FARTHEST * state.travel.swing
     miss = z - driving.line_z(state) - state.owed
     candidate.judge(state.score, min(max(miss, -bound), bound), swings)
-    slots.judge(state.candidates, z, swings, bound)
+    if state.scale > 0.0:
+        slots.judge(state.candidates, z, swings, bound)
     if settings.minimum < u < settings.maximum:
         # No model is to blame for a limit.
         off = (x - state.r) / state.unit
@@ -115,12 +174,13 @@ def _is_beyond(state: Any, settings: Any, x: Any) -> bool:
 
 
 @register_jitable
-def _leave_limit(state: Any, beyond: Any, moved: Any) -> None:
-    """Where the stage stands beyond the reference for long, though the line has followed: begin anew."""
-    state.railed = state.railed + moved if beyond and state.readings.fault == reading.NONE else 0.0
+def _leave_limit(state: Any, settings: Any, moved: Any) -> None:
+    """Where the voltage rests at a limit for long, all that is known may be wrong: begin anew."""
+    rests = state.u <= settings.minimum or state.u >= settings.maximum
+    state.railed = state.railed + moved if rests and state.readings.fault == reading.NONE else 0.0
     if state.railed > RESTED * state.reference.swing:
         state.stage, state.driving, state.feedback = SEEK, 0.0, 0.0
-        starts.begin_again(state.start, state.u)
+        starts.begin_again(state.start, settings.start, state.u)
 
 
 @register_jitable
@@ -129,7 +189,8 @@ def _learn_from(state: Any, settings: Any, x: Any) -> None:
     z = (x - state.zero) / state.unit
     if np.isfinite(x):
         _score(state, settings, state.u, x, z)
-    slots.learn(state.candidates, settings.candidates, state.u, z)
+    if state.scale > 0.0:
+        slots.learn(state.candidates, settings.candidates, state.u, z)
 
 
 @register_jitable
@@ -179,16 +240,19 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
     """The reading where it can be believed, NaN where not; what is wrong is noted, and the line drives."""
     before = state.readings.fault
     raw = x
+    if not settings.minimum < u < settings.maximum:
+        state.line.clipped = 1.0
     x = reading.believed(state.readings, state.line, state.travel, redraw.memory(state, settings), u, x, gone)
     _follow_zero(state)
+    _watch_voltage(state, settings, gone, moved)
     if state.readings.fault != before:
         reading.notice(state, state.readings.fault)
         if state.readings.fault != reading.NONE:
             driving.drive(state, 0.0)
             redraw.hold(state)
     beyond = _is_beyond(state, settings, raw)
-    _leave_limit(state, beyond, moved)
-    far = state.railed > BEYOND * state.reference.swing or redraw.is_young(state)
+    _leave_limit(state, settings, moved)
+    far = (beyond and state.railed > BEYOND * state.reference.swing) or redraw.is_young(state)
     if far and state.readings.fault == reading.NONE:
         redraw.follow(state)
     return x
@@ -216,7 +280,7 @@ def begin_homing(state: Any, settings: Any, amplitude: Any, turn: Any, cycles: A
 def _home(state: Any, settings: Any, u: Any, x: Any) -> None:
     """Follow the sweep; behind it the way to the reference begins, or the gain is sought."""
     start, line, recent = state.start, state.line, state.readings.recent
-    if state.unit != 0.0:
+    if state.scale > 0.0:
         slots.advance(state.candidates, settings.candidates, u)
         slots.learn(state.candidates, settings.candidates, u, np.nan)
     if np.abs(x) < WILDEST:
@@ -225,7 +289,7 @@ def _home(state: Any, settings: Any, u: Any, x: Any) -> None:
         return
     if state.unit == 0.0:
         state.stage = SEEK
-        starts.begin_again(start, u)
+        starts.begin_again(start, settings.start, u)
         return
     here = lines.at(line, u)
     if recent.count > 0.0:
@@ -248,7 +312,7 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     r = state.r
     if state.stage == SEEK:
         starts.learn(state.start, settings.start, u, x)
-        if state.unit != 0.0:
+        if state.scale > 0.0:
             slots.advance(state.candidates, settings.candidates, u)
         _name_silence(state)
         if state.start.stage == starts.DONE:
@@ -264,7 +328,10 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         redraw.draw(state)
     state.gone += gone
     state.handed += gone
-    slots.advance(state.candidates, settings.candidates, u)
+    if state.scale > 0.0:
+        slots.advance(state.candidates, settings.candidates, u)
+    else:
+        _size_up(state, settings, u)
     if state.stage == APPROACH:
         x = _approach(state, settings, r, u, x)
     else:

@@ -11,22 +11,27 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.layout import AMOUNT, COUNT, MEASURED, NUMBER, record
+from piezoest.layout import AMOUNT, COUNT, FLAG, MEASURED, NUMBER, record
 
 # Points: how many; means of voltage and reading; mean squares of their deviations, mean product.
 POINTS = record(
     count=AMOUNT, mean_u=MEASURED, mean_x=MEASURED, square=AMOUNT, square_x=AMOUNT, product=NUMBER
 )
-# The line; the one before the last turn; legs it rests on, turns since the last one, legs of late that agreed
-# with it; length of the first leg when it was looked at last; points of this leg and of the last one.
+# The line; the one before the last turn; the gain it began with; whether the voltage was at a limit since the
+# last turn; legs it rests on, turns since the last one, legs of late that agreed with it; length of the first
+# leg when it was looked at last; points of this leg and of the last one.
 LINE = record(
-    gain=NUMBER, centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER, legs=COUNT, small=COUNT, agreed=AMOUNT,
-    looked=AMOUNT, now=POINTS, before=POINTS,
+    gain=NUMBER, centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER, first_gain=NUMBER, clipped=FLAG,
+    legs=COUNT, small=COUNT, agreed=AMOUNT, looked=AMOUNT, now=POINTS, before=POINTS,
 )  # fmt: skip
 
 # Points of which a line explains less than this share teach nothing about its gain; it changes by no more
-# than this factor at once, later by less.
-EXPLAINED, CHANGE, LATER_CHANGE = 0.8, 2.0, 1.3
+# than this factor at once, and by less after so many legs; before it grows no more than that in all.
+EXPLAINED, CHANGE, LATER_CHANGE, CERTAIN = 0.8, 2.0, 1.3, 4.0
+# Points of which a line explains less than this share teach nothing at all.
+ANSWERED = 0.1
+# Without a line, the stage goes too far at so many times what the gain says.
+FARTHER = 1.5
 # A leg whose mean square is so many times that of the next one does not count beside it.
 UNLIKE = 6.0
 # ... and one so much smaller than the last is no leg, but part of the next, for so many turns.
@@ -38,7 +43,7 @@ ALIKE = 1.6
 @register_jitable
 def begin(line: Any, gain: Any, u: Any, x: Any) -> None:
     """Begin with a gain and a line through one point."""
-    line.gain = line.held_gain = gain
+    line.gain = line.held_gain = line.first_gain = gain
     line.centre = line.held_centre = x - gain * u
     line.agreed = line.legs = line.looked = line.before.count = 0.0
     forget(line.now)
@@ -92,10 +97,20 @@ def voltage(line: Any, r: Any) -> float:
 @register_jitable
 def _draw(line: Any, u: Any, x: Any, square: Any, square_x: Any, product: Any) -> None:
     """Draw the line through the middle of points, with their slope if they lie near it."""
+    most = CHANGE if line.legs < CERTAIN else LATER_CHANGE
+    answers = product * line.gain > 0.0 and product * product > ANSWERED * square * square_x
     if product * product > EXPLAINED * square * square_x and product * line.gain > 0.0:
         gain = product / square
-        most = CHANGE if line.legs < 4.0 else LATER_CHANGE
         line.gain *= min(max(gain / line.gain, 1.0 / most), most)
+        if line.legs < CERTAIN and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
+            # What lags goes on while the voltage hardly moves.
+            line.gain = CHANGE * line.first_gain
+    elif line.clipped != 0.0 and square_x > FARTHER * FARTHER * line.gain * line.gain * square > 0.0:
+        # The stage goes much farther than the line says, and the voltage from limit to limit: far too small.
+        line.gain *= most
+    elif not answers:
+        # Readings that do not go with the voltage say nothing of the centre either: it would run away.
+        return
     line.centre = x - line.gain * u
 
 
@@ -124,6 +139,7 @@ def turn(line: Any) -> None:
         )  # fmt: skip
     before.count, before.mean_u, before.mean_x = now.count, now.mean_u, now.mean_x
     before.square, before.square_x, before.product = now.square, now.square_x, now.product
+    line.clipped = 0.0
     forget(now)
 
 
@@ -149,5 +165,5 @@ def hold(line: Any) -> None:
 @register_jitable
 def follow(line: Any, recent: Any) -> None:
     """Lay the line through the middle of the points of late."""
-    if recent.count >= 4.0:
+    if recent.count >= 4.0 and (recent.product * line.gain >= 0.0 or explained(recent) < EXPLAINED):
         line.centre = recent.mean_x - line.gain * recent.mean_u

@@ -20,9 +20,20 @@ from piezoest.layout import AMOUNT, COUNT, MEASURED, record, whole
 # Faults: none; no response; response the wrong way round; far too large or too small; the reading stops at a
 # level; the reading's zero has moved.
 NONE, NO_RESPONSE, REVERSED, SCALED, SATURATED, MOVED = (float(i) for i in range(6))
-# What is noted beside: the stage answers otherwise than the user's gain says; a write may have been lost.
-OTHER_GAIN, UNKNOWN = 6.0, 7.0
-FAULTS = ("", "no response", "reversed", "scaled", "saturated", "zero moved", "gain", "unknown voltage")
+# What is noted beside: the stage answers otherwise than the user's gain says; a write may have been lost;
+# models shake the stage.
+OTHER_GAIN, UNKNOWN, SHAKEN = 6.0, 7.0, 8.0
+FAULTS = (
+    "",
+    "no response",
+    "reversed",
+    "scaled",
+    "saturated",
+    "zero moved",
+    "gain",
+    "unknown voltage",
+    "shaken",
+)
 
 READINGS = record(
     fault=whole(0.0, 5.0),
@@ -47,6 +58,10 @@ WEAK, WRONG, LARGE, GOOD = 0.12, -0.3, 3.0, 0.4
 BACKLASH = 0.35
 # For so many swings.
 WEAK_FOR, WRONG_FOR, LARGE_FOR, STOPPED_FOR, OFF_FOR = 0.35, 0.15, 0.15, 0.04, 0.3
+# A zero that has moved is followed after so many swings, if the reference has not moved with it.
+HELD_FOR = 24.0
+# For so many swings of a line that has not held.
+SILENT_FOR = 2.0
 # A reading that is the same to the last bit is believed for this travel, in swings.
 STANDS_STILL = 5e-3
 # ... and for so many before nobody learns any more.
@@ -104,7 +119,9 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> N
     slope = lines.slope(recent) / line.gain
     straight = lines.explained(recent) > 0.7
     stopped = line.agreed >= TRUSTED and clear and _stands_still(readings, line, travel, STOPPED_FOR, 4.0)
-    readings.weak = readings.weak + swings if trusted and answer < WEAK else 0.0
+    # Of a line that has not held yet silence takes longer to be believed.
+    share = 1.0 if trusted else WEAK_FOR / SILENT_FOR
+    readings.weak = readings.weak + share * swings if known and answer < WEAK else 0.0
     readings.wrong = readings.wrong + swings if trusted and straight and slope < WRONG else 0.0
     readings.large = readings.large + swings if trusted and (straight or off) and answer > LARGE else 0.0
     readings.stopped = 1.0 if stopped else 0.0
@@ -121,6 +138,8 @@ def _name(readings: Any) -> float:
     if readings.large > LARGE_FOR:
         return SCALED
     if readings.weak > WEAK_FOR:
+        if readings.fault == SCALED or readings.fault == NO_RESPONSE:
+            return readings.fault
         follows = lines.explained(readings.recent) > 0.8 and readings.still == 0.0
         return SCALED if follows else NO_RESPONSE
     if readings.stopped != 0.0:
@@ -166,6 +185,9 @@ def believed(readings: Any, line: Any, travel: Any, memory: Any, u: Any, x: Any,
     far = np.abs(x - lines.at(line, u)) > bound
     readings.spikes = readings.spikes + 1.0 if far else 0.0
     off = readings.spikes > IN_A_ROW
+    if readings.spikes == IN_A_ROW + 1.0:
+        # A jump is no slope.
+        lines.forget(readings.recent)
     before = readings.fault
     _evidence(readings, line, travel, off, swings)
     readings.fault = _name(readings)

@@ -22,9 +22,11 @@ MEANINGS = {
     "reversed": "the readings go the wrong way",
     "scaled": "the readings answer far more or far less than before",
     "saturated": "the readings stand still at a level",
-    "zero moved": "the readings have moved by a constant, which is followed",
+    "zero moved": "the readings have moved by a constant",
     "gain": "the stage answers with {gain_before:.3g} µm/V, not {gain:.3g}: the gain is sought",
     "unknown voltage": "nobody knows what was written, and the line drives until the models have shown again",
+    "shaken": "models made it worse than the line, as where a resonance is shaken: a slower or smoother "
+    "reference helps",
 }
 
 
@@ -166,14 +168,40 @@ def model(start: Model, state: Any, settings: Any, name: str) -> Model | None:
     name : str
         Of the candidate's slot.
     """
-    if state["candidates"][name]["usable"] == 0.0:
+    own = state["candidates"][name]
+    if own["usable"] == 0.0:
         return None
-    numbers = settings["candidates"][name]["inverse"]
-    return in_micrometres(start, numbers, state["unit"], state["zero"])
+    units = Units(
+        *(float(each) for each in (own["centre"], own["scale"], own["shift"], state["zero"], state["unit"]))
+    )
+    return in_micrometres(start, settings["candidates"][name]["inverse"], units)
 
 
-def in_micrometres(start: Model, numbers: Any, unit: float, zero: float) -> Model:
-    """Return a model in µm and V from the numbers of its inverse in volts.
+@dataclass(frozen=True, slots=True)
+class Units:
+    """What a model's numbers are relative to: u = centre + scale v, x = zero + unit (shift + scale f(v)).
+
+    Parameters
+    ----------
+    centre, scale, shift : float
+        [V].
+    zero, unit : float
+        [µm], [µm/V].
+    """
+
+    centre: float
+    scale: float
+    shift: float
+    zero: float
+    unit: float
+
+    def offset(self, own: Any, slope: float) -> float:
+        """Displacement at 0 V from a model's own offset and its slope, both in its units [µm]."""
+        return self.zero + self.unit * (self.shift + self.scale * float(own) - slope * self.centre)
+
+
+def in_micrometres(start: Model, numbers: Any, units: Units) -> Model:
+    """Return a model in µm and V from the numbers of its inverse.
 
     Parameters
     ----------
@@ -181,35 +209,36 @@ def in_micrometres(start: Model, numbers: Any, unit: float, zero: float) -> Mode
         One of its kind.
     numbers : ndarray
         Settings of its inverse, by name.
-    unit, zero : float
-        Of z = (x - zero)/unit [µm/V], [µm].
+    units : Units
+        Of these numbers.
 
     Raises
     ------
     ValueError
         If the numbers make no model.
     """
-    return _KINDS[start.inverse](start, numbers, float(unit), float(zero))
+    return _KINDS[start.inverse](start, numbers, units)
 
 
-def _loop(start: Any, numbers: Any, unit: float, zero: float) -> Model:
+def _loop(start: Any, numbers: Any, units: Units) -> Model:
     a, b, c = float(numbers["a"]), float(numbers["b"]), float(numbers["c"])
-    offset = unit * float(numbers["offset"]) + zero
+    unit, offset = units.unit, units.offset(numbers["offset"], c)
     if b == 0.0:
         return LinearGain(unit * c, offset)
-    return ColemanHodgdon.from_loop(a, unit * b, unit * c, offset)
+    return ColemanHodgdon.from_loop(a / units.scale, unit * b, unit * c, offset)
 
 
-def _plays(start: Any, numbers: Any, unit: float, zero: float) -> Model:
+def _plays(start: Any, numbers: Any, units: Units) -> Model:
     thresholds, bends, gains = numbers["thresholds"], numbers["bends"], numbers["creep_gains"]
     changes = numbers["bend_weights"].reshape(bends.size, -1 if bends.size else 1)
+    unit, slope = units.unit, float(numbers["gain"] + numbers["weights"].sum())
     return PrandtlIshlinskii(
         unit * float(numbers["gain"]),
-        thresholds,
+        units.scale * thresholds,
         unit * numbers["weights"],
-        unit * float(numbers["offset"]) + zero,
+        units.offset(numbers["offset"], slope),
         creep=dataclasses.replace(start.creep, gains=gains) if gains.size else None,
-        bends=bends,
+        bends=units.centre + units.scale * bends,
         bend_weights=unit * changes,
         sample_rate=start.sample_rate,
     )

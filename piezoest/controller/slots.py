@@ -131,18 +131,33 @@ def hand_over(slots: Any, settings: Any) -> None:
 
 
 @register_jitable
-def _begin(slot: Any, settings: Any, u: Any) -> None:
+def _begin(slot: Any, settings: Any, u: Any, centre: Any, scale: Any) -> None:
     if slot is not None:
-        candidate.begin(slot, settings, u)
+        candidate.begin(slot, settings, u, centre, scale)
 
 
 @register_jitable
-def begin(slots: Any, settings: Any, u: Any) -> None:
-    """Begin at rest at a voltage."""
-    _begin(slots.first, settings.first, u)
-    _begin(slots.second, settings.second, u)
-    _begin(slots.third, settings.third, u)
-    _begin(slots.fourth, settings.fourth, u)
+def begin(slots: Any, settings: Any, u: Any, centre: Any, scale: Any) -> None:
+    """Begin at rest at a voltage; the swing has a centre, and `scale` is half of it."""
+    _begin(slots.first, settings.first, u, centre, scale)
+    _begin(slots.second, settings.second, u, centre, scale)
+    _begin(slots.third, settings.third, u, centre, scale)
+    _begin(slots.fourth, settings.fourth, u, centre, scale)
+
+
+@register_jitable
+def _shift(slot: Any, settings: Any, z: Any) -> None:
+    if slot is not None:
+        candidate.shift(slot, settings, z)
+
+
+@register_jitable
+def shift(slots: Any, settings: Any, z: Any) -> None:
+    """Let all models stand at z."""
+    _shift(slots.first, settings.first, z)
+    _shift(slots.second, settings.second, z)
+    _shift(slots.third, settings.third, z)
+    _shift(slots.fourth, settings.fourth, z)
 
 
 @register_jitable

@@ -15,6 +15,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
+from piezoest.controller.readings import median
 from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, numbers, record, whole
 
 # At rest; the voltage goes a way; it rests there; the gain is known; no answer.
@@ -28,14 +29,14 @@ START = record(
     # Samples of the stage; where the reading stood at first and at the last rest, its noise.
     samples=COUNT, zero=MEASURED, from_x=MEASURED, noise=AMOUNT,
     # Sums over a window of readings, scatter within, its mean and that of the last two; windows so far; the
-    # last reading and the smallest change of one: the step of its converter.
+    # last two readings and the smallest change of one: the step of its converter.
     sum=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT, mean=MEASURED, now=MEASURED, windows=COUNT,
-    last=MEASURED, step=AMOUNT,
+    before=MEASURED, last=MEASURED, step=AMOUNT,
     # Sum of the windows' answers, or of what an answer lacks of the user's gain; how late the stage answers
     # [samples].
     total=NUMBER, lag=AMOUNT,
-    # Gain of the last way [µm/V], of the one before.
-    gain=NUMBER, gain_before=NUMBER, tries=COUNT, first=numbers(FIRST, kind=MEASURED),
+    # Gain of the last way [µm/V], of the one before; ways for nothing; samples without the voltage.
+    gain=NUMBER, gain_before=NUMBER, tries=AMOUNT, stuck=COUNT, first=numbers(FIRST, kind=MEASURED),
     # Whether the gain is the user's, and not confirmed yet; readings in a row that spoke for it, all against.
     given=FLAG, agreed=COUNT, doubted=COUNT,
 )  # fmt: skip
@@ -49,12 +50,14 @@ SETTINGS = record(
 CLEAR, SCATTERS, STEPS, ALIKE = 6.0, 3.0, 10.0, 1.6
 # The voltage written follows the one planned within this fraction of a way.
 FOLLOWS = 0.125
+# Without that, or without readings, the start is given up after so many windows.
+STUCK = 240.0
 # The way that checks an answer is so many times as long.
 CHECK = 4.0
 # At rest the means of two windows differ by less than this fraction of the answer; so many are enough.
 STILL, MOST_WINDOWS = 0.08, 30.0
 # Windows before the first repetition; then twice as many each time.
-PAUSE = 10.0
+PAUSE, LONGEST_PAUSE = 10.0, 8.0
 
 
 @register_jitable
@@ -66,10 +69,12 @@ def begin(start: Any, u: Any) -> None:
 
 
 @register_jitable
-def begin_again(start: Any, u: Any) -> None:
-    """Begin anew at a voltage where the stage may not be at rest yet."""
-    begin(start, u)
-    start.stage = SILENT
+def begin_again(start: Any, settings: Any, u: Any) -> None:
+    """Begin anew from a voltage where the stage may not be at rest yet: back to where nothing is strained."""
+    rest = min(max(0.0, settings.lowest), settings.highest)
+    begin(start, rest)
+    start.stage, start.voltage, start.from_u, start.target = GO, u, u, rest
+    start.tries = 0.5
 
 
 @register_jitable
@@ -121,7 +126,9 @@ def smooth(from_u: Any, target: Any, share: Any) -> float:
 def _move(start: Any, settings: Any) -> None:
     """The next voltage of a way, which begins and ends gently."""
     start.samples += 1.0
-    share = min(start.samples / settings.ramp, 1.0)
+    # A way back from afar takes longer.
+    longer = max(1.0, np.abs(start.target - start.from_u) / settings.longest)
+    share = min(start.samples / (longer * settings.ramp), 1.0)
     start.voltage = smooth(start.from_u, start.target, share)
     if share >= 1.0:
         start.stage, start.voltage = WAIT, start.target
@@ -188,26 +195,33 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
     """Take the reading at a voltage, NaN for none, and choose the next voltage."""
     known = np.abs(x) < WILDEST
     if known:
-        change = np.abs(x - start.last)
-        start.last = x
+        change, middle = np.abs(x - start.last), median(x, start.last, start.before)
+        start.before, start.last = start.last, x
         if change > 0.0 and start.samples + start.windows > 1.0:
             start.step = min(start.step, change) if start.step > 0.0 else change
+    if start.stage < DONE:
+        # In a block that was planned at rest the voltage does not follow yet; one that never does is frozen.
+        follows = np.abs(u - start.voltage) <= FOLLOWS * np.abs(start.target - start.from_u)
+        fine = known if start.stage == REST else follows and (known or start.stage == GO)
+        start.stuck = 0.0 if fine else start.stuck + 1.0
+        if start.stuck > STUCK * settings.window:
+            start.stage, start.samples, start.stuck = SILENT, 0.0, 0.0
+            start.tries += 1.0
     if start.stage == GO:
-        # In a block that was planned at rest the voltage does not follow yet.
-        if np.abs(u - start.voltage) <= FOLLOWS * np.abs(start.target - start.from_u):
+        if start.stuck == 0.0:
             _move(start, settings)
-    elif not known:
+    elif not known and start.stage < DONE:
         return
     elif start.stage == REST:
         start.first[int(start.samples)] = x
         start.samples += 1.0
         if start.samples >= FIRST:
             _settle_rest(start, settings, u)
-    elif start.stage == WAIT and u == start.target:
-        if _has_come_to_rest(start, settings, x):
+    elif start.stage == WAIT and start.stuck == 0.0:
+        if _has_come_to_rest(start, settings, middle):
             _judge(start, settings, u)
     elif start.stage == SILENT:
         start.samples += 1.0
         # Less and less often: the stage is not to be shaken for nothing.
-        if start.samples >= PAUSE * settings.window * 2.0 ** min(start.tries, 20.0):
+        if start.samples >= PAUSE * settings.window * 2.0 ** min(start.tries, LONGEST_PAUSE):
             start.stage, start.samples, start.way = REST, 0.0, settings.way

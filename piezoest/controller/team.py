@@ -1,7 +1,7 @@
-"""The estimators that work for a controller, made for its range of voltages.
+"""The estimators that work for a controller, made for a stage of gain one and a voltage from -1 to 1.
 
-A controller gives them its readings in volts, z = (x - zero)/unit, so that the stage has a gain of about one
-and nothing needs to be known of µm/V beforehand. What they begin with must be made for that, which is why a
+A controller gives them voltages and readings in units of half the swing, z = (x - zero)/unit, so that nothing
+needs to be known of the stage beforehand. What they begin with must be made for that, which is why a
 controller makes them itself.
 """
 
@@ -27,14 +27,14 @@ DEFAULT: tuple[Factory, ...] = (HysteresisRLS, OutputErrorRLS, PrandtlIshlinskii
 KNOWN = (HysteresisRLS, OutputErrorRLS, PrandtlIshlinskiiRLS, HysteresisEKF)
 # Inverses whose numbers a controller can hand over.
 INVERSES = (loop_inverse, play_inverse)
-# Gain of a first model that was made for volts, about.
+# Gain of a first model, about.
 LEAST, MOST = 0.1, 10.0
-# Standard deviation of the readings' noise, relative to half the range of the voltage.
-NOISE = 1e-4
+# What they begin with: a loop of the usual width, and noise of so small a part of half a swing.
+START, NOISE = ColemanHodgdon(alpha=0.8, beta=0.8, gamma=0.96), 2.5e-4
 
 
-def made(factories: Any, sample_rate: float, half_range: float) -> tuple[CompiledEstimator, ...]:
-    """Estimators for a range of voltages.
+def made(factories: Any, sample_rate: float) -> tuple[CompiledEstimator, ...]:
+    """Estimators for a controller.
 
     Parameters
     ----------
@@ -42,8 +42,6 @@ def made(factories: Any, sample_rate: float, half_range: float) -> tuple[Compile
         Up to four, called as ``factory(sample_rate, initial_model=..., noise=...)``.
     sample_rate : float
         [Hz].
-    half_range : float
-        Half the range of the voltage [V].
 
     Raises
     ------
@@ -54,8 +52,7 @@ def made(factories: Any, sample_rate: float, half_range: float) -> tuple[Compile
     factories = tuple(instance("estimators", factories, tuple | list, hint))
     if len(factories) > len(slots.NAMES):
         raise ValueError(f"estimators must be at most {len(slots.NAMES)}, got {len(factories)}: choose")
-    start = ColemanHodgdon(alpha=2.0 / half_range, beta=0.8, gamma=2.4 / half_range)
-    given = {"initial_model": start, "noise": NOISE * half_range}
+    given = {"initial_model": START, "noise": NOISE}
     return tuple(_made(f"estimators[{i}]", factories[i], sample_rate, given) for i in range(len(factories)))
 
 

@@ -142,8 +142,6 @@ def test_whose_coordinates_count() -> None:
     for mode, moved in ((START, True), ("permanent", True), (TRANSIENT, False)):
         assert draw(11, fault="zero-off", mode=mode, **SHORT).coordinates[1].any() == moved
     assert draw(11, fault="zero-off-shifted", mode=TRANSIENT, **SHORT).coordinates[1].any()
-    assert not draw(11, fault="sensor-noise", mode=START, **SHORT).fair
-    assert draw(11, fault="sensor-noise", mode="permanent", **SHORT).fair
 
 
 def test_a_fault_that_is_unknown_is_refused() -> None:

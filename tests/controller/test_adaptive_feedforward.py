@@ -339,9 +339,9 @@ def test_limits_are_asked_for() -> None:
         pz.AdaptiveFeedforward(FS)  # type: ignore[call-arg]
 
 
-def test_estimators_are_made_for_volts() -> None:
+def test_estimators_are_made_for_a_gain_of_one() -> None:
     factories = (pz.HysteresisRLS, functools.partial(pz.HysteresisRLS, memory=0.4), pz.HysteresisEKF)
-    made = team.made(factories, FS, 50.0)
+    made = team.made(factories, FS)
     assert team.names(made) == ("line", "HysteresisRLS", "HysteresisRLS 2", "HysteresisEKF")
     assert all(0.5 < each.model.line[0] < 2.0 for each in made)
     assert made[1].to_dict()["arguments"]["memory"] == 0.4

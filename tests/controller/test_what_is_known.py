@@ -231,7 +231,7 @@ def test_a_fast_reference_and_hum_do_not_lead_astray(gain: float) -> None:
         k += 1
         return float(stage.step(u) + 0.15 * np.sin(2.0 * np.pi * 50.0 * k / FS))
 
-    r = pz.signals.sine(5.0, 100.0, 100, FS).values
+    r = pz.signals.sine(5.0, 40.0, 60, FS).values
     u, _, stages = drive(driver, humming, r)
     assert ("seeking" in stages[4:]) == (gain < 0.0)
     assert stages[-1] == "running"

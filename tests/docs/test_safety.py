@@ -39,8 +39,9 @@ def row(seed: int, ratio: float | None = 0.5, **given: Any) -> dict[str, Any]:
     return {
         **numbers, "seed": seed, "family": "duhem", "reference": "sine", "fault": "none", "mode": "none",
         "mechanics": "none", "sample_rate": 1000.0, "frequency": 5.0, "block": 1, "delay": 0, "low": 0.0,
-        "high": 100.0, "fair": True, "failure": None, "finite": True, "within_limits": True, "rail": 0.0,
-        "rests_at_rail": False, "ratio": ratio, "last_ratio": ratio, **given,
+        "high": 100.0, "failure": None, "finite": True, "within_limits": True, "rail": 0.0,
+        "rests_at_rail": False, "ratio": ratio, "last_ratio": ratio, "cycle_ratio": ratio,
+        "named_right": None, "recovery": False, "recovered": None, **given,
     }  # fmt: skip
 
 
@@ -53,8 +54,7 @@ def test_often_counts_calls_in_half_a_wave_and_the_delay(program: Any) -> None:
 
 def test_sums_count_what_is_judged_only(program: Any) -> None:
     rows = [
-        row(0), row(1, 2.0, fault="gap", mode="permanent"),
-        row(2, 9.0, fault="gap", mode="from-start", fair=False),
+        row(0), row(1, 2.0, fault="gap", mode="permanent"), row(2, None, fault="gap", mode="from-start"),
         row(3, 3.0, block=50), row(4, None),
     ]  # fmt: skip
     found = program.summed_up(rows)
@@ -73,12 +73,31 @@ def test_sums_count_what_is_judged_only(program: Any) -> None:
     assert program.drawn(rows)["fault"] == {"gap": 2, "none": 3}
 
 
-def test_the_line_alone_has_no_estimator(program: Any) -> None:
-    from piezoest import VoltageLimits
+def test_faults_that_were_named_and_forgotten_are_counted(program: Any, page: Any) -> None:
+    stuck: dict[str, Any] = {"fault": "stage-stuck", "mode": "transient"}
+    rows = [
+        row(0, **stuck, named_right=True, named_periods=2.0, recovery=True, recovered=1),
+        row(1, **stuck, named_right=True, named_periods=4.0, recovery=True, recovered=3),
+        row(2, **stuck, named_right=False, named_periods=None, recovery=True, recovered=None),
+        row(3, fault="hum", mode="permanent"),
+    ]
+    found = program.summed_up(rows)["told"]
+    assert [each["fault"] for each in found] == ["hum", "stage-stuck"]
+    assert found[1] == {
+        **stuck, "to_name": 3, "named": 2, "named_periods": 3.0, "to_recover": 3, "recovered_first": 1,
+        "recovered_soon": 2,
+    }  # fmt: skip
+    told = page.told({"controller": {"told": found}})
+    assert '"stage-stuck","for a time","2 of 3 (66.7 %)","3","1 of 3 (33.3 %)","2 of 3 (66.7 %)"' in told
+    assert "hum" not in told
+
+
+def test_the_others_are_the_default_controller_without_its_parts(program: Any, page: Any) -> None:
     from piezoest.bench.zoo.contenders import contender
 
-    controller = contender(program.CONTROLLERS["line"])(1000.0, VoltageLimits(0.0, 100.0))
-    assert controller.to_dict()["estimators"] == []
+    assert list(program.CONTROLLERS) == list(program.COLOURS) == list(program.NAMES) == list(page.WHO)
+    assert set(program.SHOWN) == set(page.WHO)
+    assert all(callable(contender(name)) for name in program.CONTROLLERS.values())
 
 
 def test_everything_drawn_is_described(page: Any) -> None:
@@ -111,9 +130,12 @@ def test_the_page_names_where_it_fails_most(page: Any) -> None:
 def test_pieces_hold_for_few_runs(page: Any, program: Any, document: dict[str, Any]) -> None:
     """Also where most of the kinds have not been drawn, and a run raised."""
     rows = [row(0), row(1, None, failure="ValueError: no", finite=None, within_limits=None)]
-    summed = {name: program.summed_up(rows) for name in page.WHO}
-    texts = page.pieces({**document, "runs": 2, "drawn": program.drawn(rows), **summed})
+    summed = {name: shown(rows) for name, shown in program.SHOWN.items()}
+    unplayed = {"map": None, "singles": None}
+    texts = page.pieces({**document, "runs": 2, "drawn": program.drawn(rows), **summed, **unplayed})
     assert "ValueError: no" in texts["worst"]
+    assert "none" in texts["map"]
+    assert "not been played" in texts["singles"]
     assert "``" not in texts["show"]
 
 

@@ -4,27 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from piezoest.bench.zoo.judging import ERRORS
 from piezoest.bench.zoo.playing import Row
-
-_ERRORS = ("worst", "rms", "line_worst", "line_rms", "ratio", "ratio_rms")
 
 COLUMNS: dict[str, type] = {
     "key": str, "controller": str, "seed": int, "family": str, "gain": float, "width": float, "low": float,
     "high": float, "sample_rate": float, "mechanics": str, "lag": float, "delay": int, "sensor_noise": float,
     "resolution": float, "volts": float, "slew_rate": float, "creep": float, "hum": float, "drift": float,
     "reference": str, "amplitude": float, "centre": float, "frequency": float, "samples": int, "block": int,
-    "fault": str, "mode": str, "fault_size": float, "fault_start": float, "fault_stop": float, "fair": bool,
+    "fault": str, "mode": str, "fault_size": float, "fault_start": float, "fault_stop": float,
     "line_gain": float, "line_centre": float, "failure": str, "finite": bool, "within_limits": bool,
     "rail": float, "rests_at_rail": bool, "swing": float, "noise": float, "floor": float,
-    "judged_from": float, **{f"{part}{name}": float for part in ("", "last_", "after_") for name in _ERRORS},
-    "settled": float, "events": int, "named": str, "named_first": str, "named_after": float, "driver": str,
-    "status": str, "microseconds": float,
+    "judged_from": float, **{f"{part}{name}": float for part in ("", "last_", "after_") for name in ERRORS},
+    "cycle_ratio": float, "settled": float, "events": int, "named": str, "named_first": str,
+    "named_after": float, "named_right": bool, "named_periods": float,
+    "recovery": bool, "recovered": int, "driver": str, "status": str, "microseconds": float,
 }  # fmt: skip
 
 CELL_COLUMNS: dict[str, type] = {
     "key": str, "controller": str, "family": str, "amplitude": float, "frequency": float, "seed": int,
-    "gain": float, "width": float, "block": int, "noise": float, "failure": str, "change": str,
-    "periods": int, "error": float, "allowed": float,
+    "gain": float, "width": float, "block": int, "noise": float, "mechanics": str, "asked": bool,
+    "failure": str, "change": str, "periods": int, "error": float, "allowed": float,
 }  # fmt: skip
 
 

@@ -17,6 +17,10 @@ from piezoest.bench.zoo.controllers import Parts
 from piezoest.bench.zoo.running import Factory
 
 PARTS = "parts"
+# The default controller, changed: with the line alone, with one candidate beside it, and with all the room.
+CANDIDATES = ("HysteresisRLS", "OutputErrorRLS", "PrandtlIshlinskiiRLS")  # of the default one
+ALONE = (*CANDIDATES, "HysteresisEKF")
+CHANGED = ("line", "no-corridor", *ALONE)
 NEEDED = ("step", "run", "learn")
 DEFAULT = "AdaptiveFeedforward" if hasattr(piezoest, "AdaptiveFeedforward") else PARTS
 
@@ -28,7 +32,9 @@ def contender(name: str) -> Factory:
     ----------
     name : str
         "parts", a class of the package, or a class or function of one's own as ``module:name``. It is called
-        as ``name(sample_rate, limits=limits)``.
+        as ``name(sample_rate, limits=limits)``. Or the default controller, changed: "line" has no candidate
+        beside the line, "no-corridor" leaves the voltage all its room, and the name of an estimator has that
+        one alone.
 
     Raises
     ------
@@ -48,10 +54,13 @@ def _made(make: Any, sample_rate: float, limits: Any) -> Any:
 def _found(name: str) -> Any:
     if name == PARTS:
         return Parts
+    if name in CHANGED:
+        return functools.partial(piezoest.AdaptiveFeedforward, **_change(name))
     module, separator, attribute = name.partition(":")
     if not separator:
         if not hasattr(piezoest, name):
-            raise ValueError(f"controller {name}: choose {PARTS}, a class of piezoest, or module:name")
+            known = ", ".join((PARTS, *CHANGED))
+            raise ValueError(f"controller {name}: choose {known}, a class of piezoest, or module:name")
         return getattr(piezoest, name)
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
@@ -59,6 +68,13 @@ def _found(name: str) -> Any:
         return getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as error:
         raise ValueError(f"controller {name}: {error}") from None
+
+
+def _change(name: str) -> dict[str, Any]:
+    """What a controller of this name is given beside sample rate and limits."""
+    if name == "no-corridor":
+        return {"corridor": 1.0}
+    return {"estimators": (getattr(piezoest, name),) if name in ALONE else ()}
 
 
 def code_of(name: str) -> str:

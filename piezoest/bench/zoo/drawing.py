@@ -18,7 +18,9 @@ USUAL_GAIN, ODD_GAIN = (0.05, 0.5), (1.5e-3, 20.0)  # µm/V
 USUAL_AMPLITUDE = (0.2, 10.0)  # µm
 FREQUENCY = (0.5, 50.0)  # Hz
 WIDTH = (0.08, 0.25)
-SAMPLES, MOST = 30_000, 200_000
+SAMPLES, MOST = 12_000, 60_000  # of a run, about and at most
+LONG, LONGEST = 0.06, 200_000  # how often a run may be longer, and how long
+BLOCKS = 4  # of a run, at least
 BY_SAMPLE, ONE_BY_ONE = 25_000, 0.15  # samples of a run that may be handed over one by one; how often
 
 
@@ -93,6 +95,8 @@ def draw(seed: int, **given: Any) -> Rig:
     fault = draw_fault(kind, pick("mode", None), np.random.default_rng([seed, 22]), facts)
     block = 1 if rng.random() < ONE_BY_ONE else round(pick.log(1.0, 500.0))
     block = block if plain.values.size <= BY_SAMPLE else max(block, 10)
+    # Of a run that is one block nothing can be learnt.
+    block = min(block, plain.values.size // BLOCKS)
     block = integer("block", pick("block", block), 1)
     pick.check()
     return Rig(
@@ -118,10 +122,11 @@ def _reference(
     amplitude = float(pick("amplitude", amplitude))
     waves_in_cycle = cycle_of(kind)
     least = 12.0 if waves_in_cycle == 1.0 else 7.0
-    slowest = max(FREQUENCY[0], 7.0 * waves_in_cycle * sample_rate / MOST)
+    longest = LONGEST if rng.random() < LONG else MOST
+    slowest = max(FREQUENCY[0], 7.0 * waves_in_cycle * sample_rate / longest)
     frequency = float(pick("frequency", pick.log(slowest, FREQUENCY[1])))
     cycles = np.clip(SAMPLES * frequency / sample_rate / waves_in_cycle, least, 40.0)
-    most = MOST * frequency / sample_rate / waves_in_cycle
+    most = longest * frequency / sample_rate / waves_in_cycle
     waves = float(pick("waves", round(min(cycles, most)) * waves_in_cycle))
     return build(
         kind, amplitude=amplitude, centre=centre, frequency=frequency, sample_rate=sample_rate, waves=waves,

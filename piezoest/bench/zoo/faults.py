@@ -46,6 +46,25 @@ class Fault:
             return NONE
         return TRANSIENT if not self.lasting else START if self.start == 0 else PERMANENT
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What a controller is to call it; empty if it need not be noticed.
+
+        Of what is there from the start only a stage that does not answer can be noticed: else the readings
+        have never been different.
+        """
+        kind = FAULTS.get(self.kind, Kind())
+        if self.mode == START:
+            return kind.names if kind.hides and STILL[0] in kind.names else ()
+        return kind.names
+
+    @property
+    def right(self) -> bool:
+        """Whether the gauge is right by definition, since the reference is in its coordinates."""
+        return (self.kind == "zero-off" and self.lasting) or (
+            self.kind == "sensor-factor" and self.mode == START
+        )
+
     def within(self, n: int) -> Any:
         """Which of n samples have it."""
         k = np.arange(n)
@@ -89,17 +108,20 @@ class Kind:
         Draws the size from (random numbers, `Around`).
     stage : callable, optional
         Makes the faulty stage of (stage, `Fault`, `Around`).
-    lies : bool
-        Whether readings say something else than where the stage is.
-    silent : bool
-        Whether readings say nothing at all about the stage.
+    hides : bool
+        Whether nothing can be learnt meanwhile: readings say nothing or lie, or the stage stands still.
+    partly : bool
+        Whether some readings are wrong and the others right.
+    names : tuple of str
+        What a controller may call it; empty if it need not be noticed.
     """
 
     modes: tuple[str, ...] = (TRANSIENT, PERMANENT)
     size: Callable[[Any, Around], float] = lambda rng, around: 0.0
     stage: Callable[[Any, Fault, Around], Any] = lambda stage, fault, around: stage
-    lies: bool = False
-    silent: bool = False
+    hides: bool = False
+    partly: bool = False
+    names: tuple[str, ...] = ()
 
 
 def _times(fault: Fault, around: Around) -> tuple[float, float]:
@@ -126,40 +148,49 @@ def _zero(rng: Any, around: Around) -> float:
 
 
 ALL = (START, TRANSIENT, PERMANENT)
+STILL, FACTORS = (
+    ("no response", "saturated"),
+    ("reversed", "scaled"),
+)  # readings stand still, or are multiplied
+ANY = (*STILL, *FACTORS, "zero moved")
 
 FAULTS: dict[str, Kind] = {
     "amplifier-frozen": Kind(
-        ALL, stage=lambda stage, fault, around: FrozenAmplifier(stage, *_times(fault, around))
+        ALL, stage=lambda stage, fault, around: FrozenAmplifier(stage, *_times(fault, around)), hides=True,
+        names=STILL,
     ),
     "stage-stuck": Kind(
         ALL, stage=lambda stage, fault, around: StuckStage(
             stage, *_times(fault, around), around.noise, seed=around.seed
         ),
+        hides=True, names=STILL,
     ),
     "sensor-constant": Kind(
-        ALL, stage=lambda stage, fault, around: Stuck(stage, *_times(fault, around)), lies=True, silent=True
+        ALL, stage=lambda stage, fault, around: Stuck(stage, *_times(fault, around)), hides=True, names=STILL
     ),
     "sensor-noise": Kind(
         ALL, size=lambda rng, around: around.reference.centre + rng.uniform(-1.0, 1.0) * around.stroke,
         stage=lambda stage, fault, around: Dead(
             stage, *_times(fault, around), fault.size, 0.002 * _swing(around), seed=around.seed
         ),
-        lies=True, silent=True,
+        hides=True, names=ANY,
     ),
     "sensor-saturated": Kind(
         ALL, size=lambda rng, around: 0.6 * around.reference.amplitude,
         stage=_for_a_time(
             lambda stage, fault, around: Saturation(stage, fault.size, around.reference.centre)
         ),
-        lies=True,
+        partly=True, names=("saturated",),
     ),
     "sensor-factor": Kind(
         ALL, size=lambda rng, around: float(rng.choice([-1.0, 1e-3, 1e3])),
-        stage=_for_a_time(lambda stage, fault, around: Factor(stage, fault.size)), lies=True,
+        stage=_for_a_time(lambda stage, fault, around: Factor(stage, fault.size)), hides=True,
+        names=FACTORS,
     ),
     "zero-off": Kind(
         ALL, size=_zero,
-        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)), lies=True,
+        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)), hides=True,
+        names=("zero moved",),
     ),
     "zero-off-shifted": Kind(
         ALL, size=_zero,
@@ -172,16 +203,16 @@ FAULTS: dict[str, Kind] = {
                 stage, 0.01 * around.sample_rate, fault.size, seed=around.seed
             )
         ),
-        lies=True,
+        partly=True,
     ),
     "dropouts": Kind(
         ALL, size=lambda rng, around: float(rng.choice([0.01, 0.2, 0.5])),
         stage=_for_a_time(lambda stage, fault, around: Missing(stage, fault.size, seed=around.seed)),
     ),
-    "gap": Kind(ALL, stage=lambda stage, fault, around: Gap(stage, *_times(fault, around)), silent=True),
+    "gap": Kind(ALL, stage=lambda stage, fault, around: Gap(stage, *_times(fault, around)), hides=True),
     "hum": Kind(
         ALL, size=lambda rng, around: _usual(0.2, around) if rng.random() < 0.5 else 0.05 * _swing(around),
-        stage=_for_a_time(lambda stage, fault, around: Hum(stage, fault.size, seed=around.seed)), lies=True,
+        stage=_for_a_time(lambda stage, fault, around: Hum(stage, fault.size, seed=around.seed)),
     ),
     "drift": Kind(
         ALL, size=lambda rng, around: _swing(around) * rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.3),
@@ -193,7 +224,7 @@ FAULTS: dict[str, Kind] = {
     "amplitude-drop": Kind((TRANSIENT, PERMANENT), size=lambda rng, around: rng.uniform(0.1, 0.4)),
     "glitch": Kind(
         (TRANSIENT,), size=lambda rng, around: _usual(rng.choice([1.0, 2.0, 10.0]), around),
-        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)), lies=True,
+        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)), hides=True,
     ),
     "dwell": Kind((TRANSIENT,)),
 }  # fmt: skip
@@ -309,8 +340,31 @@ def coordinates(fault: Fault, n: int) -> tuple[float, FloatArray]:
         Samples of the run.
     """
     zero = np.zeros(n)
-    if fault.kind == "zero-off-shifted" or (fault.kind == "zero-off" and fault.lasting):
+    if fault.kind == "zero-off-shifted" or (fault.kind == "zero-off" and fault.right):
         zero = fault.size * fault.within(n)
-    if fault.kind == "sensor-factor" and fault.mode == START:
-        return fault.size, zero
-    return 1.0, zero
+    return (fault.size if fault.kind == "sensor-factor" and fault.right else 1.0), zero
+
+
+def truthful(fault: Fault, first: int, x: FloatArray, seen: FloatArray, tolerance: float) -> Any:
+    """Which readings say something true of how the stage answers; an oracle knows it.
+
+    Parameters
+    ----------
+    fault : Fault
+        From `draw_fault`.
+    first : int
+        Sample of the first reading.
+    x : ndarray, shape (M,)
+        Readings [µm].
+    seen : ndarray, shape (M,)
+        What a sound gauge without noise would have read [µm].
+    tolerance : float
+        By which a reading may miss that [µm].
+    """
+    told = np.isfinite(x)
+    kind = FAULTS.get(fault.kind, Kind())
+    if kind.hides and not fault.right:
+        told &= ~fault.within(first + x.size)[first:]
+    if kind.partly:
+        told &= np.abs(np.where(told, x, np.inf) - seen) <= tolerance
+    return told

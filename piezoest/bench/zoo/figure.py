@@ -1,4 +1,4 @@
-"""A picture of one run: reference and displacement, voltage, error and loop, beside the line's."""
+"""A picture of one run: reference and displacement, voltage, error and loop, beside the lines'."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from piezoest.bench.zoo.playing import Both, Row
 from piezoest.bench.zoo.rig import Rig
 
 POINTS = 20_000  # that are drawn, at most
-LINE, RUN = "#0072B2", "#D55E00"
+LINE, LEARNT, RUN = "#0072B2", "#009E73", "#D55E00"
 
 
 def write_figure(rig: Rig, row: Row, both: Both, path: Path) -> None:
@@ -25,21 +25,27 @@ def write_figure(rig: Rig, row: Row, both: Both, path: Path) -> None:
     row : dict
         Its row.
     both : Both
-        Traces of the controller and of the line.
+        Traces of the controller and of the lines.
     path : Path
         To write to.
     """
     from matplotlib.figure import Figure
 
-    every = max(1, both.line.reference.size // POINTS)
-    time = np.arange(both.line.reference.size)[::every] / rig.sample_rate
+    fitted, learnt = both.lines.fitted, both.lines.learnt
+    every = max(1, fitted.reference.size // POINTS)
+    time = np.arange(fitted.reference.size)[::every] / rig.sample_rate
     figure = Figure(figsize=(13.0, 9.0), layout="constrained")
     panels: Any = figure.subplot_mosaic(
         [["way", "way", "loop"], ["voltage", "voltage", "loop"], ["error", "error", "last"]]
     )
     way, voltage, error = (panels[name] for name in ("way", "voltage", "error"))
-    way.plot(time, both.line.reference[::every], color="k", lw=0.6, label="reference")
-    for name, run, colour in (("line", both.line, LINE), ("controller", both.run, RUN)):
+    way.plot(time, fitted.reference[::every], color="k", lw=0.6, label="reference")
+    drawn = (
+        ("line in hindsight", fitted, LINE),
+        ("learnt line", learnt, LEARNT),
+        ("controller", both.run, RUN),
+    )
+    for name, run, colour in drawn:
         if run is None:
             continue
         style = {"color": colour, "lw": 0.7}

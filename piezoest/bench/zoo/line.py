@@ -1,5 +1,7 @@
 """What a controller has to be better than: the best straight line for the healthy stage, held throughout.
 
+It is drawn in hindsight; see `learnt_line` for the one that somebody could have had.
+
 u = (r - centre)/gain, where displacement = gain u + centre is the least-squares line of a healthy twin
 that is driven over the same reference; in the coordinates of the gauge.
 """
@@ -58,6 +60,19 @@ def fit_line(rig: Rig) -> FittedLine:
     return line
 
 
+def slope_of(u: FloatArray, x: FloatArray) -> float:
+    """Slope of the least-squares line through points.
+
+    Parameters
+    ----------
+    u, x : ndarray, shape (N,)
+        [V] and [µm].
+    """
+    du = u - u.mean()
+    # Sums, for products of long arrays start threads, which wait for one another where all cores are at work.
+    return float(np.sum(du * x) / np.sum(du * du))
+
+
 class _Twin:
     """The stage without its faults, in the gauge's coordinates."""
 
@@ -92,8 +107,7 @@ def _improved(line: FittedLine, twin: _Twin, r: FloatArray, rounds: int) -> Fitt
             best, least = line, missed
         u, x = u[twin.judged], x[twin.judged]
         mean_u, mean_x = float(u.mean()), float(x.mean())
-        du = u - mean_u
-        gain = float(du @ (x - mean_x) / (du @ du)) if np.any(du) else line.gain
+        gain = slope_of(u, x) if np.any(u != mean_u) else line.gain
         near = abs(middle - mean_x) < twin.close and abs(gain / line.gain - 1.0) < CLOSE
         if near or gain * twin.slope <= 0.0:
             break

@@ -7,8 +7,10 @@ from typing import Any, Literal, NamedTuple, overload
 import numpy as np
 
 from piezoest.bench.adaptation import json_safe
-from piezoest.bench.zoo.judging import judge, named
+from piezoest.bench.zoo.judging import Lines, judge
+from piezoest.bench.zoo.learnt_line import run_learnt_line
 from piezoest.bench.zoo.line import fit_line
+from piezoest.bench.zoo.naming import named
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Factory, Traces, run_controller, run_line
 
@@ -16,10 +18,10 @@ Row = dict[str, Any]
 
 
 class Both(NamedTuple):
-    """Traces of the controller, None if it failed, and of the line; and what the controller said."""
+    """Traces of the controller, None if it failed; the lines, and what the controller said."""
 
     run: Traces | None
-    line: Traces
+    lines: Lines
     events: tuple[Any, ...] = ()
 
 
@@ -32,7 +34,7 @@ def play(rig: Rig, factory: Factory, *, traces: Literal[True]) -> tuple[Row, Bot
 
 
 def play(rig: Rig, factory: Factory, *, traces: bool = False) -> Row | tuple[Row, Both]:
-    """Let a controller drive a rig, and judge it beside the best straight line.
+    """Let a controller drive a rig, and judge it beside straight lines.
 
     Parameters
     ----------
@@ -51,7 +53,7 @@ def play(rig: Rig, factory: Factory, *, traces: bool = False) -> Row | tuple[Row
         With `traces` only.
     """
     line = fit_line(rig)
-    by_line = run_line(rig, line)
+    lines = Lines(line, run_line(rig, line), *run_learnt_line(rig, line))
     row = {**rig.to_dict(), "line_gain": line.gain, "line_centre": line.centre, "failure": None}
     run: Traces | None = None
     controller: Any = None
@@ -59,10 +61,10 @@ def play(rig: Rig, factory: Factory, *, traces: bool = False) -> Row | tuple[Row
         controller = factory(rig.sample_rate, rig.limits)
         with np.errstate(all="ignore"):
             run, seconds = run_controller(rig, controller)
-            row |= judge(rig, run, line, by_line)
+            row |= judge(rig, run, lines)
             row |= named(rig, controller)
         row["microseconds"] = 1e6 * seconds / run.reference.size
     except Exception as error:
         row["failure"] = f"{type(error).__name__}: {error}"
     row = dict(json_safe(row))
-    return (row, Both(run, by_line, tuple(getattr(controller, "events", ())))) if traces else row
+    return (row, Both(run, lines, tuple(getattr(controller, "events", ())))) if traces else row

@@ -51,6 +51,11 @@ class Reference:
         """Samples that two swings over the whole range take, from wherever."""
         return round(1.5 * self.cycle)
 
+    @property
+    def repeats(self) -> bool:
+        """Whether each cycle is like the one before."""
+        return self.kind in REPEATING
+
 
 def _triangle(n: int, f: float, fs: float, rng: Any) -> FloatArray:
     return signals.triangle(1.0, f, n * f / fs, fs, smoothing=rng.choice([0.02, 0.1])).values
@@ -111,6 +116,7 @@ SHAPES: dict[str, Callable[[int, float, float, Any], FloatArray]] = {
     "steps": _steps,
     "beyond": _triangle,
 }
+REPEATING = ("triangle", "sine", "raster", "walk", "steps", "beyond")
 CYCLES = {"walk": float(WALK_SWINGS), "steps": 0.5 * LEVELS}
 
 

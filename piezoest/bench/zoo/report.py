@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from piezoest.bench.zoo.settling import SEGMENTS
+from piezoest.bench.zoo.summary import ENOUGH, SOON
 
 KEY = (
-    "Ratio: largest error after two swings, over the largest of 1.5 times that of the best straight line, "
-    "three times the noise and 0.2 % of the swing; rms: the same of root mean squares; last: of the last "
-    "cycle; after: from two swings after a transient fault, or after the beginning of one that stays. At a "
-    "limit: the voltage rests there for more than a quarter swing though the line's lies well within. Runs "
-    "in which no reading ever says anything have no ratio that counts."
+    "Ratio: largest error after two swings, over the largest of 1.5 times that of the straight line, three "
+    "times the noise and 0.2 % of the swing; rms: the same of root mean squares; cycle: the largest of all "
+    "cycles, each with the line's error in that very cycle; last: of the last cycle; "
+    "after: from two swings after a transient fault, or after the beginning of one that stays. The line is "
+    "the worse one of two: that drawn in hindsight, and that learnt leg by leg. At a limit: the voltage "
+    "rests there for more than a quarter swing though the line's lies well within."
 )
 
 
@@ -39,11 +41,14 @@ def print_summary(summary: dict[str, Any], console: Any) -> None:
     _crossed(console, summary["by_family"])
     columns = ("runs", "over", "over_rms", "over_last", "over_after", "at_limit")
     _table(
-        console, "By fault: runs with a ratio above 1, or at a limit; how many were named, and when",
-        ("fault", "mode", "runs", "over", "rms", "last", "after", "limit", "median", "named", "s"),
+        console,
+        "By fault: runs with a ratio above 1, or at a limit; faults named, in how many periods; as good as "
+        "before within three cycles",
+        ("fault", "mode", "runs", "over", "rms", "last", "after", "limit", "median", "named", "in", "back"),
         [
             (row["fault"], row["mode"], *(row[name] for name in columns), number(row["ratio"]),
-             row["named"], number(row["named_after"]))
+             _of(row["named"], row["to_name"]), number(row["named_periods"]),
+             _of(row["recovered_soon"], row["to_recover"]))
             for row in summary["by_fault"]
         ],
     )  # fmt: skip
@@ -64,6 +69,10 @@ def _told(row: dict[str, Any]) -> str:
     return f"{what}: {said}; {row['driver'] or 'nobody'} drove"
 
 
+def _of(count: int, runs: int) -> str:
+    return f"{count}/{runs}" if runs else ""
+
+
 def _crossed(console: Any, groups: list[dict[str, Any]]) -> None:
     """Families by references: runs with a ratio above 1, of all."""
     references = sorted({row["reference"] for row in groups})
@@ -76,7 +85,7 @@ def _crossed(console: Any, groups: list[dict[str, Any]]) -> None:
 
 
 def print_map(summary: dict[str, Any], console: Any) -> None:
-    """Print shares of runs that settled within two periods.
+    """Print shares of runs that settled within two periods, of those that are asked for.
 
     Parameters
     ----------
@@ -86,18 +95,61 @@ def print_map(summary: dict[str, Any], console: Any) -> None:
         To print on.
     """
     changes = [name for name, _, _ in SEGMENTS]
+    cells = summary["cells"]
+    kept = ", ".join(f"{name} {cells['kept'][name]}" for name in changes)
+    console.print(
+        f"Cells with at least {100.0 * ENOUGH:g} % of the runs settled within {SOON} periods, of "
+        f"{cells['asked']} that are asked for: {kept}. All others: {summary['others']} runs.",
+        highlight=False,
+    )
     for title, names in (("by_family", ("family",)), ("by_place", ("amplitude", "frequency"))):
         _table(
             console, f"Settled within two periods [%], and median of the periods, {title.replace('_', ' ')}",
             (*names, *changes),
             [
                 (*(number(row[name]) for name in names), *(
-                    f"{100.0 * row[change]:.0f} ({number(row[f'{change} periods'])})" for change in changes
+                    f"{_percent(row[change])} ({number(row[f'{change} periods'])})" for change in changes
                 ))
                 for row in summary[title]
             ],
         )  # fmt: skip
     console.print(f"{summary['runs']} runs, {summary['failures']} failed.", highlight=False)
+
+
+def print_contest(summary: dict[str, Any], console: Any) -> None:
+    """Print settled errors relative to those of the best single estimator.
+
+    Parameters
+    ----------
+    summary : dict
+        From `piezoest.bench.zoo.contest.summarise_contest`.
+    console : rich.console.Console
+        To print on.
+    """
+    _table(
+        console,
+        f"Median settled error of {summary['seeds']} seeds [% of the amplitude], that of the best single "
+        "estimator, and their ratio",
+        ("family", "reference", "error", "best", "single estimator", "ratio"),
+        [
+            (row["family"], row["reference"], number(_hundredfold(row["settled"])),
+             number(_hundredfold(row["best_settled"])), row["best"] or "", number(row["ratio"]))
+            for row in summary["cells"]
+        ],
+    )  # fmt: skip
+    console.print(
+        f"{summary['kept']} of {len(summary['cells'])} cells within {summary['allowed']:g}; "
+        f"{summary['runs']} runs, {summary['failures']} failed.",
+        highlight=False,
+    )
+
+
+def _hundredfold(value: float | None) -> float | None:
+    return None if value is None else 100.0 * value
+
+
+def _percent(share: float | None) -> str:
+    return "—" if share is None else f"{100.0 * share:.0f}"
 
 
 def number(value: Any) -> str:

@@ -11,7 +11,6 @@ from piezoest._checks import FloatArray
 from piezoest.bench.zoo.families import Reach
 from piezoest.bench.zoo.faults import (
     FAULTS,
-    START,
     TRANSIENT,
     Around,
     Fault,
@@ -25,13 +24,15 @@ from piezoest.compensators import VoltageLimits
 from piezoest.models import Creep, MassSpringDamper
 from piezoest.stage import Amplifier, Gauge, SimulatedStage
 
-# Mechanics by name. The lag is a stage so damped that only its slow pole is left: a first-order low-pass.
+# Mechanics by name: natural frequency [Hz] and damping. The lag is a stage so damped that only its slow pole
+# is left: a first-order low-pass.
 MECHANICS: dict[str, tuple[float, float]] = {
     "none": (0.0, 0.0),
     "200 Hz": (200.0, 0.01),
     "400 Hz": (400.0, 0.01),
     "780 Hz": (780.0, 0.02),
 }
+DAMPING = 0.01  # of a resonance that is given as its frequency
 LAG_DAMPING = 2.0
 SLOW_POLE = LAG_DAMPING - (LAG_DAMPING**2 - 1.0) ** 0.5  # of the lag, relative to its natural frequency
 
@@ -43,7 +44,7 @@ class Surroundings:
     Parameters
     ----------
     mechanics : str
-        Name in `MECHANICS`, or "lag".
+        Name in `MECHANICS`, another frequency as in "523 Hz", or "lag".
     lag : float
         Corner of the lag [Hz]; 0 without.
     delay : int
@@ -74,6 +75,15 @@ class Surroundings:
     creep: float = 0.0
     hum: float = 0.0
     drift: float = 0.0
+
+    @property
+    def resonance(self) -> tuple[float, float]:
+        """Natural frequency [Hz], 0 for none, and damping of the mechanics."""
+        if self.mechanics == "lag":
+            return self.lag / SLOW_POLE, LAG_DAMPING
+        if self.mechanics in MECHANICS:
+            return MECHANICS[self.mechanics]
+        return float(self.mechanics.removesuffix(" Hz")), DAMPING
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -147,15 +157,20 @@ class Rig:
 
     @property
     def judged_from(self) -> int:
-        """First sample that is judged: two swings after the beginning, or after a fault at the start."""
+        """First sample that is judged: after the beginning, or a fault at the start, and time to learn."""
         plain, fault = self.plain, self.fault
         ends = fault.stop if fault.mode == TRANSIENT and fault.start == 0 else 0
-        return min(max(plain.begins, ends) + plain.two_swings, plain.values.size)
+        return min(max(plain.begins, ends) + self.learning, plain.values.size)
 
     @property
-    def fair(self) -> bool:
-        """Whether a controller can know anything about the stage: not where no reading ever says anything."""
-        return not (self.fault.mode == START and FAULTS[self.fault.kind].silent)
+    def learning(self) -> int:
+        """Samples that learning may take: two swings, and the block at whose end the first reading comes."""
+        return self.plain.two_swings + (self.block if self.block > 1 else 0)
+
+    def seen(self, true: FloatArray) -> FloatArray:
+        """True displacements, shape (N,) [µm], in the gauge's coordinates."""
+        factor, zero = self.coordinates
+        return factor * true + zero
 
     def stage(self, *, healthy: bool = False) -> Any:
         """Make the stage, at rest.
@@ -189,9 +204,7 @@ class Rig:
         return stage
 
     def _mechanics(self) -> MassSpringDamper | None:
-        if self.around.mechanics == "lag":
-            return MassSpringDamper(self.around.lag / SLOW_POLE, LAG_DAMPING)
-        frequency, damping = MECHANICS[self.around.mechanics]
+        frequency, damping = self.around.resonance
         return MassSpringDamper(frequency, damping) if frequency else None
 
     def to_dict(self) -> dict[str, Any]:
@@ -226,5 +239,4 @@ class Rig:
             "fault_size": fault.size,
             "fault_start": fault.start / self.sample_rate,
             "fault_stop": fault.stop / self.sample_rate,
-            "fair": self.fair,
         }

@@ -57,7 +57,7 @@ def run_controller(rig: Rig, controller: Any) -> tuple[Traces, float]:
     u, x, true = np.empty_like(r), np.empty_like(r), np.empty_like(r)
     drive = _by_sample if rig.block == 1 else _by_block
     seconds = drive(controller, stage, r, u, x, true, rig.block)
-    return Traces(r, u, x, _seen(rig, true)), seconds
+    return Traces(r, u, x, rig.seen(true)), seconds
 
 
 def run_line(rig: Rig, line: FittedLine) -> Traces:
@@ -73,12 +73,7 @@ def run_line(rig: Rig, line: FittedLine) -> Traces:
     r, stage = rig.reference, rig.stage()
     u = np.clip(line.voltage(r), rig.reach.low, rig.reach.high)
     x = stage.run(u)
-    return Traces(r, u, x, _seen(rig, np.asarray(stage.displacement)))
-
-
-def _seen(rig: Rig, true: FloatArray) -> FloatArray:
-    factor, zero = rig.coordinates
-    return factor * true + zero
+    return Traces(r, u, x, rig.seen(np.asarray(stage.displacement)))
 
 
 def _by_sample(

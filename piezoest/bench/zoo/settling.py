@@ -2,7 +2,8 @@
 
 A run goes through `SEGMENTS`: a cold start, smaller and much smaller waves, the first ones again, and a gain
 that steps. It is settled from the period on after which the largest error of each stays within 1.2 % of the
-amplitude, or three times the noise.
+amplitude, or three times the noise. The stage has a resonance. Settling soon is asked for where the reference
+is slow beside it, and large beside the noise.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ from piezoest import signals
 from piezoest._checks import FloatArray
 from piezoest.bench.adaptation import json_safe
 from piezoest.bench.zoo.drawing import draw
-from piezoest.bench.zoo.families import FAMILIES
 from piezoest.bench.zoo.faults import Fault
 from piezoest.bench.zoo.references import Reference
 from piezoest.bench.zoo.rig import Rig
@@ -27,17 +27,21 @@ from piezoest.bench.zoo.running import Factory, run_controller
 AMPLITUDES = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # µm
 FREQUENCIES = (1.0, 3.0, 10.0, 30.0)  # Hz
 SETTLED, NOISES = 0.012, 3.0
-PERIOD = 1000  # samples: the sample rate goes with the frequency
+PERIOD, SLOWEST = 1000, 4000.0  # samples in a period, and Hz of the sample rate, at least
 REACH = 100.0  # V, to both sides
 GAINS = (0.05, 0.5)  # µm/V
 FREE = 1.3  # reach over what the amplitude needs, at least
 NOISE = (2e-4, 2e-3)  # µm
 STEPS = 2.0**16  # of both converters
+RESONANCES = (400.0, 780.0)  # Hz
+SLOW, LARGE = 0.025, 100.0  # frequency over the resonance at most, amplitude over the noise at least
+# Kinds of stages, of which the first and the last are of the families that some estimators learn.
+KINDS = ("paper", "relays", "bouc-wen", "duhem", "coleman-hodgdon")
 
 # Name, factor of the amplitude, and periods; the last one starts with a step of the gain.
 SEGMENTS = (
-    ("cold-start", 1.0, 10), ("switch", 0.6, 8), ("drop", 0.2, 8), ("switch-back", 1.0, 8),
-    ("gain-step", 1.0, 10),
+    ("cold-start", 1.0, 6), ("switch", 0.6, 4), ("drop", 0.2, 4), ("switch-back", 1.0, 4),
+    ("gain-step", 1.0, 6),
 )  # fmt: skip
 
 
@@ -66,7 +70,7 @@ def cells(
     *,
     amplitudes: Sequence[float] = AMPLITUDES,
     frequencies: Sequence[float] = FREQUENCIES,
-    families: Sequence[str] = tuple(FAMILIES),
+    families: Sequence[str] = KINDS,
 ) -> list[Cell]:
     """All places of the map.
 
@@ -77,7 +81,7 @@ def cells(
     amplitudes, frequencies : sequence of float
         [µm] and [Hz].
     families : sequence of str
-        Names in `FAMILIES`.
+        Names in `piezoest.bench.zoo.families.FAMILIES`.
     """
     return [Cell(*each) for each in itertools.product(families, amplitudes, frequencies, seeds)]
 
@@ -92,32 +96,44 @@ def cell_rig(cell: Cell) -> Rig:
     """
     rng = np.random.default_rng([cell.seed, 24])
     gain = float(np.exp(rng.uniform(*np.log([max(GAINS[0], FREE * cell.amplitude / REACH), GAINS[1]]))))
-    sample_rate = PERIOD * cell.frequency
+    period = max(PERIOD, round(SLOWEST / cell.frequency))
     rig = draw(
-        cell.seed, family=cell.family, limits="±100", gain=gain, sample_rate=sample_rate,
+        cell.seed, family=cell.family, limits="±100", gain=gain, sample_rate=period * cell.frequency,
         reference="triangle", amplitude=cell.amplitude, frequency=cell.frequency, waves=12,
-        mechanics="none", delay=0, slew=np.inf,
+        mechanics=f"{rng.uniform(*RESONANCES):.0f} Hz", delay=0, slew=np.inf,
         noise=float(np.exp(rng.uniform(*np.log(NOISE)))),
         resolution=2.0 * REACH * gain / STEPS, volts=2.0 * REACH / STEPS, creep=0.0,
         hum=0.0, drift=0.0, fault="none",
-        block=int(rng.choice([10, 50])),
+        block=int(rng.choice([10, 50])) * period // PERIOD,
     )  # fmt: skip
-    values = _values(cell)
-    begins = values.size - SEGMENTS[-1][2] * PERIOD
+    values = _values(cell, period)
+    begins = values.size - SEGMENTS[-1][2] * period
     size = float(rng.choice([0.7, 1.3])) if FREE * cell.amplitude < 0.6 * gain * REACH else 1.3
     return replace(
         rig,
-        plain=Reference("triangle", values, cell.amplitude, 0.0, cell.frequency, float(PERIOD), PERIOD, 0),
+        plain=Reference("triangle", values, cell.amplitude, 0.0, cell.frequency, float(period), period, 0),
         fault=Fault("gain-step", begins, values.size, size, lasting=True),
     )
 
 
-def _values(cell: Cell) -> FloatArray:
+def _values(cell: Cell, period: int) -> FloatArray:
     parts = [
-        signals.triangle(factor * cell.amplitude, cell.frequency, periods, PERIOD * cell.frequency).values
+        signals.triangle(factor * cell.amplitude, cell.frequency, periods, period * cell.frequency).values
         for _, factor, periods in SEGMENTS
     ]
     return np.concatenate(parts)
+
+
+def asked(rig: Rig) -> bool:
+    """Whether it is asked for that all settles soon.
+
+    Parameters
+    ----------
+    rig : Rig
+        From `cell_rig`.
+    """
+    slow = rig.plain.frequency <= SLOW * rig.around.resonance[0]
+    return bool(slow and rig.plain.amplitude >= LARGE * rig.noise)
 
 
 def settle(cell: Cell, factory: Factory) -> dict[str, Any]:
@@ -134,18 +150,19 @@ def settle(cell: Cell, factory: Factory) -> dict[str, Any]:
     -------
     dict
         With ``segments``: for each its name, the periods until it settled (None if it did not), the
-        largest error of its last period [µm] and what was allowed.
+        largest error of its last period [µm] and what was allowed. ``asked``: see `asked`.
     """
     rig = cell_rig(cell)
     row: dict[str, Any] = {**asdict(cell), "gain": rig.gain, "width": rig.width, "block": rig.block,
-                           "noise": rig.noise, "failure": None, "segments": []}  # fmt: skip
+                           "noise": rig.noise, "mechanics": rig.around.mechanics, "asked": asked(rig),
+                           "failure": None, "segments": []}  # fmt: skip
     try:
         controller = factory(rig.sample_rate, rig.limits)
         with np.errstate(all="ignore"):
             run, _ = run_controller(rig, controller)
     except Exception as error:
         return {**row, "failure": f"{type(error).__name__}: {error}"}
-    worst = np.abs(run.error).reshape(-1, PERIOD).max(axis=1)
+    worst = np.abs(run.error).reshape(-1, rig.plain.cycle).max(axis=1)
     first = 0
     for name, factor, periods in SEGMENTS:
         allowed = max(SETTLED * factor * cell.amplitude, NOISES * rig.noise)

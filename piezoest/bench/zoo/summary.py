@@ -12,12 +12,21 @@ from piezoest.bench.zoo.playing import Row
 from piezoest.bench.zoo.settling import SEGMENTS
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
-RATIOS = ("ratio", "ratio_rms", "last_ratio", "last_ratio_rms", "after_ratio", "after_ratio_rms")
-SOON = 2  # periods
+RATIOS = (
+    "ratio",
+    "ratio_rms",
+    "cycle_ratio",
+    "last_ratio",
+    "last_ratio_rms",
+    "after_ratio",
+    "after_ratio_rms",
+)
+ENOUGH = 0.95  # of the runs of a cell
+SOON, BACK = 2, 3  # periods until it has settled, and until a fault is forgotten
 
 
 def _over(column: str) -> Callable[[Row], bool]:
-    return lambda row: row.get(column) is not None and row[column] > 1.0 and bool(row["fair"])
+    return lambda row: row.get(column) is not None and row[column] > 1.0
 
 
 # Name of a criterion and whether a row violates it.
@@ -48,7 +57,7 @@ def summarise(rows: Iterable[Row], worst: int = 10) -> dict[str, Any]:
     """
     rows = list(rows)
     healthy = [row for row in rows if row["fault"] == "none"]
-    ranked = sorted((row for row in rows if row["fair"]), key=_badness, reverse=True)
+    ranked = sorted(rows, key=_badness, reverse=True)
     columns = ("seed", "family", "reference", "fault", "mode", "ratio", "last_ratio", "after_ratio", "rail",
                "driver", "failure")  # fmt: skip
     return dict(
@@ -76,7 +85,7 @@ def _badness(row: Row) -> float:
 
 
 def _quantiles(rows: Sequence[Row], column: str) -> dict[str, Any]:
-    values = [row[column] for row in rows if row["fair"] and row.get(column) is not None]
+    values = [row[column] for row in rows if row.get(column) is not None]
     return {f"{100 * q:g} %": float(np.quantile(values, q)) if values else None for q in QUANTILES}
 
 
@@ -87,9 +96,6 @@ def _median(values: Iterable[Any]) -> float | None:
 
 def _groups(rows: Sequence[Row], first: str, second: str) -> list[dict[str, Any]]:
     """For each pair of two columns: runs, those over the ratio or at a limit, and what was said."""
-    found: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        found.setdefault((row[first], row[second]), []).append(row)
     return [
         {
             first: key[0],
@@ -101,11 +107,24 @@ def _groups(rows: Sequence[Row], first: str, second: str) -> list[dict[str, Any]
             "over_after": sum(map(CRITERIA["after_ratio"], group)),
             "at_limit": sum(map(CRITERIA["rests at a limit"], group)),
             "ratio": _quantiles(group, "ratio")["50 %"],
-            "named": sum(row.get("named_after") is not None for row in group),
-            "named_after": _median(row.get("named_after") for row in group),
+            **_told(group),
         }
-        for key, group in sorted(found.items())
+        for key, group in _parted(rows, first, second).items()
     ]
+
+
+def _told(group: Sequence[Row]) -> dict[str, Any]:
+    """How many faults were to be named and were, how soon; and how soon errors were as before."""
+    asked = [row for row in group if row.get("named_right") is not None]
+    back = [row["recovered"] for row in group if row.get("recovery")]
+    return {
+        "to_name": len(asked),
+        "named": sum(row["named_right"] for row in asked),
+        "named_periods": _median(row["named_periods"] for row in asked),
+        "to_recover": len(back),
+        "recovered_first": sum(each == 1 for each in back),
+        "recovered_soon": sum(each is not None and each <= BACK for each in back),
+    }
 
 
 def summarise_cells(rows: Iterable[Row]) -> dict[str, Any]:
@@ -115,31 +134,53 @@ def summarise_cells(rows: Iterable[Row]) -> dict[str, Any]:
     ----------
     rows : iterable of dict
         From `piezoest.bench.zoo.settling.settle`.
+
+    Returns
+    -------
+    dict
+        Shares ``by_family`` and ``by_place`` of the runs that are asked for, ``other_places`` of the others;
+        ``cells``: how many there are in which a run is asked for, and in how many of them enough settled.
     """
     rows = list(rows)
-    places = sorted({(row["amplitude"], row["frequency"]) for row in rows})
+    asked = [row for row in rows if row["asked"]]
+    others = [row for row in rows if not row["asked"]]
+    cells = [_shares(group) for group in _parted(asked, "family", "amplitude", "frequency").values()]
     return {
         "runs": len(rows),
         "failures": sum(row["failure"] is not None for row in rows),
-        "by_family": [
-            {"family": family, **_shares([row for row in rows if row["family"] == family])}
-            for family in sorted({row["family"] for row in rows})
-        ],
-        "by_place": [
-            {"amplitude": place[0], "frequency": place[1],
-             **_shares([row for row in rows if (row["amplitude"], row["frequency"]) == place])}
-            for place in places
-        ],
-    }  # fmt: skip
+        "others": len(others),
+        "cells": {
+            "asked": len(cells),
+            "kept": {name: sum(cell[name] >= ENOUGH for cell in cells) for name, _, _ in SEGMENTS},
+        },
+        "by_family": _by(asked, "family"),
+        "by_place": _by(asked, "amplitude", "frequency"),
+        "other_places": _by(others, "amplitude", "frequency"),
+    }
+
+
+def _parted(rows: Sequence[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
+    """Rows by the values of some columns, in order."""
+    found: dict[tuple[Any, ...], list[Row]] = {}
+    for row in rows:
+        found.setdefault(tuple(row[name] for name in names), []).append(row)
+    return dict(sorted(found.items()))
+
+
+def _by(rows: Sequence[Row], *names: str) -> list[dict[str, Any]]:
+    """Shares for each value of some columns."""
+    return [
+        {**dict(zip(names, key, strict=True)), **_shares(group)}
+        for key, group in _parted(rows, *names).items()
+    ]
 
 
 def _shares(rows: Sequence[Row]) -> dict[str, Any]:
     """Share of runs that settled within `SOON` periods of each change, and median of the periods."""
-    found: dict[str, Any] = {}
+    found: dict[str, Any] = {"runs": len(rows)}
     for k, (name, _, _) in enumerate(SEGMENTS):
         periods = [row["segments"][k]["periods"] if row["segments"] else None for row in rows]
-        soon = [each is not None and each <= SOON for each in periods]
-        found[name] = float(np.mean(soon))
+        found[name] = float(np.mean([each is not None and each <= SOON for each in periods]))
         median = float(np.median([np.inf if each is None else each for each in periods]))
         found[f"{name} periods"] = None if np.isinf(median) else median
     return found

@@ -74,7 +74,7 @@ def died(task: Task) -> Row:
     task : Task
         What was to be run.
     """
-    cell = {} if task.cell is None else {**asdict(task.cell), "segments": []}
+    cell = {} if task.cell is None else {**asdict(task.cell), "segments": [], "asked": True}
     drawn = draw(task.seed, **task.given).to_dict() if task.cell is None else {}
     row = {"key": task.key, "controller": task.controller, "seed": task.seed, **drawn, **cell}
     return dict(json_safe({**row, "failure": "the process died"}))

@@ -1,0 +1,103 @@
+"""Whether the controller is as good as the best of its estimators alone, on each kind of stage and reference.
+
+The rigs are healthy and ideal: what is left of the error is what a model does not know of the hysteresis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from piezoest.bench.zoo.contenders import CANDIDATES
+from piezoest.bench.zoo.families import FAMILIES
+from piezoest.bench.zoo.playing import Row
+from piezoest.bench.zoo.references import SHAPES
+from piezoest.bench.zoo.tasks import Task, runs
+
+FLOOR, ALLOWED = 0.001, 1.3  # of the amplitude; settled error over that of the best single estimator
+IDEAL: dict[str, Any] = {
+    "sample_rate": 10_000.0, "frequency": 20.0, "mechanics": "none", "delay": 0, "noise": 0.0,
+    "resolution": 0.0, "volts": 0.0, "slew": float("inf"), "creep": 0.0, "hum": 0.0, "drift": 0.0,
+    "fault": "none", "block": 10,
+}  # fmt: skip
+REFERENCES = tuple(kind for kind in SHAPES if kind != "beyond")  # there the limits decide
+
+
+def contest(
+    controller: str,
+    seeds: range,
+    *,
+    families: Sequence[str] = tuple(FAMILIES),
+    references: Sequence[str] = REFERENCES,
+) -> list[Task]:
+    """All runs of a controller, and of the default one with each estimator alone.
+
+    Parameters
+    ----------
+    controller : str
+        As `piezoest.bench.zoo.contenders.contender` reads it.
+    seeds : range
+        For each family and reference.
+    families, references : sequence of str
+        Names in `FAMILIES` and `SHAPES`.
+    """
+    return [
+        task
+        for name in (controller, *CANDIDATES)
+        for family in families
+        for reference in references
+        for task in runs(name, seeds, {**IDEAL, "family": family, "reference": reference})
+    ]
+
+
+def summarise_contest(rows: Iterable[Row], controller: str) -> dict[str, Any]:
+    """Compare settled errors in each cell.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        Of the runs that `contest` planned.
+    controller : str
+        The one that is compared with the others.
+
+    Returns
+    -------
+    dict
+        ``cells``: for each family and reference the median of the settled errors over the amplitude, that of
+        the best single estimator and its name, and their ratio. ``kept``: in how many cells that is allowed.
+    """
+    rows = list(rows)
+    errors: dict[tuple[str, str], dict[str, list[float]]] = {}
+    for row in rows:
+        of_cell = errors.setdefault((row["family"], row["reference"]), {})
+        of_cell.setdefault(row["controller"], []).append(_relative(row))
+    cells = [
+        {"family": key[0], "reference": key[1], **_compared(of_cell, controller)}
+        for key, of_cell in sorted(errors.items())
+    ]
+    ratios = [cell["ratio"] for cell in cells]
+    return {
+        "runs": len(rows),
+        "failures": sum(row["failure"] is not None for row in rows),
+        "seeds": len({row["seed"] for row in rows}),
+        "allowed": ALLOWED,
+        "floor": FLOOR,
+        "cells": cells,
+        "kept": sum(ratio is not None and ratio <= ALLOWED for ratio in ratios),
+    }
+
+
+def _relative(row: Row) -> float:
+    """Settled error over the amplitude; infinite where there is none."""
+    settled = row.get("settled")
+    return np.inf if settled is None else max(settled / row["amplitude"], FLOOR)
+
+
+def _compared(errors: dict[str, list[float]], controller: str) -> dict[str, Any]:
+    medians = {name: float(np.median(each)) for name, each in errors.items()}
+    own = medians[controller]
+    best = min((name for name in CANDIDATES if name in medians), key=medians.__getitem__)
+    found = {"settled": own, "best": best, "best_settled": medians[best], "ratio": own / medians[best]}
+    return {name: None if value in (np.inf, np.nan) else value for name, value in found.items()}

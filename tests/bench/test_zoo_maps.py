@@ -1,0 +1,103 @@
+"""How soon a controller settles over its map, and whether it is as good as the best single estimator."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from piezoest.bench.zoo import draw, settling, summary
+from piezoest.bench.zoo.contenders import CANDIDATES, DEFAULT
+from piezoest.bench.zoo.contest import FLOOR, IDEAL, contest, summarise_contest
+from piezoest.bench.zoo.families import FAMILIES
+from piezoest.bench.zoo.settling import SEGMENTS
+
+CHANGES = [name for name, _, _ in SEGMENTS]
+
+
+def on_map(seed: int, *periods: int | None, amplitude: float = 1.0, asked: bool = True) -> dict[str, Any]:
+    segments = [{"change": name, "periods": each} for name, each in zip(CHANGES, periods, strict=True)]
+    return {"family": "paper", "amplitude": amplitude, "frequency": 3.0, "seed": seed, "asked": asked,
+            "failure": None, "segments": segments}  # fmt: skip
+
+
+def test_shares_count_what_is_asked_for() -> None:
+    rows = [on_map(seed, 2, 2, 3, None, 0 if seed else 3) for seed in range(20)]
+    rows += [on_map(0, *[None] * 5, amplitude=2.0), on_map(1, *[0] * 5, amplitude=2.0, asked=False)]
+    found = summary.summarise_cells(rows)
+    assert found["cells"]["asked"] == 2
+    assert found["cells"]["kept"] == dict(zip(CHANGES, (1, 1, 0, 0, 1), strict=True))
+    assert found["others"] == 1
+    first = found["by_place"][0]
+    assert (first["amplitude"], first["runs"], first["cold-start"], first["gain-step"]) == (
+        1.0,
+        20,
+        1.0,
+        0.95,
+    )
+    assert first["cold-start periods"] == 2.0
+    assert first["switch-back periods"] is None
+    assert found["by_family"][0]["runs"] == 21
+    assert found["other_places"][0]["switch"] == 1.0
+
+
+@pytest.mark.parametrize("frequency", settling.FREQUENCIES)
+def test_a_cell_has_a_resonance_and_samples_enough(frequency: float) -> None:
+    for seed in range(6):
+        rig = settling.cell_rig(settling.Cell("relays", 1.0, frequency, seed))
+        resonance, damping = rig.around.resonance
+        assert 400.0 <= resonance <= 780.0
+        assert damping == 0.01
+        assert rig.sample_rate > 0.99 * settling.SLOWEST
+        assert rig.plain.cycle == round(rig.sample_rate / frequency) >= settling.PERIOD
+        assert rig.plain.values.size == sum(periods for _, _, periods in SEGMENTS) * rig.plain.cycle
+        assert settling.asked(rig) == (frequency <= 0.025 * resonance)
+    assert not settling.asked(settling.cell_rig(settling.Cell("relays", 1e-3, frequency, 0)))
+
+
+def test_mechanics_are_given_by_name_or_frequency() -> None:
+    assert draw(1, mechanics="780 Hz").around.resonance == (780.0, 0.02)
+    assert draw(1, mechanics="523 Hz").around.resonance == (523.0, 0.01)
+    assert draw(1, mechanics="none").around.resonance == (0.0, 0.0)
+    lag = draw(1, mechanics="lag").around
+    assert lag.resonance[0] > lag.lag > 0.0
+
+
+def settled(seed: int, controller: str, error: float | None) -> dict[str, Any]:
+    return {"family": "paper", "reference": "sine", "seed": seed, "controller": controller, "settled": error,
+            "amplitude": 10.0, "failure": None if error else "none"}  # fmt: skip
+
+
+def test_the_best_single_estimator_is_chosen_for_each_cell() -> None:
+    first, second, third = CANDIDATES
+    of = {
+        DEFAULT: (0.2, 0.3, 0.4),
+        first: (0.1, 0.5, 0.9),
+        second: (0.1, 0.2, 0.3),
+        third: (0.0001, 0.4, None),
+    }
+    rows = [settled(k, name, error) for name, each in of.items() for k, error in enumerate(each)]
+    found = summarise_contest(rows, DEFAULT)
+    (cell,) = found["cells"]
+    assert cell["best"] == second
+    assert cell["settled"] == pytest.approx(0.03)
+    assert cell["ratio"] == pytest.approx(1.5)
+    assert (found["kept"], found["failures"], found["seeds"]) == (0, 1, 3)
+    # Below the floor all are alike.
+    tiny = [settled(0, name, error) for name, error in ((DEFAULT, 2e-3), (first, 1e-5))]
+    assert summarise_contest(tiny, DEFAULT)["cells"][0]["ratio"] == 1.0
+    assert summarise_contest(tiny, DEFAULT)["cells"][0]["settled"] == FLOOR
+
+
+def test_all_play_on_the_same_ideal_rigs() -> None:
+    planned = contest(DEFAULT, range(2))
+    assert len(planned) == 4 * len(FAMILIES) * 7 * 2
+    assert len({task.key for task in planned}) == len(planned)
+    assert {task.controller for task in planned} == {DEFAULT, *CANDIDATES}
+    rig = draw(planned[0].seed, **planned[0].given)
+    assert rig.noise == 0.0
+    assert rig.fault.kind == "none"
+    assert rig.sample_rate == IDEAL["sample_rate"]
+    assert rig.plain.values.size < 30_000
+    assert np.isinf(rig.around.slew_rate)

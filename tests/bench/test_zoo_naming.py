@@ -1,0 +1,101 @@
+"""What a controller said about a fault is compared with what it was, and how soon all was as before."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from piezoest._checks import FloatArray
+from piezoest.bench.zoo import draw, play
+from piezoest.bench.zoo.contenders import DEFAULT, contender
+from piezoest.bench.zoo.faults import ANY, FAULTS
+from piezoest.bench.zoo.naming import named, recovery, settled
+from piezoest.bench.zoo.rig import Rig
+from piezoest.controller.shown import MEANINGS
+from piezoest.supervisor import Event
+
+SHORT: dict[str, Any] = {
+    "family": "coleman-hodgdon", "limits": "±100", "gain": 0.15, "width": 0.15, "sample_rate": 1000.0,
+    "frequency": 10.0, "amplitude": 10.0, "waves": 20, "reference": "triangle", "delay": 0, "noise": 1e-3,
+    "hum": 0.0, "drift": 0.0, "creep": 0.0, "mechanics": "none", "slew": np.inf, "resolution": 0.0,
+    "volts": 0.0, "block": 20,
+}  # fmt: skip
+
+
+def rig_with(fault: str, mode: str, **given: Any) -> Rig:
+    return draw(5, **{**SHORT, "fault": fault, "mode": mode, **given})
+
+
+def after(rig: Rig, *said: tuple[float, str]) -> dict[str, Any]:
+    """What is found where faults are named some periods after the beginning of the fault."""
+    start = rig.fault.start / rig.sample_rate
+    events = [Event(start + periods / 10.0, "fell back", f"{name}: so it is") for periods, name in said]
+    return named(rig, SimpleNamespace(events=events, status={"driving": "line"}))
+
+
+def test_the_right_name_counts_and_how_soon() -> None:
+    rig = rig_with("sensor-factor", "permanent")
+    found = after(rig, (-2.0, "scaled"), (0.5, "saturated"), (1.5, "reversed"), (2.5, "scaled"))
+    assert found["named_right"] is True
+    assert found["named_periods"] == pytest.approx(1.5)
+    assert found["named"] == "scaled; saturated; reversed"
+    assert found["named_first"] == "saturated"
+    assert found["named_after"] == pytest.approx(0.05)
+    assert found["driver"] == "line"
+    wrong = after(rig, (-2.0, "scaled"), (1.0, "no response"))
+    assert wrong["named_right"] is False
+    assert wrong["named_periods"] is None
+    assert after(rig_with("hum", "permanent"), (1.0, "scaled"))["named_right"] is None
+
+
+def test_of_what_was_there_from_the_start_silence_alone_is_named() -> None:
+    asked = {
+        kind
+        for kind in FAULTS
+        if "from-start" in FAULTS[kind].modes and rig_with(kind, "from-start").fault.names
+    }
+    assert asked == {"amplifier-frozen", "stage-stuck", "sensor-constant", "sensor-noise"}
+    later = {kind for kind in FAULTS if rig_with(kind, FAULTS[kind].modes[-1]).fault.names}
+    assert later == {*asked, "sensor-saturated", "sensor-factor", "zero-off"}
+
+
+def test_every_name_is_one_that_a_controller_has() -> None:
+    assert set(ANY) == set(MEANINGS)
+    assert {name for kind in FAULTS.values() for name in kind.names} == set(ANY)
+
+
+def errors(rig: Rig, *cycles: float) -> FloatArray:
+    """0.1 µm, and others in the cycles after the fault."""
+    error = np.full(rig.plain.values.size, 0.1)
+    for k, value in enumerate(cycles):
+        begin = rig.fault.stop + k * rig.plain.cycle
+        error[begin + 5 : begin + 8] = value
+    return error
+
+
+def test_the_first_cycle_that_is_as_good_as_before_counts() -> None:
+    rig = rig_with("gap", "transient")
+    assert recovery(rig, errors(rig), 0.01) == {"recovery": True, "recovered": 1}
+    assert recovery(rig, errors(rig, 0.5, 0.13, 0.119), 0.01)["recovered"] == 3
+    assert recovery(rig, errors(rig, 0.5, 0.13), 0.2)["recovered"] == 2
+    assert recovery(rig, errors(rig, *[0.5] * 20), 0.01) == {"recovery": True, "recovered": None}
+    for other in (rig_with("gap", "permanent"), rig_with("gap", "transient", reference="chirp")):
+        assert recovery(other, errors(other), 0.01) == {"recovery": False, "recovered": None}
+    early = rig_with("glitch", "transient")
+    assert recovery(early, errors(early, 0.5), 0.01)["recovered"] == 2
+
+
+def test_a_settled_error_is_the_median_of_three_cycles() -> None:
+    error = np.repeat([9.0, 1.0, 3.0, 2.0], 10)
+    assert settled(error, 10) == 2.0
+    assert settled(error[:0], 10) is None
+
+
+def test_a_dead_sensor_is_named_by_the_default_controller() -> None:
+    row = play(rig_with("sensor-constant", "permanent"), contender(DEFAULT))
+    assert row["named_right"] is True
+    assert row["named_periods"] < 5.0
+    assert row["recovery"] is False
