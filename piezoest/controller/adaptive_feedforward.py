@@ -50,7 +50,7 @@ class AdaptiveFeedforward(Face):
         0 to 1.
     gain : float, optional
         What the stage does [µm/V], about; below zero if it falls with the voltage. The start seeks nothing
-        then: the way to the reference checks it, and what is a factor of three off is sought after all.
+        then: the first few per cent of the range check it, and what is a factor of three off is sought.
     stroke : float, optional
         The same as displacement over the whole range of the limits [µm].
     model : Model, optional

@@ -1,8 +1,8 @@
 """A gain that the user knows, until the readings have confirmed it.
 
-The voltage goes no farther than twice the way on which they have. A stage that lags, or has backlash, answers
-too little at first: that is waited for, within the first per cents of the range. Where the readings speak
-against the gain for long, it is sought as if nothing were known.
+On its way to the reference the voltage goes a few per cent of its range first, on the side that has more
+room, and rests there until the readings have answered about as the gain says: one that lags takes a while.
+Where they speak against it for long, the gain is sought as if nothing were known.
 """
 
 from __future__ import annotations
@@ -18,41 +18,43 @@ from piezoest.controller.voltage import SEEK
 
 # An answer confirms the gain within this factor.
 ALIKE = 3.0
-# The voltage goes on for so many first ways though the answer is too small.
+# The voltage goes so many first ways before its answer is looked at.
 FREE = 4.0
-# Nothing is compared behind this fraction of the farthest way.
-BACK = 0.7
+# The answer, a mean, is clear above so many times the noise of a reading.
+CLEAR = 3.0
 
 
 @register_jitable
 def compare(state: Any, settings: Any) -> None:
-    """Compare what the readings of late have answered to a way from the start with the user's gain."""
+    """Compare what the readings of late have answered to the way from the start with the user's gain."""
     start, readings = state.start, state.readings
     gone = readings.recent.mean_u - start.origin
     answer = readings.recent.mean_x - start.zero
-    way = np.abs(gone)
+    way, longest = np.abs(gone), starts.MOST_WINDOWS * settings.start.window
     start.total += start.gain * gone - answer
-    start.farthest = max(start.farthest, way)
-    # On the way back hysteresis and lag would pass for gain.
-    if way == 0.0 or way < BACK * start.farthest:
+    if way < FREE * settings.start.way:
+        state.confirmed = max(state.confirmed, way)
         return
     answered = answer / gone
     ratio = answered / start.gain
-    noise = starts.CLEAR * max(start.noise, np.sqrt(readings.noise))
-    longest = starts.MOST_WINDOWS * settings.start.window
-    if max(np.abs(answered), np.abs(start.gain)) * way <= max(noise, starts.STEPS * readings.step):
+    noise = CLEAR * max(start.noise, np.sqrt(readings.noise))
+    clear = max(np.abs(answer), np.abs(start.gain) * way) > max(noise, starts.STEPS * readings.step)
+    alike = 1.0 / ALIKE < ratio < ALIKE
+    if clear and alike:
+        start.agreed += 1.0
+    else:
+        start.agreed = 0.0
+        start.doubted += 1.0
+    if not clear:
         # Nobody can tell yet.
-        state.confirmed = max(state.confirmed, way)
-    elif 1.0 / ALIKE < ratio < ALIKE:
-        state.confirmed = max(state.confirmed, way)
+        state.confirmed = max(state.confirmed, min(way, 0.5 * settings.start.longest))
+    if start.agreed >= settings.doubling:
         # The area between what the gain says and the answer: the time constant of a lag.
         start.lag = min(max(start.total / answer, 0.0), longest)
         start.given = start.doubted = 0.0
-    else:
-        start.doubted += 1.0
-        if np.abs(ratio) < 1.0 / ALIKE and way < FREE * settings.start.way:
-            state.confirmed = max(state.confirmed, way)
-        if start.doubted > 2.0 * longest:
+    elif start.doubted > 2.0 * longest:
+        start.given = start.doubted = 0.0
+        if clear:
             _forget(state, settings, answered)
 
 
@@ -60,7 +62,6 @@ def compare(state: Any, settings: Any) -> None:
 def _forget(state: Any, settings: Any, answered: Any) -> None:
     """Seek the gain."""
     start = state.start
-    start.given = start.doubted = 0.0
     start.gain_before = answered
     state.unit = state.scale = state.line.gain = 0.0
     state.stage = SEEK

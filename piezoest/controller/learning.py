@@ -225,8 +225,8 @@ def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any) -> float:
     missing = np.abs(target - u)
     at_limit = (u <= settings.minimum and target < u) or (u >= settings.maximum and target > u)
     there = (missing <= NEAR * np.abs(u - start.origin) or at_limit) and start.given == 0.0
-    if there or (start.samples > LONGEST and start.doubted == 0.0):
-        state.stage, start.given, start.doubted = RUN, 0.0, 0.0
+    if there or (start.samples > LONGEST and start.given == 0.0):
+        state.stage = RUN
         lines.begin(line, line.gain, recent.mean_u, recent.mean_x)
         # What is left of the way is paid on the run.
         state.owed = (r - lines.at(line, u)) / state.unit

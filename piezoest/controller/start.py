@@ -37,8 +37,8 @@ START = record(
     total=NUMBER, lag=AMOUNT,
     # Gain of the last way [µm/V], of the one before; ways for nothing; samples without the voltage.
     gain=NUMBER, gain_before=NUMBER, tries=AMOUNT, stuck=COUNT, first=numbers(FIRST, kind=MEASURED),
-    # Whether the gain is the user's, and not confirmed yet; the farthest way, readings that spoke against it.
-    given=FLAG, farthest=AMOUNT, doubted=COUNT,
+    # Whether the gain is the user's, and not confirmed yet; readings in a row that spoke for it, all against.
+    given=FLAG, agreed=COUNT, doubted=COUNT,
 )  # fmt: skip
 # First and longest way [V], samples of a way, of a window; the limits; the user's gain, zero for none.
 SETTINGS = record(
@@ -97,7 +97,7 @@ def rest_at(start: Any, settings: Any, u: Any, x: Any, gain: Any) -> None:
     if gain != 0.0:
         start.stage, start.gain = DONE, gain
         start.voltage = start.origin = u
-        start.total = 0.0
+        start.total = start.agreed = start.doubted = 0.0
 
 
 @register_jitable

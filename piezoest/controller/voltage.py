@@ -73,7 +73,11 @@ def plan(state: Any, settings: Any, r: Any) -> float:
     if state.stage == SEEK:
         wanted = state.start.voltage
     elif state.stage == APPROACH:
-        wanted = _nearer(state, settings, lines.voltage(state.line, r))
+        target = lines.voltage(state.line, r)
+        if state.start.given != 0.0:
+            # The first way says whether the gain is right.
+            target = state.start.origin + np.sign(state.start.way) * settings.start.longest
+        wanted = _nearer(state, settings, target)
     elif state.stage == HOME:
         wanted = homing.voltage(state.homing, state.u)
     else:

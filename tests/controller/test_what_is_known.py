@@ -202,3 +202,37 @@ def test_a_wrong_displacement_is_refused(wrong: Any) -> None:
     driver = controller()
     with pytest.raises(ValueError, match="displacement must"):
         driver.reset(0.0, wrong)
+
+
+def test_a_gain_that_drowns_in_noise_is_believed() -> None:
+    driver = controller(gain=0.2)
+    _, _, stages = drive(driver, loop(), np.tile(SINE, 2), noise=3.0)
+    assert "seeking" not in stages[4:]
+    assert stages[-1] == "running"
+
+
+@pytest.mark.parametrize("limits", [(0.0, 100.0), (-100.0, 0.0), (-1.0, 100.0)])
+@pytest.mark.parametrize("gain", [0.2, -0.2])
+def test_the_check_goes_where_there_is_room(limits: tuple[float, float], gain: float) -> None:
+    """At a limit, with the wrong sign, the reference asks for voltages beyond it."""
+    driver = pz.AdaptiveFeedforward(FS, limits=pz.VoltageLimits(*limits), estimators=(), gain=gain)
+    r = SINE + 0.1 * sum(limits)
+    _, x, stages = drive(driver, loop(), r)
+    assert ("seeking" in stages[4:]) == (gain < 0.0)
+    assert np.abs(r - x)[-1000:].max() < 0.7
+
+
+@pytest.mark.parametrize("gain", [0.2, -0.2])
+def test_a_fast_reference_and_hum_do_not_lead_astray(gain: float) -> None:
+    driver, stage, k = controller(gain=gain), pz.SimulatedStage(FS, LOOP), 0
+
+    def humming(u: float) -> float:
+        nonlocal k
+        k += 1
+        return float(stage.step(u) + 0.15 * np.sin(2.0 * np.pi * 50.0 * k / FS))
+
+    r = pz.signals.sine(5.0, 100.0, 100, FS).values
+    u, _, stages = drive(driver, humming, r)
+    assert ("seeking" in stages[4:]) == (gain < 0.0)
+    assert stages[-1] == "running"
+    assert np.abs(u).max() < 50.0
