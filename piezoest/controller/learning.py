@@ -17,8 +17,9 @@ from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK
 
 # Models are handed over after this fraction of a swing; legs of the line before another model drives.
 HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 2.0
-# The way to the reference is over within this fraction of its length, or after so many readings.
-NEAR, LONGEST = 0.05, 1e4
+# The way to the reference is over within this fraction of its length, or after so many times what a doubling
+# takes: a fast reference is never caught.
+NEAR, LONGEST = 0.05, 50.0
 # The voltage may rest at a limit for this travel of the reference, in swings, before all begins anew; where
 # the stage stands beyond the reference there, the line follows sooner.
 RESTED, BEYOND = 4.0, 0.1
@@ -225,7 +226,8 @@ def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any) -> float:
     missing = np.abs(target - u)
     at_limit = (u <= settings.minimum and target < u) or (u >= settings.maximum and target > u)
     there = (missing <= NEAR * np.abs(u - start.origin) or at_limit) and start.given == 0.0
-    if there or (start.samples > LONGEST and start.given == 0.0):
+    longest = LONGEST * max(settings.doubling, start.lag)
+    if there or (start.samples > longest and start.given == 0.0):
         state.stage = RUN
         lines.begin(line, line.gain, recent.mean_u, recent.mean_x)
         # What is left of the way is paid on the run.
