@@ -121,6 +121,7 @@ def _follow_zero(state: Any) -> None:
     lines.forget(line.now)
     line.before.count = 0.0
     line.centre += jump
+    line.last_centre += jump
     line.held_centre += jump
     state.owed -= jump / state.unit
     readings.off = readings.spikes = 0.0

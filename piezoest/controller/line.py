@@ -17,12 +17,13 @@ from piezoest.layout import AMOUNT, COUNT, FLAG, MEASURED, NUMBER, record
 POINTS = record(
     count=AMOUNT, mean_u=MEASURED, mean_x=MEASURED, square=AMOUNT, square_x=AMOUNT, product=NUMBER
 )
-# The line; the one before the last turn; the gain it began with; whether the voltage was at a limit since the
-# last turn; legs it rests on, turns since the last one, legs of late that agreed with it; length of the first
-# leg when it was looked at last; points of this leg and of the last one.
+# The line; the one before the last turn, and before the one before; the gain it began with; whether the
+# voltage was at a limit since the last turn; legs it rests on, turns since the last one, legs of late that
+# agreed with it; length of the first leg when it was looked at last; points of this leg and of the last one.
 LINE = record(
-    gain=NUMBER, centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER, first_gain=NUMBER, clipped=FLAG,
-    legs=COUNT, small=COUNT, agreed=AMOUNT, looked=AMOUNT, now=POINTS, before=POINTS,
+    gain=NUMBER, centre=NUMBER, last_gain=NUMBER, last_centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER,
+    first_gain=NUMBER, clipped=FLAG, legs=COUNT, small=COUNT, agreed=AMOUNT, looked=AMOUNT,
+    now=POINTS, before=POINTS,
 )  # fmt: skip
 
 # Points of which a line explains less than this share teach nothing about its gain; it changes by no more
@@ -43,8 +44,8 @@ ALIKE = 1.6
 @register_jitable
 def begin(line: Any, gain: Any, u: Any, x: Any) -> None:
     """Begin with a gain and a line through one point."""
-    line.gain = line.held_gain = line.first_gain = gain
-    line.centre = line.held_centre = x - gain * u
+    line.gain = line.last_gain = line.held_gain = line.first_gain = gain
+    line.centre = line.last_centre = line.held_centre = x - gain * u
     line.agreed = line.legs = line.looked = line.before.count = 0.0
     forget(line.now)
 
@@ -124,7 +125,8 @@ def turn(line: Any) -> None:
         return
     line.small = 0.0
     line.legs += 1.0
-    line.held_gain, line.held_centre = line.gain, line.centre
+    line.held_gain, line.held_centre = line.last_gain, line.last_centre
+    line.last_gain, line.last_centre = line.gain, line.centre
     ratio = slope(now) / line.gain
     agrees = explained(now) > EXPLAINED and 1.0 / ALIKE < ratio < ALIKE
     line.agreed = line.agreed + 1.0 if agrees else 0.5 * line.agreed
@@ -156,8 +158,9 @@ def grow(line: Any, leg: Any) -> bool:
 
 @register_jitable
 def hold(line: Any) -> None:
-    """Return to the line before the last turn, and forget the points since."""
+    """Return to the line before the last two turns, and forget the points since."""
     line.gain, line.centre = line.held_gain, line.held_centre
+    line.last_gain, line.last_centre = line.gain, line.centre
     forget(line.now)
     line.before.count = 0.0
 

@@ -1,0 +1,125 @@
+"""What a controller does not do to a stage: jumps, shaking, following what is not true."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+
+FS = 5000.0
+LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
+LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+
+
+def triangle(periods: int, amplitude: float) -> FloatArray:
+    return pz.signals.triangle(amplitude, 10.0, periods, FS).values
+
+
+def driven(
+    r: FloatArray, stage: Any, *, block: int = 1, **options: Any
+) -> tuple[Any, FloatArray, FloatArray]:
+    """The controller, its voltages, and where the stage was."""
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, **options)
+    u, true = np.empty_like(r), np.empty_like(r)
+    for k in range(0, r.size, block):
+        part = slice(k, k + block)
+        u[part] = driver.run(r[part])
+        x = stage.run(u[part])
+        true[part] = stage.displacement
+        driver.learn(u[part], x)
+    return driver, u, true
+
+
+@pytest.mark.parametrize("block", [1, 7, 60, 300])
+def test_the_start_does_not_jump(block: int) -> None:
+    _, u, _ = driven(np.zeros(3000), pz.SimulatedStage(FS, LOOP), block=block, estimators=())
+    # The ways are 0.6 V and 2.4 V long, and as far back.
+    assert 1.0 < np.abs(u).max() < 6.0
+    assert np.abs(np.diff(u)).max() < 0.4
+
+
+@pytest.mark.parametrize("amplitude", [0.1, 0.5, 5.0])
+def test_small_swings_are_learnt_as_soon_as_large_ones(amplitude: float) -> None:
+    r = triangle(6, amplitude)
+    driver, _, true = driven(r, pz.SimulatedStage(FS, LOOP))
+    assert np.abs(r - true)[-1000:].max() < 0.012 * amplitude
+    assert driver.status.driving != "line"
+
+
+@pytest.mark.parametrize("frequency", [200.0, 400.0])
+def test_a_resonance_is_not_fed(frequency: float) -> None:
+    """Its peak is fifty times its gain: any loop around it that is fast would run away."""
+    stage = pz.SimulatedStage(FS, LOOP, mechanics=pz.MassSpringDamper(frequency, 0.01))
+    r = pz.signals.sine(3.0, 10.0, 12.0, FS).values
+    line, _, by_line = driven(r, stage, estimators=())
+    stage.reset()
+    _, _, true = driven(r, stage)
+    late = slice(3000, None)
+    assert line.status.stage == "running"
+    assert np.abs(r - true)[late].max() < 1.5 * np.abs(r - by_line)[late].max()
+
+
+@pytest.mark.parametrize("wrong", ["reversed", "dead"])
+def test_readings_that_say_nothing_move_nothing(wrong: str) -> None:
+    """The line would follow them, and the voltage go to a limit."""
+    r = triangle(24, 3.0)
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=())
+    stage = pz.SimulatedStage(FS, LOOP)
+    noise = np.random.default_rng(0).normal(0.0, 1e-3, r.size)
+    u = np.empty_like(r)
+    for k, r_k in enumerate(r):
+        u[k] = driver.step(float(r_k))
+        x = stage.step(u[k])
+        if k >= 6000:
+            x = -x if wrong == "reversed" else 4.0 + noise[k]
+        driver.learn(u[k], x)
+    assert driver.status.fault == {"reversed": "reversed", "dead": "no response"}[wrong]
+    # The fault is named within a period; what was learnt meanwhile is forgotten.
+    assert np.abs(u[6000:]).max() < 2.0 * np.abs(u[3000:6000]).max()
+    assert np.abs(u[7000:]).max() < 1.3 * np.abs(u[3000:6000]).max()
+
+
+def test_a_zero_that_jumps_does_not_move_the_stage() -> None:
+    """A gauge may come back; the reference has not moved."""
+    r = triangle(20, 3.0)
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=())
+    stage = pz.SimulatedStage(FS, LOOP)
+    true = np.empty_like(r)
+    for k, r_k in enumerate(r):
+        u = driver.step(float(r_k))
+        x = stage.step(u)
+        true[k] = float(stage.displacement)
+        driver.learn(u, x + (20.0 if k >= 6000 else 0.0))
+    before = np.abs(r - true)[5000:6000].max()
+    assert driver.status.fault == "zero moved"
+    assert np.abs(r - true)[6000:].max() < 1.3 * before
+
+
+def test_an_amplifier_that_stands_still_is_named() -> None:
+    r = triangle(12, 3.0)
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=())
+    stage = pz.SimulatedStage(FS, LOOP)
+    u = 0.0
+    for k, r_k in enumerate(r):
+        planned = driver.step(float(r_k))
+        u = u if k >= 4000 else planned
+        driver.learn(u, stage.step(u))
+        if k == 4500:
+            assert driver.status.fault == "no response"
+
+
+def test_a_sensor_that_never_speaks_is_named() -> None:
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=())
+    for _ in range(5000):
+        driver.learn(driver.step(1.0), None)
+    assert driver.status.fault == "no response"
+    stage = pz.SimulatedStage(FS, LOOP)
+    for _ in range(5000):
+        u = driver.step(1.0)
+        driver.learn(u, stage.step(u))
+    assert driver.status.stage == "running"
+    assert abs(float(stage.displacement) - 1.0) < 0.1
