@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.controller import driving
+from piezoest.controller import driving, slots
 from piezoest.controller import readings as reading
 
 # A voltage that may not have been written does not matter below this fraction of a swing.
@@ -15,20 +15,11 @@ NOTHING = 1.0 / 64.0
 
 
 @register_jitable
-def _forget(slot: Any) -> None:
-    if slot is not None:
-        slot.score.weight = 0.0
-
-
-@register_jitable
 def all_models(state: Any) -> None:
     """Let the line drive, and forget how well each model has done."""
     driving.drive(state, 0.0)
     state.since = state.score.weight = state.outcome.weight = state.outcome.peak = 0.0
-    _forget(state.candidates.first)
-    _forget(state.candidates.second)
-    _forget(state.candidates.third)
-    _forget(state.candidates.fourth)
+    slots.forget(state.candidates)
 
 
 @register_jitable

@@ -13,7 +13,7 @@ from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK
+from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK, is_held
 
 # Models are handed over after this fraction of a swing; legs of the line before another model drives.
 HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 2.0
@@ -168,14 +168,6 @@ def _score(state: Any, settings: Any, u: Any, x: Any, z: Any) -> None:
 
 
 @register_jitable
-def _is_beyond(state: Any, settings: Any, x: Any) -> bool:
-    """Whether the voltage is at a limit with the stage beyond the reference: what is known is wrong."""
-    way = (x - state.r) * state.line.gain
-    low, high = state.u <= settings.minimum, state.u >= settings.maximum
-    return (low and way < 0.0) or (high and way > 0.0)
-
-
-@register_jitable
 def _leave_limit(state: Any, settings: Any, moved: Any) -> None:
     """Where the voltage rests at a limit for long, all that is known may be wrong: begin anew."""
     rests = state.u <= settings.minimum or state.u >= settings.maximum
@@ -225,10 +217,9 @@ def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any) -> float:
     start.samples += 1.0
     target = lines.voltage(line, r)
     missing = np.abs(target - u)
-    at_limit = (u <= settings.minimum and target < u) or (u >= settings.maximum and target > u)
-    there = (missing <= NEAR * np.abs(u - start.origin) or at_limit) and start.given == 0.0
+    there = missing <= NEAR * np.abs(u - start.origin) or is_held(settings, u, target - u)
     longest = LONGEST * max(settings.doubling, start.lag)
-    if there or (start.samples > longest and start.given == 0.0):
+    if (there or start.samples > longest) and start.given == 0.0:
         state.stage = RUN
         lines.begin(line, line.gain, recent.mean_u, recent.mean_x)
         # What is left of the way is paid on the run.
@@ -253,7 +244,8 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
         if state.readings.fault != reading.NONE:
             driving.drive(state, 0.0)
             redraw.hold(state)
-    beyond = _is_beyond(state, settings, raw)
+    # At a limit with the stage beyond the reference what is known is wrong.
+    beyond = is_held(settings, u, (raw - state.r) * state.line.gain)
     _leave_limit(state, settings, moved)
     far = (beyond and state.railed > BEYOND * state.reference.swing) or redraw.is_young(state)
     if far and state.readings.fault == reading.NONE:

@@ -68,6 +68,21 @@ def judge(slots: Any, z: Any, swings: Any, bound: Any) -> None:
 
 
 @register_jitable
+def _forget(slot: Any) -> None:
+    if slot is not None:
+        slot.score.weight = 0.0
+
+
+@register_jitable
+def forget(slots: Any) -> None:
+    """Forget what each model has missed."""
+    _forget(slots.first)
+    _forget(slots.second)
+    _forget(slots.third)
+    _forget(slots.fourth)
+
+
+@register_jitable
 def _pay(slot: Any, kept: Any) -> None:
     if slot is not None:
         slot.score.owed *= kept

@@ -24,6 +24,12 @@ AHEAD, LATE = 2.0, 3.0
 
 
 @register_jitable
+def is_held(settings: Any, u: Any, way: Any) -> bool:
+    """Whether a limit holds a voltage back from going a way."""
+    return (u <= settings.minimum and way < 0.0) or (u >= settings.maximum and way > 0.0)
+
+
+@register_jitable
 def _feed_forward(state: Any, settings: Any, r: Any) -> float:
     """Voltage of the model that drives, in the corridor around the line, for reference and feedback."""
     line = state.line
