@@ -3,8 +3,8 @@
 Every run follows from its seed. Finished runs are kept in the folder; started again, the same command does
 the rest. What is written sums them up and is as small for many runs as for few.
 
-    python benchmarks/safety.py [--runs N] [--others N] [--map N] [--singles N] [--workers N] [--out DIR]
-                                [--json FILE] [--figure FILE]
+    python benchmarks/safety.py [--runs N] [--others N] [--map N] [--singles N] [--dwell N] [--workers N]
+                                [--out DIR] [--json FILE] [--figure FILE]
 
 A run takes about half a second.
 """
@@ -26,11 +26,11 @@ from piezoest.bench.adaptation import json_safe
 from piezoest.bench.campaign import store_in
 from piezoest.bench.origin import origin, put
 from piezoest.bench.suite_command import counting
-from piezoest.bench.zoo import judging, naming, settling, summary
+from piezoest.bench.zoo import dwelling, judging, naming, settling, summary
 from piezoest.bench.zoo.contenders import DEFAULT, PARTS
 from piezoest.bench.zoo.contest import contest, summarise_contest
 from piezoest.bench.zoo.summary import CRITERIA, summarise
-from piezoest.bench.zoo.tasks import Task, carry_out_all, cells, runs
+from piezoest.bench.zoo.tasks import Task, carry_out_all, cells, rests, runs
 
 Row = dict[str, Any]
 
@@ -210,6 +210,7 @@ def main(given: Sequence[str] | None = None) -> int:
     parser.add_argument("--others", type=int, help="rigs for what it is compared with; default as many")
     parser.add_argument("--map", type=int, default=0, help="seeds for each place of the map")
     parser.add_argument("--singles", type=int, default=0, help="seeds for each family and reference")
+    parser.add_argument("--dwell", type=int, default=0, help="rigs that rest for a minute")
     parser.add_argument("--seed", type=int, default=0, help="the first one")
     parser.add_argument("--workers", type=int, help="processes; default one for each core")
     parser.add_argument("--out", type=Path, default=Path("bench-results-safety"), help="of finished runs")
@@ -236,6 +237,8 @@ def main(given: Sequence[str] | None = None) -> int:
         for name, controller in CONTROLLERS.items()
     }
     on_map = play("the map", cells(DEFAULT, settling.cells(range(arguments.map))))
+    first = arguments.seed
+    rested = play("rests", rests(DEFAULT, dwelling.dwells(range(first, first + arguments.dwell))))
     alone = play("single estimators", contest(DEFAULT, range(arguments.singles)))
     document = {
         "suite": "safety",
@@ -255,6 +258,7 @@ def main(given: Sequence[str] | None = None) -> int:
         **{name: SHOWN[name](each) for name, each in rows.items()},
         "map": {"seeds": arguments.map, **summary.summarise_cells(on_map)} if on_map else None,
         "singles": summarise_contest(alone, DEFAULT) if alone else None,
+        "dwell": dwelling.summarise_dwells(rested) if rested else None,
     }  # fmt: skip
     document = short(json.loads(json.dumps(json_safe(document))))
     put(document, arguments.json)

@@ -15,6 +15,7 @@ CHANGES = {
 }  # fmt: skip
 MODES = {"from-start": "from the start", "transient": "for a time", "permanent": "for good"}
 HEADS = {"amplitude": "amplitude [µm]", "frequency": "frequency [Hz]"}
+YES = {True: "yes", False: "no"}
 ASKED = {"by_family": "asked for", "by_place": "asked for", "other_places": "not asked for"}
 
 
@@ -39,6 +40,11 @@ def besides(document: Document) -> list[str]:
             f"It settles within {document['criteria']['soon']} periods in at least "
             f"{percent(document['criteria']['enough'])} of the runs of a cell, in so many of "
             f"{on_map['cells']['asked']} cells: {listed(counts)}."
+        )
+    if rested := document.get("dwell"):
+        said.append(
+            f"After a rest of {rested['duration']:g} s the error is as before in the very first period in "
+            f"{of_all(rested['kept'], rested['runs'])} runs."
         )
     if alone := document["singles"]:
         said.append(
@@ -91,4 +97,26 @@ def singles(document: Document) -> str:
     ]  # fmt: skip
     heading = ["family", "reference", "settled error", "best single one", "which", "ratio"]
     title = f"Settled errors relative to the amplitude, medians of {found['seeds']} seeds"
+    return table(title, heading, body)
+
+
+def dwell(document: Document) -> str:
+    """How it goes on after a long rest."""
+    found = document.get("dwell")
+    if not found:
+        return "No rests have been played.\n"
+    columns = ("first", "second", "third", "largest", "excursion", "farthest")
+    body = [
+        [
+            *(YES[row[name]] for name in ("creep", "feedback", "noise")),
+            of_all(row["kept"], row["runs"]),
+            *(short(row[name]) for name in columns),
+        ]
+        for row in found["groups"]
+    ]
+    heading = [
+        "creep", "feedback", "noise", "as before in the first period", "first", "second", "third",
+        "largest first", "way", "longest way",
+    ]  # fmt: skip
+    title = f"After a rest of {found['duration']:g} s, {found['rigs']} rigs"
     return table(title, heading, body)

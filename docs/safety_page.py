@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from paper_page import table, write_pieces
-from safety_more_page import besides, of_all, places, singles, told
+from safety_more_page import besides, dwell, of_all, places, singles, told
 from which_estimator_page import listed, percent, replacements, short
 
 DOCS = Path(__file__).resolve().parent
@@ -94,6 +94,7 @@ def pieces(document: Document) -> dict[str, str]:
         "places": places(document, "by_place", "amplitude", "frequency"),
         "other_places": places(document, "other_places", "amplitude", "frequency"),
         "singles": singles(document),
+        "dwell": dwell(document),
         "controller": crossed(document, "controller"),
         "line": crossed(document, "line"),
         "mechanics": mechanics(document),

@@ -59,6 +59,10 @@ class Which:
         bool,
         typer.Option("--singles", help="Each family and reference, beside each estimator of it alone."),
     ] = False
+    dwell: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="How it goes on after a rest of a minute, on N rigs."),
+    ] = None
     show: Annotated[
         int | None, typer.Option(metavar="SEED", min=0, help="Run this one alone, and draw it.")
     ] = None  # fmt: skip
@@ -66,7 +70,14 @@ class Which:
     @property
     def title(self) -> str:
         """What its files are called."""
-        return "map" if self.settling else "singles" if self.singles else "safety"
+        found = self.asked
+        return found[0] if found else "safety"
+
+    @property
+    def asked(self) -> list[str]:
+        """What is asked for beside the zoo itself: one of them, or none."""
+        given = {"map": self.settling, "singles": self.singles, "dwell": self.dwell is not None}
+        return [name for name, chosen in given.items() if chosen]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +145,7 @@ def safety(
         return
     from piezoest.bench.zoo import report
 
-    shown = {"map": report.print_map, "singles": report.print_contest}
+    shown = {"map": report.print_map, "singles": report.print_contest, "dwell": report.print_dwells}
     shown.get(which.title, report.print_summary)(document, Console())
     typer.echo(f"Results: {written.output}")
     if target is not None:
@@ -157,14 +168,18 @@ def _given(pairs: list[str]) -> dict[str, Any]:
 
 
 def _plan(which: Which, controller: str, given: dict[str, Any]) -> list[Task]:
-    from piezoest.bench.zoo import contest, draw, settling, tasks
+    from piezoest.bench.zoo import contest, draw, dwelling, settling, tasks
 
-    seeds = range(which.seed, which.seed + which.runs)
-    if which.settling or which.singles:
-        if given or (which.settling and which.singles):
-            raise ValueError(f"--{which.title} draws its rigs itself: leave out --set, and one of two maps")
-        if which.singles:
-            return contest.contest(controller, seeds)
+    seeds = range(which.seed, which.seed + (which.dwell or which.runs))
+    if which.asked and (given or len(which.asked) > 1):
+        raise ValueError(
+            f"--{which.title} draws its rigs itself: leave out --set, and all but one of the maps"
+        )
+    if which.dwell is not None:
+        return tasks.rests(controller, dwelling.dwells(seeds))
+    if which.singles:
+        return contest.contest(controller, seeds)
+    if which.settling:
         return tasks.cells(controller, settling.cells(seeds))
     draw(which.seed, **given)  # a wrong name is told now
     return tasks.runs(controller, seeds, given)
@@ -175,11 +190,14 @@ def _write(
 ) -> dict[str, Any]:
     """Write the table, and sum it up."""
     from piezoest.bench.tables import write_table
-    from piezoest.bench.zoo import columns, contest, summary
+    from piezoest.bench.zoo import columns, contest, dwelling, summary
 
     if which.settling:
         write_table(columns.tidy_cells(rows), folder / f"map.{format}", columns.CELL_COLUMNS)
         return summary.summarise_cells(rows)
+    if which.dwell is not None:
+        write_table(rows, folder / f"dwell.{format}", columns.DWELL_COLUMNS)
+        return dwelling.summarise_dwells(rows)
     write_table(rows, folder / f"{'singles' if which.singles else 'runs'}.{format}", columns.COLUMNS)
     if which.singles:
         return contest.summarise_contest(rows, controller)

@@ -144,9 +144,10 @@ class Compensator:
         """Model whose inverse is used. Setting it is bumpless.
 
         It takes effect by travel: when the reference has moved by 1/64 of its last leg since the last one
-        did, at once if it has, or has not moved at all. Until then the model in use drives on, and of several
-        that are set the last one waits. Where models follow one another soon, the voltage stays in a
-        corridor around linear feed-forward (`piezoest.compensators.corridor`).
+        did, at once if it has, or has not moved at all; less than 1e-4 of the range is no movement. Until
+        then the model in use drives on, and of several that are set the last one waits. Where models
+        follow one another soon, the voltage stays in a corridor around linear feed-forward, of which the gain
+        is at least half the first model's (`piezoest.compensators.corridor`).
 
         The new model's w_h is found as `hand_over` says, and plays as the voltage's turning
         points have left them. What the new model makes of the present voltage differs

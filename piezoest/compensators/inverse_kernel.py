@@ -89,13 +89,13 @@ def _limited(state: Any, settings: Any, r: Any, wanted: Any) -> Any:
     u = state.voltage
     if not np.abs(wanted) < BEYOND:
         wanted = u
-    inside = corridor.kept(state.corridor, r, wanted)
+    inside = corridor.kept(state.corridor, settings, r, wanted)
     slewed = min(max(inside, u - settings.largest_step), u + settings.largest_step)
     given = min(max(slewed, settings.minimum), settings.maximum)
     state.slewed += slewed != inside
     state.saturated += given != slewed
     state.limited = np.sign(wanted - given)
-    corridor.follow(state.corridor, given, (given != inside) * 1.0)
+    corridor.follow(state.corridor, given, (slewed != inside) * 1.0)
     return given
 
 
@@ -146,7 +146,7 @@ def begin(state: Any, settings: Any, u: float, slope: float) -> None:
     recent_path.begin(state.path, u, 1.0)
     remember(state.memory, u)
     state.inverse.place(state, settings)
-    corridor.begin(state.corridor, u, state.inverse.expected(state, settings), slope)
+    corridor.begin(state.corridor, settings, u, state.inverse.expected(state, settings), slope)
 
 
 def go_on(state: Any, settings: Any, expected: float, stays: bool) -> None:

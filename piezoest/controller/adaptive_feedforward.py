@@ -18,7 +18,7 @@ from piezoest.layout import by_name, from_bytes, write
 # Events that are kept.
 MOST_EVENTS = 1000
 # What planning a block counts, of which learning knows nothing.
-_COUNTED = ("missing", "saturated", "slewed", "planned")
+_COUNTED = ("missing", "saturated", "slewed", "planned", "back")
 
 _log = logging.getLogger(__name__)
 
@@ -58,6 +58,9 @@ class AdaptiveFeedforward(Face):
     feedback : float, optional
         Integral gain of a feedback from the readings that are believed [1/s], as of `IntegralFeedback`; it
         corrects no more than the corridor's width. Default: none.
+    resonance : float, optional
+        Lowest resonance of the stage [Hz], of which a warning knows: an event, once, where the reference is
+        above 5 % of it. Default: nobody knows it.
 
     Raises
     ------
@@ -103,11 +106,12 @@ class AdaptiveFeedforward(Face):
         stroke: float | None = None,
         model: Any = None,
         feedback: float | None = None,
+        resonance: float | None = None,
     ) -> None:
         sample_rate, limits = moderate("sample_rate", sample_rate), making.checked_limits(limits, sample_rate)
         factories = team.DEFAULT if estimators is None else estimators
         known = making.known_gain(gain, stroke, model, limits)
-        options = making.options(sample_rate, corridor, known, feedback)
+        options = making.options(sample_rate, corridor, known, feedback, resonance)
         self._make(sample_rate, limits, options, team.made(factories, sample_rate))
 
     def _make(self, sample_rate: float, limits: VoltageLimits, options: Any, estimators: Any) -> None:
@@ -281,7 +285,8 @@ class AdaptiveFeedforward(Face):
             return
         event = shown.event(state, self._sample_rate)
         self._events.append(event)
-        level = logging.WARNING if event.action == "fell back" else logging.INFO
+        warned = event.action == "fell back" or state["notice"] in shown.WARNINGS
+        level = logging.WARNING if warned else logging.INFO
         _log.log(level, "%s at %.6g s, %s", event.action, event.time, event.reason)
 
     # ------------------------------------------------------------ copies and files
@@ -333,7 +338,8 @@ class AdaptiveFeedforward(Face):
         limits = making.checked_limits(saved.read_limits(data["limits"]), sample_rate)
         controller = cls.__new__(cls)
         estimators = saved.read_estimators(data["estimators"], data["state"])
-        options = making.options(sample_rate, data["corridor"], data["gain"], data["feedback"])
+        chosen = (data[name] for name in ("corridor", "gain", "feedback", "resonance"))
+        options = making.options(sample_rate, *chosen)
         controller._make(sample_rate, limits, options, estimators)
         controller._load(data)
         return controller

@@ -73,15 +73,26 @@ def drive(state: Any, number: Any) -> None:
 
 
 @register_jitable
+def _faked(state: Any) -> float:
+    """By how much late readings miss what is true: models learn it as if it were hysteresis."""
+    reference = state.reference
+    return state.start.lag / max(reference.usual, 1.0) * state.travel.swing
+
+
+@register_jitable
 def _choose(state: Any) -> float:
-    """The model that has missed least of late, if it is clearly better than the present one."""
-    line = candidate.missed(state.score)
+    """The model that has missed least of late, if it is clearly better than the present one.
+
+    Who learns from late readings is right about them: the line gets what the models lose by that.
+    """
+    faked = _faked(state)
+    line = max(candidate.missed(state.score) - faked, 0.0)
     noise = state.readings.noise / (state.unit * state.unit)
     floor = noise + (ALIKE * state.travel.swing) ** 2
     best, least = 0.0, np.inf
     present = np.inf
     for number in range(5):
-        miss = slots.missed(state.candidates, number * 1.0, line if number == 0 else np.inf)
+        miss = slots.missed(state.candidates, number * 1.0, np.inf) + faked if number > 0 else line
         if number == state.driving:
             present = miss
         if miss < least:
@@ -102,19 +113,21 @@ def _disappoints(state: Any) -> bool:
 
     A model can be right and still shake a resonance, which every model then misses alike.
     """
-    missed = candidate.missed(state.score)
+    swing = state.travel.swing
+    missed = candidate.missed(state.score) / swing
     if state.driving == 0.0:
         if state.since > SEEN:
-            state.line_missed, state.line_peak = missed, state.score.peak
+            state.line_missed, state.line_peak = missed, state.score.peak / swing
         return False
     state.line_missed = min(state.line_missed, missed)
-    return state.since > SEEN and candidate.missed(state.outcome) > state.line_missed + _floor(state)
+    return state.since > SEEN and candidate.missed(state.outcome) > state.line_missed * swing + _floor(state)
 
 
 @register_jitable
 def watch(state: Any, off: Any) -> None:
     """Fall back to the line at once where the stage is farther off than it ever was under the line."""
-    if state.driving > 0.0 and off > TRIP * state.line_peak + 3.0 * _floor(state) and state.since > CALM:
+    most = TRIP * state.line_peak * state.travel.swing + 3.0 * _floor(state)
+    if state.driving > 0.0 and off > most and state.since > CALM:
         _change(state, 0.0)
         state.shaken += 1.0
         if state.shaken == OFTEN:

@@ -49,8 +49,9 @@ def compare(state: Any, settings: Any) -> None:
         # Nobody can tell yet.
         state.confirmed = max(state.confirmed, min(way, 0.5 * settings.start.longest))
     if start.agreed >= settings.doubling:
-        # The area between what the gain says and the answer: the time constant of a lag.
-        start.lag = min(max(start.total / answer, 0.0), longest)
+        # The area between what the gain says and the answer: about the time constant of a lag. Nobody is
+        # warned of it, for the gain may be off.
+        start.lag, state.pace.late = min(max(start.total / answer, 0.0), longest), 1.0
         start.given = start.doubted = 0.0
     elif start.doubted > 2.0 * longest:
         start.given = start.doubted = 0.0

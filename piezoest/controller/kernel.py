@@ -11,13 +11,14 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest.compile import Record, Vector, compiled
-from piezoest.controller import candidate, homing
+from piezoest.controller import candidate, homing, redraw
 from piezoest.controller import line as lines
+from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
 from piezoest.controller.learning import begin_homing, take
-from piezoest.controller.voltage import plan
+from piezoest.controller.voltage import RUN, plan
 from piezoest.layout import AMOUNT, COUNT, FIXED, MEASURED, NUMBER, record, whole
 from piezoest.layout import Record as Layout
 
@@ -43,19 +44,22 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         unit=NUMBER, zero=MEASURED,
         # Half the swing that they began with; zero before [V].
         scale=AMOUNT,
-        # Correction of the reference by feedback [µm].
-        feedback=NUMBER,
+        # Correction of the reference by feedback [µm], and that of the voltage planned.
+        feedback=NUMBER, back=NUMBER,
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
-        noticed=COUNT, notice=whole(0.0, 8.0), shaken=COUNT,
-        # What the line misses, what it missed when it drove, what the stage misses of the reference.
-        score=candidate.SCORE, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
+        noticed=COUNT, notice=whole(0.0, 10.0), shaken=COUNT,
+        # What the line misses, the most of late, what it missed of a swing when it drove; what the stage
+        # misses of the reference.
+        score=candidate.SCORE, widest=AMOUNT, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
         travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,
-        start=starts.START, homing=homing.HOMING, candidates=candidates,
+        start=starts.START, homing=homing.HOMING, pace=paces.PACE, candidates=candidates,
     )  # fmt: skip
     settings = record(
         minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED, feedback=FIXED,
+        # Samples of the shortest period that is far from the resonance, zero where nobody knows it.
+        shortest=FIXED,
         start=starts.SETTINGS, candidates=candidate_settings,
     )  # fmt: skip
     return state, settings
@@ -76,6 +80,7 @@ def learn(state: Record, settings: Record, u: float, x: float) -> None:
 @compiled
 def run(state: Record, settings: Record, r: Vector, u: Vector) -> None:
     """Voltages `u` for a reference `r`, were each written as planned; for a copy of the state."""
+    state.start.ahead = 1.0
     for k in range(len(r)):
         u[k] = plan(state, settings, r[k])
         take(state, settings, r[k], u[k], np.nan)
@@ -87,6 +92,8 @@ def learn_all(state: Record, settings: Record, r: Vector, u: Vector, x: Vector) 
     state.block = max(0.9 * state.block, len(r) - 1.0)
     for k in range(len(r)):
         take(state, settings, r[k], u[k], x[k])
+    if state.stage == RUN and len(r) > 1:
+        redraw.go_on(state, settings)
 
 
 @register_jitable
@@ -107,6 +114,7 @@ def begin_at(state: Record, settings: Record, u: float, x: float) -> None:
     """Begin with a state of zeros, at rest at a voltage where the sensor reads x."""
     _begin(state, settings, u)
     starts.rest_at(state.start, settings.start, u, x, settings.start.gain)
+    state.start.told = 1.0
 
 
 @compiled

@@ -10,6 +10,7 @@ from numba.extending import register_jitable
 from piezoest._checks import WILDEST
 from piezoest.controller import candidate, doubt, driving, feedback, given, homing, redraw, slots
 from piezoest.controller import line as lines
+from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
@@ -20,6 +21,8 @@ HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 2.0
 # The way to the reference is over within this fraction of its length, or after so many times what a doubling
 # takes: a fast reference is never caught.
 NEAR, LONGEST = 0.05, 50.0
+# The gain on the way is that of readings whose mean has gone this fraction of it.
+LEAST_WAY = 0.4
 # The voltage may rest at a limit for this travel of the reference, in swings, before all begins anew; where
 # the stage stands beyond the reference there, the line follows sooner.
 RESTED, BEYOND = 4.0, 0.1
@@ -30,10 +33,12 @@ WIDE, USUAL = 0.12, 0.4
 # way of the start, or after the second leg. Their unit is no smaller than this fraction of that way.
 PASSED, LARGE, SMALLEST = 0.7, 4.0, 0.25
 # Readings of a moved zero have at least this slope relative to the line's; they are near the reference by
-# so many swings if it has moved, too.
-LEAST_SLOPE, NEAR_IT = 0.2, 0.6
+# so many swings if it has moved, too, or nearer than the line by this factor.
+LEAST_SLOPE, NEAR_IT, NEARER = 0.2, 0.6, 0.5
 # The voltage stands still for this travel of the reference, in swings: it is frozen.
 FROZEN = 0.4
+# What the line misses most is remembered over turns, near which it misses least: this fraction at each.
+REMEMBERED = 0.7
 # No miss counts for more than so many swings.
 FARTHEST = 3.0
 
@@ -45,8 +50,8 @@ def _begin_learning(state: Any, settings: Any) -> None:
     if state.unit == 0.0:
         state.unit = start.gain
         state.zero = start.now - start.gain * start.voltage
-    lines.begin(state.line, start.gain, start.voltage, start.now)
     least = np.abs(start.target - start.from_u)
+    lines.begin(state.line, start.gain, start.voltage, start.now, least)
     travels.begin(state.reference, state.r, least * np.abs(start.gain))
     travels.begin(state.travel, start.voltage, least)
     state.stage = APPROACH
@@ -106,16 +111,19 @@ def _follow_zero(state: Any) -> None:
     jump = recent.mean_x - lines.at(line, recent.mean_u)
     slope = lines.slope(recent) / line.gain
     plain = 0.5 < slope < 2.0 and lines.explained(recent) > lines.EXPLAINED
-    sure = line.agreed >= reading.TRUSTED
+    sure = reading.is_sure(readings)
     known = readings.fault == reading.NONE or readings.fault == reading.MOVED
     if not plain and (sure or not known or slope < LEAST_SLOPE):
         return
-    near = np.abs(readings.last - state.r) < NEAR_IT * np.abs(line.gain) * state.travel.swing
+    miss = np.abs(readings.last - state.r)
+    near = miss < NEAR_IT * np.abs(line.gain) * state.travel.swing
+    # A reference that the line cannot reach, but the readings do, has moved with them.
+    near = near or miss < NEARER * np.abs(lines.at(line, state.u) - state.r)
     if sure and not near and readings.off < reading.HELD_FOR:
-        if known:
+        if known and readings.off > reading.MOVED_FOR:
             readings.fault = reading.MOVED
         return
-    if plain:
+    if plain and sure:
         state.zero += jump
         reading.notice(state, reading.MOVED)
     lines.forget(line.now)
@@ -133,7 +141,9 @@ def _follow_zero(state: Any) -> None:
 def _watch_voltage(state: Any, settings: Any, gone: Any, moved: Any) -> None:
     """An amplifier that does not move its voltage with the reference answers nothing."""
     within = settings.minimum < state.u < settings.maximum
-    state.frozen = state.frozen + moved if gone == 0.0 and within else 0.0
+    # The rest of a block that was planned before the reference was reached stands still by right.
+    planned = state.travel.turns > 0.0 or state.travel.count > state.block
+    state.frozen = state.frozen + moved if gone == 0.0 and within and planned else 0.0
     if state.frozen > FROZEN * state.reference.swing and state.readings.fault == reading.NONE:
         state.readings.fault, state.readings.good = reading.NO_RESPONSE, 0.0
 
@@ -149,15 +159,18 @@ def _name_silence(state: Any) -> None:
 
 
 @register_jitable
-def _score(state: Any, settings: Any, u: Any, x: Any, z: Any) -> None:
+def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
     """Take a believed reading into the line's points and all scores."""
-    swings = travels.progress(state.travel, state.gone)
+    u, swings = state.u, travels.progress(state.travel, state.gone)
     state.gone = 0.0
     state.since += swings
-    lines.add(state.line.now, u, x, 1e9)
+    if redraw.is_young(state) or not travels.rests(state.reference, moved):
+        lines.add(state.line.now, u, x, 1e9)
     bound = FARTHEST * state.travel.swing
     miss = z - driving.line_z(state) - state.owed
     candidate.judge(state.score, min(max(miss, -bound), bound), swings)
+    kept = REMEMBERED if state.travel.turned_now != 0.0 else 1.0
+    state.widest = max(state.score.peak, kept * state.widest)
     if state.scale > 0.0:
         slots.judge(state.candidates, z, swings, bound)
     if settings.minimum < u < settings.maximum:
@@ -171,18 +184,21 @@ def _score(state: Any, settings: Any, u: Any, x: Any, z: Any) -> None:
 def _leave_limit(state: Any, settings: Any, moved: Any) -> None:
     """Where the voltage rests at a limit for long, all that is known may be wrong: begin anew."""
     rests = state.u <= settings.minimum or state.u >= settings.maximum
-    state.railed = state.railed + moved if rests and state.readings.fault == reading.NONE else 0.0
+    # Beside a line that was learnt from wrong readings, right ones look scaled or moved.
+    fault = state.readings.fault
+    doubted = fault == reading.NONE or fault == reading.SCALED or fault == reading.MOVED
+    state.railed = state.railed + moved if rests and doubted else 0.0
     if state.railed > RESTED * state.reference.swing:
         state.stage, state.driving, state.feedback = SEEK, 0.0, 0.0
         starts.begin_again(state.start, settings.start, state.u)
 
 
 @register_jitable
-def _learn_from(state: Any, settings: Any, x: Any) -> None:
+def _learn_from(state: Any, settings: Any, x: Any, moved: Any) -> None:
     """Take a reading, NaN where it cannot be believed, after the voltage has been followed."""
     z = (x - state.zero) / state.unit
     if np.isfinite(x):
-        _score(state, settings, state.u, x, z)
+        _score(state, settings, x, z, moved)
     if state.scale > 0.0:
         slots.learn(state.candidates, settings.candidates, state.u, z)
 
@@ -196,10 +212,8 @@ def _begin_swings(state: Any, r: Any, u: Any, least: Any) -> None:
 
 
 @register_jitable
-def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any) -> float:
-    """Take a reading on the way to the reference; nobody doubts it yet, but for single ones."""
-    if not np.abs(x) < WILDEST:
-        return np.nan
+def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
+    """Draw the line anew by a reading on the way to the reference; single ones are doubted."""
     start, line, recent = state.start, state.line, state.readings.recent
     x = reading.middle(state.readings, x)
     lines.add(recent, u, x, settings.doubling)
@@ -209,34 +223,58 @@ def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any) -> float:
     elif way >= state.confirmed and way > 0.0:
         # Only on new ground: on the way back hysteresis would pass for gain.
         state.confirmed = way
-        gain = (recent.mean_x - start.zero) / (recent.mean_u - start.origin)
-        line.gain = gain if gain * line.gain > 0.0 else line.gain
-    if state.stage == SEEK:
-        return np.nan
-    line.centre = recent.mean_x - line.gain * recent.mean_u
+        gone = recent.mean_u - start.origin
+        # Where the way has led through its beginning, the mean has hardly gone anywhere.
+        if np.abs(gone) > LEAST_WAY * way:
+            gain = (recent.mean_x - start.zero) / gone
+            line.gain = gain if gain * line.gain > 0.0 else line.gain
+    if state.stage != SEEK:
+        line.centre = recent.mean_x - line.gain * recent.mean_u
+    return x
+
+
+@register_jitable
+def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any) -> None:
+    """The run begins where the voltage has come to the reference, or has tried for long."""
+    start, line = state.start, state.line
+    if gone == 0.0:
+        # The rest of a block that was planned before the way began.
+        return
     start.samples += 1.0
     target = lines.voltage(line, r)
-    missing = np.abs(target - u)
-    there = missing <= NEAR * np.abs(u - start.origin) or is_held(settings, u, target - u)
+    there = np.abs(target - u) <= NEAR * np.abs(u - start.origin) or is_held(settings, u, target - u)
     longest = LONGEST * max(settings.doubling, start.lag)
-    if (there or start.samples > longest) and start.given == 0.0:
+    if there or start.samples > longest:
+        least = np.abs(start.target - start.from_u)
         state.stage = RUN
-        lines.begin(line, line.gain, recent.mean_u, recent.mean_x)
+        lines.begin(line, line.gain, u, lines.at(line, u), least)
         # What is left of the way is paid on the run.
         state.owed = (r - lines.at(line, u)) / state.unit
-        _begin_swings(state, r, u, np.abs(start.target - start.from_u))
-    # Nobody learns in the unit of a gain that may be wrong.
-    return x if start.given == 0.0 else np.nan
+        _begin_swings(state, r, u, least)
+
+
+@register_jitable
+def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any, gone: Any) -> float:
+    """Take a reading on the way to the reference; nobody learns in the unit of a gain that may be wrong."""
+    known = np.abs(x) < WILDEST
+    if known:
+        x = _refine(state, settings, u, x)
+    if state.stage == SEEK or state.start.given != 0.0 or not (known or state.start.ahead != 0.0):
+        return np.nan
+    _arrive(state, settings, r, u, gone)
+    return x if known else np.nan
 
 
 @register_jitable
 def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -> float:
     """The reading where it can be believed, NaN where not; what is wrong is noted, and the line drives."""
     before = state.readings.fault
-    raw = x
+    raw, wanted, line = x, gone, state.line
     if not settings.minimum < u < settings.maximum:
-        state.line.clipped = 1.0
-    x = reading.believed(state.readings, state.line, state.travel, redraw.memory(state, settings), u, x, gone)
+        line.clipped = 1.0
+        wanted = moved / np.abs(line.gain)
+    memory = redraw.memory(state, settings)
+    x = reading.believed(state.readings, line, state.travel, memory, u, x, gone, wanted)
     _follow_zero(state)
     _watch_voltage(state, settings, gone, moved)
     if state.readings.fault != before:
@@ -245,7 +283,7 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
             driving.drive(state, 0.0)
             redraw.hold(state)
     # At a limit with the stage beyond the reference what is known is wrong.
-    beyond = is_held(settings, u, (raw - state.r) * state.line.gain)
+    beyond = is_held(settings, u, (raw - state.r) * line.gain)
     _leave_limit(state, settings, moved)
     far = (beyond and state.railed > BEYOND * state.reference.swing) or redraw.is_young(state)
     if far and state.readings.fault == reading.NONE:
@@ -306,11 +344,13 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     state.r = r if np.abs(r) < WILDEST else state.r
     r = state.r
     if state.stage == SEEK:
+        paces.follow(state.pace, state.start, u, x)
         starts.learn(state.start, settings.start, u, x)
         if state.scale > 0.0:
             slots.advance(state.candidates, settings.candidates, u)
         _name_silence(state)
         if state.start.stage == starts.DONE:
+            paces.conclude(state.pace, state.start, u)
             _begin_learning(state, settings)
         return
     if state.stage == HOME:
@@ -328,12 +368,14 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     else:
         _size_up(state, settings, u)
     if state.stage == APPROACH:
-        x = _approach(state, settings, r, u, x)
+        x = _approach(state, settings, r, u, x, gone)
     else:
         x = _believe(state, settings, u, x, gone, moved)
         if state.stage == RUN and np.isfinite(x):
             feedback.follow(state, settings, x)
-    _learn_from(state, settings, x)
+        if state.reference.turned_now != 0.0:
+            paces.watch(state, settings)
+    _learn_from(state, settings, x, moved)
     if state.stage == RUN and state.readings.fault == reading.NONE and _is_due(state, gone):
         state.handed = 0.0
         _hand_over(state, settings)

@@ -42,11 +42,12 @@ ALIKE = 1.6
 
 
 @register_jitable
-def begin(line: Any, gain: Any, u: Any, x: Any) -> None:
-    """Begin with a gain and a line through one point."""
+def begin(line: Any, gain: Any, u: Any, x: Any, leg: Any) -> None:
+    """Begin with a gain and a line through one point; legs shorter than half of `leg` are not looked at."""
     line.gain = line.last_gain = line.held_gain = line.first_gain = gain
     line.centre = line.last_centre = line.held_centre = x - gain * u
-    line.agreed = line.legs = line.looked = line.before.count = 0.0
+    line.agreed = line.legs = line.before.count = 0.0
+    line.looked = 0.25 * leg
     forget(line.now)
 
 

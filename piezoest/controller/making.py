@@ -7,7 +7,7 @@ from typing import Any
 
 from piezoest._checks import WILDEST, finite, fraction, instance, integer, moderate, non_negative, positive
 from piezoest.compensators.limits import VoltageLimits
-from piezoest.controller import candidate, homing, kernel, slots
+from piezoest.controller import candidate, homing, kernel, pace, slots
 from piezoest.controller.feedback import FASTEST
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import Field, Record, new
@@ -76,7 +76,7 @@ def _gain(name: str, value: Any) -> float:
     return number
 
 
-def options(sample_rate: float, corridor: Any, gain: Any, feedback: Any) -> dict[str, float]:
+def options(sample_rate: float, corridor: Any, gain: Any, feedback: Any, resonance: Any) -> dict[str, Any]:
     """Return what users choose beside limits and estimators, checked.
 
     Raises
@@ -94,6 +94,7 @@ def options(sample_rate: float, corridor: Any, gain: Any, feedback: Any) -> dict
         "corridor": fraction("corridor", corridor),
         "gain": finite("gain", gain) and _gain("gain", gain),
         "feedback": feedback,
+        "resonance": None if resonance is None else moderate("resonance", resonance),
     }
 
 
@@ -147,7 +148,7 @@ def measured(name: str, value: Any) -> float:
     return fraction(name, value, -0.5 * WILDEST, 0.5 * WILDEST)
 
 
-def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, float]) -> dict[str, Any]:
+def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, Any]) -> dict[str, Any]:
     """Settings of the kernel but for the candidates."""
     width = limits.maximum - limits.minimum
     return {
@@ -157,9 +158,11 @@ def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, f
         "doubling": max(5.0, 4e-3 * sample_rate),
         "corridor": options["corridor"],
         "feedback": options["feedback"] / sample_rate,
+        "shortest": sample_rate / (pace.FAST * options["resonance"]) if options["resonance"] else 0.0,
         "start": {
             "gain": options["gain"],
-            "way": 0.005 * width,
+            # Where the gain is known, the first way only has to show that.
+            "way": (0.005 if options["gain"] else 0.02) * width,
             "longest": 0.1 * width,
             "ramp": max(4.0, 7e-3 * sample_rate),
             "window": max(3.0, 2.5e-3 * sample_rate),
@@ -172,7 +175,7 @@ def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, f
 def room(
     sample_rate: float,
     limits: VoltageLimits,
-    options: dict[str, float],
+    options: dict[str, Any],
     estimators: tuple[CompiledEstimator, ...],
 ) -> tuple[tuple[Record, Record], tuple[Any, Any]]:
     """Layouts of state and settings, and both as they are before the start."""

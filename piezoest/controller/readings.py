@@ -14,8 +14,7 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.controller import line as lines
-from piezoest.controller import travel as travels
-from piezoest.layout import AMOUNT, COUNT, MEASURED, record, whole
+from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, record, whole
 
 # Faults: none; no response; response the wrong way round; far too large or too small; the reading stops at a
 # level; the reading's zero has moved.
@@ -23,6 +22,8 @@ NONE, NO_RESPONSE, REVERSED, SCALED, SATURATED, MOVED = (float(i) for i in range
 # What is noted beside: the stage answers otherwise than the user's gain says; a write may have been lost;
 # models shake the stage.
 OTHER_GAIN, UNKNOWN, SHAKEN = 6.0, 7.0, 8.0
+# The reference is near the resonance; so fast that lag passes for hysteresis.
+FAST, LATE = 9.0, 10.0
 FAULTS = (
     "",
     "no response",
@@ -33,6 +34,8 @@ FAULTS = (
     "gain",
     "unknown voltage",
     "shaken",
+    "resonance",
+    "lag",
 )
 
 READINGS = record(
@@ -41,6 +44,8 @@ READINGS = record(
     before=MEASURED, last=MEASURED, count=COUNT, still=AMOUNT,
     # Mean square of the noise [µm²].
     noise=AMOUNT,
+    # The widest swing of the voltage of late, the most legs of late that had agreed with the line.
+    swing=DISTANCE, sure=AMOUNT,
     # Smallest change of the reading: the step of its converter.
     step=AMOUNT,
     # Spikes in a row, all of them; travel in swings that spoke for each fault, and that spoke for none.
@@ -52,14 +57,25 @@ READINGS = record(
 
 # The recent points, in legs; legs that must have agreed with the line before a fault is named.
 RECENT, TRUSTED = 0.3, 3.0
-# Slopes, relative to the line's, of no response, of the wrong way round, and of too much; and of a good one.
-WEAK, WRONG, LARGE, GOOD = 0.12, -0.3, 3.0, 0.4
+# Slopes, relative to the line's, of no response, of the wrong way round, and of too much, even for a line
+# that is not sure; and of a good one.
+WEAK, WRONG, LARGE, HUGE, GOOD = 0.12, -0.3, 3.0, 30.0, 0.4
+# Points of which a line explains this share show a slope; the sign of one.
+STRAIGHT, SIGNED = 0.7, 0.4
 # Widest backlash, in swings.
 BACKLASH = 0.35
+# Of the widest swing this fraction counts after another turn: in the minor loops of a walk or of steps the
+# stage is as far from the line as in the wide one around them. So does trust, of which so many legs are
+# enough: readings that lie do not agree with the line either.
+KEPT, ENOUGH = 0.9, 6.0
+# No sample speaks for more than this, in swings, nor for a reading that stands still: it may be late by some
+# samples, or ring.
+MOST, MOST_STILL = 0.03, 0.01
 # For so many swings.
 WEAK_FOR, WRONG_FOR, LARGE_FOR, STOPPED_FOR, OFF_FOR = 0.35, 0.15, 0.15, 0.04, 0.3
-# A zero that has moved is followed after so many swings, if the reference has not moved with it.
-HELD_FOR = 24.0
+# A zero that has moved has its name after so many swings, for what is late comes back after a turn; it is
+# followed after so many, if the reference has not moved with it.
+MOVED_FOR, HELD_FOR = 0.5, 24.0
 # For so many swings of a line that has not held.
 SILENT_FOR = 2.0
 # A reading that is the same to the last bit is believed for this travel, in swings.
@@ -68,8 +84,9 @@ STANDS_STILL = 5e-3
 DOUBT = 0.1
 # A fault is over after so many good swings; one of range after more.
 OVER, OVER_STOPPED = 0.6, 1.6
-# Farthest from the line that a reading can be, in swings; spikes in a row that are spikes.
-FAR, IN_A_ROW = 1.0, 5.0
+# Farthest from the line that a reading can be, in swings of the last legs, and in the widest of late: half a
+# loop and what a minor loop's slope adds; spikes in a row that are spikes.
+FAR, FAR_WITHIN, IN_A_ROW = 1.0, 0.4, 5.0
 
 
 @register_jitable
@@ -91,10 +108,20 @@ def _follow(readings: Any, x: Any, gone: Any) -> float:
     change = np.abs(x - readings.last)
     if change > 0.0:
         readings.step = min(readings.step, change) if readings.step > 0.0 else change
-    readings.still = readings.still + gone if x == readings.last else 0.0
+    readings.still = readings.still + min(gone, MOST_STILL * readings.swing) if x == readings.last else 0.0
     middle = median(x, readings.last, readings.before)
     readings.before, readings.last = readings.last, x
     return middle
+
+
+@register_jitable
+def _size_up(readings: Any, line: Any, travel: Any) -> None:
+    """The widest swing and the surest line of late."""
+    if travel.turns == 0.0:
+        readings.swing = readings.sure = 0.0
+    kept = KEPT if travel.turned_now != 0.0 else 1.0
+    readings.swing = max(travel.swing, kept * readings.swing)
+    readings.sure = max(min(line.agreed, ENOUGH), kept * readings.sure)
 
 
 @register_jitable
@@ -104,30 +131,45 @@ def _stands_still(readings: Any, line: Any, travel: Any, fraction: Any, steps: A
     Just after a turn it may: a stage with backlash rests there.
     """
     gain = np.abs(line.gain)
-    onward = np.abs(travel.last - travel.turned) > BACKLASH * travel.swing
-    return onward and gain * readings.still > max(fraction * gain * travel.swing, steps * readings.step)
+    onward = np.abs(travel.last - travel.turned) > BACKLASH * readings.swing
+    return onward and gain * readings.still > max(fraction * gain * readings.swing, steps * readings.step)
+
+
+@register_jitable
+def is_sure(readings: Any) -> bool:
+    """Whether enough legs have agreed with the line to doubt readings that do not."""
+    return readings.sure >= TRUSTED
 
 
 @register_jitable
 def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> None:
     """Count the travel that speaks for each fault."""
     recent = readings.recent
-    clear = np.abs(line.gain) * travel.swing > 30.0 * np.sqrt(readings.noise)
-    known = clear and recent.square > (0.05 * travel.swing) ** 2
-    trusted = line.agreed >= TRUSTED and known
+    sure = is_sure(readings)
+    moved = recent.square > (0.05 * readings.swing) ** 2
+    clear = np.abs(line.gain) * readings.swing > 30.0 * np.sqrt(readings.noise)
+    known = clear and moved
     answer = np.sqrt(recent.square_x / recent.square) / np.abs(line.gain) if recent.square > 0.0 else 0.0
-    slope = lines.slope(recent) / line.gain
-    straight = lines.explained(recent) > 0.7
-    stopped = line.agreed >= TRUSTED and clear and _stands_still(readings, line, travel, STOPPED_FOR, 4.0)
-    # Of a line that has not held yet silence takes longer to be believed.
-    share = 1.0 if trusted else WEAK_FOR / SILENT_FOR
-    readings.weak = readings.weak + share * swings if known and answer < WEAK else 0.0
-    readings.wrong = readings.wrong + swings if trusted and straight and slope < WRONG else 0.0
-    readings.large = readings.large + swings if trusted and (straight or off) and answer > LARGE else 0.0
+    slope, explained = lines.slope(recent) / line.gain, lines.explained(recent)
+    stopped = sure and clear and _stands_still(readings, line, travel, STOPPED_FOR, 4.0)
+    straight = explained > STRAIGHT
+    # Of a line that has not held yet silence takes longer to be believed; readings that follow the voltage
+    # may be right, and the line wrong.
+    share = 1.0 if sure else WEAK_FOR / SILENT_FOR
+    weakest = WEAK if sure or not straight else (1.0 / HUGE if line.legs >= TRUSTED else 0.0)
+    if known:
+        readings.weak = readings.weak + share * swings if answer < weakest else 0.0
+    wrong = sure and known and explained > SIGNED and slope < WRONG
+    readings.wrong = readings.wrong + swings if wrong else 0.0
+    # What is far too large passes for noise.
+    plain = straight or (sure and clear and off)
+    large = (answer > LARGE if sure else slope > HUGE and line.legs >= TRUSTED) and moved and plain
+    readings.large = readings.large + swings if large else 0.0
     readings.stopped = 1.0 if stopped else 0.0
-    readings.off = readings.off + swings if off else 0.0
-    good = known and GOOD < slope < 1.0 / GOOD and not stopped and not off
-    readings.good = readings.good + swings if good else (readings.good if slope > GOOD else 0.0)
+    lowest = GOOD if sure else WEAK
+    highest = 1.0 / GOOD if sure else HUGE
+    good = known and lowest < slope < highest and not stopped and not (off and sure)
+    readings.good = readings.good + swings if good else (readings.good if slope > lowest else 0.0)
 
 
 @register_jitable
@@ -140,7 +182,8 @@ def _name(readings: Any) -> float:
     if readings.weak > WEAK_FOR:
         if readings.fault == SCALED or readings.fault == NO_RESPONSE:
             return readings.fault
-        follows = lines.explained(readings.recent) > 0.8 and readings.still == 0.0
+        stands = readings.still > STOPPED_FOR * readings.swing
+        follows = lines.explained(readings.recent) > STRAIGHT and not stands
         return SCALED if follows else NO_RESPONSE
     if readings.stopped != 0.0:
         return SATURATED if readings.fault == NONE else readings.fault
@@ -170,24 +213,31 @@ def middle(readings: Any, x: Any) -> float:
 
 
 @register_jitable
-def believed(readings: Any, line: Any, travel: Any, memory: Any, u: Any, x: Any, gone: Any) -> float:
+def believed(
+    readings: Any, line: Any, travel: Any, memory: Any, u: Any, x: Any, gone: Any, wanted: Any
+) -> float:
     """The reading where it can be believed, NaN where not; `gone` is the voltage's travel since the last.
 
-    `memory` is about how many samples a leg takes.
+    `memory` is about how many samples a leg takes. Where the voltage is at a limit `wanted` is the travel
+    that the reference wants.
     """
     if not np.abs(x) < WILDEST:
         return np.nan
+    _size_up(readings, line, travel)
     middle = _follow(readings, x, gone)
-    swings = travels.in_swings(travel, gone)
+    unit = readings.swing if readings.swing > 0.0 else np.inf
+    swings = min(gone / unit, MOST)
     lines.add(readings.recent, u, middle, max(RECENT * memory, 16.0))
     noise = np.sqrt(readings.noise)
-    bound = FAR * np.abs(line.gain) * travel.swing + 8.0 * noise
+    farthest = max(FAR * travel.swing, FAR_WITHIN * readings.swing)
+    bound = np.abs(line.gain) * farthest + 8.0 * noise
     far = np.abs(x - lines.at(line, u)) > bound
     readings.spikes = readings.spikes + 1.0 if far else 0.0
     off = readings.spikes > IN_A_ROW
     if readings.spikes == IN_A_ROW + 1.0:
         # A jump is no slope.
         lines.forget(readings.recent)
+    readings.off = readings.off + min(wanted / unit, MOST) if off else 0.0
     before = readings.fault
     _evidence(readings, line, travel, off, swings)
     readings.fault = _name(readings)
@@ -196,6 +246,5 @@ def believed(readings: Any, line: Any, travel: Any, memory: Any, u: Any, x: Any,
     if far:
         readings.outliers += 1.0
     still = _stands_still(readings, line, travel, STANDS_STILL, 1.5)
-    confirmed = line.agreed >= TRUSTED
     doubtful = readings.fault != NONE or readings.weak > DOUBT or readings.wrong > 0.0
-    return np.nan if doubtful or still or (far and (confirmed or not off)) else x
+    return np.nan if doubtful or still or (far and (is_sure(readings) or not off)) else x

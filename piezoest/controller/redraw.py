@@ -47,14 +47,20 @@ def memory(state: Any, settings: Any) -> float:
 
 
 @register_jitable
-def pay(state: Any, settings: Any, moved: Any) -> None:
-    """Pay what is owed, after a travel of the reference and a sample."""
-    kept = driving.kept(state.reference, moved, state.reference.swing)
-    kept *= 1.0 - PAID_IN_TIME / settings.doubling
+def kept(state: Any, settings: Any, moved: Any, swing: Any) -> float:
+    """The fraction of what is owed that is left after a travel of the reference and a sample."""
+    left = driving.kept(state.reference, moved, swing) * (1.0 - PAID_IN_TIME / settings.doubling)
     if is_young(state) or state.railed > 0.0:
-        kept = max(kept, 1.0 - 1.0 / _slow(state, settings))
-    state.owed *= kept
-    slots.pay(state.candidates, kept)
+        left = max(left, 1.0 - 1.0 / _slow(state, settings))
+    return left
+
+
+@register_jitable
+def pay(state: Any, settings: Any, moved: Any) -> None:
+    """Pay what is owed."""
+    left = kept(state, settings, moved, state.reference.swing)
+    state.owed *= left
+    slots.pay(state.candidates, left)
 
 
 @register_jitable
@@ -83,3 +89,15 @@ def hold(state: Any) -> None:
     before = driving.line_z(state)
     lines.hold(state.line)
     state.owed += before - driving.line_z(state)
+
+
+@register_jitable
+def go_on(state: Any, settings: Any) -> None:
+    """After a block: whatever it has changed is owed, so that the voltage goes on from where it is."""
+    if not settings.minimum < state.u < settings.maximum:
+        return
+    z = (state.r + state.feedback - state.zero) / state.unit
+    if state.driving > 0.0:
+        slots.owe(state.candidates, state.driving, z)
+    else:
+        state.owed = z - driving.line_z(state)

@@ -18,8 +18,8 @@ from piezoest.supervisor import Event
 
 FORMAT = 1
 _FIELDS = (
-    "controller", "format", "sample_rate", "limits", "corridor", "gain", "feedback", "estimators", "state",
-    "models", "planned", "events",
+    "controller", "format", "sample_rate", "limits", "corridor", "gain", "feedback", "resonance",
+    "estimators", "state", "models", "planned", "events",
 )  # fmt: skip
 
 

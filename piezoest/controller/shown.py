@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from piezoest.controller import candidate, slots
-from piezoest.controller.readings import FAULTS
+from piezoest.controller.pace import WAVE
+from piezoest.controller.readings import FAST, FAULTS, LATE
 from piezoest.equations import loop_inverse, play_inverse
 from piezoest.layout import Named
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
@@ -27,7 +28,14 @@ MEANINGS = {
     "unknown voltage": "nobody knows what was written, and the line drives until the models have shown again",
     "shaken": "models made it worse than the line, as where a resonance is shaken: a slower or smoother "
     "reference helps",
+    "resonance": "the reference, at {frequency:.3g} Hz, is above 5 % of the resonance, where the stage's "
+    "dynamics count as much as hysteresis: slow it down, smooth it, or put a LeadFilter before it",
+    "lag": "the readings are about {lag:.2g} ms late, which at {frequency:.3g} Hz looks like a loop of "
+    "{width:.2g} % of the swing: what is learnt holds at this frequency alone; slow the reference down, or "
+    "read sooner",
 }
+# Of what is noted beside faults, that which the user is to change.
+WARNINGS = (FAST, LATE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +131,17 @@ def event(state: Any, sample_rate: float) -> Event:
         return Event(time, "resumed", "the readings follow the voltage again")
     action = "fell back" if number == state["readings"]["fault"] else "went on"
     start = {each: float(state["start"][each]) + 0.0 for each in ("gain", "gain_before")}
-    return Event(time, action, f"{name}: {MEANINGS[name].format_map(start)}")
+    return Event(time, action, f"{name}: {MEANINGS[name].format_map(start | _pace(state, sample_rate))}")
+
+
+def _pace(state: Any, sample_rate: float) -> dict[str, float]:
+    """Frequency of the reference [Hz]; how late the readings are [ms], and how wide a loop that makes [%]."""
+    period, lag = max(float(state["pace"]["period"]), 1.0), float(state["start"]["lag"])
+    return {
+        "frequency": sample_rate / period,
+        "lag": 1e3 * lag / sample_rate,
+        "width": 100.0 * WAVE * lag / period,
+    }
 
 
 def misses(state: Any) -> list[float | None]:

@@ -1,10 +1,10 @@
-"""Finding out what the stage does, from nothing: the voltage goes a small way, and a longer one.
+"""Finding out what the stage does, from nothing: the voltage goes a small way.
 
 At rest the first readings say where the stage stands; one wrong one among them does not count. Then the
-voltage goes half a per cent of its range and rests until the reading has come to rest too. An answer that
-drowns in noise or in steps of the converter doubles the way; one that is clear is checked by a way four times
-as long. The gain is what lies between two rests, where neither delay nor lag counts, if both ways were
-answered alike; else, as with backlash, the way is doubled. A gain that the user knows is not sought.
+voltage goes two per cent of its range and rests until the reading has come to rest too. The gain is what lies
+between two rests, where neither delay nor lag counts. An answer that drowns in noise or in steps of the
+converter doubles the way; one that is clear, but not sure, is checked by a way twice as long: both must
+have been answered alike, else, as with backlash, the way is doubled. A gain that a user knows is not sought.
 """
 
 from __future__ import annotations
@@ -32,13 +32,14 @@ START = record(
     # last two readings and the smallest change of one: the step of its converter.
     sum=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT, mean=MEASURED, now=MEASURED, windows=COUNT,
     before=MEASURED, last=MEASURED, step=AMOUNT,
-    # Sum of the windows' answers, or of what an answer lacks of the user's gain; how late the stage answers
-    # [samples].
+    # Sum of what an answer lacks of the user's gain; how late the stage answers [samples].
     total=NUMBER, lag=AMOUNT,
     # Gain of the last way [µm/V], of the one before; ways for nothing; samples without the voltage.
     gain=NUMBER, gain_before=NUMBER, tries=AMOUNT, stuck=COUNT, first=numbers(FIRST, kind=MEASURED),
     # Whether the gain is the user's, and not confirmed yet; readings in a row that spoke for it, all against.
     given=FLAG, agreed=COUNT, doubted=COUNT,
+    # Whether the voltage is planned before there are readings; whether where it stands was said, not read.
+    ahead=FLAG, told=FLAG,
 )  # fmt: skip
 # First and longest way [V], samples of a way, of a window; the limits; the user's gain, zero for none.
 SETTINGS = record(
@@ -48,14 +49,17 @@ SETTINGS = record(
 # An answer is clear above so many times the noise at rest, the scatter within a window, and the step of the
 # converter; two are alike within this factor.
 CLEAR, SCATTERS, STEPS, ALIKE = 6.0, 3.0, 10.0, 1.6
+# An answer so many times as clear is sure by itself, if it came to rest within so many windows, for hum rests
+# only for a moment, and the last two are this close to it, for a slow amplifier is still on its way.
+SURE, AT_ONCE, CLOSE = 3.0, 3.0, 0.02
 # The voltage written follows the one planned within this fraction of a way.
 FOLLOWS = 0.125
 # Without that, or without readings, the start is given up after so many windows.
 STUCK = 240.0
-# The way that checks an answer is so many times as long.
-CHECK = 4.0
+# The way that checks an answer is so many times as long: what slews is later on it.
+CHECK = 2.0
 # At rest the means of two windows differ by less than this fraction of the answer; so many are enough.
-STILL, MOST_WINDOWS = 0.08, 30.0
+STILL, MOST_WINDOWS = 0.04, 30.0
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
 
@@ -132,7 +136,7 @@ def _move(start: Any, settings: Any) -> None:
     start.voltage = smooth(start.from_u, start.target, share)
     if share >= 1.0:
         start.stage, start.voltage = WAIT, start.target
-        start.sum = start.squares = start.summed = start.windows = start.total = 0.0
+        start.sum = start.squares = start.summed = start.windows = 0.0
 
 
 @register_jitable
@@ -147,7 +151,6 @@ def _has_come_to_rest(start: Any, settings: Any, x: Any) -> bool:
     start.now = 0.5 * (before + start.mean)
     start.scatter = np.sqrt(max(0.0, start.squares / start.summed - (start.mean - start.from_x) ** 2))
     start.windows += 1.0
-    start.total += start.mean - start.from_x
     start.sum = start.squares = start.summed = 0.0
     # What rings or is noise differs by chance.
     chance = 3.0 * start.scatter * np.sqrt(2.0 / settings.window) + 0.5 * start.noise
@@ -160,16 +163,11 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     """What the way has shown: done if two were answered alike, else another, twice as long."""
     answer = start.now - start.from_x
     start.gain_before, start.gain = start.gain, answer / (u - start.from_u) if u != start.from_u else 0.0
-    clear = (
-        u != start.from_u
-        and np.abs(answer) > max(CLEAR * start.noise, STEPS * start.step)
-        and np.abs(answer) > SCATTERS * start.scatter
-    )
-    if clear:
-        # The area above the answer: the time constant of a lag, whatever rings around it.
-        late = settings.window * (start.windows - start.total / answer)
-        start.lag = min(max(late, 0.0), start.windows * settings.window)
-    alike = start.ways > 0.0 and 1.0 / ALIKE < start.gain / start.gain_before < ALIKE
+    bound = max(CLEAR * start.noise, STEPS * start.step, SCATTERS * start.scatter)
+    clear = u != start.from_u and np.abs(answer) > bound
+    rests = start.windows <= AT_ONCE and np.abs(start.mean - start.now) < CLOSE * np.abs(answer)
+    sure = rests and np.abs(answer) > SURE * bound and start.told == 0.0
+    alike = sure or (start.ways > 0.0 and 1.0 / ALIKE < start.gain / start.gain_before < ALIKE)
     longest = np.abs(start.way) >= settings.longest
     start.from_x = start.now
     if start.target == start.origin and start.ways == 0.0 and start.tries > 0.0:
@@ -193,7 +191,7 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
 @register_jitable
 def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
     """Take the reading at a voltage, NaN for none, and choose the next voltage."""
-    known = np.abs(x) < WILDEST
+    known, middle = np.abs(x) < WILDEST, x
     if known:
         change, middle = np.abs(x - start.last), median(x, start.last, start.before)
         start.before, start.last = start.last, x
@@ -210,6 +208,11 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
     if start.stage == GO:
         if start.stuck == 0.0:
             _move(start, settings)
+    elif start.stage == REST and start.ahead != 0.0:
+        # Planned before the readings are there: the first way begins after as many samples as they take.
+        start.samples += 1.0
+        if start.samples >= FIRST:
+            rest_at(start, settings, u, 0.0, start.given * settings.gain)
     elif not known and start.stage < DONE:
         return
     elif start.stage == REST:

@@ -20,8 +20,11 @@ TRAVEL = record(
     turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, usual=COUNT,
 )  # fmt: skip
 
-# A way back of this fraction of a swing is a turn; so many turns show a swing.
-TURN, SHOWN = 0.05, 2.0
+# A way back of this fraction of a swing is a turn; so many turns show a swing. Before, a smaller one is: the
+# first way may lead to a bias that small waves lie on.
+TURN, SHOWN, FIRST_TURN = 0.05, 2.0, 0.02
+# A leg is long that has taken so many times the last one.
+LONG = 2.0
 # No swing counts for less than this fraction of the one before: noise at rest would.
 LEAST = 0.02
 
@@ -46,7 +49,7 @@ def follow(travel: Any, value: Any) -> float:
         if travel.direction == 0.0:
             travel.direction = np.sign(way)
         travel.furthest = value
-    elif np.abs(way) > TURN * travel.swing:
+    elif np.abs(way) > (TURN if travel.turns >= SHOWN else FIRST_TURN) * travel.swing:
         leg = np.abs(travel.furthest - travel.turned)
         travel.turns += 1.0
         swing = max(leg, travel.leg, LEAST * travel.swing, travel.least if travel.turns < SHOWN else 0.0)
@@ -67,6 +70,13 @@ def progress(travel: Any, gone: Any) -> float:
     return 0.5 * in_swings(travel, gone) + (
         0.5 / max(usual, travel.count) if travel.count < 2.0 * usual else 0.0
     )
+
+
+@register_jitable
+def rests(travel: Any, gone: Any) -> bool:
+    """Whether a leg has taken long, and the last sample has gone no farther: a rest is no part of a leg."""
+    late = travel.count > LONG * max(travel.usual, 8.0)
+    return late and (gone == 0.0 or travel.furthest != travel.last)
 
 
 @register_jitable

@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import driving, homing, slots
+from piezoest.controller import homing, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 
@@ -20,7 +20,9 @@ WIDER = 1.3
 RATE = 5.0
 # On the way to the reference the voltage goes no farther than so many times the way that was answered; a
 # doubling takes so many times as long as the stage takes to answer.
-AHEAD, LATE = 2.0, 3.0
+AHEAD, LATE = 8.0, 3.0
+# ... and where the readings have yet to confirm a user's gain, than so many times.
+FIRST_AHEAD = 2.0
 
 
 @register_jitable
@@ -34,22 +36,22 @@ def _feed_forward(state: Any, settings: Any, r: Any) -> float:
     """Voltage of the model that drives, in the corridor around the line, for reference and feedback."""
     line = state.line
     swing = max(state.reference.swing, np.abs(r - state.reference.turned))
-    kept = driving.kept(state.reference, np.abs(r - state.reference.last), swing)
-    back = state.feedback
-    r += back
+    kept = redraw.kept(state, settings, np.abs(r - state.reference.last), swing)
+    r += state.feedback
     straight = wanted = lines.voltage(line, r - state.owed * kept * state.unit)
     if state.pending <= 1.0 and state.readings.fault == reading.NONE and state.driving > 0.0:
         z = (r - state.zero) / state.unit - slots.owed(state.candidates, state.driving, 0.0) * kept
         wanted = slots.voltage(state.candidates, settings.candidates, state.driving, z, straight)
         # Near a turn the inverse of a wide loop leaps, which would shake a resonance.
-        ahead = straight - lines.voltage(line, state.reference.last + back - state.owed * state.unit)
+        before = state.reference.last + state.back
+        ahead = straight - lines.voltage(line, before - state.owed * state.unit)
         most = (RATE - 1.0) * np.abs(ahead)
         wanted = min(max(wanted, state.u + ahead - most), state.u + ahead + most)
     if not np.abs(wanted) < WILDEST:
         wanted = straight
     room = np.abs(settings.corridor * 0.5 * swing / line.gain)
     # No model can gain more on the line than the line has missed of late.
-    missed = np.abs(state.unit) * state.score.peak + 3.0 * np.sqrt(state.readings.noise)
+    missed = np.abs(state.unit) * state.widest + 3.0 * np.sqrt(state.readings.noise)
     room = min(room, WIDER * missed / np.abs(line.gain))
     return min(max(wanted, straight - room), straight + room)
 
@@ -82,7 +84,8 @@ def plan(state: Any, settings: Any, r: Any) -> float:
         target = lines.voltage(state.line, r)
         if state.start.given != 0.0:
             # The first way says whether the gain is right.
-            target = state.start.origin + np.sign(state.start.way) * settings.start.longest
+            way = min(FIRST_AHEAD * state.confirmed, settings.start.longest)
+            target = state.start.origin + np.sign(state.start.way) * way
         wanted = _nearer(state, settings, target)
     elif state.stage == HOME:
         wanted = homing.voltage(state.homing, state.u)
@@ -95,5 +98,5 @@ def plan(state: Any, settings: Any, r: Any) -> float:
     given = min(max(slewed, settings.minimum), settings.maximum)
     state.slewed += slewed != wanted
     state.saturated += given != slewed
-    state.planned = given
+    state.planned, state.back = given, state.feedback
     return given

@@ -82,7 +82,8 @@ def c(
     interval = integer("update_interval", update_interval, 1)
     if not isinstance(compensator, Compensator):
         raise ValueError(
-            f"compensator must be an InverseCompensator or a LinearCompensator, got {compensator!r}"
+            "give an AdaptiveFeedforward alone, or an estimator or None and, as compensator, an "
+            f"InverseCompensator or a LinearCompensator, got {estimator!r} and {compensator!r}"
         )
     if estimator is not None and not _has_kernel(estimator):
         hint = "only estimators with a compiled kernel can be exported"

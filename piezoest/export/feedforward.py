@@ -56,6 +56,7 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
             f"AdaptiveFeedforward at {controller.sample_rate:g} Hz, corridor {data['corridor']:g}.",
             *([f"Gain: about {data['gain']:g} um/V."] if data["gain"] else []),
             *([f"Feedback: {data['feedback']:g} 1/s."] if data["feedback"] else []),
+            *([f"Resonance: {data['resonance']:g} Hz."] if data["resonance"] else []),
             f"Limits: {limits}.",
             *(line for each in data["estimators"] for line in estimator_lines(each)),
         ],

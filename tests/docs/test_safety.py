@@ -131,12 +131,29 @@ def test_pieces_hold_for_few_runs(page: Any, program: Any, document: dict[str, A
     """Also where most of the kinds have not been drawn, and a run raised."""
     rows = [row(0), row(1, None, failure="ValueError: no", finite=None, within_limits=None)]
     summed = {name: shown(rows) for name, shown in program.SHOWN.items()}
-    unplayed = {"map": None, "singles": None}
+    unplayed = {"map": None, "singles": None, "dwell": None}
     texts = page.pieces({**document, "runs": 2, "drawn": program.drawn(rows), **summed, **unplayed})
     assert "ValueError: no" in texts["worst"]
     assert "none" in texts["map"]
     assert "not been played" in texts["singles"]
+    assert "No rests" in texts["dwell"]
     assert "``" not in texts["show"]
+
+
+def test_rests_are_shown(page: Any, document: dict[str, Any]) -> None:
+    from piezoest.bench.zoo.dwelling import summarise_dwells
+
+    rest = {"family": "paper", "duration": 60.0, "creep": 0.0, "setpoint_noise": 0.0, "allowed": 1.0,
+            "second": 0.5, "third": 0.5, "excursion": 0.125, "failure": None}  # fmt: skip
+    rows = [
+        {**rest, "seed": 1, "feedback": 0.0, "first": 0.75, "kept": True},
+        {**rest, "seed": 1, "feedback": 2.0, "first": 1.5, "kept": False},
+    ]
+    played = {**document, "dwell": summarise_dwells(rows)}
+    shown = page.pieces(played)["dwell"]
+    assert '"no","no","no","1 of 1 (100 %)","0.75","0.5","0.5","0.75","0.125","0.125"' in shown
+    assert '"no","yes","no","0 of 1 (0 %)","1.5"' in shown
+    assert "in the very first period in 1 of 2 (50 %) runs" in "".join(page.verdict(played))
 
 
 def test_the_figure_is_drawn(program: Any, document: dict[str, Any], tmp_path: Path) -> None:

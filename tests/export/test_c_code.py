@@ -440,6 +440,8 @@ def test_what_has_no_kernel_is_refused() -> None:
         pz.export.c(pz.FilterPyEKF(FS), inverse())
     with pytest.raises(ValueError, match="compensator"):
         pz.export.c(None, START)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"give an AdaptiveFeedforward alone, or .* got 3 and None"):
+        pz.export.c(3)
     with pytest.raises(ValueError, match="LinearGain"):
         pz.export.c(rls(), pz.LinearCompensator(LINE))
     with pytest.raises(ValueError, match=r"export it fixed: c\(None"):

@@ -27,6 +27,13 @@ CELL_COLUMNS: dict[str, type] = {
     "failure": str, "change": str, "periods": int, "error": float, "allowed": float,
 }  # fmt: skip
 
+DWELL_COLUMNS: dict[str, type] = {
+    **dict(list(COLUMNS.items())[: list(COLUMNS).index("block") + 1]),
+    "setpoint_noise": float, "feedback": float, "duration": float, "failure": str, "settled": float,
+    "allowed": float, "first": float, "second": float, "third": float, "kept": bool, "excursion": float,
+    "events": str,
+}  # fmt: skip
+
 
 def tidy_cells(rows: Iterable[Row]) -> Iterator[Row]:
     """A row for each change of each run of the map.

@@ -47,8 +47,8 @@ def contender(name: str) -> Factory:
     return functools.partial(_made, found)
 
 
-def _made(make: Any, sample_rate: float, limits: Any) -> Any:
-    return make(sample_rate, limits=limits)
+def _made(make: Any, sample_rate: float, limits: Any, **options: Any) -> Any:
+    return make(sample_rate, limits=limits, **options)
 
 
 def _found(name: str) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from piezoest.bench.zoo.dwelling import WAYS
 from piezoest.bench.zoo.settling import SEGMENTS
 from piezoest.bench.zoo.summary import ENOUGH, SOON
 
@@ -140,6 +141,40 @@ def print_contest(summary: dict[str, Any], console: Any) -> None:
     console.print(
         f"{summary['kept']} of {len(summary['cells'])} cells within {summary['allowed']:g}; "
         f"{summary['runs']} runs, {summary['failures']} failed.",
+        highlight=False,
+    )
+
+
+def print_dwells(summary: dict[str, Any], console: Any) -> None:
+    """Print how a controller goes on after a long rest.
+
+    Parameters
+    ----------
+    summary : dict
+        From `piezoest.bench.zoo.dwelling.summarise_dwells`.
+    console : rich.console.Console
+        To print on.
+    """
+    numbers = ("first", "second", "third", "largest", "excursion", "farthest")
+    heads = ("runs", "kept", "first", "second", "third", "largest", "way", "longest")
+    for title, names in (("groups", WAYS), ("by_family", ("family",))):
+        _table(
+            console,
+            f"After a rest of {summary['duration']:g} s: largest errors over what is allowed, medians; way "
+            "of the voltage in it over its swing",
+            (*names, *heads),
+            [
+                (*(str(row[name]) for name in names), row["runs"], row["kept"],
+                 *(number(row[name]) for name in numbers))
+                for row in summary[title]
+            ],
+        )  # fmt: skip
+    for row in summary["worst"]:
+        with_feedback = "with" if row["feedback"] else "without"
+        console.print(f"  {row['seed']} {with_feedback} feedback: {number(row['ratio'])}", highlight=False)
+    console.print(
+        f"As before in the first period: {summary['kept']} of {summary['runs']} runs, "
+        f"{summary['failures']} failed.",
         highlight=False,
     )
 

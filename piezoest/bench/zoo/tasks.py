@@ -15,13 +15,15 @@ from piezoest.bench.quiet import quiet
 from piezoest.bench.store import Store
 from piezoest.bench.zoo.contenders import code_of, contender
 from piezoest.bench.zoo.drawing import draw
+from piezoest.bench.zoo.dwelling import Dwell, play_dwell
+from piezoest.bench.zoo.dwelling import died as dwell_died
 from piezoest.bench.zoo.playing import Row, play
 from piezoest.bench.zoo.settling import Cell, settle
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One run: a rig of the zoo, or one cell of the map.
+    """One run: a rig of the zoo, one cell of the map, or a long rest.
 
     Parameters
     ----------
@@ -35,6 +37,8 @@ class Task:
         What is not drawn, see `piezoest.bench.zoo.draw`.
     cell : Cell, optional
         Of the map; then the run is `settle`.
+    dwell : Dwell, optional
+        A rest; then the run is `play_dwell`.
     """
 
     controller: str
@@ -42,6 +46,7 @@ class Task:
     code: str
     given: dict[str, Any] = field(default_factory=dict)
     cell: Cell | None = None
+    dwell: Dwell | None = None
 
     @property
     def key(self) -> str:
@@ -63,6 +68,8 @@ def carry_out(task: Task) -> Row:
     factory = contender(task.controller)
     if task.cell is not None:
         return {**known, **settle(task.cell, factory)}
+    if task.dwell is not None:
+        return {**known, **play_dwell(task.dwell, factory)}
     return {**known, **play(draw(task.seed, **task.given), factory)}
 
 
@@ -74,9 +81,13 @@ def died(task: Task) -> Row:
     task : Task
         What was to be run.
     """
-    cell = {} if task.cell is None else {**asdict(task.cell), "segments": [], "asked": True}
-    drawn = draw(task.seed, **task.given).to_dict() if task.cell is None else {}
-    row = {"key": task.key, "controller": task.controller, "seed": task.seed, **drawn, **cell}
+    if task.cell is not None:
+        drawn: Row = {**asdict(task.cell), "segments": [], "asked": True}
+    elif task.dwell is not None:
+        drawn = dwell_died(task.dwell)
+    else:
+        drawn = draw(task.seed, **task.given).to_dict()
+    row = {"key": task.key, "controller": task.controller, "seed": task.seed, **drawn}
     return dict(json_safe({**row, "failure": "the process died"}))
 
 
@@ -108,6 +119,20 @@ def cells(controller: str, of: Sequence[Cell]) -> list[Task]:
     """
     code = code_of(controller)
     return [Task(controller, cell.seed, code, cell=cell) for cell in of]
+
+
+def rests(controller: str, of: Sequence[Dwell]) -> list[Task]:
+    """Runs of a controller over long rests.
+
+    Parameters
+    ----------
+    controller : str
+        As `contender` reads it.
+    of : sequence of Dwell
+        From `piezoest.bench.zoo.dwelling.dwells`.
+    """
+    code = code_of(controller)
+    return [Task(controller, dwell.seed, code, dwell=dwell) for dwell in of]
 
 
 def carry_out_all(

@@ -1,0 +1,223 @@
+"""Whether a controller goes on after a long rest as it did before.
+
+A healthy rig follows a wave until it has settled, rests for a minute at a point of the wave, exactly or with
+noise in the reference, and follows the wave again: with feedback and without. In the very first period its
+largest error is to be as it was. The stage may creep: what it does meanwhile is not judged, but how far the
+voltage goes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from piezoest.bench.adaptation import json_safe
+from piezoest.bench.zoo.drawing import draw
+from piezoest.bench.zoo.families import FAMILIES
+from piezoest.bench.zoo.faults import NONE
+from piezoest.bench.zoo.judging import NEGLIGIBLE, NOISES
+from piezoest.bench.zoo.naming import BACK, settled
+from piezoest.bench.zoo.rig import Rig
+from piezoest.bench.zoo.running import Factory, run_controller
+
+DURATION = 60.0  # s
+SHAPES = ("triangle", "sine", "raster")
+SAMPLE_RATES = (1e3, 1e4)  # Hz: a minute at more takes long
+FREQUENCIES = (1.0, 20.0)  # Hz
+BEFORE, AFTER = 12, 4  # periods
+CALLS = 32  # in a period
+NOISE = (1e-4, 1e-3)  # µm, of the reference that rests
+FEEDBACK = (0.5, 5.0)  # 1/s
+PERIODS = ("first", "second", "third")
+WAYS = ("creep", "feedback", "noise")
+
+
+@dataclass(frozen=True, slots=True)
+class Dwell:
+    """A rest on some rig.
+
+    Parameters
+    ----------
+    seed : int
+        Of all that is drawn.
+    feedback : bool
+        Whether the controller is given ``feedback=``.
+    duration : float
+        Of the rest [s].
+    """
+
+    seed: int
+    feedback: bool
+    duration: float = DURATION
+
+
+def dwells(seeds: Sequence[int], duration: float = DURATION) -> list[Dwell]:
+    """All rests on the rigs of these seeds, without feedback and with it.
+
+    Parameters
+    ----------
+    seeds : sequence of int
+        One for each rig.
+    duration : float
+        [s].
+    """
+    return [Dwell(seed, feedback, duration) for seed in seeds for feedback in (False, True)]
+
+
+def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
+    """Rig of a dwell, the samples in which its reference rests, and what is drawn beside.
+
+    Parameters
+    ----------
+    dwell : Dwell
+        From `dwells`.
+
+    Returns
+    -------
+    Rig
+    slice
+    dict
+        ``setpoint_noise`` [µm], zero for none, and ``feedback`` [1/s], zero for none.
+    """
+    rng = np.random.default_rng([dwell.seed, 25])
+    sample_rate = float(rng.choice(SAMPLE_RATES))
+    period = round(sample_rate / float(np.exp(rng.uniform(*np.log(FREQUENCIES)))))
+    rig = draw(
+        dwell.seed, family=list(FAMILIES)[dwell.seed % len(FAMILIES)], sample_rate=sample_rate,
+        reference=str(rng.choice(SHAPES)), frequency=sample_rate / period, waves=float(BEFORE + AFTER + 1),
+        fault=NONE, drift=0.0, block=max(1, period // CALLS),
+    )  # fmt: skip
+    plain = rig.plain
+    start = plain.begins + BEFORE * period + int(rng.integers(period))
+    noise = float(np.exp(rng.uniform(*np.log(NOISE)))) if rng.random() < 0.5 else 0.0
+    gain = float(np.exp(rng.uniform(*np.log(FEEDBACK))))
+    rest = plain.values[start - 1] + noise * rng.normal(size=round(dwell.duration * sample_rate))
+    values = np.concatenate((plain.values[:start], rest, plain.values[start : start + AFTER * period]))
+    drawn = {"setpoint_noise": noise, "feedback": gain if dwell.feedback else 0.0}
+    return replace(rig, plain=replace(plain, values=values)), slice(start, start + rest.size), drawn
+
+
+def play_dwell(dwell: Dwell, factory: Factory) -> dict[str, Any]:
+    """Let a controller rest, and go on.
+
+    Parameters
+    ----------
+    dwell : Dwell
+        From `dwells`.
+    factory : callable
+        ``factory(sample_rate, limits)`` makes a controller, ``factory(sample_rate, limits, feedback=...)``
+        one with feedback.
+
+    Returns
+    -------
+    dict
+        ``settled``: median of the largest errors of the last three periods before; ``allowed``: 1.2 times
+        the largest of it, three times the noise and 0.2 % of the swing; ``first``, ``second``, ``third``:
+        largest errors of the periods after, all [µm]; ``kept``: whether the first is allowed;
+        ``excursion``: how far the voltage went in the rest, as a fraction of its swing before.
+    """
+    rig, rest, drawn = dwell_rig(dwell)
+    row: dict[str, Any] = {**rig.to_dict(), **drawn, "duration": dwell.duration, "failure": None}
+    options = {"feedback": drawn["feedback"]} if dwell.feedback else {}
+    try:
+        controller = factory(rig.sample_rate, rig.limits, **options)
+        with np.errstate(all="ignore"):
+            run, _ = run_controller(rig, controller)
+    except Exception as error:
+        return dict(json_safe({**row, "failure": f"{type(error).__name__}: {error}"}))
+    off, cycle, u = np.abs(run.error), rig.plain.cycle, run.voltage
+    level = settled(off[: rest.start], cycle) or 0.0
+    allowed = BACK * max(level, NOISES * rig.noise, 2.0 * NEGLIGIBLE * rig.plain.amplitude)
+    after = off[rest.stop : rest.stop + len(PERIODS) * cycle].reshape(-1, cycle).max(axis=1).tolist()
+    swing = float(np.ptp(u[rest.start - cycle : rest.start]))
+    gone = float(np.max(np.abs(u[rest] - u[rest.start - 1])))
+    row |= {"settled": level, "allowed": allowed, **dict(zip(PERIODS, after, strict=True))}
+    row |= {
+        "kept": after[0] <= allowed,
+        "excursion": gone / swing if swing > 0.0 else None,
+        "events": "; ".join(event.reason.partition(":")[0] for event in getattr(controller, "events", ())),
+    }
+    return dict(json_safe(row))
+
+
+def summarise_dwells(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """Sum up rests.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        From `play_dwell`.
+
+    Returns
+    -------
+    dict
+        ``groups``, with and without creep, feedback and noise in the reference, and ``by_family``: runs,
+        how many are ``kept``, medians and the largest of the errors over what is allowed, and of the
+        excursion.
+        ``worst``: the seeds that are not kept, the worst ones first.
+    """
+    rows = list(rows)
+    judged = [row for row in rows if row["failure"] is None]
+    ways = sorted({_of(row) for row in rows})
+    groups = [
+        {**dict(zip(WAYS, way, strict=True)), **_summed([row for row in rows if _of(row) == way])}
+        for way in ways
+    ]
+    families = sorted({row["family"] for row in rows})
+    broken = sorted((row for row in judged if not row["kept"]), key=_ratio, reverse=True)
+    return {
+        "runs": len(rows),
+        "failures": len(rows) - len(judged),
+        "rigs": len({row["seed"] for row in rows}),
+        "kept": sum(row["kept"] for row in judged),
+        "duration": max((row["duration"] for row in rows), default=0.0),
+        "groups": groups,
+        "by_family": [
+            {"family": family, **_summed([row for row in rows if row["family"] == family])}
+            for family in families
+        ],
+        "worst": [
+            {"seed": row["seed"], "feedback": row["feedback"] > 0.0, "ratio": _ratio(row)}
+            for row in broken[:10]
+        ],
+    }
+
+
+def _of(row: dict[str, Any]) -> tuple[bool, ...]:
+    """Whether the stage creeps, and there is feedback, and noise in the reference."""
+    return row["creep"] > 0.0, row["feedback"] > 0.0, row["setpoint_noise"] > 0.0
+
+
+def _ratio(row: dict[str, Any], period: str = "first") -> float:
+    """Largest error of a period over what is allowed; infinite where it is no number."""
+    value = row[period]
+    return np.inf if value is None else float(value / row["allowed"])
+
+
+def _summed(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    judged = [row for row in rows if row["failure"] is None]
+    found: dict[str, Any] = {"runs": len(rows), "kept": sum(row["kept"] for row in judged)}
+    for period in PERIODS:
+        found[period] = float(np.median([_ratio(row, period) for row in judged])) if judged else None
+    found["largest"] = max(map(_ratio, judged), default=None)
+    gone = [row["excursion"] for row in judged if row["excursion"] is not None]
+    return {
+        **found,
+        "excursion": float(np.median(gone)) if gone else None,
+        "farthest": max(gone, default=None),
+    }
+
+
+def died(dwell: Dwell) -> dict[str, Any]:
+    """Row of a run whose process died over it.
+
+    Parameters
+    ----------
+    dwell : Dwell
+        From `dwells`.
+    """
+    rig, _, drawn = dwell_rig(dwell)
+    return {**rig.to_dict(), **drawn, "duration": dwell.duration}

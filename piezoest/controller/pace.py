@@ -1,0 +1,88 @@
+"""Whether the reference is too fast: near the resonance, or so fast that lag passes for width of the loop.
+
+The start shows how late the readings are: the area between the way of the voltage and the answer, both as
+fractions of what they came to, is the time between them, for a lag and for a delay alike, whatever rings
+around it. Both voltages and readings are those of the same sample, so blocks do not count.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST
+from piezoest.controller import readings as reading
+from piezoest.controller import start as starts
+from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, record
+
+PACE = record(
+    # Samples of a way of the start, where it began; sums of the voltage's way and of the answer; how late the
+    # readings were on the last two ways [samples].
+    count=COUNT, from_u=MEASURED, from_x=MEASURED, gone=NUMBER, answered=NUMBER, before=AMOUNT, now=AMOUNT,
+    # Samples and length of the reference's last leg, its longest one, samples of a period; sample of the last
+    # warning, and which have been given.
+    leg=COUNT, length=DISTANCE, widest=DISTANCE, period=AMOUNT, told=COUNT, fast=FLAG, late=FLAG,
+)  # fmt: skip
+
+# A reference is fast above this fraction of the resonance; a lag of this phase [rad] is about as wide a loop,
+# relative to the swing.
+FAST, LATE = 0.05, 0.05
+WAVE = 2.0 * np.pi
+# Creep, and the bend of the way, take this fraction of the samples off, about. Two ways are alike within this
+# factor: an amplifier that slews is later on the last one, which is longer, and hum on the first one.
+CREEP, ALIKE = 0.007, 1.8
+# Legs below this fraction of the longest are noise of a reference that rests; the first one leads there.
+LEAST, FIRST_LEGS = 0.05, 3.0
+
+
+@register_jitable
+def _end(pace: Any, start: Any, u: Any) -> None:
+    """A way of the start is over: how late the readings were on it; the middle one of three is one later."""
+    way, answer = u - pace.from_u, start.mean - pace.from_x
+    if pace.count == 0.0 or way * answer == 0.0:
+        return
+    late = pace.gone / way - pace.answered / answer - 1.0 - CREEP * pace.count
+    pace.before, pace.now = pace.now, max(late, 0.0)
+
+
+@register_jitable
+def follow(pace: Any, start: Any, u: Any, x: Any) -> None:
+    """Take a sample of the start, before the start does."""
+    if u == start.from_u or start.stage == starts.REST:
+        _end(pace, start, u)
+        pace.count = pace.gone = pace.answered = 0.0
+        pace.from_u, pace.from_x = u, start.from_x
+    elif np.abs(x) < WILDEST:
+        pace.count += 1.0
+        pace.gone += u - pace.from_u
+        pace.answered += reading.median(x, start.last, start.before) - pace.from_x
+
+
+@register_jitable
+def conclude(pace: Any, start: Any, u: Any) -> None:
+    """How late the readings are: if two ways do not agree, as on the one less late, and nobody is warned."""
+    _end(pace, start, u)
+    alike = start.ways == 0.0 or (pace.now < ALIKE * pace.before and pace.before < ALIKE * pace.now)
+    start.lag = pace.now if alike else min(pace.now, pace.before)
+    pace.late = pace.late if alike else 1.0
+
+
+@register_jitable
+def watch(state: Any, settings: Any) -> None:
+    """Warn once where the reference is too fast, when it has turned."""
+    pace, reference = state.pace, state.reference
+    pace.widest = max(pace.widest, reference.leg) if reference.turns > 1.0 else 0.0
+    wide = min(pace.length, reference.leg) > LEAST * pace.widest
+    pace.period = pace.leg + reference.usual
+    pace.leg, pace.length = reference.usual, reference.leg
+    # Of two warnings in a block one would be lost.
+    if reference.turns < FIRST_LEGS or not wide or state.samples <= pace.told + state.block:
+        return
+    if pace.fast == 0.0 and pace.period < settings.shortest:
+        pace.fast, pace.told = 1.0, state.samples
+        reading.notice(state, reading.FAST)
+    elif pace.late == 0.0 and WAVE * state.start.lag > LATE * pace.period:
+        pace.late, pace.told = 1.0, state.samples
+        reading.notice(state, reading.LATE)

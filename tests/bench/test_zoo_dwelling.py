@@ -1,0 +1,93 @@
+"""Whether a controller goes on after a long rest as it did before."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from piezoest.bench.commands import app
+from piezoest.bench.zoo import columns, tasks
+from piezoest.bench.zoo.controllers import Line
+from piezoest.bench.zoo.dwelling import BEFORE, SHAPES, Dwell, dwell_rig, dwells, play_dwell, summarise_dwells
+from piezoest.bench.zoo.line import fit_line
+
+
+def line(dwell: Dwell, jump: float = 0.0) -> Any:
+    """A line in hindsight, which may forget where it was when the reference rests."""
+    rig, rest, _ = dwell_rig(dwell)
+    fitted = fit_line(rig)
+
+    class Forgetful(Line):
+        seen = 0
+
+        def run(self, r: Any) -> Any:
+            self.seen += r.size
+            return super().run(r) + (jump if self.seen > rest.start + 2 * rig.block else 0.0)
+
+    return lambda sample_rate, limits, feedback=0.0: Forgetful(fitted.gain, fitted.centre, limits)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_it_rests_where_the_wave_is(seed: int) -> None:
+    rig, rest, drawn = dwell_rig(Dwell(seed, True, 2.0))
+    r, cycle = rig.reference, rig.plain.cycle
+    assert rest.stop - rest.start == round(2.0 * rig.sample_rate)
+    assert np.abs(r[rest] - r[rest.start - 1]).max() <= 6.0 * drawn["setpoint_noise"]
+    # Without the rest the wave goes on, and each period but the first is like the one before.
+    whole = np.concatenate((r[: rest.start], r[rest.stop :]))[rig.plain.begins :]
+    np.testing.assert_allclose(whole[2 * cycle :], whole[cycle:-cycle], atol=1e-9 * abs(r).max())
+    assert whole.size - (rest.start - rig.plain.begins) >= 3 * cycle
+    assert rest.start - rig.plain.begins >= BEFORE * cycle
+    assert rig.plain.kind in SHAPES
+    assert drawn["feedback"] > 0.0
+    assert dwell_rig(Dwell(seed, False, 2.0))[2]["feedback"] == 0.0
+
+
+def test_a_line_goes_on_as_before_and_a_jump_is_seen() -> None:
+    dwell = next(each for each in dwells(range(40), 1.0) if dwell_rig(each)[0].block > 1)
+    rig, _, _ = dwell_rig(dwell)
+    row = play_dwell(dwell, line(dwell))
+    assert row["failure"] is None
+    assert row["kept"]
+    assert row["excursion"] < 0.05
+    far = play_dwell(dwell, line(dwell, 0.2 * rig.reach.half))
+    assert not far["kept"]
+    assert far["excursion"] > row["excursion"]
+    found = summarise_dwells([row, {**far, "seed": -1}, {**row, "failure": "ValueError: no"}])
+    assert (found["runs"], found["failures"], found["kept"], found["rigs"]) == (3, 1, 1, 2)
+    (group,) = found["groups"]
+    assert (group["runs"], group["kept"], group["feedback"]) == (3, 1, False)
+    assert group["largest"] == far["first"] / far["allowed"]
+    assert [each["seed"] for each in found["worst"]] == [-1]
+
+
+def test_what_breaks_is_a_row() -> None:
+    def broken(sample_rate: float, limits: Any, feedback: float = 0.0) -> Any:
+        raise RuntimeError("no idea")
+
+    dwell = Dwell(3, True, 1.0)
+    row = play_dwell(dwell, broken)
+    assert row["failure"] == "RuntimeError: no idea"
+    (task,) = tasks.rests("parts", [dwell])
+    died = tasks.died(task)
+    assert died["failure"] == "the process died"
+    found = summarise_dwells([row, died])
+    assert found["failures"] == 2
+    assert found["groups"][0]["first"] is None
+
+
+def test_the_command_plays_it(tmp_path: Path) -> None:
+    """By a controller that takes no feedback, so half of the runs fail."""
+    words = ["bench", "safety", "--dwell", "1", "-c", "parts", "--workers", "1", "--table", "csv"]
+    result = CliRunner().invoke(app, [*words[1:], "--out", str(tmp_path)], env={"COLUMNS": "160"})
+    assert result.exit_code == 0, result.output
+    assert "After a rest of 60 s" in result.output
+    document = json.loads((tmp_path / "dwell.json").read_text(encoding="utf-8"))
+    assert (document["runs"], document["failures"]) == (2, 1)
+    heads = (tmp_path / "dwell.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
+    assert heads == list(columns.DWELL_COLUMNS)

@@ -1,0 +1,110 @@
+"""A reference that is too fast is told, once: near the resonance, or where lag passes for hysteresis."""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+
+FS = 10_000.0
+LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
+LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+
+
+def wave(frequency: float, periods: int = 5) -> FloatArray:
+    return pz.signals.triangle(4.0, frequency, periods, FS).values
+
+
+def driven(r: FloatArray, lag: float = 0.0, block: int = 1, noise: float = 0.0, **options: Any) -> Any:
+    """A controller behind a reference, of a stage that follows with a lag [s]."""
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), **options)
+    stage, rng, share, late = pz.SimulatedStage(FS, LOOP), np.random.default_rng(0), 1.0, 0.0
+    share = 1.0 - np.exp(-1.0 / (lag * FS)) if lag else 1.0
+    for begin in range(0, r.size, block):
+        u = driver.run(r[begin : begin + block])
+        x = stage.run(u)
+        for k, x_k in enumerate(x.tolist()):
+            late += share * (x_k - late)
+            x[k] = late
+        driver.learn(u, x + noise * rng.normal(size=x.size))
+    return driver
+
+
+def warnings(driver: Any) -> list[str]:
+    return [name for event in driver.events if (name := event.reason.split(":")[0]) in ("lag", "resonance")]
+
+
+@pytest.mark.parametrize("block", [1, 150])
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_a_lag_that_passes_for_hysteresis_is_told_once(block: int, noise: float) -> None:
+    """Of 1 ms: its phase is 0.13 at 20 Hz, and 0.01 at 2 Hz; no lag has none, whatever the block."""
+    driver = driven(wave(20.0, 12), lag=1e-3, block=block, noise=noise)
+    assert warnings(driver) == ["lag"]
+    assert driver.state["start"]["lag"] / FS == pytest.approx(1e-3, rel=0.25)
+    assert warnings(driven(wave(2.0, 3), lag=1e-3, block=block, noise=noise)) == []
+    assert warnings(driven(wave(20.0, 12), block=block, noise=noise)) == []
+
+
+def test_what_is_said_has_the_figures(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        driver = driven(wave(20.0), lag=1e-3)
+    (event,) = driver.events
+    assert event.action == "went on"
+    assert re.search(r"0\.\d+ ms late, which at (19\.\d|20) Hz looks like a loop of 1\d %", event.reason)
+    assert caplog.text.count("lag:") == 1
+
+
+def test_an_amplifier_that_slews_is_no_lag() -> None:
+    """The start goes faster than it can; the reference does not."""
+    slow, r = (
+        pz.SimulatedStage(FS, LOOP, amplifier=pz.stage.Amplifier(-60.0, 60.0, slew_rate=120.0)),
+        wave(1.0, 3),
+    )
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=())
+    for r_k in np.concatenate((r, 0.1 * wave(30.0))).tolist():
+        u = driver.step(r_k)
+        driver.learn(u, slow.step(u))
+    assert warnings(driver) == []
+
+
+@pytest.mark.parametrize(("resonance", "told"), [(None, []), (300.0, ["resonance"]), (500.0, [])])
+def test_a_reference_near_the_resonance_is_told_once(resonance: float | None, told: list[str]) -> None:
+    driver = driven(wave(20.0, 10), resonance=resonance)
+    assert warnings(driver) == told
+
+
+def test_a_rest_is_not_fast() -> None:
+    """Noise of the reference turns at each sample."""
+    rest = 1.0 + 1e-3 * np.random.default_rng(1).normal(size=20_000)
+    r = np.concatenate((wave(20.0, 4), np.linspace(0.0, 1.0, 200), rest, wave(20.0, 4)[125:]))
+    assert warnings(driven(r, resonance=500.0)) == []
+
+
+def test_both_are_told_within_blocks() -> None:
+    driver = driven(wave(20.0, 30), lag=1e-3, block=2000, resonance=300.0)
+    assert sorted(warnings(driver)) == ["lag", "resonance"]
+
+
+def test_it_is_kept() -> None:
+    driver = driven(wave(20.0, 3), resonance=300.0)
+    data = json.loads(json.dumps(driver.to_dict()))
+    assert data["resonance"] == 300.0
+    for other in (driver.copy(), pz.AdaptiveFeedforward.from_dict(data)):
+        assert other.to_dict() == driver.to_dict()
+        other.reset()
+        assert other.to_dict() == driven(wave(20.0)[:0], resonance=300.0).to_dict()
+    assert "Resonance: 300 Hz." in pz.export.c(driver).header
+    assert "Resonance" not in pz.export.c(driven(wave(20.0)[:0])).header
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, np.inf, "x", 1e30])
+def test_a_wrong_resonance_is_refused(wrong: Any) -> None:
+    with pytest.raises(ValueError, match="resonance must"):
+        driven(wave(20.0)[:0], resonance=wrong)

@@ -1,0 +1,31 @@
+"""A long rest within a leg: the line stays what the legs have shown."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+
+FS = 1000.0
+LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
+LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+@pytest.mark.parametrize("part", [0.1, 0.3, 0.4, 0.6, 0.85])
+def test_a_rest_does_not_count_as_a_leg(part: float, noise: float) -> None:
+    """A minute is hundreds of legs, in which a stage creeps and a loop is at one side."""
+    rng, period = np.random.default_rng(0), 500
+    wave = np.tile(5.0 * np.sin(2.0 * np.pi * np.arange(period) / period), 10)
+    k = 6 * period + round(part * period)
+    rest = wave[k - 1] + noise * rng.normal(size=60_000)
+    r = np.concatenate((wave[:k], rest, wave[k:]))
+    driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=()), pz.SimulatedStage(FS, LOOP)
+    gains = []
+    for j, r_j in enumerate(r.tolist()):
+        u = driver.step(r_j)
+        driver.learn(u, stage.step(u) + 1e-3 * rng.normal() - 0.1 * np.log10(1.0 + max(j - k, 0)))
+        gains.append(float(driver.state["line"]["gain"]))
+    before, after = gains[k], np.array(gains[k + rest.size :])
+    assert np.abs(after / before - 1.0).max() < 0.08
