@@ -170,6 +170,45 @@ def test_parameters_may_be_a_bare_model(reference: Path) -> None:
         assert run("compensate", reference, "-p", "model.json", "-o", "voltage.csv").exit_code == 0
 
 
+LEARNT_ON = {"voltage": [-16.0, 16.0], "displacement": [1.0, 5.0], "rate": 400.0, "frequency": [5.0, 5.0]}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({}, ()),
+        ({"frequency": None}, ()),
+        (
+            {"displacement": [1.0, 4.5]},
+            ("the displacement goes from 1.",),
+        ),
+        ({"voltage": [-10.0, 16.0]}, ("the voltage goes from",)),
+        ({"rate": 100.0}, ("V/s, the model was learnt at up to 100 V/s",)),
+        ({"frequency": [10.0, 20.0]}, ("the model was learnt at 10 to 20 Hz",)),
+        (
+            {"rate": 100.0, "displacement": [2.0, 4.0]},
+            ("the displacement goes", "learnt at up to"),
+        ),
+    ],
+)
+@pytest.mark.parametrize("offset", [3.0, 0.0])
+def test_compensate_says_what_the_model_was_not_learnt_on(
+    reference: Path, change: dict[str, object], words: tuple[str, ...], offset: float
+) -> None:
+    r = signals.triangle(2.0, 5.0, 4, RATE)
+    write_columns(reference, {"time_s": r.time, "reference_um": r.values + offset})
+    Path("model.json").write_text(json.dumps({"model": TRUE.to_dict(), "learnt_on": LEARNT_ON | change}))
+    moved = () if offset == TRUE.offset else ("--offset", offset)
+    result = run("compensate", reference, "-p", "model.json", "-o", "voltage.csv", *moved)
+    assert result.exit_code == 0
+    assert "voltage.csv: " in result.stdout
+    lines = result.stderr.strip().splitlines()
+    assert len(lines) == len(words)
+    if offset == TRUE.offset:
+        assert all(word in line for word, line in zip(words, lines, strict=True))
+    assert all("identify a log" in line for line in lines)
+
+
 def test_mistakes_in_logs(log: Path) -> None:
     refused(run("identify", "none.csv"), "none.csv", "No such file")
     refused(run("identify", "."), "Is a directory" if sys.platform != "win32" else ".")
@@ -206,6 +245,7 @@ def test_mistakes_in_compensate(reference: Path) -> None:
         "[1]": "no model",
         '{"model": ["a"]}': "no model",
         '{"model": "Foo"}': "Foo",
+        json.dumps({"model": TRUE.to_dict(), "learnt_on": LEARNT_ON | {"rate": "fast"}}): "rate must be one",
         '{"alpha": 1}': "ColemanHodgdon has no 'beta'",
         "[" * 100_000: "nested too deeply",
         json.dumps({**TRUE.to_dict(), "alpha": 10**400}): "alpha must be a number of at most",

@@ -257,7 +257,7 @@ METHOD_MODULES = ("models", "estimators", "compensators", "stage", "policies", "
 # They hold values, describe an instrument, or are what others fill in.
 WITHOUT_A_METHOD = (
     "Amplifier", "BatchFitResult", "CompensatorStatus", "Estimator", "Event", "Gauge", "Status", "Trace",
-    "VoltageLimits", "models.FreeRunning", "models.Model", "models.StepModel",
+    "VoltageLimits", "models.FreeRunning", "models.LearntModel", "models.Model", "models.StepModel",
 )  # fmt: skip
 
 

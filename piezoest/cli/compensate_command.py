@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from piezoest._errors import errors
-from piezoest._files import read_object
 from piezoest._options import grouped
 from piezoest.cli.shared import Debug, check_writable, progress
 
 if TYPE_CHECKING:
-    from piezoest.models import Model
+    from piezoest._checks import FloatArray
+    from piezoest.models import LearntModel
+    from piezoest.signals import Signal
 
 EPILOG = (
     "Examples: piezoest compensate reference.csv --parameters model.json -o voltage.csv; "
     "piezoest compensate reference.csv --alpha 0.017 --beta 0.148 --gamma 0.0038 --maximum 150 -o voltage.csv"
 )
-
-NO_MODEL = "model: write it with identify --output"  # behind the name of a file that holds none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,13 +82,13 @@ def compensate(
             from piezoest.signals import check_continuity
 
             writer_for(output)  # refuses a name before the work is done
-            model = _model(stated)
+            learnt = _model(stated)
             voltage_limits = VoltageLimits(
                 minimum=-float("inf") if limits.minimum is None else limits.minimum,
                 maximum=float("inf") if limits.maximum is None else limits.maximum,
             )
             signal = read_reference(reference, column=column, sample_rate=sample_rate)
-            compensator = InverseCompensator(model, voltage_limits, sample_rate=signal.sample_rate)
+            compensator = InverseCompensator(learnt.model, voltage_limits, sample_rate=signal.sample_rate)
             check_continuity(signal.values, signal.sample_rate, "the reference")
             voltage = compensator.run(signal.values)
             columns = {"time_s": signal.time, "voltage_V": voltage, "reference_um": signal.values}
@@ -104,11 +103,17 @@ def compensate(
                 "there the stage will not follow the reference",
                 err=True,
             )
+        for left in _leaves(learnt, voltage, signal):
+            typer.echo(
+                f"{left}: nobody has seen how the stage answers there; change the reference, or identify a "
+                "log that goes as far",
+                err=True,
+            )
 
 
-def _model(stated: Stated) -> Model:
+def _model(stated: Stated) -> LearntModel:
     """Model from a JSON file, or from the three options."""
-    from piezoest.models import ColemanHodgdon, model_from_dict
+    from piezoest.models import ColemanHodgdon, LearntModel
 
     path, offset = stated.parameters, stated.offset
     options = {"alpha": stated.alpha, "beta": stated.beta, "gamma": stated.gamma}
@@ -116,21 +121,20 @@ def _model(stated: Stated) -> Model:
     if path is None:
         if missing := sorted(set(options) - set(given)):
             raise ValueError(f"no model: pass --parameters FILE, or also --{' --'.join(missing)}")
-        return ColemanHodgdon(**given, offset=offset or 0.0)
+        return LearntModel(ColemanHodgdon(**given, offset=offset or 0.0))
     if given:
         raise ValueError(f"two models: leave out --parameters or --{' --'.join(given)}")
-    data = read_object(path, NO_MODEL)
-    match data.get("model", "ColemanHodgdon"):
-        case dict(nested):
-            data = {"model": "ColemanHodgdon", **nested}
-        case str(name):
-            data = {**data, "model": name}
-        case _:
-            raise ValueError(f"{path} holds no {NO_MODEL}")
-    try:
-        model: Any = model_from_dict(data)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
-    if not hasattr(model, "invert"):
-        raise ValueError(f"{path}: a {type(model).__name__} cannot be inverted here: use a ColemanHodgdon")
-    return model if offset is None else replace(model, offset=offset)
+    learnt = LearntModel.read(path)
+    if not hasattr(learnt.model, "invert"):
+        kind = type(learnt.model).__name__
+        raise ValueError(f"{path}: a {kind} cannot be inverted here: use a ColemanHodgdon")
+    return learnt if offset is None else learnt.with_offset(offset)
+
+
+def _leaves(learnt: LearntModel, voltage: FloatArray, signal: Signal) -> tuple[str, ...]:
+    """In what this leaves the ranges that the model was learnt on."""
+    from piezoest.models import LearntOn
+
+    if learnt.learnt_on is None:
+        return ()
+    return learnt.learnt_on.left_by(LearntOn.of(voltage, signal.values, signal.sample_rate))

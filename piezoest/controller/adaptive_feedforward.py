@@ -14,6 +14,7 @@ from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import kernel, making, saved, shown, team
 from piezoest.controller.face import Face
 from piezoest.layout import by_name, from_bytes, write
+from piezoest.models import LearntModel
 
 # Events that are kept.
 MOST_EVENTS = 1000
@@ -53,8 +54,10 @@ class AdaptiveFeedforward(Face):
         then: the first few per cent of the range check it, and what is a factor of three off is sought.
     stroke : float, optional
         The same as displacement over the whole range of the limits [µm].
-    model : Model, optional
-        The same as a model, of which its slope counts. At most one of the three.
+    model : Model, path or Identification, optional
+        The same as a model, of which its slope counts; also as the JSON file that `piezoest identify` wrote,
+        or as what `identify` returned. Where these say on which voltages and displacements it was learnt, an
+        event warns, once, when the run leaves them by more than 5 %. At most one of the three.
     feedback : float, optional
         Integral gain of a feedback from the readings that are believed [1/s], as of `IntegralFeedback`; it
         corrects no more than the corridor's width. Default: none.
@@ -66,7 +69,9 @@ class AdaptiveFeedforward(Face):
     ------
     ValueError
         If a value is out of its range, the limits are infinite or of another sample rate, an estimator is
-        none that a controller can use, or the gain is given twice.
+        none that a controller can use, the gain is given twice, or a file holds no model.
+    OSError
+        If the file of a model cannot be read.
 
     Notes
     -----
@@ -110,8 +115,10 @@ class AdaptiveFeedforward(Face):
     ) -> None:
         sample_rate, limits = moderate("sample_rate", sample_rate), making.checked_limits(limits, sample_rate)
         factories = team.DEFAULT if estimators is None else estimators
-        known = making.known_gain(gain, stroke, model, limits)
-        options = making.options(sample_rate, corridor, known, feedback, resonance)
+        learnt = None if model is None else LearntModel.of(model)
+        known = making.known_gain(gain, stroke, learnt, limits)
+        ranges = None if learnt is None else learnt.to_dict()["learnt_on"]
+        options = making.options(sample_rate, corridor, known, feedback, resonance, ranges)
         self._make(sample_rate, limits, options, team.made(factories, sample_rate))
 
     def _make(self, sample_rate: float, limits: VoltageLimits, options: Any, estimators: Any) -> None:
@@ -283,7 +290,7 @@ class AdaptiveFeedforward(Face):
         loop(state, self._settings, *samples)
         if state["noticed"].item() == before:
             return
-        event = shown.event(state, self._sample_rate)
+        event = shown.event(state, self._sample_rate, self._options["learnt_on"])
         self._events.append(event)
         warned = event.action == "fell back" or state["notice"] in shown.WARNINGS
         level = logging.WARNING if warned else logging.INFO
@@ -338,7 +345,7 @@ class AdaptiveFeedforward(Face):
         limits = making.checked_limits(saved.read_limits(data["limits"]), sample_rate)
         controller = cls.__new__(cls)
         estimators = saved.read_estimators(data["estimators"], data["state"])
-        chosen = (data[name] for name in ("corridor", "gain", "feedback", "resonance"))
+        chosen = (data[name] for name in ("corridor", "gain", "feedback", "resonance", "learnt_on"))
         options = making.options(sample_rate, *chosen)
         controller._make(sample_rate, limits, options, estimators)
         controller._load(data)

@@ -13,6 +13,7 @@ from numba.extending import register_jitable
 from piezoest.compile import Record, Vector, compiled
 from piezoest.controller import candidate, homing, redraw
 from piezoest.controller import line as lines
+from piezoest.controller import outside as outsides
 from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
@@ -49,17 +50,18 @@ def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Lay
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
-        noticed=COUNT, notice=whole(0.0, 10.0), shaken=COUNT,
+        noticed=COUNT, notice=whole(0.0, 11.0), shaken=COUNT,
         # What the line misses, the most of late, what it missed of a swing when it drove; what the stage
         # misses of the reference.
         score=candidate.SCORE, widest=AMOUNT, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
         travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,
-        start=starts.START, homing=homing.HOMING, pace=paces.PACE, candidates=candidates,
+        start=starts.START, homing=homing.HOMING, pace=paces.PACE, outside=outsides.OUTSIDE,
+        candidates=candidates,
     )  # fmt: skip
     settings = record(
         minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED, feedback=FIXED,
         # Samples of the shortest period that is far from the resonance, zero where nobody knows it.
-        shortest=FIXED,
+        shortest=FIXED, allowed=outsides.ALLOWED,
         start=starts.SETTINGS, candidates=candidate_settings,
     )  # fmt: skip
     return state, settings

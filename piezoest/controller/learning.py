@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import candidate, doubt, driving, feedback, given, homing, redraw, slots
+from piezoest.controller import candidate, doubt, driving, feedback, given, homing, outside, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
@@ -375,6 +375,7 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
             feedback.follow(state, settings, x)
         if state.reference.turned_now != 0.0:
             paces.watch(state, settings)
+        outside.watch(state, settings)
     _learn_from(state, settings, x, moved)
     if state.stage == RUN and state.readings.fault == reading.NONE and _is_due(state, gone):
         state.handed = 0.0

@@ -11,7 +11,8 @@ from piezoest.controller import candidate, homing, kernel, pace, slots
 from piezoest.controller.feedback import FASTEST
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import Field, Record, new
-from piezoest.models import Model
+from piezoest.models import LearntModel, LearntOn
+from piezoest.models.learnt_on import allowed
 
 # Least range and largest size of the voltage [V].
 LEAST_RANGE, LARGEST_VOLTAGE = 1e-6, 1e6
@@ -45,7 +46,7 @@ def checked_limits(limits: Any, sample_rate: float) -> Any:
     return limits
 
 
-def known_gain(gain: Any, stroke: Any, model: Any, limits: VoltageLimits) -> float:
+def known_gain(gain: Any, stroke: Any, model: LearntModel | None, limits: VoltageLimits) -> float:
     """Return the gain that a user knows [µm/V]; zero if none is given.
 
     Raises
@@ -62,8 +63,7 @@ def known_gain(gain: Any, stroke: Any, model: Any, limits: VoltageLimits) -> flo
     if stroke is not None:
         return _gain("stroke", stroke) / (limits.maximum - limits.minimum)
     if model is not None:
-        model = instance("model", model, Model, "a model, as LinearGain(0.15)")
-        return _gain("slope of model", model.line[0])
+        return _gain("slope of model", model.model.line[0])
     return 0.0
 
 
@@ -76,7 +76,9 @@ def _gain(name: str, value: Any) -> float:
     return number
 
 
-def options(sample_rate: float, corridor: Any, gain: Any, feedback: Any, resonance: Any) -> dict[str, Any]:
+def options(
+    sample_rate: float, corridor: Any, gain: Any, feedback: Any, resonance: Any, learnt_on: Any
+) -> dict[str, Any]:
     """Return what users choose beside limits and estimators, checked.
 
     Raises
@@ -95,6 +97,7 @@ def options(sample_rate: float, corridor: Any, gain: Any, feedback: Any, resonan
         "gain": finite("gain", gain) and _gain("gain", gain),
         "feedback": feedback,
         "resonance": None if resonance is None else moderate("resonance", resonance),
+        "learnt_on": None if learnt_on is None else LearntOn.from_dict(learnt_on).to_dict(),
     }
 
 
@@ -159,6 +162,7 @@ def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, A
         "corridor": options["corridor"],
         "feedback": options["feedback"] / sample_rate,
         "shortest": sample_rate / (pace.FAST * options["resonance"]) if options["resonance"] else 0.0,
+        "allowed": _allowed(options["learnt_on"]),
         "start": {
             "gain": options["gain"],
             # Where the gain is known, the first way only has to show that.
@@ -170,6 +174,15 @@ def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, A
             "highest": limits.maximum,
         },
     }
+
+
+def _allowed(learnt_on: dict[str, Any] | None) -> dict[str, float]:
+    """Ranges beyond which it is noted that the user's model was not learnt there."""
+    every = math.inf
+    r, u = (-every, every), (-every, every)
+    if learnt_on is not None:
+        r, u = allowed(learnt_on["displacement"]), allowed(learnt_on["voltage"])
+    return {"lowest_r": r[0], "highest_r": r[1], "lowest_u": u[0], "highest_u": u[1]}
 
 
 def room(

@@ -24,6 +24,8 @@ NONE, NO_RESPONSE, REVERSED, SCALED, SATURATED, MOVED = (float(i) for i in range
 OTHER_GAIN, UNKNOWN, SHAKEN = 6.0, 7.0, 8.0
 # The reference is near the resonance; so fast that lag passes for hysteresis.
 FAST, LATE = 9.0, 10.0
+# Reference or voltage are outside what the user's model was learnt on.
+OUTSIDE = 11.0
 FAULTS = (
     "",
     "no response",
@@ -36,6 +38,7 @@ FAULTS = (
     "shaken",
     "resonance",
     "lag",
+    "outside",
 )
 
 READINGS = record(

@@ -19,7 +19,7 @@ from piezoest.supervisor import Event
 FORMAT = 1
 _FIELDS = (
     "controller", "format", "sample_rate", "limits", "corridor", "gain", "feedback", "resonance",
-    "estimators", "state", "models", "planned", "events",
+    "learnt_on", "estimators", "state", "models", "planned", "events",
 )  # fmt: skip
 
 

@@ -10,10 +10,11 @@ from typing import Any
 
 from piezoest.controller import candidate, slots
 from piezoest.controller.pace import WAVE
-from piezoest.controller.readings import FAST, FAULTS, LATE
+from piezoest.controller.readings import FAST, FAULTS, LATE, OUTSIDE
 from piezoest.equations import loop_inverse, play_inverse
 from piezoest.layout import Named
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
+from piezoest.models.learnt_on import ends, figure
 from piezoest.supervisor import Event
 
 STAGES = ("seeking", "approaching", "running", "homing")
@@ -33,9 +34,12 @@ MEANINGS = {
     "lag": "the readings are about {lag:.2g} ms late, which at {frequency:.3g} Hz looks like a loop of "
     "{width:.2g} % of the swing: what is learnt holds at this frequency alone; slow the reference down, or "
     "read sooner",
+    "outside": "the reference is at {r} µm and the voltage at {u} V, the model that you gave was learnt from "
+    "{displacement} and from {voltage}: the controller learns on, but a model that is to hold there must be "
+    "identified from a log that goes as far",
 }
 # Of what is noted beside faults, that which the user is to change.
-WARNINGS = (FAST, LATE)
+WARNINGS = (FAST, LATE, OUTSIDE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +119,7 @@ def stage_name(number: Any) -> str:
     return STAGES[int(number)]
 
 
-def event(state: Any, sample_rate: float) -> Event:
+def event(state: Any, sample_rate: float, learnt_on: Any) -> Event:
     """Return what was noticed last.
 
     Parameters
@@ -124,6 +128,8 @@ def event(state: Any, sample_rate: float) -> Event:
         Of the controller.
     sample_rate : float
         [Hz].
+    learnt_on : dict or None
+        Ranges of the user's model.
     """
     number, time = state["notice"], float(state["samples"]) / sample_rate
     name = fault_name(number)
@@ -131,7 +137,8 @@ def event(state: Any, sample_rate: float) -> Event:
         return Event(time, "resumed", "the readings follow the voltage again")
     action = "fell back" if number == state["readings"]["fault"] else "went on"
     start = {each: float(state["start"][each]) + 0.0 for each in ("gain", "gain_before")}
-    return Event(time, action, f"{name}: {MEANINGS[name].format_map(start | _pace(state, sample_rate))}")
+    figures = start | _pace(state, sample_rate) | _outside(state, learnt_on)
+    return Event(time, action, f"{name}: {MEANINGS[name].format_map(figures)}")
 
 
 def _pace(state: Any, sample_rate: float) -> dict[str, float]:
@@ -142,6 +149,15 @@ def _pace(state: Any, sample_rate: float) -> dict[str, float]:
         "lag": 1e3 * lag / sample_rate,
         "width": 100.0 * WAVE * lag / period,
     }
+
+
+def _outside(state: Any, learnt_on: Any) -> dict[str, str]:
+    """Where reference and voltage were outside, and of what."""
+    if learnt_on is None:
+        return {}
+    units = {"displacement": "µm", "voltage": "V"}
+    known = {name: ends(learnt_on[name], unit) for name, unit in units.items()}
+    return known | {name: figure(float(state["outside"][name])) for name in ("r", "u")}
 
 
 def misses(state: Any) -> list[float | None]:

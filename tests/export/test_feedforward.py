@@ -134,6 +134,14 @@ def test_a_gain_that_is_known_need_not_be_right(gain: float) -> None:
     assert any(event.reason.startswith("gain") for event in library.events) == (gain < 0.0)
 
 
+def test_what_the_model_was_learnt_on_changes_no_voltage() -> None:
+    known = pz.models.LearntOn((-20.0, 20.0), (-4.0, 4.0), 1e3, (20.0, 20.0))
+    learnt = pz.models.LearntModel(pz.LinearGain(0.2), known)
+    library = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), model=learnt)
+    drive(library, pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem"))
+    assert [event.reason.split(":")[0] for event in library.events] == ["outside"]
+
+
 @pytest.mark.parametrize("begin", [0, 2500])
 def test_it_homes(begin: int) -> None:
     library = pz.AdaptiveFeedforward(FS, limits=pz.VoltageLimits(-100.0, 100.0, 2e4, FS), estimators=())

@@ -1,0 +1,67 @@
+"""Where a signal turns: the ends of its swings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from piezoest._checks import array_1d, non_negative
+from piezoest.compile import Vector, compiled
+
+
+def turns(values: Any, threshold: float) -> NDArray[np.intp]:
+    """Places at which a signal turns and then runs back by more than a threshold.
+
+    Parameters
+    ----------
+    values : array_like, shape (N,)
+        Without gaps.
+    threshold : float
+        Ways back of this size or less are noise, in the unit of the values.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        Rising indices of the first sample of each extreme. The first and the last sample are no turns.
+
+    Raises
+    ------
+    ValueError
+        If the values are not 1-D and finite, or the threshold is below zero.
+
+    Notes
+    -----
+    One pass in time. Source: the hysteresis filter of rainflow counting (ASTM E1049).
+
+    Examples
+    --------
+    >>> from piezoest.signals.turns import turns
+    >>> turns([0.0, 1.0, 2.0, 1.9, 2.1, 0.0, 1.0], 0.5).tolist()
+    [4, 5]
+    """
+    values = array_1d("values", values).copy()
+    places = np.empty(values.size)
+    return places[: _turns(values, non_negative("threshold", threshold), places)].astype(np.intp)
+
+
+@compiled
+def _turns(values: Vector, threshold: float, places: Vector) -> int:
+    """Write the places of turns; return how many there are."""
+    count, direction, place = 0, 0.0, 0
+    low = high = extreme = values[0] if len(values) else 0.0
+    for k in range(len(values)):
+        value = values[k]
+        if direction == 0.0:
+            low, high = min(low, value), max(high, value)
+            if high - low > threshold:
+                direction = 1.0 if value == high else -1.0
+                extreme, place = value, k
+        elif direction * (value - extreme) > 0.0:
+            extreme, place = value, k
+        elif direction * (extreme - value) > threshold:
+            places[count] = place
+            count += 1
+            direction, extreme, place = -direction, value, k
+    return count

@@ -1,0 +1,242 @@
+"""Ranges that a model was learnt on, and models with them in files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+from piezoest.models import LearntModel, LearntOn, model_from_dict
+from piezoest.signals.turns import turns
+
+FS = 5000.0
+LOOP = pz.ColemanHodgdon(0.02, 0.12, 0.0036, offset=3.0)
+KNOWN = LearntOn((-40.0, 40.0), (-6.0, 6.0), 800.0, (4.0, 6.0))
+
+
+def wave(amplitude: float = 40.0, frequency: float = 5.0, periods: int = 8) -> FloatArray:
+    """A triangle with sharp corners."""
+    time = np.arange(round(periods * FS / frequency)) / FS
+    return amplitude * np.interp(time * frequency % 1.0, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0.0])
+
+
+# ---------------------------------------------------------------- turns
+
+
+def test_turns_are_the_extremes_that_the_signal_runs_back_from() -> None:
+    u = wave(periods=2)
+    assert turns(u, 1.0).tolist() == [250, 750, 1250, 1750]
+    assert turns(u + 0.3 * np.sin(np.arange(u.size)), 1.0) == pytest.approx([250, 750, 1250, 1750], abs=8)
+    assert turns(u, 100.0).size == turns(np.ones(5), 0.0).size == turns([], 1.0).size == 0
+    # Of a flat one the first sample counts, where the signal came from does not.
+    assert turns([5.0, 0.0, 3.0, 3.0, 3.0, 0.0, 4.0], 1.0).tolist() == [1, 2, 5]
+
+
+# ---------------------------------------------------------------- ranges of a log
+
+
+def test_a_log_has_its_ranges() -> None:
+    u = np.concatenate((wave(20.0, 2.0), wave(40.0, 10.0)))
+    found = LearntOn.of(u, 0.1 * u + 1.0, FS)
+    assert found.voltage == (-40.0, 40.0)
+    assert found.displacement == pytest.approx((-3.0, 5.0), abs=0.05)
+    assert found.rate == pytest.approx(1600.0)
+    assert found.frequency == pytest.approx((2.0, 10.0), rel=0.01)
+
+
+def test_what_is_wild_or_missing_does_not_count() -> None:
+    u = wave()
+    x = 0.1 * u
+    plain = LearntOn.of(u, x, FS)
+    u[700], x[[100, 3000]] = np.nan, [1e6, -1e6]
+    u[1000:1100], x[2000:2010] = np.nan, np.nan
+    found = LearntOn.of(u, x, FS)
+    assert found.voltage == plain.voltage
+    assert found.displacement == pytest.approx(plain.displacement, abs=0.02)
+    assert found.rate == pytest.approx(800.0)
+    assert found.frequency == pytest.approx((5.0, 5.0), rel=0.01)
+
+
+def test_steps_spikes_rests_and_converters_are_no_rate() -> None:
+    u, rest = wave(), np.zeros(200_000)
+    stepped, spiked = u.copy(), u.copy()
+    stepped[4000:] += 30.0
+    spiked[4000] += 30.0
+    steps = 0.5 * np.round(u / 0.5)  # each of three samples or so
+    for each in (stepped, spiked, np.concatenate((rest, u, rest)), steps):
+        assert LearntOn.of(each, each, FS).rate == pytest.approx(800.0, rel=0.2)
+    assert LearntOn.of(rest, rest, FS) == LearntOn((0.0, 0.0), (0.0, 0.0), 0.0)
+
+
+def test_noise_is_no_swing() -> None:
+    noise = 0.3 * np.random.default_rng(0).normal(size=wave().size)
+    found = LearntOn.of(wave() + noise, 0.1 * wave() + noise, FS)
+    assert found.frequency == pytest.approx((5.0, 5.0), rel=0.04)
+    assert found.rate == pytest.approx(800.0, rel=0.5)
+
+
+def test_a_ramp_has_no_frequency() -> None:
+    ramp = np.linspace(0.0, 10.0, 1000)
+    assert LearntOn.of(ramp, ramp, FS).frequency is None
+    assert LearntOn.of(wave(periods=1), wave(periods=1), FS).frequency == pytest.approx((5.0, 5.0))
+
+
+@pytest.mark.parametrize(
+    ("u", "x", "fs", "message"),
+    [
+        ([1.0, 2.0], [1.0], FS, "same length"),
+        ([np.nan], [1.0], FS, "u holds no number"),
+        ([1.0], [np.inf], FS, "x holds no number"),
+        ([1.0], [1.0], 0.0, "sample_rate must"),
+        ([[1.0]], [1.0], FS, "u must have shape"),
+    ],
+)
+def test_what_is_no_log_is_refused(u: Any, x: Any, fs: float, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        LearntOn.of(u, x, fs)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("voltage", [1.0], "voltage must be a pair"),
+        ("voltage", "ab", "voltage must be a pair"),
+        ("voltage", [2.0, 1.0], "voltage must be the lowest and the highest"),
+        ("displacement", [0.0, np.nan], "displacement must be finite"),
+        ("displacement", None, "displacement must be a pair"),
+        ("rate", -1.0, "rate must be zero or more"),
+        ("rate", None, "rate must be one number"),
+        ("frequency", [-1.0, 1.0], "frequency must be zero or more"),
+        ("colour", 1.0, "unknown fields"),
+    ],
+)
+def test_what_is_no_range_is_refused(field: str, value: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        LearntOn.from_dict(KNOWN.to_dict() | {field: value})
+
+
+@pytest.mark.parametrize("known", [KNOWN, LearntOn((0.0, 1.0), (0.0, 1.0), 1.0)])
+def test_ranges_survive_json(known: LearntOn) -> None:
+    assert LearntOn.from_dict(json.loads(json.dumps(known.to_dict()))) == known
+    assert hash(known) == hash(LearntOn.from_dict(known.to_dict()))
+
+
+def test_blocks_of_a_log_have_the_ranges_of_the_log() -> None:
+    u = np.concatenate((wave(20.0, 2.0), wave(40.0, 10.0)))
+    parts = [LearntOn.of(part, 0.1 * part, FS) for part in np.split(u, 4)]
+    joined = parts[0].joined(parts[1]).joined(parts[2]).joined(parts[3])
+    whole = LearntOn.of(u, 0.1 * u, FS)
+    assert joined.voltage == whole.voltage
+    assert joined.rate == pytest.approx(whole.rate)
+    assert joined.frequency == pytest.approx(whole.frequency, rel=0.01)
+    still = LearntOn((0.0, 0.0), (0.0, 0.0), 0.0)
+    assert still.joined(KNOWN) == KNOWN.joined(still) == KNOWN
+    assert still.joined(still) == still
+
+
+# ---------------------------------------------------------------- who leaves them
+
+
+@pytest.mark.parametrize(
+    ("used", "words"),
+    [
+        (KNOWN, ()),
+        # Within 5 % of the width, of the frequency, a factor of 1.5.
+        (LearntOn((-43.9, 43.9), (-6.5, 6.5), 1190.0, (3.9, 6.2)), ()),
+        (LearntOn((-1.0, 1.0), (-0.1, 0.1), 1.0), ()),
+        (LearntOn((-44.1, 40.0), (-6.0, 6.0), 1.0), ("the voltage goes from -44.1 to 40 V",)),
+        (LearntOn((0.0, 44.1), (0.0, 6.7), 1.0), ("from 0 to 6.7 µm", "from 0 to 44.1 V")),
+        (
+            LearntOn((0.0, 1.0), (-6.7, 0.0), 1.0),
+            ("from -6.7 to 0 µm, the model was learnt from -6 to",),
+        ),
+        (
+            LearntOn((0.0, 1.0), (0.0, 1.0), 1234.5),
+            ("up to 1230 V/s, the model was learnt at up to 800",),
+        ),
+        (LearntOn((0.0, 1.0), (0.0, 1.0), 1.0, (5.0, 6.4)), ("5 to 6.4 Hz",)),
+        (
+            LearntOn((0.0, 1.0), (0.0, 1.0), 1.0, (3.5, 3.5)),
+            ("at 3.5 Hz, the model was learnt at 4 to 6",),
+        ),
+    ],
+)
+def test_who_leaves_a_range_is_told_the_figures(used: LearntOn, words: tuple[str, ...]) -> None:
+    said = KNOWN.left_by(used)
+    assert len(said) == len(words)
+    assert all(word in left for word, left in zip(words, said, strict=True))
+
+
+@pytest.mark.parametrize("kind", [pz.signals.triangle, pz.signals.sine])
+def test_the_same_reference_again_leaves_nothing(kind: Any) -> None:
+    """Though the inverse is steeper after a turn than on the way."""
+    r = kind(5.0, 5.0, 4, FS).values
+    log = pz.InverseCompensator(LOOP).run(kind(5.0, 5.0, 4, FS).values + LOOP.offset)
+    known = LearntOn.of(kind(np.ptp(log) / 2.0, 5.0, 4, FS).values, r, FS)
+    assert known.left_by(LearntOn.of(log, r, FS)) == ()
+
+
+# ---------------------------------------------------------------- with a model
+
+
+def test_a_model_comes_in_many_forms(tmp_path: Path) -> None:
+    plain, both = LearntModel(LOOP), LearntModel(LOOP, KNOWN)
+    assert LearntModel.of(LOOP) == plain
+    assert LearntModel.of(both) == both
+    assert LearntModel.of(SimpleNamespace(model=LOOP)) == plain
+    assert LearntModel.of(SimpleNamespace(model=LOOP, learnt_on=KNOWN)) == both
+    assert LearntModel.of(pz.HysteresisRLS(FS, initial_model=LOOP)).learnt_on is None
+    file, bare = tmp_path / "model.json", {"alpha": 0.02, "beta": 0.12, "gamma": 0.0036, "offset": 3.0}
+    for data, expected in (
+        (both.to_dict(), both),
+        (both.to_dict() | {"format": "piezoest-identification-1", "advice": []}, both),
+        ({"model": LOOP.to_dict()}, plain),
+        (LOOP.to_dict(), plain),
+        (bare, plain),
+        ({"model": bare}, plain),
+    ):
+        file.write_text(json.dumps(data), encoding="utf-8")
+        assert LearntModel.of(file) == LearntModel.of(str(file)) == expected
+    line = LearntModel(pz.LinearGain(0.1), KNOWN)
+    assert LearntModel.from_dict(line.to_dict()) == line
+    assert model_from_dict(both.to_dict()["model"]) == LOOP
+
+
+def test_an_offset_takes_the_displacement_with_it() -> None:
+    moved = LearntModel(LOOP, KNOWN).with_offset(1.0)
+    assert moved.model.offset == 1.0
+    assert moved.learnt_on is not None
+    assert moved.learnt_on.displacement == (-8.0, 4.0)
+    assert moved.learnt_on.voltage == KNOWN.voltage
+    assert LearntModel(LOOP).with_offset(1.0).model.offset == 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[1]", "model.json holds no model"),
+        ('{"model": 3}', "model.json holds no model"),
+        ('{"model": {"alpha": 1}}', "model.json: ColemanHodgdon has no 'beta'"),
+        (json.dumps(LearntModel(LOOP).to_dict() | {"learnt_on": 3}), "model.json: learnt_on must be"),
+        (json.dumps(LearntModel(LOOP).to_dict() | {"learnt_on": {}}), "learnt_on has no 'voltage'"),
+    ],
+)
+def test_a_file_without_a_model_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "model.json"
+    file.write_text(text)
+    with pytest.raises(ValueError, match=message):
+        LearntModel.read(file)
+
+
+def test_what_is_no_model_is_refused() -> None:
+    for wrong in (3.0, None, SimpleNamespace(model=3.0)):
+        with pytest.raises(ValueError, match="model must be a model, as LinearGain"):
+            LearntModel.of(wrong)
+    with pytest.raises(ValueError, match="learnt_on must be"):
+        LearntModel(LOOP, {})  # type: ignore[arg-type]
