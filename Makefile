@@ -104,6 +104,7 @@ figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the docume
 	$(BIN)/python benchmarks/best_fixed_model.py --json docs/data/best_fixed_model.json
 	$(BIN)/python benchmarks/faults.py --json docs/data/faults.json
 	$(BIN)/python benchmarks/safety.py --runs 10000 --others 1000 --seed 20000 --map 2 --singles 2 --dwell 60 --out docs/_build/safety --json docs/data/safety.json --figure docs/figures/safety.png
+	$(BIN)/python benchmarks/logs.py --logs 200 --seed 5000 --json docs/data/logs.json
 	mkdir -p docs/_build
 	# `-`: these two end with 1 where something diverged or drifted, which the page says.
 	-$(BIN)/python benchmarks/monte_carlo.py --file docs/_build/monte_carlo.jsonl --json docs/data/monte_carlo.json

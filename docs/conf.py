@@ -15,6 +15,7 @@ import beyond_page
 import controller_page
 import estimators_page
 import faults_page
+import logs_page
 import paper_page
 import performance_page
 import real_data_page
@@ -127,6 +128,7 @@ def setup(app: Any) -> None:
     app.connect("builder-inited", which_estimator_page.write)
     app.connect("builder-inited", tuning_page.write)
     app.connect("builder-inited", real_data_page.write)
+    app.connect("builder-inited", logs_page.write)
     app.connect("builder-inited", adaptation_page.write)
     app.connect("builder-inited", faults_page.write)
     app.connect("builder-inited", safety_page.write)

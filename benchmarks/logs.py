@@ -1,0 +1,222 @@
+"""How well piezoest fits recorded logs: simulated ones, of stages that none of its models was made for.
+
+Each log is drawn from its seed (`piezoest.bench.zoo.logs`) and judged by `log_judging`. Beside what was
+chosen stand the best candidate in hindsight, a gain and 20 plays by non-negative least squares, and a
+straight line.
+
+    python benchmarks/logs.py [--logs N] [--seed S] [--clean N] [--workers N] [--json FILE] [--rows FILE]
+
+A log takes about a second.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from log_judging import NEGLIGIBLE, PLAYS, TRAIN, clean_scores, judge
+from safety import short
+
+from piezoest._files import write_text
+from piezoest.bench.adaptation import json_safe
+from piezoest.bench.executors import in_processes
+from piezoest.bench.origin import origin, put
+from piezoest.bench.suite_command import counting
+from piezoest.bench.zoo.logs import ADDED
+from piezoest.models import ColemanHodgdon
+
+Row = dict[str, Any]
+
+NEAR = 1.2  # of the best candidate's error
+SIZES = {"short": (0, 10_000), "middle": (10_000, 25_000), "long": (25_000, 1 << 30)}  # samples
+LEVELS = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 1.0)
+RATIOS = ("best", "nnls", "line", "stroke", "noise")
+COVERED = ("below 50 %", "50 to 90 %", "90 to 98 %", "above 98 %")
+COVERED_AT = (0.5, 0.9, 0.98)
+WORST = 10
+SHOWN = ("seed", "family", "voltage", "added", "chosen_name", "best_name", "seconds")
+
+
+def ratios(row: Row) -> Row:
+    """The row and, if it was fitted, its error relative to others', to the stroke and to the noise.
+
+    What is far below the noise counts as equal. `regret` is that to the best of all that is known.
+    """
+    if row["failure"] is not None:
+        return row
+    floor = NEGLIGIBLE * row["noise"]
+    mine = max(row["chosen"], floor)
+    of = {name: mine / max(row[name], floor) for name in ("best", "nnls", "line")}
+    of |= {"stroke": row["chosen"] / row["stroke"], "noise": row["chosen"] / row["noise"]}
+    return {**row, "ratio": of, "regret": max(of["best"], of["nnls"], of["line"])}
+
+
+def quantiles(values: Sequence[float]) -> dict[str, float]:
+    """By level, in per cent."""
+    if not values:
+        return {}
+    return {f"{100.0 * level:g} %": float(np.quantile(values, level)) for level in LEVELS}
+
+
+def share(hits: int, of: int) -> float | None:
+    """Of something."""
+    return hits / of if of else None
+
+
+def part(rows: Sequence[Row]) -> Row:
+    """What is said of a group of logs; one that was refused counts as neither near the best nor better."""
+    fitted = [row for row in rows if row["failure"] is None]
+    covered = [row["coverage"] for row in fitted if row.get("coverage") is not None]
+    near = sum(row["ratio"]["best"] <= NEAR for row in fitted)
+    better = sum(row["ratio"]["nnls"] <= 1.0 for row in fitted)
+    return {
+        "logs": len(rows),
+        "failed": len(rows) - len(fitted),
+        "near_best": share(near, len(rows)),
+        "beats_nnls": share(better, len(rows)),
+        "beats_line": share(sum(row["ratio"]["line"] <= 1.0 for row in fitted), len(rows)),
+        **{
+            f"median_{name}": float(np.median([row["ratio"][name] for row in fitted])) if fitted else None
+            for name in RATIOS
+        },
+        "covered": float(np.median(covered)) if covered else None,
+        "seconds": float(np.median([row["seconds"] for row in rows])) if rows else None,
+    }
+
+
+def parts(rows: Sequence[Row], column: str) -> list[Row]:
+    """`part` for each value of a column."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(str(row[column]), []).append(row)
+    return [{"name": name, **part(group)} for name, group in sorted(groups.items())]
+
+
+def by_added(rows: Sequence[Row]) -> list[Row]:
+    """`part` of the logs with each thing that was added, and of those without it."""
+    found = []
+    for name in ADDED:
+        having = [row for row in rows if name in row["added"]]
+        others = [row for row in rows if name not in row["added"]]
+        # Noise is in all of them.
+        if having and others:
+            found.append({"name": name, **part(having), "without": part(others)})
+    return found
+
+
+def coverages(rows: Sequence[Row]) -> Row | None:
+    """How often the interval of 95 % held what."""
+    values = [row["coverage"] for row in rows if row.get("coverage") is not None]
+    if not values:
+        return None
+    places = np.digitize(values, COVERED_AT, right=False)
+    counts = {name: int(np.sum(places == i)) for i, name in enumerate(COVERED)}
+    return {"logs": len(values), "counts": counts, "quantiles": quantiles(values)}
+
+
+def scores(rows: Sequence[Row], clean: Sequence[Row]) -> list[Row]:
+    """Errors of a Coleman-Hodgdon stage's parameters, relative to their standard errors.
+
+    Of the logs, and of others to which nothing is added that is not of the model.
+    """
+    found = []
+    for group, mine in (("clean", clean), ("all", rows)):
+        known = [row["z"] for row in mine if row.get("z") is not None]
+        for i, name in enumerate(ColemanHodgdon.parameter_names):
+            z = np.abs([each[i] for each in known if each[i] is not None])
+            found.append(
+                {
+                    "logs_with": group,
+                    "parameter": name,
+                    "logs": int(z.size),
+                    "within_2": share(int(np.sum(z <= 2.0)), z.size),
+                    "median": float(np.median(z)) if z.size else None,
+                    "largest": float(np.max(z)) if z.size else None,
+                }
+            )
+    return found
+
+
+def summarise(rows: Sequence[Row], clean: Sequence[Row] = ()) -> Row:
+    """All that the page shows, as small for many logs as for few."""
+    rows = [ratios(row) for row in rows]
+    fitted = [row for row in rows if row["failure"] is None]
+    failed = [row for row in rows if row["failure"] is not None]
+    sized = [
+        {**row, "size": name}
+        for row in rows
+        for name, (low, high) in SIZES.items()
+        if low <= row["samples"] < high
+    ]
+    worst = sorted(fitted, key=lambda row: row["regret"], reverse=True)[:WORST]
+    return {
+        "all": part(rows),
+        "by_family": parts(rows, "family"),
+        "by_voltage": parts(rows, "voltage"),
+        "by_added": by_added(rows),
+        "by_size": parts(sized, "size"),
+        "by_chosen": parts(fitted, "chosen_name"),
+        "quantiles": {name: quantiles([row["ratio"][name] for row in fitted]) for name in RATIOS},
+        "seconds": quantiles([row["seconds"] for row in rows]),
+        "coverage": coverages(fitted),
+        "scores": scores(fitted, clean),
+        "worst": [
+            {**{name: row[name] for name in SHOWN}, **row["ratio"], "level": row["level"] / row["chosen"]}
+            for row in worst
+        ],
+        "failures": [{"seed": row["seed"], "text": row["failure"]} for row in failed[:WORST]],
+    }
+
+
+def played(what: str, work: Callable[[int], Row], seeds: Sequence[int], workers: int | None) -> list[Row]:
+    """Rows of some logs, in the order of their seeds."""
+    rows: list[Row] = []
+    with counting(what) as count:
+        for row in in_processes(work, seeds, workers):
+            rows.append(row)
+            count(len(rows), len(seeds))
+    return sorted(rows, key=lambda row: row["seed"])
+
+
+def main(given: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--logs", type=int, default=200, help="one for each seed")
+    parser.add_argument("--seed", type=int, default=5000, help="the first one")
+    parser.add_argument(
+        "--clean", type=int, default=50, help="Coleman-Hodgdon stages for the standard errors"
+    )
+    parser.add_argument("--workers", type=int, help="processes; default one for each core")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--rows", type=Path, help="each log as a line of JSON, to compare two versions")
+    arguments = parser.parse_args(given)
+    if arguments.logs < 1:
+        parser.error("--logs must be at least 1")
+
+    began = time.perf_counter()
+    first = arguments.seed
+    rows = played("logs", judge, range(first, first + arguments.logs), arguments.workers)
+    clean = played("clean logs", clean_scores, range(first, first + arguments.clean), arguments.workers)
+    document = {
+        "suite": "logs",
+        **origin(began),
+        "logs": arguments.logs,
+        "seed": first,
+        "clean": arguments.clean,
+        "criteria": {"train": TRAIN, "plays": PLAYS, "near": NEAR, "negligible": NEGLIGIBLE, "sizes": SIZES},
+        **summarise(rows, clean),
+    }
+    if arguments.rows is not None:
+        lines = (json.dumps(json_safe(ratios(row)), ensure_ascii=False) for row in rows)
+        write_text(arguments.rows, "".join(f"{line}\n" for line in lines))
+    put(short(json.loads(json.dumps(json_safe(document)))), arguments.json)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
