@@ -92,7 +92,7 @@ class Reader:
     def _with_points(self, text: str) -> str | None:
         """The text with decimal points; None if cells have to be looked at one by one."""
         style, delimiter = self._layout.style, self._layout.delimiter
-        if style.thousands or style.spaced:
+        if style.thousands:
             return None
         if delimiter == ",":
             return text if "." in style.decimal else None

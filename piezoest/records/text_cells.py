@@ -37,13 +37,10 @@ class Style(NamedTuple):
         ``"."``, ``","``, or ``".,"`` where both stand for decimals.
     thousands : str
         ``","``, ``"."``, or empty if neither separates thousands.
-    spaced : bool
-        Whether spaces or apostrophes do.
     """
 
     decimal: str = "."
     thousands: str = ""
-    spaced: bool = False
 
 
 def style_of(cells: Iterable[str]) -> Style:
@@ -55,19 +52,16 @@ def style_of(cells: Iterable[str]) -> Style:
         If the cells contradict each other; the message begins with one of them.
     """
     seen: dict[str, str] = {}  # what a mark is for, and a cell that shows it
-    spaced = False
     for cell in cells:
-        text = cell.strip()
-        if SPACED.match(text):
-            spaced, text = True, re.sub(SPACES, "", text)
-        for use in _uses(text):
+        text = _without_spaces(cell)
+        if use := _use(text):
             seen.setdefault(use, text)
     for thousands, decimal in ((",", "."), (".", ",")):
         if f"{thousands} thousands" in seen:
             against = seen.get(f"{decimal} thousands") or seen.get(f"{thousands} decimal")
             if against:
                 raise ValueError(_contradiction(seen[f"{thousands} thousands"], against))
-            return Style(decimal, thousands, spaced)
+            return Style(decimal, thousands)
     marks = [mark for mark in ".," if f"{mark} decimal" in seen]
     if len(marks) == 1:
         other = "," if marks == ["."] else "."
@@ -75,18 +69,31 @@ def style_of(cells: Iterable[str]) -> Style:
             raise ValueError(_contradiction(unclear, seen[f"{marks[0]} decimal"]))
     if not marks:
         marks = [mark for mark in ".," if f"{mark} unclear" in seen]
-    return Style("".join(marks) or ".,", "", spaced)
+    return Style("".join(marks) or ".,")
 
 
-def _uses(text: str) -> Iterable[str]:
-    for mark, pattern in GROUPED.items():
-        other = "." if mark == "," else ","
-        if pattern.fullmatch(text) and (text.count(mark) > 1 or other in text):
-            return (f"{mark} thousands",)
+def _use(text: str) -> str:
+    """What a number shows of its mark: that it is for decimals, for thousands, or nothing sure."""
+    if mark := _separates_thousands(text):
+        return f"{mark} thousands"
     plain = PLAIN.fullmatch(text)
     if plain is None or not (plain[1] or plain[3]):
-        return ()
-    return (f"{plain[2]} unclear" if ONE_GROUP.fullmatch(text) else f"{plain[2]} decimal",)
+        return ""
+    return f"{plain[2]} unclear" if ONE_GROUP.fullmatch(text) else f"{plain[2]} decimal"
+
+
+def _separates_thousands(text: str) -> str:
+    """Mark that can only separate thousands in this number; empty if there is none."""
+    for mark, pattern in GROUPED.items():
+        other = "." if mark == "," else ","
+        if mark in text and (other in text or text.count(mark) > 1) and pattern.fullmatch(text):
+            return mark
+    return ""
+
+
+def _without_spaces(cell: str) -> str:
+    text = cell.strip()
+    return re.sub(SPACES, "", text) if SPACED.match(text) else text
 
 
 def _contradiction(one: str, other: str) -> str:
@@ -98,11 +105,10 @@ def _contradiction(one: str, other: str) -> str:
 
 def number(cell: str, style: Style) -> float:
     """Value of a cell; ValueError if it holds no number."""
-    text = cell.strip()
-    if style.spaced and SPACED.match(text):
-        text = re.sub(SPACES, "", text)
-    if style.thousands and GROUPED[style.thousands].fullmatch(text):
-        text = text.replace(style.thousands, "")
+    text = _without_spaces(cell)
+    mark = style.thousands or _separates_thousands(text)
+    if mark and mark not in style.decimal and GROUPED[mark].fullmatch(text):
+        text = text.replace(mark, "")
     if any(mark in text and mark not in style.decimal for mark in ".,"):
         raise ValueError("a mark that is not for decimals")
     return float(text.replace(",", "."))
@@ -114,7 +120,7 @@ def is_number(cell: str) -> bool:
     if text.lower() in MISSING or is_stamp(text) or any(each.fullmatch(text) for each in GROUPED.values()):
         return True
     try:
-        number(text, Style(".,", "", True))
+        number(text, Style(".,"))
     except ValueError:
         return False
     return True

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import csv
 import itertools
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from piezoest.records.text_cells import SPACES, Style, is_number, is_stamp, style_of
+from piezoest.records.text_cells import Style, is_number, is_stamp, style_of
 from piezoest.records.text_lines import chunks, encoding_of, numbered
 
 # Blank lines among the others: more are the way the file is written, fewer are samples that were lost.
@@ -17,7 +16,6 @@ MOST_BLANK = 0.1
 # Lines by which the layout is recognised, and rows in which a time stamp is looked for.
 HEAD_LINES, STAMP_ROWS = 10_000, 100
 ROWS_AT_A_TIME = 1000
-GROUPED_BY_SPACE = re.compile(rf"\d{SPACES}\d{{3}}(?!\d)")
 
 
 class Layout(NamedTuple):
@@ -100,8 +98,7 @@ def split(path: Path, lines: list[str], delimiter: str) -> list[list[str]]:
 def _style(path: Path, lines: list[str], delimiter: str) -> Style:
     # Where commas stand between numbers, one with a comma has quotation marks.
     mark = '"' if delimiter == "," else ","
-    spaced = delimiter != " " and any(map(GROUPED_BY_SPACE.search, lines))
-    if not spaced and not any(mark in line for line in lines):
+    if not any(mark in line for line in lines):
         # Without any mark in the beginning, either may come later.
         return Style("." if delimiter == "," or any("." in line for line in lines) else ".,")
     try:
