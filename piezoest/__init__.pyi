@@ -1,4 +1,4 @@
-from . import export, models, policies, report, signals
+from . import export, models, policies, records, report, signals
 from ._version import __version__
 from .compensators import (
     CompensatorStatus,
@@ -96,6 +96,7 @@ __all__ = [
     "models",
     "policies",
     "read_record",
+    "records",
     "report",
     "signals",
     "stream_record",

@@ -119,6 +119,15 @@ def test_identify_json_is_all_there_is_on_stdout(log: Path) -> None:
     assert not list(log.parent.glob("*.png"))
 
 
+def test_identify_the_example(tmp_path: Path, log: Path) -> None:
+    found = json.loads(run("identify", "example", "--json", "--no-plot").stdout)
+    assert found["samples"] == 14_155
+    # A file of that name comes first.
+    Path("example").write_bytes(log.read_bytes())
+    found = json.loads(run("identify", "example", "--json", "--no-plot").stdout)
+    assert found["samples"] < 14_155
+
+
 def test_identify_real_recording(data_dir: Path, tmp_path: Path) -> None:
     file = data_dir / "discrete_backlash_operator" / "test_1hz.csv"
     result = run("identify", file, "--json", "--plot", tmp_path / "figure.png")

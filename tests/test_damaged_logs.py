@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import random
 import struct
 import zipfile
@@ -157,12 +158,12 @@ def test_text_that_is_no_log(tmp_path: Path, name: str, content: str, words: str
     assert len(str(refusal.value)) < 400 + len(str(path))
 
 
-def test_a_spreadsheet_is_called_one(tmp_path: Path) -> None:
+def test_a_damaged_spreadsheet_is_called_one(tmp_path: Path) -> None:
     path = tmp_path / "log.xlsx"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("[Content_Types].xml", "<Types/>")
         archive.writestr("xl/workbook.xml", "<workbook/>")
-    with pytest.raises(ValueError, match=r"log\.xlsx: .* spreadsheet: save the log as CSV"):
+    with pytest.raises(ValueError, match=r"log\.xlsx: cannot be read as a spreadsheet"):
         read_record(path)
 
 
@@ -182,14 +183,52 @@ def test_a_sample_rate_in_an_array_of_one_is_taken(tmp_path: Path) -> None:
     assert read_record(tmp_path / "log.h5").sample_rate == 100.0
 
 
-@pytest.mark.parametrize("ending", ["csv", "npy", "npz", "h5", "parquet"])
+def packed(path: Path) -> None:
+    plain = path.with_name("plain.csv")
+    write_columns(plain, LOG)
+    path.write_bytes(gzip.compress(plain.read_bytes()))
+
+
+def labview(path: Path) -> None:
+    rows = [f"{t}\t{u:.6f}\t{1.5 * u:.6f}\t" for t, u in zip(TIME.tolist(), VOLTAGE.tolist(), strict=True)]
+    head = ["LabVIEW Measurement\t", "Separator\tTab", "Decimal_Separator\t.", "***End_of_Header***\t", "\t"]
+    segment = ["Channels\t2\t\t", "***End_of_Header***\t\t\t", "X_Value\tdrive_V\tgauge_um\tComment"]
+    path.write_text("\n".join([*head, *segment, *rows[:30], "", *segment, *rows[30:]]) + "\n")
+
+
+def tdms(path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(str(path)) as writer:
+        writer.write_segment([nptdms.ChannelObject("run", name, values) for name, values in LOG.items()])
+
+
+def spreadsheet(path: Path) -> None:
+    pytest.importorskip("python_calamine")
+    book = pytest.importorskip("openpyxl").Workbook()
+    for row in (list(LOG), *np.column_stack(list(LOG.values())).tolist()):
+        book.active.append(row)
+    book.save(path)
+
+
+MAKERS: dict[str, Callable[[Path], None]] = {
+    "csv.gz": packed,
+    "lvm": labview,
+    "tdms": tdms,
+    "xlsx": spreadsheet,
+    "npz": lambda path: np.savez_compressed(path, **LOG),
+}
+
+
+@pytest.mark.parametrize("ending", ["csv", "npy", "h5", "parquet", *MAKERS])
 def test_any_damage_ends_in_one_sentence(tmp_path: Path, ending: str) -> None:
     if ending in ("h5", "parquet"):
         pytest.importorskip("h5py" if ending == "h5" else "pyarrow")
     path = tmp_path / f"log.{ending}"
-    write_columns(path, LOG)
-    if ending == "npz":
-        np.savez_compressed(path, **LOG)
+    if ending in MAKERS:
+        MAKERS[ending](path)
+    else:
+        write_columns(path, LOG)
+    assert len(read_record(path)) == N
     good, chance = path.read_bytes(), random.Random(0)
     said: list[str] = []
     for _ in range(150):

@@ -42,8 +42,8 @@ class Reading:
         bool,
         typer.Option(
             "--stream",
-            help="Read in blocks and learn recursively, for files larger than memory: CSV, Parquet, HDF5, "
-            "MATLAB 7.3, .npy.",
+            help="Read in blocks and learn recursively, for files larger than memory: text, LabVIEW, TDMS, "
+            "Parquet, HDF5, MATLAB 7.3, .npy.",
         ),
     ] = False
 
@@ -85,7 +85,8 @@ def identify(
         Path,
         typer.Argument(
             metavar="FILE",
-            help="Log with time, voltage and displacement: CSV, Parquet, HDF5, MATLAB or NumPy.",
+            help="Log with time, voltage and displacement: text (.gz too), LabVIEW, TDMS, Parquet, HDF5, "
+            "MATLAB, NumPy or a spreadsheet; or the word example, for a recording that comes with piezoest.",
         ),
     ],
     reading: Reading,
@@ -117,7 +118,7 @@ def identify(
             say(f"reading {file.name}")
             read: Any = records.stream_record if reading.stream else records.read_record
             record = read(
-                file,
+                records.example_log() if str(file) == "example" and not file.exists() else file,
                 columns=_pairs("--columns", "voltage=u,displacement=3", reading.columns),
                 units=_pairs("--units", "voltage=mV,displacement=nm", reading.units),
                 sample_rate=reading.sample_rate,

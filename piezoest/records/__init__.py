@@ -1,5 +1,7 @@
-"""Recorded logs in and out: CSV, Parquet, HDF5, MATLAB and NumPy files of time, voltage, displacement."""
+"""Recorded logs in and out: text, LabVIEW, TDMS, Parquet, HDF5, MATLAB, NumPy, spreadsheets, DataFrames."""
 
+from piezoest.records.as_record import as_record
+from piezoest.records.example_log import example_log
 from piezoest.records.record import Record, read_record, read_reference
 from piezoest.records.stream import Block, RecordStream, stream_record
 from piezoest.records.writing import write_columns, writer_for
@@ -8,6 +10,8 @@ __all__ = [
     "Block",
     "Record",
     "RecordStream",
+    "as_record",
+    "example_log",
     "read_record",
     "read_reference",
     "stream_record",

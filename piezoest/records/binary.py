@@ -115,8 +115,11 @@ class Table:
         titles = leaves if len(set(leaves)) == len(leaves) else names
         return Source(
             self.path, names, with_units(titles, self.units if titles else ()), len(self.names), self.read,
-            whole=whole, sample_rate=self.sample_rate, check=self._check,
+            self._count, whole=whole, sample_rate=self.sample_rate, check=self._check,
         )  # fmt: skip
+
+    def _count(self, positions: Sequence[int]) -> int:
+        return self.columns[positions[0]][3]
 
     def _check(self, positions: Sequence[int]) -> None:
         lengths = {self.names[i]: self.columns[i][3] for i in positions}
@@ -136,7 +139,7 @@ class Table:
                     values.append(column(array[part]))
                 else:
                     values.append(column(array[part, place] if axis == 0 else array[place, part]))
-            yield Rows(row_numbers(start, values[0].size), values)
+            yield Rows(row_numbers(start, values[0].size), values, part.stop)
 
 
 # ---------------------------------------------------------------- NumPy
@@ -249,12 +252,15 @@ def open_parquet(path: Path) -> Source:
             try:
                 for batch in file.iter_batches(rows, columns=[names[i] for i in positions]):
                     values = [_parquet_column(pyarrow, batch.column(names[i]), i, origins) for i in positions]
-                    yield Rows(row_numbers(start, batch.num_rows), values)
                     start += batch.num_rows
+                    yield Rows(row_numbers(start - batch.num_rows, batch.num_rows), values, start)
             except (pyarrow.ArrowException, OSError, ValueError) as error:
                 raise ValueError(f"{path}: damaged behind row {start}: {shown(str(error), 200)}") from None
 
-    return Source(path, names, with_units(names, units), len(names), read, sample_rate=_rate(schema.metadata))
+    return Source(
+        path, names, with_units(names, units), len(names), read, lambda positions: int(contents.num_rows),
+        sample_rate=_rate(schema.metadata),
+    )  # fmt: skip
 
 
 def _is_numeric(types: Any, kind: Any) -> bool:

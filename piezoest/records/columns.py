@@ -12,7 +12,7 @@ from piezoest.records.source import Source, shown
 
 # Names by which logs call the quantities, in lower case; the unit stands beside them.
 NAMES = {
-    "time": ("time", "t", "timestamp", "seconds", "elapsed", "zeit"),
+    "time": ("time", "t", "timestamp", "time stamp", "datetime", "seconds", "elapsed", "zeit"),
     "voltage": ("voltage", "u", "v", "volt", "volts", "vin", "drive", "input", "control voltage", "spannung"),
     "displacement": (
         "displacement", "x", "y", "w", "disp", "position", "pos", "measured", "measurement", "output",
@@ -21,8 +21,8 @@ NAMES = {
     "reference": ("reference", "ref", "r", "setpoint", "target", "desired"),
 }  # fmt: skip
 UNITS = {
-    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "voltage": {"v": 1.0, "mv": 1e-3, "uv": 1e-6, "kv": 1e3},
+    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "seconds": 1.0},
+    "voltage": {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "kv": 1e3},
     "displacement": {"um": 1.0, "micron": 1.0, "microns": 1.0, "nm": 1e-3, "pm": 1e-6, "mm": 1e3, "m": 1e6},
 }
 UNITS["reference"] = UNITS["displacement"]
@@ -100,9 +100,16 @@ def _by_position(
 
 
 def _find(source: Source, quantity: str, name: str) -> int:
+    several = 0
     for candidates in (source.names, source.titles, [split_unit(title)[0] for title in source.titles]):
         if candidates.count(name) == 1:
             return candidates.index(name)
+        several = max(several, candidates.count(name))
+    if several:
+        raise ValueError(
+            f"{source.path}: {several} columns are called {name!r}: name the one for {quantity} by its "
+            f"number, from 1 to {source.width}"
+        )
     if name.isdigit() and 1 <= int(name) <= source.width:
         return int(name) - 1
     raise ValueError(f"{source.path}: no column {name!r} for {quantity}; there {_listed(source)}")

@@ -32,7 +32,7 @@ def open_hdf5(path: Path) -> Source:
             raise ValueError(f"{path}: damaged: {error}") from None
 
     return Source(
-        path, source.names, source.titles, source.width, read,
+        path, source.names, source.titles, source.width, read, source.count,
         sample_rate=source.sample_rate, check=source.check,
     )  # fmt: skip
 

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import importlib
+import zipfile
 from pathlib import Path
 
 from piezoest.records.source import Source
+from piezoest.records.text_lines import PACKED, beginning
 
-FORMATS: tuple[tuple[str, tuple[bytes, ...], tuple[str, ...]], ...] = (
-    ("parquet", (b"PAR1",), (".parquet", ".pq")),
-    ("hdf5", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), (".h5", ".hdf5", ".hdf", ".he5")),
-    ("mat", (b"MATLAB 5.0",), (".mat",)),
-    ("npy", (b"\x93NUMPY",), (".npy",)),
-    ("npz", (b"PK\x03\x04",), (".npz",)),
+# Name, what files begin with, endings of their names, and the function that opens them.
+FORMATS: tuple[tuple[str, tuple[bytes, ...], tuple[str, ...], str], ...] = (
+    ("Parquet", (b"PAR1",), (".parquet", ".pq"), "binary:open_parquet"),
+    ("HDF5", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), (".h5", ".hdf5", ".hdf", ".he5"), "hdf5:open_hdf5"),
+    ("MATLAB", (b"MATLAB 5.0",), (".mat",), "binary:open_mat"),
+    ("NumPy", (b"\x93NUMPY",), (".npy",), "binary:open_npy"),
+    ("TDMS", (b"TDSm",), (".tdms",), "tdms:open_tdms"),
+    (
+        "spreadsheet",
+        (b"PK\x03\x04", b"\xd0\xcf\x11\xe0"),
+        (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
+        "sheet:open_sheet",
+    ),
+    ("NumPy", (b"PK\x03\x04",), (".npz",), "binary:open_npz"),
+    ("LabVIEW", (b"LabVIEW Measurement", b"\xef\xbb\xbfLabVIEW Measurement"), (), "lvm:open_lvm"),
 )
-NAMES_OF_FORMATS = {"parquet": "Parquet", "hdf5": "HDF5", "npy": "NumPy", "npz": "NumPy"}
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat")
+TEXT = "text:open_text"
+# A file in the archive by which a spreadsheet is known.
+OF_SPREADSHEETS = frozenset({"xl/workbook.xml", "xl/workbook.bin", "content.xml"})
 
 
 def open_source(path: Path) -> Source:
@@ -30,36 +43,43 @@ def open_source(path: Path) -> Source:
     MissingExtraError
         If its format needs a package that is not installed.
     """
-    with path.open("rb") as file:
-        start = file.read(128)
+    start = beginning(path, 128)
     ending = path.suffix.lower()
     if not start.strip():
         raise ValueError(f"{path}: the file is empty")
-    for format_, beginnings, endings in FORMATS:
-        begins = start.startswith(beginnings)
-        if begins and (format_ != "npz" or ending not in TEXT_ENDINGS):
-            return _opener(format_)(path)
+    with path.open("rb") as file:
+        packed = file.read(2) == PACKED
+    for name, beginnings, endings, opener in FORMATS:
+        begins = start.startswith(beginnings) and _is_what_it_may_be(path, opener)
+        if begins and packed and name != "LabVIEW":
+            raise ValueError(f"{path}: a packed {name} file: unpack it first; only text is read packed")
+        if begins:
+            return _opened(opener, path)
         # Files of MATLAB before version 5 have no mark.
-        if ending in endings and not begins and format_ != "mat":
+        if ending in endings and name != "MATLAB":
             raise ValueError(
-                f"{path}: this is no {NAMES_OF_FORMATS[format_]} file, although its name ends in {ending}: "
+                f"{path}: this is no {name} file, although its name ends in {ending}: "
                 "it may be truncated, or of another format under a wrong name"
             )
-    return _opener("mat" if ending == ".mat" else "text")(path)
+    return _opened("binary:open_mat" if ending == ".mat" else TEXT, path)
 
 
-def _opener(format_: str) -> Callable[[Path], Source]:
-    """Function that opens a format; each pulls in what it needs only when it is called."""
-    if format_ == "text":
-        from piezoest.records.text import open_text
+def _is_what_it_may_be(path: Path, opener: str) -> bool:
+    """Whether an archive is a spreadsheet or NumPy's; true of all other formats."""
+    if opener not in ("sheet:open_sheet", "binary:open_npz"):
+        return True
+    names: frozenset[str] = frozenset()
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = frozenset(archive.namelist())
+    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
+        pass
+    if opener == "sheet:open_sheet":
+        return bool(names & OF_SPREADSHEETS) or path.suffix.lower() in (".xls", ".xlsx", ".xlsm", ".ods")
+    return path.suffix.lower() not in TEXT_ENDINGS
 
-        return open_text
-    from piezoest.records import binary, hdf5
 
-    return {
-        "parquet": binary.open_parquet,
-        "hdf5": hdf5.open_hdf5,
-        "mat": binary.open_mat,
-        "npy": binary.open_npy,
-        "npz": binary.open_npz,
-    }[format_]
+def _opened(opener: str, path: Path) -> Source:
+    """Source of a file; what a format needs is imported only now."""
+    module, _, function = opener.partition(":")
+    return getattr(importlib.import_module(f"piezoest.records.{module}"), function)(path)

@@ -11,6 +11,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, fraction, positive
 from piezoest.records.columns import choose
+from piezoest.records.frame import frame_source
 from piezoest.records.opening import open_source
 from piezoest.records.source import ROWS
 from piezoest.records.stream import FEWEST_ROWS, RecordStream, sane
@@ -88,6 +89,45 @@ class Record:
         time = np.arange(voltage.size) / positive("sample_rate", sample_rate)
         return cls(time, voltage, displacement, sample_rate, source)
 
+    @classmethod
+    def from_frame(
+        cls,
+        frame: Any,
+        columns: Mapping[str, str] | None = None,
+        units: Mapping[str, str] | None = None,
+        sample_rate: float | None = None,
+    ) -> Record:
+        """Make a record of a table of pandas or Polars.
+
+        Parameters
+        ----------
+        frame : pandas.DataFrame or polars.DataFrame
+            One row per sample. An index of pandas that holds times, or is named like time, is the column of
+            time.
+        columns, units : mapping of str to str, optional
+            As for `read_record`; the index is called by its name, or ``"index"``.
+        sample_rate : float, optional
+            [Hz], as for `read_record`.
+
+        Returns
+        -------
+        Record
+            In s, V and µm.
+
+        Raises
+        ------
+        ValueError
+            If `frame` is no such table, or as `read_record`.
+
+        Examples
+        --------
+        >>> frame = pd.DataFrame({"t_ms": np.arange(20.0), "u": np.arange(20.0), "x_nm": np.ones(20)})
+        >>> Record.from_frame(frame).sample_rate
+        1000.0
+        """
+        source = frame_source(frame)
+        return _record(RecordStream(source, columns=columns, units=units, sample_rate=sample_rate))
+
     def __len__(self) -> int:
         return int(self.time.size)
 
@@ -163,13 +203,16 @@ def read_record(
     units: Mapping[str, str] | None = None,
     sample_rate: float | None = None,
 ) -> Record:
-    """Read a log from a CSV, Parquet, HDF5, MATLAB or NumPy file.
+    """Read a log from a text, LabVIEW, TDMS, Parquet, HDF5, MATLAB, NumPy or spreadsheet file.
 
     Parameters
     ----------
     path : str or Path
         File with one row per sample; the format is recognised. In text files, delimiter (comma, semicolon,
-        tab, blank), decimal comma and header are recognised too, and lines that begin with # are comments.
+        tab, blank), decimal comma, separators of thousands, time stamps of ISO 8601 and header are
+        recognised too, lines that begin with # are comments, and gzip may have packed them (``.csv.gz``).
+        Of a spreadsheet the first sheet with a table of numbers is read, of LabVIEW's files and TDMS all
+        channels.
         Of HDF5 and MATLAB files every vector is a column, and so is every column of a matrix (``data:1``,
         ``data:2``) and every field of a structure (``log.u``).
     columns : mapping of str to str, optional
@@ -202,14 +245,17 @@ def read_record(
     ImportError
         If reading the format needs a package of the extra ``formats`` that is not installed.
     """
-    stream = RecordStream(path, columns=columns, units=units, sample_rate=sample_rate)
+    return _record(RecordStream(path, columns=columns, units=units, sample_rate=sample_rate))
+
+
+def _record(stream: RecordStream) -> Record:
     blocks = list(stream)
     time, voltage, displacement = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
     notes = list(stream.notes)
     if skipped := int(np.sum(~(np.isfinite(voltage) & np.isfinite(displacement)))):
         noun = "sample is" if skipped == 1 else "samples are"
         notes.append(f"{skipped} {noun} without usable numbers: skipped, the timing is kept")
-    return Record(time, voltage, displacement, stream.sample_rate, str(path), skipped, tuple(notes))
+    return Record(time, voltage, displacement, stream.sample_rate, str(stream.path), skipped, tuple(notes))
 
 
 def read_reference(

@@ -22,10 +22,21 @@ LONGEST_SHOWN = 60
 
 
 class Rows(NamedTuple):
-    """Some rows of the columns that were asked for, and the number of each row in its file."""
+    """Some rows of the columns that were asked for.
+
+    Parameters
+    ----------
+    numbers : ndarray of int64, shape (n,)
+        Number of each row in its file.
+    values : list of ndarray, shape (n,)
+        The columns.
+    done : int
+        Bytes or rows of the file that are read by then, see `Source`.
+    """
 
     numbers: np.ndarray[Any, np.dtype[np.int64]]
     values: list[FloatArray]
+    done: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +56,10 @@ class Source:
         Number of columns.
     read : callable
         ``read(positions, rows)`` yields blocks of at most so many rows of the columns at these positions.
+    count : callable
+        ``count(positions)`` is the number of rows of these columns.
+    size : int
+        Bytes of a file whose `Rows.done` counts bytes; 0 where it counts rows.
     place : str
         What the file calls a row: ``"line"`` or ``"row"``.
     whole : str
@@ -60,6 +75,8 @@ class Source:
     titles: list[str]
     width: int
     read: Callable[[Sequence[int], int], Iterator[Rows]]
+    count: Callable[[Sequence[int]], int]
+    size: int = 0
     place: str = "row"
     whole: str = ""
     sample_rate: float | None = None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import itertools
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +16,9 @@ from piezoest.records.source import ROWS, Rows, Source
 from piezoest.records.timing import Timing, placed, scan
 
 FEWEST_ROWS = 10
+
+# Called with how much is done, and of how much.
+Progress = Callable[[int, int], object]
 
 
 class Block(NamedTuple):
@@ -41,14 +45,16 @@ class RecordStream:
 
     Parameters
     ----------
-    path : str or Path
-        As for `read_record`.
+    path : str, Path or Source
+        As for `read_record`, or what is open already.
     columns, units : mapping of str to str, optional
         As for `read_record`.
     sample_rate : float, optional
         [Hz], as for `read_record`.
     rows : int
-        Rows of the file that are read at a time, at least 1; a block has about as many samples.
+        Rows of the file that are read at a time, at least 1; a block has at most about as many samples.
+    progress : callable, optional
+        As for `stream_record`.
 
     Raises
     ------
@@ -67,16 +73,17 @@ class RecordStream:
 
     def __init__(
         self,
-        path: str | Path,
+        path: str | Path | Source,
         *,
         columns: Mapping[str, str] | None = None,
         units: Mapping[str, str] | None = None,
         sample_rate: float | None = None,
         rows: int = ROWS,
+        progress: Progress | None = None,
     ) -> None:
         named, stated = dict(columns or {}), dict(units or {})
         self._rows = integer("rows", rows, 1)
-        self._source = source = open_source(Path(path))
+        self._source = source = path if isinstance(path, Source) else open_source(Path(path))
         notes = []
         if sample_rate is None and "time" not in named and _states_its_rate(source):
             sample_rate = source.sample_rate
@@ -86,7 +93,7 @@ class RecordStream:
         source.check([column.position for column in self._chosen.values()])
         self._timing = None
         if sample_rate is None:
-            self._timing = _scan(source, self._chosen["time"])
+            self._timing = _scan(source, self._chosen["time"], progress)
             self.sample_rate = self._timing.sample_rate
         else:
             self.sample_rate = positive("sample_rate", sample_rate)
@@ -106,15 +113,43 @@ class RecordStream:
         return self._source.whole
 
     def count(self) -> int:
-        """Return the number of samples; without a column of time this reads the file once."""
+        """Return the number of samples; of text without a column of time, its lines are counted."""
         if self._timing is not None:
             return self._timing.samples
-        return sum(block.voltage.size for block in self)
+        return self._source.count([column.position for column in self._chosen.values()])
 
     def __iter__(self) -> Iterator[Block]:
         """Yield the log in blocks, from its start."""
+        return self.blocks()
+
+    def blocks(self, progress: Progress | None = None) -> Iterator[Block]:
+        """Yield the log in blocks, from its start, and say how far it is read.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            ``progress(done, total)`` is called after each block, in bytes of a text file, in rows of any
+            other; at the end `done` is `total`.
+
+        Yields
+        ------
+        Block
+            Time [s], voltage [V] and displacement [µm], shape (n,).
+
+        Raises
+        ------
+        ValueError
+            If there is text in numbers, or there are too few rows.
+
+        Examples
+        --------
+        >>> log = pz.stream_record(pz.records.example_log())
+        >>> for block in log.blocks(progress=lambda done, total: print(f"{done / total:.0%}")):
+        ...     pass
+        100%
+        """
         first = usable = 0
-        for voltage, displacement in self._samples():
+        for voltage, displacement in self._samples(progress):
             voltage, displacement = sane(voltage), sane(displacement)
             time = (
                 np.arange(first, first + voltage.size) / self.sample_rate
@@ -127,9 +162,9 @@ class RecordStream:
         if usable < FEWEST_ROWS:
             raise ValueError(f"{self.path}: only {usable} usable rows, at least {FEWEST_ROWS} are needed")
 
-    def _samples(self) -> Iterator[list[FloatArray]]:
+    def _samples(self, progress: Progress | None) -> Iterator[list[FloatArray]]:
         columns = list(self._chosen.values())
-        blocks = _converted(self._source, columns, self._rows)
+        blocks = _converted(self._source, columns, self._rows, progress)
         if self._timing is None:
             yield from (values for _, values in blocks)
         else:
@@ -143,6 +178,7 @@ def stream_record(
     units: Mapping[str, str] | None = None,
     sample_rate: float | None = None,
     rows: int = ROWS,
+    progress: Progress | None = None,
 ) -> RecordStream:
     """Open a log that may be larger than memory, to be read in blocks.
 
@@ -158,14 +194,17 @@ def stream_record(
     Parameters
     ----------
     path : str or Path
-        As for `read_record`. CSV, HDF5, MATLAB 7.3, Parquet and ``.npy`` are read in parts; ``.npz`` and
-        older ``.mat`` files are refused.
+        As for `read_record`. Text, LabVIEW text, TDMS, HDF5, MATLAB 7.3, Parquet and ``.npy`` are read in
+        parts; spreadsheets, ``.npz`` and older ``.mat`` files are refused.
     columns, units : mapping of str to str, optional
         As for `read_record`.
     sample_rate : float, optional
         [Hz], as for `read_record`. Without it the column of time is read twice before the first block.
     rows : int
         Rows of the file that are read at a time, at least 1.
+    progress : callable, optional
+        ``progress(done, total)`` is called while the column of time is read, as by `RecordStream.blocks`
+        while the blocks are.
 
     Returns
     -------
@@ -179,7 +218,9 @@ def stream_record(
     ValueError
         As `read_record`; also if the format cannot be read in parts.
     """
-    stream = RecordStream(path, columns=columns, units=units, sample_rate=sample_rate, rows=rows)
+    stream = RecordStream(
+        path, columns=columns, units=units, sample_rate=sample_rate, rows=rows, progress=progress
+    )
     if stream.whole:
         raise ValueError(
             f"{path}: cannot be streamed: {stream.whole}; or use read_record, if it fits in memory"
@@ -193,17 +234,33 @@ def _states_its_rate(source: Source) -> bool:
     return not has_column(source, "time") if source.titles else source.width == 2
 
 
-def _scan(source: Source, column: Column) -> Timing:
+def _scan(source: Source, column: Column, progress: Progress | None) -> Timing:
+    passes = itertools.count()
+
     def times() -> Iterator[tuple[object, FloatArray]]:
-        return ((rows.numbers, values[0]) for rows, values in _converted(source, [column], ROWS))
+        before = next(passes)
+
+        def both(done: int, total: int) -> None:
+            if progress is not None:
+                progress(before * total + done, 2 * total)
+
+        return ((rows.numbers, values[0]) for rows, values in _converted(source, [column], ROWS, both))
 
     return scan(str(source.path), source.place, times)
 
 
-def _converted(source: Source, columns: list[Column], rows: int) -> Iterator[tuple[Rows, list[FloatArray]]]:
+def _converted(
+    source: Source, columns: list[Column], rows: int, progress: Progress | None
+) -> Iterator[tuple[Rows, list[FloatArray]]]:
     """Blocks of columns in s, V and µm."""
-    for block in source.read([column.position for column in columns], rows):
+    positions = [column.position for column in columns]
+    total = source.size or source.count(positions)
+    for block in source.read(positions, rows):
         yield block, [column.factor * values for column, values in zip(columns, block.values, strict=True)]
+        if progress is not None and block.done < total:
+            progress(block.done, total)
+    if progress is not None:
+        progress(total, total)
 
 
 def _notes(source: Source, chosen: dict[str, Column]) -> list[str]:

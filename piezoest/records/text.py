@@ -1,202 +1,194 @@
-"""Columns of a text file: encoding, delimiter, decimal comma, header and blank lines are recognised."""
+"""Columns of a text file, in blocks: by the readers of Arrow or NumPy where they can, else cell by cell."""
 
 from __future__ import annotations
 
-import codecs
-import csv
-import itertools
+import functools
+import importlib.util
+import io
 import math
-from collections.abc import Iterator, Sequence
-from functools import partial
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO
+from typing import Any
 
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.records.columns import split_unit
 from piezoest.records.source import Rows, Source, shown
+from piezoest.records.text_cells import MISSING, number, seconds, stamp
+from piezoest.records.text_layout import Layout, layout_of, split
+from piezoest.records.text_lines import Lines, sample_lines
 
-MOST_BLANK = 0.1
-MISSING = frozenset({"", "nan", "-", "--", "na", "n/a", "#n/a", "null", "none", "missing"})
-# What the layout of a file is recognised by: bytes for the encoding, lines for the rest.
-HEAD_BYTES, HEAD_LINES = 1 << 16, 10_000
-# Characters of a line; more are no row of a log, and would fill the memory.
-LONGEST_LINE = 1 << 20
-# Characters that no text has, unless as UTF-16.
-CONTROL = frozenset(range(32)) - frozenset(b"\t\n\v\f\r\x1a\x1b")
-UTF_16 = (b"\xff\xfe", b"\xfe\xff")
-
-
-class _Layout(NamedTuple):
-    """How the file is written."""
-
-    path: Path
-    encoding: str
-    delimiter: str
-    header: list[str]
-    width: int
-    begins: int  # number of the first line with numbers
-    skip_blank: bool  # whether blank lines are the way it is written, and not samples that were lost
+# Below this size [bytes], Arrow takes longer to load than it saves.
+WORTH_ARROW = 1 << 23
+# One block of Arrow's must hold a whole one of ours; bytes beside characters that take several.
+ARROW_ROOM = 1 << 20
+ARROW_MISSING = sorted(MISSING | {word.upper() for word in MISSING} | {"NaN", "None", "Null"})
 
 
 def open_text(path: Path) -> Source:
     """Open a text file with one row per sample; ValueError if it is none."""
-    layout = _layout(path)
+    layout = layout_of(path)
+
+    def lines(rows: int) -> Iterator[Lines]:
+        return sample_lines(path, layout.encoding, layout.begins, layout.skip_blank, rows)
 
     def read(positions: Sequence[int], rows: int) -> Iterator[Rows]:
-        lines = _lines(layout)
-        while block := list(itertools.islice(lines, rows)):
-            numbers = np.fromiter((number for number, _ in block), np.int64, len(block))
-            yield Rows(numbers, _values(layout, numbers, [line for _, line in block], positions))
+        return read_lines(layout, lines(rows), positions, rows)
 
-    return Source(path, layout.header, layout.header, layout.width, read, place="line")
+    def count(positions: Sequence[int]) -> int:
+        return sum(block.numbers.size for block in lines(1 << 20))
 
-
-def _layout(path: Path) -> _Layout:
-    encoding = _encoding(path)
-    with path.open(encoding=encoding, errors="replace") as file:
-        head = [
-            (number, line)
-            for number, line in itertools.islice(_numbered(path, file), HEAD_LINES)
-            if not line.lstrip().startswith("#")
-        ]
-    filled = [(number, line) for number, line in head if line.strip()]
-    if not filled:
-        raise ValueError(f"{path}: the file is empty")
-    # A few blank lines are samples that were lost; many are the way the file is written.
-    between = sum(filled[0][0] < number < filled[-1][0] for number, line in head if not line.strip())
-    delimiter = next((mark for mark in ";\t,|" if mark in filled[0][1]), " ")
-    first = _split(path, [_decimal(filled[0][1], delimiter)], delimiter)[0]
-    header = [] if all(_is_number(cell) for cell in first) else [cell.strip() for cell in first]
-    if header and len(filled) == 1:
-        raise ValueError(f"{path}: no rows below the header")
-    begins = filled[1][0] if header else filled[0][0]
-    return _Layout(path, encoding, delimiter, header, len(first), begins, between > MOST_BLANK * len(filled))
+    # Time stamps come out in seconds, whatever the header says.
+    titles = [
+        f"{split_unit(name)[0]} [s]" if i in layout.stamps else name for i, name in enumerate(layout.header)
+    ]
+    size = path.stat().st_size
+    return Source(path, layout.header, titles, layout.width, read, count, size, place="line")
 
 
-def _encoding(path: Path) -> str:
-    with path.open("rb") as file:
-        raw = file.read(HEAD_BYTES)
-    if raw.startswith(UTF_16):
-        return "utf-16"
-    if CONTROL.intersection(raw[:4096]):
-        raise ValueError(
-            f"{path}: this is not a text file: save the log as CSV, or name it by its format "
-            "(.mat, .h5, .parquet, .npy, .npz)"
-        )
-    try:
-        # The last character may be cut in two.
-        codecs.getincrementaldecoder("utf-8")().decode(raw)
-    except UnicodeDecodeError:
-        return "latin-1"
-    return "utf-8-sig"
+def read_lines(
+    layout: Layout, blocks: Iterable[Lines], positions: Sequence[int], rows: int
+) -> Iterator[Rows]:
+    """Columns at these positions, in blocks of at most so many rows."""
+    values_of = Reader(layout, positions).values
+    for block in blocks:
+        values = values_of(block)
+        for start in range(0, block.numbers.size, rows):
+            part = slice(start, start + rows)
+            yield Rows(block.numbers[part], [each[part] for each in values], block.done)
 
 
-def _lines(layout: _Layout) -> Iterator[tuple[int, str]]:
-    """Lines with samples and their numbers; a blank one is a sample if another follows it."""
-    blank: list[tuple[int, str]] = []
-    with layout.path.open(encoding=layout.encoding, errors="replace") as file:
-        for number, line in _numbered(layout.path, file):
-            if number < layout.begins or line.lstrip().startswith("#"):
+class Reader:
+    """Reads columns of one file, block after block.
+
+    Parameters
+    ----------
+    layout : Layout
+        How the file is written.
+    positions : sequence of int
+        Columns that are wanted.
+    """
+
+    def __init__(self, layout: Layout, positions: Sequence[int]) -> None:
+        self._layout, self._positions = layout, positions
+        self._origins: dict[int, int] = {}
+        self._stamped = layout.stamps.intersection(positions)
+        arrow = importlib.util.find_spec("pyarrow") and layout.delimiter != " "
+        self._arrow = bool(arrow and layout.path.stat().st_size >= WORTH_ARROW)
+
+    def values(self, block: Lines) -> list[FloatArray]:
+        """Columns of a block; ValueError that names line and column if a cell holds something else."""
+        text = self._with_points(block.text)
+        if text is not None:
+            for reader in (self._by_arrow, self._by_numpy):
+                if (found := reader(text, block.numbers.size)) is not None:
+                    return found
+        lines = block.text.split("\n")
+        cells = split(self._layout.path, lines, self._layout.delimiter)
+        self._check_width(block.numbers, cells)
+        return [self._by_cells(block.numbers, cells, position) for position in self._positions]
+
+    def _with_points(self, text: str) -> str | None:
+        """The text with decimal points; None if cells have to be looked at one by one."""
+        style, delimiter = self._layout.style, self._layout.delimiter
+        if style.thousands:
+            return None
+        if delimiter == ",":
+            return text if "." in style.decimal else None
+        if style.decimal == ",":
+            return None if "." in text else text.replace(",", ".")
+        return text.replace(",", ".") if "," in style.decimal else text
+
+    def _by_arrow(self, text: str, count: int) -> list[FloatArray] | None:
+        if not self._arrow:
+            return None
+        import pyarrow
+        from pyarrow import csv
+
+        names = [str(i) for i in range(self._layout.width)]
+        wanted = [names[i] for i in self._positions]
+        for zone in (None, "UTC") if self._stamped else (None,):
+            times = pyarrow.timestamp("ns", zone)
+            kinds = [times if i in self._stamped else pyarrow.float64() for i in self._positions]
+            try:
+                table = csv.read_csv(
+                    io.BytesIO(text.encode()),
+                    csv.ReadOptions(column_names=names, use_threads=False, block_size=len(text) + ARROW_ROOM),
+                    csv.ParseOptions(delimiter=self._layout.delimiter, ignore_empty_lines=False),
+                    csv.ConvertOptions(
+                        include_columns=wanted,
+                        column_types=dict(zip(wanted, kinds, strict=True)),
+                        null_values=ARROW_MISSING,
+                    ),
+                )
+            except pyarrow.ArrowException:
                 continue
-            if not line.strip():
-                if not layout.skip_blank:
-                    blank.append((number, ""))
-                continue
-            yield from blank
-            blank.clear()
-            yield number, _decimal(line.rstrip("\r\n"), layout.delimiter)
-
-
-def _numbered(path: Path, file: TextIO) -> Iterator[tuple[int, str]]:
-    """Lines and their numbers from 1."""
-    for number, line in enumerate(iter(partial(file.readline, LONGEST_LINE), ""), 1):
-        if len(line) == LONGEST_LINE:
-            raise ValueError(f"{path}, line {number}: more than {LONGEST_LINE} characters: this is no log")
-        yield number, line
-
-
-def _decimal(line: str, delimiter: str) -> str:
-    """A decimal comma as a point; in a header it would only be part of a name."""
-    return line if delimiter == "," else line.replace(",", ".")
-
-
-def _split(path: Path, lines: list[str], delimiter: str) -> list[list[str]]:
-    if delimiter == " ":
-        return [line.split() for line in lines]
-    try:
-        rows = list(csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=False))
-    except csv.Error as error:
-        raise ValueError(f"{path}: cannot be read as a table: {error}") from None
-    if len(rows) != len(lines) or (len(lines) == 1 and lines[0].count('"') % 2):
-        raise ValueError(f"{path}: a quotation mark is left open")
-    return rows
-
-
-def _values(
-    layout: _Layout, numbers: np.ndarray[Any, Any], lines: list[str], positions: Sequence[int]
-) -> list[FloatArray]:
-    fast = _plain_numbers(layout, lines, positions)
-    if fast is not None:
-        return fast
-    rows = _split(layout.path, lines, layout.delimiter)
-    for number, row in zip(numbers, rows, strict=True):
-        if len(row) > layout.width and any(cell.strip() for cell in row[layout.width :]):
-            raise ValueError(
-                f"{layout.path}, line {number}: {len(row)} fields, where the first row has {layout.width}"
-            )
-    return [_numbers(layout, numbers, rows, position) for position in positions]
-
-
-def _plain_numbers(layout: _Layout, lines: list[str], positions: Sequence[int]) -> list[FloatArray] | None:
-    """The same, several times faster, where every field is there and holds a number; else None."""
-    blanks = layout.delimiter == " "
-    text = "".join(lines)
-    if '"' in text or not (blanks or text.count(layout.delimiter) == (layout.width - 1) * len(lines)):
+            if table.num_rows == count:
+                return [self._of_arrow(table.column(str(i)).to_numpy(), i) for i in self._positions]
         return None
-    try:
-        values = np.loadtxt(
-            lines,
-            delimiter=None if blanks else layout.delimiter,
-            usecols=None if blanks else positions,
-            comments=None,
-            ndmin=2,
-        )
-    except ValueError:
-        return None
-    if len(values) != len(lines) or (blanks and values.shape[1] != layout.width):
-        return None
-    values[~np.isfinite(values)] = np.nan
-    return [values[:, position].copy() for position in (positions if blanks else range(len(positions)))]
 
+    def _of_arrow(self, values: Any, position: int) -> FloatArray:
+        if position in self._stamped:
+            return seconds(values, self._origins, position)
+        return _finite(values.astype(np.float64))
 
-def _is_number(cell: str) -> bool:
-    text = cell.strip().lower()
-    if text in MISSING:
-        return True
-    try:
-        float(text.replace(",", "."))
-    except ValueError:
-        return False
-    return True
-
-
-def _numbers(
-    layout: _Layout, numbers: np.ndarray[Any, Any], rows: list[list[str]], position: int
-) -> FloatArray:
-    values = np.full(len(rows), np.nan)
-    for k, row in enumerate(rows):
-        cell = row[position].strip() if position < len(row) else ""
+    def _by_numpy(self, text: str, count: int) -> list[FloatArray] | None:
+        """As `_by_arrow`, where every field is there and holds a number."""
+        layout, blanks = self._layout, self._layout.delimiter == " "
+        complete = blanks or text.count(layout.delimiter) == (layout.width - 1) * count
+        if self._stamped or '"' in text or not complete:
+            return None
         try:
-            value = float(cell)
+            values = np.loadtxt(
+                text.split("\n"),
+                delimiter=None if blanks else layout.delimiter,
+                usecols=None if blanks else self._positions,
+                comments=None,
+                ndmin=2,
+            )
         except ValueError:
-            if cell.lower() not in MISSING:
-                title = layout.header[position] if layout.header else str(position + 1)
+            return None
+        if len(values) != count or (blanks and values.shape[1] != layout.width):
+            return None
+        places = self._positions if blanks else range(len(self._positions))
+        return [_finite(values[:, place].copy()) for place in places]
+
+    def _check_width(self, numbers: np.ndarray[Any, Any], cells: list[list[str]]) -> None:
+        width = self._layout.width
+        for line, row in zip(numbers, cells, strict=True):
+            if len(row) > width and any(cell.strip() for cell in row[width:]):
                 raise ValueError(
-                    f"{layout.path}, line {numbers[k]}, column {shown(title)!r}: {shown(cell)!r} is "
-                    "not a number"
-                ) from None
-            continue
-        if math.isfinite(value):
-            values[k] = value
+                    f"{self._layout.path}, line {line}: {len(row)} fields, where the first row has {width}"
+                )
+
+    def _by_cells(self, numbers: np.ndarray[Any, Any], cells: list[list[str]], position: int) -> FloatArray:
+        layout, stamped = self._layout, position in self._stamped
+        values = np.full(len(cells), np.nan)
+        ticks = np.full(len(cells), np.datetime64("NaT"), "datetime64[ns]")
+        read = stamp if stamped else functools.partial(number, style=layout.style)
+        for k, row in enumerate(cells):
+            cell = row[position].strip() if position < len(row) else ""
+            try:
+                value = read(cell)
+            except ValueError:
+                if cell.lower() not in MISSING:
+                    title = layout.header[position] if layout.header else str(position + 1)
+                    what = "a time stamp such as 2026-11-22 10:00:00.005" if stamped else "a number"
+                    raise ValueError(
+                        f"{layout.path}, line {numbers[k]}, column {shown(title)!r}: {shown(cell)!r} is "
+                        f"not {what}"
+                    ) from None
+                continue
+            if value is None:
+                continue
+            if stamped:
+                ticks[k] = np.datetime64(int(value), "ns")
+            elif math.isfinite(value):
+                values[k] = value
+        return seconds(ticks, self._origins, position) if stamped else values
+
+
+def _finite(values: FloatArray) -> FloatArray:
+    values[~np.isfinite(values)] = np.nan
     return values

@@ -13,7 +13,7 @@ from piezoest import _extras
 from piezoest._checks import FloatArray, array_1d
 from piezoest._files import replacing
 from piezoest.records.binary import EXTRA
-from piezoest.records.opening import FORMATS, TEXT_ENDINGS
+from piezoest.records.opening import TEXT_ENDINGS
 
 Columns = Mapping[str, FloatArray]
 
@@ -28,7 +28,7 @@ def write_columns(path: str | Path, columns: Mapping[str, Any], *, allow_nan: bo
         with a header, to nine significant digits and time to twelve; ``.parquet``, ``.h5``, ``.mat`` (of
         version 5, which every MATLAB reads), ``.npy`` (named fields) and ``.npz`` hold every bit.
     columns : mapping of str to array_like, each of shape (N,)
-        Names and values.
+        Names, which end in the unit, and values: ``time_s``, ``voltage_V``.
     allow_nan : bool
         Whether values may be NaN or infinite. A voltage for a stage may not.
 
@@ -73,19 +73,19 @@ def writer_for(path: str | Path) -> Callable[[Path, Columns], None]:
         If the format needs a package that is not installed.
     """
     ending = Path(path).suffix.lower()
-    formats = {each: name for name, _, endings in FORMATS for each in endings}
-    formats |= dict.fromkeys(TEXT_ENDINGS, "text")
+    writers = {each: writer for endings, writer in WRITERS.items() for each in endings}
     if not ending:  # such as /dev/stdout
         return _write_text
-    if ending not in formats:
+    if ending not in writers:
         raise ValueError(
-            f"{path}: the ending of its name stands for no format: use one of {', '.join(formats)}"
+            f"{path}: the ending of its name stands for no format that is written: use one of "
+            f"{', '.join(writers)}"
         )
-    if formats[ending] == "parquet":
+    if writers[ending] is _write_parquet:
         _extras.load("pyarrow.parquet", EXTRA, "writing Parquet")
-    if formats[ending] == "hdf5":
+    if writers[ending] is _write_hdf5:
         _extras.load("h5py", EXTRA, "writing HDF5")
-    return WRITERS[formats[ending]]
+    return writers[ending]
 
 
 def _write_text(path: Path, columns: Columns) -> None:
@@ -141,11 +141,11 @@ def _write_npz(path: Path, columns: Columns) -> None:
         np.savez(file, **arrays)
 
 
-WRITERS: dict[str, Callable[[Path, Columns], None]] = {
-    "text": _write_text,
-    "parquet": _write_parquet,
-    "hdf5": _write_hdf5,
-    "mat": _write_mat,
-    "npy": _write_npy,
-    "npz": _write_npz,
+WRITERS: dict[tuple[str, ...], Callable[[Path, Columns], None]] = {
+    (".parquet", ".pq"): _write_parquet,
+    (".h5", ".hdf5", ".hdf", ".he5"): _write_hdf5,
+    (".mat",): _write_mat,
+    (".npy",): _write_npy,
+    (".npz",): _write_npz,
+    TEXT_ENDINGS: _write_text,
 }

@@ -1,0 +1,219 @@
+"""LabVIEW's logs: .lvm with its headers, and TDMS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from piezoest.records import Record, read_record, stream_record, text
+
+N = 60
+RATE = 1000.0
+TIME = np.arange(N) / RATE
+VOLTAGE = np.round(10.0 * np.sin(0.5 * np.arange(N)), 6)
+DISPLACEMENT = np.round(1.5 * VOLTAGE + 3.0, 6)
+FILE_HEADER = """LabVIEW Measurement\t
+Writer_Version\t2
+Reader_Version\t2
+Separator\t{name}
+Decimal_Separator\t{decimal}
+Multi_Headings\tYes
+X_Columns\t{x_columns}
+Time_Pref\tRelative
+Operator\tAda
+Date\t2026/11/22
+Time\t10:00:00,0
+***Start_Special***
+Channels\t99
+***End_Special***
+***End_of_Header***\t
+"""
+SEGMENT = """\t
+Channels\t2\t\t
+Samples\t{samples}\t{samples}\t
+Date\t2026/11/22\t2026/11/22\t
+Time\t10:00:{second:012.9f}\t10:00:{second:012.9f}\t
+Y_Unit_Label\tVolts\tum\t
+X_Dimension\tTime\tTime\t
+X0\t{x_0}\t{x_0}\t
+Delta_X\t0.001\t{second_step}\t
+***End_of_Header***\t\t\t
+{names}
+"""
+
+
+def lvm(
+    path: Path,
+    segments: tuple[tuple[slice, float, float], ...] = ((slice(0, N), 0.0, 0.0),),
+    *,
+    decimal: str = ".",
+    separator: str = "\t",
+    x_columns: str = "One",
+    names: str = "X_Value\tDrive\tPosition\tComment",
+    second_step: str = "0.001",
+    dated: bool = True,
+) -> Path:
+    """Write a .lvm file of segments: rows, X of the first row, seconds of the clock."""
+    word = {"\t": "Tab", ";": "Semicolon"}[separator]
+    content = FILE_HEADER.format(name=word, decimal=decimal, x_columns=x_columns)
+    for part, x_0, second in segments:
+        count = len(range(N)[part])
+        content += SEGMENT.format(samples=count, second=second, x_0=x_0, names=names, second_step=second_step)
+        for k, (u, x) in enumerate(zip(VOLTAGE[part], DISPLACEMENT[part], strict=True)):
+            t = f"{x_0 + k / RATE:.6f}"
+            row = {"No": ["", f"{u:.6f}", f"{x:.6f}"], "Multi": [t, f"{u:.6f}", t, f"{x:.6f}"]}
+            cells = row.get(x_columns, [t, f"{u:.6f}", f"{x:.6f}"])
+            content += "\t".join(cells) + ("\tbegins" if k == 0 and "Comment" in names else "") + "\n"
+    if not dated:
+        content = "\n".join(line for line in content.split("\n") if not line.startswith(("Date", "Time\t")))
+    path.write_text(content.replace(".", decimal).replace("\t", separator), encoding="utf-8")
+    return path
+
+
+def check(record: Record) -> None:
+    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
+    np.testing.assert_array_equal(record.voltage, VOLTAGE)
+    np.testing.assert_array_equal(record.displacement, DISPLACEMENT)
+    assert record.sample_rate == pytest.approx(RATE)
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+@pytest.mark.parametrize("separator", ["\t", ";"])
+@pytest.mark.parametrize("x_columns", ["One", "No", "Multi"])
+@pytest.mark.parametrize("ending", ["lvm", "txt"])
+def test_lvm(tmp_path: Path, decimal: str, separator: str, x_columns: str, ending: str) -> None:
+    names = "X_Value\tDrive\tX_Value\tPosition\tComment" if x_columns == "Multi" else None
+    more = {} if names is None else {"names": names}
+    file = lvm(tmp_path / f"log.{ending}", decimal=decimal, separator=separator, x_columns=x_columns, **more)  # type: ignore[arg-type]
+    record = read_record(file)
+    check(record)
+    assert record.notes == ()
+
+
+PARTS = (slice(0, 20), slice(20, 45), slice(45, N))
+
+
+@pytest.mark.parametrize("rows", [1, 7, 1000])
+@pytest.mark.parametrize(
+    "starts",
+    [
+        [(0.0, 0.0), (0.020, 0.0), (0.045, 0.0)],  # time goes on
+        [(0.0, 0.0), (0.0, 0.020), (0.0, 0.045)],  # time begins anew, the clock says when
+    ],
+)
+@pytest.mark.parametrize("x_columns", ["One", "No"])
+@pytest.mark.parametrize("arrow", [False, True])
+def test_lvm_of_several_segments(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    starts: list[tuple[float, float]],
+    rows: int,
+    x_columns: str,
+    arrow: bool,
+) -> None:
+    monkeypatch.setattr(text, "WORTH_ARROW", 0 if arrow else 1 << 60)
+    segments = tuple((part, *start) for part, start in zip(PARTS, starts, strict=True))
+    file = lvm(tmp_path / "log.lvm", segments, x_columns=x_columns)
+    check(read_record(file))
+    stream = stream_record(file, rows=rows)
+    np.testing.assert_array_equal(np.concatenate([block.voltage for block in stream]), VOLTAGE)
+    assert stream.count() == N
+    assert stream_record(file, sample_rate=RATE).count() == N
+
+
+def test_a_gap_between_segments_stays(tmp_path: Path) -> None:
+    file = lvm(tmp_path / "log.lvm", ((PARTS[0], 0.0, 0.0), (slice(22, N), 0.0, 0.022)))
+    record = read_record(file)
+    assert np.flatnonzero(~record.usable).tolist() == [20, 21]
+    np.testing.assert_array_equal(record.voltage[22:], VOLTAGE[22:])
+
+
+def test_lvm_that_is_refused(tmp_path: Path) -> None:
+    anew = tuple((part, 0.0, 0.0) for part in PARTS)
+    file = lvm(tmp_path / "log.lvm", anew, dated=False)
+    with pytest.raises(ValueError, match=r"line \d+: time begins anew with this segment"):
+        read_record(file)
+    assert len(read_record(file, sample_rate=RATE)) == N
+    with pytest.raises(ValueError, match="sampled at different rates"):
+        read_record(lvm(file, second_step="0.002"))
+    content = lvm(file, anew[:2]).read_text()
+    at = content.rindex("Position")
+    file.write_text(content[:at] + "Force" + content[at + len("Position") :])
+    with pytest.raises(ValueError, match="other columns than the first"):
+        read_record(file)
+    file.write_text(content[: content.index("X_Value")])
+    with pytest.raises(ValueError, match=r"log\.lvm: no rows below the header"):
+        read_record(file)
+    lvm(file, names="X_Value\tUntitled\tUntitled 1\tComment")
+    # Both are named by nothing but their units, which is enough.
+    check(read_record(file))
+    file.write_text(file.read_text().replace("Y_Unit_Label\tVolts\tum", "Y_Unit_Label\tVolts\tVolts"))
+    with pytest.raises(
+        ValueError, match=r"no column for displacement .* X_Value, Untitled, Untitled 1:|could all"
+    ):
+        read_record(file)
+    named = {"voltage": "Untitled", "displacement": "Untitled 1"}
+    check(read_record(file, columns=named, units={"displacement": "1 um"}))
+    file.write_text(file.read_text().replace("-", "minus ", 1))
+    with pytest.raises(ValueError, match=r"line \d+, column 'Untitled.*': 'minus .* is not a number"):
+        read_record(file, columns=named, units={"displacement": "1 um"})
+
+
+# ---------------------------------------------------------------- TDMS
+
+
+def tdms(path: Path, **changes: object) -> Path:
+    """Write a file of two segments; `changes` are properties of the second channel."""
+    nptdms = pytest.importorskip("nptdms")
+    waveform = {"wf_increment": 1.0 / RATE}
+    with nptdms.TdmsWriter(str(path)) as writer:
+        for part in (slice(0, 20), slice(20, N)):
+            u = nptdms.ChannelObject("run", "drive", 1e3 * VOLTAGE[part], {**waveform, "unit_string": "mV"})
+            x = nptdms.ChannelObject(
+                "run", "gauge", DISPLACEMENT[part], {**waveform, "unit_string": "um", **changes}
+            )
+            words = nptdms.ChannelObject("notes", "words", ["a", "b"])
+            writer.write_segment([u, x, words])
+    return path
+
+
+def test_tdms(tmp_path: Path) -> None:
+    file = tdms(tmp_path / "log.tdms")
+    record = read_record(file)
+    np.testing.assert_allclose(record.voltage, VOLTAGE, atol=1e-12)
+    np.testing.assert_array_equal(record.displacement, DISPLACEMENT)
+    np.testing.assert_allclose(record.time, TIME, atol=1e-12)
+    assert record.notes[0] == "sample rate of 1000 Hz as the file states it"
+    with pytest.raises(ValueError, match="there are the columns run/drive, run/gauge"):
+        read_record(file, columns={"voltage": "nope"})
+    with pytest.raises(ValueError, match="no column for time"):
+        read_record(tdms(file, wf_increment=0.5))
+    assert read_record(file, sample_rate=50.0).sample_rate == 50.0
+
+
+def test_tdms_of_times_of_day_and_single_precision(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    stamps = np.datetime64("2026-11-22T10:00:00", "us") + (1e6 * TIME).round().astype("timedelta64[us]")
+    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
+        columns = {"time": stamps, "u": VOLTAGE.astype(np.float32), "x": np.arange(N, dtype=np.int16)}
+        writer.write_segment([nptdms.ChannelObject("run", name, values) for name, values in columns.items()])
+    record = read_record(tmp_path / "log.tdms")
+    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
+    np.testing.assert_array_equal(record.voltage, VOLTAGE.astype(np.float32))
+    np.testing.assert_array_equal(record.displacement, np.arange(N))
+    stream = stream_record(tmp_path / "log.tdms", rows=7)
+    assert [block.time.size for block in stream] == [7] * 8 + [4]
+
+
+def test_tdms_without_numbers_or_under_a_wrong_name(tmp_path: Path) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    file = tmp_path / "log.tdms"
+    with nptdms.TdmsWriter(str(file)) as writer:
+        writer.write_segment([nptdms.ChannelObject("notes", "words", ["a", "b"])])
+    with pytest.raises(ValueError, match="no arrays of numbers"):
+        read_record(file)
+    file.write_text("t,u,x\n" * 20)
+    with pytest.raises(ValueError, match="this is no TDMS file"):
+        read_record(file)
