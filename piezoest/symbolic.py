@@ -390,3 +390,34 @@ class _Hessian(_Output):
     def eval(self, arguments: Any) -> list[Any]:
         (hessian,) = super().eval(arguments)
         return [casadi.project(hessian * float(arguments[2]), self.get_sparsity_out(0))]
+
+
+# Solvers of convex programs, the fastest first; which of them there are depends on how CasADi was built.
+QUADRATIC = {"daqp": {}, "qpoases": {"printLevel": "none", "sparse": False}, "qrqp": {"print_iter": False}}
+
+
+@lru_cache(maxsize=1)
+def quadratic_solver() -> str:
+    """Name of the solver of convex programs that is used."""
+    return next(name for name in QUADRATIC if casadi.has_conic(name))
+
+
+@lru_cache(maxsize=64)
+def _conic(size: int) -> Any:
+    name = quadratic_solver()
+    shapes = {"h": casadi.Sparsity.dense(size, size), "a": casadi.Sparsity(0, size)}
+    return casadi.conic("program", name, shapes, {**QUADRATIC[name], "error_on_fail": False})
+
+
+def quadratic_program(H: FloatArray, g: FloatArray, lower: FloatArray) -> FloatArray:
+    """Minimum of w' H w / 2 - g' w over w >= lower.
+
+    Parameters
+    ----------
+    H : ndarray, shape (n, n)
+        Symmetric, positive definite.
+    g, lower : ndarray, shape (n,)
+        `lower` is -inf where there is no bound.
+    """
+    found = _conic(g.size)(h=casadi.DM(H), g=-g, lbx=lower, ubx=np.inf)
+    return np.fmax(found["x"].full()[:, 0], lower)

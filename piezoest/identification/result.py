@@ -2,43 +2,129 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.fitting import Fit, Prediction
+from piezoest.fitting.flaws import Flaws
+from piezoest.fitting.outliers import unsettled
 from piezoest.identification.residual import Misfit, Whiteness
-from piezoest.models import ColemanHodgdon, LinearGain
+from piezoest.identification.sense import Finding
+from piezoest.models import LearntOn, Model
 from piezoest.records import Record
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-
-def parameter_rows(
-    model: ColemanHodgdon, delay: float, errors: Mapping[str, float]
-) -> list[tuple[str, float, float, str]]:
-    """Rows of parameter name, value, standard error (zero if it was not estimated) and unit."""
-    names = (*model.parameter_names, "offset", "delay")
-    units = (*model.parameter_units, "µm", "samples")
-    values = (*(float(value) for value in model.theta), model.offset, delay)
-    return [
-        (name, value, errors.get(name, 0.0), unit)
-        for name, value, unit in zip(names, values, units, strict=True)
-    ]
+Row = tuple[str, float, float, str]
+# More parameters than this are not listed one by one.
+MOST_ROWS = 12
 
 
-def misfits_to_dict(found: Any) -> dict[str, Any]:
-    """Errors of a model and of the straight line beside it, JSON-safe."""
-    return {
-        "train": found.train.to_dict(),
-        "held_out": found.held_out.to_dict(),
-        "straight_line": {
-            "model": found.line.to_dict(),
-            "train": found.line_train.to_dict(),
-            "held_out": found.line_held_out.to_dict(),
-        },
-    }
+def parameter_rows(model: Any, delay: float, errors: dict[str, float]) -> list[Row]:
+    """Rows of parameter name, value, standard error (zero if it was not estimated) and unit.
+
+    Of many plays, gain and sum of the weights stand for all.
+    """
+    values = list(zip(model.parameter_names, model.theta.tolist(), model.parameter_units, strict=True))
+    if len(values) > MOST_ROWS:
+        values = [row for row in values if row[0] == "gain" or row[0].startswith("creep")]
+        weights = [(name, value) for name, value in zip(model.parameter_names, model.theta, strict=True)
+                   if name.startswith("weights")]  # fmt: skip
+        values.append((f"sum of {len(weights)} weights", float(sum(value for _, value in weights)), "µm/V"))
+    values += [("offset", model.offset, "µm"), ("delay", delay, "samples")]
+    return [(name, value, errors.get(name, 0.0), unit) for name, value, unit in values]
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One kind of model, fitted and judged.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fit.
+    train, held_out : Misfit
+        Free-running error where it was fitted and where it was not.
+    prediction : Prediction
+        Free-running displacement over the record, and between what readings are to be expected [µm].
+    residual : ndarray, shape (N,)
+        Measured displacement less that, and less jumps of the sensor behind the fitted part [µm]; NaN where a
+        sample is missing or flawed.
+    """
+
+    fit: Fit
+    train: Misfit
+    held_out: Misfit
+    prediction: Prediction = field(repr=False)
+    residual: FloatArray = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        """Kind of the model, as `piezoest.fit` names it."""
+        return self.fit.form
+
+    @property
+    def label(self) -> str:
+        """The same in words."""
+        return self.fit.label
+
+    @property
+    def model(self) -> Model:
+        """The model, with offset."""
+        return self.fit.model
+
+    @property
+    def parameters(self) -> int:
+        """How many were fitted."""
+        return self.fit.parameters
+
+    @property
+    def cross_validated(self) -> float:
+        """Error on blocks of the fitted part that were left out of the fit [µm rms]."""
+        return self.fit.held_out
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a JSON-safe dictionary of the figures."""
+        return {
+            "name": self.name,
+            "parameters": self.parameters,
+            "cross_validated_um": self.cross_validated,
+            "train": self.train.to_dict(),
+            "held_out": self.held_out.to_dict(),
+        }
+
+
+class Validation(NamedTuple):
+    """How a model predicts another log of the stage, but for a start that has not settled.
+
+    The error as it is, and without its mean: an offset is what moves between two days.
+    """
+
+    source: str
+    error: Misfit
+    without_mean: Misfit
+
+    @classmethod
+    def of(cls, fit: Fit, other: Record) -> Validation:
+        """Judge a fit on another record."""
+        error = other.displacement - fit.elsewhere(other.voltage)
+        error[~np.isfinite(other.voltage)] = np.nan
+        error[: unsettled(error - np.nanmedian(error))] = np.nan
+        return cls(other.source, Misfit.of(error), Misfit.of(error - np.nanmean(error)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a JSON-safe dictionary."""
+        return {
+            "source": self.source,
+            "error": self.error.to_dict(),
+            "without_mean": self.without_mean.to_dict(),
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,63 +133,126 @@ class Identification:
 
     Parameters
     ----------
-    model : ColemanHodgdon
-        Admissible, with offset.
-    standard_errors : dict of str to float
-        Of alpha, beta, gamma, offset and delay, in their units. Zero where a value was given or lies on
-        the edge of what is allowed. From the Jacobian of the free-running error, widened for coloured
-        residuals by the sum of its gradients over 25 blocks in time.
-    initial_state : float
-        w_h at the first sample [µm].
-    delay : float
-        Samples by which the displacement lags the voltage.
-    delay_estimated : bool
-        Whether the delay was estimated or given.
-    train, held_out : Misfit
-        Free-running error of the model on the part it was fitted on and on the part held out: it sees
-        only the voltage, and its state runs on from the first sample to the last.
-    line : LinearGain
-        The best straight line on the same samples, with the same delay, for comparison.
-    line_train, line_held_out : Misfit
-        Its errors.
+    best : Candidate
+        The model to use.
+    candidates : tuple of Candidate
+        All that were fitted, from the simplest to the richest; the straight line is always one of them.
+    reason : str
+        Why that one, with the figures.
     whiteness : Whiteness
         Of the residual of the fitted part.
+    noise_floor : float
+        Noise of the displacement [µm rms], from periods that the voltage repeats, else from differences of
+        neighbouring samples.
     drift : float
         Slope of the residual in time, over the whole record [µm].
-    left_out : int
-        Samples at the start that the fit leaves out, because the stage had not settled.
+    delay_known : bool
+        Whether the delay was given, or the log can tell it from the width of the loop.
     trained : int
         Number of samples in the fitted part, which comes first.
-    prediction : ndarray, shape (N,)
-        Free-running displacement [µm].
     record : Record
         What was identified.
+    findings : tuple of Finding
+        What is odd about the log.
+    flaws : Flaws
+        Spikes, jumps, dropouts and rests.
+    learnt_on : LearntOn
+        Ranges that the model was learnt on.
+    validations : tuple of Validation
+        Other logs, predicted.
     advice : tuple of str
         What to know before using it, in plain sentences.
     """
 
-    model: ColemanHodgdon
-    standard_errors: dict[str, float]
-    initial_state: float
-    delay: float
-    delay_estimated: bool
-    train: Misfit
-    held_out: Misfit
-    line: LinearGain
-    line_train: Misfit
-    line_held_out: Misfit
+    best: Candidate
+    candidates: tuple[Candidate, ...] = field(repr=False)
+    reason: str
     whiteness: Whiteness
+    noise_floor: float
     drift: float
-    left_out: int
+    delay_known: bool
     trained: int
-    prediction: FloatArray = field(repr=False)
     record: Record = field(repr=False)
+    findings: tuple[Finding, ...]
+    flaws: Flaws = field(repr=False)
+    learnt_on: LearntOn
+    validations: tuple[Validation, ...] = ()
     advice: tuple[str, ...] = ()
 
     @property
+    def fit(self) -> Fit:
+        """Fit of the best model."""
+        return self.best.fit
+
+    @property
+    def model(self) -> Model:
+        """The model, with offset."""
+        return self.best.model
+
+    @property
+    def chosen(self) -> str:
+        """Kind of the model, as `piezoest.fit` names it."""
+        return self.fit.form
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Of the parameters, the offset and the delay; zero where a value was given or ended at a bound."""
+        return self.fit.standard_errors
+
+    @property
+    def initial_state(self) -> Any:
+        """What `model.simulate` is to begin with on this record."""
+        return self.fit.initial_state
+
+    @property
+    def delay(self) -> float:
+        """Samples by which the displacement lags the voltage."""
+        return self.fit.delay
+
+    @property
+    def delay_estimated(self) -> bool:
+        """Whether the delay was estimated."""
+        return self.fit.delay_estimated
+
+    @property
+    def left_out(self) -> int:
+        """Samples at the start that the fit leaves out, because the stage had not settled."""
+        return self.fit.left_out
+
+    @property
+    def train(self) -> Misfit:
+        """Free-running error where the model was fitted."""
+        return self.best.train
+
+    @property
+    def held_out(self) -> Misfit:
+        """Free-running error where it was not: it sees only the voltage."""
+        return self.best.held_out
+
+    @property
+    def line(self) -> Model:
+        """The best straight line on the same samples, with the same delay."""
+        return self.candidates[0].model
+
+    @property
+    def line_train(self) -> Misfit:
+        """Error of the straight line where it was fitted."""
+        return self.candidates[0].train
+
+    @property
+    def line_held_out(self) -> Misfit:
+        """Error of the straight line where it was not."""
+        return self.candidates[0].held_out
+
+    @property
+    def prediction(self) -> FloatArray:
+        """Free-running displacement [µm], shape (N,)."""
+        return self.best.prediction.x
+
+    @property
     def residual(self) -> FloatArray:
-        """Measured displacement less prediction [µm], shape (N,); NaN where a sample is missing."""
-        return self.record.displacement - self.prediction
+        """Measured displacement less prediction [µm], shape (N,); NaN where a sample is missing or flawed."""
+        return self.best.residual
 
     @property
     def source(self) -> str:
@@ -125,38 +274,95 @@ class Identification:
         """What had to be assumed or converted to read the log, in plain sentences."""
         return self.record.notes
 
-    def table(self) -> list[tuple[str, float, float, str]]:
+    def predict(self, u: FloatArray | None = None) -> Prediction:
+        """Displacement that the model expects, and between what a reading will lie, 95 times in 100.
+
+        Parameters
+        ----------
+        u : array_like, shape (N,), optional
+            Voltage [V]; by default this record's.
+        """
+        return self.best.prediction if u is None else self.fit.predict(u)
+
+    def compare(self, *others: Identification) -> str:
+        """Return a table of held-out errors of this and other identifications, of the same log or of others.
+
+        Parameters
+        ----------
+        *others : Identification
+            What to compare with.
+        """
+        rows = [("log", "model", "held out [µm rms]", "blocks left out [µm rms]", "noise [µm rms]")]
+        for each in (self, *others):
+            figures = (each.held_out.rms, each.best.cross_validated, each.noise_floor)
+            rows.append((Path(each.source).name, each.best.label, *(f"{value:.3g}" for value in figures)))
+        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+        return "\n".join(
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+        )
+
+    def table(self) -> list[Row]:
         """Rows of parameter name, value, standard error and unit."""
         return parameter_rows(self.model, self.delay, self.standard_errors)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary; the model under ``"model"`` is that of `ColemanHodgdon.to_dict`."""
+        """Return a JSON-safe dictionary; the model under ``"model"`` is that of the model's `to_dict`."""
+        state = self.initial_state
         return {
-            "format": "piezoest-identification-1",
+            "format": "piezoest-identification-2",
             "source": self.record.source,
             "samples": len(self.record),
             "skipped_rows": self.record.skipped,
             "sample_rate_Hz": self.record.sample_rate,
             "model": self.model.to_dict(),
+            "learnt_on": self.learnt_on.to_dict(),
+            "kind": self.chosen,
+            "reason": self.reason,
+            "candidates": [each.to_dict() for each in self.candidates],
             "standard_errors": dict(self.standard_errors),
             "units": {name: unit for name, _, _, unit in self.table()},
-            "initial_state_um": self.initial_state,
+            "initial_state": state.tolist() if isinstance(state, np.ndarray) else state,
             "delay_samples": self.delay,
             "delay_estimated": self.delay_estimated,
+            "delay_known": self.delay_known,
             "trained_samples": self.trained,
             "left_out_samples": self.left_out,
-            **misfits_to_dict(self),
+            "train": self.train.to_dict(),
+            "held_out": self.held_out.to_dict(),
+            "straight_line": {
+                "model": self.line.to_dict(),
+                "train": self.line_train.to_dict(),
+                "held_out": self.line_held_out.to_dict(),
+            },
+            "noise_floor_um": self.noise_floor,
+            "interval_um": self.fit.spread.within,
             "whiteness": self.whiteness.to_dict(),
             "drift_um": self.drift,
+            "validation": [each.to_dict() for each in self.validations],
+            "findings": [dataclasses.asdict(each) for each in self.findings],
+            "solver": self.fit.solver,
             "notes": list(self.record.notes),
             "advice": list(self.advice),
         }
 
+    def __repr__(self) -> str:
+        return (
+            f"<Identification of {Path(self.source).name}: {self.best.label}, {self.held_out.rms:.3g} µm rms held out "
+            f"(straight line {self.line_held_out.rms:.3g}), {len(self.advice)} remarks>"
+        )
+
     def __str__(self) -> str:
-        lines = [f"{name:>8} {value:12.6g} ± {error:.2g} {unit}" for name, value, error, unit in self.table()]
-        for name, held in (("free-running error", self.held_out), ("straight line", self.line_held_out)):
-            lines.append(f"{name}, held out: {held.rms:.4g} µm rms, {held.max:.4g} µm largest")
-        return "\n".join([*lines, *self.advice])
+        return self.report()
+
+    def report(self) -> str:
+        """Return parameters, errors and advice as text."""
+        lines = [repr(self)[1:-1]]
+        lines += [f"{name:>8} {value:12.6g} ± {error:.2g} {unit}" for name, value, error, unit in self.table()]
+        lines += [
+            f"{each.label:>28}: {each.held_out.rms:.4g} µm rms held out, {each.cross_validated:.4g} on blocks left out"
+            for each in self.candidates
+        ]
+        return "\n".join([*lines, self.reason, *self.advice])
 
     def plot(self) -> Figure:
         """Draw displacement and model over time, the loop, the residual and its autocorrelation.

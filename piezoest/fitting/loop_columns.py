@@ -1,0 +1,91 @@
+"""The Coleman-Hodgdon model of a given alpha as columns of a regression.
+
+x = c u + w_h + offset, and w_h is linear in b and in where it begins: with b = 1 and w_h = 0 at the start it is
+f(u), so x = (c - b) u + b (u + f) + w_h(0) exp(-a travel) + offset. Equations (2)-(4) of Eielsen et al. (2012).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.compile import Matrix, Vector, compiled
+from piezoest.equations.coleman_hodgdon import hysteresis_step
+from piezoest.models import ColemanHodgdon, Creep
+
+# beta = c - b, and b, are at least these fractions of the straight line's gain.
+LEAST_BETA, LEAST_LOOP = 0.02, 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class LoopColumns:
+    """Columns of beta, b and w_h(0), for one `alpha` [1/V]."""
+
+    alpha: float
+
+    size = 3
+    free = 1
+    goes_on = True
+
+    def begin(self) -> FloatArray:
+        """Voltage, f, and what is left of the start; the first sample says the voltage."""
+        return np.array([np.nan, 0.0, 1.0])
+
+    def afresh(self, u: float) -> LoopColumns:
+        """The same: where its loop begins is a coefficient."""
+        return self
+
+    def rows(self, u: FloatArray, state: FloatArray) -> FloatArray:
+        """Columns along a voltage."""
+        if np.isnan(state[0]):
+            state[0] = u[0]
+        rows = np.empty((u.size, 3))
+        _loop(u, self.alpha, state, rows)
+        return rows
+
+    def lower(self, gain: float) -> FloatArray:
+        """Admissible are a slope and a loop above zero."""
+        return np.array([LEAST_BETA * gain, LEAST_LOOP * gain, -np.inf])
+
+    def line(self) -> FloatArray:
+        """The voltage alone."""
+        return np.array([1.0, 0.0, 0.0])
+
+    def unevenness(self) -> FloatArray:
+        """Nothing is to be smooth."""
+        return np.zeros((3, 3))
+
+    def prior(self) -> FloatArray:
+        """The record shows all there is."""
+        return np.zeros((3, 3))
+
+    def beyond(self, w: FloatArray) -> tuple[LoopColumns, FloatArray, float]:
+        """The model as it is: it goes on by itself."""
+        return self, w, 0.0
+
+    def model(self, w: FloatArray, offset: float, creep: Creep | None, rate: float) -> ColemanHodgdon:
+        """Model of these coefficients; it has no creep."""
+        return ColemanHodgdon.from_loop(self.alpha, float(w[1]), float(w[0] + w[1]), offset)
+
+    def names(self, w: FloatArray) -> dict[str, FloatArray]:
+        """beta; gamma = alpha c is not linear in them."""
+        return {"beta": np.array([1.0, 0.0, 0.0])}
+
+    def initial_state(self, w: FloatArray, model: ColemanHodgdon) -> float:
+        """w_h at the first sample [µm]."""
+        return float(w[2])
+
+
+@compiled
+def _loop(u: Vector, alpha: float, state: Vector, rows: Matrix) -> None:
+    """Voltage, loop and start along a voltage; `state` goes on."""
+    for k in range(u.size):
+        du = u[k] - state[0]
+        state[1] = hysteresis_step(state[1], du, alpha, 1.0)
+        state[2] = hysteresis_step(state[2], du, alpha, 0.0)
+        state[0] = u[k]
+        rows[k, 0] = u[k]
+        rows[k, 1] = u[k] + state[1]
+        rows[k, 2] = state[2]

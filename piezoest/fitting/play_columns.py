@@ -1,0 +1,228 @@
+"""Plays, and what each has between two bends, as columns of a regression."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.compile import Matrix, Vector, compiled
+from piezoest.equations.play import play
+from piezoest.models import Creep, LinearGain, Model, PrandtlIshlinskii
+
+# The slope just after a turn is at least this fraction of the straight line's.
+LEAST_GAIN = 0.02
+# Beyond the thresholds that the record moved, as many volts again are laid out with so many plays. They have
+# this fraction of the density of the last ones that moved: of stages of eight families, driven up to twice as
+# far as in the fitted part of a log, some stop there and some go on (benchmarks/logs.py).
+BEYOND, LAST, GOES_ON = 5, 0.25, 0.3
+# What differences cost of plays that move as far as the voltage; of others, more by as much as they move less.
+HARDLY, LEAST_MOVING = 1e-6, 1e-4
+# A range is about 0 V if its middle is nearer to it than this fraction of its half.
+ABOUT_ZERO = 0.1
+FAR = 1e300
+
+
+class Start(NamedTuple):
+    """Where the plays were before the record: at `centre`, as far as the voltage `left` allows [V]."""
+
+    left: float
+    centre: float
+
+    def states(self, thresholds: FloatArray) -> FloatArray:
+        """States of plays [V], shape (n,), that some voltage leaves behind."""
+        return np.clip(self.centre, self.left - thresholds, self.left + thresholds)
+
+
+def starts(u: FloatArray) -> list[Start]:
+    """Where a stage may have been left: at rest somewhere, or by a swing over the whole range."""
+    low, high, first = float(u.min()), float(u.max()), float(u[0])
+    found = [Start(first, centre) for centre in (first, 0.0, low, 0.5 * (low + high), high)]
+    return list(dict.fromkeys([*found, Start(low, high), Start(high, low), Start(low, low), Start(high, high)]))
+
+
+@dataclass(frozen=True, slots=True)
+class PlayColumns:
+    """Plays of given thresholds, cut at bends into segments that add up to them.
+
+    Parameters
+    ----------
+    thresholds : ndarray, shape (n,)
+        [V], rising from zero, which is the voltage itself.
+    bends : ndarray, shape (k,)
+        Voltages at which slopes may change [V].
+    start : Start
+        Where the plays were before the first sample.
+    visited : tuple of float
+        Range of the voltage of the record that is fitted [V].
+    moving : ndarray, shape (n,)
+        How far each play goes in it, relative to the voltage.
+    moved : int, optional
+        How many of the plays moved in it; those beyond begin in its middle, so that they move one after the other
+        as the voltage goes further on either side.
+    """
+
+    thresholds: FloatArray
+    bends: FloatArray
+    start: Start
+    visited: tuple[float, float]
+    moving: FloatArray
+    moved: int | None = None
+
+    free = 0
+
+    @property
+    def size(self) -> int:
+        """Slopes: segment by segment, and in each of them play by play."""
+        return int(self.thresholds.size * (self.bends.size + 1))
+
+    @property
+    def _edges(self) -> FloatArray:
+        return np.concatenate(([-FAR], self.bends, [FAR]))
+
+    def begin(self) -> FloatArray:
+        """State before the first sample: that of the plays [V]."""
+        states = self.start.states(self.thresholds)
+        if self.moved is not None:
+            states[self.moved :] = self.middle
+        return states
+
+    def afresh(self, u: float) -> PlayColumns:
+        """The same for a stage that rests at 0 V until a record begins at voltage u [V]."""
+        return replace(self, start=Start(u, 0.0))
+
+    @property
+    def middle(self) -> float:
+        """Middle of the range of the record [V]."""
+        return 0.5 * (self.visited[0] + self.visited[1])
+
+    def rows(self, u: FloatArray, state: FloatArray) -> FloatArray:
+        """Columns along a voltage."""
+        n, edges = self.thresholds.size, self._edges
+        plays = np.empty((u.size, n))
+        _plays(u, self.thresholds, state, plays)
+        if self.bends.size == 0:
+            return plays
+        rows = np.empty((u.size, self.size))
+        for s, (low, high) in enumerate(pairwise(edges)):
+            rows[:, s * n : (s + 1) * n] = np.clip(plays, low, high) - np.clip(0.0, low, high)
+        return rows
+
+    def lower(self, gain: float) -> FloatArray:
+        """Slopes are not negative, and the voltage's own is above zero."""
+        return LEAST_GAIN * gain * self.line()
+
+    def line(self) -> FloatArray:
+        """The voltage alone."""
+        w = np.zeros(self.size)
+        w[:: self.thresholds.size] = 1.0
+        return w
+
+    def unevenness(self) -> FloatArray:
+        """Squared differences of neighbouring plays, as densities, and of neighbouring segments."""
+        return self._differences(np.ones(self.thresholds.size))
+
+    def prior(self) -> FloatArray:
+        """The same where plays hardly move: they are as their neighbours are."""
+        return self._differences(np.sqrt(HARDLY / np.maximum(self.moving, LEAST_MOVING)))
+
+    def _differences(self, root_weight: FloatArray) -> FloatArray:
+        n, segments = self.thresholds.size, self.bends.size + 1
+        along = root_weight[2:, None] * np.diff(np.eye(n), axis=0)[1:]
+        across = np.kron(np.diff(np.eye(segments), axis=0), np.diag(root_weight)) / np.sqrt(n)
+        rows = np.vstack([np.kron(np.eye(segments), along), across])
+        return np.asarray((self.thresholds[-1] * n) ** 2 * rows.T @ rows)
+
+    def merged(self) -> tuple[PlayColumns, FloatArray]:
+        """The same without bends, and how its columns come from these (size, n)."""
+        n, segments = self.thresholds.size, self.bends.size + 1
+        return replace(self, bends=np.empty(0)), np.tile(np.eye(n), (segments, 1))
+
+    def model(self, w: FloatArray, offset: float, creep: Creep | None, rate: float) -> Model:
+        """Plays that have a slope."""
+        slopes = w.reshape(self.bends.size + 1, -1)
+        if slopes.size == 1:
+            return LinearGain(float(slopes[0, 0]), offset)
+        kept = self._kept(slopes)
+        slopes, thresholds = slopes[:, kept], self.thresholds[kept][1:]
+        changes = np.diff(slopes, axis=0)
+        return PrandtlIshlinskii(
+            float(slopes[0, 0]), thresholds, slopes[0, 1:], offset, creep, self.bends, changes, rate
+        )
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether a model may have plays beyond the record: they begin at zero, which has to be the middle."""
+        return abs(self.middle) < ABOUT_ZERO * 0.5 * (self.visited[1] - self.visited[0])
+
+    def beyond(self, w: FloatArray) -> tuple[PlayColumns, FloatArray, float]:
+        """The same with plays that are wider than the record moves, their coefficients, and what they add in it.
+
+        Nothing is known of them but their neighbours.
+        """
+        n, slopes = self.thresholds.size, w.reshape(self.bends.size + 1, -1)
+        if n < 3:
+            return self, w, 0.0
+        step, widest = float(self.thresholds[1]), float(self.thresholds[-1])
+        more = widest * (1.0 + np.arange(1, BEYOND + 1) / BEYOND)
+        density = slopes[:, -max(1, round(LAST * n)) :].mean(axis=1, keepdims=True) / step
+        added = np.repeat(GOES_ON * density * widest / BEYOND, BEYOND, axis=1)
+        wider = replace(self, thresholds=np.concatenate([self.thresholds, more]), moved=n)
+        rest = [np.clip(wider.begin()[n:], a, b) - np.clip(0.0, a, b) for a, b in pairwise(self._edges)]
+        return wider, np.hstack([slopes, added]).ravel(), float(np.sum(added * rest))
+
+    def initial_state(self, w: FloatArray, model: Any) -> FloatArray | None:
+        """States of the model's plays [V]."""
+        if not isinstance(model, PrandtlIshlinskii):
+            return None
+        y = self.begin()[self._kept(w.reshape(self.bends.size + 1, -1))]
+        for i in range(1, y.size):
+            # Neighbours that are further apart than this no voltage leaves behind.
+            apart = model.thresholds[i - 1] - (model.thresholds[i - 2] if i > 1 else 0.0)
+            y[i] = min(max(y[i], y[i - 1] - apart), y[i - 1] + apart)
+        return y[1:]
+
+    def names(self, w: FloatArray) -> dict[str, FloatArray]:
+        """Gain, weights, and what each bend changes of them; the plays beyond the record are none of these."""
+        n = self.thresholds.size
+        unit = np.eye(self.size)
+        kept = self._kept(w.reshape(self.bends.size + 1, -1))
+        found = {"gain": unit[0]} | {f"weights[{i}]": unit[c] for i, c in enumerate(kept[1:])}
+        for j in range(self.bends.size):
+            change = unit[(j + 1) * n : (j + 2) * n] - unit[j * n : (j + 1) * n]
+            found |= {f"bend_weights[{j},{i}]": change[c] for i, c in enumerate(kept)}
+        return found
+
+    @staticmethod
+    def _kept(slopes: FloatArray) -> FloatArray:
+        """Plays that have a slope somewhere, and the voltage."""
+        return np.union1d([0], np.flatnonzero(np.any(slopes > 0.0, axis=0)))
+
+
+def moving_of(u: FloatArray, thresholds: FloatArray, start: Start) -> FloatArray:
+    """How far plays go along a voltage, relative to the voltage itself, shape (n,)."""
+    way = np.zeros(thresholds.size)
+    _ways(u, thresholds, start.states(thresholds), way)
+    return way / max(float(np.sum(np.abs(np.diff(u)))), 1e-300)
+
+
+@compiled
+def _ways(u: Vector, thresholds: Vector, y: Vector, way: Vector) -> None:
+    """Adds to `way` how far plays go; the states `y` go on."""
+    for k in range(u.size):
+        for i in range(y.size):
+            now = play(y[i], u[k], thresholds[i])
+            way[i] += abs(now - y[i])
+            y[i] = now
+
+
+@compiled
+def _plays(u: Vector, thresholds: Vector, y: Vector, plays: Matrix) -> None:
+    """Plays along a voltage; the states `y` go on."""
+    for k in range(u.size):
+        for i in range(y.size):
+            y[i] = play(y[i], u[k], thresholds[i])
+            plays[k, i] = y[i]

@@ -1,0 +1,53 @@
+"""The Coleman-Hodgdon model's nonlinear program: alpha, beta, gamma, offset, start and delay together.
+
+The linear fits at one alpha after the other end near the optimum; a few passes with the derivatives that CasADi
+makes end in it, and give the standard errors of all, the delay among them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from piezoest.estimators.coordinates import coordinates
+from piezoest.estimators.fit import Problem, outcome, single_shooting
+from piezoest.fitting.loop_columns import LoopColumns
+from piezoest.fitting.regression import Fitted, Log
+from piezoest.fitting.search import LONGEST_DELAY
+from piezoest.models import ColemanHodgdon
+
+# Most passes over the record, and the relative change at which it has ended.
+MOST_PASSES, TOLERANCE = 20, 1e-8
+
+
+class Polished(NamedTuple):
+    """A fit with another alpha, its delay, and the standard errors of all parameters by name."""
+
+    fitted: Fitted
+    delay: float
+    standard_errors: dict[str, float]
+
+
+def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Polished:
+    """The optimum near a linear fit; `log.u` is the voltage as it was written, without delay."""
+    w, offset = fitted.w, fitted.design.offset
+    beside = w[offset + 1] * np.arange(log.u.size) / fitted.design.samples
+    for jump, size in zip(log.jumps, w[offset + 2 :], strict=True):
+        beside += size * (np.arange(log.u.size) >= jump)
+    x = np.where(log.counts, log.x - beside, np.nan)
+    varied = coordinates(ColemanHodgdon, () if fit_delay else ("delay",), delayed=True)
+    limits = ColemanHodgdon.record_limits(2.0 * log.half) | {"delay": (0.0, LONGEST_DELAY)}
+    problem = Problem(log.u, x, varied, np.empty(0) if fit_delay else np.array([delay]), limits=limits)
+    model = fitted.design.basis.model(w, float(w[offset]), None, log.sample_rate)
+    start = problem.settled(varied.of(model.nearest_admissible(), {"delay": delay}))
+    solution = single_shooting(problem, start, "linear", 1.0, MOST_PASSES, TOLERANCE)
+    end = outcome(problem, solution.q, coloured=True)
+    value = end.value
+    found = ColemanHodgdon.from_theta(end.theta[:3], value["offset"])
+    w = w.copy()
+    w[: offset + 1] = found.beta, found.b, value["initial_state"], found.offset
+    errors = dict(zip(end.parameter_names, end.standard_errors.tolist(), strict=True))
+    design = replace(fitted.design, basis=LoopColumns(found.alpha))
+    return Polished(replace(fitted, design=design, w=w), value["delay"], errors)

@@ -1,0 +1,83 @@
+"""Bounded least squares with a penalty: one convex program, solved by CasADi and checked by SciPy."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.symbolic import quadratic_program
+
+# Least curvature relative to a column's own: what a record does not tell stays near zero.
+RIDGE = 1e-9
+
+
+class Sums(NamedTuple):
+    """Sums over rows: columns times columns (n, n), columns times x (n,), x times x, and how many rows."""
+
+    gram: FloatArray
+    moment: FloatArray
+    square: float
+    rows: float
+
+    @classmethod
+    def of(cls, columns: FloatArray, x: FloatArray) -> Self:
+        """Sums over rows of a matrix (N, n) and what they are to give (N,)."""
+        return cls(columns.T @ columns, columns.T @ x, float(x @ x), float(x.size))
+
+    @classmethod
+    def none(cls, columns: int) -> Self:
+        """Sums over no rows."""
+        return cls(np.zeros((columns, columns)), np.zeros(columns), 0.0, 0.0)
+
+    def plus(self, other: Sums, sign: float = 1.0) -> Self:
+        """Both, or without the other's rows."""
+        return type(self)(*(mine + sign * its for mine, its in zip(self, other, strict=True)))
+
+    def through(self, transform: FloatArray) -> Self:
+        """Sums of other columns, each a combination (n, m) of these."""
+        gram = transform.T @ self.gram @ transform
+        return self._replace(gram=gram, moment=transform.T @ self.moment)
+
+    def missed(self, w: FloatArray) -> float:
+        """Sum of squares that coefficients (n,) leave."""
+        return max(self.square - 2.0 * float(self.moment @ w) + float(w @ self.gram @ w), 0.0)
+
+
+def total(sums: list[Sums]) -> Sums:
+    """All of them together."""
+    found = Sums.none(sums[0].moment.size)
+    for each in sums:
+        found = found.plus(each)
+    return found
+
+
+def solve(sums: Sums, lower: FloatArray, penalty: FloatArray) -> FloatArray:
+    """Coefficients (n,) that miss least, plus w' penalty w per row, and are nowhere below `lower`."""
+    scale, H, g = _scaled(sums, penalty)
+    return quadratic_program(H, g, lower * scale) / scale
+
+
+def checked(sums: Sums, lower: FloatArray, penalty: FloatArray, w: FloatArray) -> float:
+    """How much less SciPy's bounded least squares leaves than `w` does, relative to what x has."""
+    from scipy.optimize import lsq_linear
+
+    scale, H, g = _scaled(sums, penalty)
+    L = np.linalg.cholesky(H)
+    other = lsq_linear(L.T, np.linalg.solve(L, g), (lower * scale, np.inf), method="bvls").x
+
+    def cost(v: FloatArray) -> float:
+        return float(0.5 * v @ H @ v - g @ v)
+
+    return abs(cost(w * scale) - cost(other)) / max(sums.square / max(sums.rows, 1.0), 1e-300)
+
+
+def _scaled(sums: Sums, penalty: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Unit of each column, then Hessian and gradient in these units, per row."""
+    rows = max(sums.rows, 1.0)
+    own = np.diag(sums.gram) / rows
+    scale = np.sqrt(np.where(own > 0.0, own, 1.0))
+    H = (sums.gram / rows + penalty) / np.outer(scale, scale)
+    H[np.diag_indices_from(H)] += RIDGE
+    return scale, H, sums.moment / rows / scale

@@ -1,0 +1,209 @@
+"""The fit of one design: its sums over blocks of a record, and what each block misses under the others' fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.fitting.design import Design
+from piezoest.fitting.program import Sums, checked, solve, total
+
+# Blocks of a record of which each is predicted from the others.
+FOLDS = 5
+# What differences of neighbouring slopes cost; how much, is seen on the blocks left out.
+SMOOTHNESS = tuple(10.0**k for k in range(-8, 1))
+# The smoothest fit is taken that misses them by so much more than the least, in squares.
+AS_GOOD = 1.01
+# So many blocks predict those behind them; a drift is fitted where it makes the squares there as small as this.
+EARLIER, DRIFTS = 3, 0.8
+# What creep had at the start costs this times its square, for slow creep and offset look alike.
+CREPT = 1e-3
+# ... and so does a drift, which is what amplitudes that change along the record look like, too.
+DRIFT = 1e-2
+
+
+@dataclass(frozen=True)
+class Log:
+    """What is fitted.
+
+    Parameters
+    ----------
+    u : ndarray, shape (N,)
+        Voltage without gaps [V].
+    x : ndarray, shape (N,)
+        Displacement [µm].
+    counts : ndarray of bool, shape (N,)
+        Which samples count.
+    sample_rate : float
+        [Hz].
+    jumps : ndarray
+        First samples behind jumps of the displacement.
+    """
+
+    u: FloatArray
+    x: FloatArray
+    counts: FloatArray
+    sample_rate: float
+    jumps: FloatArray
+
+    @property
+    def middle(self) -> float:
+        """Middle of the voltage's range [V]."""
+        return 0.5 * float(self.u.max() + self.u.min())
+
+    @property
+    def half(self) -> float:
+        """Half of the voltage's range [V]."""
+        return 0.5 * float(np.ptp(self.u))
+
+    @cached_property
+    def folds(self) -> FloatArray:
+        """Ends of the blocks, with as many samples that count in each."""
+        known = np.flatnonzero(self.counts)
+        inner = known[np.linspace(0, known.size, FOLDS + 1).astype(int)[1:-1]]
+        return np.concatenate(([0], inner, [self.u.size]))
+
+    def fold(self, place: slice) -> FloatArray:
+        """Block of each sample of a part."""
+        return np.searchsorted(self.folds, np.arange(place.start, place.stop), side="right") - 1
+
+
+def sums_of(design: Design, log: Log, w: FloatArray | None = None, every: int = 1) -> list[Sums]:
+    """Sums over each block, of every k-th sample that counts; `w` drives the creep."""
+    found = [Sums.none(design.columns) for _ in range(FOLDS)]
+    for place, rows in design.blocks(log.u, w):
+        fold = log.fold(place)
+        for k in range(fold[0], fold[-1] + 1):
+            taken = np.flatnonzero((fold == k) & log.counts[place])[::every]
+            found[k] = found[k].plus(Sums.of(rows[taken], log.x[place][taken]))
+    return found
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A regression's best coefficients.
+
+    Parameters
+    ----------
+    design : Design
+        What they belong to.
+    w : ndarray, shape (columns,)
+        All of them.
+    smoothness : float
+        How much unevenness cost.
+    used : ndarray
+        Columns that were fitted.
+    held_out : float
+        Root of the mean square of what all blocks but the first miss under the fit of the others [µm].
+    without : list of ndarray
+        Coefficients of the fit without each of them.
+    earlier : ndarray
+        Those of the fit of the first `EARLIER` blocks.
+    """
+
+    design: Design
+    w: FloatArray
+    smoothness: float
+    used: FloatArray
+    held_out: float
+    without: list[FloatArray]
+    earlier: FloatArray
+    cv: float=0.
+    ahead: float=0.
+
+
+class Regression:
+    """Sums of a design, to be fitted with any smoothness and with or without a drift.
+
+    `lower` are the least coefficients that are allowed.
+    """
+
+    def __init__(self, design: Design, sums: list[Sums]) -> None:
+        self.design, self.sums, self.all = design, sums, total(sums)
+        size = design.basis.size
+        self.lower = np.full(design.columns, -np.inf)
+        self.lower[:size] = design.basis.lower(self._line_gain())
+        self.lower[design.gains] = -design.creep.gains
+        self._penalty = np.zeros((design.columns, design.columns))
+        self._penalty[:size, :size] = design.basis.unevenness()
+        self._always = np.diag(np.where(np.isin(np.arange(design.columns), np.r_[design.crept]), CREPT, 0.0))
+        self._always[:size, :size] = design.basis.prior()
+        self._always[design.offset + 1, design.offset + 1] = DRIFT
+
+    def _line_gain(self) -> float:
+        """Slope of the straight line [µm/V], at least zero."""
+        T = np.zeros((self.design.columns, 2))
+        T[: self.design.basis.size, 0] = self.design.basis.line()
+        T[self.design.offset, 1] = 1.0
+        line = self.all.through(T)
+        return max(float(np.linalg.lstsq(line.gram, line.moment, rcond=None)[0][0]), 0.0)
+
+    def columns(self, *, drift: bool, gains: bool = True) -> FloatArray:
+        """Which columns are fitted of those that the record shows: with a drift or not, with creep's gains or not."""
+        shown = np.diag(self.all.gram) > 0.0
+        shown[self.design.offset + 1] &= drift
+        shown[self.design.gains] &= gains
+        return np.flatnonzero(shown)
+
+    def solved(self, smoothness: float, used: FloatArray, sums: Sums | None = None) -> FloatArray:
+        """All coefficients, zero where a column is not used."""
+        few, lower, penalty = self._of(smoothness, used, sums)
+        w = np.zeros(self.design.columns)
+        w[used] = solve(few, lower, penalty)
+        return w
+
+    def gap(self, fitted: Fitted) -> float:
+        """How far another solver's optimum is, relative to the displacement's mean square."""
+        few, lower, penalty = self._of(fitted.smoothness, fitted.used, None)
+        return checked(few, lower, penalty, fitted.w[fitted.used])
+
+    def curvature(self, smoothness: float) -> FloatArray:
+        """Second derivative of half of what is minimised."""
+        return self.all.gram + self.all.rows * self._cost(smoothness)
+
+    def _cost(self, smoothness: float) -> FloatArray:
+        return smoothness * self._penalty + self._always
+
+    def _of(
+        self, smoothness: float, used: FloatArray, sums: Sums | None
+    ) -> tuple[Sums, FloatArray, FloatArray]:
+        sums = self.all if sums is None else sums
+        few = Sums(sums.gram[np.ix_(used, used)], sums.moment[used], sums.square, sums.rows)
+        return few, self.lower[used], self._cost(smoothness)[np.ix_(used, used)]
+
+    def left_out(self, smoothness: float, used: FloatArray) -> tuple[float, list[FloatArray]]:
+        """Mean square of what each block but the first misses under the fit of the others, and those fits.
+
+        Only the first block says where the stage was at the start.
+        """
+        fits = [self.solved(smoothness, used, self.all.plus(each, -1.0)) for each in self.sums[1:]]
+        missed = sum(each.missed(w) for each, w in zip(self.sums[1:], fits, strict=True))
+        return missed / max(sum(each.rows for each in self.sums[1:]), 1.0), fits
+
+    def best(self, smoothness: float | None = None, *, gains: bool = True) -> Fitted:
+        """Fit with the smoothness that predicts best, and a drift if the last blocks bear it out.
+
+        With `gains` what is to be added to creep's gains is fitted, too.
+        """
+        used = self.columns(drift=False, gains=gains)
+        if smoothness is None:
+            scores = {each: self.left_out(each, used)[0] for each in self._smoothness()}
+            least = AS_GOOD * min(scores.values())
+            smoothness = max(each for each, score in scores.items() if score <= least)
+        before, later = total(self.sums[:EARLIER]), total(self.sums[EARLIER:])
+        earlier = self.solved(smoothness, used, before)
+        drifting = self.columns(drift=True, gains=gains)
+        moved = self.solved(smoothness, drifting, before)
+        if later.missed(moved) < DRIFTS * later.missed(earlier):
+            used, earlier = drifting, moved
+        score, without = self.left_out(smoothness, used)
+        ahead = later.missed(earlier) / max(later.rows, 1.0)
+        w = self.solved(smoothness, used)
+        missed = float(np.sqrt(0.5 * (score + ahead)))
+        return Fitted(self.design, w, smoothness, used, missed, without, earlier, float(np.sqrt(score)), float(np.sqrt(ahead)))
+
+    def _smoothness(self) -> tuple[float, ...]:
+        return SMOOTHNESS if np.any(self._penalty) else SMOOTHNESS[:1]

@@ -1,0 +1,131 @@
+"""What a fit is not linear in: creep gains, alpha, the delay, and where the stage was before the record.
+
+Creep gains go by Gauss-Newton steps, each of which solves the linear program with their columns in it; the others
+are tried, with everything linear solved anew (variable projection: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal.
+10 (1973) 413-432).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.estimators.coordinates import late
+from piezoest.fitting.design import NO_CREEP, Basis, Design
+from piezoest.fitting.loop_columns import LoopColumns
+from piezoest.fitting.play_columns import PlayColumns, Start, moving_of, starts
+from piezoest.fitting.regression import Fitted, Log, Regression, sums_of
+from piezoest.models import Creep
+
+# Plays, and voltages at which their slopes may change.
+THRESHOLDS, BENDS = 20, 2
+# The widest play moves by this fraction of the voltage's range.
+MOVES = 0.1
+# Rows by which delays and starts are compared, and with which smoothness.
+FEW, SMOOTH = 4000, 1e-4
+# Largest delay that is looked for [samples], and how closely it is found.
+LONGEST_DELAY, CLOSE = 10.0, 0.02
+# Gauss-Newton steps of the creep gains, the relative change at which they have settled, the least of them.
+STEPS, SETTLED, LEAST_CREEP = 8, 1e-3, 1e-3
+# Creep terms are a decade apart, from so many samples to this fraction of the record.
+SHORTEST_CREEP, LONGEST_CREEP, MOST_TERMS = 20.0, 0.5, 4
+# Range of alpha times the range of the voltage, and how closely its logarithm is found.
+ALPHAS, CLOSE_ALPHA = (0.03, 300.0), 0.003
+
+
+def plays(log: Log, start: Start, thresholds: int = THRESHOLDS, bends: int = 0) -> PlayColumns:
+    """Plays laid over the range of the voltage, up to those that hardly move."""
+    inner = log.u.min() + 2.0 * log.half * np.arange(1, bends + 1) / (bends + 1)
+    visited = (float(log.u.min()), float(log.u.max()))
+    laid = (1.0 - MOVES) * log.half * np.arange(thresholds) / max(thresholds - 1, 1)
+    return PlayColumns(laid, inner, start, visited, moving_of(log.u, laid, start))
+
+
+def design_of(log: Log, basis: Basis, creep: Creep = NO_CREEP) -> Design:
+    """All columns for a record."""
+    return Design(basis, log.sample_rate, log.u.size, creep, log.jumps)
+
+
+def regression(log: Log, basis: Basis, every: int = 1) -> Regression:
+    """Sums of a basis without creep."""
+    design = design_of(log, basis)
+    return Regression(design, sums_of(design, log, every=every))
+
+
+def missed(log: Log, basis: Basis) -> float:
+    """Mean square that a basis leaves, by some thousand rows."""
+    found = regression(log, basis, max(1, int(np.count_nonzero(log.counts)) // FEW))
+    w = found.solved(SMOOTH, found.columns(drift=False))
+    return found.all.missed(w) / max(found.all.rows, 1.0)
+
+
+def best_start(log: Log) -> Start:
+    """The start under which plays miss least."""
+    return min(starts(log.u), key=lambda start: missed(log, plays(log, start)))
+
+
+def best_delay(log: Log, start: Start) -> float:
+    """Delay [samples] under which plays miss least; no sample has a voltage later than it."""
+
+    def cost(delay: float) -> float:
+        delayed = replace(log, u=late(log.u, delay))
+        return missed(delayed, plays(delayed, start, bends=BENDS))
+
+    return _least(cost, np.linspace(0.0, LONGEST_DELAY, 11), CLOSE)
+
+
+def best_alpha(log: Log, every: int) -> float:
+    """alpha [1/V] of the Coleman-Hodgdon model that misses least."""
+
+    def cost(logarithm: float) -> float:
+        found = regression(log, LoopColumns(float(np.exp(logarithm))), every)
+        return found.all.missed(found.solved(0.0, found.columns(drift=False))) / max(found.all.rows, 1.0)
+
+    low, high = np.log(np.array(ALPHAS) / (2.0 * log.half))
+    return float(np.exp(_least(cost, np.linspace(low, high, 10), CLOSE_ALPHA)))
+
+
+def _least(cost: Callable[[float], float], grid: FloatArray, close: float) -> float:
+    """Where a cost is least: about the best point of a grid, then between its neighbours."""
+    from scipy.optimize import minimize_scalar
+
+    costs = [cost(float(each)) for each in grid]
+    best = int(np.argmin(costs))
+    between = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, grid.size - 1)]))
+    found = minimize_scalar(cost, bounds=between, method="bounded", options={"xatol": close})
+    return float(found.x) if found.fun < costs[best] else float(grid[best])
+
+
+def creep_times(log: Log) -> FloatArray:
+    """Time constants a decade apart that a record can tell [s]."""
+    shortest, longest = SHORTEST_CREEP / log.sample_rate, LONGEST_CREEP * log.u.size / log.sample_rate
+    terms = min(MOST_TERMS, int(np.log10(max(longest / shortest, 1.0))) + 1)
+    return longest / 10.0 ** np.arange(terms)[::-1]
+
+
+def with_creep(log: Log, plain: Fitted, times: FloatArray) -> Fitted:
+    """Fit with creep terms of these time constants, from a fit without; terms that come out as none go."""
+    gains, fitted = np.zeros(times.size), plain
+    for k in range(STEPS):
+        # The smoothness that suits plays without creep is no longer the best once there is some.
+        smoothness = plain.smoothness if k == 0 else None if k == 1 else fitted.smoothness
+        fitted = _crept(log, fitted, Creep(gains, times)).best(smoothness)
+        step = fitted.w[fitted.design.gains]
+        gains = np.maximum(gains + step, 0.0)
+        if k > 1 and np.max(np.abs(step)) <= SETTLED * max(float(gains.sum()), SETTLED):
+            break
+    kept = gains > LEAST_CREEP
+    if not np.any(kept):
+        return plain
+    if not np.all(kept):
+        return with_creep(log, plain, times[kept])
+    return _crept(log, fitted, Creep(gains, times)).best(fitted.smoothness, gains=False)
+
+
+def _crept(log: Log, last: Fitted, creep: Creep) -> Regression:
+    """Regression on columns that these gains have crept through; what their change adds follows the last slopes."""
+    design = design_of(log, last.design.basis, creep)
+    return Regression(design, sums_of(design, log, last.w[: design.basis.size]))

@@ -1,0 +1,112 @@
+"""What to know before using an identified model, in plain sentences."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from piezoest.fitting.search import LONGEST_DELAY
+from piezoest.identification.data import Data, turning_voltages
+from piezoest.identification.result import Identification
+
+DRIFT_WORTH_A_WORD = 0.5
+WORSE_ON_HELD_OUT = 1.5
+# An error above so many times the noise floor is not noise.
+ABOVE_NOISE = 1.3
+
+
+def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
+    """All there is to say, the log's own doubts first."""
+    said = [each.sentence for each in found.findings]
+    said += [sentence for say in (_left_out, _delay, _centre, _remainder, _along) for sentence in say(found, data)]
+    return tuple(said)
+
+
+def _left_out(found: Identification, data: Data) -> list[str]:
+    fit, flaws, said = found.fit, found.flaws, []
+    if fit.left_out:
+        said.append(
+            f"The first {fit.left_out / found.sample_rate:.3g} s do not fit the rest (the stage had not settled): "
+            "left out."
+        )
+    spikes = int(np.count_nonzero(flaws.spikes[: found.trained])) + fit.spikes
+    if spikes:
+        said.append(
+            f"{spikes} of the fitted samples {'is' if spikes == 1 else 'are'} off the rest alone, as spikes of a "
+            "sensor are: left out."
+        )
+    if flaws.jumps.size:
+        said.append(
+            f"The displacement jumps {flaws.jumps.size} time{'s' if flaws.jumps.size > 1 else ''} by up to "
+            f"{np.max(np.abs(flaws.jump_sizes)):.3g} µm without a step of the voltage: the jumps were fitted "
+            "beside the model."
+        )
+    return said
+
+
+def _delay(found: Identification, data: Data) -> list[str]:
+    if not found.delay_known:
+        return [
+            "The lag of the displacement is not known: all swings of the voltage are alike, so it looks like a wider "
+            "loop. Record swings of several sizes or frequencies, or pass delay= in samples."
+        ]
+    if not found.delay_estimated:
+        return []
+    if found.delay > 0.99 * LONGEST_DELAY:
+        return ["The delay is at the end of its range: check that the columns belong together."]
+    if found.delay > 0.1:
+        return [
+            f"The displacement lags the voltage by {found.delay:.2f} samples "
+            f"({1e3 * found.delay / found.sample_rate:.3g} ms): use HysteresisRLS(delay={found.delay:.2g})."
+        ]
+    return []
+
+
+def _centre(found: Identification, data: Data) -> list[str]:
+    said = []
+    extent = float(np.ptp(data.x[data.counts]))
+    if abs(data.middle) > 0.1 * data.extent or abs(found.model.offset) > 0.1 * extent:
+        said.append(
+            f"The loop is not centred at zero (voltage {data.middle:.3g} V, displacement "
+            f"{float(np.mean(data.x[data.counts])):.4g} µm): let HysteresisRLS estimate the offset, as it does by "
+            "default."
+        )
+    turns = turning_voltages(data)
+    tops = np.abs(turns - data.middle)
+    if turns.size > 2 and np.ptp(tops[1:]) < 0.1 * data.extent:
+        said.append("The voltage turns at one amplitude only: the parameters belong to that amplitude.")
+    return said
+
+
+def _remainder(found: Identification, data: Data) -> list[str]:
+    said = []
+    floor, error = found.noise_floor, found.best.cross_validated
+    if error > ABOVE_NOISE * floor:
+        said.append(
+            f"Between the noise of {floor:.2g} µm rms and the error of {error:.2g} µm lies what no model here explains."
+        )
+    if not found.whiteness.is_white:
+        said.append(
+            "The residual is not white: what is left is not noise but what the model cannot do "
+            "(creep, drift, rate, minor loops); the standard errors are widened for it."
+        )
+    if found.held_out.rms > 0.9 * found.line_held_out.rms and found.fit.form != "line":
+        said.append("A straight line does about as well: the record shows little hysteresis.")
+    return said
+
+
+def _along(found: Identification, data: Data) -> list[str]:
+    said = []
+    if abs(found.fit.drift) > DRIFT_WORTH_A_WORD * found.train.rms:
+        said.append(
+            f"The displacement drifts by about {found.fit.drift:+.2g} µm over the fitted part: fitted beside the model."
+        )
+    elif abs(found.drift) > DRIFT_WORTH_A_WORD * found.train.rms:
+        said.append(
+            f"The displacement drifts by about {found.drift:+.2g} µm over the record against the model."
+        )
+    if found.held_out.rms > WORSE_ON_HELD_OUT * found.train.rms:
+        said.append(
+            f"The held-out error is {found.held_out.rms / found.train.rms:.1f} times the fitted one: "
+            "the stage or the signal changes along the record."
+        )
+    return said
