@@ -17,6 +17,8 @@ BEYOND_DOUBT, EXPLAINED = 20.0, 0.3
 OPPOSITE = -0.4
 # Noise of the voltage, relative to that of the displacement, below which there is nothing to be explained.
 QUIET = 1e-3
+# Noise of the displacement, relative to its range, that is but the rounding of numbers.
+NOISELESS = 1e-9
 
 
 class Answer(NamedTuple):
@@ -78,7 +80,7 @@ def answer(u: FloatArray, x: FloatArray, gain: float) -> Answer:
     _, left_alone, _ = _least_squares(own[used], target[used])
     _, left_x, _ = _least_squares(both[used], dx[rows][used])
     noise_u, noise_x = float(np.std(left_alone)), float(np.std(left_x))
-    if noise_u < QUIET * noise_x or noise_x == 0.0:
+    if noise_u < QUIET * noise_x or noise_x < NOISELESS * float(np.ptp(x)):
         return Answer()
     explained = 1.0 - float(np.var(left_u)) / noise_u**2
     together = 0.0

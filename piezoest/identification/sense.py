@@ -206,13 +206,14 @@ def _direction(log: Examined) -> Iterator[Finding]:
             "clockwise",
             f"The loop of displacement over voltage runs clockwise, {-100 * log.loop.opening:.2g} % of the "
             "stroke wide, but that of a stage runs counter-clockwise: voltage and displacement are swapped, "
-            "or the displacement's time stamps are early.",
+            "the displacement's time stamps are early, or the stage swings above its resonance.",
             "doubt",
         )
 
 
 def _closed_loop(log: Examined) -> Iterator[Finding]:
-    if not log.related:
+    # With a wrong sign, feedback cannot be told from what it is not.
+    if not log.related or log.gain < 0.0:
         return
     off = float(np.std(log.line[1])) / log.stroke
     opening = abs(log.loop.opening)
@@ -250,12 +251,14 @@ def _closed_loop(log: Examined) -> Iterator[Finding]:
 
 def _limits(log: Examined) -> Iterator[Finding]:
     sign = 1.0 if log.gain >= 0.0 else -1.0
-    # A stage that is stopped rings, a voltage does not.
+    # A stage that is stopped rings, so it must go further than a voltage.
     for name, unit, y, other_name, other_unit, other, goes_on in (
         ("displacement", "µm", log.x, "voltage", "V", log.u, 0.04),
         ("voltage", "V", log.u, "displacement", "µm", log.x, 0.08),
     ):
-        if log.related and (top := flat_tops(y, sign * other, goes_on)):
+        top = flat_tops(y, sign * other, goes_on) if log.related else None
+        # A rest in which the stage swings once is no limit of the voltage yet.
+        if top and (name == "displacement" or top.times > 1):
             yield Finding(
                 f"clipped {name}",
                 f"The {name} stands at {top.limit:.5g} {unit} {top.times} times while the {other_name} goes "

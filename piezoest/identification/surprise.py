@@ -86,7 +86,10 @@ def _robust(A: FloatArray, b: FloatArray) -> FloatArray:
             break
         # A column that hardly moves above the noise would else get any weight.
         likely = max(scale, 1e-6 * float(np.max(np.abs(b)))) ** 2 * np.eye(weights.size)
-        solved = np.linalg.solve(A[used].T @ A[used] + likely, A[used].T @ b[used])
+        G = A[used].T @ A[used] + likely
+        # Of a log without noise no two columns may differ.
+        G += (1e-12 * np.max(np.diag(G)) + 1e-300) * np.eye(weights.size)
+        solved = np.linalg.solve(G, A[used].T @ b[used])
         weights = np.asarray(solved, dtype=np.float64)
     return weights
 

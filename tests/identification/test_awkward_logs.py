@@ -317,6 +317,8 @@ HEALTHY: dict[str, Callable[[], Log]] = {
     "input of an amplifier": lambda: (SINE / 33.0 + 1.8, log()[1] * 3.5 - 120.0, FS),
     "with an offset": lambda: log(SINE + 60.0),
     "sixteen bits": lambda: in_steps_of(2e-4),
+    "without noise": lambda: (SINE, STAGE.simulate(SINE), FS),
+    "a triangle without noise": lambda: (triangle(), STAGE.simulate(triangle()), FS),
     "noisy": lambda: (SINE, log()[1] + noise(deviation=0.05, seed=5), FS),
     "noise in the recorded voltage": lambda: (SINE + noise(deviation=0.05, seed=6), log()[1], FS),
     "late": lambda: (SINE[5:], log()[1][:-5], FS),

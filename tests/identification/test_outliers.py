@@ -94,6 +94,15 @@ def test_missing_samples_are_no_flaws() -> None:
     assert flaws.jumps.size == 0
 
 
+@pytest.mark.parametrize("turns", [0.0, 0.5, 7.0, 300.0])
+def test_a_log_without_noise_is_taken(turns: float) -> None:
+    u = np.linspace(0.0, 1.0, 4000) if turns == 0.0 else np.sin(np.linspace(0.0, 6.28 * turns, 4000))
+    x = 0.1 * u
+    assert not flawed(u, x).unusable.any()
+    x[1000] += 0.3
+    np.testing.assert_array_equal(np.flatnonzero(flawed(u, x).spikes), [1000])
+
+
 @pytest.mark.parametrize("size", [0, 1, 5, 31, 32, 33, 60])
 def test_short_logs_are_taken(size: int) -> None:
     u = np.sin(np.arange(size))
