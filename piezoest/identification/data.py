@@ -93,25 +93,30 @@ def check_excitation(data: Data, noise: float) -> FloatArray:
 
 def turning_voltages(data: Data) -> FloatArray:
     """Voltages at which it turns and then runs back by more than a twentieth of its range [V]."""
-    turns = np.empty(data.u.size)
-    return turns[: _turns(data.u, TURN * data.extent, turns)]
+    return data.u[turning_samples(data.u, TURN * data.extent)]
+
+
+def turning_samples(u: FloatArray, threshold: float) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Samples at which a voltage turns and then runs back by more than a threshold [V], shape (M,)."""
+    turns = np.empty(u.size)
+    return turns[: _turns(u, threshold, turns)].astype(np.int64)
 
 
 @compiled
 def _turns(u: Vector, threshold: float, turns: Vector) -> int:
-    """Voltages at which u turns and then runs back by more than a threshold, into `turns`."""
-    count, direction, extreme = 0, 0.0, u[0]
+    """The same into `turns`, and how many they are."""
+    count, direction, extreme = 0, 0.0, 0
     low = high = u[0]
-    for value in u:
+    for k, value in enumerate(u):
         if direction == 0.0:
             low, high = min(low, value), max(high, value)
             if high - low > threshold:
                 direction = 1.0 if value == high else -1.0
-                extreme = value
-        elif direction * (value - extreme) > 0.0:
-            extreme = value
-        elif direction * (extreme - value) > threshold:
+                extreme = k
+        elif direction * (value - u[extreme]) > 0.0:
+            extreme = k
+        elif direction * (u[extreme] - value) > threshold:
             turns[count] = extreme
             count += 1
-            direction, extreme = -direction, value
+            direction, extreme = -direction, k
     return count

@@ -1,0 +1,109 @@
+"""Readings that end at a limit, come in coarse steps, or come more often than the sensor measures."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.identification.runs import runs
+
+# A column is at its limit within this part of its range.
+AT_LIMIT = 1e-3
+# Of the way on that must be back at the end of a flat top, and of the log that flat tops are looked for in.
+BACK, MOST_TOPS, EARLY = 0.3, 10_000, 0.15
+REPEATED, STEADY = 2, 0.8
+# Steps of the sensor that a changed reading moves by, where it is held and not coarse.
+HELD_STEPS = 5.0
+
+
+class Top(NamedTuple):
+    """Stretches in which a column stands at its limit while the other column goes on and comes back.
+
+    Parameters
+    ----------
+    limit : float
+        Value at which it stands.
+    times : int
+        How many stretches.
+    beyond : float
+        How far the other one goes on, in its unit.
+    """
+
+    limit: float
+    times: int
+    beyond: float
+
+
+def flat_tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
+    """Find where a column is clipped; None if it is not.
+
+    Parameters
+    ----------
+    y, other : ndarray, shape (N,)
+        Without gaps and spikes; the other one rises where the column does.
+    goes_on : float
+        Part of its range by which the other one must go on, and come back.
+    """
+    for sign in (1.0, -1.0):
+        if found := _tops(sign * y, sign * other, goes_on):
+            return found._replace(limit=sign * found.limit)
+    return None
+
+
+def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
+    extent, reach, top = float(np.ptp(y)), float(np.ptp(other)), float(y.max())
+    noise = 1.4826 * float(np.median(np.abs(np.diff(y, 3)))) / np.sqrt(20.0)
+    tolerance = min(max(AT_LIMIT * extent, 7.0 * noise), 0.02 * extent)
+    starts, ends = runs(y >= top - tolerance)
+    beyond = []
+    for start, end in zip(starts[:MOST_TOPS], ends[:MOST_TOPS], strict=True):
+        part = other[start:end]
+        on, back = float(part.max() - part[0]), float(part.max() - part[-1])
+        # What overshoots as the column comes to rest has its greatest value at once.
+        amid = EARLY < np.argmax(part) / (end - start) < 1.0 - EARLY
+        if end - start > 5 and amid and min(on, back) > goes_on * reach and back > BACK * on:
+            beyond.append(on)
+    return Top(top, len(beyond), max(beyond)) if beyond else None
+
+
+def levels(y: FloatArray) -> tuple[float, float]:
+    """Step of a column's values and how many of them its range holds; the count is infinite without steps.
+
+    Parameters
+    ----------
+    y : ndarray, shape (N,)
+        Without gaps and spikes.
+    """
+    values = np.unique(y)
+    apart = np.diff(values)
+    extent = float(np.ptp(y))
+    apart = apart[apart > 1e-9 * extent]
+    if not apart.size:
+        return 0.0, np.inf
+    step = float(np.min(apart))
+    whole = np.abs(apart / step - np.rint(apart / step))
+    return (step, extent / step) if np.median(whole) < 0.01 else (0.0, np.inf)
+
+
+def repeats(y: FloatArray) -> int:
+    """How many times in a row each value stands where all are held alike; 1 if they are not.
+
+    Parameters
+    ----------
+    y : ndarray, shape (N,)
+        Readings.
+    """
+    changed = np.flatnonzero(np.diff(y) != 0.0)
+    if changed.size < 10:
+        return 1
+    lengths: Any = np.diff(changed)
+    usual = int(np.median(lengths))
+    # Coarse steps repeat values too, but then each change is by one step.
+    moved = np.abs(np.diff(y)[changed])
+    held = (
+        float(np.median(moved)) > HELD_STEPS * float(np.min(moved)) or np.unique(y).size > 0.5 * changed.size
+    )
+    steady = float(np.mean(np.abs(lengths - usual) <= 1)) > STEADY
+    return usual if usual >= REPEATED and steady and held else 1

@@ -1,0 +1,79 @@
+"""A log as the checks see it: without gaps and spikes, with its line and its loop."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.estimators.coordinates import bridged
+from piezoest.identification.data import TURN, turning_samples
+from piezoest.identification.loop_direction import Loop, loop_of
+from piezoest.identification.outliers import Flaws, flawed
+from piezoest.records import Record
+
+FEWEST_TURNS = 2
+# Part of the displacement's scatter that a line in the voltage must not leave, if they belong together.
+UNRELATED = 0.5
+
+
+class Examined:
+    """A record without gaps and spikes, and what several checks ask.
+
+    Parameters
+    ----------
+    record : Record
+        With at least two usable samples.
+    """
+
+    def __init__(self, record: Record) -> None:
+        self.record, self.rate = record, record.sample_rate
+        self.counts = record.usable
+        self.flaws: Flaws = flawed(record.voltage, record.displacement)
+        self.u = bridged(record.voltage)
+        self.x = bridged(np.where(self.flaws.unusable, np.nan, record.displacement))
+        self.swing = float(np.ptp(self.u))
+        self.turns = turning_samples(self.u, TURN * self.swing)
+        # The voltage without what drifts; each stretch between jumps has an offset of its own.
+        offsets = np.zeros(self.x.size)
+        offsets[self.flaws.jumps] = self.flaws.jump_sizes
+        self.level = self.x - np.cumsum(offsets)
+        self.stroke = float(np.ptp(self.level))
+
+    @cached_property
+    def line(self) -> tuple[FloatArray, FloatArray]:
+        """Weights and rest of a line in the voltage and its rate, and a parabola in time."""
+        t = np.linspace(-1.0, 1.0, self.u.size)
+        A = np.stack([self.u - self.u.mean(), np.gradient(self.u), np.ones_like(t), t, t * t], axis=1)
+        size = np.sqrt(np.mean(A**2, axis=0))
+        A = A / np.where(size > 0.0, size, 1.0)
+        weights = np.linalg.lstsq(A[self.counts], self.level[self.counts])[0]
+        return weights / np.where(size > 0.0, size, 1.0), self.level - A @ weights
+
+    @property
+    def gain(self) -> float:
+        """Slope of that line [µm/V]."""
+        return float(self.line[0][0])
+
+    @property
+    def moved(self) -> float:
+        """What the line moves over the range of the voltage [µm]."""
+        return abs(self.gain) * self.swing
+
+    @property
+    def wave(self) -> float:
+        """How long the voltage's way there and back takes [s]; infinite with fewer than two turns."""
+        if self.turns.size < FEWEST_TURNS:
+            return np.inf
+        return 2.0 * float(np.median(np.diff(self.turns))) / self.rate
+
+    @cached_property
+    def loop(self) -> Loop:
+        """The loop of displacement over voltage."""
+        return loop_of(self.u, self.level, self.counts & ~self.flaws.unusable, self.gain)
+
+    @property
+    def related(self) -> bool:
+        """Whether the displacement follows the voltage enough for a word about gain and loop."""
+        return float(np.std(self.line[1])) < UNRELATED * float(np.std(self.level))

@@ -1,0 +1,68 @@
+"""Whether a log's voltage can tell a lag of the displacement from the width of the hysteresis loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from piezoest._checks import array_1d
+from piezoest.estimators.coordinates import bridged
+from piezoest.identification.data import TURN, turning_samples
+
+# Swings whose durations or sizes differ by this factor move at rates that tell.
+FACTOR = 1.5
+# A voltage whose fastest change is so many times the usual one has steps; a sine has 1.6, a triangle 1.
+STEPPED = 2.5
+
+
+def tells_lag(u: Any) -> bool:
+    """Whether swings of several frequencies or sizes, or steps, tell a lag from a wider loop.
+
+    The width of a hysteresis loop depends on how far the voltage swings, that of a lag on how fast. Where all
+    swings are alike, as in a sine or a triangle of one frequency and one amplitude, the two look the same.
+
+    Parameters
+    ----------
+    u : array_like, shape (N,)
+        Voltage [V], evenly sampled; NaN where a sample is missing. The sample rate does not matter: swings
+        are compared with each other.
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    ValueError
+        If `u` is not numbers of shape (N,).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from piezoest.identification.lag import tells_lag
+    >>> t = np.linspace(0.0, 1.0, 10_000)
+    >>> tells_lag(np.sin(50.0 * t)), tells_lag(np.sin(50.0 * t) + np.sin(170.0 * t))
+    (False, True)
+    """
+    u = array_1d("u", u, allow_nan=True)
+    if np.sum(np.isfinite(u)) < 3:
+        return False
+    u = bridged(u)
+    extent = float(np.ptp(u))
+    turns = turning_samples(u, TURN * extent)
+    if extent == 0.0 or turns.size < 2:
+        return False
+    # The ways before the first and behind the last turn are no whole swings.
+    if _differ(np.diff(turns)) or _differ(np.abs(np.diff(u[turns]))):
+        return True
+    # Over a few samples, which is what noise does not do.
+    apart = max(1, round(float(np.median(np.diff(turns))) / 20.0))
+    moved = np.abs(u[apart:] - u[:-apart])[turns[0] : turns[-1]]
+    return bool(moved.size and np.quantile(moved, 0.99) > STEPPED * np.mean(moved))
+
+
+def _differ(values: Any) -> bool:
+    """Whether values, but for a few, spread by more than a factor."""
+    low, high = np.quantile(values, [0.05, 0.95])
+    return bool(high > FACTOR * max(low, 1.0 if values.dtype.kind == "i" else 0.0))

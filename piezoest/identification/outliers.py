@@ -1,0 +1,285 @@
+"""Samples of a log that belong to no stage: spikes, jumps of the sensor, readings that stand still, rests."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from piezoest._checks import FloatArray, array_1d
+from piezoest.compile import Vector, compiled
+from piezoest.estimators.coordinates import bridged
+from piezoest.identification.rests import rests_of
+from piezoest.identification.runs import BoolArray, IntArray, runs
+from piezoest.identification.surprise import is_peak, scale_of, surprise
+
+FEWEST_SAMPLES = 64
+# A sample that is off by so many standard deviations is no noise, in the longest of logs.
+UNUSUAL = 6.0
+# ... and by so much of the range of the displacement: less does no harm to a fit.
+SMALLEST_SPIKE, SMALLEST_JUMP = 1e-3, 5e-3
+LONGEST_SPIKE = 3
+PASSES = 4
+# Steps of the voltage explain what happens up to so many samples later, and this much more than their size.
+LONGEST_DELAY = 30
+FORGOTTEN_PER_SAMPLE = 0.98
+EXPLAINED_BY_STEP = 3.0
+# Part of the displacement that the voltage moves in a sample which a kink of the hysteresis may take or give.
+KINK = 0.35
+CROSSED = 1.5
+# So many jumps, all of them in the direction of the motion, are the stage's own.
+STICK_SLIP = 6
+# Samples on either side of a jump that say how large it is.
+EACH_SIDE = 6
+# Neighbours on either side that foresee a sample.
+NEIGHBOURS = 3
+# What surprises on either side of a spike, relative to it: largest difference, and least sum, the other way.
+ONE_SIDED, BOTH_SIDES = 0.6, 0.15
+# Samples beside a spike that say whether the displacement comes back.
+BESIDE = np.arange(2, 7)
+# A sensor that stands still for so many samples while the stage moves by so many of its steps.
+SHORTEST_DROPOUT, MOVED_IN_DROPOUT = 8, 50.0
+# Part of what the voltage moves by which the reading then jumps.
+JUMPED = 0.2
+
+
+class Flaws(NamedTuple):
+    """What in a log belongs to no stage.
+
+    Parameters
+    ----------
+    spikes, dropouts : ndarray, shape (N,), bool
+        Samples of the displacement that are off alone, or up to three together; samples at which the reading
+        stands still while the voltage moves.
+    jumps : ndarray, shape (J,), int
+        First samples after a step of the displacement that no step of the voltage explains.
+    jump_sizes : ndarray, shape (J,)
+        [µm].
+    rests : ndarray, shape (R, 2), int
+        Stretches [start, end) in which the voltage stands still.
+    """
+
+    spikes: BoolArray
+    dropouts: BoolArray
+    jumps: IntArray
+    jump_sizes: FloatArray
+    rests: IntArray
+
+    @property
+    def unusable(self) -> BoolArray:
+        """Samples that a fit should leave out, shape (N,)."""
+        return self.spikes | self.dropouts
+
+    @property
+    def stretch(self) -> IntArray:
+        """Number of the stretch between jumps that each sample lies in, from 0, shape (N,)."""
+        starts = np.zeros(self.spikes.size, dtype=np.int64)
+        starts[self.jumps] = 1
+        return np.cumsum(starts)
+
+
+def flawed(u: Any, x: Any) -> Flaws:
+    """Find spikes, jumps, dropouts and rests in a log.
+
+    Parameters
+    ----------
+    u, x : array_like, shape (N,)
+        Voltage [V], displacement [µm]; NaN where a sample is missing. Evenly sampled.
+
+    Returns
+    -------
+    Flaws
+        Nothing in it where fewer than 64 samples are known, or voltage or displacement never move.
+
+    Raises
+    ------
+    ValueError
+        If the arrays are not numbers of one shape (N,).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from piezoest.identification.outliers import flawed
+    >>> u = 10.0 * np.sin(np.linspace(0.0, 40.0, 4000))
+    >>> x = 0.1 * u
+    >>> x[1000] += 0.5
+    >>> np.flatnonzero(flawed(u, x).spikes)
+    array([1000])
+    """
+    u, x = array_1d("u", u, allow_nan=True), array_1d("x", x, allow_nan=True)
+    if u.size != x.size:
+        raise ValueError(f"x must have shape ({u.size},) as u has, got ({x.size},)")
+    known = np.isfinite(u) & np.isfinite(x)
+    nothing = np.zeros(u.size, dtype=np.bool_)
+    empty = Flaws(nothing, nothing.copy(), np.empty(0, np.int64), np.empty(0), np.empty((0, 2), np.int64))
+    if np.sum(known) < FEWEST_SAMPLES or np.ptp(u[known]) == 0.0:
+        return empty
+    u = bridged(u)
+    rests = rests_of(u)
+    if np.ptp(x[known]) == 0.0:
+        return empty._replace(rests=rests)
+    log = _Log(u, bridged(x))
+    dropouts = _dropouts(log) & known
+    spikes, clean = _spikes(log, dropouts)
+    jumps, sizes = _jumps(log, clean, spikes | dropouts)
+    return Flaws(spikes & known, dropouts, jumps, sizes, rests)
+
+
+class _Log:
+    """A log without gaps, and what it takes to judge a sample of it."""
+
+    def __init__(self, u: FloatArray, x: FloatArray) -> None:
+        self.u, self.x = u, x
+        low, high = np.quantile(x, [0.001, 0.999])
+        self.range = float(high - low) or float(np.ptp(x))
+        self.delay = _delay(u, x)
+        self.late = u[np.maximum(np.arange(u.size) - self.delay, 0)]
+        self.gain = _gain(self.late, x)
+        moved = np.abs(np.diff(x))
+        self.quantum = float(np.min(moved[moved > 0.0]))
+        # The stage may answer at once, or be as late as it seems.
+        curved = np.max(
+            [np.abs(np.diff(v, 2, prepend=v[0], append=v[-1])) for v in (self.u, self.late)], axis=0
+        )
+        steps = np.empty_like(curved)
+        _remembered(curved, FORGOTTEN_PER_SAMPLE, steps)
+        #: What the voltage moves in a sample [µm].
+        self.moving = self.gain * np.abs(np.diff(self.late, append=self.late[-1]))
+        #: What it may do to a sample, beyond what the neighbours say [µm].
+        self.explained = self.gain * EXPLAINED_BY_STEP * steps + KINK * self.moving
+
+
+def _gain(u: FloatArray, x: FloatArray) -> float:
+    """Size of the slope of the displacement over the voltage [µm/V]; jumps and spikes do little to it."""
+    about = u - np.mean(u)
+    return abs(float(about @ x)) / float(about @ about)
+
+
+def _delay(u: FloatArray, x: FloatArray) -> int:
+    """Samples by which bends of the displacement come after those of the voltage; 0 if that does not show."""
+    size = min(u.size, 200_000)
+    bent_u, bent_x = np.diff(u[:size], 2), np.diff(x[:size], 2)
+    # A spike must not decide.
+    bent_x = np.clip(bent_x, *np.quantile(bent_x, [0.01, 0.99]))
+    longest = min(LONGEST_DELAY, bent_u.size // 4)
+    match = [float(bent_u[: bent_u.size - d] @ bent_x[d:]) for d in range(longest + 1)]
+    chance = float(np.linalg.norm(bent_u)) * float(np.std(bent_x))
+    best = int(np.argmax(match))
+    return best if match[best] - match[0] > UNUSUAL * chance else 0
+
+
+@compiled
+def _remembered(size: Vector, keep: float, out: Vector) -> None:
+    """The largest so far, forgotten by a factor for each sample; and that of the two samples ahead."""
+    largest = 0.0
+    for k in range(len(size)):
+        ahead = max(size[k], size[min(k + 1, len(size) - 1)], size[min(k + 2, len(size) - 1)])
+        largest = max(keep * largest, ahead)
+        out[k] = largest
+
+
+def _spikes(log: _Log, stuck: BoolArray) -> tuple[BoolArray, FloatArray]:
+    """Samples that are off alone, and the displacement with something sensible in their place."""
+    inputs = log.gain * np.diff(log.late, 2, prepend=log.late[0], append=log.late[-1])
+    clean, spikes = log.x.copy(), np.zeros(log.x.size, dtype=np.bool_)
+    for _ in range(PASSES):
+        e = surprise(clean, inputs, NEIGHBOURS)
+        size = np.abs(e)
+        floor = SMALLEST_SPIKE * log.range + log.quantum
+        limit = np.maximum(UNUSUAL * scale_of(e), np.maximum(floor, log.explained))
+        found = np.flatnonzero((size > limit) & ~stuck)
+        found = found[is_peak(size, 2, found)]
+        # The neighbours of a spike are surprising the other way: of a step only one is, of a kink none. What
+        # stands beside a greater spike waits for the next pass.
+        before, after = (e[found + side] * np.sign(e[found]) / size[found] for side in (-1, 1))
+        found = found[(np.abs(before - after) < ONE_SIDED) & (before + after < -BOTH_SIDES)]
+        found = found[_comes_back(log, clean, found, size[found])]
+        if not found.size:
+            break
+        spikes[found] = True
+        clean[found] -= e[found]
+    return _isolated(spikes), clean
+
+
+def _comes_back(log: _Log, x: FloatArray, found: IntArray, size: FloatArray) -> BoolArray:
+    """Whether the displacement is after a spike what it was before, but for what the voltage did."""
+    h = x - log.gain * log.late
+    sides = [h[np.clip(found[:, None] + place, 0, h.size - 1)] for place in (-BESIDE, BESIDE)]
+    medians = [np.median(values[:, :3], axis=1) for values in sides]
+    t = BESIDE - BESIDE.mean()
+    ends = [values.mean(axis=1) - values @ t / (t @ t) * BESIDE.mean() for values in sides]
+    # Of a stage in motion the lines tell, beside another spike the medians.
+    stays = np.minimum(np.abs(medians[1] - medians[0]), np.abs(ends[1] - ends[0]))
+    return np.asarray(stays < 0.5 * size)
+
+
+def _isolated(marks: BoolArray) -> BoolArray:
+    """Marks of which no more than a few stand together."""
+    starts, ends = runs(marks)
+    long = ends - starts > LONGEST_SPIKE
+    out = marks.copy()
+    for start, end in zip(starts[long], ends[long], strict=True):
+        out[start:end] = False
+    return out
+
+
+def _jumps(log: _Log, clean: FloatArray, marked: BoolArray) -> tuple[IntArray, FloatArray]:
+    """First samples after a step that stays and that the voltage does not explain, and the steps."""
+    if clean.size < 4 * EACH_SIDE:
+        return np.empty(0, np.int64), np.empty(0)
+    e = surprise(np.diff(clean), log.gain * np.diff(log.late), NEIGHBOURS + 1)
+    size = np.abs(e)
+    limit = UNUSUAL * scale_of(e)
+    explained = np.maximum(log.explained[1:], log.explained[:-1])
+    near = np.convolve(marked, np.ones(5), mode="same")[1:] > 0
+    found = np.flatnonzero((size > np.maximum(limit, explained)) & ~near)
+    found = found[is_peak(size, 4, found)] + 1
+    found = found[(found >= EACH_SIDE) & (found <= clean.size - EACH_SIDE)]
+    steps, scatter = _step_at(clean - log.gain * log.late, found)
+    # What the voltage moves in a sample or two may be a kink of the hysteresis, or a gap that it crosses.
+    about = np.clip(found[:, None] + np.arange(-EACH_SIDE, EACH_SIDE), 0, clean.size - 1)
+    moving = CROSSED * np.max(log.moving[about], axis=1)
+    smallest = np.maximum(max(SMALLEST_JUMP * log.range, 3.0 * log.quantum), moving)
+    stays = np.abs(steps) > np.maximum(np.maximum(smallest, explained[found - 1]), UNUSUAL * scatter)
+    found, steps = found[stays], steps[stays]
+    onward = np.sign(log.late[found] - log.late[found - 1])
+    if found.size >= STICK_SLIP and np.all(steps * onward > 0.0):
+        # A stage that moves in steps, always onward, is sticky: no sensor does that.
+        return np.empty(0, np.int64), np.empty(0)
+    return found, steps
+
+
+def _step_at(h: FloatArray, found: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Steps between lines through a few samples before and after each place, and how far those scatter."""
+    t = np.arange(EACH_SIDE) + 0.5
+    middle = t - t.mean()
+    ends, off = [], np.zeros(found.size)
+    for places in (found[:, None] - 1 - np.arange(EACH_SIDE), found[:, None] + np.arange(EACH_SIDE)):
+        values = h[places]
+        mean, slope = values.mean(axis=1), values @ middle / (middle @ middle)
+        ends.append(mean - slope * t.mean())
+        off += np.sum((values - mean[:, None] - slope[:, None] * middle) ** 2, axis=1)
+    return ends[1] - ends[0], np.sqrt(off / (2.0 * EACH_SIDE - 4.0))
+
+
+def _dropouts(log: _Log) -> BoolArray:
+    """Samples at which the reading stands still though the voltage moves, unless it is clipped there."""
+    out = np.zeros(log.x.size, dtype=np.bool_)
+    same = np.diff(log.x) == 0.0
+    starts, ends = runs(same)
+    ends = ends + 1
+    usual = log.x.size / float(np.sum(~same))
+    worth = ends - starts >= max(SHORTEST_DROPOUT, 5.0 * usual)
+    for start, end in zip(starts[worth], ends[worth], strict=True):
+        moved = log.gain * float(np.ptp(log.late[start:end]))
+        if moved > max(MOVED_IN_DROPOUT * log.quantum, 0.02 * log.range) and _is_lost(log, start, end, moved):
+            out[start:end] = True
+    return out
+
+
+def _is_lost(log: _Log, start: int, end: int, moved: float) -> bool:
+    """Whether the reading comes to its rest, or goes on, by a jump; where it does neither it is clipped."""
+    value = log.x[start]
+    if end >= log.x.size - 1:
+        return bool(value not in (log.x.min(), log.x.max()))
+    return bool(max(abs(value - log.x[max(start - 1, 0)]), abs(value - log.x[end])) > JUMPED * moved)

@@ -1,0 +1,41 @@
+"""Rests of a log: stretches in which its voltage stands still."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+from piezoest.identification.data import TURN, turning_samples
+from piezoest.identification.runs import IntArray, runs
+
+# A rest lasts for so many samples, and for this part of a swing; the voltage moves by this part of its
+# range in it.
+SHORTEST_REST, REST_OF_SWING = 20, 0.1
+RESTING = 1e-3
+
+
+def rests_of(u: FloatArray) -> IntArray:
+    """Stretches [start, end) in which a voltage without gaps stands still, shape (R, 2).
+
+    Parameters
+    ----------
+    u : ndarray, shape (N,)
+        [V].
+    """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    extent = float(np.ptp(u))
+    noise = 1.4826 * float(np.median(np.abs(np.diff(u, 3)))) / np.sqrt(20.0) if u.size > 3 else 0.0
+    tolerance = max(RESTING * extent, 7.0 * noise)
+    turns = turning_samples(u, max(TURN * extent, tolerance)).size
+    shortest = max(SHORTEST_REST, round(REST_OF_SWING * u.size / (turns + 1)))
+    if shortest >= u.size or extent == 0.0 or tolerance > 0.1 * extent:
+        return np.empty((0, 2), np.int64)
+    # The filters' window ends at its sample: then it begins `shortest - 1` samples before.
+    origin = (shortest - 1) // 2
+    high = maximum_filter1d(u, shortest, origin=origin, mode="nearest")
+    low = minimum_filter1d(u, shortest, origin=origin, mode="nearest")
+    still = high - low <= tolerance
+    still[: shortest - 1] = False
+    starts, ends = runs(still)
+    return np.stack((starts - (shortest - 1), ends), axis=1)

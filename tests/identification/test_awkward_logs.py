@@ -1,0 +1,371 @@
+"""Logs as they should not be, and what is said of each: in a finding, or when the file is read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+from piezoest.identification.lag import tells_lag
+from piezoest.identification.outliers import flawed
+from piezoest.identification.sense import findings
+from piezoest.models import ColemanHodgdon
+from piezoest.records import Record, read_record
+from piezoest.stage import Gauge, SimulatedStage
+
+FS, N = 1000.0, 8000
+T = np.arange(N) / FS
+STAGE = ColemanHodgdon.from_loop(0.03, 0.04, 0.1)
+SINE = 60.0 * np.sin(2.0 * np.pi * 2.0 * T)
+
+Log = tuple[FloatArray, FloatArray, float]
+
+
+def noise(size: int = N, deviation: float = 5e-3, seed: int = 0) -> FloatArray:
+    return deviation * np.random.default_rng(seed).standard_normal(size)
+
+
+def log(u: FloatArray = SINE, rate: float = FS) -> Log:
+    """A healthy log: 12 µm of stroke, 5 nm of noise."""
+    return u, STAGE.simulate(u, allow_jumps=True) + noise(u.size), rate
+
+
+def times(u: float = 1.0, x: float = 1.0, rate: float = FS) -> Log:
+    v, y, _ = log()
+    return u * v, x * y, rate
+
+
+def changed(change: Callable[[FloatArray], None]) -> Log:
+    """The healthy log with the displacement changed in place."""
+    u, x, rate = log()
+    change(x)
+    return u, x, rate
+
+
+def spiky(count: int, size: float) -> Log:
+    def change(x: FloatArray) -> None:
+        x[np.random.default_rng(1).choice(np.arange(10, N - 10), count, replace=False)] += size
+
+    return changed(change)
+
+
+def stepped(*at: int) -> Log:
+    def change(x: FloatArray) -> None:
+        for k in at:
+            x[k:] += 0.5
+
+    return changed(change)
+
+
+def frozen(start: int, end: int, value: float | None) -> Log:
+    def change(x: FloatArray) -> None:
+        x[start:end] = x[start] if value is None else value
+
+    return changed(change)
+
+
+def swapped() -> Log:
+    u, x, rate = log()
+    return x, u, rate
+
+
+def early(samples: int) -> Log:
+    u, x, rate = log()
+    return u[:-samples], x[samples:], rate
+
+
+def closed_loop(same_row: bool) -> Log:
+    """A PI controller that follows a sine; each row holds the reading before or after the voltage."""
+    stage = SimulatedStage(FS, STAGE, gauge=Gauge(noise=5e-3), seed=2)
+    r, u, x, before = 5.0 * np.sin(2.0 * np.pi * T), np.zeros(N), np.zeros(N), np.zeros(N)
+    reading = integral = 0.0
+    for k in range(N):
+        before[k] = reading
+        integral += 0.1 * (r[k] - reading)
+        u[k] = (0.2 * (r[k] - reading) + integral) / 0.1
+        reading = float(stage.step(float(u[k])))
+        x[k] = reading
+    return u, before if same_row else x, FS
+
+
+def followed(unit: float) -> Log:
+    """What a closed loop leaves where its reference is logged, in µm or in volts."""
+    r = 5.0 * np.sin(2.0 * np.pi * T) + 2.0 * np.sin(2.0 * np.pi * 0.7 * T)
+    return r / unit, np.interp(T - 0.001, T, r) + noise(deviation=2e-3), FS
+
+
+def clipped_displacement(low: float, high: float) -> Log:
+    u, x, rate = log()
+    return u, np.clip(x, low, high), rate
+
+
+def clipped_voltage() -> Log:
+    u, x, rate = log()
+    return np.minimum(u, 40.0), x, rate
+
+
+def saturated_amplifier() -> Log:
+    return SINE, STAGE.simulate(np.clip(SINE, -45.0, 45.0)) + noise(), FS
+
+
+def in_steps_of(step: float) -> Log:
+    u, x, rate = log()
+    return u, np.round(x / step) * step, rate
+
+
+def held(times: int) -> Log:
+    u, x, rate = log()
+    return u, np.repeat(x[::times], times)[:N], rate
+
+
+def cut(size: int) -> Log:
+    u, x, rate = log()
+    return u[:size], x[:size], rate
+
+
+def ramp(turns: int) -> Log:
+    u = np.interp(np.arange(N), np.linspace(0, N, turns + 2), np.resize([-50.0, 50.0], turns + 2))
+    return log(u)
+
+
+def with_rest() -> Log:
+    u = SINE.copy()
+    u[2000:5000] = u[2000]
+    return log(u)
+
+
+def unrelated() -> Log:
+    return SINE, np.cumsum(noise(deviation=0.05)), FS
+
+
+def gaps() -> Log:
+    def change(x: FloatArray) -> None:
+        x[1000:3000] = np.nan
+
+    return changed(change)
+
+
+def drifting() -> Log:
+    u, x, rate = log()
+    return u, x + 0.4 * T, rate
+
+
+# name: (the log, name of the finding, a phrase of its sentence)
+FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
+    "nm taken for um": (lambda: times(x=1e3), "too large", "nm taken for µm"),
+    "volts taken for millivolts": (lambda: times(u=1e-3, x=5.0), "too large", "V for mV"),
+    "mm taken for um": (lambda: times(x=1e-3), "too small", "mm or m taken for µm"),
+    "m taken for um": (lambda: times(x=1e-6), "too small", "mm or m taken for µm"),
+    "mV taken for V": (lambda: times(u=1e3), "voltage", "mV taken for V"),
+    "a stroke of some nm": (lambda: times(u=1e-3, x=1e-3), "small stroke", "raise the voltage"),
+    "us taken for s": (lambda: times(rate=1e-6 * FS), "sample rate", "unit of time"),
+    "s taken for us": (lambda: times(rate=1e6 * FS), "sample rate", "unit of time"),
+    "a swing of hours": (
+        lambda: (*log(SINE[np.arange(80 * N) // 80])[:2], 1.1),
+        "swing time",
+        "there and back",
+    ),
+    "a swing of microseconds": (lambda: (*times()[:2], 9e6 * 4), "sample rate", "unit of time"),
+    "sign of the sensor": (lambda: times(x=-1.0), "falls", "change the sign"),
+    "sign of the voltage": (lambda: times(u=-1.0), "falls", "change the sign"),
+    "columns swapped": (swapped, "clockwise", "swapped"),
+    "displacement early": (lambda: early(25), "clockwise", "time stamps"),
+    "the reference in um": (lambda: followed(1.0), "reference", "reference in µm"),
+    "the reference in volts": (lambda: followed(0.1), "straight", "servo off"),
+    "closed loop, reading after": (lambda: closed_loop(False), "closed loop", "samples later"),
+    "closed loop, reading before": (lambda: closed_loop(True), "closed loop", "opposite ways"),
+    "sensor clipped above": (
+        lambda: clipped_displacement(-9.0, 3.0),
+        "clipped displacement",
+        "stands at 3 µm",
+    ),
+    "sensor clipped below": (lambda: clipped_displacement(-2.5, 9.0), "clipped displacement", "-2.5 µm"),
+    "recorder clips the voltage": (clipped_voltage, "clipped voltage", "stands at 40 V"),
+    "amplifier saturates": (saturated_amplifier, "clipped displacement", "comes back"),
+    "four bits": (lambda: in_steps_of(0.8), "coarse", "steps of 0.8 µm"),
+    "six bits": (lambda: in_steps_of(0.15), "coarse", "steps of 0.15 µm"),
+    "a slow sensor": (lambda: held(8), "repeated", "8 times in a row"),
+    "sensor off": (lambda: times(x=0.0), "constant displacement", "stays at 0 µm"),
+    "amplifier off": (lambda: times(u=0.0), "constant voltage", "stays at 0 V"),
+    "thirty samples": (lambda: cut(30), "short", "30 usable samples"),
+    "nothing but gaps": (lambda: times(x=np.nan), "short", "0 usable samples"),
+    "one way": (lambda: ramp(0), "no swing", "turns 0 times"),
+    "one turn": (lambda: ramp(1), "no swing", "turns 1 times"),
+    "a quarter missing": (gaps, "missing", "25 %"),
+    "another axis": (unrelated, "unrelated", "one axis"),
+    "some spikes": (lambda: spiky(8, 1.0), "spikes", "8 samples"),
+    "many spikes": (lambda: spiky(80, -2.0), "spikes", "stand off alone"),
+    "a jump of the sensor": (lambda: stepped(3000), "jumps", "jumps 1 times"),
+    "two jumps": (lambda: stepped(2000, 6100), "jumps", "jumps 2 times"),
+    "sensor frozen": (lambda: frozen(1800, 1880, None), "dropouts", "80 samples"),
+    "sensor lost": (lambda: frozen(1800, 1860, 11.0), "dropouts", "60 samples"),
+    "a long rest": (with_rest, "rests", "rests 1 times"),
+    "a strong drift": (drifting, "drift", "drifts by +3"),
+}
+NOTES = ("small stroke", "repeated", "rests", "drift", "unrelated")
+NOTED = (*(name for name, case in FOUND.items() if case[1] in NOTES), "six bits", "some spikes")
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_what_is_odd_is_said(name: str) -> None:
+    make, finding, phrase = FOUND[name]
+    found = {each.name: each for each in findings(Record.from_arrays(*make()))}
+    assert finding in found, list(found)
+    assert phrase in found[finding].sentence
+    assert found[finding].severity == ("note" if name in NOTED else "doubt")
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("some spikes", "spikes"),
+        ("two jumps", "jumps"),
+        ("sensor lost", "dropouts"),
+        ("a long rest", "rests"),
+    ],
+)
+def test_flaws_say_where(name: str, found: str) -> None:
+    u, x, _ = FOUND[name][0]()
+    flaws = flawed(u, x)
+    expected = {
+        "spikes": np.sort(np.random.default_rng(1).choice(np.arange(10, N - 10), 8, replace=False)),
+        "jumps": np.array([2000, 6100]),
+        "dropouts": np.arange(1800, 1860),
+        "rests": np.array([[2000, 5000]]),
+    }[found]
+    value = getattr(flaws, found)
+    np.testing.assert_allclose(np.flatnonzero(value) if value.dtype == bool else value, expected, atol=1)
+
+
+def rows(*lines: str, count: int = 200, header: str = "time_s,voltage_V,displacement_um") -> str:
+    """A good log with lines in the place of those from the eleventh row on."""
+    body = [f"{k / 1000:.3f},{np.sin(0.1 * k):.5f},{0.1 * np.sin(0.1 * k - 0.1):.5f}" for k in range(count)]
+    body[10 : 10 + len(lines)] = lines
+    return "\n".join([header, *body, ""])
+
+
+# name: (content of the file, a phrase of the refusal)
+REFUSED = {
+    "empty": ("", "is empty"),
+    "blank lines": ("\n\n\n", "is empty"),
+    "header only": ("time_s,voltage_V,displacement_um\n", "no rows below the header"),
+    "one column": ("\n".join(f"{k}" for k in range(100)), "1 columns"),
+    "a letter": ("Dear colleague,\nhere are\nthe data\n", "no column for"),
+    "text among numbers": (rows("0.010,overload,0.1"), "line 12"),
+    "units in a second line": (rows().replace("um\n", "um\ns,V,um\n", 1), "not a number"),
+    "no numbers": ("t,u,x\n" + "nan,nan,nan\n" * 200, "only"),
+    "three rows": (rows(count=3), "rows"),
+    "time twice": (rows("0.009,0.1,0.1"), "time does not increase"),
+    "time shuffled": (rows("0.013,0.1,0.1", "0.011,0.1,0.1"), "time does not increase"),
+    "time backwards": ("t,u,x\n" + "\n".join(f"{-k},{k},{k}" for k in range(50)), "time does not increase"),
+    "time uneven": (rows("0.0104,0.1,0.1"), "unevenly"),
+    "two logs in one": (rows("5.010,0.1,0.1"), "time"),
+    "volts of the sensor": (rows(header="time_s,voltage_V,displacement_V"), "must be in µm"),
+    "two sensors": ("t,u,x,y\n" + "1,2,3,4\n" * 50, "could all be the displacement"),
+    "a row too long": (rows("0.010,0.1,0.1,7"), "4 fields"),
+    "a quotation mark": (rows('0.010,"0.1,0.1'), "quotation mark"),
+    "bytes": ("\x00\x01\x02" * 50, "not a text file"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_files_that_are_no_logs_are_refused(name: str, tmp_path: Path) -> None:
+    content, phrase = REFUSED[name]
+    path = tmp_path / "log.csv"
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises(ValueError, match=phrase):
+        read_record(path)
+
+
+# name: (content of the file, a phrase of a note)
+READ = {
+    "nm": (rows(header="time_s,voltage_V,displacement_nm"), "converted to µm"),
+    "no units": (rows(header="time,voltage,displacement"), "unit taken as"),
+    "lost samples": (rows("0.010,,", "0.011,nan,n/a"), "2 samples are without usable numbers"),
+    "jitter": (rows("0.01008,0.1,0.1"), "uneven"),
+}
+
+
+@pytest.mark.parametrize("name", READ)
+def test_what_had_to_be_assumed_is_noted(name: str, tmp_path: Path) -> None:
+    content, phrase = READ[name]
+    path = tmp_path / "log.csv"
+    path.write_text(content, encoding="utf-8")
+    assert any(phrase in note for note in read_record(path).notes)
+
+
+def triangle(frequency: float = 2.0) -> FloatArray:
+    return pz.signals.triangle(60.0, frequency, N / FS * frequency, FS).values
+
+
+def levels() -> FloatArray:
+    return np.repeat(np.random.default_rng(3).uniform(-60.0, 60.0, 40), N // 40)
+
+
+HEALTHY: dict[str, Callable[[], Log]] = {
+    "sine": log,
+    "triangle": lambda: log(triangle()),
+    "steps": lambda: log(levels()),
+    "square": lambda: log(50.0 * np.sign(SINE)),
+    "chirp": lambda: log(pz.signals.chirp(60.0, 0.5, 10.0, N / FS, FS).values),
+    "walk": lambda: log(pz.signals.random_walk(60.0, 5.0, N / FS, FS, seed=4).values),
+    "dying away": lambda: log(SINE * np.exp(-0.4 * T)),
+    "input of an amplifier": lambda: (SINE / 33.0 + 1.8, log()[1] * 3.5 - 120.0, FS),
+    "with an offset": lambda: log(SINE + 60.0),
+    "sixteen bits": lambda: in_steps_of(2e-4),
+    "without noise": lambda: (SINE, STAGE.simulate(SINE), FS),
+    "a triangle without noise": lambda: (triangle(), STAGE.simulate(triangle()), FS),
+    "noisy": lambda: (SINE, log()[1] + noise(deviation=0.05, seed=5), FS),
+    "noise in the recorded voltage": lambda: (SINE + noise(deviation=0.05, seed=6), log()[1], FS),
+    "late": lambda: (SINE[5:], log()[1][:-5], FS),
+    "creep": lambda: (SINE, log()[1] + 0.1 * np.log10(1.0 + 10.0 * T), FS),
+}
+
+
+@pytest.mark.parametrize("name", HEALTHY)
+def test_nothing_is_doubted_in_a_healthy_log(name: str) -> None:
+    u, x, rate = HEALTHY[name]()
+    assert [found for found in findings(Record.from_arrays(u, x, rate)) if found.severity == "doubt"] == []
+    flaws = flawed(u, x)
+    assert not flaws.unusable.any()
+    assert flaws.jumps.size == 0
+
+
+def test_semicolons_and_a_decimal_comma_are_a_log(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(rows().replace(",", ";").replace(".", ","), encoding="utf-8")
+    record = read_record(path)
+    assert len(record) == 200
+    np.testing.assert_allclose(record.sample_rate, 1000.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "tells"),
+    [("sine", False), ("triangle", False), ("late", False), ("noise in the recorded voltage", False)]
+    + [(name, True) for name in ("steps", "square", "chirp", "walk", "dying away")],
+)
+def test_whether_a_voltage_tells_a_lag(name: str, tells: bool) -> None:
+    assert tells_lag(HEALTHY[name]()[0]) is tells
+
+
+@pytest.mark.parametrize(
+    ("u", "tells"),
+    [
+        (np.zeros(100), False),
+        (np.full(100, np.nan), False),
+        (np.linspace(0.0, 1.0, 100), False),
+        (np.concatenate((SINE, triangle(7.0))), True),
+        (noise(1000), True),
+    ],
+)
+def test_whether_other_voltages_tell_a_lag(u: FloatArray, tells: bool) -> None:
+    assert tells_lag(u) is tells
+
+
+def test_fifty_logs_are_awkward() -> None:
+    assert len({*FOUND, *REFUSED, *READ}) >= 50
+    assert len(HEALTHY) >= 10

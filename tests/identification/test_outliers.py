@@ -1,0 +1,114 @@
+"""Spikes and jumps are found where they are, and nowhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from piezoest._checks import FloatArray
+from piezoest.identification.outliers import flawed
+from tests.identification.zoo_logs import zoo_log
+
+SEEDS = range(100)
+
+
+def apart(rng: np.random.Generator, size: int, count: int, least: int) -> FloatArray:
+    """Places at random, none too near to another."""
+    places = np.sort(rng.choice(np.arange(100, size - 100), count, replace=False))
+    return places[np.diff(places, prepend=-least) >= least]
+
+
+def test_healthy_logs_are_without_flaw() -> None:
+    flawed_ones = []
+    for seed in SEEDS:
+        u, x, _, _ = zoo_log(seed, smooth=True)
+        flaws = flawed(u, x)
+        if flaws.unusable.any() or flaws.jumps.size:
+            flawed_ones.append((seed, int(flaws.spikes.sum()), int(flaws.dropouts.sum()), flaws.jumps.size))
+    assert flawed_ones == []
+
+
+def test_spikes_are_found() -> None:
+    found = spikes = wrong = 0
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        u, x, _, noise = zoo_log(seed, smooth=True)
+        places = apart(rng, x.size, round(x.size * 10.0 ** rng.uniform(-3.0, np.log10(0.02))), 4)
+        # What is less than a part in a thousand of the range is left alone.
+        least = max(10.0 * noise, 3e-3 * np.ptp(x))
+        y = x.copy()
+        y[places] += rng.choice([-1.0, 1.0], places.size) * least * 10.0 ** rng.uniform(0.0, 1.5, places.size)
+        flaws = flawed(u, y)
+        spikes += places.size
+        found += int(flaws.spikes[places].sum())
+        wrong += int(flaws.spikes.sum() - flaws.spikes[places].sum()) + flaws.jumps.size
+    assert found > 0.95 * spikes
+    assert wrong < 0.002 * spikes
+
+
+def test_jumps_are_found() -> None:
+    found = jumps = wrong = 0
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        u, x, _, noise = zoo_log(seed, smooth=True)
+        places = apart(rng, x.size, 5, 50)
+        sizes = max(10.0 * noise, 0.01 * float(np.ptp(x))) * 10.0 ** rng.uniform(0.05, 1.0, places.size)
+        y = x + np.sum([(np.arange(x.size) >= k) * s for k, s in zip(places, sizes, strict=True)], axis=0)
+        flaws = flawed(u, y)
+        near = np.abs(flaws.jumps[:, None] - places) <= 1
+        jumps += places.size
+        found += int(near.any(axis=0).sum())
+        wrong += int((~near.any(axis=1)).sum()) + int(flaws.spikes.sum())
+        assert np.all(
+            np.abs(flaws.jump_sizes - sizes[near.argmax(axis=1)])[near.any(axis=1)] < 0.5 * sizes.max()
+        )
+    assert found > 0.9 * jumps
+    assert wrong < 0.02 * jumps
+
+
+def test_noise_of_a_long_log_has_no_spikes() -> None:
+    t = np.arange(500_000) / 1e4
+    u = 50.0 * np.sin(20.0 * t)
+    x = 0.1 * u + 2e-3 * np.random.default_rng(0).standard_normal(t.size)
+    flaws = flawed(u, x)
+    assert not flaws.unusable.any()
+    assert flaws.jumps.size == 0
+
+
+def test_stretches_between_jumps_are_numbered() -> None:
+    u = 50.0 * np.sin(np.linspace(0.0, 40.0, 4000))
+    x = 0.1 * u + 0.5 * (np.arange(4000) >= 1500)
+    flaws = flawed(u, x)
+    np.testing.assert_array_equal(flaws.jumps, [1500])
+    np.testing.assert_allclose(flaws.jump_sizes, 0.5, rtol=0.05)
+    np.testing.assert_array_equal(flaws.stretch, np.arange(4000) >= 1500)
+
+
+def test_missing_samples_are_no_flaws() -> None:
+    u, x, _, _ = zoo_log(1, smooth=True)
+    y = x.copy()
+    y[300:320] = np.nan
+    y[700] = np.nan
+    flaws = flawed(u, y)
+    assert not flaws.unusable.any()
+    assert flaws.jumps.size == 0
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.5, 7.0, 300.0])
+def test_a_log_without_noise_is_taken(turns: float) -> None:
+    u = np.linspace(0.0, 1.0, 4000) if turns == 0.0 else np.sin(np.linspace(0.0, 6.28 * turns, 4000))
+    x = 0.1 * u
+    assert not flawed(u, x).unusable.any()
+    x[1000] += 0.3
+    np.testing.assert_array_equal(np.flatnonzero(flawed(u, x).spikes), [1000])
+
+
+@pytest.mark.parametrize("size", [0, 1, 5, 31, 32, 33, 60])
+def test_short_logs_are_taken(size: int) -> None:
+    u = np.sin(np.arange(size))
+    assert flawed(u, 0.1 * u).spikes.shape == (size,)
+
+
+def test_one_shape_is_asked_for() -> None:
+    with pytest.raises(ValueError, match=r"x must have shape \(3,\)"):
+        flawed(np.zeros(3), np.zeros(4))

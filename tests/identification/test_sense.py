@@ -1,0 +1,79 @@
+"""Doubts about logs: none about healthy ones of any family, and the right one where columns are swapped."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
+from piezoest.identification.feedback_in_log import answer
+from piezoest.identification.loop_direction import loop_of
+from piezoest.identification.sense import findings
+from piezoest.records import Record
+from tests.identification.zoo_logs import zoo_log
+
+
+def test_healthy_logs_of_all_families_are_not_doubted() -> None:
+    doubted = []
+    for seed in range(100):
+        u, x, rate, _ = zoo_log(seed)
+        found = findings(Record.from_arrays(u, x, rate))
+        doubted += [(seed, each.sentence) for each in found if each.severity == "doubt"]
+    assert doubted == []
+
+
+def test_noise_of_the_voltage_is_no_feedback() -> None:
+    rng = np.random.default_rng(0)
+    for seed in range(60):
+        u, x, _, _ = zoo_log(seed)
+        noisy = u + 10.0 ** rng.uniform(-5.0, -3.0) * np.ptp(u) * rng.standard_normal(u.size)
+        assert not answer(noisy, x, float(np.polyfit(u, x, 1)[0])).closed, seed
+
+
+@pytest.mark.parametrize("gain", [50.0, 200.0])
+def test_integral_feedback_is_seen_in_the_log(gain: float) -> None:
+    fs = 10_000.0
+    r = pz.signals.sine(5.0, 5.0, 5.0, fs)
+    feedback = pz.IntegralFeedback(pz.LinearCompensator(pz.LinearGain(0.1)), gain=gain, sample_rate=fs)
+    record = pz.track(r, stage=pz.PaperStage(fs, quantisation=False), compensator=feedback)
+    found = findings(Record.from_arrays(record.voltage, record.measured, fs))
+    assert [each.name for each in found if each.severity == "doubt"] == ["closed loop"]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_swapped_columns_turn_the_loop_round(family: str) -> None:
+    reach = Reach(-100.0, 100.0)
+    model: Any = draw_family(family, np.random.default_rng(5), reach, width=0.12, gain=0.1)
+    t = np.linspace(0.0, 1.0, 6000)
+    u = 95.0 * np.sin(2.0 * np.pi * 6.0 * t)
+    x = model.simulate(u) + 5e-3 * np.random.default_rng(6).standard_normal(t.size) + 2.0 * t + 30.0
+    assert findings(Record.from_arrays(u, x, 1000.0))[:1] != ()  # the drift
+    assert [each.severity for each in findings(Record.from_arrays(u, x, 1000.0))] == ["note"]
+    assert "clockwise" in [each.name for each in findings(Record.from_arrays(x, u, 1000.0))]
+
+
+def test_the_opening_of_a_loop_is_its_width_whatever_drifts() -> None:
+    t = np.linspace(0.0, 1.0, 20_000)
+    u = 50.0 * np.sin(2.0 * np.pi * 10.0 * t)
+    play = pz.PrandtlIshlinskii(0.1, [5.0], [0.02]).simulate(u)
+    known = np.ones(t.size, dtype=np.bool_)
+    still = loop_of(u, play, known, 0.12)
+    drifting = loop_of(u, play + 3.0 * t, known, 0.12)
+    # A play of threshold 5 V is 10 V wide, but for where it turns.
+    assert 0.7 * 0.2 < float(np.median(still.openings)) < 0.2
+    np.testing.assert_allclose(drifting.openings, still.openings, atol=0.01)
+    assert still.clockwise == 0.0
+    assert still.opening > 0.0
+
+
+def test_a_loop_without_turns_is_none() -> None:
+    u = np.linspace(0.0, 1.0, 100)
+    assert loop_of(u, u, np.ones(100, dtype=np.bool_), 1.0).opening == 0.0
+
+
+def test_what_is_no_record_is_refused() -> None:
+    with pytest.raises(ValueError, match="record must be a Record"):
+        findings("log.csv")  # type: ignore[arg-type]
