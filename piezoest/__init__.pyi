@@ -20,11 +20,10 @@ from .estimators.output_error import OutputErrorRLS
 from .estimators.play_rls import PrandtlIshlinskiiRLS
 from .estimators.recursive_least_squares import RecursiveLeastSquares
 from .estimators.rls import HysteresisRLS
+from .fitting import Fit, fit
 from .identification import (
     Identification,
-    ModelChoice,
     StreamedIdentification,
-    choose_model,
     identify,
     identify_stream,
 )
@@ -62,6 +61,7 @@ __all__ = [
     "OutputErrorRLS",
     "HysteresisEKF",
     "HysteresisRLS",
+    "Fit",
     "Identification",
     "IntegralFeedback",
     "InverseCompensator",
@@ -69,7 +69,6 @@ __all__ = [
     "LinearCompensator",
     "LinearGain",
     "MassSpringDamper",
-    "ModelChoice",
     "MovingHorizon",
     "PaperStage",
     "PrandtlIshlinskii",
@@ -89,8 +88,8 @@ __all__ = [
     "TrackingRecord",
     "VoltageLimits",
     "__version__",
-    "choose_model",
     "export",
+    "fit",
     "identify",
     "identify_stream",
     "models",

@@ -393,7 +393,11 @@ class _Hessian(_Output):
 
 
 # Solvers of convex programs, the fastest first; which of them there are depends on how CasADi was built.
-QUADRATIC = {"daqp": {}, "qpoases": {"printLevel": "none", "sparse": False}, "qrqp": {"print_iter": False}}
+QUADRATIC: dict[str, dict[str, Any]] = {
+    "daqp": {},
+    "qpoases": {"printLevel": "none", "sparse": False},
+    "qrqp": {"print_iter": False},
+}
 
 
 @lru_cache(maxsize=1)

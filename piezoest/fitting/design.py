@@ -1,7 +1,7 @@
 """A model's parts as columns of a linear regression, made block by block along a record.
 
-x = sum_i w_i column_i: everything in which a model is linear stands in one matrix, of which only sums over the
-record are kept. So a long record takes no more memory than a short one.
+x = sum_i w_i column_i: everything in which a model is linear stands in one matrix, of which only sums over
+the record are kept. So a long record takes no more memory than a short one.
 """
 
 from __future__ import annotations
@@ -24,13 +24,20 @@ NO_CREEP = Creep(np.empty(0), np.empty(0))
 class Basis(Protocol):
     """Columns of one kind of model.
 
-    `free` of the `size` columns at the end say where the stage was before the record; no creep follows them.
+    No creep follows the `free` ones.
     """
 
-    size: int
-    free: int
-    #: Whether the model of columns that go on beyond the record may have them, too.
-    goes_on: bool
+    @property
+    def size(self) -> int:
+        """How many."""
+
+    @property
+    def free(self) -> int:
+        """How many of them, at the end, say where the stage was before the record."""
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether a model may have what goes on beyond the record."""
 
     def begin(self) -> Any:
         """State before the first sample."""
@@ -54,7 +61,7 @@ class Basis(Protocol):
         """Penalty (size, size) on what the record hardly shows, whatever else is to be smooth, for 1 µm²."""
 
     def beyond(self, w: FloatArray) -> tuple[Basis, FloatArray, float]:
-        """Columns and coefficients that go on beyond the record's range, and what that adds within it [µm]."""
+        """Columns and coefficients that go on beyond the record, and what that adds within it [µm]."""
 
     def model(self, w: FloatArray, offset: float, creep: Creep | None, rate: float) -> Model:
         """Model of coefficients (size,)."""

@@ -1,12 +1,14 @@
 """The Coleman-Hodgdon model of a given alpha as columns of a regression.
 
-x = c u + w_h + offset, and w_h is linear in b and in where it begins: with b = 1 and w_h = 0 at the start it is
-f(u), so x = (c - b) u + b (u + f) + w_h(0) exp(-a travel) + offset. Equations (2)-(4) of Eielsen et al. (2012).
+x = c u + w_h + offset, and w_h is linear in b and in where it begins: with b = 1 and w_h = 0 at the start
+it is f(u), so x = (c - b) u + b (u + f) + w_h(0) exp(-a travel) + offset. Equations (2)-(4) of Eielsen et
+al. (2012).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,9 +27,9 @@ class LoopColumns:
 
     alpha: float
 
-    size = 3
-    free = 1
-    goes_on = True
+    size: ClassVar[int] = 3
+    free: ClassVar[int] = 1
+    goes_on: ClassVar[bool] = True
 
     def begin(self) -> FloatArray:
         """Voltage, f, and what is left of the start; the first sample says the voltage."""

@@ -19,7 +19,8 @@ LEAST_GAIN = 0.02
 # this fraction of the density of the last ones that moved: of stages of eight families, driven up to twice as
 # far as in the fitted part of a log, some stop there and some go on (benchmarks/logs.py).
 BEYOND, LAST, GOES_ON = 5, 0.25, 0.3
-# What differences cost of plays that move as far as the voltage; of others, more by as much as they move less.
+# What differences cost of plays that move as far as the voltage; of others, more by as much as they move
+# less.
 HARDLY, LEAST_MOVING = 1e-6, 1e-4
 # A range is about 0 V if its middle is nearer to it than this fraction of its half.
 ABOUT_ZERO = 0.1
@@ -41,7 +42,9 @@ def starts(u: FloatArray) -> list[Start]:
     """Where a stage may have been left: at rest somewhere, or by a swing over the whole range."""
     low, high, first = float(u.min()), float(u.max()), float(u[0])
     found = [Start(first, centre) for centre in (first, 0.0, low, 0.5 * (low + high), high)]
-    return list(dict.fromkeys([*found, Start(low, high), Start(high, low), Start(low, low), Start(high, high)]))
+    return list(
+        dict.fromkeys([*found, Start(low, high), Start(high, low), Start(low, low), Start(high, high)])
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +64,8 @@ class PlayColumns:
     moving : ndarray, shape (n,)
         How far each play goes in it, relative to the voltage.
     moved : int, optional
-        How many of the plays moved in it; those beyond begin in its middle, so that they move one after the other
-        as the voltage goes further on either side.
+        How many of the plays moved in it; those beyond begin in its middle, so that they move one after
+        the other as the voltage goes further on either side.
     """
 
     thresholds: FloatArray
@@ -72,7 +75,10 @@ class PlayColumns:
     moving: FloatArray
     moved: int | None = None
 
-    free = 0
+    @property
+    def free(self) -> int:
+        """None: where the plays began is not linear."""
+        return 0
 
     @property
     def size(self) -> int:
@@ -155,11 +161,11 @@ class PlayColumns:
 
     @property
     def goes_on(self) -> bool:
-        """Whether a model may have plays beyond the record: they begin at zero, which has to be the middle."""
+        """Whether a model may have plays beyond the record: they begin at zero, its middle."""
         return abs(self.middle) < ABOUT_ZERO * 0.5 * (self.visited[1] - self.visited[0])
 
     def beyond(self, w: FloatArray) -> tuple[PlayColumns, FloatArray, float]:
-        """The same with plays that are wider than the record moves, their coefficients, and what they add in it.
+        """The same with wider plays, all coefficients, and what they add in the record [µm].
 
         Nothing is known of them but their neighbours.
         """
@@ -186,7 +192,7 @@ class PlayColumns:
         return y[1:]
 
     def names(self, w: FloatArray) -> dict[str, FloatArray]:
-        """Gain, weights, and what each bend changes of them; the plays beyond the record are none of these."""
+        """Gain, weights, and what each bend changes of them."""
         n = self.thresholds.size
         unit = np.eye(self.size)
         kept = self._kept(w.reshape(self.bends.size + 1, -1))

@@ -1,13 +1,13 @@
 """The Coleman-Hodgdon model's nonlinear program: alpha, beta, gamma, offset, start and delay together.
 
-The linear fits at one alpha after the other end near the optimum; a few passes with the derivatives that CasADi
-makes end in it, and give the standard errors of all, the delay among them.
+The linear fits at one alpha after the other end near the optimum; a few passes with the derivatives that
+CasADi makes end in it, and give the standard errors of all, the delay among them.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,7 +40,8 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     varied = coordinates(ColemanHodgdon, () if fit_delay else ("delay",), delayed=True)
     limits = ColemanHodgdon.record_limits(2.0 * log.half) | {"delay": (0.0, LONGEST_DELAY)}
     problem = Problem(log.u, x, varied, np.empty(0) if fit_delay else np.array([delay]), limits=limits)
-    model = fitted.design.basis.model(w, float(w[offset]), None, log.sample_rate)
+    basis: Any = fitted.design.basis
+    model: ColemanHodgdon = basis.model(w, float(w[offset]), None, log.sample_rate)
     start = problem.settled(varied.of(model.nearest_admissible(), {"delay": delay}))
     solution = single_shooting(problem, start, "linear", 1.0, MOST_PASSES, TOLERANCE)
     end = outcome(problem, solution.q, coloured=True)

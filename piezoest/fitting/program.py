@@ -33,12 +33,25 @@ class Sums(NamedTuple):
 
     def plus(self, other: Sums, sign: float = 1.0) -> Self:
         """Both, or without the other's rows."""
-        return type(self)(*(mine + sign * its for mine, its in zip(self, other, strict=True)))
+        return type(self)(
+            self.gram + sign * other.gram,
+            self.moment + sign * other.moment,
+            self.square + sign * other.square,
+            self.rows + sign * other.rows,
+        )
 
     def through(self, transform: FloatArray) -> Self:
         """Sums of other columns, each a combination (n, m) of these."""
         gram = transform.T @ self.gram @ transform
         return self._replace(gram=gram, moment=transform.T @ self.moment)
+
+    def combined(self, size: int, transform: FloatArray) -> Self:
+        """Sums where the first `size` columns are combined by (size, m), and the others stay."""
+        rest = self.moment.size - size
+        T = np.zeros((self.moment.size, transform.shape[1] + rest))
+        T[:size, : transform.shape[1]] = transform
+        T[size:, transform.shape[1] :] = np.eye(rest)
+        return self.through(T)
 
     def missed(self, w: FloatArray) -> float:
         """Sum of squares that coefficients (n,) leave."""

@@ -1,15 +1,17 @@
-"""The fit of one design: its sums over blocks of a record, and what each block misses under the others' fit."""
+"""The fit of one design, by sums over blocks of a record of which each is predicted from the others."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.fitting.design import Design
 from piezoest.fitting.program import Sums, checked, solve, total
+from piezoest.fitting.runs import IntArray
 
 # Blocks of a record of which each is predicted from the others.
 FOLDS = 5
@@ -17,7 +19,8 @@ FOLDS = 5
 SMOOTHNESS = tuple(10.0**k for k in range(-8, 1))
 # The smoothest fit is taken that misses them by so much more than the least, in squares.
 AS_GOOD = 1.01
-# So many blocks predict those behind them; a drift is fitted where it makes the squares there as small as this.
+# So many blocks predict those behind them; a drift is fitted where it makes the squares there as small as
+# this.
 EARLIER, DRIFTS = 3, 0.8
 # What creep had at the start costs this times its square, for slow creep and offset look alike.
 CREPT = 1e-3
@@ -45,7 +48,7 @@ class Log:
 
     u: FloatArray
     x: FloatArray
-    counts: FloatArray
+    counts: Any
     sample_rate: float
     jumps: FloatArray
 
@@ -66,7 +69,7 @@ class Log:
         inner = known[np.linspace(0, known.size, FOLDS + 1).astype(int)[1:-1]]
         return np.concatenate(([0], inner, [self.u.size]))
 
-    def fold(self, place: slice) -> FloatArray:
+    def fold(self, place: slice) -> IntArray:
         """Block of each sample of a part."""
         return np.searchsorted(self.folds, np.arange(place.start, place.stop), side="right") - 1
 
@@ -100,19 +103,20 @@ class Fitted:
         Root of the mean square of what all blocks but the first miss under the fit of the others [µm].
     without : list of ndarray
         Coefficients of the fit without each of them.
+    ahead : float
+        The same of the blocks behind the first `EARLIER`, under the fit of those [µm].
     earlier : ndarray
-        Those of the fit of the first `EARLIER` blocks.
+        Coefficients of the fit of the first `EARLIER` blocks.
     """
 
     design: Design
     w: FloatArray
     smoothness: float
-    used: FloatArray
+    used: IntArray
     held_out: float
     without: list[FloatArray]
+    ahead: float
     earlier: FloatArray
-    cv: float=0.
-    ahead: float=0.
 
 
 class Regression:
@@ -141,14 +145,14 @@ class Regression:
         line = self.all.through(T)
         return max(float(np.linalg.lstsq(line.gram, line.moment, rcond=None)[0][0]), 0.0)
 
-    def columns(self, *, drift: bool, gains: bool = True) -> FloatArray:
-        """Which columns are fitted of those that the record shows: with a drift or not, with creep's gains or not."""
+    def columns(self, *, drift: bool, gains: bool = True) -> IntArray:
+        """Columns that are fitted, of those that the record shows."""
         shown = np.diag(self.all.gram) > 0.0
         shown[self.design.offset + 1] &= drift
         shown[self.design.gains] &= gains
         return np.flatnonzero(shown)
 
-    def solved(self, smoothness: float, used: FloatArray, sums: Sums | None = None) -> FloatArray:
+    def solved(self, smoothness: float, used: IntArray, sums: Sums | None = None) -> FloatArray:
         """All coefficients, zero where a column is not used."""
         few, lower, penalty = self._of(smoothness, used, sums)
         w = np.zeros(self.design.columns)
@@ -168,13 +172,13 @@ class Regression:
         return smoothness * self._penalty + self._always
 
     def _of(
-        self, smoothness: float, used: FloatArray, sums: Sums | None
+        self, smoothness: float, used: IntArray, sums: Sums | None
     ) -> tuple[Sums, FloatArray, FloatArray]:
         sums = self.all if sums is None else sums
         few = Sums(sums.gram[np.ix_(used, used)], sums.moment[used], sums.square, sums.rows)
         return few, self.lower[used], self._cost(smoothness)[np.ix_(used, used)]
 
-    def left_out(self, smoothness: float, used: FloatArray) -> tuple[float, list[FloatArray]]:
+    def left_out(self, smoothness: float, used: IntArray) -> tuple[float, list[FloatArray]]:
         """Mean square of what each block but the first misses under the fit of the others, and those fits.
 
         Only the first block says where the stage was at the start.
@@ -202,8 +206,9 @@ class Regression:
         score, without = self.left_out(smoothness, used)
         ahead = later.missed(earlier) / max(later.rows, 1.0)
         w = self.solved(smoothness, used)
-        missed = float(np.sqrt(0.5 * (score + ahead)))
-        return Fitted(self.design, w, smoothness, used, missed, without, earlier, float(np.sqrt(score)), float(np.sqrt(ahead)))
+        return Fitted(
+            self.design, w, smoothness, used, float(np.sqrt(score)), without, float(np.sqrt(ahead)), earlier
+        )
 
     def _smoothness(self) -> tuple[float, ...]:
         return SMOOTHNESS if np.any(self._penalty) else SMOOTHNESS[:1]

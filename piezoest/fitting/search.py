@@ -1,8 +1,8 @@
 """What a fit is not linear in: creep gains, alpha, the delay, and where the stage was before the record.
 
-Creep gains go by Gauss-Newton steps, each of which solves the linear program with their columns in it; the others
-are tried, with everything linear solved anew (variable projection: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal.
-10 (1973) 413-432).
+Creep gains go by Gauss-Newton steps, each of which solves the linear program with their columns in it; the
+others are tried, with everything linear solved anew (variable projection: G. H. Golub, V. Pereyra, SIAM J.
+Numer. Anal. 10 (1973) 413-432).
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def creep_times(log: Log) -> FloatArray:
     """Time constants a decade apart that a record can tell [s]."""
     shortest, longest = SHORTEST_CREEP / log.sample_rate, LONGEST_CREEP * log.u.size / log.sample_rate
     terms = min(MOST_TERMS, int(np.log10(max(longest / shortest, 1.0))) + 1)
-    return longest / 10.0 ** np.arange(terms)[::-1]
+    return np.asarray(longest / 10.0 ** np.arange(terms)[::-1])
 
 
 def with_creep(log: Log, plain: Fitted, times: FloatArray) -> Fitted:
@@ -126,6 +126,6 @@ def with_creep(log: Log, plain: Fitted, times: FloatArray) -> Fitted:
 
 
 def _crept(log: Log, last: Fitted, creep: Creep) -> Regression:
-    """Regression on columns that these gains have crept through; what their change adds follows the last slopes."""
+    """Regression on columns that have crept with these gains; their change follows the last slopes."""
     design = design_of(log, last.design.basis, creep)
     return Regression(design, sums_of(design, log, last.w[: design.basis.size]))

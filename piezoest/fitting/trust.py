@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.regression import EARLIER, Fitted, Log, Regression
 from piezoest.fitting.program import RIDGE
+from piezoest.fitting.regression import EARLIER, Fitted, Log, Regression
+from piezoest.fitting.runs import IntArray
 
 # Blocks in time over which the gradients of a coloured residual are summed.
 BLOCKS = 25
@@ -40,7 +41,9 @@ def residuals(fitted: Fitted, log: Log) -> Missed:
         own[place] = np.where(counts, log.x[place] - rows @ fitted.w, np.nan)
         for k in np.unique(fold[fold > 0]):
             here = (fold == k) & counts
-            without[place.start + np.flatnonzero(here)] = log.x[place][here] - rows[here] @ fitted.without[k - 1]
+            without[place.start + np.flatnonzero(here)] = (
+                log.x[place][here] - rows[here] @ fitted.without[k - 1]
+            )
         ahead[place] = np.where(counts & later[place], log.x[place] - rows @ fitted.earlier, np.nan)
     return Missed(own, without, ahead)
 
@@ -87,8 +90,8 @@ def spread_of(missed: Missed, log: Log, gain: float) -> Spread:
 def covariance(regression: Regression, fitted: Fitted, log: Log) -> FloatArray:
     """Covariance (columns, columns) of the coefficients; zero for those at a bound.
 
-    The sandwich H^-1 (sum over blocks of g g') H^-1 with g the gradient of one of `BLOCKS` blocks in time: what
-    neighbouring residuals have in common widens it. No variance is below that of a white residual.
+    The sandwich H^-1 (sum over blocks of g g') H^-1 with g the gradient of one of `BLOCKS` blocks in time:
+    what neighbouring residuals have in common widens it. No variance is below that of a white residual.
     """
     free = free_columns(regression, fitted)
     gradients = np.zeros((BLOCKS, free.size))
@@ -114,7 +117,7 @@ def covariance(regression: Regression, fitted: Fitted, log: Log) -> FloatArray:
     return P
 
 
-def free_columns(regression: Regression, fitted: Fitted) -> FloatArray:
+def free_columns(regression: Regression, fitted: Fitted) -> IntArray:
     """Columns that were fitted and did not end at a bound."""
     away = fitted.w - regression.lower > AT_BOUND * float(np.max(np.abs(fitted.w), initial=0.0))
     return fitted.used[away[fitted.used]]
@@ -125,7 +128,9 @@ def standard_errors(regression: Regression, fitted: Fitted, log: Log) -> dict[st
     design, size = fitted.design, fitted.design.basis.size
     P = covariance(regression, fitted, log)
     rows = design.basis.names(fitted.w[:size])
-    errors = {name: float(np.sqrt(max(row @ P[:size, :size] @ row, 0.0))) for name, row in rows.items()}
+    errors = {
+        name: float(np.sqrt(max(float(row @ P[:size, :size] @ row), 0.0))) for name, row in rows.items()
+    }
     gains = np.sqrt(np.diag(P)[design.gains])
     errors |= {f"creep.gains[{j}]": float(gain) for j, gain in enumerate(gains)}
     return errors | {"offset": float(np.sqrt(P[design.offset, design.offset]))}

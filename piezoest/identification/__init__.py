@@ -1,19 +1,20 @@
-"""A recorded log to a model: parameters with standard errors, free-running error, advice."""
+"""A recorded log to a model: does it make sense, what fits it best, how far to trust that."""
 
-from piezoest.identification.choice import Candidate, ModelChoice, choose_model
 from piezoest.identification.procedure import identify
 from piezoest.identification.residual import Misfit, Whiteness
-from piezoest.identification.result import Identification
+from piezoest.identification.result import Candidate, Identification, Validation
+from piezoest.identification.sense import Finding, findings
 from piezoest.identification.streamed import StreamedIdentification, identify_stream
 
 __all__ = [
     "Candidate",
+    "Finding",
     "Identification",
     "Misfit",
-    "ModelChoice",
     "StreamedIdentification",
+    "Validation",
     "Whiteness",
-    "choose_model",
+    "findings",
     "identify",
     "identify_stream",
 ]

@@ -17,7 +17,9 @@ ABOVE_NOISE = 1.3
 def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
     """All there is to say, the log's own doubts first."""
     said = [each.sentence for each in found.findings]
-    said += [sentence for say in (_left_out, _delay, _centre, _remainder, _along) for sentence in say(found, data)]
+    said += [
+        sentence for say in (_left_out, _delay, _centre, _remainder, _along) for sentence in say(found, data)
+    ]
     return tuple(said)
 
 
@@ -25,14 +27,14 @@ def _left_out(found: Identification, data: Data) -> list[str]:
     fit, flaws, said = found.fit, found.flaws, []
     if fit.left_out:
         said.append(
-            f"The first {fit.left_out / found.sample_rate:.3g} s do not fit the rest (the stage had not settled): "
-            "left out."
+            f"The first {fit.left_out / found.sample_rate:.3g} s do not fit the rest (the stage had not "
+            "settled): left out."
         )
     spikes = int(np.count_nonzero(flaws.spikes[: found.trained])) + fit.spikes
     if spikes:
         said.append(
-            f"{spikes} of the fitted samples {'is' if spikes == 1 else 'are'} off the rest alone, as spikes of a "
-            "sensor are: left out."
+            f"{spikes} of the fitted samples {'is' if spikes == 1 else 'are'} off the rest alone, as spikes "
+            "of a sensor are: left out."
         )
     if flaws.jumps.size:
         said.append(
@@ -46,8 +48,8 @@ def _left_out(found: Identification, data: Data) -> list[str]:
 def _delay(found: Identification, data: Data) -> list[str]:
     if not found.delay_known:
         return [
-            "The lag of the displacement is not known: all swings of the voltage are alike, so it looks like a wider "
-            "loop. Record swings of several sizes or frequencies, or pass delay= in samples."
+            "The lag of the displacement is not known: all swings of the voltage are alike, so it looks like "
+            "a wider loop. Record swings of several sizes or frequencies, or pass delay= in samples."
         ]
     if not found.delay_estimated:
         return []
@@ -67,8 +69,8 @@ def _centre(found: Identification, data: Data) -> list[str]:
     if abs(data.middle) > 0.1 * data.extent or abs(found.model.offset) > 0.1 * extent:
         said.append(
             f"The loop is not centred at zero (voltage {data.middle:.3g} V, displacement "
-            f"{float(np.mean(data.x[data.counts])):.4g} µm): let HysteresisRLS estimate the offset, as it does by "
-            "default."
+            f"{float(np.mean(data.x[data.counts])):.4g} µm): let HysteresisRLS estimate the offset, as it "
+            "does by default."
         )
     turns = turning_voltages(data)
     tops = np.abs(turns - data.middle)
@@ -82,7 +84,8 @@ def _remainder(found: Identification, data: Data) -> list[str]:
     floor, error = found.noise_floor, found.best.cross_validated
     if error > ABOVE_NOISE * floor:
         said.append(
-            f"Between the noise of {floor:.2g} µm rms and the error of {error:.2g} µm lies what no model here explains."
+            f"Between the noise of {floor:.2g} µm rms and the error of {error:.2g} µm lies what no model "
+            "here explains."
         )
     if not found.whiteness.is_white:
         said.append(
@@ -98,7 +101,8 @@ def _along(found: Identification, data: Data) -> list[str]:
     said = []
     if abs(found.fit.drift) > DRIFT_WORTH_A_WORD * found.train.rms:
         said.append(
-            f"The displacement drifts by about {found.fit.drift:+.2g} µm over the fitted part: fitted beside the model."
+            f"The displacement drifts by about {found.fit.drift:+.2g} µm over the fitted part: fitted beside "
+            "the model."
         )
     elif abs(found.drift) > DRIFT_WORTH_A_WORD * found.train.rms:
         said.append(

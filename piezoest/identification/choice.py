@@ -4,30 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from piezoest.identification.result import Candidate
 
 # A simpler model is preferred until a richer one is better by this fraction on the blocks left out.
 WORTH_IT = 0.02
 
 
+def score(item: Candidate) -> float:
+    """Geometric mean of the errors on blocks between others, and on blocks behind all others [µm rms].
+
+    Of what follows a log, the latter says more; the former is surer.
+    """
+    return float(np.sqrt(item.fit.held_out * item.fit.ahead))
+
+
 def best_of(candidates: Sequence[Candidate]) -> Candidate:
     """The simplest of those that predict blocks left out about best; from the simplest to the richest."""
-    least = min(item.cross_validated for item in candidates)
-    return next(item for item in candidates if item.cross_validated <= (1.0 + WORTH_IT) * least)
+    least = min(map(score, candidates))
+    return next(item for item in candidates if score(item) <= (1.0 + WORTH_IT) * least)
 
 
 def reason_for(candidates: Sequence[Candidate], best: Candidate) -> str:
     """Why that one, with the figures."""
     line = candidates[0]
-    said = f"{best.label}: {best.cross_validated:.3g} µm rms on blocks left out of the fit"
-    if best is not line and line.cross_validated > 0.0:
-        less = 100.0 * (1.0 - best.cross_validated / line.cross_validated)
-        said += f", {less:.0f} % less than a straight line"
-    rivals = [item for item in candidates if item.cross_validated < best.cross_validated]
+    said = f"{best.label}: {score(best):.3g} µm rms on blocks left out of the fit"
+    if best is not line and score(line) > 0.0:
+        said += f", {100.0 * (1.0 - score(best) / score(line)):.0f} % less than a straight line"
+    rivals = [item for item in candidates if score(item) < score(best)]
     if rivals:
-        rival = min(rivals, key=lambda item: item.cross_validated)
+        rival = min(rivals, key=score)
         said += (
-            f"; {rival.label} has {rival.cross_validated:.3g}, which is not worth "
+            f"; {rival.label} has {score(rival):.3g}, which is not worth "
             f"{rival.parameters - best.parameters} more parameters"
         )
     return f"{said}."

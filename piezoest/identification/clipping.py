@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.identification.runs import runs
+from piezoest.fitting.runs import runs
 
 # A column is at its limit within this part of its range.
 AT_LIMIT = 1e-3

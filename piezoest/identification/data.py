@@ -7,12 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.compile import Vector, compiled
 from piezoest.estimators.coordinates import bridged, late
 from piezoest.models import ColemanHodgdon, LinearGain
+from piezoest.signals.turns import TURN, turns
 
-# A turn counts when the voltage then runs back by this fraction of its range.
-TURN = 0.05
 FEWEST_TURNS = 2
 SMALLEST_SIGNAL_TO_NOISE = 10.0
 
@@ -69,11 +67,11 @@ def check_excitation(data: Data, noise: float) -> FloatArray:
             f"too little excitation: the voltage stays at {data.middle:.6g} V over the fitted part, "
             "it must move the stage up and down"
         )
-    turns = turning_voltages(data)
-    if turns.size < FEWEST_TURNS:
+    turned = turning_voltages(data)
+    if turned.size < FEWEST_TURNS:
         raise ValueError(
             f"too little excitation: over the fitted part the voltage moves by {data.extent:.4g} V but "
-            f"turns {turns.size} times, at least {FEWEST_TURNS} are needed: hysteresis shows only at turns"
+            f"turns {turned.size} times, at least {FEWEST_TURNS} are needed: hysteresis shows only at turns"
         )
     extent = float(np.ptp(data.x[data.counts]))
     if extent < SMALLEST_SIGNAL_TO_NOISE * noise:
@@ -88,35 +86,9 @@ def check_excitation(data: Data, noise: float) -> FloatArray:
             f"the displacement falls as the voltage rises ({gain:.4g} µm/V): change the sign of one of the "
             "two columns"
         )
-    return turns
+    return turned
 
 
 def turning_voltages(data: Data) -> FloatArray:
     """Voltages at which it turns and then runs back by more than a twentieth of its range [V]."""
-    return data.u[turning_samples(data.u, TURN * data.extent)]
-
-
-def turning_samples(u: FloatArray, threshold: float) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """Samples at which a voltage turns and then runs back by more than a threshold [V], shape (M,)."""
-    turns = np.empty(u.size)
-    return turns[: _turns(u, threshold, turns)].astype(np.int64)
-
-
-@compiled
-def _turns(u: Vector, threshold: float, turns: Vector) -> int:
-    """The same into `turns`, and how many they are."""
-    count, direction, extreme = 0, 0.0, 0
-    low = high = u[0]
-    for k, value in enumerate(u):
-        if direction == 0.0:
-            low, high = min(low, value), max(high, value)
-            if high - low > threshold:
-                direction = 1.0 if value == high else -1.0
-                extreme = k
-        elif direction * (value - u[extreme]) > 0.0:
-            extreme = k
-        elif direction * (u[extreme] - value) > threshold:
-            turns[count] = extreme
-            count += 1
-            direction, extreme = -direction, k
-    return count
+    return data.u[turns(data.u, TURN * data.extent)]

@@ -8,10 +8,10 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.estimators.coordinates import bridged
-from piezoest.identification.data import TURN, turning_samples
+from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.identification.loop_direction import Loop, loop_of
-from piezoest.identification.outliers import Flaws, flawed
 from piezoest.records import Record
+from piezoest.signals.turns import TURN, turns
 
 FEWEST_TURNS = 2
 # Part of the displacement's scatter that a line in the voltage must not leave, if they belong together.
@@ -34,7 +34,7 @@ class Examined:
         self.u = bridged(record.voltage)
         self.x = bridged(np.where(self.flaws.unusable, np.nan, record.displacement))
         self.swing = float(np.ptp(self.u))
-        self.turns = turning_samples(self.u, TURN * self.swing)
+        self.turns = turns(self.u, TURN * self.swing)
         # The voltage without what drifts; each stretch between jumps has an offset of its own.
         offsets = np.zeros(self.x.size)
         offsets[self.flaws.jumps] = self.flaws.jump_sizes

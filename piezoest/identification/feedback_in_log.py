@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.identification.runs import BoolArray
+from piezoest.fitting.runs import BoolArray
 
 LAGS, MOST_SAMPLES, PASSES = 8, 60_000, 4
 FEWEST_SAMPLES = 200

@@ -8,7 +8,7 @@ import numpy as np
 
 from piezoest._checks import array_1d
 from piezoest.estimators.coordinates import bridged
-from piezoest.identification.data import TURN, turning_samples
+from piezoest.signals.turns import TURN, turns
 
 # Swings whose durations or sizes differ by this factor move at rates that tell.
 FACTOR = 1.5
@@ -50,15 +50,15 @@ def tells_lag(u: Any) -> bool:
         return False
     u = bridged(u)
     extent = float(np.ptp(u))
-    turns = turning_samples(u, TURN * extent)
-    if extent == 0.0 or turns.size < 2:
+    places = turns(u, TURN * extent)
+    if extent == 0.0 or places.size < 2:
         return False
     # The ways before the first and behind the last turn are no whole swings.
-    if _differ(np.diff(turns)) or _differ(np.abs(np.diff(u[turns]))):
+    if _differ(np.diff(places)) or _differ(np.abs(np.diff(u[places]))):
         return True
     # Over a few samples, which is what noise does not do.
-    apart = max(1, round(float(np.median(np.diff(turns))) / 20.0))
-    moved = np.abs(u[apart:] - u[:-apart])[turns[0] : turns[-1]]
+    apart = max(1, round(float(np.median(np.diff(places))) / 20.0))
+    moved = np.abs(u[apart:] - u[:-apart])[places[0] : places[-1]]
     return bool(moved.size and np.quantile(moved, 0.99) > STEPPED * np.mean(moved))
 
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.identification.data import TURN, turning_samples
-from piezoest.identification.runs import BoolArray
+from piezoest.fitting.runs import BoolArray
+from piezoest.signals.turns import TURN, turns
 
 # Voltages at which the branches of the loop are compared.
 PLACES = 16
@@ -53,14 +53,14 @@ def loop_of(u: FloatArray, x: FloatArray, counts: BoolArray, gain: float) -> Loo
         Slope of the straight line through the loop [µm/V].
     """
     extent = float(np.ptp(u))
-    turns = turning_samples(u, TURN * extent)
+    places = turns(u, TURN * extent)
     nothing = Loop(np.empty(0), np.empty(0))
-    if turns.size < 2 or extent == 0.0 or gain == 0.0:
+    if places.size < 2 or extent == 0.0 or gain == 0.0:
         return nothing
-    branch = np.searchsorted(turns, np.arange(u.size), side="left")
-    branches = turns.size + 1
+    branch = np.searchsorted(places, np.arange(u.size), side="left")
+    branches = places.size + 1
     # Of the way there from rest, and of a last one back, only what lies between turns is compared.
-    low, high = float(u[turns].min()), float(u[turns].max())
+    low, high = float(u[places].min()), float(u[places].max())
     place = np.floor((u - low) / (high - low) * PLACES).astype(np.int64)
     between = counts & (place >= 0) & (place < PLACES)
     cell = (branch * PLACES + place)[between]
@@ -69,7 +69,7 @@ def loop_of(u: FloatArray, x: FloatArray, counts: BoolArray, gain: float) -> Loo
     height = np.bincount(cell, (x - gain * u)[between], size)
     with np.errstate(invalid="ignore"):
         heights = (height / number).reshape(branches, PLACES)
-    ends = u[np.concatenate(([0], turns, [u.size - 1]))]
+    ends = u[np.concatenate(([0], places, [u.size - 1]))]
     rising = np.sign(np.diff(ends))[:, None]
     difference = -rising[1:-1] * (heights[1:-1] - 0.5 * (heights[:-2] + heights[2:]))
     # A way from rest, at the start, is no branch of a loop.

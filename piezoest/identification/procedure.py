@@ -48,14 +48,15 @@ def identify(
 ) -> Identification:
     """Identify a stage from a recorded log: the model that fits it best, and how far to trust it.
 
-    The log is looked at first: units, columns, direction of the loop, clipping, spikes, jumps. Then models of all
-    kinds, or of one, are fitted to its first part, see `piezoest.fit`. The kind is chosen by blocks of that part,
-    each predicted from the others, and judged on the rest of the log, which no fit has seen.
+    The log is looked at first: units, columns, direction of the loop, clipping, spikes, jumps. Then models
+    of all kinds, or of one, are fitted to its first part, see `piezoest.fit`. The kind is chosen by blocks
+    of that part, each predicted from the others, and judged on the rest of the log, which no fit has seen.
 
     Parameters
     ----------
     data : array_like of shape (N,), Record, str, Path or DataFrame
-        Voltage [V], with `displacement` and `sample_rate`; or a record, a file, or a table of pandas or Polars.
+        Voltage [V], with `displacement` and `sample_rate`; or a record, a file, or a table of pandas or
+        Polars.
     displacement : array_like, shape (N,), optional
         [µm]; NaN where a sample is missing.
     sample_rate : float, optional
@@ -68,8 +69,9 @@ def identify(
     train : float
         Part of the log to fit, from its start; the rest is held out. 0.1 to 0.9.
     delay : float or "auto"
-        Samples by which the displacement lags the voltage, 0 to 10, fractions too. ``"auto"`` estimates it where
-        the log can tell it from the width of the loop, by swings of several sizes or frequencies; else it is 0.
+        Samples by which the displacement lags the voltage, 0 to 10, fractions too. ``"auto"`` estimates it
+        where the log can tell it from the width of the loop, by swings of several sizes or frequencies;
+        else it is 0.
     settle : float, optional
         Seconds to leave out at the start; by default as long as the start is off the model by more than four
         robust standard deviations, at most a tenth of the fitted part.
@@ -109,7 +111,7 @@ def identify(
     others = [as_record(each) for each in validate]
     say("looking at the log")
     trained = round(train * len(record))
-    whole, first = _checked(record, trained)
+    first = _checked(record, trained)
     noise = noise_of(first)
     check_excitation(first, noise)
     found = findings(record)
@@ -119,10 +121,10 @@ def identify(
     told = delay != "auto" or tells_lag(first.u)
     fitter = Fitter(
         record.voltage[:trained],
-        np.where(flaws.unusable, np.nan, record.displacement)[:trained],
+        record.displacement[:trained],
         sample_rate=record.sample_rate,
         delay=_delay(delay) if delay != "auto" else "auto" if told else 0.0,
-        jumps=flaws.jumps[flaws.jumps < trained],
+        flaws=flaws.before(trained),
         settle=settle,
     )
     candidates = []
@@ -158,8 +160,8 @@ def _delay(given: Any) -> float:
     return fraction("delay", finite("delay", given), 0.0, LONGEST_DELAY)
 
 
-def _checked(record: Record, trained: int) -> tuple[Data, Data]:
-    """Data of the whole record and of the fitted part, if there is enough in both parts."""
+def _checked(record: Record, trained: int) -> Data:
+    """Data of the fitted part, if there is enough in both parts."""
     for name, part in (("fitted", slice(0, trained)), ("held-out", slice(trained, None))):
         usable = int(np.sum(record.usable[part]))
         if usable < FEWEST_SAMPLES:
@@ -167,8 +169,7 @@ def _checked(record: Record, trained: int) -> tuple[Data, Data]:
                 f"the {name} part of {record.source} has {usable} usable samples, at least {FEWEST_SAMPLES} "
                 "are needed: record longer"
             )
-    whole = prepare(record.voltage, record.displacement)
-    return whole, prepare(record.voltage[:trained], record.displacement[:trained])
+    return prepare(record.voltage[:trained], record.displacement[:trained])
 
 
 def _candidate(fitter: Fitter, name: str, record: Record, flaws: Flaws, trained: int) -> Candidate:
@@ -199,7 +200,7 @@ def _unknown(item: Candidate, data: Data) -> str:
         if (error := item.fit.standard_errors[name]) > LARGEST_RELATIVE_ERROR * value:
             return (
                 f"too little excitation: {name} = {value:.3g} {unit} is known only to ±{error:.2g} "
-                f"({100 * error / value:.0f} %) over {data.extent:.4g} V: record longer, with a larger voltage "
-                "and turns of several sizes"
+                f"({100 * error / value:.0f} %) over {data.extent:.4g} V: record longer, with a larger "
+                "voltage and turns of several sizes"
             )
     return ""

@@ -7,20 +7,19 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.estimators.coordinates import bridged
 from piezoest.records import Record
-from piezoest.signals.turns import turns
+from piezoest.signals.turns import TURN, turns
 
 # The voltage repeats itself if it differs from its last period by less than this fraction of its range.
 SAME = 2e-3
 # So many samples of repeated periods are enough to say something.
 FEWEST = 200
-TURN = 0.05
 
 
 def noise_floor(record: Record, fallback: float) -> float:
     """Standard deviation of what no model of the voltage can know [µm].
 
-    Where the voltage repeats itself, displacements a period apart differ by noise twice, after what has drifted
-    between them is taken out. Where it does not, `fallback` is all that is known.
+    Where the voltage repeats itself, displacements a period apart differ by noise twice, after what has
+    drifted between them is taken out. Where it does not, `fallback` is all that is known.
     """
     u, x = bridged(record.voltage), record.displacement
     extent = float(np.ptp(u))
@@ -31,7 +30,9 @@ def noise_floor(record: Record, fallback: float) -> float:
     best = min((_differences(u, x, period + k, extent) for k in (-1, 0, 1)), key=lambda found: -found.size)
     if best.size < FEWEST:
         return fallback
-    blocks = best[: best.size // period * period].reshape(-1, period) if best.size >= period else best[None, :]
+    blocks = (
+        best[: best.size // period * period].reshape(-1, period) if best.size >= period else best[None, :]
+    )
     apart = blocks - np.nanmean(blocks, axis=1, keepdims=True)
     return max(float(1.4826 * np.nanmedian(np.abs(apart)) / np.sqrt(2.0)), fallback)
 

@@ -95,6 +95,7 @@ class Candidate:
             "name": self.name,
             "parameters": self.parameters,
             "cross_validated_um": self.cross_validated,
+            "ahead_um": self.fit.ahead,
             "train": self.train.to_dict(),
             "held_out": self.held_out.to_dict(),
         }
@@ -285,20 +286,23 @@ class Identification:
         return self.best.prediction if u is None else self.fit.predict(u)
 
     def compare(self, *others: Identification) -> str:
-        """Return a table of held-out errors of this and other identifications, of the same log or of others.
+        """Return a table of errors [µm rms] of this and other identifications, of the same log or of others.
 
         Parameters
         ----------
         *others : Identification
             What to compare with.
         """
-        rows = [("log", "model", "held out [µm rms]", "blocks left out [µm rms]", "noise [µm rms]")]
+        rows: list[tuple[str, ...]] = [
+            ("log", "model", "held out [µm rms]", "blocks left out [µm rms]", "noise [µm rms]")
+        ]
         for each in (self, *others):
             figures = (each.held_out.rms, each.best.cross_validated, each.noise_floor)
             rows.append((Path(each.source).name, each.best.label, *(f"{value:.3g}" for value in figures)))
         widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
         return "\n".join(
-            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+            for row in rows
         )
 
     def table(self) -> list[Row]:
@@ -347,8 +351,9 @@ class Identification:
 
     def __repr__(self) -> str:
         return (
-            f"<Identification of {Path(self.source).name}: {self.best.label}, {self.held_out.rms:.3g} µm rms held out "
-            f"(straight line {self.line_held_out.rms:.3g}), {len(self.advice)} remarks>"
+            f"<Identification of {Path(self.source).name}: {self.best.label}, "
+            f"{self.held_out.rms:.3g} µm rms held out (straight line {self.line_held_out.rms:.3g}), "
+            f"{len(self.advice)} remarks>"
         )
 
     def __str__(self) -> str:
@@ -357,9 +362,12 @@ class Identification:
     def report(self) -> str:
         """Return parameters, errors and advice as text."""
         lines = [repr(self)[1:-1]]
-        lines += [f"{name:>8} {value:12.6g} ± {error:.2g} {unit}" for name, value, error, unit in self.table()]
         lines += [
-            f"{each.label:>28}: {each.held_out.rms:.4g} µm rms held out, {each.cross_validated:.4g} on blocks left out"
+            f"{name:>8} {value:12.6g} ± {error:.2g} {unit}" for name, value, error, unit in self.table()
+        ]
+        lines += [
+            f"{each.label:>28}: {each.held_out.rms:.4g} µm rms held out, "
+            f"{each.cross_validated:.4g} on blocks left out"
             for each in self.candidates
         ]
         return "\n".join([*lines, self.reason, *self.advice])

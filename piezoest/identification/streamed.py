@@ -1,27 +1,36 @@
-"""A log larger than memory to a model: recursive least squares in one pass, judged in another."""
+"""A log larger than memory to a model: plays from sums over the log, judged in another pass."""
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from piezoest._checks import FloatArray, fraction
-from piezoest.compile import Vector, compiled
-from piezoest.equations.coleman_hodgdon import hysteresis_step
-from piezoest.estimators.rls import HysteresisRLS
+from piezoest._checks import FloatArray, finite, fraction
+from piezoest.fitting import Fitter
+from piezoest.fitting.design import CHUNK, Design
+from piezoest.fitting.flaws import flawed
+from piezoest.fitting.play_columns import Start
+from piezoest.fitting.program import Sums
+from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression
+from piezoest.fitting.search import BENDS, LONGEST_DELAY, plays
 from piezoest.identification.data import check_excitation, noise_of, prepare
-from piezoest.identification.procedure import FEWEST_SAMPLES, LONGEST_DELAY, identify
+from piezoest.identification.lag import tells_lag
 from piezoest.identification.residual import Misfit
-from piezoest.identification.result import misfits_to_dict, parameter_rows
-from piezoest.models import ColemanHodgdon, LinearGain, Model
+from piezoest.identification.result import Row, parameter_rows
+from piezoest.models import LearntOn, Model
 from piezoest.records import Record, RecordStream
 
-# Samples at the start that are looked at as a whole: for the delay, the noise and the first guess.
+# Samples at the start that are looked at as a whole: for the delay, the start and the noise.
 HEAD = 50_000
-# Points kept for figures.
+FEWEST_SAMPLES = 50
+# Points kept for figures, and for how far plays move.
 MOST_POINTS = 20_000
+
+Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,17 +39,18 @@ class StreamedIdentification:
 
     Parameters
     ----------
-    model : ColemanHodgdon
-        Admissible, with offset.
-    standard_errors : dict of str to float
-        Of alpha, beta and gamma, in their units, for white noise in the displacement: what the model
-        cannot do is not in them.
+    model : Model
+        With offset.
+    chosen : str
+        Its kind, as `piezoest.fit` names it.
+    cross_validated : dict of str to float
+        Error of each kind on blocks of the fitted part that were left out of the fit [µm rms].
     delay : float
         Samples by which the displacement lags the voltage.
     train, held_out : Misfit
         Free-running error of the model on the part it was fitted on and on the part held out.
-    line : LinearGain
-        A straight line of the same offset and of the gain that suits the fitted part's start, for comparison.
+    line : Model
+        The best straight line of the fitted part, for comparison.
     line_train, line_held_out : Misfit
         Its errors.
     samples, trained, skipped : int
@@ -49,6 +59,8 @@ class StreamedIdentification:
         [Hz].
     source : str
         The file.
+    learnt_on : LearntOn
+        Ranges of the fitted part.
     thinned : Record
         Every k-th sample, for figures.
     prediction : ndarray
@@ -57,12 +69,13 @@ class StreamedIdentification:
         What was assumed to read the log, and what to know before using the model, in plain sentences.
     """
 
-    model: ColemanHodgdon
-    standard_errors: dict[str, float]
+    model: Model
+    chosen: str
+    cross_validated: dict[str, float]
     delay: float
     train: Misfit
     held_out: Misfit
-    line: LinearGain
+    line: Model
     line_train: Misfit
     line_held_out: Misfit
     samples: int
@@ -70,42 +83,64 @@ class StreamedIdentification:
     skipped: int
     sample_rate: float
     source: str
+    learnt_on: LearntOn
     thinned: Record = field(repr=False)
     prediction: FloatArray = field(repr=False)
     notes: tuple[str, ...] = ()
     advice: tuple[str, ...] = ()
 
-    def table(self) -> list[tuple[str, float, float, str]]:
-        """Rows of parameter name, value, standard error and unit."""
-        return parameter_rows(self.model, self.delay, self.standard_errors)
+    def table(self) -> list[Row]:
+        """Rows of parameter name, value, standard error (zero: not estimated) and unit."""
+        return parameter_rows(self.model, self.delay, {})
 
     def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary; the model under ``"model"`` is that of `ColemanHodgdon.to_dict`."""
+        """Return a JSON-safe dictionary; the model under ``"model"`` is that of the model's `to_dict`."""
         return {
-            "format": "piezoest-streamed-1",
+            "format": "piezoest-streamed-2",
             "source": self.source,
             "samples": self.samples,
             "skipped_rows": self.skipped,
             "sample_rate_Hz": self.sample_rate,
             "model": self.model.to_dict(),
-            "standard_errors": dict(self.standard_errors),
+            "learnt_on": self.learnt_on.to_dict(),
+            "kind": self.chosen,
+            "cross_validated_um": self.cross_validated,
             "units": {name: unit for name, _, _, unit in self.table()},
             "delay_samples": self.delay,
             "trained_samples": self.trained,
-            **misfits_to_dict(self),
+            "train": self.train.to_dict(),
+            "held_out": self.held_out.to_dict(),
+            "straight_line": {
+                "model": self.line.to_dict(),
+                "train": self.line_train.to_dict(),
+                "held_out": self.line_held_out.to_dict(),
+            },
             "notes": list(self.notes),
             "advice": list(self.advice),
         }
 
 
-def identify_stream(
-    log: RecordStream, *, train: float = 0.5, delay: float | Literal["auto"] = "auto"
-) -> StreamedIdentification:
-    """Identify a Coleman-Hodgdon model from a log that need not fit in memory.
+class Part(NamedTuple):
+    """Samples of a log: the first one's number, voltage as it comes late, displacement, what counts."""
 
-    `HysteresisRLS` without forgetting takes the first part block by block; a second pass lets the
-    model it ends with run free over the whole log. Unlike `identify` there is no refinement of the
-    free-running error, which would need the whole log at once.
+    first: int
+    u: FloatArray
+    x: FloatArray
+    counts: Any
+
+
+def identify_stream(
+    log: RecordStream,
+    *,
+    train: float = 0.5,
+    delay: float | Literal["auto"] = "auto",
+    progress: Progress | None = None,
+) -> StreamedIdentification:
+    """Identify a model from a log that need not fit in memory.
+
+    Plays, with and without bends, are fitted to the first part by sums over the log, as `fit` does; the kind
+    is chosen by blocks of which each is predicted from the others. Another pass lets the model run free over the
+    whole log. Creep is not fitted, and jumps of the displacement are not looked for.
 
     Parameters
     ----------
@@ -114,8 +149,10 @@ def identify_stream(
     train : float
         Part of the log to fit, from its start; the rest is held out. 0.1 to 0.9.
     delay : float or "auto"
-        Samples by which the displacement lags the voltage, 0 to 10; ``"auto"`` takes what `identify`
-        finds in the first 50 000 samples, and 0 with a word in `advice` where it finds nothing.
+        Samples by which the displacement lags the voltage, 0 to 10; ``"auto"`` looks for it in the first
+        50 000 samples, where they can tell it from the width of the loop.
+    progress : callable, optional
+        Called with what is done and what there is, in each of three passes over the log.
 
     Returns
     -------
@@ -131,148 +168,187 @@ def identify_stream(
     train = fraction("train", train, 0.1, 0.9)
     samples = log.count()
     trained = round(train * samples)
-    head = _head(log, min(HEAD, trained))
+    survey = _Survey(log, trained, progress)
+    head = survey.head
     if int(np.sum(head.usable)) < FEWEST_SAMPLES:
         raise ValueError(
             f"the first {len(head)} samples of {log.path} have {int(np.sum(head.usable))} usable ones, "
             f"at least {FEWEST_SAMPLES} are needed"
         )
-    advice: list[str] = []
-    lag = _delay(head, delay, advice)
     data = prepare(head.voltage, head.displacement)
-    noise = noise_of(data)
-    check_excitation(data, noise)
-    estimator = HysteresisRLS(
-        log.sample_rate, initial_model=data.loop_about_line(lag), memory=None, offset=True, delay=lag,
-        uncertainty=1.0, noise=noise,
-    )  # fmt: skip
-    first = 0
-    for block in log:
-        part = slice(0, max(0, min(block.voltage.size, trained - first)))
-        if part.stop:
-            estimator.run(block.voltage[part], block.displacement[part], every=part.stop)
-        first += block.voltage.size
-    line = data.line(lag)
-    model = _hysteresis(estimator.model, line)
-    judge = _Judge(model, line, lag, samples, trained)
-    for block in log:
-        judge.add(block.time, block.voltage, block.displacement)
-    held_out, line_held_out = (judge.misfit(held_out=True, of_line=of_line) for of_line in (False, True))
-    known = dict(zip(estimator.parameter_names, estimator.standard_errors, strict=True))
-    errors = {name: float(known[name]) for name in model.parameter_names}
-    if held_out.rms > line_held_out.rms:
-        advice.append("A straight line does better: check signs, columns and the delay.")
-    if estimator.status.projected:
-        advice.append(
-            "The estimate lies outside the admissible parameters: the model is the nearest one within."
-        )
-    return StreamedIdentification(
-        model=model,
-        standard_errors=errors,
-        delay=lag,
+    check_excitation(data, noise_of(data))
+    told = delay != "auto" or tells_lag(head.voltage)
+    wanted: Any = "auto" if delay == "auto" and told else 0.0
+    if delay != "auto":
+        wanted = fraction("delay", finite("delay", delay), 0.0, LONGEST_DELAY)
+    fitter = Fitter(head.voltage, head.displacement, sample_rate=log.sample_rate, delay=wanted)
+    fits = _fits(log, survey, fitter.start, fitter.delay, samples, trained, progress)
+    chosen = min(fits, key=lambda name: float(np.sqrt(fits[name].held_out * fits[name].ahead)))
+    judge = _Judge(fits[chosen], fits["line"], samples, trained)
+    for part in _parts(log, fitter.delay, progress):
+        judge.add(part)
+    found = StreamedIdentification(
+        model=_model(fits[chosen]),
+        chosen=chosen,
+        cross_validated={name: fit.held_out for name, fit in fits.items()},
+        delay=fitter.delay,
         train=judge.misfit(held_out=False),
-        held_out=held_out,
-        line=line,
+        held_out=judge.misfit(held_out=True),
+        line=_model(fits["line"]),
         line_train=judge.misfit(held_out=False, of_line=True),
-        line_held_out=line_held_out,
+        line_held_out=judge.misfit(held_out=True, of_line=True),
         samples=samples,
         trained=trained,
         skipped=judge.skipped,
         sample_rate=log.sample_rate,
         source=str(log.path),
+        learnt_on=survey.learnt_on,
         thinned=judge.thinned(log),
         prediction=judge.prediction,
         notes=log.notes,
-        advice=tuple(advice),
     )
+    return dataclasses.replace(found, advice=tuple(_advice(found, told)))
 
 
-def _head(log: RecordStream, length: int) -> Record:
-    voltage, displacement = np.empty(0), np.empty(0)
-    for block in log:
-        voltage = np.concatenate([voltage, block.voltage])
-        displacement = np.concatenate([displacement, block.displacement])
-        if voltage.size >= length:
+def _advice(found: StreamedIdentification, told: bool) -> list[str]:
+    said = []
+    if not told:
+        said.append(
+            "The lag of the displacement is not known: all swings at the log's start are alike, so it looks "
+            "like a wider loop."
+        )
+    if found.held_out.rms > found.line_held_out.rms and found.chosen != "line":
+        said.append("A straight line does better: check signs, columns and the delay.")
+    return said
+
+
+class _Survey:
+    """The first pass: start, range and some points of the part that is fitted."""
+
+    def __init__(self, log: RecordStream, trained: int, progress: Progress | None) -> None:
+        every = max(1, -(-trained // MOST_POINTS))
+        voltage, displacement, points = np.empty(0), np.empty(0), []
+        seen, known = 0, None
+        low, high = np.inf, -np.inf
+        for block in log.blocks(progress=progress):
+            u, x = block.voltage[: trained - seen], block.displacement[: trained - seen]
+            if u.size == 0:
+                break
+            if voltage.size < HEAD:
+                voltage, displacement = np.concatenate([voltage, u]), np.concatenate([displacement, x])
+            if np.any(np.isfinite(u)) and np.any(np.isfinite(x)):
+                here = LearntOn.of(u, x, log.sample_rate)
+                known = here if known is None else known.joined(here)
+                low, high = min(low, float(np.nanmin(u))), max(high, float(np.nanmax(u)))
+            points.append(u[-seen % every :: every])
+            seen += u.size
+        if known is None:
+            raise ValueError(f"{log.path} has no usable sample in the part that is fitted")
+        head = slice(0, min(HEAD, trained))
+        self.learnt_on = known
+        self.head = Record.from_arrays(voltage[head], displacement[head], log.sample_rate, str(log.path))
+        thinned = np.concatenate(points)
+        self.voltage = np.concatenate([thinned[np.isfinite(thinned)], [low, high]])
+
+
+def _fits(
+    log: RecordStream, survey: _Survey, start: Start, delay: float, samples: int, trained: int,
+    progress: Progress | None,
+) -> dict[str, Fitted]:  # fmt: skip
+    """The second pass: a line, plays, and plays with bends, from sums over blocks of the fitted part."""
+    points = survey.voltage
+    none = np.empty(0)
+    thinned = Log(points, points, np.ones(points.size, bool), log.sample_rate, none)
+    basis = plays(thinned, start, bends=BENDS)
+    design = Design(basis, log.sample_rate, samples)
+    along, sums = design.along(), [Sums.none(design.columns) for _ in range(FOLDS)]
+    for part in _parts(log, delay, progress):
+        fold = np.minimum(np.arange(part.first, part.first + part.u.size) * FOLDS // trained, FOLDS)
+        for k in range(0, part.u.size, CHUNK):
+            rows = along.rows(part.u[k : k + CHUNK])
+            for f in np.unique(fold[k : k + CHUNK]):
+                if f < FOLDS:
+                    taken = np.flatnonzero((fold[k : k + CHUNK] == f) & part.counts[k : k + CHUNK])
+                    sums[f] = sums[f].plus(Sums.of(rows[taken], part.x[k : k + CHUNK][taken]))
+        if part.first + part.u.size >= trained:
             break
-    return Record.from_arrays(voltage[:length], displacement[:length], log.sample_rate, str(log.path))
+    merged, to_plays = basis.merged()
+    one = dataclasses.replace(merged, thresholds=merged.thresholds[:1], moving=merged.moving[:1])
+    to_line = to_plays[:, :1]
+    return {
+        "line": Regression(
+            dataclasses.replace(design, basis=one), [each.combined(basis.size, to_line) for each in sums]
+        ).best(),
+        "plays": Regression(
+            dataclasses.replace(design, basis=merged), [each.combined(basis.size, to_plays) for each in sums]
+        ).best(),
+        "plays-asymmetric": Regression(design, sums).best(),
+    }
 
 
-def _delay(head: Record, delay: float | str, advice: list[str]) -> float:
-    if delay != "auto":
-        return fraction("delay", delay, 0.0, LONGEST_DELAY)
-    try:
-        return identify(head).delay
-    except ValueError as error:
-        advice.append(f"The delay was taken as 0, for the log's start does not show it: {error}.")
-        return 0.0
+def _model(fitted: Fitted) -> Model:
+    design, w = fitted.design, fitted.w
+    return design.basis.model(w[: design.basis.size], float(w[design.offset]), None, design.sample_rate)
 
 
-def _hysteresis(model: Model, line: LinearGain) -> ColemanHodgdon:
-    if isinstance(model, ColemanHodgdon):
-        return model
-    raise ValueError(
-        f"no Coleman-Hodgdon model fits: the recursion ended with {model}, where a straight line has the "
-        f"gain {line.gain:.4g} µm/V: check the columns, their units and signs"
-    )
+def _parts(log: RecordStream, delay: float, progress: Progress | None) -> Iterator[Part]:
+    """The log from its start, with the voltage late and without gaps, where it is the last one known."""
+    before, seen = None, 0
+    whole, rest = divmod(delay, 1.0)
+    for block in log.blocks(progress=progress):
+        u, x = block.voltage, block.displacement
+        known = np.isfinite(u)
+        counts = known & np.isfinite(x)
+        counts &= ~flawed(np.where(known, u, np.nan), x).unusable
+        if before is None:
+            if not known.any():
+                seen += u.size
+                continue
+            before = np.full(int(np.ceil(delay)) + 2, u[np.argmax(known)])
+        path = np.concatenate([before, u])
+        path = path[np.maximum.accumulate(np.where(np.isfinite(path), np.arange(path.size), 0))]
+        now = np.arange(before.size, path.size) - int(whole)
+        late = (1.0 - rest) * path[now] + rest * path[now - 1]
+        before = path[-before.size :]
+        yield Part(seen, late, np.where(np.isfinite(x), x, 0.0), counts)
+        seen += u.size
 
 
 class _Judge:
     """Free-running errors of a model and of a line, block by block in order, and points for figures."""
 
-    def __init__(
-        self, model: ColemanHodgdon, line: LinearGain, lag: float, samples: int, trained: int
-    ) -> None:
-        self._model, self._line, self._lag = model, line, lag
-        # The last voltages, and w_h at the last of them delayed.
-        self._before: FloatArray | None = None
-        self._w_h = 0.0
+    def __init__(self, fitted: Fitted, line: Fitted, samples: int, trained: int) -> None:
+        self._fits = (fitted, line)
+        self._along = tuple(each.design.along() for each in self._fits)
         # Of model and line, in the fitted part and the held-out one: sum of squares, largest, count.
         self._sums = np.zeros((2, 2, 3))
-        self._trained, self._seen = trained, 0
+        self._trained = trained
         self._every = max(1, -(-samples // MOST_POINTS))
         self._points: list[FloatArray] = []
         self.skipped = 0
 
-    def add(self, time: FloatArray, u: FloatArray, x: FloatArray) -> None:
-        """Judge a block."""
-        predicted, by_line = self._predicted(u)
-        usable = np.isfinite(u) & np.isfinite(x)
-        fitted = self._seen + np.arange(u.size) < self._trained
-        for held_out, counts in enumerate((usable & fitted, usable & ~fitted)):
-            for of_line, output in enumerate((predicted, by_line)):
-                error = np.abs(x[counts] - output[counts])
+    def add(self, part: Part) -> None:
+        """Judge a part of the log."""
+        outputs = [self._output(i, part.u) for i in range(2)]
+        fitted = part.first + np.arange(part.u.size) < self._trained
+        for held_out, here in enumerate((part.counts & fitted, part.counts & ~fitted)):
+            for of_line, output in enumerate(outputs):
+                error = np.abs(part.x[here] - output[here])
                 squares, largest, count = self._sums[held_out, of_line]
-                largest = np.max(error, initial=largest)
-                # One by one, for the sum not to depend on where the blocks end.
-                squares = np.add.accumulate(np.append(squares, error**2))[-1]
-                self._sums[held_out, of_line] = squares, largest, count + error.size
-        kept = slice(-self._seen % self._every, None, self._every)
-        self._points.append(np.array([time[kept], u[kept], x[kept], predicted[kept]]))
-        self.skipped += int(np.sum(~usable))
-        self._seen += u.size
+                self._sums[held_out, of_line] = (
+                    squares + float(error @ error),
+                    np.max(error, initial=largest),
+                    count + error.size,
+                )
+        kept = slice(-part.first % self._every, None, self._every)
+        index = (part.first + np.arange(part.u.size))[kept]
+        shown = np.where(part.counts, part.x, np.nan)[kept]
+        self._points.append(np.array([index, part.u[kept], shown, outputs[0][kept]]))
+        self.skipped += int(np.sum(~part.counts))
 
-    def _predicted(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Free-running displacement of model and line; NaN before the first known voltage."""
-        known = np.isfinite(u)
-        if self._before is None:
-            if not known.any():
-                return np.full(u.size, np.nan), np.full(u.size, np.nan)
-            self._before = np.full(int(np.ceil(self._lag)) + 2, u[np.argmax(known)])
-            blind = int(np.argmax(known))
-        else:
-            blind = 0
-        # A missing voltage is taken as the last one.
-        path = np.concatenate([self._before, u])
-        path = path[np.maximum.accumulate(np.where(np.isfinite(path), np.arange(path.size), 0))]
-        whole, rest = divmod(self._lag, 1.0)
-        now = np.arange(self._before.size - 1, path.size) - int(whole)
-        voltage = (1.0 - rest) * path[now] + rest * path[now - 1]
-        w_h = np.full(voltage.size, self._w_h)
-        _follow(voltage, w_h, self._model.a, self._model.b)
-        self._w_h, self._before = float(w_h[-1]), path[-self._before.size :]
-        predicted = (self._model.c * voltage + w_h + self._model.offset)[1:]
-        predicted[:blind] = np.nan
-        return predicted, self._line.simulate(voltage[1:])
+    def _output(self, which: int, u: FloatArray) -> FloatArray:
+        along, w = self._along[which], self._fits[which].w
+        return np.concatenate([along.rows(u[k : k + CHUNK]) @ w for k in range(0, u.size, CHUNK)])
 
     def misfit(self, *, held_out: bool, of_line: bool = False) -> Misfit:
         """Return the error so far, of the model or of the line, in the fitted part or behind it."""
@@ -281,17 +357,11 @@ class _Judge:
 
     def thinned(self, log: RecordStream) -> Record:
         """Every k-th sample."""
-        time, voltage, displacement, _ = np.concatenate(self._points, axis=1)
+        index, voltage, displacement, _ = np.concatenate(self._points, axis=1)
+        time = index / log.sample_rate
         return Record(time, voltage, displacement, log.sample_rate / self._every, str(log.path))
 
     @property
     def prediction(self) -> FloatArray:
         """Of the model at the samples of `thinned`."""
         return np.asarray(np.concatenate(self._points, axis=1)[3])
-
-
-@compiled
-def _follow(u: Vector, w_h: Vector, a: float, b: float) -> None:
-    """w_h behind the first one, along the voltage."""
-    for k in range(1, u.size):
-        w_h[k] = hysteresis_step(w_h[k - 1], u[k] - u[k - 1], a, b)

@@ -8,15 +8,13 @@ from typing import Any, Self
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, fields, finite, non_negative, positive
-from piezoest.signals.turns import turns
+from piezoest.signals.turns import TURN, turns
 
 Range = tuple[float, float]
 
 # A range is left by more than this fraction of its width, a frequency by this fraction of itself; the rate by
 # this factor, for after a turn the inverse is steeper than what it was learnt on.
 BEYOND, FASTER = 0.05, 1.5
-# The voltage has turned when it runs back by this fraction of its range.
-TURN = 0.05
 # Of the samples at which the voltage moves this fraction is no faster than the rate that is named, which is
 # that over this fraction of a period: steps of a converter, and noise, are no rate.
 USUAL, PERIOD = 0.995, 0.02

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from piezoest._checks import array_1d, non_negative
 from piezoest.compile import Vector, compiled
 
+# A voltage has turned when it runs back by this fraction of its range: less is noise, or a minor loop.
+TURN = 0.05
+
 
 def turns(values: Any, threshold: float) -> NDArray[np.intp]:
     """Places at which a signal turns and then runs back by more than a threshold.

@@ -10,8 +10,8 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
+from piezoest.fitting.flaws import flawed
 from piezoest.identification.lag import tells_lag
-from piezoest.identification.outliers import flawed
 from piezoest.identification.sense import findings
 from piezoest.models import ColemanHodgdon
 from piezoest.records import Record, read_record

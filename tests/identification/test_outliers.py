@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from piezoest._checks import FloatArray
-from piezoest.identification.outliers import flawed
+from piezoest.fitting.flaws import flawed
 from tests.identification.zoo_logs import zoo_log
 
 SEEDS = range(100)

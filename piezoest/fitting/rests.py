@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.identification.data import TURN, turning_samples
-from piezoest.identification.runs import IntArray, runs
+from piezoest.fitting.runs import IntArray, runs
+from piezoest.signals.turns import TURN, turns
 
 # A rest lasts for so many samples, and for this part of a swing; the voltage moves by this part of its
 # range in it.
@@ -27,8 +27,8 @@ def rests_of(u: FloatArray) -> IntArray:
     extent = float(np.ptp(u))
     noise = 1.4826 * float(np.median(np.abs(np.diff(u, 3)))) / np.sqrt(20.0) if u.size > 3 else 0.0
     tolerance = max(RESTING * extent, 7.0 * noise)
-    turns = turning_samples(u, max(TURN * extent, tolerance)).size
-    shortest = max(SHORTEST_REST, round(REST_OF_SWING * u.size / (turns + 1)))
+    swings = turns(u, max(TURN * extent, tolerance)).size + 1
+    shortest = max(SHORTEST_REST, round(REST_OF_SWING * u.size / swings))
     if shortest >= u.size or extent == 0.0 or tolerance > 0.1 * extent:
         return np.empty((0, 2), np.int64)
     # The filters' window ends at its sample: then it begins `shortest - 1` samples before.

@@ -10,7 +10,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.compile import Vector, compiled
-from piezoest.identification.runs import BoolArray, IntArray
+from piezoest.fitting.runs import BoolArray, IntArray
 
 # A scale that holds for so many samples, in which it is this quantile.
 BLOCK, QUANTILE = 32, 0.7

@@ -12,10 +12,11 @@ from piezoest._checks import FloatArray, array_1d, finite, fraction, positive
 from piezoest.estimators.coordinates import bridged, late
 from piezoest.fitting import search, trust
 from piezoest.fitting.design import Design
+from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.fitting.forms import FORMS, Form
 from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.outliers import lonely, unsettled
-from piezoest.fitting.play_columns import PlayColumns, Start
+from piezoest.fitting.play_columns import PlayColumns
 from piezoest.fitting.polish import polished
 from piezoest.fitting.regression import Fitted, Log, Regression, sums_of
 from piezoest.models import Model
@@ -55,7 +56,10 @@ class Fit:
     initial_state : float or ndarray
         What `model.simulate` is to begin with on this record.
     held_out : float
-        Root of the mean square of what each of five blocks misses under the fit of the other four [µm].
+        Root of the mean square of what each of five blocks but the first misses under the fit of the
+        others [µm].
+    ahead : float
+        The same of the last two blocks under the fit of those before them.
     spread : Spread
         How far readings lie from the prediction, 95 times in 100 [µm].
     counts : ndarray of bool, shape (N,)
@@ -78,7 +82,6 @@ class Fit:
     delay_estimated: bool
     initial_state: Any = field(repr=False)
     held_out: float
-    cv: float
     ahead: float
     spread: trust.Spread
     counts: FloatArray = field(repr=False)
@@ -112,7 +115,9 @@ class Fit:
         return Prediction(x, x - half, x + half)
 
     def elsewhere(self, u: FloatArray) -> FloatArray:
-        """Displacement along a voltage from a stage that rests at 0 V before it, without drift and jumps [µm].
+        """Displacement along a voltage, from a stage that rests at 0 V before it [µm].
+
+        Drift and jumps are not in it.
 
         Parameters
         ----------
@@ -126,7 +131,9 @@ class Fit:
         return design.output(v, w)
 
     def continued(self, u: FloatArray) -> Prediction:
-        """Displacement along a voltage that begins as the fitted one does and goes on, from where it had drifted.
+        """Displacement along a voltage that begins as the fitted one does, and goes on.
+
+        What had drifted by the end of the record stays.
 
         Parameters
         ----------
@@ -140,8 +147,8 @@ class Fit:
 
     def __repr__(self) -> str:
         return (
-            f"<Fit of {self.label}: {self.held_out:.3g} µm rms on blocks left out, {self.parameters} parameters, "
-            f"delay {self.delay:.3g} samples>"
+            f"<Fit of {self.label}: {self.held_out:.3g} µm rms on blocks left out, "
+            f"{self.parameters} parameters, delay {self.delay:.3g} samples>"
         )
 
 
@@ -152,16 +159,16 @@ def fit(
     sample_rate: float,
     model: str = "plays",
     delay: float | Literal["auto"] = 0.0,
-    jumps: FloatArray = (),
+    flaws: Flaws | None = None,
     settle: float | None = None,
 ) -> Fit:
     """Fit a model to a record: what the free-running model misses is least.
 
     All in which a model is linear (slopes of plays, their bends, gain, offset, drift, jumps) is one convex
-    program, solved by CasADi and checked by SciPy. Smoothness of neighbouring slopes is chosen by five blocks of
-    which each is predicted from the others. Creep gains, alpha, the delay and the stage's state before the
-    record are found outside it. Lonely samples that are far off are left out, and so is a start that has not
-    settled.
+    program, solved by CasADi and checked by SciPy. Smoothness of neighbouring slopes is chosen by five
+    blocks of which each is predicted from the others. Creep gains, alpha, the delay and the stage's state
+    before the record are found outside it. Spikes and dropouts are left out, and so is a start that has
+    not settled; jumps of the displacement are fitted beside the model.
 
     Parameters
     ----------
@@ -175,8 +182,8 @@ def fit(
     delay : float or "auto"
         Samples by which the displacement lags the voltage, 0 to 10; ``"auto"`` looks for it. A record of one
         amplitude and frequency cannot tell it from the width of the loop.
-    jumps : array_like of int
-        First samples behind jumps of the displacement, whose sizes are fitted.
+    flaws : Flaws, optional
+        Spikes, dropouts and jumps; by default they are looked for.
     settle : float, optional
         Seconds to leave out at the start; by default as long as it is off by more than four robust standard
         deviations, at most a tenth.
@@ -200,11 +207,15 @@ def fit(
     >>> print(np.round(found.model.alpha, 4))
     0.02
     """
-    return Fitter(u, x, sample_rate=sample_rate, delay=delay, jumps=jumps, settle=settle).form(model)
+    return Fitter(u, x, sample_rate=sample_rate, delay=delay, flaws=flaws, settle=settle).form(model)
 
 
 class Fitter:
-    """A record made ready for fits of all kinds, with one delay, one start and the same samples left out."""
+    """A record made ready for fits of all kinds, with one delay, one start and the same samples left out.
+
+    The parameters are those of `fit`. `start` says where plays were before the record, `delay` is the one
+    used, and `delay_estimated`, `left_out` and `spikes` are as in `Fit`.
+    """
 
     def __init__(
         self,
@@ -213,7 +224,7 @@ class Fitter:
         *,
         sample_rate: float,
         delay: float | Literal["auto"] = 0.0,
-        jumps: FloatArray = (),
+        flaws: Flaws | None = None,
         settle: float | None = None,
     ) -> None:
         u, x = (array_1d(name, each, allow_nan=True) for name, each in (("u", u), ("x", x)))
@@ -223,28 +234,31 @@ class Fitter:
         counts = np.isfinite(u) & np.isfinite(x)
         if np.count_nonzero(counts) < FEWEST_SAMPLES:
             raise ValueError(
-                f"u and x have {np.count_nonzero(counts)} samples in common, at least {FEWEST_SAMPLES} are needed"
+                f"u and x have {np.count_nonzero(counts)} samples in common, at least {FEWEST_SAMPLES} are "
+                "needed"
             )
         self._given = bridged(u)
         if np.ptp(self._given) == 0.0:
             raise ValueError(f"u must move, it stays at {self._given[0]:g} V")
-        self._jumps = np.asarray(jumps, np.float64)
-        self._x = np.where(counts, x, 0.0)
+        flaws = flawed(u, x) if flaws is None else flaws
+        counts &= ~flaws.unusable
         self.delay_estimated = delay == "auto"
-        self._log = Log(self._given, self._x, counts, self._rate, self._jumps)
-        self._start = search.best_start(self._log)
+        self._log = Log(
+            self._given, np.where(counts, x, 0.0), counts, self._rate, flaws.jumps.astype(np.float64)
+        )
+        self.start = search.best_start(self._log)
         if isinstance(delay, str):
             if delay != "auto":
                 raise ValueError(f"delay must be 'auto' or a number of samples, got {delay!r}")
-            self.delay = search.best_delay(self._log, self._start)
+            self.delay = search.best_delay(self._log, self.start)
         else:
             self.delay = fraction("delay", finite("delay", delay), 0.0, search.LONGEST_DELAY)
         self._log = replace(self._log, u=late(self._given, self.delay))
-        self._start = search.best_start(self._log)
+        self.start = search.best_start(self._log)
         self._leave_out(settle)
 
     def _leave_out(self, settle: float | None) -> None:
-        """Do without spikes and a start that has not settled, as the richest plays without creep show them."""
+        """Do without what plays with bends show to be spikes, and a start that has not settled."""
         log = self._log
         fitted = self._bent.best(search.SMOOTH)
         residual = np.where(log.counts, log.x - fitted.design.output(log.u, fitted.w), np.nan)
@@ -260,18 +274,23 @@ class Fitter:
         self._log = replace(log, counts=counts)
         del self._bent
 
+    @property
+    def _bent_plays(self) -> PlayColumns:
+        return search.plays(self._log, self.start, bends=search.BENDS)
+
     @cached_property
     def _bent(self) -> Regression:
         """Sums of plays with bends, from which those without follow."""
-        return search.regression(self._log, search.plays(self._log, self._start, bends=search.BENDS))
+        return search.regression(self._log, self._bent_plays)
 
     @cached_property
     def _plain(self) -> dict[bool, Fitted]:
         """Plays without creep, with and without bends."""
         bent = self._bent
-        basis, T = bent.design.basis.merged()
+        basis, T = self._bent_plays.merged()
         design = replace(bent.design, basis=basis)
-        return {True: bent.best(), False: Regression(design, _through(bent, T)).best()}
+        sums = [each.combined(bent.design.basis.size, T) for each in bent.sums]
+        return {True: bent.best(), False: Regression(design, sums).best()}
 
     def form(self, name: str) -> Fit:
         """Fit a model of one kind.
@@ -291,7 +310,7 @@ class Fitter:
             every = max(1, int(np.count_nonzero(self._log.counts)) // 20_000)
             return search.regression(self._log, LoopColumns(search.best_alpha(self._log, every))).best()
         if not form.plays:
-            return search.regression(self._log, search.plays(self._log, self._start, 1)).best()
+            return search.regression(self._log, search.plays(self._log, self.start, 1)).best()
         plain = self._plain[form.bends]
         return search.with_creep(self._log, plain, search.creep_times(self._log)) if form.creep else plain
 
@@ -307,7 +326,9 @@ class Fitter:
             fitted = replace(again, w=fitted.w)
             solver, parameters = NONLINEAR, 5 + self.delay_estimated
         else:
-            regressed = Regression(fitted.design, sums_of(fitted.design, log, fitted.w[: fitted.design.basis.size]))
+            regressed = Regression(
+                fitted.design, sums_of(fitted.design, log, fitted.w[: fitted.design.basis.size])
+            )
             errors = trust.standard_errors(regressed, fitted, log)
             parameters = int(trust.free_columns(regressed, fitted).size)
             solver = LINEAR.format(quadratic_solver(), regressed.gap(fitted))
@@ -320,11 +341,14 @@ class Fitter:
             model=model,
             form=name,
             parameters=parameters,
-            standard_errors={name: errors.get(name, 0.0) for name in (*model.parameter_names, "offset", "delay")},
+            standard_errors={
+                name: errors.get(name, 0.0) for name in (*model.parameter_names, "offset", "delay")
+            },
             delay=delay,
             delay_estimated=self.delay_estimated,
             initial_state=design.basis.initial_state(own, model),
-            held_out=fitted.held_out, cv=fitted.cv, ahead=fitted.ahead,
+            held_out=fitted.held_out,
+            ahead=fitted.ahead,
             spread=trust.spread_of(missed, log, model.line[0]),
             counts=log.counts,
             left_out=self.left_out,
@@ -339,7 +363,7 @@ class Fitter:
 
 
 def _beyond(fitted: Fitted) -> tuple[tuple[Design, FloatArray], FloatArray]:
-    """Design and coefficients that go on beyond the record, and what creep has of that in a stage at rest [µm]."""
+    """Design and coefficients that go on beyond the record, and what creep has of that at rest [µm]."""
     size = fitted.design.basis.size
     basis, w, added = fitted.design.basis.beyond(fitted.w[:size])
     design = replace(fitted.design, basis=basis)
@@ -349,12 +373,3 @@ def _beyond(fitted: Fitted) -> tuple[tuple[Design, FloatArray], FloatArray]:
     w[design.crept] += rest
     w[design.offset] -= added + float(rest.sum())
     return (design, w), rest
-
-
-def _through(regression: Regression, transform: FloatArray) -> list[Any]:
-    """Sums of a regression whose model's columns are combined."""
-    size, rest = regression.design.basis.size, regression.design.columns - regression.design.basis.size
-    T = np.zeros((size + rest, transform.shape[1] + rest))
-    T[:size, : transform.shape[1]] = transform
-    T[size:, transform.shape[1] :] = np.eye(rest)
-    return [each.through(T) for each in regression.sums]

@@ -9,9 +9,9 @@ import numpy as np
 from piezoest._checks import FloatArray, array_1d
 from piezoest.compile import Vector, compiled
 from piezoest.estimators.coordinates import bridged
-from piezoest.identification.rests import rests_of
-from piezoest.identification.runs import BoolArray, IntArray, runs
-from piezoest.identification.surprise import is_peak, scale_of, surprise
+from piezoest.fitting.rests import rests_of
+from piezoest.fitting.runs import BoolArray, IntArray, runs
+from piezoest.fitting.surprise import is_peak, scale_of, surprise
 
 FEWEST_SAMPLES = 64
 # A sample that is off by so many standard deviations is no noise, in the longest of logs.
@@ -70,6 +70,23 @@ class Flaws(NamedTuple):
         """Samples that a fit should leave out, shape (N,)."""
         return self.spikes | self.dropouts
 
+    def before(self, end: int) -> Flaws:
+        """Those of the first samples.
+
+        Parameters
+        ----------
+        end : int
+            How many samples.
+        """
+        jumps, rests = self.jumps < end, self.rests[:, 0] < end
+        return Flaws(
+            self.spikes[:end],
+            self.dropouts[:end],
+            self.jumps[jumps],
+            self.jump_sizes[jumps],
+            self.rests[rests],
+        )
+
     @property
     def stretch(self) -> IntArray:
         """Number of the stretch between jumps that each sample lies in, from 0, shape (N,)."""
@@ -99,7 +116,7 @@ def flawed(u: Any, x: Any) -> Flaws:
     Examples
     --------
     >>> import numpy as np
-    >>> from piezoest.identification.outliers import flawed
+    >>> from piezoest.fitting.flaws import flawed
     >>> u = 10.0 * np.sin(np.linspace(0.0, 40.0, 4000))
     >>> x = 0.1 * u
     >>> x[1000] += 0.5
