@@ -18,7 +18,10 @@ BLOCKS = 25
 WITHIN = 0.95
 # Wider by this factor, for a fit is to hold for longer than the blocks tell; slopes beyond the range are
 # known to this fraction of the line's gain.
-MARGIN, BEYOND_GAIN = 1.1, 0.3
+MARGIN, BEYOND_GAIN = 1.1, 0.5
+# Creep becomes slower: it goes on with this fraction of its rate so far, but over another record by at least
+# this fraction of the stroke, which is what piezo stages do in a third of a decade of time.
+SLOWER, CREEPS_ON = 0.5, 0.002
 # A coefficient is at its bound if it is nearer than this, relative to the largest.
 AT_BOUND = 1e-9
 
@@ -89,7 +92,9 @@ def spread_of(missed: Missed, log: Log, gain: float) -> Spread:
         if np.any(np.isfinite(level)):
             rates.append(abs(float(np.nanmean(level))) / (0.5 * (first + end) - log.folds[EARLIER]))
     visited = float(log.u.min()), float(log.u.max())
-    return Spread(MARGIN * max(quantiles), 0.5 * max(rates), BEYOND_GAIN * gain, visited)
+    least = CREEPS_ON * 2.0 * log.half * gain / log.u.size
+    by_sample = max(SLOWER * max(rates), least)
+    return Spread(MARGIN * max(quantiles), by_sample, BEYOND_GAIN * gain, visited)
 
 
 def covariance(regression: Regression, fitted: Fitted, log: Log) -> FloatArray:
