@@ -138,9 +138,9 @@ def identify_stream(
 ) -> StreamedIdentification:
     """Identify a model from a log that need not fit in memory.
 
-    Plays, with and without bends, are fitted to the first part by sums over the log, as `fit` does; the kind
-    is chosen by blocks of which each is predicted from the others. Another pass lets the model run free over the
-    whole log. Creep is not fitted, and jumps of the displacement are not looked for.
+    Plays, with and without bends, are fitted to the first part by sums over the log, as `fit` does; the
+    kind is chosen by blocks of which each is predicted from the others. Another pass lets the model run free
+    over the whole log. Creep is not fitted, and jumps of the displacement are not looked for.
 
     Parameters
     ----------
