@@ -19,6 +19,7 @@ from piezoest.fitting.outliers import lonely, unsettled
 from piezoest.fitting.play_columns import PlayColumns
 from piezoest.fitting.polish import polished
 from piezoest.fitting.regression import Fitted, Log, Regression, sums_of
+from piezoest.fitting.runs import BoolArray
 from piezoest.models import Model
 from piezoest.symbolic import quadratic_solver
 
@@ -84,7 +85,7 @@ class Fit:
     held_out: float
     ahead: float
     spread: trust.Spread
-    counts: FloatArray = field(repr=False)
+    counts: BoolArray = field(repr=False)
     left_out: int
     spikes: int
     drift: float
