@@ -296,6 +296,9 @@ class Fitter:
         counts = log.counts & ~spikes
         counts[: self.left_out] = False
         self._log = replace(log, counts=counts)
+        if self.left_out:
+            # What had not settled may have looked like another start.
+            self.start = search.best_start(self._log)
         del self._bent
 
     @property
