@@ -24,6 +24,8 @@ from piezoest.models import Model
 from piezoest.symbolic import quadratic_solver
 
 FEWEST_SAMPLES = 50
+# Times that a start which has not settled is looked for, each without what was found before.
+PASSES = 3
 NONLINEAR = "SciPy's least squares, with derivatives by CasADi"
 LINEAR = "{} through CasADi; SciPy's bounded least squares agrees to {:.0e}"
 
@@ -283,23 +285,25 @@ class Fitter:
 
     def _leave_out(self, settle: float | None) -> None:
         """Do without what plays with bends show to be spikes, and a start that has not settled."""
-        log = self._log
-        fitted = self._bent.best(search.SMOOTH)
-        residual = np.where(log.counts, log.x - fitted.design.output(log.u, fitted.w), np.nan)
-        if settle is None:
-            self.left_out = unsettled(residual)
-        else:
-            self.left_out = int(fraction("settle", settle, 0.0, 0.5 * log.u.size / self._rate) * self._rate)
-        spikes = lonely(residual)
-        spikes[: self.left_out] = False
-        self.spikes = int(np.count_nonzero(spikes))
-        counts = log.counts & ~spikes
-        counts[: self.left_out] = False
-        self._log = replace(log, counts=counts)
-        if self.left_out:
-            # What had not settled may have looked like another start.
+        given, self.left_out = self._log, 0
+        if settle is not None:
+            self.left_out = int(fraction("settle", settle, 0.0, 0.5 * given.u.size / self._rate) * self._rate)
+        for _ in range(PASSES):
+            fitted = self._bent.best(search.SMOOTH)
+            residual = np.where(given.counts, given.x - fitted.design.output(given.u, fitted.w), np.nan)
+            further = self.left_out if settle is not None else max(unsettled(residual), self.left_out)
+            spikes = lonely(residual)
+            spikes[:further] = False
+            counts = given.counts & ~spikes
+            counts[:further] = False
+            self._log, settled = replace(given, counts=counts), further == self.left_out
+            self.left_out = further
+            del self._bent
+            if settled:
+                break
+            # What had not settled had looked like another start, and moved the fit.
             self.start = search.best_start(self._log)
-        del self._bent
+        self.spikes = int(np.count_nonzero(spikes))
 
     @property
     def _bent_plays(self) -> PlayColumns:

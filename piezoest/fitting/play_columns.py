@@ -173,10 +173,11 @@ class PlayColumns:
     def beyond(self, w: FloatArray) -> tuple[PlayColumns, FloatArray, float]:
         """The same with wider plays, all coefficients, and what they add in the record [µm].
 
-        Nothing is known of them but their neighbours.
+        Nothing is known of them but their neighbours. There are none where the stage comes from a voltage
+        beyond the record: plays that had moved there go along with each new extreme, whatever their width.
         """
         n, slopes = self.thresholds.size, w.reshape(self.bends.size + 1, -1)
-        if n < 3:
+        if n < 3 or not self.visited[0] <= self.start.centre <= self.visited[1]:
             return self, w, 0.0
         step, widest = float(self.thresholds[1]), float(self.thresholds[-1])
         more = widest * (1.0 + np.arange(1, BEYOND + 1) / BEYOND)

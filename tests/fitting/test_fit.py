@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting import FORMS
 from piezoest.fitting.flaws import flawed
+from piezoest.fitting.play_columns import PlayColumns, Start
 from tests.fitting.stages import N, RATE, T, noise, rms, stage, voltage
 
 U = voltage(np.random.default_rng(0))
@@ -150,17 +152,29 @@ def test_what_is_continued_begins_as_the_fitted_record() -> None:
 
 @pytest.mark.parametrize("model", ["plays", "plays-asymmetric"])
 def test_growing_amplitude_is_predicted_no_worse_than_by_the_plays_that_moved(model: str) -> None:
-    """Stages whose plays go on beyond the fitted range."""
+    """Stages whose plays go on beyond the fitted range, from rest at 0 V or cycled about the middle."""
     ratios = []
     for seed, centre in itertools.product(range(5), (0.0, 40.0)):
         rng = np.random.default_rng(seed)
         u = centre + 40.0 * np.linspace(0.35, 1.0, N) * np.sin(2.0 * np.pi * 1.7 * T + rng.uniform(0.0, 6.0))
-        x = stage(rng, 40.0, plays=25).simulate(u)
+        cycled = centre + np.linspace(60.0, 0.0, 3000) * np.sin(np.linspace(0.0, 60.0, 3000))
+        before = cycled if centre else np.empty(0)
+        x = stage(rng, 40.0, plays=25).simulate(np.append(before, u))[before.size :]
         half = N // 2
         found = fit(u[:half], (x + noise(1e-3 * float(np.ptp(x)), seed))[:half], model=model)
         narrow = _without_wider_plays(found, u)
         ratios.append(rms((found.continued(u).x - x)[half:]) / rms((narrow - x)[half:]))
+    assert max(ratios) < 1.02
     assert np.exp(np.mean(np.log(ratios))) < 0.95
+
+
+def test_no_plays_are_added_where_all_go_along_with_a_new_extreme() -> None:
+    u = 40.0 + 40.0 * np.linspace(0.35, 0.7, N) * np.sin(2.0 * np.pi * 1.7 * T)
+    basis = PlayColumns(
+        np.linspace(0.0, 20.0, 5), np.empty(0), Start(40.0, 0.0), (float(u.min()), float(u.max())), np.ones(5)
+    )
+    assert basis.beyond(np.ones(5))[0] is basis
+    assert replace(basis, start=Start(40.0, 40.0)).beyond(np.ones(5))[0].thresholds.size > 5
 
 
 def _without_wider_plays(found: Any, u: FloatArray) -> FloatArray:

@@ -45,7 +45,7 @@ def test_a_stage_of_plays_is_recovered_to_its_noise(model: str, kinds: dict[str,
     assert found.held_out < (2.2 if kinds else 1.5) * sigma
     assert found.spikes <= 5
     # A stage that creeps at the start has not settled.
-    assert found.left_out < 0.1 * N
+    assert found.left_out <= 0.1 * N
 
 
 @pytest.mark.parametrize("centre", [0.0, 60.0])
