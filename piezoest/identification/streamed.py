@@ -11,7 +11,6 @@ import numpy as np
 from piezoest._checks import FloatArray, finite, fraction
 from piezoest.fitting import Fitter
 from piezoest.fitting.design import CHUNK, Design
-from piezoest.fitting.play_columns import Start
 from piezoest.fitting.program import Sums
 from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression
 from piezoest.fitting.search import BENDS, LONGEST_DELAY, plays
@@ -169,9 +168,9 @@ def identify_stream(
     if delay != "auto":
         wanted = fraction("delay", finite("delay", delay), 0.0, LONGEST_DELAY)
     fitter = Fitter(head.voltage, head.displacement, sample_rate=log.sample_rate, delay=wanted)
-    fits = _fits(log, survey, fitter.start, fitter.delay, trained, progress)
+    fits = _fits(log, survey, fitter, trained, progress)
     chosen = list(fits)[simplest(list(fits.values()))]
-    judge = _Judge(fits[chosen], fits["line"], samples, trained)
+    judge = _Judge(fits[chosen], fits["line"], samples, slice(fitter.left_out, trained))
     for part in parts(log, fitter.delay, progress):
         judge.add(part)
     found = StreamedIdentification(
@@ -239,16 +238,18 @@ class _Survey:
 
 
 def _fits(
-    log: RecordStream, survey: _Survey, start: Start, delay: float, trained: int, progress: Progress | None
+    log: RecordStream, survey: _Survey, fitter: Fitter, trained: int, progress: Progress | None
 ) -> dict[str, Fitted]:
     """The second pass: a line, plays, and plays with bends, from sums over blocks of the fitted part."""
     points = survey.voltage
     none = np.empty(0)
     thinned = Log(points, points, np.ones(points.size, bool), log.sample_rate, none)
-    basis = plays(thinned, start, bends=BENDS)
+    basis = plays(thinned, fitter.start, bends=BENDS)
     design = Design(basis, log.sample_rate, trained)
     along, sums = design.along(), [Sums.none(design.columns) for _ in range(FOLDS)]
-    for part in parts(log, delay, progress):
+    for part in parts(log, fitter.delay, progress):
+        # A start that has not settled is left out.
+        part.counts[: max(fitter.left_out - part.first, 0)] = False
         fold = np.minimum(np.arange(part.first, part.first + part.u.size) * FOLDS // trained, FOLDS)
         for k in range(0, part.u.size, CHUNK):
             rows = along.rows(part.u[k : k + CHUNK])
@@ -280,7 +281,7 @@ def _model(fitted: Fitted) -> Model:
 class _Judge:
     """Free-running errors of a model and of a line, block by block in order, and points for figures."""
 
-    def __init__(self, fitted: Fitted, line: Fitted, samples: int, trained: int) -> None:
+    def __init__(self, fitted: Fitted, line: Fitted, samples: int, trained: slice) -> None:
         self._fits = (fitted, line)
         self._along = tuple(each.design.along() for each in self._fits)
         # Of model and line, in the fitted part and the held-out one: sum of squares, largest, count.
@@ -293,8 +294,10 @@ class _Judge:
     def add(self, part: Part) -> None:
         """Judge a part of the log."""
         outputs = [self._output(i, part.u) for i in range(2)]
-        fitted = part.first + np.arange(part.u.size) < self._trained
-        for held_out, here in enumerate((part.counts & fitted, part.counts & ~fitted)):
+        index = part.first + np.arange(part.u.size)
+        fitted = (index >= self._trained.start) & (index < self._trained.stop)
+        later = index >= self._trained.stop
+        for held_out, here in enumerate((part.counts & fitted, part.counts & later)):
             for of_line, output in enumerate(outputs):
                 error = np.abs(part.x[here] - output[here])
                 squares, largest, count = self._sums[held_out, of_line]
@@ -304,9 +307,8 @@ class _Judge:
                     count + error.size,
                 )
         kept = slice(-part.first % self._every, None, self._every)
-        index = (part.first + np.arange(part.u.size))[kept]
         shown = np.where(part.counts, part.x, np.nan)[kept]
-        self._points.append(np.array([index, part.u[kept], shown, outputs[0][kept]]))
+        self._points.append(np.array([index[kept], part.u[kept], shown, outputs[0][kept]]))
         self.skipped += int(np.sum(~part.counts))
 
     def _output(self, which: int, u: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from piezoest._checks import FloatArray
 from piezoest.fitting.design import CHUNK, NO_CREEP, Basis, Design
 from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.play_columns import PlayColumns, Start, moving_of, starts
-from piezoest.models import ColemanHodgdon, Creep
+from piezoest.models import Creep
 from tests.fitting.stages import RATE, play_matrix, stage, voltage
 
 CREEP = Creep([0.05, 0.02], [0.02, 0.6])

@@ -14,7 +14,7 @@ from piezoest._checks import FloatArray
 from piezoest.fitting import FORMS
 from piezoest.fitting.flaws import flawed
 from piezoest.fitting.play_columns import PlayColumns, Start
-from tests.fitting.stages import N, RATE, T, noise, rms, stage, voltage
+from tests.fitting.stages import RATE, N, T, noise, rms, stage, voltage
 
 U = voltage(np.random.default_rng(0))
 X = stage(np.random.default_rng(1)).simulate(U)

@@ -84,14 +84,17 @@ def test_solver_has_a_name() -> None:
     assert quadratic_solver()
 
 
+def alike(one: Sums, other: Sums) -> None:
+    for name in Sums._fields:
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-10, atol=1e-10)
+
+
 def test_sums_are_those_of_the_rows() -> None:
     rng = np.random.default_rng(3)
     A, x, w = rng.standard_normal((300, 6)), rng.standard_normal(300), rng.standard_normal(6)
     whole, parts = Sums.of(A, x), [Sums.of(A[k : k + 70], x[k : k + 70]) for k in range(0, 300, 70)]
-    for one, other in zip(total(parts), whole, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
-    for one, other in zip(whole.plus(parts[0], -1.0), Sums.of(A[70:], x[70:]), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-10)
+    alike(total(parts), whole)
+    alike(whole.plus(parts[0], -1.0), Sums.of(A[70:], x[70:]))
     for one in Sums.none(6).plus(whole), whole:
         assert one.missed(w) == pytest.approx(float(np.sum((x - A @ w) ** 2)), rel=1e-12)
 
@@ -100,12 +103,10 @@ def test_sums_of_combined_columns() -> None:
     rng = np.random.default_rng(4)
     A, x = rng.standard_normal((50, 6)), rng.standard_normal(50)
     T = rng.standard_normal((6, 2))
-    for one, other in zip(Sums.of(A, x).through(T), Sums.of(A @ T, x), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-10)
+    alike(Sums.of(A, x).through(T), Sums.of(A @ T, x))
     few = rng.standard_normal((4, 2))
     combined = Sums.of(np.hstack([A[:, :4] @ few, A[:, 4:]]), x)
-    for one, other in zip(Sums.of(A, x).combined(4, few), combined, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-10)
+    alike(Sums.of(A, x).combined(4, few), combined)
 
 
 def test_no_rounding_makes_what_is_missed_negative() -> None:

@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting import Fit
-from tests.fitting.stages import N, RATE, T, noise, play_matrix, rms, stage, voltage
+from tests.fitting.stages import RATE, N, T, noise, play_matrix, rms, stage, voltage
 
 CREEP = pz.Creep([0.06], [0.25])
 LOOP = pz.ColemanHodgdon(0.03, 0.12, 0.0066, offset=1.5)

@@ -12,7 +12,7 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting.runs import runs
 from piezoest.fitting.trust import Spread
-from tests.fitting.stages import N, RATE, noise, stage, voltage
+from tests.fitting.stages import RATE, N, noise, stage, voltage
 
 LOOP = pz.ColemanHodgdon(0.03, 0.12, 0.0066, offset=1.5)
 
