@@ -19,10 +19,13 @@ from piezoest.fitting.outliers import lonely, unsettled
 from piezoest.fitting.play_columns import PlayColumns
 from piezoest.fitting.polish import polished
 from piezoest.fitting.regression import Fitted, Log, Regression, sums_of
+from piezoest.fitting.runs import BoolArray
 from piezoest.models import Model
 from piezoest.symbolic import quadratic_solver
 
 FEWEST_SAMPLES = 50
+# Times that a start which has not settled is looked for, each without what was found before.
+PASSES = 3
 NONLINEAR = "SciPy's least squares, with derivatives by CasADi"
 LINEAR = "{} through CasADi; SciPy's bounded least squares agrees to {:.0e}"
 
@@ -84,7 +87,7 @@ class Fit:
     held_out: float
     ahead: float
     spread: trust.Spread
-    counts: FloatArray = field(repr=False)
+    counts: BoolArray = field(repr=False)
     left_out: int
     spikes: int
     drift: float
@@ -110,11 +113,11 @@ class Fit:
         """
         if u is None:
             return self.continued(self._u)
-        half = self.spread.along(bridged(array_1d("u", u, allow_nan=True)), np.zeros(1))
+        half = self.spread.along(_without_gaps(u), np.zeros(1))
         x = self.elsewhere(u)
         return Prediction(x, x - half, x + half)
 
-    def elsewhere(self, u: FloatArray) -> FloatArray:
+    def elsewhere(self, u: FloatArray, *, sample_rate: float | None = None) -> FloatArray:
         """Displacement along a voltage, from a stage that rests at 0 V before it [µm].
 
         Drift and jumps are not in it.
@@ -123,9 +126,13 @@ class Fit:
         ----------
         u : ndarray, shape (N,)
             [V].
+        sample_rate : float, optional
+            [Hz]; by default that of the fitted record.
         """
-        v = late(bridged(array_1d("u", u, allow_nan=True, minimum_length=1)), self.delay)
-        design, w = self._design.afresh(v[0]), self._w.copy()
+        u, own = _without_gaps(u), self._design.sample_rate
+        rate = own if sample_rate is None else positive("sample_rate", sample_rate)
+        v = late(u, self.delay * rate / own)
+        design, w = replace(self._design.afresh(v[0]), sample_rate=rate), self._w.copy()
         w[design.crept] = self._rest
         w[design.offset + 1 :] = 0.0
         return design.output(v, w)
@@ -140,7 +147,7 @@ class Fit:
         u : array_like, shape (N,)
             [V].
         """
-        u = bridged(array_1d("u", u, allow_nan=True))
+        u = _without_gaps(u)
         x = self._design.output(late(u, self.delay), self._w)
         half = self.spread.along(u, np.maximum(np.arange(u.size) - self._u.size, 0.0))
         return Prediction(x, x - half, x + half)
@@ -207,7 +214,20 @@ def fit(
     >>> print(np.round(found.model.alpha, 4))
     0.02
     """
+    _known(model)
     return Fitter(u, x, sample_rate=sample_rate, delay=delay, flaws=flaws, settle=settle).form(model)
+
+
+def _without_gaps(u: FloatArray) -> FloatArray:
+    u = array_1d("u", u, allow_nan=True)
+    if not np.any(np.isfinite(u)):
+        raise ValueError(f"u must hold a voltage, none of its {u.size} samples is a number")
+    return bridged(u)
+
+
+def _known(model: str) -> None:
+    if model not in FORMS:
+        raise ValueError(f"model must be one of {', '.join(FORMS)}, got {model!r}")
 
 
 class Fitter:
@@ -240,42 +260,53 @@ class Fitter:
         self._given = bridged(u)
         if np.ptp(self._given) == 0.0:
             raise ValueError(f"u must move, it stays at {self._given[0]:g} V")
+        if isinstance(delay, str) and delay != "auto":
+            raise ValueError(f"delay must be 'auto' or a number of samples, got {delay!r}")
+        if delay != "auto":
+            delay = fraction("delay", finite("delay", delay), 0.0, search.LONGEST_DELAY)
         flaws = flawed(u, x) if flaws is None else flaws
+        if flaws.unusable.size != u.size:
+            raise ValueError(f"flaws must be those of u and x: {u.size} samples, got {flaws.unusable.size}")
         counts &= ~flaws.unusable
         self.delay_estimated = delay == "auto"
         self._log = Log(
             self._given, np.where(counts, x, 0.0), counts, self._rate, flaws.jumps.astype(np.float64)
         )
+        gain = search.line_gain(self._log)
+        if gain <= 0.0:
+            raise ValueError(
+                f"x must rise with u, a straight line has {gain:.4g} µm/V: change the sign of one of them"
+            )
         self.start = search.best_start(self._log)
-        if isinstance(delay, str):
-            if delay != "auto":
-                raise ValueError(f"delay must be 'auto' or a number of samples, got {delay!r}")
-            self.delay = search.best_delay(self._log, self.start)
-        else:
-            self.delay = fraction("delay", finite("delay", delay), 0.0, search.LONGEST_DELAY)
+        self.delay = search.best_delay(self._log, self.start) if isinstance(delay, str) else delay
         self._log = replace(self._log, u=late(self._given, self.delay))
         self.start = search.best_start(self._log)
         self._leave_out(settle)
 
     def _leave_out(self, settle: float | None) -> None:
         """Do without what plays with bends show to be spikes, and a start that has not settled."""
-        log = self._log
-        # Without the first block, for what happens at the start must not be explained by it.
-        bent = self._bent
-        used = bent.columns(drift=False)
-        w = bent.solved(search.SMOOTH, used, bent.all.plus(bent.sums[0], -1.0))
-        residual = np.where(log.counts, log.x - bent.design.output(log.u, w), np.nan)
-        if settle is None:
-            self.left_out = unsettled(residual)
-        else:
-            self.left_out = int(fraction("settle", settle, 0.0, 0.5 * log.u.size / self._rate) * self._rate)
-        spikes = lonely(residual)
-        spikes[: self.left_out] = False
+        given, self.left_out = self._log, 0
+        if settle is not None:
+            self.left_out = int(fraction("settle", settle, 0.0, 0.5 * given.u.size / self._rate) * self._rate)
+        for _ in range(PASSES):
+            # Without the first block, for what happens at the start must not be explained by it.
+            bent = self._bent
+            others = bent.all.plus(bent.sums[0], -1.0)
+            w = bent.solved(search.SMOOTH, bent.columns(drift=False), others)
+            residual = np.where(given.counts, given.x - bent.design.output(given.u, w), np.nan)
+            further = self.left_out if settle is not None else max(unsettled(residual), self.left_out)
+            spikes = lonely(residual)
+            spikes[:further] = False
+            counts = given.counts & ~spikes
+            counts[:further] = False
+            self._log, settled = replace(given, counts=counts), further == self.left_out
+            self.left_out = further
+            del self._bent
+            if settled:
+                break
+            # What had not settled had looked like another start, and moved the fit.
+            self.start = search.best_start(self._log)
         self.spikes = int(np.count_nonzero(spikes))
-        counts = log.counts & ~spikes
-        counts[: self.left_out] = False
-        self._log = replace(log, counts=counts)
-        del self._bent
 
     @property
     def _bent_plays(self) -> PlayColumns:
@@ -303,8 +334,7 @@ class Fitter:
         name : str
             One of `FORMS`.
         """
-        if name not in FORMS:
-            raise ValueError(f"model must be one of {', '.join(FORMS)}, got {name!r}")
+        _known(name)
         fitted = self._fitted(FORMS[name])
         return self._outcome(name, fitted)
 
@@ -332,9 +362,11 @@ class Fitter:
             regressed = Regression(
                 fitted.design, sums_of(fitted.design, log, fitted.w[: fitted.design.basis.size])
             )
-            errors = trust.standard_errors(regressed, fitted, log)
-            parameters = int(trust.free_columns(regressed, fitted).size)
             solver = LINEAR.format(quadratic_solver(), regressed.gap(fitted))
+            # Creep gains are no columns of the last linear program, but they were fitted as well.
+            with_gains = replace(fitted, used=np.union1d(fitted.used, np.r_[fitted.design.gains]))
+            errors = trust.standard_errors(regressed, with_gains, log)
+            parameters = int(trust.free_columns(regressed, with_gains).size)
         missed = trust.residuals(fitted, log)
         wider, rest = _beyond(fitted)
         design, w = wider if fitted.design.basis.goes_on else (fitted.design, fitted.w)
@@ -349,7 +381,7 @@ class Fitter:
             },
             delay=delay,
             delay_estimated=self.delay_estimated,
-            initial_state=design.basis.initial_state(own, model),
+            initial_state=_initial_state(design, w, model),
             held_out=fitted.held_out,
             ahead=fitted.ahead,
             spread=trust.spread_of(missed, log, model.line[0]),
@@ -363,6 +395,12 @@ class Fitter:
             _rest=rest,
             _u=self._given,
         )
+
+
+def _initial_state(design: Design, w: FloatArray, model: Model) -> Any:
+    """What the model's `simulate` is to begin with: of creep, its terms relative to their gains."""
+    state = design.basis.initial_state(w[: design.basis.size], model)
+    return np.concatenate([state, w[design.crept] / design.creep.gains]) if design.terms else state
 
 
 def _beyond(fitted: Fitted) -> tuple[tuple[Design, FloatArray], FloatArray]:

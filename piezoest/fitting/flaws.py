@@ -136,7 +136,7 @@ def flawed(u: Any, x: Any) -> Flaws:
     if np.ptp(x[known]) == 0.0:
         return empty._replace(rests=rests)
     log = _Log(u, bridged(x))
-    dropouts = _dropouts(log) & known
+    dropouts = _dropouts(log, known)
     spikes, clean = _spikes(log, dropouts)
     jumps, sizes = _jumps(log, clean, spikes | dropouts)
     return Flaws(spikes & known, dropouts, jumps, sizes, rests)
@@ -279,10 +279,10 @@ def _step_at(h: FloatArray, found: IntArray) -> tuple[FloatArray, FloatArray]:
     return ends[1] - ends[0], np.sqrt(off / (2.0 * EACH_SIDE - 4.0))
 
 
-def _dropouts(log: _Log) -> BoolArray:
+def _dropouts(log: _Log, known: BoolArray) -> BoolArray:
     """Samples at which the reading stands still though the voltage moves, unless it is clipped there."""
     out = np.zeros(log.x.size, dtype=np.bool_)
-    same = np.diff(log.x) == 0.0
+    same = (np.diff(log.x) == 0.0) & known[1:] & known[:-1]
     starts, ends = runs(same)
     ends = ends + 1
     usual = log.x.size / float(np.sum(~same))

@@ -7,7 +7,7 @@ al. (2012).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -25,9 +25,13 @@ FORGOTTEN = 1e-26
 
 @dataclass(frozen=True, slots=True)
 class LoopColumns:
-    """Columns of beta, b and w_h(0), for one `alpha` [1/V]."""
+    """Columns of beta, b and w_h(0), for one `alpha` [1/V].
+
+    With `rested` the stage comes from a rest at 0 V, and nothing of w_h(0) is left.
+    """
 
     alpha: float
+    rested: bool = False
 
     size: ClassVar[int] = 3
     free: ClassVar[int] = 1
@@ -36,11 +40,11 @@ class LoopColumns:
 
     def begin(self) -> FloatArray:
         """Voltage, f, and what is left of the start; the first sample says the voltage."""
-        return np.array([np.nan, 0.0, 1.0])
+        return np.zeros(3) if self.rested else np.array([np.nan, 0.0, 1.0])
 
     def afresh(self, u: float) -> LoopColumns:
-        """The same: where its loop begins is a coefficient."""
-        return self
+        """The same for a stage that rests at 0 V until a record begins at voltage u [V]."""
+        return replace(self, rested=True)
 
     def rows(self, u: FloatArray, state: FloatArray) -> FloatArray:
         """Columns along a voltage."""

@@ -166,16 +166,22 @@ class PlayColumns:
 
     @property
     def goes_on(self) -> bool:
-        """Whether a model may have plays beyond the record: they begin at zero, its middle."""
-        return abs(self.middle) < ABOUT_ZERO * 0.5 * (self.visited[1] - self.visited[0])
+        """Whether a model may have plays beyond the record: they begin at zero, its middle.
+
+        A voltage must be able to leave them there beside the widest that moved.
+        """
+        apart = abs(float(self.begin()[-1]) - self.middle)
+        about_zero = abs(self.middle) < ABOUT_ZERO * 0.5 * (self.visited[1] - self.visited[0])
+        return about_zero and apart <= self.thresholds[-1] / BEYOND
 
     def beyond(self, w: FloatArray) -> tuple[PlayColumns, FloatArray, float]:
         """The same with wider plays, all coefficients, and what they add in the record [µm].
 
-        Nothing is known of them but their neighbours.
+        Nothing is known of them but their neighbours. There are none where the stage comes from a voltage
+        beyond the record: plays that had moved there go along with each new extreme, whatever their width.
         """
         n, slopes = self.thresholds.size, w.reshape(self.bends.size + 1, -1)
-        if n < 3:
+        if n < 3 or not self.visited[0] <= self.start.centre <= self.visited[1]:
             return self, w, 0.0
         step, widest = float(self.thresholds[1]), float(self.thresholds[-1])
         more = widest * (1.0 + np.arange(1, BEYOND + 1) / BEYOND)
@@ -189,12 +195,7 @@ class PlayColumns:
         """States of the model's plays [V]."""
         if not isinstance(model, PrandtlIshlinskii):
             return None
-        y = self.begin()[self._kept(w.reshape(self.bends.size + 1, -1))]
-        for i in range(1, y.size):
-            # Neighbours that are further apart than this no voltage leaves behind.
-            apart = model.thresholds[i - 1] - (model.thresholds[i - 2] if i > 1 else 0.0)
-            y[i] = min(max(y[i], y[i - 1] - apart), y[i - 1] + apart)
-        return y[1:]
+        return self.begin()[self._kept(w.reshape(self.bends.size + 1, -1))][1:]
 
     def names(self, w: FloatArray) -> dict[str, FloatArray]:
         """Gain, weights, and what each bend changes of them."""

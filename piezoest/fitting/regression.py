@@ -132,7 +132,7 @@ class Regression:
         self.design, self.sums, self.all = design, sums, total(sums)
         size = design.basis.size
         self.lower = np.full(design.columns, -np.inf)
-        self.lower[:size] = design.basis.lower(self._line_gain())
+        self.lower[:size] = design.basis.lower(max(self.line_gain, 0.0))
         self.lower[design.gains] = -design.creep.gains
         self._penalty = np.zeros((design.columns, design.columns))
         self._penalty[:size, :size] = design.basis.unevenness()
@@ -146,13 +146,15 @@ class Regression:
         loop = LOOP * self._line_gain() * self.design.basis.half
         return self.all.missed(w) / max(self.all.rows, 1.0) / max(loop, 1e-300) ** 2
 
-    def _line_gain(self) -> float:
-        """Slope of the straight line [µm/V], at least zero."""
-        T = np.zeros((self.design.columns, 2))
+    @cached_property
+    def line_gain(self) -> float:
+        """Slope of the straight line beside the jumps [µm/V]."""
+        beside = np.r_[self.design.offset, self.design.offset + 2 : self.design.columns]
+        T = np.zeros((self.design.columns, 1 + beside.size))
         T[: self.design.basis.size, 0] = self.design.basis.line()
-        T[self.design.offset, 1] = 1.0
+        T[beside, 1 + np.arange(beside.size)] = 1.0
         line = self.all.through(T)
-        return max(float(np.linalg.lstsq(line.gram, line.moment, rcond=None)[0][0]), 0.0)
+        return float(np.linalg.lstsq(line.gram, line.moment, rcond=None)[0][0])
 
     def columns(self, *, drift: bool, gains: bool = True) -> IntArray:
         """Columns that are fitted, of those that the record shows."""
@@ -166,6 +168,15 @@ class Regression:
         few, lower, penalty = self._of(smoothness, used, sums)
         w = np.zeros(self.design.columns)
         w[used] = solve(few, lower, penalty)
+        return w
+
+    def _foreseeing(self, smoothness: float, used: IntArray, sums: Sums) -> FloatArray:
+        """The same of some blocks; jumps behind them, which no model foresees, are those of all blocks."""
+        w = self.solved(smoothness, used, sums)
+        jumps = np.arange(self.design.offset + 2, self.design.columns)
+        behind = jumps[sums.gram[jumps, jumps] == 0.0]
+        if behind.size:
+            w[behind] = self.solved(smoothness, used)[behind]
         return w
 
     def gap(self, fitted: Fitted) -> float:
@@ -192,7 +203,7 @@ class Regression:
 
         Only the first block says where the stage was at the start.
         """
-        fits = [self.solved(smoothness, used, self.all.plus(each, -1.0)) for each in self.sums[1:]]
+        fits = [self._foreseeing(smoothness, used, self.all.plus(each, -1.0)) for each in self.sums[1:]]
         missed = sum(each.missed(w) for each, w in zip(self.sums[1:], fits, strict=True))
         return missed / max(sum(each.rows for each in self.sums[1:]), 1.0), fits
 
@@ -207,9 +218,9 @@ class Regression:
             least = AS_GOOD * min(scores.values())
             smoothness = max(each for each, score in scores.items() if score <= least)
         before, later = total(self.sums[:EARLIER]), total(self.sums[EARLIER:])
-        earlier = self.solved(smoothness, used, before)
+        earlier = self._foreseeing(smoothness, used, before)
         drifting = self.columns(drift=True, gains=gains)
-        moved = self.solved(smoothness, drifting, before)
+        moved = self._foreseeing(smoothness, drifting, before)
         if later.missed(moved) < DRIFTS * later.missed(earlier):
             used, earlier = drifting, moved
         score, without = self.left_out(smoothness, used)

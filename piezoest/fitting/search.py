@@ -55,6 +55,12 @@ def regression(log: Log, basis: Basis, every: int = 1) -> Regression:
     return Regression(design, sums_of(design, log, every=every))
 
 
+def line_gain(log: Log) -> float:
+    """Slope of the straight line [µm/V]."""
+    first = float(log.u[0])
+    return regression(log, plays(log, Start(first, first), 1)).line_gain
+
+
 def missed(log: Log, basis: Basis) -> float:
     """Mean square that a basis leaves, by some thousand rows."""
     found = regression(log, basis, max(1, int(np.count_nonzero(log.counts)) // FEW))

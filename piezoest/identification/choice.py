@@ -6,24 +6,37 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from piezoest.fitting import Fit
+from piezoest.fitting.regression import Fitted
 from piezoest.identification.result import Candidate
 
 # A simpler model is preferred until a richer one is better by this fraction on the blocks left out.
 WORTH_IT = 0.02
 
 
-def score(item: Candidate) -> float:
+def _score(fit: Fit | Fitted) -> float:
     """Geometric mean of the errors on blocks between others, and on blocks behind all others [µm rms].
 
     Of what follows a log, the latter says more; the former is surer.
     """
-    return float(np.sqrt(item.fit.held_out * item.fit.ahead))
+    return float(np.sqrt(fit.held_out * fit.ahead))
+
+
+def simplest(fits: Sequence[Fit | Fitted]) -> int:
+    """Place of the simplest that predicts blocks left out about best; from the simplest to the richest."""
+    scores = [_score(fit) for fit in fits]
+    least = min(scores)
+    return next(i for i, each in enumerate(scores) if each <= (1.0 + WORTH_IT) * least)
+
+
+def score(item: Candidate) -> float:
+    """What a candidate is chosen by [µm rms]."""
+    return _score(item.fit)
 
 
 def best_of(candidates: Sequence[Candidate]) -> Candidate:
     """The simplest of those that predict blocks left out about best; from the simplest to the richest."""
-    least = min(map(score, candidates))
-    return next(item for item in candidates if score(item) <= (1.0 + WORTH_IT) * least)
+    return candidates[simplest([item.fit for item in candidates])]
 
 
 def reason_for(candidates: Sequence[Candidate], best: Candidate) -> str:

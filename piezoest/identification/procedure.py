@@ -109,6 +109,8 @@ def identify(
     train = fraction("train", train, 0.1, 0.9)
     record = as_record(data, displacement, sample_rate=sample_rate, columns=columns, units=units)
     others = [as_record(each) for each in validate]
+    for each in others:
+        _enough("part to validate", each, slice(None))
     say("looking at the log")
     trained = round(train * len(record))
     first = _checked(record, trained)
@@ -162,14 +164,18 @@ def _delay(given: Any) -> float:
 
 def _checked(record: Record, trained: int) -> Data:
     """Data of the fitted part, if there is enough in both parts."""
-    for name, part in (("fitted", slice(0, trained)), ("held-out", slice(trained, None))):
-        usable = int(np.sum(record.usable[part]))
-        if usable < FEWEST_SAMPLES:
-            raise ValueError(
-                f"the {name} part of {record.source} has {usable} usable samples, at least {FEWEST_SAMPLES} "
-                "are needed: record longer"
-            )
+    _enough("fitted part", record, slice(0, trained))
+    _enough("held-out part", record, slice(trained, None))
     return prepare(record.voltage[:trained], record.displacement[:trained])
+
+
+def _enough(name: str, record: Record, part: slice) -> None:
+    usable = int(np.sum(record.usable[part]))
+    if usable < FEWEST_SAMPLES:
+        raise ValueError(
+            f"the {name} of {record.source} has {usable} usable samples, at least {FEWEST_SAMPLES} are "
+            "needed: record longer"
+        )
 
 
 def _candidate(fitter: Fitter, name: str, record: Record, flaws: Flaws, trained: int) -> Candidate:
@@ -178,6 +184,7 @@ def _candidate(fitter: Fitter, name: str, record: Record, flaws: Flaws, trained:
     prediction = fit.continued(record.voltage)
     error = np.where(flaws.unusable, np.nan, record.displacement) - prediction.x
     error[~np.isfinite(record.voltage)] = np.nan
+    error[fit.left_out : trained][~fit.counts[fit.left_out :]] = np.nan
     later = flaws.jumps >= trained
     for place, size in zip(flaws.jumps[later], flaws.jump_sizes[later], strict=True):
         error[place:] -= size

@@ -9,8 +9,9 @@ from piezoest.estimators.coordinates import bridged
 from piezoest.records import Record
 from piezoest.signals.turns import TURN, turns
 
-# The voltage repeats itself if it differs from its last period by less than this fraction of its range.
-SAME = 2e-3
+# The voltage repeats itself if it differs from its last period by less than this fraction of its range, at so
+# many of the samples of a whole period: at a single one two swings of unlike size may cross.
+SAME, ALL = 2e-3, 0.95
 # So many samples of repeated periods are enough to say something.
 FEWEST = 200
 
@@ -38,9 +39,12 @@ def noise_floor(record: Record, fallback: float) -> float:
 
 
 def _differences(u: FloatArray, x: FloatArray, period: int, extent: float) -> FloatArray:
-    """Differences of displacements a period apart, where the voltage was the same."""
+    """Differences of displacements a period apart, where the voltage was the same for a period."""
     if period < 2 or 2 * period > u.size:
         return np.empty(0)
     same = np.abs(u[period:] - u[:-period]) < SAME * extent
+    count = np.cumsum(np.append(0, same))
+    same[: period - 1] = False
+    same[period - 1 :] &= count[period:] - count[:-period] >= ALL * period
     apart = (x[period:] - x[:-period])[same]
     return apart[np.isfinite(apart)]

@@ -114,7 +114,7 @@ class Validation(NamedTuple):
     @classmethod
     def of(cls, fit: Fit, other: Record) -> Validation:
         """Judge a fit on another record."""
-        error = other.displacement - fit.elsewhere(other.voltage)
+        error = other.displacement - fit.elsewhere(other.voltage, sample_rate=other.sample_rate)
         error[~np.isfinite(other.voltage)] = np.nan
         error[: unsettled(error - np.nanmedian(error))] = np.nan
         return cls(other.source, Misfit.of(error), Misfit.of(error - np.nanmean(error)))

@@ -1,0 +1,191 @@
+"""The face of a fit: what it refuses, what it shows, and where it goes on."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+from piezoest.fitting import FORMS
+from piezoest.fitting.flaws import flawed
+from piezoest.fitting.play_columns import PlayColumns, Start
+from tests.fitting.stages import RATE, N, T, noise, rms, stage, voltage
+
+U = voltage(np.random.default_rng(0))
+X = stage(np.random.default_rng(1)).simulate(U)
+SIGMA = 1e-3 * float(np.ptp(X))
+Y = X + noise(SIGMA)
+
+
+def fit(u: Any = U, x: Any = Y, **options: Any) -> Any:
+    return pz.fit(u, x, **{"sample_rate": RATE, **options})
+
+
+REFUSED: dict[str, tuple[dict[str, Any], str]] = {
+    "lengths": ({"x": Y[:-1]}, "u and x must have one length, got 5000 and 4999"),
+    "shape": ({"u": U[:, None]}, r"u must have shape \(N,\)"),
+    "text": ({"x": ["a"] * N}, "x must"),
+    "few": ({"u": U[:49], "x": Y[:49]}, "49 samples in common"),
+    "few in common": ({"x": np.where(np.arange(N) < 40, Y, np.nan)}, "40 samples in common"),
+    "no number": ({"x": np.full(N, np.nan)}, "0 samples in common"),
+    "no voltage": ({"u": np.full(N, np.nan)}, "0 samples in common"),
+    "constant voltage": ({"u": np.full(N, 5.0)}, "u must move, it stays at 5 V"),
+    "falling": ({"x": -Y}, "x must rise with u.* change the sign"),
+    "constant displacement": ({"x": np.full(N, 2.0)}, "x must rise with u"),
+    "model": ({"model": "spline"}, "model must be one of line, .*, got 'spline'"),
+    "delay too long": ({"delay": 10.5}, "delay must"),
+    "delay below zero": ({"delay": -1.0}, "delay must"),
+    "delay no number": ({"delay": np.nan}, "delay must"),
+    "delay in words": ({"delay": "soon"}, "delay must be 'auto' or a number of samples, got 'soon'"),
+    "settle": ({"settle": 10.0}, "settle must"),
+    "sample rate": ({"sample_rate": 0.0}, "sample_rate must"),
+    "flaws of another log": ({"flaws": flawed(U[:100], Y[:100])}, "flaws must be those of u and x"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_input_is_refused(name: str) -> None:
+    options, words = REFUSED[name]
+    with pytest.raises(ValueError, match=words):
+        fit(**options)
+
+
+@pytest.mark.parametrize("model", FORMS)
+def test_every_kind_is_fitted_and_shown(model: str) -> None:
+    found = fit(model=model)
+    assert found.form == model
+    assert found.label == FORMS[model].label
+    assert repr(found).startswith(f"<Fit of {found.label}: ")
+    assert found.solver
+    assert found.model.is_admissible
+    prediction = found.predict()
+    assert prediction.x.shape == U.shape
+    assert np.all(prediction.lower < prediction.upper)
+    state = {} if found.initial_state is None else {"initial_state": found.initial_state}
+    np.testing.assert_allclose(
+        found.model.simulate(U, **state) + found.drift * np.arange(N) / N, prediction.x, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("model", FORMS)
+def test_the_same_record_gives_the_same_bits(model: str) -> None:
+    one, other = fit(model=model), fit(model=model)
+    np.testing.assert_array_equal(one.predict().x, other.predict().x)
+    assert one.standard_errors == other.standard_errors
+
+
+def test_lists_are_taken_and_nothing_is_changed() -> None:
+    u, x = U.copy(), Y.copy()
+    x[[5, 700]] = np.nan
+    before = x.copy()
+    found = fit(u, x)
+    np.testing.assert_array_equal(u, U)
+    np.testing.assert_array_equal(x, before)
+    np.testing.assert_array_equal(fit(u.tolist(), x.tolist()).predict().x, found.predict().x)
+
+
+def test_flaws_may_be_given() -> None:
+    flaws = flawed(U, Y)
+    mine = flaws._replace(spikes=np.arange(N) < 100)
+    assert not fit(flaws=mine).counts[:100].any()
+    np.testing.assert_array_equal(fit(flaws=flaws).predict().x, fit().predict().x)
+
+
+def test_another_record_is_predicted_from_rest() -> None:
+    """The fitted record comes from elsewhere, another one from 0 V."""
+    model = stage(np.random.default_rng(1))
+    before = np.concatenate([np.full(5, 45.0), np.linspace(45.0, U[0], 50)])
+    y = model.simulate(np.concatenate([before, U]))[before.size :] + noise(SIGMA)
+    found = fit(U, y)
+    v = voltage(np.random.default_rng(5))
+    assert rms(found.predict(v).x - model.simulate(v)) < 2.0 * SIGMA
+    np.testing.assert_array_equal(found.predict(v).x, found.elsewhere(v))
+
+
+@pytest.mark.parametrize("model", ["plays-creep", "coleman-hodgdon"])
+def test_another_record_from_a_voltage_of_its_own(model: str) -> None:
+    """It comes from 0 V, and goes to its first voltage at once."""
+    loop = pz.ColemanHodgdon(0.03, 0.12, 0.0066)
+    plays = stage(np.random.default_rng(1), creep=pz.Creep([0.05], [2.5]))
+    true: Any = loop if model == "coleman-hodgdon" else plays
+    x = true.simulate(U)
+    found = fit(U, x + noise(1e-3 * float(np.ptp(x))), model=model)
+    v = voltage(np.random.default_rng(6), 15.0, 20.0)
+    rise = np.linspace(0.0, v[0], 2)
+    expected = true.simulate(np.append(rise, v), **({"allow_jumps": True} if true is loop else {}))[2:]
+    assert rms(found.predict(v).x - expected) < 3e-3 * np.ptp(x)
+
+
+def test_another_record_may_have_another_sample_rate() -> None:
+    model = stage(np.random.default_rng(1), creep=pz.Creep([0.06], [0.25]))
+    late = np.interp(np.arange(N) - 4.0, np.arange(N), U)
+    x = model.simulate(late)
+    found = fit(U, x + noise(SIGMA), model="plays-creep", delay=4.0)
+    half = found.elsewhere(U[::2], sample_rate=0.5 * RATE)
+    assert rms(half - found.elsewhere(U)[::2]) < 2.0 * SIGMA
+    assert rms(found.elsewhere(U[::2]) - found.elsewhere(U)[::2]) > 4.0 * SIGMA
+
+
+@pytest.mark.parametrize("name", ["predict", "continued", "elsewhere"])
+def test_a_voltage_without_a_number_is_refused(name: str) -> None:
+    found = fit(model="line")
+    with pytest.raises(ValueError, match="u must hold a voltage"):
+        getattr(found, name)(np.full(10, np.nan))
+    assert np.all(np.isfinite(found.predict([1.0, np.nan, 3.0]).x))
+
+
+def test_what_is_continued_begins_as_the_fitted_record() -> None:
+    half = N // 2
+    found = fit(U[:half], Y[:half] + 0.02 * np.arange(half) / half)
+    whole = found.continued(U)
+    np.testing.assert_allclose(whole.x[:half], found.predict().x, atol=1e-12)
+    # What has drifted stays, and the interval does not get narrower.
+    assert rms(whole.x[half:] - X[half:] - 0.02) < 0.02
+    widths = whole.upper - whole.lower
+    assert widths[-1] >= widths[0]
+
+
+@pytest.mark.parametrize("model", ["plays", "plays-asymmetric"])
+def test_growing_amplitude_is_predicted_no_worse_than_by_the_plays_that_moved(model: str) -> None:
+    """Stages whose plays go on beyond the fitted range, from rest at 0 V or cycled about the middle."""
+    ratios = []
+    for seed, centre in itertools.product(range(5), (0.0, 40.0)):
+        rng = np.random.default_rng(seed)
+        u = centre + 40.0 * np.linspace(0.35, 1.0, N) * np.sin(2.0 * np.pi * 1.7 * T + rng.uniform(0.0, 6.0))
+        cycled = centre + np.linspace(60.0, 0.0, 3000) * np.sin(np.linspace(0.0, 60.0, 3000))
+        before = cycled if centre else np.empty(0)
+        x = stage(rng, 40.0, plays=25).simulate(np.append(before, u))[before.size :]
+        half = N // 2
+        found = fit(u[:half], (x + noise(1e-3 * float(np.ptp(x)), seed))[:half], model=model)
+        narrow = _without_wider_plays(found, u)
+        ratios.append(rms((found.continued(u).x - x)[half:]) / rms((narrow - x)[half:]))
+    assert max(ratios) < 1.02
+    assert np.exp(np.mean(np.log(ratios))) < 0.95
+
+
+def test_no_plays_are_added_where_all_go_along_with_a_new_extreme() -> None:
+    u = 40.0 + 40.0 * np.linspace(0.35, 0.7, N) * np.sin(2.0 * np.pi * 1.7 * T)
+    basis = PlayColumns(
+        np.linspace(0.0, 20.0, 5), np.empty(0), Start(40.0, 0.0), (float(u.min()), float(u.max())), np.ones(5)
+    )
+    assert basis.beyond(np.ones(5))[0] is basis
+    assert replace(basis, start=Start(40.0, 40.0)).beyond(np.ones(5))[0].thresholds.size > 5
+
+
+def _without_wider_plays(found: Any, u: FloatArray) -> FloatArray:
+    """Prediction by a fit whose plays end where the record did."""
+    model = found.model
+    kept = model.thresholds <= 0.5 * (found.spread.visited[1] - found.spread.visited[0])
+    plain = pz.PrandtlIshlinskii(
+        model.gain, model.thresholds[kept], model.weights[kept], model.offset, None, model.bends,
+        model.bend_weights[:, np.append(True, kept)], RATE,
+    )  # fmt: skip
+    x = plain.simulate(u, initial_state=found.initial_state[kept])
+    # Wider plays may stand beside zero, and add something of their own.
+    own = found.continued(u).x
+    return np.asarray(x - np.mean(x[: N // 2] - own[: N // 2]))

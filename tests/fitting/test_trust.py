@@ -1,0 +1,114 @@
+"""How far to trust a fit: standard errors and intervals hold what they promise."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+from piezoest.fitting.runs import runs
+from piezoest.fitting.trust import Spread
+from tests.fitting.stages import RATE, N, noise, stage, voltage
+
+LOOP = pz.ColemanHodgdon(0.03, 0.12, 0.0066, offset=1.5)
+
+
+def coloured(size: float, seed: int, memory: float) -> FloatArray:
+    """Noise of standard deviation `size` of which a fraction `memory` is left a sample later."""
+    return np.asarray(lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], noise(size, seed)))
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_standard_errors_of_a_loop_cover(memory: float) -> None:
+    z = []
+    for seed in range(10):
+        u = voltage(np.random.default_rng(seed))
+        x = LOOP.simulate(u) + coloured(5e-3, seed, memory)
+        found = pz.fit(u, x, sample_rate=RATE, model="coleman-hodgdon")
+        values = dict(zip(found.model.parameter_names, found.model.theta, strict=True))
+        values["offset"] = found.model.offset
+        true = dict(zip(LOOP.parameter_names, LOOP.theta, strict=True)) | {"offset": 1.5}
+        z += [(values[name] - true[name]) / found.standard_errors[name] for name in true]
+        assert found.standard_errors["delay"] == 0.0
+    # Standard errors that are right give 1; ten runs of four leave it within this.
+    assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.5
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_standard_errors_of_a_line_cover(memory: float) -> None:
+    z = []
+    for seed in range(20):
+        u = voltage(np.random.default_rng(seed), centre=30.0)
+        x = 0.2 * u - 3.0 + coloured(0.02, seed, memory)
+        found: Any = pz.fit(u, x, sample_rate=RATE, model="line")
+        z.append((found.model.gain - 0.2) / found.standard_errors["gain"])
+        z.append((found.model.offset + 3.0) / found.standard_errors["offset"])
+    assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.5
+
+
+def test_standard_errors_of_plays_and_creep_are_of_the_size_of_their_scatter() -> None:
+    """Of a stage whose thresholds and time constants are those of the fit."""
+    u = voltage(np.random.default_rng(1), centre=40.0)
+    thresholds = 0.45 * np.ptp(u) * np.arange(1, 20) / 19.0
+    creep = pz.Creep([0.05], [2.5])
+    model = pz.PrandtlIshlinskii(0.1, thresholds, np.full(19, 4e-3), creep=creep, sample_rate=RATE)
+    state = np.clip(0.0, u[0] - thresholds, u[0] + thresholds)
+    x = model.simulate(u, initial_state=np.append(state, 0.0))
+    found: list[Any] = []
+    for seed in range(10):
+        fit: Any = pz.fit(u, x + noise(5e-3, seed), sample_rate=RATE, model="plays-creep")
+        if fit.model.creep is not None and fit.model.creep.gains.size == 1:
+            found.append(fit)
+    assert len(found) >= 3
+    for name, values in {"gain": [fit.model.gain for fit in found],
+                         "creep.gains[0]": [fit.model.creep.gains[0] for fit in found]}.items():  # fmt: skip
+        stated = float(np.median([fit.standard_errors[name] for fit in found]))
+        assert 0.3 < stated / np.std(values) < 4.0
+
+
+def test_what_ends_at_a_bound_has_no_standard_error() -> None:
+    u = voltage(np.random.default_rng(2))
+    found = pz.fit(u, 0.1 * u + noise(1e-2), sample_rate=RATE, model="plays")
+    errors = found.standard_errors
+    assert errors["gain"] > 0.0
+    assert errors["delay"] == 0.0
+    assert set(errors) == {*found.model.parameter_names, "offset", "delay"}
+    assert found.parameters < 21
+
+
+@pytest.mark.parametrize("model", ["plays", "plays-asymmetric-creep", "coleman-hodgdon"])
+def test_intervals_hold_what_they_promise(model: str) -> None:
+    """Of the half behind the fitted one."""
+    inside = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        u = voltage(rng, centre=40.0 * (seed % 2))
+        x: FloatArray = LOOP.simulate(u) if model == "coleman-hodgdon" else stage(rng).simulate(u)
+        y = x + noise(2e-3 * float(np.ptp(x)), seed)
+        low = 0 if np.ptp(u[: N // 2]) > np.ptp(u[N // 2 :]) else N // 2
+        # The half of larger swings is fitted: beyond the range, less is known.
+        order = np.r_[low : low + N // 2]
+        found = pz.fit(u[order], y[order], sample_rate=RATE, model=model)
+        p = found.predict()
+        inside.append(np.mean((y[order] >= p.lower) & (y[order] <= p.upper)))
+        if low == 0:
+            p = found.continued(u)
+            inside.append(np.mean(((y >= p.lower) & (y <= p.upper))[N // 2 :]))
+    assert 0.9 <= np.median(inside) <= 0.995
+    assert min(inside) > 0.85
+
+
+def test_an_interval_widens_behind_the_record_and_beyond_its_range() -> None:
+    spread = Spread(1.0, 0.01, 0.1, (-10.0, 10.0))
+    half = spread.along(np.array([0.0, 10.0, 20.0, -15.0]), np.array([0.0, 0.0, 0.0, 100.0]))
+    np.testing.assert_allclose(half, [1.0, 1.0, 2.0, 2.5])
+
+
+def test_runs_are_where_marks_are_set() -> None:
+    starts, ends = runs(np.array([True, False, True, True, False, True]))
+    assert list(zip(starts, ends, strict=True)) == [(0, 1), (2, 4), (5, 6)]
+    assert runs(np.zeros(5, np.bool_))[0].size == 0

@@ -1,0 +1,434 @@
+"""Identification of a recorded log: known models, the real recording, what says too little."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+
+import piezoest as pz
+from piezoest import signals
+from piezoest._checks import FloatArray
+from piezoest.fitting import FORMS
+from piezoest.identification import Identification, Whiteness, identify
+from piezoest.models import ColemanHodgdon
+from piezoest.models.reading import LearntModel
+from piezoest.records import Record, read_record, write_columns
+from tests.fitting.stages import noise, stage, voltage
+
+RATE = 2000.0
+TRUE = ColemanHodgdon(0.02, 0.12, 0.0036, offset=3.0)
+DELAY = 2.3
+LOOP = "coleman-hodgdon"
+
+
+def swings(centre: float = 0.0) -> FloatArray:
+    values = np.asarray(signals.multi_amplitude([20.0, 35.0, 10.0, 30.0], 5.0, 2, RATE))
+    return np.tile(values, 2) + centre
+
+
+def made(seed: int = 0, centre: float = 0.0, drift: float = 0.0, delay: float = DELAY) -> Record:
+    u = swings(centre)
+    index = np.arange(u.size)
+    x = TRUE.simulate(np.interp(index - delay, index, u), initial_state=-1.0)
+    return Record.from_arrays(u, x + noise(2e-3, seed, u.size) + drift * index / u.size, RATE)
+
+
+def changed(displacement: FloatArray, of: Record | None = None) -> Record:
+    of = made() if of is None else of
+    return Record.from_arrays(of.voltage, displacement, of.sample_rate)
+
+
+def plays_log(seed: int = 0, rate: float = 1000.0, **kinds: Any) -> Record:
+    rng = np.random.default_rng(seed)
+    u = voltage(rng, 40.0, 40.0)
+    x = stage(rng, **kinds).simulate(u)
+    return Record.from_arrays(u, x + noise(1e-3 * float(np.ptp(x)), seed), rate)
+
+
+# ---------------------------------------------------------------- a stage that is known
+
+
+def test_finds_a_known_model_within_its_standard_errors() -> None:
+    z = []
+    for seed in range(8):
+        found = identify(made(seed), model=LOOP)
+        true = np.array([TRUE.alpha, TRUE.beta, TRUE.gamma, TRUE.offset, DELAY])
+        values = np.array([value for _, value, _, _ in found.table()])
+        z.append((values - true) / np.array([error for _, _, error, _ in found.table()]))
+        assert found.held_out.rms == pytest.approx(2e-3, rel=0.1)
+        assert found.whiteness.is_white
+        assert found.left_out == 0
+    # Standard errors that are right give 1; eight runs of five leave it within this.
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
+
+
+def test_unipolar_voltage() -> None:
+    found = identify(made(centre=60.0), model=LOOP)
+    np.testing.assert_allclose(found.model.theta, TRUE.theta, rtol=5e-3)
+    assert found.model.offset == pytest.approx(TRUE.offset, abs=0.05)
+    assert any("not centred" in sentence for sentence in found.advice)
+
+
+def test_given_delay_is_kept() -> None:
+    found = identify(made(), delay=DELAY, model=LOOP)
+    assert found.delay == DELAY
+    assert found.standard_errors["delay"] == 0.0
+    assert not found.delay_estimated
+    assert found.delay_known
+    np.testing.assert_allclose(found.model.theta, TRUE.theta, rtol=5e-3)
+
+
+def test_a_lag_that_swings_alike_cannot_tell_is_not_guessed() -> None:
+    u = 30.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(8000) / RATE)
+    found = identify(u, TRUE.simulate(u) + noise(2e-3, 0, u.size), sample_rate=RATE)
+    assert not found.delay_known
+    assert not found.delay_estimated
+    assert found.delay == 0.0
+    assert any("lag of the displacement is not known" in sentence for sentence in found.advice)
+    assert identify(made()).delay_known
+
+
+def test_missing_samples_do_not_matter() -> None:
+    u, x = made().voltage.copy(), made().displacement.copy()
+    x[100:130], x[2000], u[500] = np.nan, np.nan, np.nan
+    found = identify(u, x, sample_rate=RATE, model=LOOP)
+    np.testing.assert_allclose(found.model.theta, TRUE.theta, rtol=5e-3)
+    assert np.all(np.isfinite(found.prediction))
+    assert np.isnan(found.residual[[100, 500, 2000]]).all()
+
+
+def test_unsettled_start_is_left_out() -> None:
+    whole = made()
+    record = changed(whole.displacement - 5.0 * np.exp(-np.arange(len(whole)) / 10.0))
+    found = identify(record, model=LOOP)
+    assert 40 < found.left_out < 400
+    np.testing.assert_allclose(found.model.theta, TRUE.theta, rtol=1e-2)
+    assert any("do not fit the rest" in sentence for sentence in found.advice)
+    assert identify(record, settle=0.05, model=LOOP).left_out == 100
+
+
+def test_a_rest_and_a_jump_at_the_start_do_no_harm() -> None:
+    u = np.concatenate([np.zeros(1500), swings()])
+    x = TRUE.simulate(u) + noise(2e-3, 0, u.size)
+    x[700:] += 0.7
+    found = identify(u, x, sample_rate=RATE, model=LOOP, delay=0.0)
+    np.testing.assert_allclose(found.model.theta, TRUE.theta, rtol=1e-2)
+    assert found.held_out.rms < 3e-3
+    assert {"jumps", "rests"} <= {each.name for each in found.findings}
+
+
+def test_a_jump_behind_the_fitted_part_is_the_sensors() -> None:
+    whole = made()
+    x = whole.displacement.copy()
+    x[-400:] += 5.0
+    assert identify(changed(x), model=LOOP).held_out.rms < 4e-3
+
+
+def test_drift_is_found_and_said() -> None:
+    found = identify(made(drift=0.5), model=LOOP)
+    assert found.fit.drift + found.drift > 0.2
+    assert any("drifts" in sentence for sentence in found.advice)
+
+
+def test_spikes_are_counted_and_said() -> None:
+    assert not any("spikes" in sentence for sentence in identify(made(), model=LOOP).advice)
+    x = made().displacement.copy()
+    x[[300, 700]] += 20.0
+    found = identify(changed(x), model=LOOP)
+    assert any("2 of the fitted samples are off" in sentence for sentence in found.advice)
+    assert found.train.max < 0.1
+    np.testing.assert_allclose(found.model.theta, TRUE.theta, rtol=5e-3)
+
+
+def test_noise_is_what_repeated_periods_differ_by() -> None:
+    # White noise is seen in neighbouring samples as well, slow noise only in periods that repeat.
+    assert identify(made(), model="line").noise_floor == pytest.approx(2e-3, rel=0.1)
+    rng = np.random.default_rng(3)
+    u = 30.0 * np.sin(2.0 * np.pi * np.arange(16_000) / 400.0)
+    slow = np.convolve(rng.standard_normal(u.size + 60), np.ones(60) / np.sqrt(60.0), mode="valid")[: u.size]
+    x = TRUE.simulate(u) + 0.02 * slow + noise(1e-4, 0, u.size)
+    assert identify(u, x, sample_rate=RATE, model="line").noise_floor == pytest.approx(0.02, rel=0.2)
+
+
+# ---------------------------------------------------------------- which kind
+
+
+@pytest.mark.parametrize(
+    ("kinds", "wanted"),
+    [({}, {"plays"}),
+     ({"creep": pz.Creep([0.08], [0.25])}, {"plays-creep"}),
+     ({"bends": 2}, {"plays-asymmetric", "plays-asymmetric-creep"}),
+     ({"bends": 2, "creep": pz.Creep([0.08], [0.25])}, {"plays-creep", "plays-asymmetric-creep"})],
+)  # fmt: skip
+def test_the_kind_that_a_stage_needs_is_chosen(kinds: dict[str, Any], wanted: set[str]) -> None:
+    found = [identify(plays_log(seed, **kinds), delay=0.0) for seed in range(3)]
+    assert len([each for each in found if each.chosen in wanted]) >= 2
+    for each in found:
+        assert each.held_out.rms < 1.4 * min(item.held_out.rms for item in each.candidates)
+
+
+def test_the_simplest_that_will_do_is_chosen() -> None:
+    t = np.arange(8000) / 1000.0
+    u = 30.0 * np.sin(2.0 * np.pi * 1.7 * t) * np.linspace(1.0, 0.5, t.size)
+    found = identify(u, ColemanHodgdon(0.02, 0.14, 0.004).simulate(u) + noise(2e-3, 0, t.size),
+                     sample_rate=1000.0)  # fmt: skip
+    assert found.chosen == LOOP
+    line = identify(u, 0.2 * u + noise(5e-3, 0, t.size), sample_rate=1000.0)
+    assert line.chosen == "line"
+    assert any("straight line does about as well" in sentence for sentence in found.advice) is False
+
+
+def test_a_stage_of_relays_needs_asymmetry() -> None:
+    t = np.arange(16_000) / RATE
+    u = 30.0 * np.sin(4.0 * np.pi * t) * np.linspace(0.4, 1.0, t.size) + 5.0 * np.sin(18.0 * np.pi * t)
+    found = identify(u, pz.PreisachStage(RATE, seed=0).run(u), sample_rate=RATE, delay=0.0)
+    assert "asymmetric" in found.chosen
+    errors = {item.name: item.held_out.rms for item in found.candidates}
+    assert list(errors) == list(FORMS)
+    assert errors[found.chosen] < 0.4 * errors[LOOP]
+    assert found.best.label in found.reason
+
+
+@pytest.mark.parametrize("model", FORMS)
+def test_one_kind_is_fitted_where_one_is_named(model: str) -> None:
+    found = identify(made(), model=model)
+    assert found.chosen == model
+    assert [each.name for each in found.candidates] == list(dict.fromkeys(["line", model]))
+    assert found.line.theta[0] == pytest.approx(found.candidates[0].model.theta[0])
+
+
+# ---------------------------------------------------------------- what is given
+
+
+def test_arrays_records_files_and_tables_give_the_same(tmp_path: Path) -> None:
+    record = made()
+    columns = {"time_s": record.time, "voltage_V": record.voltage, "displacement_um": record.displacement}
+    np.save(tmp_path / "log.npy", np.column_stack(list(columns.values())))
+    wanted = identify(record, model=LOOP).model.theta
+    for data in (
+        tmp_path / "log.npy",
+        str(tmp_path / "log.npy"),
+        pd.DataFrame(columns),
+        pl.DataFrame(columns),
+    ):
+        np.testing.assert_allclose(identify(data, model=LOOP).model.theta, wanted, rtol=1e-6)
+    same = identify(record.voltage, record.displacement, sample_rate=RATE, model=LOOP)
+    np.testing.assert_array_equal(same.model.theta, wanted)
+
+
+def test_columns_and_units_of_a_table_may_be_named() -> None:
+    record = made()
+    table = pd.DataFrame({"t": record.time, "mon": 1e3 * record.voltage, "cap": record.displacement})
+    found = identify(
+        table, columns={"time": "t", "voltage": "mon", "displacement": "cap"},
+        units={"voltage": "mV", "displacement": "um", "time": "s"}, model="line",
+    )  # fmt: skip
+    assert found.line.theta[0] == pytest.approx(identify(record, model="line").line.theta[0], rel=1e-6)
+
+
+def test_other_logs_are_predicted(tmp_path: Path) -> None:
+    other = made(seed=3)
+    write_columns(
+        tmp_path / "other.csv",
+        {"time_s": other.time, "voltage_V": other.voltage, "displacement_um": other.displacement + 1.5},
+    )
+    found = identify(made(), model=LOOP, validate=[other, tmp_path / "other.csv"])
+    one, shifted = found.validations
+    assert shifted.source.endswith("other.csv")
+    # They were recorded from a loop of another start, which the first swings forget.
+    assert one.without_mean.rms < 0.05
+    assert shifted.error.rms == pytest.approx(1.5, abs=0.05)
+    assert shifted.without_mean.rms == pytest.approx(one.without_mean.rms, rel=1e-3)
+    with pytest.raises(ValueError, match=r"part to validate of .* 30 usable samples"):
+        identify(made(), validate=[Record.from_arrays(other.voltage[:30], other.displacement[:30], RATE)])
+
+
+def test_another_log_may_have_another_sample_rate() -> None:
+    creep = pz.Creep([0.06], [0.25])
+    record = plays_log(1, creep=creep)
+    half = Record.from_arrays(record.voltage[::2], record.displacement[::2], 500.0)
+    found = identify(record, train=0.9, validate=[half, record])
+    assert found.validations[0].error.rms < 1.3 * found.validations[1].error.rms
+
+
+def test_doubts_are_errors_where_they_are_to_be() -> None:
+    record = made()
+    gap = record.displacement.copy()
+    gap[-4000:] = np.nan
+    found = identify(changed(gap), model="line", train=0.2)
+    assert [each.name for each in found.findings if each.severity == "doubt"] == ["missing"]
+    assert found.findings[0].sentence in found.advice
+    with pytest.raises(ValueError, match="%"):
+        identify(changed(gap), model="line", train=0.2, strict=True)
+    assert identify(record, model="line", strict=True).chosen == "line"
+
+
+def test_every_step_is_told() -> None:
+    told: list[str] = []
+    identify(made(), say=told.append)
+    assert told[0] == "looking at the log"
+    assert [words for words in told if words.startswith("fitting")] == [
+        f"fitting {form.label}" for form in FORMS.values()
+    ]
+
+
+def bad_records() -> dict[str, tuple[Record, str]]:
+    u, time = swings(), np.arange(swings().size) / RATE
+    hiss = noise(1e-2, 0, u.size)
+    square = np.where(np.arange(u.size) // 100 % 2, 10.0, -10.0)
+    stepped = TRUE.simulate(square, allow_jumps=True) + hiss / 10.0
+    ramp = 30.0 * time / time[-1]
+    return {
+        "constant": (Record.from_arrays(np.full(u.size, 5.0), hiss, RATE), r"the voltage stays at 5 V"),
+        "ramp": (Record.from_arrays(ramp, 0.15 * ramp + hiss, RATE), r"moves by 15 V but turns 0 times"),
+        "only noise": (Record.from_arrays(u, hiss, RATE), r"displacement moves by .* µm in noise of"),
+        "small": (Record.from_arrays(u / 20, TRUE.simulate(u / 20) + hiss, RATE), "alpha = .* known only"),
+        "two levels": (Record.from_arrays(square, stepped, RATE), "(alpha|beta|gamma) = .* known only"),
+        "falls": (Record.from_arrays(u, -TRUE.simulate(u), RATE), "falls as the voltage rises"),
+        "short": (Record.from_arrays(u[:60], TRUE.simulate(u[:60]), RATE), "part .* 30 usable samples"),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", list(bad_records()))
+def test_records_that_say_too_little_are_refused(name: str) -> None:
+    record, words = bad_records()[name]
+    with pytest.raises(ValueError, match=words):
+        identify(record, model=LOOP)
+
+
+@pytest.mark.parametrize("name", ["small", "two levels"])
+def test_what_tells_little_of_a_loop_is_fitted_by_another_kind(name: str) -> None:
+    found = identify(bad_records()[name][0])
+    assert found.chosen != LOOP
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [{"train": 0.0}, {"train": 1.0}, {"delay": 11.0}, {"delay": "later"}, {"settle": -1.0},
+     {"model": "spline"}, {"sample_rate": 100.0}],
+)  # fmt: skip
+def test_arguments_out_of_range(arguments: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=next(iter(arguments))):
+        identify(made(), **arguments)
+
+
+def test_what_is_no_log_is_refused() -> None:
+    with pytest.raises(ValueError, match="data must be a log"):
+        identify(made().voltage)
+    with pytest.raises(ValueError, match="sample_rate must be given"):
+        identify(made().voltage, made().displacement)
+    with pytest.raises(OSError, match=r"no\.csv"):
+        identify("no.csv")
+
+
+# ---------------------------------------------------------------- what is shown
+
+
+@pytest.mark.parametrize("model", FORMS)
+def test_dictionary_is_json_and_holds_the_model(model: str, tmp_path: Path) -> None:
+    found = identify(plays_log(1, creep=pz.Creep([0.06], [0.25])), model=model)
+    (tmp_path / "found.json").write_text(json.dumps(found.to_dict(), allow_nan=False), encoding="utf-8")
+    learnt = LearntModel.read(tmp_path / "found.json")
+    assert learnt == LearntModel.of(found)
+    assert learnt.learnt_on == found.learnt_on
+    data = found.to_dict()
+    assert data["held_out"]["rms_um"] == found.held_out.rms
+    assert set(data["standard_errors"]) == {*found.model.parameter_names, "offset", "delay"}
+    first = found.record.voltage[:500]
+    r = cast(Any, found.model).simulate(np.concatenate([np.linspace(0.0, first[0], 300), first]))
+    u = pz.InverseCompensator(learnt.model, sample_rate=1000.0).run(r)
+    model_again: Any = learnt.model
+    assert np.max(np.abs(model_again.simulate(u) - r)) < 1e-6
+
+
+def test_text_names_what_matters() -> None:
+    found = identify(made(), model=LOOP)
+    text = found.report()
+    assert str(found) == text
+    assert "held out" in text
+    assert found.reason in text
+    assert all(sentence in text for sentence in found.advice)
+    assert found.best.label in repr(found)
+    table = identify(plays_log()).table()
+    assert [row[0] for row in table][-2:] == ["offset", "delay"]
+    assert len(table) <= 12
+
+
+def test_identifications_are_compared() -> None:
+    lines = identify(made(), model=LOOP).compare(identify(made(), model="line")).splitlines()
+    assert len(lines) == 3
+    assert "Coleman-Hodgdon" in lines[1]
+    assert "straight line" in lines[2]
+
+
+def test_prediction_is_that_of_the_best_fit() -> None:
+    found = identify(made(), model=LOOP)
+    np.testing.assert_array_equal(found.predict().x, found.prediction)
+    inside = (found.record.displacement >= found.predict().lower) & (
+        found.record.displacement <= found.predict().upper
+    )
+    assert 0.9 < np.mean(inside) < 0.99
+    v = swings()[:3000]
+    np.testing.assert_array_equal(found.predict(v).x, found.fit.predict(v).x)
+
+
+def test_plot_needs_no_display(tmp_path: Path) -> None:
+    identify(made(), model=LOOP).plot().savefig(tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+
+
+def test_whiteness() -> None:
+    white = np.random.default_rng(0).standard_normal(2000)
+    assert Whiteness.of(white).is_white
+    coloured = Whiteness.of(np.convolve(white, np.ones(5), mode="valid"))
+    assert not coloured.is_white
+    assert coloured.first_autocorrelation == pytest.approx(0.8, abs=0.05)
+
+
+# ---------------------------------------------------------------- a real recording
+
+
+@pytest.fixture(scope="module")
+def real(data_dir: Path) -> Identification:
+    folder = data_dir / "discrete_backlash_operator"
+    return identify(folder / "test_1hz.csv", validate=[folder / "model_1hz.csv"])
+
+
+def test_real_recording_free_running(real: Identification) -> None:
+    assert real.trained == pytest.approx(len(real.record) / 2, abs=1)
+    assert real.held_out.rms <= 0.30
+    assert real.held_out.rms < 0.2 * real.line_held_out.rms
+    assert real.model.is_admissible
+    # The lag of the sensor is found, and the start, where the stage came from 0 V, left out.
+    assert 0.5 < real.delay < 4.0
+    assert 0 < real.left_out < 200
+
+
+def test_real_recordings_predict_each_other(real: Identification, data_dir: Path) -> None:
+    folder = data_dir / "discrete_backlash_operator"
+    other = identify(folder / "model_1hz.csv", validate=[folder / "test_1hz.csv"])
+    assert real.validations[0].without_mean.rms <= 0.45
+    assert other.validations[0].without_mean.rms <= 0.45
+    # It swings alike all the time: a lag cannot be told.
+    assert not other.delay_known
+
+
+def test_real_recording_with_the_published_lag(data_dir: Path) -> None:
+    record = read_record(data_dir / "discrete_backlash_operator" / "test_1hz.csv")
+    found = identify(record, delay=1.0)
+    assert found.held_out.rms <= 0.30
+    assert found.line_held_out.rms == pytest.approx(2.2, abs=0.1)
+
+
+def test_free_running_sees_only_the_voltage(real: Identification) -> None:
+    record = real.record
+    x = record.displacement.copy()
+    x[real.trained :] = np.where(np.arange(x.size - real.trained) % 2, 1.0, -1.0)
+    blind = identify(changed(x, record))
+    np.testing.assert_allclose(blind.prediction, real.prediction, atol=1e-6)

@@ -1,0 +1,170 @@
+"""Identification of a log that need not fit in memory: as that of one which does, whatever its blocks."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+from piezoest.identification.parts import PART, parts, pieces
+from piezoest.records import RecordStream, stream_record
+from tests.fitting.stages import RATE, noise, stage, voltage
+
+COUNT = 10_000
+
+
+def drawn(seed: int = 0, **kinds: Any) -> tuple[FloatArray, FloatArray]:
+    """Voltage and displacement; the second half is as the first."""
+    rng = np.random.default_rng(seed)
+    u = np.tile(voltage(rng, 40.0, 40.0 * (seed % 2)), 2)
+    x = stage(rng, **kinds).simulate(u)
+    return u, x + noise(1e-3 * float(np.ptp(x)), seed, u.size)
+
+
+def saved(folder: Path, u: FloatArray, x: FloatArray, rows: int = 1000) -> RecordStream:
+    np.save(folder / "log.npy", np.column_stack([np.arange(u.size) / RATE, u, x]))
+    return stream_record(folder / "log.npy", rows=rows)
+
+
+@pytest.mark.parametrize(("kinds", "kind"), [({}, "plays"), ({"bends": 2}, "plays-asymmetric")])
+@pytest.mark.parametrize("seed", range(3))
+def test_as_good_as_in_memory(tmp_path: Path, kinds: dict[str, Any], kind: str, seed: int) -> None:
+    found = pz.identify_stream(saved(tmp_path, *drawn(seed, **kinds)), delay=0.0)
+    wanted = pz.identify(tmp_path / "log.npy", delay=0.0, model=found.chosen)
+    assert found.held_out.rms == pytest.approx(wanted.held_out.rms, rel=0.05)
+    assert found.train.rms == pytest.approx(wanted.train.rms, rel=0.05)
+    assert found.cross_validated[found.chosen] == pytest.approx(wanted.best.cross_validated, rel=0.05)
+    assert found.line_held_out.rms == pytest.approx(wanted.line_held_out.rms, rel=0.01)
+    assert found.chosen in ("plays", kind)
+    u = wanted.record.voltage
+    assert np.std(found.prediction - wanted.prediction) < 0.02 * np.std(u - u.mean())
+    assert (found.samples, found.trained, found.skipped) == (COUNT, COUNT // 2, 0)
+
+
+def test_whatever_the_blocks_the_same_bits(tmp_path: Path) -> None:
+    u, x = drawn(1)
+    u[300:340], u[:7], x[:2], x[4000:4010] = np.nan, np.nan, np.nan, np.nan
+    x[[800, 4500, 7777]] += 3.0
+    wanted = pz.identify_stream(saved(tmp_path, u, x))
+    for rows in (100, 777, 4501, COUNT, 10 * COUNT):
+        found = pz.identify_stream(stream_record(tmp_path / "log.npy", rows=rows))
+        assert found.to_dict() == wanted.to_dict()
+        np.testing.assert_array_equal(found.prediction, wanted.prediction)
+    assert wanted.skipped == 40 + 7 + 10 + 3
+
+
+def test_gaps_and_a_late_start_do_no_harm(tmp_path: Path) -> None:
+    u, x = drawn(2)
+    whole = pz.identify_stream(saved(tmp_path, u, x), delay=0.0)
+    u[:600], x[2000:2300], x[6000:6100] = np.nan, np.nan, np.nan
+    found = pz.identify_stream(saved(tmp_path, u, x, rows=500), delay=0.0)
+    assert found.skipped == 1000
+    assert found.held_out.rms < 2.0 * whole.held_out.rms
+    assert np.all(np.isfinite(found.prediction))
+    assert len(found.thinned) == COUNT
+
+
+def test_a_lag_is_found_and_followed(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    u = np.tile(voltage(rng), 2)
+    late = np.interp(np.arange(u.size) - 2.5, np.arange(u.size), u)
+    x = stage(rng).simulate(late)
+    stream = saved(tmp_path, u, x + noise(1e-3 * float(np.ptp(x)), 0, u.size))
+    found = pz.identify_stream(stream)
+    assert found.delay == pytest.approx(2.5, abs=0.2)
+    given = pz.identify_stream(stream, delay=2.5)
+    assert given.delay == 2.5
+    assert given.held_out.rms == pytest.approx(found.held_out.rms, rel=0.25)
+    assert given.held_out.rms < 0.7 * pz.identify_stream(stream, delay=0.0).held_out.rms
+
+
+def test_a_lag_that_the_start_cannot_tell_is_not_guessed(tmp_path: Path) -> None:
+    u = 30.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(COUNT) / RATE)
+    x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(u) + noise(2e-3, 0, COUNT)
+    found = pz.identify_stream(saved(tmp_path, u, x))
+    assert found.delay == 0.0
+    assert any("lag of the displacement is not known" in sentence for sentence in found.advice)
+
+
+def test_progress_is_told_in_three_passes(tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    pz.identify_stream(saved(tmp_path, *drawn()), progress=lambda done, all_: told.append((done, all_)))
+    assert len({total for _, total in told}) == 1
+    assert sum(1 for (now, _), (then, _) in zip(told[1:], told, strict=False) if now <= then) == 2
+    assert told[-1][0] == told[-1][1]
+
+
+def test_a_line_is_a_line(tmp_path: Path) -> None:
+    u, _ = drawn()
+    found = pz.identify_stream(saved(tmp_path, u, 0.2 * u + 1.0 + noise(1e-2, 0, u.size)))
+    assert found.chosen == "line"
+    assert found.model.theta[0] == pytest.approx(0.2, rel=1e-3)
+    assert [row[0] for row in found.table()] == ["gain", "offset", "delay"]
+
+
+def test_what_was_found_is_json(tmp_path: Path) -> None:
+    found = pz.identify_stream(saved(tmp_path, *drawn()))
+    data = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert pz.models.model_from_dict(data["model"]) == found.model
+    assert pz.models.reading.LearntModel.from_dict(data).learnt_on == found.learnt_on
+    assert data["samples"] == COUNT
+
+
+def test_streams_that_show_nothing_are_refused(tmp_path: Path) -> None:
+    u, x = drawn()
+    for voltage_, displacement, words in (
+        (0.0 * u, x, "too little excitation"),
+        (u, -x, "change the sign"),
+        (u, np.nan * x, "usable"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            pz.identify_stream(saved(tmp_path, voltage_, displacement))
+    with pytest.raises(ValueError, match="log must be a RecordStream, got str"):
+        pz.identify_stream("log.npy")  # type: ignore[arg-type]
+    for options in ({"train": 1.0}, {"delay": 11.0}, {"delay": np.nan}):
+        with pytest.raises(ValueError, match=next(iter(options))):
+            pz.identify_stream(saved(tmp_path, u, x), **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.4, 3.0, 7.7])
+def test_parts_join_to_the_late_voltage(tmp_path: Path, delay: float) -> None:
+    u = np.cumsum(np.random.default_rng(0).standard_normal(2 * PART + 123))
+    stream = saved(tmp_path, u, 0.1 * u, rows=33_333)
+    found = list(parts(stream, delay, None))
+    assert [part.first for part in found] == [0, PART, 2 * PART]
+    expected = np.interp(np.arange(u.size) - delay, np.arange(u.size), u)
+    np.testing.assert_allclose(np.concatenate([part.u for part in found]), expected, atol=1e-9)
+    np.testing.assert_array_equal(np.concatenate([piece for piece, _ in pieces(stream, None)]), u)
+
+
+def test_a_part_without_a_voltage_counts_as_missing(tmp_path: Path) -> None:
+    u = np.cumsum(np.random.default_rng(0).standard_normal(PART + 500))
+    x, first = 0.1 * u, u[PART + 10]
+    u[: PART + 10] = np.nan
+    found = list(parts(saved(tmp_path, u, x), 0.0, None))
+    assert [part.first for part in found] == [0, PART]
+    assert not found[0].counts.any()
+    np.testing.assert_array_equal(found[0].u, first)
+    np.testing.assert_array_equal(found[1].u[:11], first)
+
+
+def test_recording_of_a_real_stage(data_dir: Path) -> None:
+    found = pz.identify_stream(
+        stream_record(data_dir / "discrete_backlash_operator" / "test_1hz.csv", rows=1000)
+    )
+    assert found.held_out.rms < 0.45
+    assert found.line_held_out.rms > 1.2
+
+
+def test_a_start_that_has_not_settled_is_left_out(tmp_path: Path) -> None:
+    u, x = drawn(4)
+    whole = pz.identify_stream(saved(tmp_path, u, x), delay=0.0)
+    x -= np.ptp(x) * np.exp(-np.arange(COUNT) / 20.0)
+    found = pz.identify_stream(saved(tmp_path, u, x), delay=0.0)
+    assert found.held_out.rms < 1.2 * whole.held_out.rms
+    assert found.train.rms < 1.2 * whole.train.rms
