@@ -139,8 +139,8 @@ def identify_stream(
     """Identify a model from a log that need not fit in memory.
 
     Plays, with and without bends, are fitted to the first part by sums over the log, as `fit` does; the kind
-    is chosen by blocks of which each is predicted from the others. Another pass lets the model run free over the
-    whole log. Creep is not fitted, and jumps of the displacement are not looked for.
+    is chosen by blocks of which each is predicted from the others. Another pass lets the model run free over
+    the whole log. Creep is not fitted, and jumps of the displacement are not looked for.
 
     Parameters
     ----------
