@@ -10,8 +10,9 @@ from piezoest._checks import FloatArray
 
 # The start is left out as long as it is off by this many robust standard deviations, at most this fraction.
 UNSETTLED, LONGEST_UNSETTLED = 4.0, 0.1
-# A sample is a spike that is off from its neighbours' median by this many robust standard deviations.
-SPIKE, NEIGHBOURS = 8.0, 7
+# A sample is a spike that is off from its neighbours by this many robust standard deviations, and this many
+# times as far as the nearest two are: about a kink they are half as far as the sample itself.
+SPIKE, ALONE = 8.0, 3.0
 # Standard deviation of a normal distribution whose median is one from zero.
 NORMAL = 1.4826
 
@@ -31,14 +32,18 @@ def unsettled(residual: FloatArray) -> int:
 
 
 def lonely(residual: FloatArray) -> Any:
-    """Which samples are far from the median of those about them, shape (N,)."""
+    """Which samples alone are far from those about them, shape (N,); neither slopes nor kinks count."""
     from scipy.ndimage import median_filter
 
     known = np.flatnonzero(np.isfinite(residual))
     found = np.zeros(residual.size, bool)
     values = residual[known]
-    apart = np.abs(values - median_filter(values, NEIGHBOURS, mode="nearest"))
+    # Half-way between the medians of the three before and of the three after: a slope cancels.
+    medians = np.pad(median_filter(values, 3, mode="nearest"), 2, mode="edge")
+    apart = np.abs(values - 0.5 * (medians[:-4] + medians[4:]))
     deviation = NORMAL * float(np.median(apart))
+    beside = np.pad(apart, 1)
+    beside = np.maximum(beside[:-2], beside[2:])
     if deviation > 0.0:
-        found[known] = apart > SPIKE * deviation
+        found[known] = (apart > SPIKE * deviation) & (apart > ALONE * beside)
     return found
