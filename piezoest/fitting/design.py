@@ -18,6 +18,8 @@ from piezoest.models import Creep, Model
 
 # Rows that are made at once.
 CHUNK = 8192
+# After so many time constants nothing is left.
+LONG_AGO = 60.0
 NO_CREEP = Creep(np.empty(0), np.empty(0))
 
 
@@ -34,6 +36,10 @@ class Basis(Protocol):
     @property
     def free(self) -> int:
         """How many of them, at the end, say where the stage was before the record."""
+
+    @property
+    def half(self) -> float:
+        """Half of the voltage's range in the record [V]."""
 
     @property
     def goes_on(self) -> bool:
@@ -174,7 +180,9 @@ class Along:
             _add_creep(driven, design.creep.gains, self._decays, self._z, each)
             rows[:, :followed], rows[:, design.gains] = driven[:, :-1], each
             age = (index + 1.0) / design.sample_rate
-            rows[:, design.crept] = np.exp(-np.outer(age, 1.0 / design.creep.time_constants))
+            past = np.outer(age, 1.0 / design.creep.time_constants)
+            # Numbers below the normal range would make all that follows a hundred times slower.
+            rows[:, design.crept] = np.where(past < LONG_AGO, np.exp(-np.minimum(past, LONG_AGO)), 0.0)
         rows[:, design.offset] = 1.0
         # What has drifted stays when the record that was fitted is over.
         rows[:, design.offset + 1] = np.minimum(index, design.samples) / design.samples

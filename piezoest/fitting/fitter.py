@@ -261,8 +261,11 @@ class Fitter:
     def _leave_out(self, settle: float | None) -> None:
         """Do without what plays with bends show to be spikes, and a start that has not settled."""
         log = self._log
-        fitted = self._bent.best(search.SMOOTH)
-        residual = np.where(log.counts, log.x - fitted.design.output(log.u, fitted.w), np.nan)
+        # Without the first block, for what happens at the start must not be explained by it.
+        bent = self._bent
+        used = bent.columns(drift=False)
+        w = bent.solved(search.SMOOTH, used, bent.all.plus(bent.sums[0], -1.0))
+        residual = np.where(log.counts, log.x - bent.design.output(log.u, w), np.nan)
         if settle is None:
             self.left_out = unsettled(residual)
         else:

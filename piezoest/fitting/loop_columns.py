@@ -19,6 +19,8 @@ from piezoest.models import ColemanHodgdon, Creep
 
 # beta = c - b, and b, are at least these fractions of the straight line's gain.
 LEAST_BETA, LEAST_LOOP = 0.02, 1e-6
+# What is left of the start, relative to it, that counts for nothing.
+FORGOTTEN = 1e-26
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,7 @@ class LoopColumns:
     size: ClassVar[int] = 3
     free: ClassVar[int] = 1
     goes_on: ClassVar[bool] = True
+    half: ClassVar[float] = 1.0
 
     def begin(self) -> FloatArray:
         """Voltage, f, and what is left of the start; the first sample says the voltage."""
@@ -86,7 +89,9 @@ def _loop(u: Vector, alpha: float, state: Vector, rows: Matrix) -> None:
     for k in range(u.size):
         du = u[k] - state[0]
         state[1] = hysteresis_step(state[1], du, alpha, 1.0)
-        state[2] = hysteresis_step(state[2], du, alpha, 0.0)
+        left = hysteresis_step(state[2], du, alpha, 0.0)
+        # Numbers below the normal range would make all that follows a hundred times slower.
+        state[2] = left if left > FORGOTTEN else 0.0
         state[0] = u[k]
         rows[k, 0] = u[k]
         rows[k, 1] = u[k] + state[1]

@@ -19,9 +19,8 @@ LEAST_GAIN = 0.02
 # this fraction of the density of the last ones that moved: of stages of eight families, driven up to twice as
 # far as in the fitted part of a log, some stop there and some go on (benchmarks/logs.py).
 BEYOND, LAST, GOES_ON = 5, 0.25, 0.3
-# What differences cost of plays that move as far as the voltage; of others, more by as much as they move
-# less.
-HARDLY, LEAST_MOVING = 1e-6, 1e-4
+# Plays that go less far than this, relative to the voltage, are as their neighbours are.
+SELDOM, LEAST_MOVING = 0.03, 1e-4
 # A range is about 0 V if its middle is nearer to it than this fraction of its half.
 ABOUT_ZERO = 0.1
 FAR = 1e300
@@ -132,8 +131,14 @@ class PlayColumns:
         return self._differences(np.ones(self.thresholds.size))
 
     def prior(self) -> FloatArray:
-        """The same where plays hardly move: they are as their neighbours are."""
-        return self._differences(np.sqrt(HARDLY / np.maximum(self.moving, LEAST_MOVING)))
+        """The same where plays seldom move."""
+        moving = np.maximum(self.moving, LEAST_MOVING)
+        return self._differences(np.sqrt(np.maximum(SELDOM / moving - 1.0, 0.0)))
+
+    @property
+    def half(self) -> float:
+        """Half of the record's range [V]."""
+        return 0.5 * (self.visited[1] - self.visited[0])
 
     def _differences(self, root_weight: FloatArray) -> FloatArray:
         n, segments = self.thresholds.size, self.bends.size + 1

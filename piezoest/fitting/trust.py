@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +16,12 @@ from piezoest.fitting.runs import IntArray
 BLOCKS = 25
 # Of readings lie within the interval.
 WITHIN = 0.95
-# Slopes beyond the range are known to this fraction of the line's gain.
-BEYOND_GAIN = 0.3
+# Wider by this factor, for a fit is to hold for longer than the blocks tell; slopes beyond the range are
+# known to this fraction of the line's gain.
+MARGIN, BEYOND_GAIN = 1.1, 0.5
+# Creep becomes slower: it goes on with this fraction of its rate so far, but over another record by at least
+# this fraction of the stroke, which is what piezo stages do in a third of a decade of time.
+SLOWER, CREEPS_ON = 0.5, 0.002
 # A coefficient is at its bound if it is nearer than this, relative to the largest.
 AT_BOUND = 1e-9
 
@@ -81,10 +86,15 @@ def spread_of(missed: Missed, log: Log, gain: float) -> Spread:
     What comes after the record is predicted from what came before, as the last blocks are: the wider counts.
     """
     quantiles = [float(np.nanquantile(np.abs(each), WITHIN)) for each in (missed.left_out, missed.ahead)]
-    known = np.flatnonzero(np.isfinite(missed.ahead))
-    elapsed = float(np.mean(known)) - log.folds[EARLIER]
-    by_sample = abs(float(np.mean(missed.ahead[known]))) / max(elapsed, 1.0)
-    return Spread(max(quantiles), by_sample, BEYOND_GAIN * gain, (float(log.u.min()), float(log.u.max())))
+    rates = [0.0]
+    for first, end in pairwise(log.folds[EARLIER:].astype(int)):
+        level = missed.ahead[first:end]
+        if np.any(np.isfinite(level)):
+            rates.append(abs(float(np.nanmean(level))) / (0.5 * (first + end) - log.folds[EARLIER]))
+    visited = float(log.u.min()), float(log.u.max())
+    least = CREEPS_ON * 2.0 * log.half * gain / log.u.size
+    by_sample = max(SLOWER * max(rates), least)
+    return Spread(MARGIN * max(quantiles), by_sample, BEYOND_GAIN * gain, visited)
 
 
 def covariance(regression: Regression, fitted: Fitted, log: Log) -> FloatArray:
