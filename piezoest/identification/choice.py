@@ -4,39 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from piezoest.identification.result import Candidate
 
 # A simpler model is preferred until a richer one is better by this fraction on the blocks left out.
 WORTH_IT = 0.02
 
 
-def score(item: Candidate) -> float:
-    """Geometric mean of the errors on blocks between others, and on blocks behind all others [µm rms].
-
-    Of what follows a log, the latter says more; the former is surer.
-    """
-    return float(np.sqrt(item.fit.held_out * item.fit.ahead))
-
-
 def best_of(candidates: Sequence[Candidate]) -> Candidate:
     """The simplest of those that predict blocks left out about best; from the simplest to the richest."""
-    least = min(map(score, candidates))
-    return next(item for item in candidates if score(item) <= (1.0 + WORTH_IT) * least)
+    least = min(item.cross_validated for item in candidates)
+    return next(item for item in candidates if item.cross_validated <= (1.0 + WORTH_IT) * least)
 
 
 def reason_for(candidates: Sequence[Candidate], best: Candidate) -> str:
-    """Why that one, with the figures."""
-    line = candidates[0]
-    said = f"{best.label}: {score(best):.3g} µm rms on blocks left out of the fit"
-    if best is not line and score(line) > 0.0:
-        said += f", {100.0 * (1.0 - score(best) / score(line)):.0f} % less than a straight line"
-    rivals = [item for item in candidates if score(item) < score(best)]
-    if rivals:
-        rival = min(rivals, key=score)
-        said += (
-            f"; {rival.label} has {score(rival):.3g}, which is not worth "
-            f"{rival.parameters - best.parameters} more parameters"
+    """Why that one, with the figures; candidates come from the simplest to the richest."""
+    line, error = candidates[0], best.cross_validated
+    said = f"{best.label}: {error:.3g} µm rms on blocks left out of the fit"
+    if best is not line and 0.0 < error < line.cross_validated:
+        said += f", {100.0 * (1.0 - error / line.cross_validated):.0f} % less than a straight line"
+    rival = min(candidates, key=lambda item: item.cross_validated)
+    if rival.cross_validated < error:
+        richer = candidates.index(rival) > candidates.index(best)
+        said += f"; {rival.label} has {rival.cross_validated:.3g}" + (
+            ", which is not enough less for a richer model" if richer else " and is simpler"
         )
     return f"{said}."

@@ -20,13 +20,14 @@ from piezoest.fitting.search import BENDS, LONGEST_DELAY, plays
 from piezoest.identification.data import check_excitation, noise_of, prepare
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.residual import Misfit
-from piezoest.identification.result import Row, parameter_rows
+from piezoest.identification.result import Row, left_out_error, parameter_rows
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record, RecordStream
 
 # Samples at the start that are looked at as a whole: for the delay, the start and the noise.
 HEAD = 50_000
 FEWEST_SAMPLES = 50
+BLOCK = 8 * CHUNK
 # Points kept for figures, and for how far plays move.
 MOST_POINTS = 20_000
 
@@ -135,6 +136,7 @@ def identify_stream(
     train: float = 0.5,
     delay: float | Literal["auto"] = "auto",
     progress: Progress | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> StreamedIdentification:
     """Identify a model from a log that need not fit in memory.
 
@@ -152,7 +154,10 @@ def identify_stream(
         Samples by which the displacement lags the voltage, 0 to 10; ``"auto"`` looks for it in the first
         50 000 samples, where they can tell it from the width of the loop.
     progress : callable, optional
-        Called with what is done and what there is, in each of three passes over the log.
+        Called with what is done and what there is, in each of three passes over the log; the first two
+        end with the fitted part.
+    say : callable, optional
+        Called with a few words before each pass.
 
     Returns
     -------
@@ -166,8 +171,11 @@ def identify_stream(
     if not isinstance(log, RecordStream):
         raise ValueError(f"log must be a RecordStream, got {type(log).__name__}: use stream_record(path)")
     train = fraction("train", train, 0.1, 0.9)
+    say = say or (lambda words: None)
+    say("counting samples")
     samples = log.count()
     trained = round(train * samples)
+    say("looking at the log")
     survey = _Survey(log, trained, progress)
     head = survey.head
     if int(np.sum(head.usable)) < FEWEST_SAMPLES:
@@ -182,15 +190,18 @@ def identify_stream(
     if delay != "auto":
         wanted = fraction("delay", finite("delay", delay), 0.0, LONGEST_DELAY)
     fitter = Fitter(head.voltage, head.displacement, sample_rate=log.sample_rate, delay=wanted)
+    say("fitting plays")
     fits = _fits(log, survey, fitter.start, fitter.delay, samples, trained, progress)
-    chosen = min(fits, key=lambda name: float(np.sqrt(fits[name].held_out * fits[name].ahead)))
+    missed = {name: left_out_error(fit) for name, fit in fits.items()}
+    chosen = min(missed, key=lambda name: missed[name])
     judge = _Judge(fits[chosen], fits["line"], samples, trained)
+    say("predicting the whole log")
     for part in _parts(log, fitter.delay, progress):
         judge.add(part)
     found = StreamedIdentification(
         model=_model(fits[chosen]),
         chosen=chosen,
-        cross_validated={name: fit.held_out for name, fit in fits.items()},
+        cross_validated=missed,
         delay=fitter.delay,
         train=judge.misfit(held_out=False),
         held_out=judge.misfit(held_out=True),
@@ -230,8 +241,8 @@ class _Survey:
         voltage, displacement, points = np.empty(0), np.empty(0), []
         seen, known = 0, None
         low, high = np.inf, -np.inf
-        for block in log.blocks(progress=progress):
-            u, x = block.voltage[: trained - seen], block.displacement[: trained - seen]
+        for whole_u, whole_x in _blocks(log, progress):
+            u, x = whole_u[: trained - seen], whole_x[: trained - seen]
             if u.size == 0:
                 break
             if voltage.size < HEAD:
@@ -291,12 +302,30 @@ def _model(fitted: Fitted) -> Model:
     return design.basis.model(w[: design.basis.size], float(w[design.offset]), None, design.sample_rate)
 
 
+def _blocks(log: RecordStream, progress: Progress | None) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Voltage and displacement in blocks of one size: nothing depends on how the file is read."""
+    pieces: list[FloatArray] = []
+    held = 0
+    for block in log.blocks(progress=progress):
+        pieces.append(np.array([block.voltage, block.displacement]))
+        held += block.voltage.size
+        if held < BLOCK:
+            continue
+        samples = np.concatenate(pieces, axis=1)
+        whole = held - held % BLOCK
+        for k in range(0, whole, BLOCK):
+            yield samples[0, k : k + BLOCK], samples[1, k : k + BLOCK]
+        pieces, held = [samples[:, whole:]], held - whole
+    if held:
+        u, x = np.concatenate(pieces, axis=1)
+        yield u, x
+
+
 def _parts(log: RecordStream, delay: float, progress: Progress | None) -> Iterator[Part]:
     """The log from its start, with the voltage late and without gaps, where it is the last one known."""
     before, seen = None, 0
     whole, rest = divmod(delay, 1.0)
-    for block in log.blocks(progress=progress):
-        u, x = block.voltage, block.displacement
+    for u, x in _blocks(log, progress):
         known = np.isfinite(u)
         counts = known & np.isfinite(x)
         counts &= ~flawed(np.where(known, u, np.nan), x).unusable
