@@ -33,10 +33,9 @@ def log(samples: int, first: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Voltage and displacement of plays with creep, bent a little, in noise; swings of several sizes."""
     t = (first + np.arange(samples)) / RATE
     u = 60.0 + 50.0 * np.sin(2.0 * np.pi * 3.0 * t) * (0.65 + 0.35 * np.sin(0.4 * t))
-    plays = pz.PrandtlIshlinskii(
-        0.1, np.linspace(2.0, 40.0, 20), np.full(20, 0.003), 1.0, pz.Creep.logarithmic(0.01, shortest=0.1, longest=10.0),
-        sample_rate=RATE,
-    )  # fmt: skip
+    creep = pz.Creep.logarithmic(0.01, shortest=0.1, longest=10.0)
+    thresholds, weights = np.linspace(2.0, 40.0, 20), np.full(20, 0.003)
+    plays = pz.PrandtlIshlinskii(0.1, thresholds, weights, 1.0, creep, sample_rate=RATE)
     x = plays.simulate(u)
     return u, x + 2e-4 * x**2 + 2e-3 * np.random.default_rng(first).standard_normal(samples)
 

@@ -13,7 +13,6 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -48,8 +47,6 @@ class Found:
 
 def fitted(log: Log) -> Found:
     """The one place that knows piezoest's face."""
-    if "sample_rate" not in signature(pz.identify).parameters:
-        return _fitted_by_choice(log)
 
     def identify(model: str) -> Any:
         return pz.identify(log.u, log.x, sample_rate=log.sample_rate, train=TRAIN, model=model)
@@ -66,17 +63,6 @@ def fitted(log: Log) -> Found:
         of = found if isinstance(found.model, ColemanHodgdon) else identify(FAMILY)
         result.theta, result.errors = np.array(of.model.theta), dict(of.standard_errors)
     return result
-
-
-def _fitted_by_choice(log: Log) -> Found:
-    """By `choose_model`, which `identify` is going to replace."""
-    choice = pz.choose_model(pz.Record.from_arrays(log.u, log.x, log.sample_rate), train=TRAIN)
-    predictions = {item.name: lambda item=item: log.x - item.residual for item in choice.candidates}
-    base = choice.base
-    return Found(
-        choice.best.name, predictions, {item.name: item.held_out.rms for item in choice.candidates},
-        theta=np.array(base.model.theta), errors=dict(base.standard_errors),
-    )  # fmt: skip
 
 
 def plays(u: np.ndarray, thresholds: np.ndarray) -> np.ndarray:

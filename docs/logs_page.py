@@ -82,8 +82,15 @@ def numbers(document: Document) -> str:
             "logs plays": criteria["plays"],
             "logs negligible": percent(criteria["negligible"]),
             "logs train": percent(criteria["train"]),
+            "logs within": percent(least_within(document)),
         }
     )
+
+
+def least_within(document: Document) -> float:
+    """Part of the clean logs whose parameters are within two standard errors: of the worst parameter."""
+    rows = [row["within_2"] or 0.0 for row in document["scores"] if row["logs_with"] == "clean"]
+    return float(min(rows, default=0.0))
 
 
 def cells(row: Document) -> list[str]:

@@ -1,7 +1,7 @@
-"""A recorded stage, as the page `real_data` shows it; writes docs/data/real_data.json and its figures.
+"""A recorded stage, as the page `real_data` shows it; writes docs/data/real_data.json and its figure.
 
-The recordings are not part of this repository: PIEZOEST_DATA, or --data, names their folder. Without them the
-files stay as they are.
+The recording comes with the package. Another one of the same stage, which the model is to predict, does not:
+PIEZOEST_DATA, or --data, names its folder. Without it, what the page says of that one stays as it is.
 
     python docs/real_data.py [--data DIR] [--json FILE] [--figures DIR]
 """
@@ -9,6 +9,7 @@ files stay as they are.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
 from pathlib import Path
@@ -20,14 +21,14 @@ import piezoest as pz
 from piezoest._files import save_figure
 from piezoest.bench.origin import origin, put
 
-FILE = Path("discrete_backlash_operator") / "test_1hz.csv"
+OTHER = Path("discrete_backlash_operator") / "model_1hz.csv"
 
 
-def figures_of(file: Path) -> tuple[dict[str, Any], pz.Identification, pz.ModelChoice]:
-    """What the page says of a recording."""
-    record = pz.read_record(file)
-    found, choice = pz.identify(record), pz.choose_model(record)
-    streamed = pz.identify_stream(pz.stream_record(file, rows=1000))
+def figures_of(other: Path | None) -> tuple[dict[str, Any], pz.Identification]:
+    """What the page says of the recording, and of another one that its model predicts."""
+    record = pz.read_record(pz.records.example_log())
+    found = pz.identify(record, validate=[] if other is None else [other])
+    streamed = pz.identify_stream(pz.stream_record(pz.records.example_log(), rows=1000))
     document = {
         **origin(),
         "samples": len(record),
@@ -36,26 +37,31 @@ def figures_of(file: Path) -> tuple[dict[str, Any], pz.Identification, pz.ModelC
         "displacement_um": float(np.ptp(record.displacement)),
         "identify": {
             "table": found.table(),
+            "chosen": found.best.label,
+            "reason": found.reason,
             "held_out": found.held_out.to_dict(),
             "line_held_out": found.line_held_out.to_dict(),
-            "left_out_s": found.left_out / record.sample_rate,
+            "noise_floor_um": found.noise_floor,
+            "interval_um": found.fit.spread.within,
+            "covered": covered(found),
             "advice": list(found.advice),
-        },
-        "stream": {"table": streamed.table(), "held_out": streamed.held_out.to_dict()},
-        "choice": {
-            "reason": choice.reason,
             "candidates": [
-                {
-                    "name": item.name,
-                    "parameters": item.parameters,
-                    "held_out": item.held_out.to_dict(),
-                    "best": item is choice.best,
-                }
-                for item in choice.candidates
+                each.to_dict() | {"label": each.label, "chosen": each is found.best}
+                for each in found.candidates
             ],
         },
+        "stream": {"held_out": streamed.held_out.to_dict()},
     }
-    return document, found, choice
+    if found.validations:
+        document["other"] = found.validations[0].to_dict() | {"source": OTHER.name}
+    return document, found
+
+
+def covered(found: pz.Identification) -> float:
+    """Part of the held-out readings that lie within the interval of 95 %."""
+    predicted = found.predict()
+    inside = (found.record.displacement >= predicted.lower) & (found.record.displacement <= predicted.upper)
+    return float(np.mean(inside[found.trained :][np.isfinite(found.residual[found.trained :])]))
 
 
 def main() -> None:
@@ -68,13 +74,13 @@ def main() -> None:
     parser.add_argument("--json", type=Path, default=docs / "data" / "real_data.json")
     parser.add_argument("--figures", type=Path, default=docs / "figures")
     given = parser.parse_args()
-    if not (given.data / FILE).is_file():
-        print(f"no recordings in {given.data}: {given.json.name} stays as it is", file=sys.stderr)
-        return
-    document, found, choice = figures_of(given.data / FILE)
+    other = given.data / OTHER
+    document, found = figures_of(other if other.is_file() else None)
+    if "other" not in document:
+        print(f"no {OTHER} in {given.data}: what is said of it stays as it is", file=sys.stderr)
+        document["other"] = json.loads(given.json.read_text(encoding="utf-8"))["other"]
     put(document, given.json)
-    for name, drawn in (("real_data", found), ("real_data_choice", choice)):
-        save_figure(drawn.plot(), given.figures / f"{name}.png", dpi=90)
+    save_figure(found.plot(), given.figures / "real_data.png", dpi=90)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from paper_page import table, write_pieces
+from which_estimator_page import percent, replacements
 
 DOCS = Path(__file__).resolve().parent
 SOURCE = DOCS / "data" / "real_data.json"
@@ -23,7 +24,23 @@ def write(app: Any = None) -> None:
 
 def pieces(document: dict[str, Any]) -> dict[str, str]:
     """Texts by the name of their file."""
-    found, stream = document["identify"], document["stream"]
+    found = document["identify"]
+    return {
+        "numbers": numbers(document),
+        "parameters": parameters(found["chosen"], found["table"]),
+        "advice": "".join(f"- {sentence}\n" for sentence in found["advice"]),
+        "models": models(found["candidates"]),
+        "reason": f"{found['reason']}\n",
+    }
+
+
+def numbers(document: dict[str, Any]) -> str:
+    """Substitutions for numbers that stand in sentences."""
+    found, other = document["identify"], document["other"]
+    lengths = {
+        "held": found["held_out"], "line": found["line_held_out"], "stream": document["stream"]["held_out"],
+        "other": other["error"], "other without mean": other["without_mean"],
+    }  # fmt: skip
     values = {
         "date": document["date"][:10],
         "machine": document["machine"]["cpu"],
@@ -31,32 +48,36 @@ def pieces(document: dict[str, Any]) -> dict[str, str]:
         "rate": f"{document['sample_rate_Hz']:g} Hz",
         "voltage": f"{document['voltage_V'][0]:.2g} to {document['voltage_V'][1]:.2g} V",
         "travel": f"{document['displacement_um']:.0f} µm",
-        "held": f"{found['held_out']['rms_um']:.2f} µm",
-        "line": f"{found['line_held_out']['rms_um']:.2f} µm",
-        "stream": f"{stream['held_out']['rms_um']:.2f} µm",
+        "noise": f"{found['noise_floor_um']:.2f} µm",
+        "interval": f"{found['interval_um']:.2f} µm",
+        "covered": percent(found["covered"]),
+        "other file": f"``{other['source']}``",
+        **{name: f"{each['rms_um']:.2f} µm" for name, each in lengths.items()},
     }
-    parameters = [
+    return replacements({f"recording {name}": value for name, value in values.items()})
+
+
+def parameters(model: str, rows: list[Any]) -> str:
+    """Parameters of the chosen model."""
+    body = [
         [name, f"{value:.4g}", f"± {error:.1g}" if error > 0.0 else "—", unit]
-        for name, value, error, unit in found["table"]
+        for name, value, error, unit in rows
     ]
-    models = [
+    return table(model, ["parameter", "value", "standard error", "unit"], body)
+
+
+def models(candidates: list[dict[str, Any]]) -> str:
+    """Errors of all kinds."""
+    body = [
         [
-            f"▸ {item['name']}" if item["best"] else item["name"],
-            f"{item['parameters']}",
-            f"{item['held_out']['rms_um']:.3f}",
-            f"{item['held_out']['max_um']:.2f}",
+            f"▸ {item['label']}" if item["chosen"] else item["label"], f"{item['parameters']}",
+            *(f"{item[name]:.3f}" for name in ("cross_validated_um", "ahead_um")),
+            f"{item['held_out']['rms_um']:.3f}", f"{item['held_out']['max_um']:.2f}",
         ]
-        for item in document["choice"]["candidates"]
-    ]
-    return {
-        "numbers": "".join(f".. |recording {name}| replace:: {value}\n" for name, value in values.items()),
-        "parameters": table("Coleman-Hodgdon model", ["parameter", "value", "error", "unit"], parameters),
-        "advice": "".join(f"- {sentence}\n" for sentence in found["advice"]),
-        "models": table(
-            "Free-running error, held-out half [µm]", ["model", "parameters", "rms", "largest"], models
-        ),
-        "reason": f"{document['choice']['reason']}\n",
-    }
+        for item in candidates
+    ]  # fmt: skip
+    heading = ["model", "parameters", "blocks", "ahead", "held out", "held out, largest"]
+    return table("Free-running error [µm], rms but for the last column", heading, body)
 
 
 if __name__ == "__main__":

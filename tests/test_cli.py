@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,9 @@ from typer.testing import CliRunner, Result
 
 from piezoest import signals
 from piezoest.cli import app
-from piezoest.models import ColemanHodgdon
+from piezoest.cli.shared import Shown, progress
+from piezoest.fitting import FORMS
+from piezoest.models import ColemanHodgdon, LearntModel, PrandtlIshlinskii
 from piezoest.records import Record, read_record, write_columns
 
 RATE = 1000.0
@@ -100,6 +103,9 @@ def test_identify_prints_tables_and_writes_figure_and_model(log: Path) -> None:
         "µm/V²",
         "held out",
         "straight line",
+        "▸ Coleman-Hodgdon",
+        "plays, asymmetric, creep",
+        "less than a straight line",
         "Ljung-Box",
         "log_identified.png",
         "model.json",
@@ -107,6 +113,95 @@ def test_identify_prints_tables_and_writes_figure_and_model(log: Path) -> None:
         assert word in result.stdout
     assert Path("log_identified.png").stat().st_size > 10_000
     assert json.loads(Path("model.json").read_text(encoding="utf-8"))["model"]["model"] == "ColemanHodgdon"
+
+
+def test_tables_of_an_identification_fit_80_columns(log: Path) -> None:
+    Path("a_log_of_another_day_with_a_rather_long_name_that_does_not_fit_a_terminal.csv").write_bytes(
+        log.read_bytes()
+    )
+    for arguments in (("example", "--validate", *Path.cwd().glob("a_log*")), ("example", "--stream")):
+        result = CliRunner().invoke(
+            app, ["identify", *map(str, arguments), "--no-plot"], env={"COLUMNS": "80"}
+        )
+        assert result.exit_code == 0
+        drawn = [line for line in result.stdout.splitlines() if line[:1] in "┏┃┡│└"]
+        assert len(drawn) > 15
+        assert max(map(len, drawn)) <= 80
+        assert "…" not in result.stdout
+        assert "▸ plays, asymmetric" in result.stdout
+
+
+def test_identify_one_kind(log: Path) -> None:
+    data = json.loads(run("identify", log, "--model", "plays", "--json", "--no-plot").stdout)
+    assert data["kind"] == "plays"
+    assert [each["name"] for each in data["candidates"]] == ["line", "plays"]
+    refused(run("identify", log, "--model", "play"), "--model", "got play", *FORMS)
+    said = run("identify", "--help").stdout
+    assert all(name in said for name in FORMS)
+
+
+def test_identify_predicts_other_logs(log: Path) -> None:
+    record = read_record(log)
+    Record.from_arrays(record.voltage, record.displacement + 0.5, RATE).write("other.csv")
+    options = ("--no-plot", "--validate", "other.csv", "--validate", log)
+    result = run("identify", log, *options)
+    assert result.exit_code == 0
+    assert "other.csv" in result.stdout
+    other, same = json.loads(run("identify", log, *options, "--json").stdout)["validation"]
+    assert (other["source"], same["source"]) == ("other.csv", str(log))
+    assert other["error"]["rms_um"] == pytest.approx(0.5, rel=0.01)
+    assert other["without_mean"]["rms_um"] < 3e-3
+    assert same["error"]["rms_um"] < 3e-3
+    refused(run("identify", log, "--no-plot", "--validate", "none.csv"), "none.csv", "No such file")
+    refused(run("identify", log, "--validate", "other.csv", "-o", "other.csv"), "other.csv", "named twice")
+
+
+def test_strict_refuses_a_doubtful_log(log: Path) -> None:
+    record = read_record(log)
+    # Mirrored about a line of 0.15 µm/V, the loop runs clockwise.
+    mirrored = 0.3 * record.voltage - record.displacement
+    Record.from_arrays(record.voltage, mirrored, RATE).write("odd.csv")
+    assert run("identify", "odd.csv", "--no-plot").exit_code == 0
+    refused(run("identify", "odd.csv", "--no-plot", "--strict"), "clockwise")
+    assert run("identify", log, "--no-plot", "--strict").exit_code == 0
+
+
+def test_stream_refuses_what_needs_the_whole_log(log: Path) -> None:
+    for options in (("--model", "plays"), ("--validate", log), ("--strict",), ("--plot", "figure.png")):
+        refused(run("identify", log, "--stream", *options), options[0], "leave out --stream")
+
+
+def test_progress_shows_steps_and_how_much_of_each_is_done(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    done: list[tuple[int, int]] = []
+    monkeypatch.setattr(Shown, "__call__", lambda self, words: said.append(words))
+    monkeypatch.setattr(Shown, "done", lambda self, *much: done.append(much))
+    assert run("identify", log, "--stream").exit_code == 0
+    passes = [total for part, total in done if part == total]
+    # The column of time, and the prediction; the two passes between them end with the fitted part.
+    assert len(passes) >= 2
+    assert all(0 < part <= total for part, total in done)
+    assert [words for words in said if "predict" in words or "fitting" in words]
+    done.clear()
+    said.clear()
+    assert run("identify", log, "--no-plot").exit_code == 0
+    assert [words for words in said if words.startswith("fitting")] == [
+        f"fitting {form.label}" for form in FORMS.values()
+    ]
+    assert not done
+
+
+def test_a_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    with progress("loading", bar=True) as shown:
+        shown("reading")
+        shown.done(3, 4)
+        time.sleep(0.3)
+    said = capsys.readouterr().err
+    assert "reading" in said
+    assert "75%" in said
 
 
 def test_identify_json_is_all_there_is_on_stdout(log: Path) -> None:
@@ -146,6 +241,27 @@ def test_identified_model_goes_into_compensate(log: Path, reference: Path) -> No
     u = read_record("voltage.csv", columns={"displacement": "reference_um"})
     x = model.simulate(u.voltage) - model.offset
     np.testing.assert_allclose(x, u.displacement, atol=1e-6)
+
+
+@pytest.mark.parametrize("options", [("--model", "auto"), ("--model", "plays-creep"), ("--stream",)])
+def test_plays_go_into_compensate_with_their_ranges(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("identify", "example", "--no-plot", "-o", "model.json", *options).exit_code == 0
+    learnt = LearntModel.read("model.json")
+    assert isinstance(learnt.model, PrandtlIshlinskii)
+    assert learnt.learnt_on is not None
+    for amplitude, words in ((12.0, ()), (30.0, ("the displacement goes from", "the voltage goes from"))):
+        r = signals.sine(amplitude, 1.0, periods=5, sample_rate=200.0)
+        write_columns("reference.csv", {"time_s": r.time, "reference_um": r.values - 96.0})
+        result = run("compensate", "reference.csv", "-p", "model.json", "-o", "voltage.csv")
+        assert result.exit_code == 0
+        assert all(word in result.stderr for word in words)
+        assert bool(result.stderr) == bool(words)
+        u = read_record("voltage.csv", columns={"displacement": "reference_um"})
+        x = learnt.model.simulate(u.voltage, sample_rate=200.0)
+        np.testing.assert_allclose(x, u.displacement, atol=1e-3)
 
 
 @pytest.mark.parametrize("name", ["voltage.mat", "voltage.npy"])

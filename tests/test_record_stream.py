@@ -206,3 +206,44 @@ def test_memory_does_not_grow_with_the_file(tmp_path: Path, kind: str) -> None:
         tracemalloc.stop()
     assert total == pytest.approx(float(np.sin(np.arange(n) / 50_000.0).sum()), rel=1e-6)
     assert peak < (3_000_000 if kind == "csv" else size / 10)
+
+
+def test_steps_and_how_much_of_each_is_done(tmp_path: Path) -> None:
+    time, voltage, displacement = swing(3000)
+    np.save(tmp_path / "log.npy", np.column_stack([time, voltage, displacement]))
+    said: list[str] = []
+    done: list[tuple[str, int, int]] = []
+
+    def progress(part: int, total: int) -> None:
+        done.append((said[-1], part, total))
+
+    log = stream_record(tmp_path / "log.npy", rows=100)
+    pz.identify_stream(log, progress=progress, say=said.append)
+    passes = {words: [part for named, part, _ in done if named == words] for words in said}
+    lengths = [len(parts) for parts in passes.values() if parts]
+    assert len(lengths) == 3
+    assert all(parts == sorted(parts) for parts in passes.values())
+    assert all(part <= total for _, part, total in done)
+    assert done[-1][1] == done[-1][2]
+
+
+def test_streams_that_show_nothing_are_refused(tmp_path: Path) -> None:
+    time, voltage, displacement = swing(3000)
+    np.save(tmp_path / "log.npy", np.column_stack([time, 0.0 * voltage, displacement]))
+    with pytest.raises(ValueError, match="too little excitation"):
+        pz.identify_stream(stream_record(tmp_path / "log.npy"))
+    np.save(tmp_path / "log.npy", np.column_stack([time, voltage, -displacement]))
+    with pytest.raises(ValueError, match="change the sign"):
+        pz.identify_stream(stream_record(tmp_path / "log.npy"))
+    with pytest.raises(ValueError, match="log must be a RecordStream, got str"):
+        pz.identify_stream("log.npy")  # type: ignore[arg-type]
+    np.save(tmp_path / "log.npy", np.column_stack([time, voltage, np.nan * displacement]))
+    with pytest.raises(ValueError, match="usable"):
+        pz.identify_stream(stream_record(tmp_path / "log.npy"))
+
+
+def test_recording_of_a_real_stage(data_dir: Path) -> None:
+    file = data_dir / "discrete_backlash_operator" / "test_1hz.csv"
+    found = pz.identify_stream(stream_record(file, rows=1000))
+    assert found.held_out.rms < 0.45
+    assert found.line_held_out.rms > 1.2

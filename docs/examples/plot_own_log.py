@@ -2,8 +2,8 @@
 A recorded log
 ==============
 
-From a file that another program wrote to a compensated stage: columns and units named, a model with
-standard errors, and its inverse tried on the stage that was recorded.
+From a file that another program wrote to a compensated stage: columns and units named, a model and how far
+to trust it, and its inverse tried on the stage that was recorded.
 """
 
 import tempfile
@@ -36,7 +36,7 @@ record = pz.read_record(
 print(*record.notes, sep="\n")
 
 # %%
-# The first half is fitted, the second is predicted from the voltage alone.
+# The first half is fitted, with models of all kinds; the second is predicted from the voltage alone.
 
 found = pz.identify(record)
 print(found)
@@ -46,7 +46,10 @@ loop.plot(record.voltage, record.displacement, color="0.7", lw=2, label="measure
 loop.plot(record.voltage, found.prediction, lw=0.7, label="model, from the voltage alone")
 loop.set(xlabel="voltage [V]", ylabel="displacement [µm]")
 loop.legend()
+predicted = found.predict()
+half = 0.5 * (predicted.upper - predicted.lower)
 series.plot(record.time, found.residual, color="C3", lw=0.6)
+series.fill_between(record.time, -half, half, color="C0", alpha=0.2, lw=0, label="95 of 100 readings")
 series.axvspan(record.time[found.trained], record.time[-1], color="C1", alpha=0.15, lw=0, label="held out")
 series.set(xlabel="time [s]", ylabel="measured − model [µm]")
 series.legend()
@@ -57,7 +60,7 @@ series.legend()
 r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=4, sample_rate=fs)
 for name, compensator in {
     "straight line": pz.LinearCompensator(pz.LinearGain(found.line.gain)),
-    "inverse": pz.InverseCompensator(pz.ColemanHodgdon(*found.model.theta)),
+    "inverse": pz.InverseCompensator(found.model),
 }.items():
     record = pz.track(r, stage=pz.PaperStage(fs, seed=1), compensator=compensator)
     print(f"{name:>14}: {record.max_error(last_periods=2):.3f} µm")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.console import Console
@@ -13,7 +13,10 @@ from rich.console import Console
 from piezoest._errors import errors
 from piezoest._files import save_figure, write_text
 from piezoest._options import grouped
-from piezoest.cli.shared import Debug, check_figure, check_outputs, progress
+from piezoest.cli.shared import Debug, Shown, check_figure, check_outputs, progress
+
+if TYPE_CHECKING:
+    from piezoest.identification import Identification, StreamedIdentification
 
 EPILOG = "Example: piezoest identify log.csv --columns voltage=drive_mV,displacement=3 --output model.json"
 
@@ -42,10 +45,18 @@ class Reading:
         bool,
         typer.Option(
             "--stream",
-            help="Read in blocks and learn recursively, for files larger than memory: text, LabVIEW, TDMS, "
+            help="Read in blocks, in three passes, for files larger than memory: text, LabVIEW, TDMS, "
             "Parquet, HDF5, MATLAB 7.3, .npy.",
         ),
     ] = False
+
+    def options(self) -> dict[str, Any]:
+        """Keyword arguments of `read_record` and `stream_record`."""
+        return {
+            "columns": _pairs("--columns", "voltage=u,displacement=3", self.columns),
+            "units": _pairs("--units", "voltage=mV,displacement=nm", self.units),
+            "sample_rate": self.sample_rate,
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,12 +65,22 @@ class Fitting:
 
     model: Annotated[
         str,
-        typer.Option(help="coleman-hodgdon, or auto: compare models of all kinds and say which to use."),
-    ] = "coleman-hodgdon"
+        typer.Option(
+            help="auto: compare models of all kinds, use the best and say why. Or one kind: line, "
+            "coleman-hodgdon, plays, plays-creep, plays-asymmetric, plays-asymmetric-creep."
+        ),
+    ] = "auto"
     train: Annotated[float, typer.Option(help="Part to fit, from the start; the rest is held out.")] = 0.5
     delay: Annotated[
         str, typer.Option(help="Samples by which the displacement lags the voltage, or auto.")
     ] = "auto"
+    validate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE", help="Another log of the stage, for the model to predict; may be given again."
+        ),
+    ] = None
+    strict: Annotated[bool, typer.Option("--strict", help="Refuse a log that looks wrong.")] = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,42 +117,23 @@ def identify(
 ) -> None:
     """Learn a model from a recorded log, and say how far to trust it.
 
-    Columns and units are guessed from a header such as time_s,voltage_V,displacement_um.
+    Models of several kinds are compared on blocks of the log that the fit left out. Columns and units are
+    guessed from a header such as time_s,voltage_V,displacement_um.
     """
     with errors(debug):
-        if fitting.model not in ("coleman-hodgdon", "auto"):
-            raise ValueError(f"--model must be coleman-hodgdon or auto, got {fitting.model}")
-        if reading.stream and (fitting.model == "auto" or out.plot is not None):
-            other = "--model auto" if fitting.model == "auto" else "--plot"
-            raise ValueError(
-                f"{other} needs the whole log in memory: leave out --stream, or draw with --html"
-            )
+        if reading.stream:
+            _check_streamed(fitting, out)
         figure = None if out.no_plot or reading.stream else out.plot or Path(f"{file.stem}_identified.png")
+        read = (file, *(fitting.validate or ()))
         if figure is not None:
-            check_figure(figure, keep=(file,))
-        check_outputs(out.output, out.html, keep=(file,) if figure is None else (file, figure))
-        with progress("loading (compiles once after the installation)") as say:
-            from piezoest import records
-            from piezoest.identification import choose_model, identify_stream
-            from piezoest.identification import identify as run
-
-            say(f"reading {file.name}")
-            read: Any = records.stream_record if reading.stream else records.read_record
-            record = read(
-                records.example_log() if str(file) == "example" and not file.exists() else file,
-                columns=_pairs("--columns", "voltage=u,displacement=3", reading.columns),
-                units=_pairs("--units", "voltage=mV,displacement=nm", reading.units),
-                sample_rate=reading.sample_rate,
-            )
-            say("fitting")
-            lag: Any = "auto" if fitting.delay == "auto" else _number("--delay", fitting.delay)
-            fit: Any = identify_stream if reading.stream else choose_model if fitting.model == "auto" else run
-            found = fit(record, train=fitting.train, delay=lag)
+            check_figure(figure, keep=read)
+        check_outputs(out.output, out.html, keep=read if figure is None else (*read, figure))
+        with progress("loading (compiles once after the installation)", bar=reading.stream) as say:
+            found: Any = (_streamed if reading.stream else _identified)(file, reading, fitting, say)
+            say("drawing")
             if figure is not None:
-                say("drawing")
                 save_figure(found.plot(), figure, dpi=130)
             if out.html is not None:
-                say("drawing")
                 from piezoest.report import write_report
 
                 write_report(found, out.html)
@@ -140,12 +142,67 @@ def identify(
         if out.as_json:
             typer.echo(json.dumps(found.to_dict(), indent=2, allow_nan=False))
             return
-        from piezoest.identification.terminal import print_choice, print_identification
+        from piezoest.identification.terminal import print_identification
 
-        (print_choice if fitting.model == "auto" else print_identification)(found, Console())
+        print_identification(found, Console())
         for name, path in (("Figure", figure), ("Report", out.html), ("Model", out.output)):
             if path is not None:
                 typer.echo(f"{name}: {path}")
+
+
+def _check_streamed(fitting: Fitting, out: Output) -> None:
+    """Refuse what needs the whole log in memory."""
+    asked = {
+        f"--model {fitting.model}": fitting.model != "auto",
+        "--validate": bool(fitting.validate),
+        "--strict": fitting.strict,
+        "--plot": out.plot is not None,
+    }
+    for option, given in asked.items():
+        if given:
+            way_out = ", or draw with --html" if option == "--plot" else ""
+            raise ValueError(f"{option} needs the whole log in memory: leave out --stream{way_out}")
+
+
+def _identified(file: Path, reading: Reading, fitting: Fitting, say: Shown) -> Identification:
+    """Read logs as a whole, and identify the first."""
+    from piezoest.fitting import FORMS
+    from piezoest.identification import identify as run
+    from piezoest.records import read_record
+
+    if fitting.model not in ("auto", *FORMS):
+        raise ValueError(f"--model must be auto or one of {', '.join(FORMS)}, got {fitting.model}")
+    delay = _delay(fitting.delay)
+    say(f"reading {file.name}")
+    logs = (file, *(fitting.validate or ()))
+    record, *others = (read_record(_named(each), **reading.options()) for each in logs)
+    return run(
+        record,
+        model=fitting.model,
+        train=fitting.train,
+        delay=delay,
+        validate=others,
+        strict=fitting.strict,
+        say=say,
+    )
+
+
+def _streamed(file: Path, reading: Reading, fitting: Fitting, say: Shown) -> StreamedIdentification:
+    """Identify a log block by block."""
+    from piezoest.identification import identify_stream
+    from piezoest.records import stream_record
+
+    delay = _delay(fitting.delay)
+    say(f"reading the times of {file.name}")
+    log = stream_record(_named(file), progress=say.done, **reading.options())
+    return identify_stream(log, train=fitting.train, delay=delay, progress=say.done, say=say)
+
+
+def _named(file: Path) -> Path:
+    """The file; by the word example, where there is none of that name, the log that comes with piezoest."""
+    from piezoest.records import example_log
+
+    return example_log() if str(file) == "example" and not file.exists() else file
 
 
 def _pairs(option: str, example: str, text: str | None) -> dict[str, str] | None:
@@ -158,8 +215,10 @@ def _pairs(option: str, example: str, text: str | None) -> dict[str, str] | None
     return {name.strip(): value.strip() for name, _, value in pairs}
 
 
-def _number(name: str, text: str) -> float:
+def _delay(text: str) -> float | Literal["auto"]:
+    if text == "auto":
+        return "auto"
     try:
         return float(text)
     except ValueError:
-        raise ValueError(f"{name} must be a number or auto, got {text!r}") from None
+        raise ValueError(f"--delay must be a number of samples or auto, got {text!r}") from None

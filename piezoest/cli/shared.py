@@ -3,31 +3,58 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+
+from piezoest import _extras
 
 FIGURE_FORMATS = (".png", ".pdf", ".svg", ".jpg", ".jpeg")
 
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 
 
+class Shown:
+    """What a command is doing: called with a few words at each step, and with how much of it is done."""
+
+    def __init__(self, progress: Any = None, text: str = "") -> None:
+        self._progress = progress
+        self._task = None if progress is None else progress.add_task(text, total=None)
+
+    def __call__(self, words: str) -> None:
+        """Begin a step, of which nobody knows yet how long it takes."""
+        if self._progress is not None:
+            self._progress.reset(self._task, total=None, description=words)
+
+    def done(self, done: int, total: int) -> None:
+        """Say how much of the step is done."""
+        if self._progress is not None:
+            self._progress.update(self._task, completed=done, total=total)
+
+
 @contextlib.contextmanager
-def progress(text: str) -> Iterator[Callable[[str], None]]:
-    """A spinner on stderr, if that is a terminal; yields a function that changes its text."""
+def progress(text: str, *, bar: bool = False) -> Iterator[Shown]:
+    """A spinner on stderr, if that is a terminal, with a bar for steps of which the length is known."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield lambda _: None
+        yield Shown()
         return
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        SpinnerColumn,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+    )
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task(text, total=None)
-        yield lambda said: progress.update(task, description=said)
+    length = (BarColumn(), TaskProgressColumn()) if bar else ()
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), *length, TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as shown:
+        yield Shown(shown, text)
 
 
 def check_figure(path: Path, keep: tuple[Path, ...] = ()) -> None:
@@ -38,7 +65,7 @@ def check_figure(path: Path, keep: tuple[Path, ...] = ()) -> None:
 
 
 def check_outputs(output: Path | None, html: Path | None, keep: tuple[Path, ...]) -> None:
-    """Refuse what cannot be written, and a report by a name that no browser opens, or without plots."""
+    """Refuse what cannot be written, and a report by a name that no browser opens, or without plotly."""
     if output is not None:
         check_writable(output, keep)
         keep = (*keep, output)
@@ -46,6 +73,7 @@ def check_outputs(output: Path | None, html: Path | None, keep: tuple[Path, ...]
         if html.suffix.lower() not in (".html", ".htm"):
             raise ValueError(f"{html}: a report's name must end in .html")
         check_writable(html, keep)
+        _extras.load("plotly", "report", "an HTML report")
 
 
 def check_writable(path: Path, keep: tuple[Path, ...] = ()) -> None:

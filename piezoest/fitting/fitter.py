@@ -51,7 +51,8 @@ class Fit:
     parameters : int
         How many were fitted; slopes at their bound do not count.
     standard_errors : dict of str to float
-        Of the parameters that were estimated, by their names; honest for residuals that are not white.
+        Of the parameters that were estimated, by their names, in their units; honest for residuals that are
+        not white.
     delay : float
         Samples by which the displacement lags the voltage.
     delay_estimated : bool
@@ -193,7 +194,7 @@ def fit(
         Spikes, dropouts and jumps; by default they are looked for.
     settle : float, optional
         Seconds to leave out at the start; by default as long as it is off by more than four robust standard
-        deviations, at most a tenth.
+        deviations, at most a fifth.
 
     Returns
     -------

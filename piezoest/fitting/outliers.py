@@ -12,8 +12,9 @@ from piezoest._checks import FloatArray
 UNSETTLED, LONGEST_UNSETTLED = 4.0, 0.2
 # It is over once so many samples, and so large a fraction of all, are quiet but for a few.
 QUIET, QUIET_PART, RARE = 10, 0.02, 0.05
-# A sample is a spike that is off from its neighbours' median by this many robust standard deviations.
-SPIKE, NEIGHBOURS = 8.0, 7
+# A sample is a spike that is off from its neighbours by this many robust standard deviations, and this many
+# times as far as the nearest two are: about a kink they are half as far as the sample itself.
+SPIKE, ALONE = 8.0, 3.0
 # Standard deviation of a normal distribution whose median is one from zero.
 NORMAL = 1.4826
 
@@ -34,14 +35,18 @@ def unsettled(residual: FloatArray) -> int:
 
 
 def lonely(residual: FloatArray) -> Any:
-    """Which samples are far from the median of those about them, shape (N,)."""
+    """Which samples alone are far from those about them, shape (N,); neither slopes nor kinks count."""
     from scipy.ndimage import median_filter
 
     known = np.flatnonzero(np.isfinite(residual))
     found = np.zeros(residual.size, bool)
     values = residual[known]
-    apart = np.abs(values - median_filter(values, NEIGHBOURS, mode="nearest"))
+    # Half-way between the medians of the three before and of the three after: a slope cancels.
+    medians = np.pad(median_filter(values, 3, mode="nearest"), 2, mode="edge")
+    apart = np.abs(values - 0.5 * (medians[:-4] + medians[4:]))
     deviation = NORMAL * float(np.median(apart))
+    beside = np.pad(apart, 1)
+    beside = np.maximum(beside[:-2], beside[2:])
     if deviation > 0.0:
-        found[known] = apart > SPIKE * deviation
+        found[known] = (apart > SPIKE * deviation) & (apart > ALONE * beside)
     return found

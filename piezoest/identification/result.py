@@ -13,6 +13,7 @@ from piezoest._checks import FloatArray
 from piezoest.fitting import Fit, Prediction
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
+from piezoest.fitting.regression import Fitted
 from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.sense import Finding
 from piezoest.models import LearntOn, Model
@@ -39,6 +40,11 @@ def parameter_rows(model: Any, delay: float, errors: dict[str, float]) -> list[R
         values.append((f"sum of {len(weights)} weights", float(sum(value for _, value in weights)), "µm/V"))
     values += [("offset", model.offset, "µm"), ("delay", delay, "samples")]
     return [(name, value, errors.get(name, 0.0), unit) for name, value, unit in values]
+
+
+def left_out_error(fitted: Fit | Fitted) -> float:
+    """Geometric mean of a fit's errors on blocks between others, and on blocks behind all others [µm rms]."""
+    return float(np.sqrt(fitted.held_out * fitted.ahead))
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +92,12 @@ class Candidate:
 
     @property
     def cross_validated(self) -> float:
-        """Error on blocks of the fitted part that were left out of the fit [µm rms]."""
-        return self.fit.held_out
+        """Error on blocks of the fitted part that were left out of the fit [µm rms]: it decides.
+
+        Geometric mean of the errors on blocks between others, and on blocks behind all others. Of what
+        follows a log, the latter says more; the former is surer.
+        """
+        return left_out_error(self.fit)
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe dictionary of the figures."""
@@ -95,6 +105,7 @@ class Candidate:
             "name": self.name,
             "parameters": self.parameters,
             "cross_validated_um": self.cross_validated,
+            "between_um": self.fit.held_out,
             "ahead_um": self.fit.ahead,
             "train": self.train.to_dict(),
             "held_out": self.held_out.to_dict(),

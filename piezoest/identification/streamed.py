@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -19,7 +20,7 @@ from piezoest.identification.data import check_excitation, noise_of, prepare
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.parts import Part, Progress, parts, pieces
 from piezoest.identification.residual import Misfit
-from piezoest.identification.result import Row, parameter_rows
+from piezoest.identification.result import Row, left_out_error, parameter_rows
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record, RecordStream
 
@@ -121,6 +122,7 @@ def identify_stream(
     train: float = 0.5,
     delay: float | Literal["auto"] = "auto",
     progress: Progress | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> StreamedIdentification:
     """Identify a model from a log that need not fit in memory.
 
@@ -138,7 +140,10 @@ def identify_stream(
         Samples by which the displacement lags the voltage, 0 to 10; ``"auto"`` looks for it in the first
         50 000 samples, where they can tell it from the width of the loop.
     progress : callable, optional
-        Called with what is done and what there is, in each of three passes over the log.
+        Called with what is done and what there is, in each of three passes over the log; the first two
+        end with the fitted part.
+    say : callable, optional
+        Called with a few words before each pass.
 
     Returns
     -------
@@ -152,8 +157,11 @@ def identify_stream(
     if not isinstance(log, RecordStream):
         raise ValueError(f"log must be a RecordStream, got {type(log).__name__}: use stream_record(path)")
     train = fraction("train", train, 0.1, 0.9)
+    say = say or (lambda words: None)
+    say("counting samples")
     samples = log.count()
     trained = round(train * samples)
+    say("looking at the log")
     survey = _Survey(log, trained, progress)
     head = survey.head
     if int(np.sum(head.usable)) < FEWEST_SAMPLES:
@@ -168,15 +176,18 @@ def identify_stream(
     if delay != "auto":
         wanted = fraction("delay", finite("delay", delay), 0.0, LONGEST_DELAY)
     fitter = Fitter(head.voltage, head.displacement, sample_rate=log.sample_rate, delay=wanted)
+    say("fitting plays")
     fits = _fits(log, survey, fitter, trained, progress)
-    chosen = list(fits)[simplest(list(fits.values()))]
+    missed = {name: left_out_error(fit) for name, fit in fits.items()}
+    chosen = list(fits)[simplest(list(missed.values()))]
     judge = _Judge(fits[chosen], fits["line"], samples, slice(fitter.left_out, trained))
+    say("predicting the whole log")
     for part in parts(log, fitter.delay, progress):
         judge.add(part)
     found = StreamedIdentification(
         model=_model(fits[chosen]),
         chosen=chosen,
-        cross_validated={name: fit.held_out for name, fit in fits.items()},
+        cross_validated=missed,
         delay=fitter.delay,
         train=judge.misfit(held_out=False),
         held_out=judge.misfit(held_out=True),

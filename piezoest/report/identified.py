@@ -10,23 +10,36 @@ import numpy as np
 from piezoest import _extras
 from piezoest._checks import FloatArray
 from piezoest._version import __version__
-from piezoest.identification.choice import ModelChoice
+from piezoest.identification.compared import (
+    Compared,
+    Found,
+    compared,
+    label_of,
+    log_sentence,
+    parameter_cells,
+    reason_sentence,
+    remarks,
+    residual_sentence,
+    validation_cells,
+)
 from piezoest.identification.data import prepare, turning_voltages
-from piezoest.identification.residual import Misfit, autocorrelation
+from piezoest.identification.residual import autocorrelation
 from piezoest.identification.result import Identification
 from piezoest.identification.streamed import StreamedIdentification
-from piezoest.identification.terminal import remarks, residual_sentence
 from piezoest.records import Record
 from piezoest.report.page import BLUE, GREEN, GREY, ORANGE, RED, Page, extremes, short, thin
 
+# It is straight, but for a bend where the fitted part ends.
+BAND_POINTS, BAND = 400, "rgba(31, 95, 168, 0.13)"
 
-def write_report(found: Identification | ModelChoice | StreamedIdentification, path: str | Path) -> None:
+
+def write_report(found: Found, path: str | Path) -> None:
     """Write what was identified as one page of HTML that needs no network.
 
     Parameters
     ----------
-    found : Identification, ModelChoice or StreamedIdentification
-        From `identify`, `choose_model` or `identify_stream`.
+    found : Identification or StreamedIdentification
+        From `identify` or `identify_stream`.
     path : str or Path
         File to write; an existing one is replaced.
 
@@ -39,51 +52,69 @@ def write_report(found: Identification | ModelChoice | StreamedIdentification, p
     OSError
         If the file cannot be written.
     """
-    match found:
-        case ModelChoice():
-            page = _choice_page(found)
-        case Identification() | StreamedIdentification():
-            page = _page(f"{Path(found.source).name}: what was identified", found)
-        case _:
-            raise ValueError(
-                f"found must come from identify, choose_model or identify_stream, got {type(found).__name__}"
-            )
+    if not isinstance(found, Identification | StreamedIdentification):
+        raise ValueError(f"found must come from identify or identify_stream, got {type(found).__name__}")
+    page = Page(f"{Path(found.source).name}: what was identified", log_sentence(found))
+    page.cards(_cards(found))
+    _add_kinds(page, found)
+    _add_parameters(page, found)
+    _add_advice(page, found)
+    record, _ = _drawn(found)
+    _add_loops(page, found, record)
+    _add_residual(page, found, record)
+    _add_excitation(page, found, record)
+    page.footer(f"piezoest {__version__}. Source: {found.source}")
     page.write(path)
 
 
-def _page(title: str, found: Identification | StreamedIdentification) -> Page:
-    page = Page(title, _what(found))
-    page.cards(_cards(found.held_out, found.line_held_out))
-    _add_sections(page, found)
-    return page
-
-
-def _what(found: Identification | StreamedIdentification) -> str:
-    return (
-        f"{found.samples} samples at {found.sample_rate:.6g} Hz; the first {found.trained} fitted, "
-        f"the other {found.samples - found.trained} held out"
-    )
-
-
-def _cards(held: Misfit, line: Misfit) -> list[tuple[str, str]]:
+def _cards(found: Found) -> list[tuple[str, str]]:
+    held, line = found.held_out.rms, found.line_held_out.rms
     cards = [
-        (f"{held.rms:.3g} µm", "free-running error, held out, rms"),
-        (f"{held.max:.3g} µm", "the same, largest"),
+        (label_of(found), "the model to use"),
+        (f"{held:.3g} µm", "free-running error, held out, rms"),
+        (f"{found.held_out.max:.3g} µm", "the same, largest"),
     ]
-    less = 100.0 * (1.0 - held.rms / line.rms)
-    return [*cards, (f"{less:.0f} %", f"less than a straight line ({line.rms:.3g} µm rms)")]
+    if found.chosen == "line" or line == 0.0:
+        return cards
+    share = 100.0 * (1.0 - held / line)
+    than = f"than a straight line ({line:.3g} µm rms)"
+    return [*cards, (f"{abs(share):.0f} %", f"{'less' if share >= 0.0 else 'more'} {than}")]
 
 
-def _add_sections(page: Page, found: Identification | StreamedIdentification) -> None:
-    _add_parameters(page, found)
-    record, _ = _drawn(found)
-    _add_loops(page, found, record, found.prediction)
-    _add_residual(page, found, record, found.prediction)
-    _add_excitation(page, found, record)
-    page.footer(f"piezoest {__version__}. Source: {found.source}")
+def _add_kinds(page: Page, found: Found) -> None:
+    page.heading("Models of all kinds")
+    if reason := reason_sentence(found):
+        page.text(reason)
+    kinds = compared(found)
+    page.table(
+        ("free-running error [µm]", "parameters", "fitted\nrms", "blocks left out\nrms", "held out\nrms",
+         "held out\nlargest"),
+        [each.cells() for each in kinds],
+    )  # fmt: skip
+    page.plot(_errors_of(kinds), 160 + 32 * len(kinds))
 
 
-def _drawn(found: Identification | StreamedIdentification) -> tuple[Record, str]:
+def _errors_of(kinds: list[Compared]) -> Any:
+    """Errors as dots: a straight line's may be a thousand times those of the others."""
+    figure = _plotly("graph_objects").Figure()
+    for name, color, symbol, errors in (
+        ("fitted", GREY, "circle-open", [each.train and each.train.rms for each in kinds]),
+        ("blocks left out", BLUE, "diamond", [each.left_out for each in kinds]),
+        ("held out", ORANGE, "circle", [each.held_out and each.held_out.rms for each in kinds]),
+    ):
+        figure.add_scatter(
+            x=errors, y=[each.label for each in kinds], mode="markers", name=name,
+            marker={"color": color, "size": 11, "symbol": symbol, "line": {"width": 2, "color": color}},
+        )  # fmt: skip
+    chosen = next(k for k, each in enumerate(kinds) if each.chosen)
+    figure.add_hrect(y0=chosen - 0.5, y1=chosen + 0.5, fillcolor=BLUE, opacity=0.08, line_width=0)
+    # A category that comes first stands below the others otherwise.
+    figure.update_yaxes(range=[len(kinds) - 0.5, -0.5], type="category")
+    figure.update_xaxes(title_text="free-running error [µm rms]", type="log")
+    return figure
+
+
+def _drawn(found: Found) -> tuple[Record, str]:
     """Record that the figures show, and what a sample of it is."""
     match found:
         case StreamedIdentification():
@@ -92,38 +123,29 @@ def _drawn(found: Identification | StreamedIdentification) -> tuple[Record, str]
             return found.record, "samples"
 
 
-def _add_parameters(page: Page, found: Identification | StreamedIdentification) -> None:
+def _add_parameters(page: Page, found: Found) -> None:
     page.heading("Parameters")
-    page.tables(
+    tables: list[tuple[tuple[str, ...], list[tuple[str, ...]], str]] = [
         (
-            ("Coleman-Hodgdon", "value", "± standard error", "unit"),
-            [
-                (name, f"{value:.6g}", f"± {error:.2g}" if error > 0.0 else "not estimated", unit)
-                for name, value, error, unit in found.table()
-            ],
+            (label_of(found), "value", "± standard error", "unit"),
+            [tuple(row) for row in parameter_cells(found)],
             "",
-        ),
-        (
-            ("free-running error [µm]", "fitted, rms", "held out, rms", "held out, largest"),
-            [
-                (name, f"{fitted.rms:.4g}", f"{held.rms:.4g}", f"{held.max:.4g}")
-                for name, fitted, held in (
-                    ("model", found.train, found.held_out),
-                    ("straight line, same lag", found.line_train, found.line_held_out),
-                )
-            ],
-            "",
-        ),
-    )
-    sentences = remarks(found)
-    if sentences:
+        )
+    ]
+    if isinstance(found, Identification) and found.validations:
+        titles = ("other logs, predicted [µm]", "rms", "largest", "rms without mean")
+        tables.append((titles, validation_cells(found), ""))
+    page.tables(*tables)
+
+
+def _add_advice(page: Page, found: Found) -> None:
+    if sentences := remarks(found):
         page.heading("Advice")
         page.advice(sentences)
 
 
-def _add_loops(
-    page: Page, found: Identification | StreamedIdentification, record: Record, prediction: FloatArray
-) -> None:
+def _add_loops(page: Page, found: Found, record: Record) -> None:
+    prediction = found.prediction
     page.heading("Loops")
     page.text(
         "Displacement over voltage, and over time: what was measured, and the model, which sees only the "
@@ -156,9 +178,7 @@ def _add_loops(
     page.plot(figure, 440)
 
 
-def _add_residual(
-    page: Page, found: Identification | StreamedIdentification, record: Record, prediction: FloatArray
-) -> None:
+def _add_residual(page: Page, found: Found, record: Record) -> None:
     page.heading("Residual")
     page.text(
         "Measured displacement less the model's. "
@@ -168,7 +188,9 @@ def _add_residual(
         rows=1, cols=2, column_widths=[0.65, 0.35], horizontal_spacing=0.09,
         subplot_titles=("over time", "autocorrelation, fitted part"),
     )  # fmt: skip
-    residual = record.displacement - prediction
+    residual = _residual(found, record)
+    if isinstance(found, Identification):
+        _add_band(figure, found)
     t, y = extremes(record.time, residual)
     figure.add_scatter(
         x=t, y=y, mode="lines", line={"color": RED, "width": 1}, name="measured − model", row=1, col=1
@@ -194,7 +216,23 @@ def _add_residual(
     page.plot(figure, 380)
 
 
-def _add_excitation(page: Page, found: Identification | StreamedIdentification, record: Record) -> None:
+def _residual(found: Found, record: Record) -> FloatArray:
+    return found.residual if isinstance(found, Identification) else record.displacement - found.prediction
+
+
+def _add_band(figure: Any, found: Identification) -> None:
+    """Where the model expects readings, about its prediction."""
+    expected = found.predict()
+    t, below, above = thin(
+        found.record.time, expected.lower - expected.x, expected.upper - expected.x, points=BAND_POINTS
+    )
+    figure.add_scatter(
+        x=np.concatenate([t, t[::-1]]), y=np.concatenate([below, above[::-1]]), mode="lines", fill="toself",
+        line={"width": 0}, fillcolor=BAND, name="95 of 100 readings, as expected", row=1, col=1,
+    )  # fmt: skip
+
+
+def _add_excitation(page: Page, found: Found, record: Record) -> None:
     page.heading("Excitation")
     data = prepare(record.voltage, record.displacement)
     turns = turning_voltages(data)
@@ -248,57 +286,3 @@ def _mark_held_out(figure: Any, found: Any, record: Record, row: int, col: int) 
 
 def _plotly(module: str) -> Any:
     return _extras.load(f"plotly.{module}", "report", "an HTML report")
-
-
-# ---------------------------------------------------------------- models of all kinds
-
-
-def _choice_page(found: ModelChoice) -> Page:
-    base, best = found.base, found.best
-    page = Page(f"{Path(base.source).name}: which model", _what(base))
-    page.cards([(best.name, "to be used"), *_cards(best.held_out, base.line_held_out)])
-    page.heading("Models of all kinds")
-    page.text(found.reason)
-    page.table(
-        ("model", "parameters", "fitted rms [µm]", "held out rms [µm]", "held out largest [µm]", "BIC"),
-        [
-            (
-                f"{'▸ ' if item is best else ''}{item.name}",
-                f"{item.parameters}",
-                *(f"{value:.4g}" for value in (item.train.rms, item.held_out.rms, item.held_out.max)),
-                f"{item.bic:.0f}",
-            )
-            for item in found.candidates
-        ],
-    )
-    page.plot(_bars(found), 320)
-    page.plot(_residuals(found), 320)
-    page.heading("Of these, the Coleman-Hodgdon model")
-    _add_sections(page, base)
-    return page
-
-
-def _bars(found: ModelChoice) -> Any:
-    names = [item.name for item in found.candidates]
-    figure = _plotly("graph_objects").Figure()
-    for samples, color in (("train", GREY), ("held_out", BLUE)):
-        values = [getattr(item, samples).rms for item in found.candidates]
-        figure.add_bar(
-            y=names, x=values, orientation="h", marker_color=color,
-            name={"train": "fitted", "held_out": "held out"}[samples],
-        )  # fmt: skip
-    figure.update_yaxes(autorange="reversed")
-    figure.update_xaxes(title_text="free-running error [µm rms]")
-    return figure
-
-
-def _residuals(found: ModelChoice) -> Any:
-    figure = _plotly("graph_objects").Figure()
-    for item, color in ((found.candidates[0], GREY), (found.best, BLUE)):
-        t, y = extremes(found.base.record.time, item.residual)
-        figure.add_scatter(x=t, y=y, mode="lines", line={"color": color, "width": 1}, name=item.name)
-    settled = found.candidates[0].residual[max(found.base.left_out, found.base.samples // 50) :]
-    largest = 1.1 * float(np.nanmax(np.abs(settled)))
-    figure.update_yaxes(range=[-largest, largest], title_text="measured − model [µm]")
-    figure.update_xaxes(title_text="time [s]")
-    return figure

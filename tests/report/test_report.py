@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 import piezoest as pz
 from piezoest.cli import app
+from piezoest.fitting import FORMS
 from piezoest.report import Page, write_report
 from piezoest.report.page import extremes, thin
 from tests.browser import check_report, chromium, console_of
@@ -73,12 +74,16 @@ def test_page_is_sound_and_self_contained(found: pz.Identification, tmp_path: Pa
     assert "a &lt;stage&gt; &amp; its log.csv: what was identified" in text
     body = text.split("<body>")[1]
     for name, value, error, unit in found.table():
-        assert re.search(rf"<td>{name}</td><td>{value:.6g}</td>", body)
-        assert f"± {error:.2g}" in body or error == 0.0
+        assert re.search(rf"<td>{re.escape(name)}</td><td>{value:.6g}</td>", body) or abs(value) < 1e-9
+        assert f"<td>{error:.2g}</td>" in body or error == 0.0
         assert f"<td>{unit}</td>" in body
+    for item in found.candidates:
+        mark = "▸" if item is found.best else " "
+        assert f"<td>{mark} {item.label}</td><td>{item.parameters}</td><td>{item.train.rms:.3g}</td>" in body
+    assert found.reason in body
     for sentence in found.advice:
         assert sentence in body
-    for heading in ("Parameters", "Loops", "Residual", "Excitation"):
+    for heading in ("Models of all kinds", "Parameters", "Loops", "Residual", "Excitation"):
         assert f"<h2>{heading}</h2>" in body
     # Of which plotly's script is 4.8 MB.
     assert len(body) < 600_000
@@ -110,8 +115,30 @@ def test_thinning_keeps_peaks_and_order() -> None:
 
 
 def test_other_things_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="found must come from identify, choose_model or identify_stream"):
+    with pytest.raises(ValueError, match="found must come from identify or identify_stream, got str"):
         write_report("log.csv", tmp_path / "report.html")  # type: ignore[arg-type]
+
+
+def test_page_of_a_stream(streamed: pz.StreamedIdentification, tmp_path: Path) -> None:
+    write_report(streamed, tmp_path / "report.html")
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert Outline(text).open == []
+    body = text.split("<body>")[1]
+    assert f"▸ {FORMS[streamed.chosen].label}" in body
+    for name, error in streamed.cross_validated.items():
+        assert re.search(rf"{FORMS[name].label}</td><td></td><td>[^<]*</td><td>{error:.3g}</td>", body)
+    assert "95 of 100 readings" not in body
+    assert len(body) < 600_000
+
+
+def test_other_logs_are_on_the_page(record: pz.Record, tmp_path: Path) -> None:
+    moved = pz.Record.from_arrays(record.voltage, record.displacement + 0.5, RATE, "another <day>.csv")
+    found = pz.identify(record, model="coleman-hodgdon", delay=0.0, validate=[moved])
+    write_report(found, tmp_path / "report.html")
+    body = (tmp_path / "report.html").read_text(encoding="utf-8").split("<body>")[1]
+    judged = found.validations[0]
+    assert f"<td>another &lt;day&gt;.csv</td><td>{judged.error.rms:.3g}</td>" in body
+    assert f"<td>{judged.without_mean.rms:.3g}</td>" in body
 
 
 def test_command_writes_the_report(
@@ -136,8 +163,6 @@ def test_command_writes_the_report(
         assert words in result.stderr
     result = CliRunner().invoke(app, ["identify", "log.csv", "--stream", "--plot", "figure.png"])
     assert "leave out --stream" in result.stderr
-    result = CliRunner().invoke(app, ["identify", "log.csv", "--stream", "--model", "auto"])
-    assert "leave out --stream" in result.stderr
     result = CliRunner().invoke(app, ["identify", "log.csv", "--units", "voltage"])
     assert "--units must read like" in result.stderr
 
@@ -148,7 +173,9 @@ def test_missing_plotly_is_named(record: pz.Record, tmp_path: Path) -> None:
         "import sys; sys.modules['plotly'] = None\n"
         f"sys.argv = ['piezoest', 'identify', {str(tmp_path / 'log.csv')!r}, '--no-plot', '--delay', '0', "
         f"'--html', {str(tmp_path / 'report.html')!r}]\n"
-        "from piezoest.cli import main; main()"
+        "from piezoest.cli import main; import piezoest.records\n"
+        "def read(*_, **__): raise AssertionError('plotly must be missed before anything is read')\n"
+        "piezoest.records.read_record = read; main()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 1
@@ -161,27 +188,21 @@ def test_missing_plotly_is_named(record: pz.Record, tmp_path: Path) -> None:
 
 def test_identification_in_a_browser(found: pz.Identification, tmp_path: Path) -> None:
     write_report(found, tmp_path / "report_identify.html")
-    plots, text = check_report(tmp_path / "report_identify.html", plots=3)
+    plots, text = check_report(tmp_path / "report_identify.html", plots=4)
     titles = [title for plot in plots for title in plot["titles"]]
     for title in ("voltage [V]", "displacement [µm]", "loop", "held out", "autocorrelation, fitted part"):
         assert title in titles
-    assert f"{found.model.alpha:.6g}" in text
-    assert [plot["traces"] for plot in plots] == [4, 2, 3]
+    assert f"{found.table()[0][1]:.6g}" in text
+    assert found.reason in text
+    for item in found.candidates:
+        assert item.label in text
+    assert [plot["traces"] for plot in plots] == [3, 4, 3, 3]
 
 
 def test_stream_in_a_browser(streamed: pz.StreamedIdentification, tmp_path: Path) -> None:
     write_report(streamed, tmp_path / "report_stream.html")
-    _, text = check_report(tmp_path / "report_stream.html", plots=3)
-    assert "not estimated" in text
-
-
-def test_choice_of_models_in_a_browser(record: pz.Record, tmp_path: Path) -> None:
-    choice = pz.choose_model(record, delay=0.0)
-    write_report(choice, tmp_path / "report_choice.html")
-    _, text = check_report(tmp_path / "report_choice.html", plots=5)
-    for item in choice.candidates:
-        assert item.name in text
-    assert choice.reason in text
+    _, text = check_report(tmp_path / "report_stream.html", plots=4)
+    assert FORMS[streamed.chosen].label in text
 
 
 def test_the_check_would_see_what_is_wrong(tmp_path: Path) -> None:
