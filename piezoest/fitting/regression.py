@@ -143,7 +143,7 @@ class Regression:
     def _scatter(self) -> float:
         """Mean square that is left where nothing is asked of the model, relative to that of a loop."""
         w = self.solved(SMOOTHNESS[0], self.columns(drift=False))
-        loop = LOOP * self.line_gain() * self.design.basis.half
+        loop = LOOP * abs(self.line_gain) * self.design.basis.half
         return self.all.missed(w) / max(self.all.rows, 1.0) / max(loop, 1e-300) ** 2
 
     @cached_property
