@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from piezoest.fitting.outliers import lonely, unsettled
 from piezoest.fitting.play_columns import PlayColumns
 from piezoest.fitting.polish import polished
 from piezoest.fitting.regression import Fitted, Log, Regression, sums_of
-from piezoest.fitting.runs import BoolArray
+from piezoest.fitting.result import Fit
 from piezoest.models import Model
 from piezoest.symbolic import quadratic_solver
 
@@ -28,136 +28,6 @@ FEWEST_SAMPLES = 50
 PASSES = 3
 NONLINEAR = "SciPy's least squares, with derivatives by CasADi"
 LINEAR = "{} through CasADi; SciPy's bounded least squares agrees to {:.0e}"
-
-
-class Prediction(NamedTuple):
-    """Displacement (N,) [µm], and between what a reading is to be expected, 95 times in 100."""
-
-    x: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-
-
-@dataclass(frozen=True)
-class Fit:
-    """A model fitted to a record.
-
-    Parameters
-    ----------
-    model : Model
-        With offset.
-    form : str
-        Its kind, one of `FORMS`.
-    parameters : int
-        How many were fitted; slopes at their bound do not count.
-    standard_errors : dict of str to float
-        Of the parameters that were estimated, by their names, in their units; honest for residuals that are
-        not white.
-    delay : float
-        Samples by which the displacement lags the voltage.
-    delay_estimated : bool
-        Whether the delay was estimated.
-    initial_state : float or ndarray
-        What `model.simulate` is to begin with on this record.
-    held_out : float
-        Root of the mean square of what each of five blocks but the first misses under the fit of the
-        others [µm].
-    ahead : float
-        The same of the last two blocks under the fit of those before them.
-    spread : Spread
-        How far readings lie from the prediction, 95 times in 100 [µm].
-    counts : ndarray of bool, shape (N,)
-        Which samples were fitted: not those that are missing, spikes, or not yet settled.
-    left_out : int
-        Samples at the start that were left out, because the stage had not settled.
-    spikes : int
-        Samples that were left out because they alone are far off.
-    drift : float
-        Drift over the record that was fitted beside the model [µm].
-    solver : str
-        What solved, and what checked it.
-    """
-
-    model: Model
-    form: str
-    parameters: int
-    standard_errors: dict[str, float]
-    delay: float
-    delay_estimated: bool
-    initial_state: Any = field(repr=False)
-    held_out: float
-    ahead: float
-    spread: trust.Spread
-    counts: BoolArray = field(repr=False)
-    left_out: int
-    spikes: int
-    drift: float
-    solver: str
-    _design: Design = field(repr=False)
-    _w: FloatArray = field(repr=False)
-    _rest: FloatArray = field(repr=False)
-    _u: FloatArray = field(repr=False)
-
-    @property
-    def label(self) -> str:
-        """Kind of the model in words."""
-        return FORMS[self.form].label
-
-    def predict(self, u: FloatArray | None = None) -> Prediction:
-        """Free-running displacement, which sees only the voltage.
-
-        Parameters
-        ----------
-        u : array_like, shape (N,), optional
-            Voltage [V] of another record, from a stage that rests at 0 V before it; by default the fitted
-            record's, with its drift and jumps.
-        """
-        if u is None:
-            return self.continued(self._u)
-        half = self.spread.along(_without_gaps(u), np.zeros(1))
-        x = self.elsewhere(u)
-        return Prediction(x, x - half, x + half)
-
-    def elsewhere(self, u: FloatArray, *, sample_rate: float | None = None) -> FloatArray:
-        """Displacement along a voltage, from a stage that rests at 0 V before it [µm].
-
-        Drift and jumps are not in it.
-
-        Parameters
-        ----------
-        u : ndarray, shape (N,)
-            [V].
-        sample_rate : float, optional
-            [Hz]; by default that of the fitted record.
-        """
-        u, own = _without_gaps(u), self._design.sample_rate
-        rate = own if sample_rate is None else positive("sample_rate", sample_rate)
-        v = late(u, self.delay * rate / own)
-        design, w = replace(self._design.afresh(v[0]), sample_rate=rate), self._w.copy()
-        w[design.crept] = self._rest
-        w[design.offset + 1 :] = 0.0
-        return design.output(v, w)
-
-    def continued(self, u: FloatArray) -> Prediction:
-        """Displacement along a voltage that begins as the fitted one does, and goes on.
-
-        What had drifted by the end of the record stays.
-
-        Parameters
-        ----------
-        u : array_like, shape (N,)
-            [V].
-        """
-        u = _without_gaps(u)
-        x = self._design.output(late(u, self.delay), self._w)
-        half = self.spread.along(u, np.maximum(np.arange(u.size) - self._u.size, 0.0))
-        return Prediction(x, x - half, x + half)
-
-    def __repr__(self) -> str:
-        return (
-            f"<Fit of {self.label}: {self.held_out:.3g} µm rms on blocks left out, "
-            f"{self.parameters} parameters, delay {self.delay:.3g} samples>"
-        )
 
 
 def fit(
@@ -217,13 +87,6 @@ def fit(
     """
     _known(model)
     return Fitter(u, x, sample_rate=sample_rate, delay=delay, flaws=flaws, settle=settle).form(model)
-
-
-def _without_gaps(u: FloatArray) -> FloatArray:
-    u = array_1d("u", u, allow_nan=True)
-    if not np.any(np.isfinite(u)):
-        raise ValueError(f"u must hold a voltage, none of its {u.size} samples is a number")
-    return bridged(u)
 
 
 def _known(model: str) -> None:
@@ -290,11 +153,8 @@ class Fitter:
         if settle is not None:
             self.left_out = int(fraction("settle", settle, 0.0, 0.5 * given.u.size / self._rate) * self._rate)
         for _ in range(PASSES):
-            # Without the first block, for what happens at the start must not be explained by it.
-            bent = self._bent
-            others = bent.all.plus(bent.sums[0], -1.0)
-            w = bent.solved(search.SMOOTH, bent.columns(drift=False), others)
-            residual = np.where(given.counts, given.x - bent.design.output(given.u, w), np.nan)
+            fitted = self._bent.best(search.SMOOTH)
+            residual = np.where(given.counts, given.x - fitted.design.output(given.u, fitted.w), np.nan)
             further = self.left_out if settle is not None else max(unsettled(residual), self.left_out)
             spikes = lonely(residual)
             spikes[:further] = False

@@ -70,8 +70,7 @@ def stored(outcome: Outcome) -> dict[str, Stored]:
     }
 
 
-def write(cases: dict[str, Outcome], path: Path = FILE) -> None:
-    entries = {name: stored(outcome) for name, outcome in cases.items()}
+def write(entries: dict[str, dict[str, Stored]], path: Path = FILE) -> None:
     index = {name: {key: array.size for key, array in entry.items()} for name, entry in entries.items()}
     arrays = [array for entry in entries.values() for array in entry.values()]
     text = json.dumps({"home": home(), "cases": index}, separators=(",", ":"))
