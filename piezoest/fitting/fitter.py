@@ -19,6 +19,7 @@ from piezoest.fitting.outliers import lonely, unsettled
 from piezoest.fitting.play_columns import PlayColumns
 from piezoest.fitting.polish import polished
 from piezoest.fitting.regression import Fitted, Log, Regression, sums_of
+from piezoest.fitting.runs import BoolArray
 from piezoest.models import Model
 from piezoest.symbolic import quadratic_solver
 
@@ -55,7 +56,7 @@ class Fit:
     delay_estimated : bool
         Whether the delay was estimated.
     initial_state : float or ndarray
-        What `model.simulate` is to begin with on this record.
+        What `model.simulate` is to begin with on this record, in V of plays, in µm of a loop and of creep.
     held_out : float
         Root of the mean square of what each of five blocks but the first misses under the fit of the
         others [µm].
@@ -85,7 +86,7 @@ class Fit:
     held_out: float
     ahead: float
     spread: trust.Spread
-    counts: FloatArray = field(repr=False)
+    counts: BoolArray = field(repr=False)
     left_out: int
     spikes: int
     drift: float

@@ -10,10 +10,15 @@ from piezoest.identification.result import Candidate
 WORTH_IT = 0.02
 
 
+def simplest(errors: Sequence[float]) -> int:
+    """Place of the simplest that predicts blocks left out about best; from the simplest to the richest."""
+    least = min(errors)
+    return next(i for i, error in enumerate(errors) if error <= (1.0 + WORTH_IT) * least)
+
+
 def best_of(candidates: Sequence[Candidate]) -> Candidate:
-    """The simplest of those that predict blocks left out about best; from the simplest to the richest."""
-    least = min(item.cross_validated for item in candidates)
-    return next(item for item in candidates if item.cross_validated <= (1.0 + WORTH_IT) * least)
+    """The simplest of those that predict blocks left out about best."""
+    return candidates[simplest([item.cross_validated for item in candidates])]
 
 
 def reason_for(candidates: Sequence[Candidate], best: Candidate) -> str:

@@ -178,6 +178,7 @@ def _candidate(fitter: Fitter, name: str, record: Record, flaws: Flaws, trained:
     prediction = fit.continued(record.voltage)
     error = np.where(flaws.unusable, np.nan, record.displacement) - prediction.x
     error[~np.isfinite(record.voltage)] = np.nan
+    error[fit.left_out : trained][~fit.counts[fit.left_out :]] = np.nan
     later = flaws.jumps >= trained
     for place, size in zip(flaws.jumps[later], flaws.jump_sizes[later], strict=True):
         error[place:] -= size

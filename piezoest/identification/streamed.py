@@ -3,35 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
 from piezoest._checks import FloatArray, finite, fraction
 from piezoest.fitting import Fitter
 from piezoest.fitting.design import CHUNK, Design
-from piezoest.fitting.flaws import flawed
-from piezoest.fitting.play_columns import Start
 from piezoest.fitting.program import Sums
 from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression
 from piezoest.fitting.search import BENDS, LONGEST_DELAY, plays
+from piezoest.identification.choice import simplest
 from piezoest.identification.data import check_excitation, noise_of, prepare
 from piezoest.identification.lag import tells_lag
+from piezoest.identification.parts import Part, Progress, Say, parts, pieces
 from piezoest.identification.residual import Misfit
 from piezoest.identification.result import Row, left_out_error, parameter_rows
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record, RecordStream
 
-# Samples at the start that are looked at as a whole: for the delay, the start and the noise.
-HEAD = 50_000
 FEWEST_SAMPLES = 50
-BLOCK = 8 * CHUNK
 # Points kept for figures, and for how far plays move.
 MOST_POINTS = 20_000
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +48,9 @@ class StreamedIdentification:
         The best straight line of the fitted part, for comparison.
     line_train, line_held_out : Misfit
         Its errors.
-    samples, trained, skipped : int
-        Samples of the log, of the fitted part, and those without usable numbers.
+    samples, trained, left_out, skipped : int
+        Samples of the log, of the fitted part, those at its start that are left out because the stage had
+        not settled, and those without usable numbers.
     sample_rate : float
         [Hz].
     source : str
@@ -81,6 +76,7 @@ class StreamedIdentification:
     line_held_out: Misfit
     samples: int
     trained: int
+    left_out: int
     skipped: int
     sample_rate: float
     source: str
@@ -109,6 +105,7 @@ class StreamedIdentification:
             "units": {name: unit for name, _, _, unit in self.table()},
             "delay_samples": self.delay,
             "trained_samples": self.trained,
+            "left_out_samples": self.left_out,
             "train": self.train.to_dict(),
             "held_out": self.held_out.to_dict(),
             "straight_line": {
@@ -121,22 +118,13 @@ class StreamedIdentification:
         }
 
 
-class Part(NamedTuple):
-    """Samples of a log: the first one's number, voltage as it comes late, displacement, what counts."""
-
-    first: int
-    u: FloatArray
-    x: FloatArray
-    counts: Any
-
-
 def identify_stream(
     log: RecordStream,
     *,
     train: float = 0.5,
     delay: float | Literal["auto"] = "auto",
     progress: Progress | None = None,
-    say: Callable[[str], None] | None = None,
+    say: Say | None = None,
 ) -> StreamedIdentification:
     """Identify a model from a log that need not fit in memory.
 
@@ -191,12 +179,12 @@ def identify_stream(
         wanted = fraction("delay", finite("delay", delay), 0.0, LONGEST_DELAY)
     fitter = Fitter(head.voltage, head.displacement, sample_rate=log.sample_rate, delay=wanted)
     say("fitting plays")
-    fits = _fits(log, survey, fitter.start, fitter.delay, samples, trained, progress)
+    fits = _fits(log, survey, fitter, trained, progress)
     missed = {name: left_out_error(fit) for name, fit in fits.items()}
-    chosen = min(missed, key=lambda name: missed[name])
-    judge = _Judge(fits[chosen], fits["line"], samples, trained)
+    chosen = list(fits)[simplest(list(missed.values()))]
+    judge = _Judge(fits[chosen], fits["line"], samples, slice(fitter.left_out, trained))
     say("predicting the whole log")
-    for part in _parts(log, fitter.delay, progress):
+    for part in parts(log, fitter.delay, progress):
         judge.add(part)
     found = StreamedIdentification(
         model=_model(fits[chosen]),
@@ -210,6 +198,7 @@ def identify_stream(
         line_held_out=judge.misfit(held_out=True, of_line=True),
         samples=samples,
         trained=trained,
+        left_out=fitter.left_out,
         skipped=judge.skipped,
         sample_rate=log.sample_rate,
         source=str(log.path),
@@ -223,6 +212,11 @@ def identify_stream(
 
 def _advice(found: StreamedIdentification, told: bool) -> list[str]:
     said = []
+    if found.left_out:
+        said.append(
+            f"The first {found.left_out / found.sample_rate:.3g} s do not fit the rest (the stage had not "
+            "settled): left out."
+        )
     if not told:
         said.append(
             "The lag of the displacement is not known: all swings at the log's start are alike, so it looks "
@@ -241,12 +235,12 @@ class _Survey:
         voltage, displacement, points = np.empty(0), np.empty(0), []
         seen, known = 0, None
         low, high = np.inf, -np.inf
-        for whole_u, whole_x in _blocks(log, progress):
+        for whole_u, whole_x in pieces(log, progress):
             u, x = whole_u[: trained - seen], whole_x[: trained - seen]
             if u.size == 0:
                 break
-            if voltage.size < HEAD:
-                voltage, displacement = np.concatenate([voltage, u]), np.concatenate([displacement, x])
+            if seen == 0:
+                voltage, displacement = u, x
             if np.any(np.isfinite(u)) and np.any(np.isfinite(x)):
                 here = LearntOn.of(u, x, log.sample_rate)
                 known = here if known is None else known.joined(here)
@@ -255,26 +249,26 @@ class _Survey:
             seen += u.size
         if known is None:
             raise ValueError(f"{log.path} has no usable sample in the part that is fitted")
-        head = slice(0, min(HEAD, trained))
         self.learnt_on = known
-        self.head = Record.from_arrays(voltage[head], displacement[head], log.sample_rate, str(log.path))
+        #: Samples at the start that are looked at as a whole: for the delay, the start and the noise.
+        self.head = Record.from_arrays(voltage, displacement, log.sample_rate, str(log.path))
         thinned = np.concatenate(points)
         self.voltage = np.concatenate([thinned[np.isfinite(thinned)], [low, high]])
 
 
 def _fits(
-    log: RecordStream, survey: _Survey, start: Start, delay: float, samples: int, trained: int,
-    progress: Progress | None,
-) -> dict[str, Fitted]:  # fmt: skip
+    log: RecordStream, survey: _Survey, fitter: Fitter, trained: int, progress: Progress | None
+) -> dict[str, Fitted]:
     """The second pass: a line, plays, and plays with bends, from sums over blocks of the fitted part."""
     points = survey.voltage
     none = np.empty(0)
     thinned = Log(points, points, np.ones(points.size, bool), log.sample_rate, none)
-    basis = plays(thinned, start, bends=BENDS)
-    design = Design(basis, log.sample_rate, samples)
+    basis = plays(thinned, fitter.start, bends=BENDS)
+    design = Design(basis, log.sample_rate, trained)
     along, sums = design.along(), [Sums.none(design.columns) for _ in range(FOLDS)]
-    for part in _parts(log, delay, progress):
-        fold = np.minimum(np.arange(part.first, part.first + part.u.size) * FOLDS // trained, FOLDS)
+    for part in parts(log, fitter.delay, progress):
+        index = np.arange(part.first, part.first + part.u.size)
+        fold = np.where(index < fitter.left_out, FOLDS, np.minimum(index * FOLDS // trained, FOLDS))
         for k in range(0, part.u.size, CHUNK):
             rows = along.rows(part.u[k : k + CHUNK])
             for f in np.unique(fold[k : k + CHUNK]):
@@ -302,51 +296,10 @@ def _model(fitted: Fitted) -> Model:
     return design.basis.model(w[: design.basis.size], float(w[design.offset]), None, design.sample_rate)
 
 
-def _blocks(log: RecordStream, progress: Progress | None) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Voltage and displacement in blocks of one size: nothing depends on how the file is read."""
-    pieces: list[FloatArray] = []
-    held = 0
-    for block in log.blocks(progress=progress):
-        pieces.append(np.array([block.voltage, block.displacement]))
-        held += block.voltage.size
-        if held < BLOCK:
-            continue
-        samples = np.concatenate(pieces, axis=1)
-        whole = held - held % BLOCK
-        for k in range(0, whole, BLOCK):
-            yield samples[0, k : k + BLOCK], samples[1, k : k + BLOCK]
-        pieces, held = [samples[:, whole:]], held - whole
-    if held:
-        u, x = np.concatenate(pieces, axis=1)
-        yield u, x
-
-
-def _parts(log: RecordStream, delay: float, progress: Progress | None) -> Iterator[Part]:
-    """The log from its start, with the voltage late and without gaps, where it is the last one known."""
-    before, seen = None, 0
-    whole, rest = divmod(delay, 1.0)
-    for u, x in _blocks(log, progress):
-        known = np.isfinite(u)
-        counts = known & np.isfinite(x)
-        counts &= ~flawed(np.where(known, u, np.nan), x).unusable
-        if before is None:
-            if not known.any():
-                seen += u.size
-                continue
-            before = np.full(int(np.ceil(delay)) + 2, u[np.argmax(known)])
-        path = np.concatenate([before, u])
-        path = path[np.maximum.accumulate(np.where(np.isfinite(path), np.arange(path.size), 0))]
-        now = np.arange(before.size, path.size) - int(whole)
-        late = (1.0 - rest) * path[now] + rest * path[now - 1]
-        before = path[-before.size :]
-        yield Part(seen, late, np.where(np.isfinite(x), x, 0.0), counts)
-        seen += u.size
-
-
 class _Judge:
     """Free-running errors of a model and of a line, block by block in order, and points for figures."""
 
-    def __init__(self, fitted: Fitted, line: Fitted, samples: int, trained: int) -> None:
+    def __init__(self, fitted: Fitted, line: Fitted, samples: int, trained: slice) -> None:
         self._fits = (fitted, line)
         self._along = tuple(each.design.along() for each in self._fits)
         # Of model and line, in the fitted part and the held-out one: sum of squares, largest, count.
@@ -359,8 +312,10 @@ class _Judge:
     def add(self, part: Part) -> None:
         """Judge a part of the log."""
         outputs = [self._output(i, part.u) for i in range(2)]
-        fitted = part.first + np.arange(part.u.size) < self._trained
-        for held_out, here in enumerate((part.counts & fitted, part.counts & ~fitted)):
+        index = part.first + np.arange(part.u.size)
+        fitted = (index >= self._trained.start) & (index < self._trained.stop)
+        behind = index >= self._trained.stop
+        for held_out, here in enumerate((part.counts & fitted, part.counts & behind)):
             for of_line, output in enumerate(outputs):
                 error = np.abs(part.x[here] - output[here])
                 squares, largest, count = self._sums[held_out, of_line]
@@ -370,9 +325,8 @@ class _Judge:
                     count + error.size,
                 )
         kept = slice(-part.first % self._every, None, self._every)
-        index = (part.first + np.arange(part.u.size))[kept]
         shown = np.where(part.counts, part.x, np.nan)[kept]
-        self._points.append(np.array([index, part.u[kept], shown, outputs[0][kept]]))
+        self._points.append(np.array([index[kept], part.u[kept], shown, outputs[0][kept]]))
         self.skipped += int(np.sum(~part.counts))
 
     def _output(self, which: int, u: FloatArray) -> FloatArray:
