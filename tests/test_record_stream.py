@@ -11,7 +11,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import piezoest as pz
-from piezoest.records import Record, RecordStream, read_record, stream_record, write_columns
+from piezoest.records import (
+    Record,
+    RecordStream,
+    example_log,
+    read_record,
+    stream_record,
+    write_columns,
+)
 
 RATE = 1000.0
 
@@ -240,6 +247,13 @@ def test_streams_that_show_nothing_are_refused(tmp_path: Path) -> None:
     np.save(tmp_path / "log.npy", np.column_stack([time, voltage, np.nan * displacement]))
     with pytest.raises(ValueError, match="usable"):
         pz.identify_stream(stream_record(tmp_path / "log.npy"))
+
+
+def test_a_start_that_has_not_settled_is_left_out() -> None:
+    found = pz.identify_stream(stream_record(example_log(), rows=1000))
+    assert 0 < found.left_out < 0.2 * found.trained
+    assert found.train.rms < 0.15
+    assert found.held_out.rms < 0.25
 
 
 def test_recording_of_a_real_stage(data_dir: Path) -> None:

@@ -43,12 +43,12 @@ class Fit:
     delay_estimated : bool
         Whether the delay was estimated.
     initial_state : float or ndarray
-        What `model.simulate` is to begin with on this record.
+        What `model.simulate` is to begin with on this record, in V of plays, in µm of a loop and of creep.
     held_out : float
         Root of the mean square of what each of five blocks but the first misses under the fit of the
         others [µm].
     ahead : float
-        The same of the last two blocks under the fit of those before them.
+        The same of the last two blocks under the fit of those before them [µm].
     spread : Spread
         How far readings lie from the prediction, 95 times in 100 [µm].
     counts : ndarray of bool, shape (N,)

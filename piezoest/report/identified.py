@@ -158,7 +158,7 @@ def _add_loops(page: Page, found: Found, record: Record) -> None:
         subplot_titles=("loop", "over time"),
         horizontal_spacing=0.09,
     )
-    settled = slice(getattr(found, "left_out", 0), None)
+    settled = slice(_start(found, record), None)
     u, x, model = thin(record.voltage[settled], record.displacement[settled], prediction[settled])
     figure.add_scatter(
         x=u, y=x, mode="lines", line={"color": GREY, "width": 3}, name="measured", row=1, col=1
@@ -196,7 +196,7 @@ def _add_residual(page: Page, found: Found, record: Record) -> None:
         x=t, y=y, mode="lines", line={"color": RED, "width": 1}, name="measured − model", row=1, col=1
     )
     _mark_held_out(figure, found, record, row=1, col=1)
-    start = getattr(found, "left_out", 0)
+    start = _start(found, record)
     # What was left out at the start would hide everything else.
     largest = 1.1 * float(np.nanmax(np.abs(residual[max(start, residual.size // 100) :])))
     figure.update_yaxes(range=[-largest, largest], title_text="µm", row=1, col=1)
@@ -214,6 +214,11 @@ def _add_residual(page: Page, found: Found, record: Record) -> None:
     figure.update_xaxes(title_text=f"lag [{unit}]; band: white noise, 99 %", row=1, col=2)
     figure.update_yaxes(range=[-1.05, 1.05], row=1, col=2)
     page.plot(figure, 380)
+
+
+def _start(found: Found, record: Record) -> int:
+    """First sample drawn that was not left out."""
+    return -(-found.left_out * len(record) // found.samples)
 
 
 def _residual(found: Found, record: Record) -> FloatArray:
