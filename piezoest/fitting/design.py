@@ -14,6 +14,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.compile import Matrix, Vector, compiled
+from piezoest.fitting.rows import times
 from piezoest.models import Creep, Model
 
 # Rows that are made at once.
@@ -150,7 +151,7 @@ class Design:
         """Displacement (N,) of all coefficients (columns,) [µm]."""
         x = np.empty(u.size)
         for place, rows in self.blocks(u, w[: self.basis.size]):
-            x[place] = rows @ w
+            x[place] = times(rows, w)
         return x
 
 
@@ -175,7 +176,7 @@ class Along:
         if design.terms:
             driven = np.empty((u.size, followed + 1))
             driven[:, :-1] = rows[:, :followed]
-            driven[:, -1] = 0.0 if self._w is None else rows[:, :followed] @ self._w
+            driven[:, -1] = 0.0 if self._w is None else times(rows[:, :followed], self._w)
             each = np.empty((u.size, design.terms))
             _add_creep(driven, design.creep.gains, self._decays, self._z, each)
             rows[:, :followed], rows[:, design.gains] = driven[:, :-1], each

@@ -24,6 +24,8 @@ from piezoest.models import Model
 from piezoest.symbolic import quadratic_solver
 
 FEWEST_SAMPLES = 50
+# A displacement that rises by no more than this fraction of its size over the record stands still.
+ROUNDING = 1e-9
 # Times that a start which has not settled is looked for, each without what was found before.
 PASSES = 3
 NONLINEAR = "SciPy's least squares, with derivatives by CasADi"
@@ -137,7 +139,7 @@ class Fitter:
             self._given, np.where(counts, x, 0.0), counts, self._rate, flaws.jumps.astype(np.float64)
         )
         gain = search.line_gain(self._log)
-        if gain <= 0.0:
+        if gain * np.ptp(self._given) <= ROUNDING * np.max(np.abs(self._log.x)):
             raise ValueError(
                 f"x must rise with u, a straight line has {gain:.4g} µm/V: change the sign of one of them"
             )

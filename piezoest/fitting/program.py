@@ -7,6 +7,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.fitting.rows import gram, onto
 from piezoest.symbolic import quadratic_program
 
 # Least curvature relative to a column's own: what a record does not tell stays near zero.
@@ -24,7 +25,7 @@ class Sums(NamedTuple):
     @classmethod
     def of(cls, columns: FloatArray, x: FloatArray) -> Self:
         """Sums over rows of a matrix (N, n) and what they are to give (N,)."""
-        return cls(columns.T @ columns, columns.T @ x, float(x @ x), float(x.size))
+        return cls(gram(columns), onto(columns, x), float(x @ x), float(x.size))
 
     @classmethod
     def none(cls, columns: int) -> Self:

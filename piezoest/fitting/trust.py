@@ -10,6 +10,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.fitting.program import RIDGE
 from piezoest.fitting.regression import EARLIER, Fitted, Log, Regression
+from piezoest.fitting.rows import onto, times
 from piezoest.fitting.runs import IntArray
 
 # Blocks in time over which the gradients of a coloured residual are summed.
@@ -43,13 +44,13 @@ def residuals(fitted: Fitted, log: Log) -> Missed:
     later = np.arange(log.u.size) >= log.folds[EARLIER]
     for place, rows in fitted.design.blocks(log.u, fitted.w[: fitted.design.basis.size]):
         fold, counts = log.fold(place), log.counts[place]
-        own[place] = np.where(counts, log.x[place] - rows @ fitted.w, np.nan)
+        own[place] = np.where(counts, log.x[place] - times(rows, fitted.w), np.nan)
         for k in np.unique(fold[fold > 0]):
             here = (fold == k) & counts
-            without[place.start + np.flatnonzero(here)] = (
-                log.x[place][here] - rows[here] @ fitted.without[k - 1]
-            )
-        ahead[place] = np.where(counts & later[place], log.x[place] - rows @ fitted.earlier, np.nan)
+            missed = log.x[place][here] - times(rows[here], fitted.without[k - 1])
+            without[place.start + np.flatnonzero(here)] = missed
+        missed = log.x[place] - times(rows, fitted.earlier)
+        ahead[place] = np.where(counts & later[place], missed, np.nan)
     return Missed(own, without, ahead)
 
 
@@ -108,11 +109,11 @@ def covariance(regression: Regression, fitted: Fitted, log: Log) -> FloatArray:
     square = 0.0
     block = np.minimum(np.arange(log.u.size) * BLOCKS // log.u.size, BLOCKS - 1)
     for place, rows in fitted.design.blocks(log.u, fitted.w[: fitted.design.basis.size]):
-        e = np.where(log.counts[place], log.x[place] - rows @ fitted.w, 0.0)
+        e = np.where(log.counts[place], log.x[place] - times(rows, fitted.w), 0.0)
         square += float(e @ e)
         for k in np.unique(block[place]):
             here = block[place] == k
-            gradients[k] += rows[np.ix_(here, free)].T @ e[here]
+            gradients[k] += onto(rows[np.ix_(here, free)], e[here])
     H = regression.curvature(fitted.smoothness)[np.ix_(free, free)]
     scale = np.sqrt(np.diag(H))
     H = H / np.outer(scale, scale)

@@ -14,6 +14,7 @@ from piezoest.fitting import Fitter
 from piezoest.fitting.design import CHUNK, Design
 from piezoest.fitting.program import Sums
 from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression
+from piezoest.fitting.rows import times
 from piezoest.fitting.search import BENDS, LONGEST_DELAY, plays
 from piezoest.identification.choice import simplest
 from piezoest.identification.data import check_excitation, noise_of, prepare
@@ -324,7 +325,7 @@ class _Judge:
 
     def _output(self, which: int, u: FloatArray) -> FloatArray:
         along, w = self._along[which], self._fits[which].w
-        return np.concatenate([along.rows(u[k : k + CHUNK]) @ w for k in range(0, u.size, CHUNK)])
+        return np.concatenate([times(along.rows(u[k : k + CHUNK]), w) for k in range(0, u.size, CHUNK)])
 
     def misfit(self, *, held_out: bool, of_line: bool = False) -> Misfit:
         """Return the error so far, of the model or of the line, in the fitted part or behind it."""

@@ -38,7 +38,6 @@ TOLERATED: dict[str, tuple[float, str]] = {
     "horizon": (1e-5, "solver's tolerance, carried from window to window"),
     "horizon/other-start": (3e-3, SINGULAR),
     "identify": (1e-6, "solver's tolerance"),
-    "identify-auto": (1e-5, "solver's tolerance, of slopes that a log hardly tells"),
 }
 ELSEWHERE = 1e-7  # on another computer: with the BLAS of another processor 9e-10 was seen
 
