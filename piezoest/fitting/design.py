@@ -39,10 +39,6 @@ class Basis(Protocol):
         """How many of them, at the end, say where the stage was before the record."""
 
     @property
-    def half(self) -> float:
-        """Half of the voltage's range in the record [V]."""
-
-    @property
     def goes_on(self) -> bool:
         """Whether a model may have what goes on beyond the record."""
 

@@ -66,7 +66,7 @@ def fit(
         Spikes, dropouts and jumps; by default they are looked for.
     settle : float, optional
         Seconds to leave out at the start; by default as long as it is off by more than four robust standard
-        deviations, at most a fifth.
+        deviations, at most a tenth.
 
     Returns
     -------

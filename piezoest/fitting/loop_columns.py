@@ -36,7 +36,6 @@ class LoopColumns:
     size: ClassVar[int] = 3
     free: ClassVar[int] = 1
     goes_on: ClassVar[bool] = True
-    half: ClassVar[float] = 1.0
 
     def begin(self) -> FloatArray:
         """Voltage, f, and what is left of the start; the first sample says the voltage."""

@@ -9,9 +9,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 
 # The start is left out as long as it is off by this many robust standard deviations, at most this fraction.
-UNSETTLED, LONGEST_UNSETTLED = 4.0, 0.2
-# It is over once so many samples, and so large a fraction of all, are quiet but for a few.
-QUIET, QUIET_PART, RARE = 10, 0.02, 0.05
+UNSETTLED, LONGEST_UNSETTLED = 4.0, 0.1
 # A sample is a spike that is off from its neighbours by this many robust standard deviations, and this many
 # times as far as the nearest two are: about a kink they are half as far as the sample itself.
 SPIKE, ALONE = 8.0, 3.0
@@ -26,9 +24,8 @@ def unsettled(residual: FloatArray) -> int:
     off = np.abs(residual[: int(LONGEST_UNSETTLED * residual.size)]) > UNSETTLED * deviation
     if deviation == 0.0 or not np.any(off[:3]):
         return 0
-    # A stage that settles may cross zero: a while of quiet samples is the end.
-    while_ = max(QUIET, int(QUIET_PART * residual.size))
-    quiet = np.convolve(off, np.ones(while_), mode="valid") <= RARE * while_
+    # A stage that settles may cross zero: ten quiet samples in a row are the end.
+    quiet = np.convolve(off, np.ones(10), mode="valid") == 0.0
     end = int(np.argmax(quiet)) if np.any(quiet) else off.size
     # Twice as long, for what has fallen below the threshold is not yet gone.
     return min(2 * end, off.size)

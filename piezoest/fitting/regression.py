@@ -22,9 +22,6 @@ AS_GOOD = 1.01
 # So many blocks predict those behind them; a drift is fitted where it makes the squares there as small as
 # this.
 EARLIER, DRIFTS = 3, 0.8
-# A loop is about so wide, relative to the stroke; a slope as large as that of a play of it costs, where the
-# record hardly shows it, this fraction of what the model misses anyway.
-LOOP, PRIOR = 0.1, 0.1
 # What creep had at the start costs this times its square, for slow creep and offset look alike.
 CREPT = 1e-3
 # ... and so does a drift, which is what amplitudes that change along the record look like, too.
@@ -137,14 +134,8 @@ class Regression:
         self._penalty = np.zeros((design.columns, design.columns))
         self._penalty[:size, :size] = design.basis.unevenness()
         self._always = np.diag(np.where(np.isin(np.arange(design.columns), np.r_[design.crept]), CREPT, 0.0))
+        self._always[:size, :size] = design.basis.prior()
         self._always[design.offset + 1, design.offset + 1] = DRIFT
-        self._always[:size, :size] = PRIOR * self._scatter() * design.basis.prior()
-
-    def _scatter(self) -> float:
-        """Mean square that is left where nothing is asked of the model, relative to that of a loop."""
-        w = self.solved(SMOOTHNESS[0], self.columns(drift=False))
-        loop = LOOP * abs(self.line_gain) * self.design.basis.half
-        return self.all.missed(w) / max(self.all.rows, 1.0) / max(loop, 1e-300) ** 2
 
     @cached_property
     def line_gain(self) -> float:

@@ -74,7 +74,7 @@ def identify(
         else it is 0.
     settle : float, optional
         Seconds to leave out at the start; by default as long as the start is off the model by more than four
-        robust standard deviations, at most a fifth of the fitted part.
+        robust standard deviations, at most a tenth of the fitted part.
     validate : sequence
         Other logs of the stage, each a record, a file or a table: the model predicts them.
     strict : bool

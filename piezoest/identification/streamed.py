@@ -58,6 +58,8 @@ class StreamedIdentification:
         The file.
     learnt_on : LearntOn
         Ranges of the fitted part.
+    left_out : int
+        Samples at the start that the fit leaves out, because the stage had not settled.
     thinned : Record
         Every k-th sample, for figures.
     prediction : ndarray
@@ -81,6 +83,7 @@ class StreamedIdentification:
     sample_rate: float
     source: str
     learnt_on: LearntOn
+    left_out: int
     thinned: Record = field(repr=False)
     prediction: FloatArray = field(repr=False)
     notes: tuple[str, ...] = ()
@@ -201,6 +204,7 @@ def identify_stream(
         sample_rate=log.sample_rate,
         source=str(log.path),
         learnt_on=survey.learnt_on,
+        left_out=fitter.left_out,
         thinned=judge.thinned(log),
         prediction=judge.prediction,
         notes=log.notes,
