@@ -58,7 +58,7 @@ class Fit:
     delay_estimated : bool
         Whether the delay was estimated.
     initial_state : float or ndarray
-        What `model.simulate` is to begin with on this record.
+        What `model.simulate` is to begin with on this record: plays [V]; a loop, and behind plays creep [µm].
     held_out : float
         Root of the mean square of what each of five blocks but the first misses under the fit of the
         others [µm].
