@@ -63,7 +63,7 @@ class Fit:
         Root of the mean square of what each of five blocks but the first misses under the fit of the
         others [µm].
     ahead : float
-        The same of the last two blocks under the fit of those before them.
+        The same of the last two blocks under the fit of those before them [µm].
     spread : Spread
         How far readings lie from the prediction, 95 times in 100 [µm].
     counts : ndarray of bool, shape (N,)
