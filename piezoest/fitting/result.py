@@ -37,7 +37,8 @@ class Fit:
     parameters : int
         How many were fitted; slopes at their bound do not count.
     standard_errors : dict of str to float
-        Of the parameters that were estimated, by their names; honest for residuals that are not white.
+        Of the parameters that were estimated, by their names, in their units; honest for residuals that are
+        not white.
     delay : float
         Samples by which the displacement lags the voltage.
     delay_estimated : bool

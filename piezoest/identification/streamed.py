@@ -108,6 +108,7 @@ class StreamedIdentification:
             "units": {name: unit for name, _, _, unit in self.table()},
             "delay_samples": self.delay,
             "trained_samples": self.trained,
+            "left_out_samples": self.left_out,
             "train": self.train.to_dict(),
             "held_out": self.held_out.to_dict(),
             "straight_line": {
@@ -214,6 +215,11 @@ def identify_stream(
 
 def _advice(found: StreamedIdentification, told: bool) -> list[str]:
     said = []
+    if found.left_out:
+        said.append(
+            f"The first {found.left_out / found.sample_rate:.3g} s do not fit the rest (the stage had not "
+            "settled): left out."
+        )
     if not told:
         said.append(
             "The lag of the displacement is not known: all swings at the log's start are alike, so it looks "
