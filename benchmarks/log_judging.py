@@ -60,8 +60,10 @@ def fitted(log: Log) -> Found:
         predicted.lower, predicted.upper,
     )  # fmt: skip
     if log.family == FAMILY:
-        of = found if isinstance(found.model, ColemanHodgdon) else identify(FAMILY)
-        result.theta, result.errors = np.array(of.model.theta), dict(of.standard_errors)
+        # A log may leave a parameter open, which identify then refuses.
+        with contextlib.suppress(ValueError):
+            of = found if isinstance(found.model, ColemanHodgdon) else identify(FAMILY)
+            result.theta, result.errors = np.array(of.model.theta), dict(of.standard_errors)
     return result
 
 
