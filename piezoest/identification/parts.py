@@ -45,8 +45,9 @@ def pieces(log: RecordStream, progress: Progress | None) -> Iterator[tuple[Float
             for k in range(0, whole, PART):
                 yield joined[0, k : k + PART], joined[1, k : k + PART]
             held = [joined[:, whole:]]
-    if held:
-        voltage, displacement = np.concatenate(held, axis=1)
+    voltage, displacement = np.concatenate(held, axis=1) if held else np.empty((2, 0))
+    # None are left of a log of so many whole pieces.
+    if voltage.size:
         yield voltage, displacement
 
 
