@@ -174,4 +174,4 @@ def test_a_log_of_whole_parts(tmp_path: Path) -> None:
     u, x = (np.resize(each, 2 * PART) for each in drawn(2))
     found = pz.identify_stream(saved(tmp_path, u, x, rows=PART), delay=0.0)
     assert found.samples == 2 * PART
-    assert found.held_out.rms < 0.1 * found.line_held_out.rms
+    assert found.held_out.rms < 0.2 * found.line_held_out.rms
