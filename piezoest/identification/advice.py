@@ -58,7 +58,7 @@ def _delay(found: Identification, data: Data) -> list[str]:
     if found.delay > 0.1:
         return [
             f"The displacement lags the voltage by {found.delay:.2f} samples "
-            f"({1e3 * found.delay / found.sample_rate:.3g} ms): use HysteresisRLS(delay={found.delay:.2g})."
+            f"({1e3 * found.delay / found.sample_rate:.3g} ms): pass delay={found.delay:.2g}."
         ]
     return []
 
@@ -69,8 +69,8 @@ def _centre(found: Identification, data: Data) -> list[str]:
     if abs(data.middle) > 0.1 * data.extent or abs(found.model.offset) > 0.1 * extent:
         said.append(
             f"The loop is not centred at zero (voltage {data.middle:.3g} V, displacement "
-            f"{float(np.mean(data.x[data.counts])):.4g} µm): let HysteresisRLS estimate the offset, as it "
-            "does by default."
+            f"{float(np.mean(data.x[data.counts])):.4g} µm): let estimators find the offset, as "
+            "HysteresisRLS does by default."
         )
     turns = turning_voltages(data)
     tops = np.abs(turns - data.middle)
