@@ -58,7 +58,7 @@ def _delay(found: Identification, data: Data) -> list[str]:
     if found.delay > 0.1:
         return [
             f"The displacement lags the voltage by {found.delay:.2f} samples "
-            f"({1e3 * found.delay / found.sample_rate:.3g} ms): pass delay={found.delay:.2g}."
+            f"({1e3 * found.delay / found.sample_rate:.3g} ms): estimators take delay={found.delay:.2g}."
         ]
     return []
 

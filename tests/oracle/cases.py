@@ -38,6 +38,7 @@ TOLERATED: dict[str, tuple[float, str]] = {
     "horizon": (1e-5, "solver's tolerance, carried from window to window"),
     "horizon/other-start": (3e-3, SINGULAR),
     "identify": (1e-6, "solver's tolerance"),
+    "identify-auto": (1e-5, "solver's tolerance, where slopes of neighbouring plays do almost the same"),
 }
 ELSEWHERE = 1e-7  # on another computer: with the BLAS of another processor 9e-10 was seen
 
