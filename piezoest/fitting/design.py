@@ -128,7 +128,7 @@ class Design:
     def along(self, w: FloatArray | None = None) -> Along:
         """What makes rows, one part of the record after the other.
 
-        The model's coefficients `w` (basis.size,) make the displacement that drives the creep.
+        The model's coefficients, which come first in `w`, make the displacement that drives the creep.
         """
         return Along(self, w)
 
@@ -143,10 +143,15 @@ class Design:
         """The same for a stage that rests at 0 V until a record begins at voltage u [V]."""
         return replace(self, basis=self.basis.afresh(u))
 
+    def model(self, w: FloatArray) -> Model:
+        """Model of all coefficients (columns,), with its offset and creep."""
+        own, creep = w[: self.basis.size], self.creep if self.terms else None
+        return self.basis.model(own, float(w[self.offset]), creep, self.sample_rate)
+
     def output(self, u: FloatArray, w: FloatArray) -> FloatArray:
         """Displacement (N,) of all coefficients (columns,) [µm]."""
         x = np.empty(u.size)
-        for place, rows in self.blocks(u, w[: self.basis.size]):
+        for place, rows in self.blocks(u, w):
             x[place] = times(rows, w)
         return x
 

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, finite, fraction, positive
+from piezoest._checks import FloatArray, array_1d, fraction, positive
 from piezoest.estimators.coordinates import bridged, late
 from piezoest.fitting import search, trust
 from piezoest.fitting.design import Design
@@ -126,10 +126,7 @@ class Fitter:
         self._given = bridged(u)
         if np.ptp(self._given) == 0.0:
             raise ValueError(f"u must move, it stays at {self._given[0]:g} V")
-        if isinstance(delay, str) and delay != "auto":
-            raise ValueError(f"delay must be 'auto' or a number of samples, got {delay!r}")
-        if delay != "auto":
-            delay = fraction("delay", finite("delay", delay), 0.0, search.LONGEST_DELAY)
+        delay = search.checked_delay(delay)
         flaws = flawed(u, x) if flaws is None else flaws
         if flaws.unusable.size != u.size:
             raise ValueError(f"flaws must be those of u and x: {u.size} samples, got {flaws.unusable.size}")
@@ -184,10 +181,7 @@ class Fitter:
     def _plain(self) -> dict[bool, Fitted]:
         """Plays without creep, with and without bends."""
         bent = self._bent
-        basis, T = self._bent_plays.merged()
-        design = replace(bent.design, basis=basis)
-        sums = [each.combined(bent.design.basis.size, T) for each in bent.sums]
-        return {True: bent.best(), False: Regression(design, sums).best()}
+        return {True: bent.best(), False: bent.combined(*self._bent_plays.merged()).best()}
 
     def form(self, name: str) -> Fit:
         """Fit a model of one kind.
@@ -222,9 +216,7 @@ class Fitter:
             fitted = replace(again, w=fitted.w)
             solver, parameters = NONLINEAR, 5 + self.delay_estimated
         else:
-            regressed = Regression(
-                fitted.design, sums_of(fitted.design, log, fitted.w[: fitted.design.basis.size])
-            )
+            regressed = Regression(fitted.design, sums_of(fitted.design, log, fitted.w))
             solver = LINEAR.format(quadratic_solver(), regressed.gap(fitted))
             # Creep gains are no columns of the last linear program, but they were fitted as well.
             with_gains = replace(fitted, used=np.union1d(fitted.used, np.r_[fitted.design.gains]))
@@ -233,8 +225,7 @@ class Fitter:
         missed = trust.residuals(fitted, log)
         wider, rest = _beyond(fitted)
         design, w = wider if fitted.design.basis.goes_on else (fitted.design, fitted.w)
-        own, creep = w[: design.basis.size], design.creep if design.terms else None
-        model = design.basis.model(own, float(w[design.offset]), creep, log.sample_rate)
+        model = design.model(w)
         return Fit(
             model=model,
             form=name,

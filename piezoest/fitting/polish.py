@@ -40,8 +40,7 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     varied = coordinates(ColemanHodgdon, () if fit_delay else ("delay",), delayed=True)
     limits = ColemanHodgdon.record_limits(2.0 * log.half) | {"delay": (0.0, LONGEST_DELAY)}
     problem = Problem(log.u, x, varied, np.empty(0) if fit_delay else np.array([delay]), limits=limits)
-    basis: Any = fitted.design.basis
-    model: ColemanHodgdon = basis.model(w, float(w[offset]), None, log.sample_rate)
+    model: Any = fitted.design.model(w)
     start = problem.settled(varied.of(model.nearest_admissible(), {"delay": delay}))
     solution = single_shooting(problem, start, "linear", 1.0, MOST_PASSES, TOLERANCE)
     end = outcome(problem, solution.q, coloured=True)

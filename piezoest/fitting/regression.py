@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.design import Design
+from piezoest.fitting.design import Basis, Design
 from piezoest.fitting.program import Sums, checked, solve, total
 from piezoest.fitting.runs import IntArray
 
@@ -78,11 +78,17 @@ def sums_of(design: Design, log: Log, w: FloatArray | None = None, every: int = 
     """Sums over each block, of every k-th sample that counts; `w` drives the creep."""
     found = [Sums.none(design.columns) for _ in range(FOLDS)]
     for place, rows in design.blocks(log.u, w):
-        fold = log.fold(place)
-        for k in range(fold[0], fold[-1] + 1):
-            taken = np.flatnonzero((fold == k) & log.counts[place])[::every]
-            found[k] = found[k].plus(Sums.of(rows[taken], log.x[place][taken]))
+        add(found, rows, log.x[place], log.counts[place], log.fold(place), every)
     return found
+
+
+def add(
+    sums: list[Sums], rows: FloatArray, x: FloatArray, counts: Any, fold: IntArray, every: int = 1
+) -> None:
+    """Add to the sums of its block every k-th row that counts, if the block has sums."""
+    for k in range(fold[0], min(fold[-1] + 1, len(sums))):
+        taken = np.flatnonzero((fold == k) & counts)[::every]
+        sums[k] = sums[k].plus(Sums.of(rows[taken], x[taken]))
 
 
 @dataclass(frozen=True)
@@ -197,6 +203,11 @@ class Regression:
         fits = [self._foreseeing(smoothness, used, self.all.plus(each, -1.0)) for each in self.sums[1:]]
         missed = sum(each.missed(w) for each, w in zip(self.sums[1:], fits, strict=True))
         return missed / max(sum(each.rows for each in self.sums[1:]), 1.0), fits
+
+    def combined(self, basis: Basis, transform: FloatArray) -> Regression:
+        """Regression on a basis whose columns are combinations (size, m) of this one's; the same sums."""
+        sums = [each.combined(self.design.basis.size, transform) for each in self.sums]
+        return Regression(replace(self.design, basis=basis), sums)
 
     def best(self, smoothness: float | None = None, *, gains: bool = True) -> Fitted:
         """Fit with the smoothness that predicts best, and a drift if the last blocks bear it out.

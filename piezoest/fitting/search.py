@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 
-from piezoest._checks import FloatArray
+from piezoest._checks import FloatArray, finite, fraction
 from piezoest.estimators.coordinates import late
 from piezoest.fitting.design import NO_CREEP, Basis, Design
 from piezoest.fitting.loop_columns import LoopColumns
@@ -71,6 +72,15 @@ def missed(log: Log, basis: Basis) -> float:
 def best_start(log: Log) -> Start:
     """The start under which plays miss least."""
     return min(starts(log.u), key=lambda start: missed(log, plays(log, start)))
+
+
+def checked_delay(delay: Any) -> float | Literal["auto"]:
+    """Delay as it may be asked for: ``"auto"``, or samples within what is looked for."""
+    if not isinstance(delay, str):
+        return fraction("delay", finite("delay", delay), 0.0, LONGEST_DELAY)
+    if delay != "auto":
+        raise ValueError(f"delay must be 'auto' or a number of samples, got {delay!r}")
+    return "auto"
 
 
 def best_delay(log: Log, start: Start) -> float:
@@ -134,4 +144,4 @@ def with_creep(log: Log, plain: Fitted, times: FloatArray) -> Fitted:
 def _crept(log: Log, last: Fitted, creep: Creep) -> Regression:
     """Regression on columns that have crept with these gains; their change follows the last slopes."""
     design = design_of(log, last.design.basis, creep)
-    return Regression(design, sums_of(design, log, last.w[: design.basis.size]))
+    return Regression(design, sums_of(design, log, last.w))

@@ -42,7 +42,7 @@ def residuals(fitted: Fitted, log: Log) -> Missed:
     """What a fit misses, and what the fits without each block miss in it."""
     own, without, ahead = np.full((3, log.u.size), np.nan)
     later = np.arange(log.u.size) >= log.folds[EARLIER]
-    for place, rows in fitted.design.blocks(log.u, fitted.w[: fitted.design.basis.size]):
+    for place, rows in fitted.design.blocks(log.u, fitted.w):
         fold, counts = log.fold(place), log.counts[place]
         own[place] = np.where(counts, log.x[place] - times(rows, fitted.w), np.nan)
         for k in np.unique(fold[fold > 0]):
@@ -108,7 +108,7 @@ def covariance(regression: Regression, fitted: Fitted, log: Log) -> FloatArray:
     gradients = np.zeros((BLOCKS, free.size))
     square = 0.0
     block = np.minimum(np.arange(log.u.size) * BLOCKS // log.u.size, BLOCKS - 1)
-    for place, rows in fitted.design.blocks(log.u, fitted.w[: fitted.design.basis.size]):
+    for place, rows in fitted.design.blocks(log.u, fitted.w):
         e = np.where(log.counts[place], log.x[place] - times(rows, fitted.w), 0.0)
         square += float(e @ e)
         for k in np.unique(block[place]):

@@ -23,13 +23,15 @@ def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
     return tuple(said)
 
 
+def unsettled_sentence(seconds: float) -> str:
+    """That the start was left out, which lasts so long [s]."""
+    return f"The first {seconds:.3g} s do not fit the rest (the stage had not settled): left out."
+
+
 def _left_out(found: Identification, data: Data) -> list[str]:
     fit, flaws, said = found.fit, found.flaws, []
     if fit.left_out:
-        said.append(
-            f"The first {fit.left_out / found.sample_rate:.3g} s do not fit the rest (the stage had not "
-            "settled): left out."
-        )
+        said.append(unsettled_sentence(fit.left_out / found.sample_rate))
     spikes = int(np.count_nonzero(flaws.spikes[: found.trained])) + fit.spikes
     if spikes:
         said.append(

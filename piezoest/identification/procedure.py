@@ -8,10 +8,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from piezoest._checks import FloatArray, finite, fraction
+from piezoest._checks import FloatArray, fraction
 from piezoest.fitting import FORMS, Fitter
 from piezoest.fitting.flaws import Flaws, flawed
-from piezoest.fitting.search import LONGEST_DELAY
+from piezoest.fitting.search import checked_delay
 from piezoest.identification.advice import advice_of
 from piezoest.identification.choice import best_of, reason_for
 from piezoest.identification.data import Data, check_excitation, noise_of, prepare
@@ -120,12 +120,13 @@ def identify(
     if strict and (doubts := [each.sentence for each in found if each.severity == "doubt"]):
         raise ValueError(" ".join(doubts))
     flaws = flawed(record.voltage, record.displacement)
-    told = delay != "auto" or tells_lag(first.u)
+    wanted = checked_delay(delay)
+    told = wanted != "auto" or tells_lag(first.u)
     fitter = Fitter(
         record.voltage[:trained],
         record.displacement[:trained],
         sample_rate=record.sample_rate,
-        delay=_delay(delay) if delay != "auto" else "auto" if told else 0.0,
+        delay=wanted if told else 0.0,
         flaws=flaws.before(trained),
         settle=settle,
     )
@@ -154,12 +155,6 @@ def identify(
         validations=tuple(Validation.of(best.fit, each) for each in others),
     )
     return dataclasses.replace(result, advice=advice_of(result, first))
-
-
-def _delay(given: Any) -> float:
-    if isinstance(given, str):
-        raise ValueError(f"delay must be 'auto' or a number of samples, got {given!r}")
-    return fraction("delay", finite("delay", given), 0.0, LONGEST_DELAY)
 
 
 def _checked(record: Record, trained: int) -> Data:

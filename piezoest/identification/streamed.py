@@ -9,13 +9,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from piezoest._checks import FloatArray, finite, fraction
+from piezoest._checks import FloatArray, fraction
 from piezoest.fitting import Fitter
 from piezoest.fitting.design import CHUNK, Design
 from piezoest.fitting.program import Sums
-from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression
+from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression, add
 from piezoest.fitting.rows import times
-from piezoest.fitting.search import BENDS, LONGEST_DELAY, plays
+from piezoest.fitting.search import BENDS, checked_delay, plays
+from piezoest.identification.advice import unsettled_sentence
 from piezoest.identification.choice import simplest
 from piezoest.identification.data import check_excitation, noise_of, prepare
 from piezoest.identification.lag import tells_lag
@@ -176,11 +177,11 @@ def identify_stream(
         )
     data = prepare(head.voltage, head.displacement)
     check_excitation(data, noise_of(data))
-    told = delay != "auto" or tells_lag(head.voltage)
-    wanted: Any = "auto" if delay == "auto" and told else 0.0
-    if delay != "auto":
-        wanted = fraction("delay", finite("delay", delay), 0.0, LONGEST_DELAY)
-    fitter = Fitter(head.voltage, head.displacement, sample_rate=log.sample_rate, delay=wanted)
+    wanted = checked_delay(delay)
+    told = wanted != "auto" or tells_lag(head.voltage)
+    fitter = Fitter(
+        head.voltage, head.displacement, sample_rate=log.sample_rate, delay=wanted if told else 0.0
+    )
     say("fitting plays")
     fits = _fits(log, survey, fitter, trained, progress)
     missed = {name: left_out_error(fit) for name, fit in fits.items()}
@@ -190,13 +191,13 @@ def identify_stream(
     for part in parts(log, fitter.delay, progress):
         judge.add(part)
     found = StreamedIdentification(
-        model=_model(fits[chosen]),
+        model=fits[chosen].design.model(fits[chosen].w),
         chosen=chosen,
         cross_validated=missed,
         delay=fitter.delay,
         train=judge.misfit(held_out=False),
         held_out=judge.misfit(held_out=True),
-        line=_model(fits["line"]),
+        line=fits["line"].design.model(fits["line"].w),
         line_train=judge.misfit(held_out=False, of_line=True),
         line_held_out=judge.misfit(held_out=True, of_line=True),
         samples=samples,
@@ -216,10 +217,7 @@ def identify_stream(
 def _advice(found: StreamedIdentification, told: bool) -> list[str]:
     said = []
     if found.left_out:
-        said.append(
-            f"The first {found.left_out / found.sample_rate:.3g} s do not fit the rest (the stage had not "
-            "settled): left out."
-        )
+        said.append(unsettled_sentence(found.left_out / found.sample_rate))
     if not told:
         said.append(
             "The lag of the displacement is not known: all swings at the log's start are alike, so it looks "
@@ -275,29 +273,18 @@ def _fits(
         fold = np.minimum(np.arange(part.first, part.first + part.u.size) * FOLDS // trained, FOLDS)
         for k in range(0, part.u.size, CHUNK):
             rows = along.rows(part.u[k : k + CHUNK])
-            for f in np.unique(fold[k : k + CHUNK]):
-                if f < FOLDS:
-                    taken = np.flatnonzero((fold[k : k + CHUNK] == f) & part.counts[k : k + CHUNK])
-                    sums[f] = sums[f].plus(Sums.of(rows[taken], part.x[k : k + CHUNK][taken]))
+            piece = slice(k, k + CHUNK)
+            add(sums, rows, part.x[piece], part.counts[piece], fold[piece])
         if part.first + part.u.size >= trained:
             break
+    bent = Regression(design, sums)
     merged, to_plays = basis.merged()
     one = dataclasses.replace(merged, thresholds=merged.thresholds[:1], moving=merged.moving[:1])
-    to_line = to_plays[:, :1]
     return {
-        "line": Regression(
-            dataclasses.replace(design, basis=one), [each.combined(basis.size, to_line) for each in sums]
-        ).best(),
-        "plays": Regression(
-            dataclasses.replace(design, basis=merged), [each.combined(basis.size, to_plays) for each in sums]
-        ).best(),
-        "plays-asymmetric": Regression(design, sums).best(),
+        "line": bent.combined(one, to_plays[:, :1]).best(),
+        "plays": bent.combined(merged, to_plays).best(),
+        "plays-asymmetric": bent.best(),
     }
-
-
-def _model(fitted: Fitted) -> Model:
-    design, w = fitted.design, fitted.w
-    return design.basis.model(w[: design.basis.size], float(w[design.offset]), None, design.sample_rate)
 
 
 class _Judge:
