@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import html
+import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ from piezoest._files import write_text
 # A plot is some thousand dots wide: more points only make the page large and slow.
 MOST_POINTS = 4000
 MANY_SERIES = 5
+DPI = 130  # of pictures
 
 BLUE, ORANGE, GREEN, RED, GREY = "#1f5fa8", "#d9822b", "#2e8b57", "#b22234", "#8a8f98"
 
@@ -39,7 +42,7 @@ th:first-child, td:first-child { text-align: left; }
 ul.advice { background: #fff8ec; border-left: 4px solid #d9822b; margin: .5rem 0;
             padding: .6rem 1rem .6rem 2rem; }
 details { margin: .6rem 0; } summary { cursor: pointer; font-weight: 600; }
-.plot { width: 100%; margin: .4rem 0 1rem; }
+.plot { width: 100%; margin: .4rem 0 1rem; } .picture { max-width: 100%; }
 footer { margin-top: 2.5rem; color: #5b616b; font-size: .85rem; border-top: 1px solid #e3e6ea;
          padding-top: .6rem; }
 """
@@ -144,7 +147,7 @@ class Page:
         height : int
             In dots.
         """
-        io = _extras.load("plotly.io", "report", "an HTML report")
+        plotly_io = _extras.load("plotly.io", "report", "an HTML report")
         figure.update_layout(
             template="plotly_white",
             height=height,
@@ -163,7 +166,7 @@ class Page:
         self._plots += 1
         self._parts.append(
             '<div class="plot">'
-            + io.to_html(
+            + plotly_io.to_html(
                 figure,
                 include_plotlyjs=False,
                 full_html=False,
@@ -172,6 +175,23 @@ class Page:
                 div_id=f"plot-{self._plots}",
             )
             + "</div>"
+        )
+
+    def picture(self, figure: Any, alt: str) -> None:
+        """Add a picture.
+
+        Parameters
+        ----------
+        figure : matplotlib.figure.Figure
+            What to show.
+        alt : str
+            What it is, for those who do not see it.
+        """
+        drawn = io.BytesIO()
+        figure.savefig(drawn, format="png", dpi=DPI)
+        data = base64.b64encode(drawn.getvalue()).decode()
+        self._parts.append(
+            f'<img class="picture" alt="{html.escape(alt)}" src="data:image/png;base64,{data}">'
         )
 
     def footer(self, text: str) -> None:
