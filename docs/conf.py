@@ -10,18 +10,15 @@ from typing import Any
 import piezoest
 
 sys.path.insert(0, str(Path(__file__).parent))
-import adaptation_page
 import beyond_page
 import controller_page
-import estimators_page
-import faults_page
 import logs_page
 import paper_page
 import performance_page
 import real_data_page
 import safety_page
+import table_page
 import tuning_page
-import which_estimator_page
 
 project = "piezoest"
 author = "The piezoest developers"
@@ -74,7 +71,8 @@ html_sidebars: dict[str, list[str]] = {
     "coming_from": [],
     "mathematics": [],
     "paper": [],
-    "estimators": [],
+    "policies": [],
+    "performance": [],
     "which_estimator": [],
     "adaptation_speed": [],
     "controller": [],
@@ -123,14 +121,11 @@ def setup(app: Any) -> None:
     app.connect("builder-inited", paper_page.write)
     app.connect("builder-inited", performance_page.write)
     app.connect("builder-inited", beyond_page.write)
-    app.connect("builder-inited", estimators_page.write)
     app.connect("builder-inited", controller_page.write)
-    app.connect("builder-inited", which_estimator_page.write)
     app.connect("builder-inited", tuning_page.write)
     app.connect("builder-inited", real_data_page.write)
     app.connect("builder-inited", logs_page.write)
-    app.connect("builder-inited", adaptation_page.write)
-    app.connect("builder-inited", faults_page.write)
     app.connect("builder-inited", safety_page.write)
+    app.connect("builder-inited", table_page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

@@ -139,7 +139,7 @@ def cost(document: Document) -> Figure:
                     **style[row["estimator"]],
                 )  # fmt: skip
         axes.set(title=said, xlabel="one step [µs]", xscale="log", yscale="log")
-        _plain_numbers(axes.xaxis, (1.0,))
+        _plain_numbers(axes.xaxis)
         _plain_numbers(axes.yaxis)
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("largest error [% of the amplitude]")
