@@ -115,16 +115,15 @@ def reasons(document: Document, rows: dict[tuple[str, str], Document], fixed: Do
 
 
 def diverged(document: Document, rows: dict[tuple[str, str], Document]) -> str:
-    """Where the default did worse than linear feed-forward after the first period, with nobody to watch."""
+    """Where the default did worse than linear feed-forward after the first period."""
     mine = {name: row for (name, estimator), row in rows.items() if estimator == targets.DEFAULT}
     counts = listed(
         [f"{row['diverged']} of {row['runs']} runs of *{n}*" for n, row in mine.items() if row["diverged"]]
     )
     return (
-        f"Without the guard {counts} are worse than linear feed-forward by more than half in the period "
+        f"{counts} are worse than linear feed-forward by more than half in the period "
         "after the change, and settle all the same. A gain that falls at once makes the reading "
-        "jump, which is first taken for a fault of the sensor, and then for an offset. What the guard "
-        "makes of such runs is said below."
+        "jump, which is first taken for a fault of the sensor, and then for an offset."
     )
 
 
@@ -219,31 +218,15 @@ def hindsight_table(rows: dict[tuple[str, str], Document]) -> str:
 
 def monte_carlo_pieces(document: Document) -> dict[str, str]:
     """Texts by the name of their file."""
-    plain, guarded = document["unguarded"], document["guarded"]
-    counts = [["all", str(plain["diverged"]), str(guarded["diverged"])]]
-    counts += [
-        [name, str(count), str(guarded["by_scenario"][name])] for name, count in plain["by_scenario"].items()
-    ]
-    worst = [
-        worst_run(run, key) for key in ("unguarded", "guarded") for run in document[key]["worst"][:WORST]
-    ]
+    counts = [["all", str(document["diverged"])]]
+    counts += [[name, str(count)] for name, count in document["by_scenario"].items()]
     spans = document["spans"]
     return {
-        "monte_carlo": table("Runs that diverged", ["scenario", "without the guard", "with it"], counts),
+        "monte_carlo": table("Runs that diverged", ["scenario", "runs"], counts),
         "monte_carlo_worst": table(
             "The worst runs: largest error after the first period, over linear feed-forward's",
-            [
-                "guard",
-                "scenario",
-                "run",
-                "memory, s",
-                "amplitude, µm",
-                "frequency, Hz",
-                "noise, nm",
-                "without",
-                "with",
-            ],
-            worst,
+            ["scenario", "run", "memory, s", "amplitude, µm", "frequency, Hz", "noise, nm", "ratio"],
+            [worst_run(run) for run in document["worst"][:WORST]],
         ),
         "monte_carlo_verdict": monte_carlo_verdict(document),
         "monte_carlo_numbers": replacements(
@@ -261,27 +244,21 @@ def monte_carlo_pieces(document: Document) -> dict[str, str]:
     }
 
 
-def worst_run(run: Document, key: str) -> list[str]:
+def worst_run(run: Document) -> list[str]:
     """One line about a run."""
     given = run["conditions"]
     return [
-        "off" if key == "unguarded" else "on", run["scenario"], str(run["number"]), short(run["memory"]),
+        run["scenario"], str(run["number"]), short(run["memory"]),
         short(given["amplitude"]), short(given["frequency"]), f"{1e3 * given['noise']:.3g}",
-        *(short(run[each].get("run_ratio")) for each in ("unguarded", "guarded")),
+        short(run.get("run_ratio")),
     ]  # fmt: skip
 
 
 def monte_carlo_verdict(document: Document) -> str:
-    """Whether any run with the guard diverged, in a sentence."""
-    plain, guarded, runs = document["unguarded"], document["guarded"], document["runs"]
-    held = (
-        "none diverges with the guard on" if guarded["diverged"] == 0
-        else f"{guarded['diverged']} diverge with the guard on"
-    )  # fmt: skip
-    largest = guarded["worst"][0]["guarded"].get("run_ratio")
-    failed = plain["failures"] + guarded["failures"]
+    """How many runs diverged, in a sentence."""
+    largest, failed = document["worst"][0].get("run_ratio"), document["failures"]
     return (
-        f"Of {runs} runs {held}, {plain['diverged']} without it. The largest ratio with the guard is "
+        f"Of {document['runs']} runs {document['diverged'] or 'none'} diverge. The largest ratio is "
         f"{short(largest)}. {'No run failed.' if failed == 0 else f'{failed} runs failed.'}\n"
     )
 

@@ -32,8 +32,7 @@ def pieces(document: Document) -> dict[str, str]:
     machine = document["machine"]
     return {
         "outcomes": outcomes(),
-        "off": errors(document, guard=False),
-        "on": errors(document, guard=True),
+        "errors": errors(document),
         "bounds": bounds(document),
         "numbers": replacements(
             {
@@ -54,16 +53,15 @@ def outcomes() -> str:
     return table("Faults", ["fault", "what it is", "what happens", "settles"], body)
 
 
-def errors(document: Document, *, guard: bool) -> str:
+def errors(document: Document) -> str:
     """Worst and last error of each estimator under each fault."""
-    rows = {(row["fault"], row["estimator"]): row for row in document["rows"] if row["guard"] == guard}
+    rows = {(row["fault"], row["estimator"]): row for row in document["rows"]}
     names = list(dict.fromkeys(row["estimator"] for row in document["rows"]))
     body = [
         [fault, *(cell(rows[fault, name]) for name in names)]
         for fault in dict.fromkeys(row["fault"] for row in document["rows"])
     ]
-    title = f"Worst error, and that of the last periods [µm], guard {'on' if guard else 'off'}"
-    return table(title, ["fault", *names], body)
+    return table("Worst error, and that of the last periods [µm]", ["fault", *names], body)
 
 
 def cell(row: Document) -> str:
@@ -76,7 +74,7 @@ def bounds(document: Document) -> str:
     """Whether anything left its bounds, in a sentence."""
     rows = document["rows"]
     broken = [
-        f"{row['fault']} with ``{row['estimator']}``, guard {'on' if row['guard'] else 'off'}"
+        f"{row['fault']} with ``{row['estimator']}``"
         for row in rows
         if row["failure"] is not None or not (row["finite"] and row["admissible"])
     ]

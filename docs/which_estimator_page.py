@@ -80,8 +80,7 @@ def in_short(document: Document) -> list[str]:
     if diverged:
         said = listed([f"``{name}`` {count} times" for name, count in diverged.items()])
         sentences.append(
-            f"Worse than one and a half times linear feed-forward, somewhere within a run: {said}. "
-            "The supervisor of the ring was off."
+            f"Worse than one and a half times linear feed-forward, somewhere within a run: {said}."
         )
     return sentences
 

@@ -18,7 +18,6 @@ from piezoest.bench.scenarios import SCENARIOS
 from piezoest.compensators import InverseCompensator, LinearCompensator, VoltageLimits
 from piezoest.estimators.rls import HysteresisRLS
 from piezoest.models import LinearGain
-from piezoest.supervisor import Supervisor
 from piezoest.tracking import TrackingRecord, track
 
 LIMITS = VoltageLimits(-100.0, 100.0)  # V, the stage's
@@ -43,8 +42,6 @@ class Job:
         As `piezoest.bench.candidates.candidate` reads them.
     overrides : dict
         Fields of `piezoest.bench.cases.Conditions`.
-    guard : bool
-        Whether the supervisor of the ring is on.
     title : str, optional
         What the runs are said to be of, where the overrides make it more than the scenario.
     """
@@ -53,7 +50,6 @@ class Job:
     seed: int
     estimators: tuple[str, ...]
     overrides: dict[str, Any] = field(default_factory=dict)
-    guard: bool = False
     title: str | None = None
 
 
@@ -101,7 +97,6 @@ def follow(
     case: Case,
     estimator: str | None,
     *,
-    guard: bool = False,
     watch: Callable[[Any], Any] = lambda estimator: estimator,
 ) -> TrackingRecord:
     """Send a case round the ring.
@@ -112,8 +107,6 @@ def follow(
         Reference, stage and start.
     estimator : str or None
         As `piezoest.bench.candidates.candidate` reads it; None for linear feed-forward.
-    guard : bool
-        Whether the supervisor of the ring is on.
     watch : callable
         Is given the estimator and returns what goes into the ring in its place.
 
@@ -143,7 +136,6 @@ def follow(
         compensator=compensator,
         estimator=watch(made),
         update_interval=case.update_interval,
-        supervisor=Supervisor(rate) if guard else None,
     )
 
 
@@ -166,7 +158,7 @@ def play(job: Job) -> list[Run]:
     for estimator in job.estimators:
         metrics, failure = None, None
         try:
-            metrics = measure(follow(case, estimator, guard=job.guard), linear, case)
+            metrics = measure(follow(case, estimator), linear, case)
         except Exception as error:
             failure = f"{type(error).__name__}: {error}"
         runs.append(Run(title, job.seed, estimator, case.amplitude, metrics, failure))

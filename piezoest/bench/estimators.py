@@ -102,7 +102,6 @@ class Scenario:
             compensator=compensator,
             estimator=estimator,
             update_interval=max(1, round(UPDATE_INTERVAL * self.sample_rate)),
-            supervisor=False,  # the estimators are compared, not the guard
         )
 
 

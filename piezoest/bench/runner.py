@@ -57,8 +57,6 @@ class Settings:
         Updates of the compensator's model in a period of the wave.
     stage : {"paper", "preisach"}
         `PaperStage` or `PreisachStage`.
-    guard : bool
-        Whether the supervisor of the ring is on.
 
     Raises
     ------
@@ -74,7 +72,6 @@ class Settings:
     drift: float = 5.0
     updates: int = 50
     stage: Stage = "paper"
-    guard: bool = False
 
     def __post_init__(self) -> None:
         Conditions(**self.conditions("cold-start"))
@@ -189,7 +186,7 @@ def play(task: Task) -> Row:
             }
             record = linear
             if estimator is not None:
-                record = follow(case, estimator, guard=task.settings.guard, watch=clock.watch)
+                record = follow(case, estimator, watch=clock.watch)
             row |= _numbers(measure(record, linear, case), case)
         if estimator is not None:
             row["microseconds"] = 1e6 * clock.seconds / row["samples"]

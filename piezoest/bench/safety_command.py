@@ -45,7 +45,7 @@ class Which:
             "-c",
             metavar="NAME|MODULE:NAME",
             help="Called with (sample_rate, limits=...). line, no-corridor or an estimator: the default one, "
-            "changed; parts: estimator, inverse and supervisor by hand.",
+            "changed; parts: estimator and inverse by hand.",
         ),
     ] = None
     given: Annotated[

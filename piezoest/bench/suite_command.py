@@ -93,7 +93,6 @@ class Ring:
 
     sample_rate: Annotated[float | None, typer.Option(min=2000.0, help="Hz; default 5000.")] = None
     stage: Annotated[str, typer.Option(help="paper or preisach.")] = "paper"
-    guard: Annotated[bool, typer.Option("--guard", help="With the supervisor of the ring.")] = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,7 +166,7 @@ def suite(
 
             stage: Any = ring.stage
             settings = QUICK if runs.quick else Settings()
-            settings = replace(settings, stage=stage, guard=ring.guard)
+            settings = replace(settings, stage=stage)
             if ring.sample_rate is not None:
                 settings = replace(settings, sample_rate=ring.sample_rate)
             named = [*(runs.only or campaign.default_estimators()), *(runs.estimator or [])]

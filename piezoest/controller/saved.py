@@ -11,10 +11,10 @@ import numpy as np
 from piezoest._checks import FloatArray, array_1d, dictionary, fields, finite, instance
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import slots, start, team
+from piezoest.controller.shown import Event
 from piezoest.estimators import saved_state
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import FIXED, NUMBER, Kind, Numbers, Record, by_name
-from piezoest.supervisor import Event
 
 FORMAT = 1
 _FIELDS = (

@@ -15,7 +15,6 @@ from piezoest.equations import loop_inverse, play_inverse
 from piezoest.layout import Named
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
 from piezoest.models.learnt_on import ends, figure
-from piezoest.supervisor import Event
 
 STAGES = ("seeking", "approaching", "running", "homing")
 # What each fault means.
@@ -40,6 +39,25 @@ MEANINGS = {
 }
 # Of what is noted beside faults, that which the user is to change.
 WARNINGS = (FAST, LATE, OUTSIDE)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that a controller noticed or did.
+
+    Parameters
+    ----------
+    time : float
+        Seconds since its start.
+    action : str
+        ``"fell back"`` (to a line, for the readings are at fault), ``"resumed"`` or ``"went on"``.
+    reason : str
+        Why, with the figures.
+    """
+
+    time: float
+    action: str
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
