@@ -113,9 +113,7 @@ def _scenarios(rows: list[Any]) -> Iterator[Criterion]:
 
 def _faults(rows: list[Any]) -> Iterator[Criterion]:
     for stage, cases in _by_stage(rows):
-        broken = sum(
-            numbers[name]["sum"] for numbers in cases.values() for name in ("broken", "broken_guarded")
-        )
+        broken = sum(numbers["broken"]["sum"] for numbers in cases.values())
         yield _line(stage, "all faults: runs out of bounds", broken, 0.0)
         last = _worst([cases[name]["last_um"]["worst"] for name in RECOVERABLE])
         yield _line(stage, "faults that can recover: largest error at the end", last, RECOVERED, "nm")

@@ -71,7 +71,7 @@ def compare(name: str, learner: str, samples: int) -> dict[str, Any]:
     estimator, compensator = pair(learner, case)
     double = pz.export.CompiledController(pz.export.c(estimator, compensator))
     single = pz.export.CompiledController(pz.export.c(estimator, compensator, precision="float"))
-    parts: dict[str, Any] = {"compensator": compensator, "estimator": estimator, "supervisor": False}
+    parts: dict[str, Any] = {"compensator": compensator, "estimator": estimator}
     library = pz.track(r, stage=case.new_stage(), **parts)
     before = np.concatenate([[np.nan], library.measured[:-1]])
     voltage = double.run(library.reference, before)
@@ -103,9 +103,7 @@ def rounding(name: str, learner: str, samples: int) -> float:
     case, r = build(name, samples)
     estimator, compensator = pair(learner, case)
     single = pz.signals.from_array(r.values.astype(np.float32).astype(float), r.sample_rate, period=r.period)
-    record = pz.track(
-        single, stage=case.new_stage(), compensator=compensator, estimator=estimator, supervisor=False
-    )
+    record = pz.track(single, stage=case.new_stage(), compensator=compensator, estimator=estimator)
     return settled(record.error, round(case.period))
 
 

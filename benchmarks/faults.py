@@ -1,4 +1,4 @@
-"""What each fault does to the ring: every estimator, with the guard and without.
+"""What each fault does to the ring: every estimator.
 
 A triangle of 5 µm at 5 Hz for three seconds; the fault is between the stage and the rest of the ring
 (piezoest.bench.faults). Errors are those of the true displacement: the worst from the fourth period on,
@@ -42,18 +42,12 @@ class Case:
 
     fault: str
     estimator: str
-    guard: bool
     seed: int
 
 
 def cases(seed: int) -> list[Case]:
-    """Every fault, and none, with every estimator, without the guard and with it."""
-    return [
-        Case(fault, estimator, guard, seed)
-        for fault in ("none", *FAULTS)
-        for estimator in ESTIMATORS
-        for guard in (False, True)
-    ]
+    """Every fault, and none, with every estimator."""
+    return [Case(fault, estimator, seed) for fault in ("none", *FAULTS) for estimator in ESTIMATORS]
 
 
 def one(case: Case) -> dict[str, Any]:
@@ -62,8 +56,7 @@ def one(case: Case) -> dict[str, Any]:
     reference = fault.reference(pz.signals.triangle(AMPLITUDE, FREQUENCY, PERIODS, SAMPLE_RATE))
     learner = candidate(case.estimator)(SAMPLE_RATE, START)
     transfer = round(TRANSFER * SAMPLE_RATE)
-    supervisor = pz.Supervisor(SAMPLE_RATE) if case.guard else None
-    row: dict[str, Any] = {"fault": case.fault, "estimator": case.estimator, "guard": case.guard}
+    row: dict[str, Any] = {"fault": case.fault, "estimator": case.estimator}
     try:
         record = pz.track(
             reference,
@@ -71,7 +64,6 @@ def one(case: Case) -> dict[str, Any]:
             compensator=pz.InverseCompensator(START, LIMITS, transfer_samples=transfer),
             estimator=learner,
             update_interval=round(UPDATE * SAMPLE_RATE),
-            supervisor=supervisor,
         )
     except Exception as error:
         return {**row, "failure": f"{type(error).__name__}: {error}"}
@@ -90,7 +82,6 @@ def one(case: Case) -> dict[str, Any]:
         "finite": bool(np.isfinite(record.theta).all() and np.isfinite(learner.P).all()),
         "admissible": bool(learner.model.is_admissible),
         "largest_voltage": float(np.max(np.abs(record.voltage))),
-        "fell_back": sum(event.action == "fell back" for event in supervisor.events) if supervisor else None,
         "errors": errors.tolist(),
     }
 
@@ -109,10 +100,8 @@ def main() -> int:
 
     began = time.perf_counter()
     todo = cases(arguments.seed)
-    found = {
-        (row["fault"], row["estimator"], row["guard"]): row for row in in_processes(one, todo, arguments.jobs)
-    }
-    rows = [found[case.fault, case.estimator, case.guard] for case in todo]
+    found = {(row["fault"], row["estimator"]): row for row in in_processes(one, todo, arguments.jobs)}
+    rows = [found[case.fault, case.estimator] for case in todo]
     document = {
         "suite": "faults",
         **origin(began),
@@ -124,7 +113,7 @@ def main() -> int:
     put(document, arguments.json)
     broken = [row for row in rows if row["failure"] or not (row["finite"] and row["admissible"])]
     for row in broken:
-        print(f"out of bounds: {row['fault']}, {row['estimator']}, guard {row['guard']}", file=sys.stderr)
+        print(f"out of bounds: {row['fault']}, {row['estimator']}", file=sys.stderr)
     return 1 if broken else 0
 
 

@@ -1,9 +1,8 @@
 """Look for divergence: thousands of random runs over memory, amplitude, frequency, noise and scenario.
 
 A run diverges if its largest tracking error after the first period is above 1.5 times that of linear
-feed-forward on an identical stage; counted with the supervisor of the ring and without. Every run
-follows from its number alone. Lengths are in periods and a period has always as many samples, so
-that a slow reference costs no more than a fast one.
+feed-forward on an identical stage. Every run follows from its number alone. Lengths are in periods and a
+period has always as many samples, so that a slow reference costs no more than a fast one.
 
     python benchmarks/monte_carlo.py [--runs N] [--jobs N] [--estimator NAME] [--file FILE]
 
@@ -72,26 +71,22 @@ def draw(number: int, estimator: str) -> dict[str, Any]:
 
 
 def one(run: dict[str, Any]) -> dict[str, Any]:
-    """Run it without the guard, and with it."""
+    """Run it."""
     case = SCENARIOS[run["scenario"]].build(run["number"], **run["conditions"])
     linear = follow(case, None)
-    result: dict[str, Any] = dict(run)
-    for guard in (False, True):
-        key = "guarded" if guard else "unguarded"
-        try:
-            metrics = measure(follow(case, run["estimator"], guard=guard), linear, case)
-        except Exception as error:
-            result[key] = {"failure": f"{type(error).__name__}: {error}", "diverged": True}
-            continue
-        result[key] = {
-            "run_ratio": metrics.run_ratio if math.isfinite(metrics.run_ratio) else None,
-            "worst_ratio": metrics.worst_ratio if math.isfinite(metrics.worst_ratio) else None,
-            "ratio": metrics.ratio if math.isfinite(metrics.ratio) else None,
-            "diverged": metrics.diverged,
-            "diverged_in_a_period": metrics.diverged_in_a_period,
-            "settling_periods": metrics.settling_periods,
-        }
-    return result
+    try:
+        metrics = measure(follow(case, run["estimator"]), linear, case)
+    except Exception as error:
+        return {**run, "failure": f"{type(error).__name__}: {error}", "diverged": True}
+    return {
+        **run,
+        "run_ratio": metrics.run_ratio if math.isfinite(metrics.run_ratio) else None,
+        "worst_ratio": metrics.worst_ratio if math.isfinite(metrics.worst_ratio) else None,
+        "ratio": metrics.ratio if math.isfinite(metrics.ratio) else None,
+        "diverged": metrics.diverged,
+        "diverged_in_a_period": metrics.diverged_in_a_period,
+        "settling_periods": metrics.settling_periods,
+    }
 
 
 def finished(path: Path | None, estimator: str) -> dict[int, dict[str, Any]]:
@@ -119,21 +114,16 @@ def results(todo: list[dict[str, Any]], jobs: int) -> Iterator[dict[str, Any]]:
 
 def summary(runs: list[dict[str, Any]]) -> dict[str, Any]:
     """Divergences in all and by scenario, and the worst runs to look at."""
-    found: dict[str, Any] = {"runs": len(runs)}
-    for key in ("unguarded", "guarded"):
-        mine = [run for run in runs if key in run]
-        worst = sorted(mine, key=lambda run: -(run[key].get("run_ratio") or math.inf))[:10]
-        found[key] = {
-            "diverged": sum(run[key]["diverged"] for run in mine),
-            "diverged_in_a_period": sum(run[key].get("diverged_in_a_period", True) for run in mine),
-            "failures": sum("failure" in run[key] for run in mine),
-            "by_scenario": {
-                name: sum(run[key]["diverged"] for run in mine if run["scenario"] == name)
-                for name in SCENARIOS
-            },
-            "worst": worst,
-        }
-    return found
+    return {
+        "runs": len(runs),
+        "diverged": sum(run["diverged"] for run in runs),
+        "diverged_in_a_period": sum(run.get("diverged_in_a_period", True) for run in runs),
+        "failures": sum("failure" in run for run in runs),
+        "by_scenario": {
+            name: sum(run["diverged"] for run in runs if run["scenario"] == name) for name in SCENARIOS
+        },
+        "worst": sorted(runs, key=lambda run: -(run.get("run_ratio") or math.inf))[:10],
+    }
 
 
 def main() -> int:
@@ -165,14 +155,9 @@ def main() -> int:
                 log.write(json.dumps(run, allow_nan=False) + "\n")
                 log.flush()
             if done * 50 // len(todo) > (done - 1) * 50 // len(todo):
-                plain, guarded = (
-                    sum(each[key]["diverged"] for each in runs.values()) for key in ("unguarded", "guarded")
-                )
+                diverged = sum(each["diverged"] for each in runs.values())
                 seconds = time.perf_counter() - began
-                print(
-                    f"{done} of {len(todo)}, {seconds:.0f} s; diverged: {plain} unguarded, {guarded} guarded",
-                    file=sys.stderr,
-                )
+                print(f"{done} of {len(todo)}, {seconds:.0f} s; diverged: {diverged}", file=sys.stderr)
     finally:
         if log is not None:
             log.close()
@@ -185,7 +170,7 @@ def main() -> int:
         **summary([runs[number] for number in sorted(runs)]),
     }
     put(document, arguments.json)
-    return 1 if document["guarded"]["diverged"] else 0
+    return 1 if document["diverged"] else 0
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ from piezoest._checks import FloatArray, array_1d, integer, number_or_nan
 from piezoest.estimators.base import EstimatorBase
 from piezoest.estimators.compiled import NONE
 from piezoest.signals import check_continuity
-from piezoest.supervisor import Supervisor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -184,7 +183,6 @@ def track(
     update_interval: int = 50,
     sample_rate: float | None = None,
     allow_jumps: bool = False,
-    supervisor: Supervisor | bool | None = True,
 ) -> TrackingRecord:
     """Let a stage follow a reference, and the compensator learn from the estimator, or a controller from all.
 
@@ -200,7 +198,7 @@ def track(
     estimator : object with ``step(u, x)`` and ``model``, optional
         Such as `HysteresisRLS`; without one the compensator's model stays.
     controller : object with ``step(r) -> u`` and ``learn(u, x)``, optional
-        Such as `AdaptiveFeedforward`, in the place of compensator, estimator and guard: it goes round the
+        Such as `AdaptiveFeedforward`, in the place of compensator and estimator: it goes round the
         ring sample by sample, and the record has no parameters.
     update_interval : int
         Samples between two updates of the compensator's model (default 50: 1 ms at 50 kHz).
@@ -209,10 +207,6 @@ def track(
     allow_jumps : bool
         Take a reference with unfiltered steps instead of refusing it; without a slew-rate limit
         they reach the voltage.
-    supervisor : Supervisor or bool
-        Guard that falls back to the last good model, or to linear feed-forward, when the
-        compensated error is worse than linear feed-forward's. True (default) makes one; False or
-        None is none.
 
     Returns
     -------
@@ -222,20 +216,19 @@ def track(
     ------
     ValueError
         If r is not a finite 1-D array or jumps, no sample rate is known or two of them differ,
-        supervisor is none of these, or there is a controller beside a compensator, or neither.
+        or there is a controller beside a compensator, or neither.
 
     Notes
     -----
     Feed-forward needs no measurement within an interval, so objects that also have ``run``
     are run an interval at a time; the result is that of a loop of ``step``.
     """
-    _check_driver(compensator, estimator, controller, supervisor)
+    _check_driver(compensator, estimator, controller)
     reference = array_1d("r", r, minimum_length=1)
     rate = _sample_rate(sample_rate, r=r, stage=stage, estimator=estimator, controller=controller)
     if not allow_jumps:
         check_continuity(reference, rate, "r")
     interval = integer("update_interval", update_interval, 1)
-    guard = _guard(supervisor, rate)
     period = getattr(r, "period", None)
     period = None if period is None else round(period)
     N = reference.size
@@ -254,39 +247,25 @@ def track(
                 known, theta, names = present, present.theta, present.parameter_names
             history.append(theta)
             feed(estimator, voltage[part], measured[part])
-            due = bool(getattr(compensator, "hand_over_due", True))
-            model = estimator.model if due else present
-            if guard is not None:
-                model = guard.review(reference[part], voltage[part], measured[part], present, model)
-            if due and model is not present:
-                compensator.model = model
+            if getattr(compensator, "hand_over_due", True):
+                model = estimator.model
+                if model is not present:
+                    compensator.model = model
     parameters = _of_one_kind(history) if history else np.empty((-(-N // interval), 0))
     return TrackingRecord(
         reference, voltage, measured, displacement, parameters, names, rate, period, interval
     )
 
 
-def _check_driver(compensator: Any, estimator: Any, controller: Any, supervisor: Any) -> None:
+def _check_driver(compensator: Any, estimator: Any, controller: Any) -> None:
     """Refuse two that give the voltage, and none."""
     if controller is None:
         if compensator is None:
             raise ValueError("nothing gives the voltage: pass compensator= or controller=")
         return
     others = {"compensator": compensator, "estimator": estimator}
-    others["supervisor"] = None if isinstance(supervisor, bool) else supervisor
     if given := [name for name, value in others.items() if value is not None]:
         raise ValueError(f"controller does without {' and '.join(given)}: leave out one or the other")
-
-
-def _guard(supervisor: Any, rate: float) -> Supervisor | None:
-    """The guard that was asked for."""
-    if supervisor is None or supervisor is False:
-        return None
-    if supervisor is True:
-        return Supervisor(rate)
-    if not isinstance(supervisor, Supervisor):
-        raise ValueError(f"supervisor must be a Supervisor, True or False, got {supervisor!r}")
-    return supervisor
 
 
 def _turn(

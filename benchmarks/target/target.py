@@ -80,11 +80,9 @@ def prepare(name: str, samples: int) -> tuple[Any, Any, Any, Any]:
     teacher = estimator
     if name == MOVED:
         teacher = pz.HysteresisRLS(SAMPLE_RATE, initial_model=compensator.model)
-    pz.track(r[:learnt], stage=stage, compensator=compensator, estimator=teacher, supervisor=False)
+    pz.track(r[:learnt], stage=stage, compensator=compensator, estimator=teacher)
     estimator, before = copy.deepcopy(estimator), compensator.copy()
-    record = pz.track(
-        r[learnt:end], stage=stage, compensator=compensator, estimator=teacher, supervisor=False
-    )
+    record = pz.track(r[learnt:end], stage=stage, compensator=compensator, estimator=teacher)
     return estimator, before, r[learnt:end], np.concatenate([[np.nan], record.measured[:-1]])
 
 

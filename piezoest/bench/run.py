@@ -195,5 +195,4 @@ def follow(case: Case, estimator: str) -> TrackingRecord:
         compensator=compensator,
         estimator=made,
         update_interval=case.update_interval,
-        supervisor=None,
     )

@@ -50,7 +50,7 @@ def numbers(given: dict[str, Any], part: str, case: str) -> Any:
         ("settled", "triangle 5 µm 5 Hz", "PrandtlIshlinskiiRLS_left", "worst", 0.06, "triangle 5 µm 5 Hz"),
         ("scenarios", "prbs", "PrandtlIshlinskiiRLS_diverged", "sum", 1.0, "diverged"),
         ("scenarios", "gain-step", "PrandtlIshlinskiiRLS_late", "mean", 0.1, "gain-step"),
-        ("faults", "spikes", "broken_guarded", "sum", 1.0, "out of bounds"),
+        ("faults", "spikes", "broken", "sum", 1.0, "out of bounds"),
         ("faults", "gap", "last_um", "worst", None, "can recover"),
     ],
 )
