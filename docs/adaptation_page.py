@@ -20,7 +20,6 @@ from piezoest.bench.scenarios import SCENARIOS
 DOCS = Path(__file__).resolve().parent
 DATA = DOCS / "data"
 TARGETS, POLICIES = DOCS / "generated" / "adaptation_targets", DOCS / "generated" / "adaptation_policies"
-WORST = 5  # runs of the Monte Carlo that are shown
 
 Document = dict[str, Any]
 
@@ -32,19 +31,14 @@ def read(name: str) -> Document:
 
 def write(app: Any = None) -> None:
     """Write what the pages include."""
-    pieces = {
-        **criteria_pieces(read("adaptation"), read("best_fixed_model")),
-        **monte_carlo_pieces(read("monte_carlo")),
-        **soak_pieces(read("soak")),
-    }
-    write_pieces(TARGETS, pieces)
+    write_pieces(TARGETS, pieces(read("adaptation")))
     write_pieces(POLICIES, policies_pieces(read("policies")))
 
 
 # ---------------------------------------------------------------- asked, measured, verdict
 
 
-def criteria_pieces(document: Document, fixed: Document) -> dict[str, str]:
+def pieces(document: Document) -> dict[str, str]:
     """Texts by the name of their file."""
     rows = {(row["scenario"], row["estimator"]): row for row in document["summary"]}
     body = []
@@ -58,7 +52,7 @@ def criteria_pieces(document: Document, fixed: Document) -> dict[str, str]:
         )  # fmt: skip
     return {
         "criteria": table("Asked and measured", ["", "asked", "measured", "verdict"], body),
-        "reasons": "".join(f"- {sentence}\n" for sentence in reasons(document, rows, fixed)),
+        "reasons": "".join(f"- {sentence}\n" for sentence in reasons(document, rows)),
         "spread": spread_table(document, rows),
         "hindsight": hindsight_table(rows),
         "paper_rate": paper_rate(rows),
@@ -93,7 +87,7 @@ def origin(document: Document, of: str) -> dict[str, str]:
     }
 
 
-def reasons(document: Document, rows: dict[tuple[str, str], Document], fixed: Document) -> list[str]:
+def reasons(document: Document, rows: dict[tuple[str, str], Document]) -> list[str]:
     """Why what is not met is not."""
     missed = {one["kind"] for one in document["criteria"] if not one["met"]}
     sentences = []
@@ -106,7 +100,10 @@ def reasons(document: Document, rows: dict[tuple[str, str], Document], fixed: Do
             )  # fmt: skip
             sentences.append(f"*{name}*: {percent(row['settled_soon'])} of the runs settle in time{said}.")
     if "linear" in missed:
-        sentences.append(below_linear(fixed))
+        sentences.append(
+            "That far below linear feed-forward is beyond a Coleman-Hodgdon model on this stage: its loop "
+            "has another shape than the stage's. ``PrandtlIshlinskiiRLS``, which learns plays, comes further."
+        )
     if "rest" in missed:
         sentences += at_rest(rows)
     if "divergence" in missed:
@@ -123,18 +120,7 @@ def diverged(document: Document, rows: dict[tuple[str, str], Document]) -> str:
     return (
         f"Without the guard {counts} are worse than linear feed-forward by more than half in the period "
         "after the change, and settle all the same. A gain that falls at once makes the reading "
-        "jump, which is first taken for a fault of the sensor, and then for an offset. What the guard "
-        "makes of such runs is said below."
-    )
-
-
-def below_linear(fixed: Document) -> str:
-    """How far a Coleman-Hodgdon model can get at all."""
-    reached = listed([percent(row["reduction"]) for row in fixed["rows"]])
-    rows = listed([f"{row['amplitude']:g} µm at {row['frequency']:g} Hz" for row in fixed["rows"]])
-    return (
-        "That far below linear feed-forward is beyond this model on this stage: the best fixed one, found by "
-        f"direct search over its parameters with no estimator in between, is {reached} below for {rows}."
+        "jump, which is first taken for a fault of the sensor, and then for an offset."
     )
 
 
@@ -212,124 +198,6 @@ def hindsight_table(rows: dict[tuple[str, str], Document]) -> str:
     ]
     title = f"Settled error (median); part of the runs that settle within {targets.SOON} periods"
     return table(title, ["HysteresisRLS", *targets.CHANGES], body)
-
-
-# ---------------------------------------------------------------- Monte Carlo
-
-
-def monte_carlo_pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
-    plain, guarded = document["unguarded"], document["guarded"]
-    counts = [["all", str(plain["diverged"]), str(guarded["diverged"])]]
-    counts += [
-        [name, str(count), str(guarded["by_scenario"][name])] for name, count in plain["by_scenario"].items()
-    ]
-    worst = [
-        worst_run(run, key) for key in ("unguarded", "guarded") for run in document[key]["worst"][:WORST]
-    ]
-    spans = document["spans"]
-    return {
-        "monte_carlo": table("Runs that diverged", ["scenario", "without the guard", "with it"], counts),
-        "monte_carlo_worst": table(
-            "The worst runs: largest error after the first period, over linear feed-forward's",
-            [
-                "guard",
-                "scenario",
-                "run",
-                "memory, s",
-                "amplitude, µm",
-                "frequency, Hz",
-                "noise, nm",
-                "without",
-                "with",
-            ],
-            worst,
-        ),
-        "monte_carlo_verdict": monte_carlo_verdict(document),
-        "monte_carlo_numbers": replacements(
-            {
-                **origin(document, "monte"),
-                "monte runs": document["runs"],
-                "monte bound": short(document["diverged_above"]),
-                "monte estimator": f"``{document['estimator'].replace('{memory:.4g}', 'T')}``",
-                "monte memory": "{:g} to {:g} s".format(*spans["memory"]),
-                "monte amplitude": "{:g} to {:g} µm".format(*spans["amplitude"]),
-                "monte frequency": "{:g} to {:g} Hz".format(*spans["frequency"]),
-                "monte noise": "{:g} to {:g} nm".format(*(1e3 * noise for noise in spans["noise"])),
-            }
-        ),
-    }
-
-
-def worst_run(run: Document, key: str) -> list[str]:
-    """One line about a run."""
-    given = run["conditions"]
-    return [
-        "off" if key == "unguarded" else "on", run["scenario"], str(run["number"]), short(run["memory"]),
-        short(given["amplitude"]), short(given["frequency"]), f"{1e3 * given['noise']:.3g}",
-        *(short(run[each].get("run_ratio")) for each in ("unguarded", "guarded")),
-    ]  # fmt: skip
-
-
-def monte_carlo_verdict(document: Document) -> str:
-    """Whether any run with the guard diverged, in a sentence."""
-    plain, guarded, runs = document["unguarded"], document["guarded"], document["runs"]
-    held = (
-        "none diverges with the guard on" if guarded["diverged"] == 0
-        else f"{guarded['diverged']} diverge with the guard on"
-    )  # fmt: skip
-    largest = guarded["worst"][0]["guarded"].get("run_ratio")
-    failed = plain["failures"] + guarded["failures"]
-    return (
-        f"Of {runs} runs {held}, {plain['diverged']} without it. The largest ratio with the guard is "
-        f"{short(largest)}. {'No run failed.' if failed == 0 else f'{failed} runs failed.'}\n"
-    )
-
-
-# ---------------------------------------------------------------- soak
-
-
-def soak_pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
-    checks, names = document["checks"], ("α", "β", "γ", "offset's slope")
-    last, starts, noises = checks[-1], document["theta_at_the_start"], document["noise_of_theta"]
-    body = []
-    for name, start, noise, end, trend in zip(
-        names, starts, noises, last["theta"], document["trend"], strict=True
-    ):
-        off = (end - start) / noise
-        body.append([name, f"{start:.6g}", f"{noise:.2g}", f"{end:.6g}", f"{off:+.1f}", f"{trend:+.1f}"])
-    heading = ["", "mean at the start", "its standard deviation", "at the end", "off by", "trend"]
-    unsound = sum(not each["sound"] for each in checks)
-    sound = (
-        f"At all {len(checks)} checks P is symmetric and positive definite"
-        if unsound == 0
-        else f"At {unsound} of {len(checks)} checks P is not symmetric and positive definite"
-    )
-    smallest = min(each["smallest_eigenvalue"] for each in checks)
-    within = "within" if document["within_noise"] else "beyond"
-    return {
-        "soak": table("Parameters; the last two columns in standard deviations of the start", heading, body),
-        "soak_verdict": (
-            f"{sound}; its least eigenvalue, scaled to a unit diagonal, is {short(smallest)}. The largest "
-            f"deviation of a parameter at a check is {short(document['largest_deviation'])} standard "
-            f"deviations of the start, {within} the {short(document['within'])} that are allowed.\n"
-        ),
-        "soak_numbers": replacements(
-            {
-                **origin(document, "soak"),
-                "soak samples": power_of_ten(last["samples"]),
-                "soak hours": short(last["samples"] / document["sample_rate"] / 3600.0),
-                "soak rate": f"{document['sample_rate']:g} Hz",
-                "soak seconds": f"{document['seconds']:.0f} s",
-                "soak run in": f"{document['run_in_samples'] / document['sample_rate']:g} s",
-            }
-        ),
-    }  # fmt: skip
-
-
-def power_of_ten(count: int) -> str:
-    return f"{count / 1e6:g} million"
 
 
 # ---------------------------------------------------------------- policies

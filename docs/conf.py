@@ -11,7 +11,6 @@ import piezoest
 
 sys.path.insert(0, str(Path(__file__).parent))
 import adaptation_page
-import beyond_page
 import controller_page
 import estimators_page
 import faults_page
@@ -122,7 +121,6 @@ def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, li
 def setup(app: Any) -> None:
     app.connect("builder-inited", paper_page.write)
     app.connect("builder-inited", performance_page.write)
-    app.connect("builder-inited", beyond_page.write)
     app.connect("builder-inited", estimators_page.write)
     app.connect("builder-inited", controller_page.write)
     app.connect("builder-inited", which_estimator_page.write)

@@ -15,7 +15,7 @@ from paper_page import table, write_pieces
 DOCS = Path(__file__).resolve().parent
 DATA = DOCS / "data"
 TARGET = DOCS / "generated" / "estimators"
-NAMES = ("estimators", "batch_fit", "filterpy_parity", "consistency")
+NAMES = ("estimators", "speed", "consistency")
 # Least part of the runs that must lie within three standard errors.
 CONSISTENT = 0.95
 
@@ -30,15 +30,14 @@ def write(app: Any = None) -> None:
 
 def pieces(documents: Mapping[str, Document]) -> dict[str, str]:
     """Texts by the name of their file."""
-    ring, fits, parity, known = (documents[name] for name in NAMES)
+    ring, speed, known = (documents[name] for name in NAMES)
     return {
         "ring": ring_table(ring),
         "options": options(ring),
         "consistency": consistency_table(known),
         "inconsistent": inconsistent(known),
-        "fits": fits_table(fits),
-        "memory": memory_table(fits),
-        "numbers": numbers(ring, fits, parity, known),
+        "fits": fits_table(speed),
+        "numbers": numbers(ring, speed, known),
     }
 
 
@@ -109,42 +108,21 @@ def inconsistent(document: Document) -> str:
 
 def fits_table(document: Document) -> str:
     """Times of fits and solves, and their ratio to a simulation."""
-    heading = ["", "samples", "best, ms", "median, ms", "simulations", "worst relative error", "outcome"]
     body = [
-        [
-            row["name"],
-            str(row["samples"]),
-            short(1e3 * row["seconds"]),
-            short(1e3 * row["median_seconds"]),
-            f"{row['simulations']:.0f}",
-            f"{row['worst_parameter_error']:.1e}" if row["solver"] else "—",
-            row["solver"].replace("`", "") or "—",
-        ]
-        for row in document["rows"]
+        [row["name"], str(row["samples"]), short(1e3 * row["seconds"]), f"{row['simulations']:.0f}"]
+        for row in document["fits"]
     ]
-    return table("BatchFit: one fit; MovingHorizon: one solve", heading, body)
+    return table("One fit, one solve", ["", "samples", "ms", "simulations"], body)
 
 
-def memory_table(document: Document) -> str:
-    """Memory of a process that makes one fit."""
-    body = [
-        [
-            row["method"],
-            str(row["samples"]),
-            f"{row['megabytes']:.0f}",
-            "—" if row["bytes_per_sample"] is None else f"{row['bytes_per_sample']:.0f}",
-        ]
-        for row in document["memory"]
-    ]
-    heading = ["BatchFit", "samples", "MB", "bytes a sample more"]
-    return table("Largest memory of a process that makes one fit", heading, body)
-
-
-def numbers(ring: Document, fits: Document, parity: Document, known: Document) -> str:
+def numbers(ring: Document, speed: Document, known: Document) -> str:
     """Substitutions for numbers that stand in sentences."""
     scenario = ring["scenario"]
-    solve = next(row for row in fits["rows"] if row["name"] == "moving horizon")
-    full = next(row for row in fits["rows"] if row["name"] == "moving horizon, full rate")
+    solve, full = (row for row in speed["fits"] if row["name"].startswith("MovingHorizon"))
+    bare, face = (
+        next(row for row in speed["against_python"] if row["peer"] == peer)
+        for peer in ("filterpy's EKF, bare loop", "FilterPyEKF.run")
+    )
     paper = next(row for row in known["rows"] if row["options"].get("memory"))
     low, high = min(paper["alone_by_said"]), max(paper["alone_by_said"])
     values = {
@@ -156,18 +134,18 @@ def numbers(ring: Document, fits: Document, parity: Document, known: Document) -
         "settled_below": f"{100.0 * scenario['settled_below']:g} %",
         "update_interval": f"{1e3 * scenario['update_interval_s']:g} ms",
         "seed": scenario["seed"],
-        "fits_date": fits["date"][:10],
-        "solve": f"{1e3 * solve['median_seconds']:.0f} ms",
-        "full_solve": f"{1e3 * full['median_seconds']:.0f} ms",
+        "fits_date": speed["date"][:10],
+        "solve": f"{1e3 * solve['seconds']:.0f} ms",
+        "full_solve": f"{1e3 * full['seconds']:.0f} ms",
         "runs": known["runs"],
         "known_date": known["date"][:10],
         "by_P": f"{low:.0f} to {high:.0f}",
-        "parity_samples": f"{parity['samples']} samples",
-        "parity_missing": parity["missing"],
-        "parity": f"{max(parity['largest_relative_difference'].values()):.1e}",
-        "parity_times": f"{parity['times_faster']:.0f}",
-        "parity_compiled": f"{parity['compiled_microseconds_per_sample']:.2f} µs",
-        "parity_filterpy": f"{parity['filterpy_microseconds_per_sample']:.0f} µs",
+        "parity_samples": f"{speed['slow']} samples",
+        "parity": f"{bare['difference']:.0e}",
+        "parity_times": f"{1.0 / bare['ratio']:.0f}",
+        "parity_compiled": f"{1e-3 * bare['ns']:.2f} µs",
+        "parity_filterpy": f"{1e-3 * bare['peer_ns']:.0f} µs",
+        "parity_face": f"{1e-3 * face['peer_ns']:.0f} µs",
     }
     return "".join(f".. |{name}| replace:: {value}\n" for name, value in values.items())
 

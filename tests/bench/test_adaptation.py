@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -26,7 +24,6 @@ from piezoest.policies import DeadZone, NormBound
 
 FS = 4000.0
 SMALL: dict[str, Any] = {"sample_rate": FS, "before": 2, "after": 4, "rest": 0.4, "drift": 1.0, "updates": 40}
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 OWN = """
 class Still:
@@ -56,15 +53,6 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "own_estimators_of_adaptation.py").write_text(OWN, encoding="utf-8")
     return "own_estimators_of_adaptation"
-
-
-def load_script(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, BENCHMARKS / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_candidates(own: str) -> None:
@@ -331,42 +319,3 @@ def test_command_refuses_wrong_words(tmp_path: Path) -> None:
         ("--json", tmp_path / "nowhere" / "a.json"),
     ):
         assert run(*arguments).exit_code == 2, arguments
-
-
-def test_monte_carlo_resumes(tmp_path: Path) -> None:
-    script = load_script("monte_carlo")
-    runs = [script.draw(number, script.TUNED) for number in range(400)]
-    assert runs[7] == script.draw(7, script.TUNED)
-    assert {each["scenario"] for each in runs} == set(SCENARIOS)
-    for key, (low, high) in (("amplitude", (0.5, 10.0)), ("frequency", (0.5, 20.0)), ("noise", (1e-4, 3e-2))):
-        values = [each["conditions"][key] for each in runs]
-        assert low <= min(values) < 1.2 * low
-        assert high / 1.2 < max(values) <= high
-    result = script.one(script.draw(0, "HysteresisEKF"))
-    assert result["unguarded"]["ratio"] > 0.0
-    assert result["guarded"]["ratio"] > 0.0
-    path = tmp_path / "runs.jsonl"
-    path.write_text(json.dumps(result) + "\n" + '{"number": 1, "cut', encoding="utf-8")
-    assert list(script.finished(path, "HysteresisEKF")) == [0]
-    assert script.finished(path, "HysteresisRLS") == {}
-    found = script.summary([result])
-    assert found["runs"] == 1
-    assert found["unguarded"]["failures"] == found["guarded"]["failures"] == 0
-
-
-def test_soak_judges() -> None:
-    script = load_script("soak")
-    estimator = pz.HysteresisRLS(50_000.0)
-    u, x = script.stationary_loop()
-    estimator.run(u[:50_000], x[:50_000], every=50_000)
-    first = script.check(estimator)
-    assert first["sound"]
-    assert first["samples"] == 50_000
-    n = estimator.theta.size
-    scatter = np.full(n, 1e-3)
-    start = estimator.theta
-    assert script.verdict([first, first], start, scatter)["within_noise"]
-    assert not script.verdict([first, first], start + 9e-3, scatter)["within_noise"]
-    drifted = [{**first, "theta": (estimator.theta + k * 1e-3).tolist()} for k in range(20)]
-    assert not script.verdict(drifted, start, scatter)["within_noise"]
-    assert not script.verdict([first, {**first, "sound": False}], start, scatter)["sound"]

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib.util
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -211,26 +208,3 @@ def test_the_guard_turns_no_gain_round(name: str, estimator: type) -> None:
     record, _ = ring(name, estimator, guard=True)
     assert np.max(np.abs(record.voltage)) < 50.0
     assert record.parameters[:, 0].min() > 0.0
-
-
-def test_the_benchmark_of_faults_tells_what_recovered() -> None:
-    path = Path(__file__).parents[2] / "benchmarks" / "faults.py"
-    specification = importlib.util.spec_from_file_location("benchmark_of_faults", path)
-    assert specification is not None
-    assert specification.loader is not None
-    script = importlib.util.module_from_spec(specification)
-    # Its dataclass asks for the module by name.
-    sys.modules[specification.name] = script
-    specification.loader.exec_module(script)
-    assert len(script.cases(3)) == 8 * (1 + len(FAULTS))
-    moved, wrong = (
-        script.one(script.Case(name, "HysteresisRLS", False, 3)) for name in ("offset-step", "gauge-sign")
-    )
-    assert moved["recovered"]
-    assert moved["after"] < 0.06 < 0.5 < moved["worst"]
-    assert not wrong["recovered"]
-    for row in (moved, wrong):
-        assert row["finite"]
-        assert row["admissible"]
-        assert row["largest_voltage"] <= 100.0
-        assert row["fell_back"] is None
