@@ -18,6 +18,12 @@ import piezoest as pz
 
 FloatArray = NDArray[np.float64]
 
+# Told to all that are compared.
+SAMPLE_RATE, NOISE, MEMORY, CUTOFF = 50_000.0, 1.5e-3, 0.4, 2500.0
+START = pz.ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)
+FORGETTING = float(np.exp(-1.0 / (MEMORY * SAMPLE_RATE)))
+VARIANCE = 1000.0  # of padasip's start
+
 SOURCE = Path(__file__).parent / "reference" / "reference.c"
 # Without -ffast-math, as Numba compiles the library; gcc may fuse a product and a sum, Numba does not.
 COMMAND = ("gcc", "-O3", "-march=native", "-shared", "-fPIC")
@@ -72,7 +78,7 @@ class Exported:
 
     def __init__(self, estimator: pz.HysteresisRLS) -> None:
         limits = pz.VoltageLimits(-100.0, 100.0)
-        code = pz.export.c(estimator, pz.InverseCompensator(pz.ColemanHodgdon(0.02, 0.12, 0.0036), limits))
+        code = pz.export.c(estimator, pz.InverseCompensator(START, limits))
         self._scale = np.ascontiguousarray(estimator.settings["parameter_scale"])
         with tempfile.TemporaryDirectory() as folder:
             _, source = code.write(folder)
@@ -88,32 +94,22 @@ class Exported:
         return theta
 
 
-def rls_settings(
-    sample_rate: float,
-    start: pz.ColemanHodgdon,
-    memory: float,
-    noise: float,
-    cutoff: float,
-    *,
-    bounded: bool,
-) -> FloatArray:
+def rls_settings(*, bounded: bool) -> FloatArray:
     """Numbers for `rls` and `bank` that say what `HysteresisRLS` is told."""
-    pole = np.exp(-2.0 * np.pi * cutoff / sample_rate)
-    unit = 1.0 / (noise * np.sqrt(2.0 * (1.0 - pole) ** 2 / (1.0 + pole)))
+    pole = np.exp(-2.0 * np.pi * CUTOFF / SAMPLE_RATE)
+    unit = 1.0 / (NOISE * np.sqrt(2.0 * (1.0 - pole) ** 2 / (1.0 + pole)))
     variance = 0.25  # an uncertainty of one half
-    bound = 100.0 * 3.0 * variance if bounded else 1e300
-    zone = 1e-9 if bounded else -1.0
-    forgetting = np.exp(-1.0 / (memory * sample_rate))
-    theta = start.theta
-    return np.array([pole, forgetting, bound, zone, *(theta * unit), unit, variance, *theta])
+    bound, zone = (100.0 * 3.0 * variance, 1e-9) if bounded else (1e300, -1.0)
+    theta = START.theta
+    return np.array([pole, FORGETTING, bound, zone, *(theta * unit), unit, variance, *theta])
 
 
-def ekf_settings(sample_rate: float, start: pz.ColemanHodgdon) -> FloatArray:
+def ekf_settings() -> FloatArray:
     """Numbers that say what `HysteresisEKF` is by default: R, Q, the state to start from, its variances."""
-    scale = np.array([1.0, start.a, start.b, start.c])
-    walk = (0.3 * scale) ** 2 / sample_rate
-    spread = np.array([0.5 * start.b / start.a, *(0.5 * scale[1:])]) ** 2
-    return np.array([1.5e-3**2, *walk, 0.0, *scale[1:], *spread])
+    scale = np.array([1.0, START.a, START.b, START.c])
+    walk = (0.3 * scale) ** 2 / SAMPLE_RATE
+    spread = np.array([0.5 * START.b / START.a, *(0.5 * scale[1:])]) ** 2
+    return np.array([NOISE**2, *walk, 0.0, *scale[1:], *spread])
 
 
 def loop_parameters(s: Any) -> FloatArray:
@@ -124,15 +120,16 @@ def loop_parameters(s: Any) -> FloatArray:
 # ---------------------------------------------------------------- filterpy, as fast as its interface allows
 
 
-def _prepared(kalman: Any, settings: FloatArray) -> Any:
+def _prepared(kalman: Any) -> Any:
+    settings = ekf_settings()
     kalman.x, kalman.P = settings[5:9].copy(), np.diag(settings[9:13])
     kalman.Q, kalman.R = np.diag(settings[1:5]), settings[:1].reshape(1, 1).copy()
     return kalman
 
 
-def filterpy_ekf(u: FloatArray, x: FloatArray, settings: FloatArray) -> FloatArray:
+def filterpy_ekf(u: FloatArray, x: FloatArray) -> FloatArray:
     """Bare loop over filterpy's `ExtendedKalmanFilter`: state at the end."""
-    kalman = _prepared(ExtendedKalmanFilter(dim_x=4, dim_z=1), settings)
+    kalman = _prepared(ExtendedKalmanFilter(dim_x=4, dim_z=1))
 
     def place(w: float) -> None:
         kalman.x[0] = w
@@ -168,7 +165,7 @@ def filterpy_ekf(u: FloatArray, x: FloatArray, settings: FloatArray) -> FloatArr
     return np.asarray(kalman.x)
 
 
-def filterpy_ukf(u: FloatArray, x: FloatArray, settings: FloatArray) -> FloatArray:
+def filterpy_ukf(u: FloatArray, x: FloatArray) -> FloatArray:
     """Bare loop over filterpy's `UnscentedKalmanFilter`: state at the end."""
 
     def advance(s: FloatArray, dt: float, du: float) -> FloatArray:
@@ -182,7 +179,7 @@ def filterpy_ukf(u: FloatArray, x: FloatArray, settings: FloatArray) -> FloatArr
         return np.array([s[0] + voltage * s[3]])
 
     points = MerweScaledSigmaPoints(4, alpha=0.1, beta=2.0, kappa=-1.0)
-    kalman = _prepared(UnscentedKalmanFilter(4, 1, 1.0, measured, advance, points), settings)
+    kalman = _prepared(UnscentedKalmanFilter(4, 1, 1.0, measured, advance, points))
     walk, last = kalman.Q[0, 0], u[0]
     for voltage, reading in zip(u.tolist(), x.tolist(), strict=True):
         du, last = voltage - last, voltage
@@ -204,9 +201,9 @@ def regression(u: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.diff(x), np.column_stack([-middle_x * travel, du, middle_u * travel])
 
 
-def padasip_rls(z: FloatArray, phi: FloatArray, forgetting: float, variance: float) -> FloatArray:
+def padasip_rls(z: FloatArray, phi: FloatArray) -> FloatArray:
     """Bare loop over padasip's `FilterRLS`: parameters at the end."""
-    learner = FilterRLS(3, mu=forgetting, eps=1.0 / variance, w="zeros")
+    learner = FilterRLS(3, mu=FORGETTING, eps=1.0 / VARIANCE, w="zeros")
     for output, regressor in zip(z.tolist(), phi, strict=True):
         learner.adapt(output, regressor)
     return np.asarray(learner.w)

@@ -12,6 +12,7 @@ A run takes about half a second.
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import sys
 import time
@@ -193,13 +194,16 @@ def short(value: Any) -> Any:
 
 def main(given: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--runs", type=int, default=2000, help="rigs, one for each seed")
-    parser.add_argument("--others", type=int, help="rigs for what it is compared with; default as many")
-    parser.add_argument("--map", type=int, default=0, help="seeds for each place of the map")
-    parser.add_argument("--singles", type=int, default=0, help="seeds for each family and reference")
-    parser.add_argument("--dwell", type=int, default=0, help="rigs that rest for a minute")
-    parser.add_argument("--seed", type=int, default=0, help="the first one")
-    parser.add_argument("--workers", type=int, help="processes; default one for each core")
+    for name, default, words in (
+        ("runs", 2000, "rigs, one for each seed"),
+        ("others", None, "rigs for what it is compared with; default as many"),
+        ("map", 0, "seeds for each place of the map"),
+        ("singles", 0, "seeds for each family and reference"),
+        ("dwell", 0, "rigs that rest for a minute"),
+        ("seed", 0, "the first one"),
+        ("workers", None, "processes; default one for each core"),
+    ):
+        parser.add_argument(f"--{name}", type=int, default=default, help=words)
     parser.add_argument("--out", type=Path, default=Path("bench-results-safety"), help="of finished runs")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--figure", type=Path)
@@ -209,10 +213,7 @@ def main(given: Sequence[str] | None = None) -> int:
 
     began = time.perf_counter()
     others = min(arguments.runs, arguments.others or arguments.runs)
-
-    def play(what: str, tasks: Sequence[Task]) -> list[Row]:
-        return played(what, tasks, arguments.out, arguments.workers)
-
+    play = functools.partial(played, folder=arguments.out, workers=arguments.workers)
     first = arguments.seed
     rows = {}
     for name, controller in CONTROLLERS.items():

@@ -23,18 +23,15 @@ from typing import Any
 
 import numpy as np
 import peers
-from peers import FloatArray
+from peers import MEMORY, NOISE, SAMPLE_RATE, START, FloatArray
 
 import piezoest as pz
 from piezoest._files import save_figure
 from piezoest.bench.origin import origin, put
 from piezoest.policies import Forgetting
 
-SAMPLE_RATE, NOISE, MEMORY, CUTOFF = 50_000.0, 1.5e-3, 0.4, 2500.0
 TRUE = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
-START = pz.ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)
 LIMITS = pz.VoltageLimits(-100.0, 100.0)
-FORGETTING, VARIANCE = float(np.exp(-1.0 / (MEMORY * SAMPLE_RATE))), 1000.0
 LARGEST_DIFFERENCE = 1e-6
 LATE = 20_000  # [ns], a sample at 50 kHz
 Work = Callable[[], Any]
@@ -59,26 +56,20 @@ FAST = (
     Pair(BARE_RLS, "C, the bare law", 1.3, "less: no look for missing samples, no status"),
     Pair(f"{RLS}, the paper's", BOUNDED, 3.0, "less: no look for missing samples, no status"),
     Pair(f"{RLS}, default", "exported C", 1.3, "the same, compiled by gcc"),
-    Pair(f"{RLS}, default", BOUNDED, 3.0, "less: no outliers, no level, no noise measured", is_same=False),
+    Pair(f"{RLS}, default", BOUNDED, 3.0, "less: no outliers, no level, no noise measured", False),
     Pair(f"{RLS}, default, with errors", "exported C", 1.3, "less: no standard errors"),
     Pair(EKF, "C, EKF", 1.5, "less: P - K S K', not Joseph's form; no projection, no checks"),
     Pair("InverseCompensator.run", "C, inverse", 1.5, "the same series; less: no look for NaN, no count"),
-    Pair(
-        f"{PLAYS}, plain",
-        "C, 12 plays",
-        2.0,
-        "more: learns at every sample; less: a fixed grid",
-        is_same=False,
-    ),
-    Pair(PLAYS, "C, 12 plays, bends, creep", 2.0, "as in the line above", is_same=False),
+    Pair(f"{PLAYS}, plain", "C, 12 plays", 2.0, "more: learns at each sample; less: a fixed grid", False),
+    Pair(PLAYS, "C, 12 plays, bends, creep", 2.0, "as in the line above", False),
 )
 SLOW = (
     Pair(FREE_EKF, FILTERPY, 0.001, "less: no look for missing samples; it keeps copies of x and P"),
     Pair("HysteresisEKF.step, not projected", FILTERPY, None, "the same peer; ours called from Python, too"),
     Pair(FREE_EKF, "FilterPyEKF.run", None, "filterpy with this library's checks and histories"),
-    Pair(FREE_EKF, "filterpy's UKF, bare loop", None, "more: nine sigma points, no Jacobian", is_same=False),
+    Pair(FREE_EKF, "filterpy's UKF, bare loop", None, "more: nine sigma points, no Jacobian", False),
     Pair("RecursiveLeastSquares.update", PADASIP, None, "less: no checks; both are called from Python"),
-    Pair(BARE_RLS, PADASIP, None, "less: is given regressors, unfiltered", is_same=False),
+    Pair(BARE_RLS, PADASIP, None, "less: is given regressors, unfiltered", False),
 )
 
 
@@ -104,7 +95,7 @@ def stepped(estimator: Any, u: FloatArray, x: FloatArray) -> FloatArray:
 
 def updated(z: FloatArray, phi: FloatArray) -> FloatArray:
     """Parameters that `RecursiveLeastSquares` learns with padasip's settings."""
-    learner = pz.RecursiveLeastSquares(3, P=VARIANCE, policies=(Forgetting(MEMORY * SAMPLE_RATE),))
+    learner = pz.RecursiveLeastSquares(3, P=peers.VARIANCE, policies=(Forgetting(MEMORY * SAMPLE_RATE),))
     for output, regressor in zip(z.tolist(), phi, strict=True):
         learner.update(output, regressor)
     return learner.theta
@@ -120,15 +111,13 @@ def our_plays(**options: Any) -> pz.PrandtlIshlinskiiRLS:
 
 def fast_work(c: peers.Reference, r: FloatArray, u: FloatArray, x: FloatArray) -> dict[str, Work]:
     """What takes nanoseconds a sample, by name."""
-    off, on = (
-        peers.rls_settings(SAMPLE_RATE, START, MEMORY, NOISE, CUTOFF, bounded=each) for each in (False, True)
-    )
+    off, on = peers.rls_settings(bounded=False), peers.rls_settings(bounded=True)
     tuning = [0.99995, NOISE**2, 0.01, 1.0, *np.linspace(1.0, 35.0, 12)]
     plays = np.array([*tuning, *np.ones(14)])
     decays = np.exp(-1.0 / (SAMPLE_RATE * np.array([0.01, 0.1, 1.0])))
     bent_plays = np.array([*tuning, -12.0, 12.0, *decays])
     inverse = np.array([TRUE.a, TRUE.b, TRUE.c, LIMITS.minimum, LIMITS.maximum])
-    kalman = peers.ekf_settings(SAMPLE_RATE, START)
+    kalman = peers.ekf_settings()
     exported = peers.Exported(our_rls(errors=False))
     return {
         BARE_RLS: lambda: learnt(our_rls(memory=MEMORY, policies=(), errors=False), u, x),
@@ -151,7 +140,6 @@ def fast_work(c: peers.Reference, r: FloatArray, u: FloatArray, x: FloatArray) -
 
 def slow_work(u: FloatArray, x: FloatArray) -> dict[str, Work]:
     """What takes microseconds a sample, and ours on the same short record."""
-    kalman = peers.ekf_settings(SAMPLE_RATE, START)
     z, phi = peers.regression(u, x)
 
     def ekf() -> pz.HysteresisEKF:
@@ -161,11 +149,11 @@ def slow_work(u: FloatArray, x: FloatArray) -> dict[str, Work]:
         FREE_EKF: lambda: learnt(ekf(), u, x),
         "HysteresisEKF.step, not projected": lambda: stepped(ekf(), u, x),
         "FilterPyEKF.run": lambda: learnt(pz.FilterPyEKF(SAMPLE_RATE, initial_model=START), u, x),
-        FILTERPY: lambda: peers.loop_parameters(peers.filterpy_ekf(u, x, kalman)),
-        "filterpy's UKF, bare loop": lambda: peers.loop_parameters(peers.filterpy_ukf(u, x, kalman)),
+        FILTERPY: lambda: peers.loop_parameters(peers.filterpy_ekf(u, x)),
+        "filterpy's UKF, bare loop": lambda: peers.loop_parameters(peers.filterpy_ukf(u, x)),
         BARE_RLS: lambda: learnt(our_rls(memory=MEMORY, policies=(), errors=False), u, x),
         "RecursiveLeastSquares.update": lambda: updated(z, phi),
-        PADASIP: lambda: peers.padasip_rls(z, phi, FORGETTING, VARIANCE),
+        PADASIP: lambda: peers.padasip_rls(z, phi),
     }
 
 
@@ -213,7 +201,7 @@ def bank(c: peers.Reference, samples: int, rounds: int) -> list[Row]:
     At least 20 ms of signal: what a bank does once for every channel would be a tenth of 4 ms.
     """
     shortest = min(samples // 64, int(0.02 * SAMPLE_RATE))
-    settings = peers.rls_settings(SAMPLE_RATE, START, MEMORY, NOISE, CUTOFF, bounded=True)
+    settings = peers.rls_settings(bounded=True)
     found = []
     for channels in (64, 1024, 8192):
         K = max(shortest, samples // channels)
@@ -240,9 +228,7 @@ def bank(c: peers.Reference, samples: int, rounds: int) -> list[Row]:
     return found
 
 
-def single_calls(
-    function: Callable[..., Any], columns: tuple[FloatArray, ...], count: int
-) -> dict[str, float]:
+def single_calls(function: Callable[..., Any], columns: tuple[FloatArray, ...], count: int) -> Row:
     """Times of single calls [ns], less the clock's own; a call is late after a sample at 50 kHz."""
     clock = time.perf_counter_ns
     rows = itertools.cycle(list(zip(*(column.tolist() for column in columns), strict=True)))
@@ -324,8 +310,8 @@ def draw(rows: list[Row], path: Path) -> None:
     """Time of a sample, of ours and of its peers."""
     from matplotlib.figure import Figure
 
-    times = {row["ours"]: (row["ns"], "#D55E00") for row in rows}
-    times |= {row["peer"]: (row["peer_ns"], "0.6") for row in rows}
+    times = {row["ours"]: (row["ns"], "#D55E00") for row in reversed(rows)}
+    times |= {row["peer"]: (row["peer_ns"], "0.6") for row in reversed(rows)}
     names = sorted(times, key=lambda name: -times[name][0])
     figure = Figure(figsize=(8.0, 0.27 * len(names) + 0.6), layout="constrained")
     axes = figure.subplots()
@@ -346,9 +332,7 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=15, help="rounds, of which the median counts")
     parser.add_argument("--turns", type=int, default=2_000_000, help="single calls from Python")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file too")
-    parser.add_argument(
-        "--figure", type=Path, metavar="FILE", help="draw the times of a sample into this file"
-    )
+    parser.add_argument("--figure", type=Path, metavar="FILE", help="draw the times into this file")
     given = parser.parse_args()
     few = max(1, given.rounds // 5)
     c, (r, u, x) = peers.Reference(), record(given.samples)
