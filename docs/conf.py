@@ -10,7 +10,6 @@ from typing import Any
 import piezoest
 
 sys.path.insert(0, str(Path(__file__).parent))
-import beyond_page
 import controller_page
 import logs_page
 import paper_page
@@ -120,7 +119,6 @@ def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, li
 def setup(app: Any) -> None:
     app.connect("builder-inited", paper_page.write)
     app.connect("builder-inited", performance_page.write)
-    app.connect("builder-inited", beyond_page.write)
     app.connect("builder-inited", controller_page.write)
     app.connect("builder-inited", tuning_page.write)
     app.connect("builder-inited", real_data_page.write)
