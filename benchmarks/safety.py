@@ -23,14 +23,14 @@ from typing import Any
 import numpy as np
 
 from piezoest._files import save_figure
-from piezoest.bench.adaptation import json_safe
-from piezoest.bench.campaign import store_in
-from piezoest.bench.origin import origin, put
-from piezoest.bench.suite_command import counting
+from piezoest.bench.origin import json_safe, origin, put
+from piezoest.bench.shared import counting
+from piezoest.bench.store import carry_out
+from piezoest.bench.table import store_in
 from piezoest.bench.zoo import contenders, dwelling, judging, naming, settling, summary
 from piezoest.bench.zoo.contest import contest, summarise_contest
 from piezoest.bench.zoo.summary import CRITERIA, summarise
-from piezoest.bench.zoo.tasks import Task, carry_out_all, cells, rests, runs
+from piezoest.bench.zoo.tasks import Task, cells, over_cores, rests, runs
 
 Row = dict[str, Any]
 
@@ -155,7 +155,7 @@ def drawn(rows: Sequence[Row]) -> Row:
 def played(what: str, tasks: Sequence[Task], folder: Path, workers: int | None) -> list[Row]:
     """Rows of some runs, of which those that are known are not made again."""
     with store_in(folder) as store, counting(f"runs of {what}") as count:
-        carry_out_all(tasks, store, workers, count)
+        carry_out(tasks, store, over_cores(workers), count)
         return list(store.rows(task.key for task in tasks))
 
 

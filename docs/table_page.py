@@ -1,4 +1,4 @@
-"""Tables of the pages about estimators, from docs/data/table.json and policies.json; no number is typed by hand.
+"""Tables of the pages about estimators, from docs/data; no number is typed by hand.
 
 Runs at the start of every Sphinx build; by itself: python docs/table_page.py
 """
@@ -30,7 +30,7 @@ def write(app: Any = None) -> None:
         "overview": table("", *report.overview_table(runs)),
         "needs": table("", *report.needs_table(runs)),
         "settles": table("", *settles(runs)),
-        "scenarios": table("", ["scenario", "what happens"], [list(row) for row in runs["scenarios"].items()]),
+        "scenarios": table("", ["scenario", "what happens"], list(map(list, runs["scenarios"].items()))),
         "stages": table("", *stages(runs)),
         "tuned": table("", *tuned(runs)),
         "policies": table("", *settles(policies)),
@@ -49,9 +49,10 @@ def names(document: Document) -> list[str]:
 
 
 def settles(document: Document) -> report.Table:
-    """Periods until each estimator settles, in each scenario on the first stage: median, and 95 % of the runs."""
+    """Periods until each estimator settles, in each scenario on the first stage."""
     scenarios, stage = list(document["scenarios"]), document["plan"]["stages"][0]
-    cells = {(cell["scenario"], cell["estimator"]): cell for cell in document["cells"] if cell["stage"] == stage}
+    mine = [cell for cell in document["cells"] if cell["stage"] == stage]
+    cells = {(cell["scenario"], cell["estimator"]): cell for cell in mine}
     body = []
     for name in names(document):
         row = [short(document["estimators"][name]["name"])]

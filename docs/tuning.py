@@ -16,8 +16,8 @@ import numpy as np
 
 import piezoest as pz
 from piezoest._files import save_figure
-from piezoest.bench.adaptation import in_parallel, jobs_for, summarise
 from piezoest.bench.origin import origin, put
+from piezoest.bench.run import Task, play
 
 RATE, FREQUENCY, AMPLITUDE = 10_000.0, 5.0, 5.0  # Hz, Hz, µm
 SEEDS = 3
@@ -43,16 +43,22 @@ def settled(reference: pz.Signal, gauge_noise: float, **options: Any) -> float:
 def memories() -> list[dict[str, Any]]:
     """After a step of the gain by 20 %: worst and settled error, and how long it takes."""
     names = ["HysteresisRLS", *(f"HysteresisRLS(memory={memory:g})" for memory in MEMORIES)]
-    work = jobs_for(["gain-step"], names, range(SEEDS), {"sample_rate": RATE, "after": 20})
-    runs = [run for some in in_parallel(work) for run in some]
-    rows = {row["estimator"]: row for row in summarise(runs)}
+    given = {"sample_rate": RATE, "after": 20}
+    rows = {name: [play(Task("gain-step", name, seed, given)) for seed in range(SEEDS)] for name in names}
     return [
         {
             "estimator": name,
             "memory_s": memory,
-            "worst_um": rows[name]["worst_error"]["median"],
-            "settled_um": rows[name]["settled_max"]["median"],
-            "settling_periods": rows[name]["settling_periods"]["median"],
+            **{
+                key: sorted(float("inf") if row[column] is None else row[column] for row in rows[name])[
+                    SEEDS // 2
+                ]
+                for key, column in (
+                    ("worst_um", "worst"),
+                    ("settled_um", "settled"),
+                    ("settling_periods", "settles"),
+                )
+            },
         }
         for name, memory in zip(names, (None, *MEMORIES), strict=True)
     ]
