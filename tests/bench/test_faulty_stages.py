@@ -45,7 +45,11 @@ def test_step_and_run_are_the_same_to_the_bit(name: str) -> None:
     whole = make(sound())
     x = whole.run(u)
     pieces = make(sound())
-    parts: list[Any] = [pieces.run(u[:123]), pieces.run(u[123:5500]), [pieces.step(float(v)) for v in u[5500:]]]
+    parts: list[Any] = [
+        pieces.run(u[:123]),
+        pieces.run(u[123:5500]),
+        [pieces.step(float(v)) for v in u[5500:]],
+    ]
     np.testing.assert_array_equal(np.concatenate(parts), x)
     whole.reset()
     np.testing.assert_array_equal(whole.run(u), x)
