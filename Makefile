@@ -42,12 +42,10 @@ $(VENV)/.installed-dev: pyproject.toml | $(BIN)/python
 
 venv: $(VENV)/.installed-dev  ## Set up .venv with everything a contributor needs
 
-# Compilers, checker and emulator for the exported C, and the browser for pages; tests that need one skip
-# where it is absent.
-TOOLS := gcc libc6-dev clang cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm \
-         chromium chromium-driver
+# Compilers, checker and emulator for the exported C; tests that need one skip where it is absent.
+TOOLS := gcc libc6-dev clang cppcheck gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
 
-tools:  ## Install what exported C and pages are checked with (Debian's packages, as root)
+tools:  ## Install what exported C is checked with (Debian's packages, as root)
 	apt-get update
 	DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends $(TOOLS)
 
