@@ -62,7 +62,7 @@ def figures() -> str:
 
 def markdown(heading: list[str], body: list[list[str]]) -> list[str]:
     """Lines of a table, numbers to the right."""
-    rows = [[name.replace("\n", " ").replace("re- ", "re") for name in heading], *body]
+    rows = [[name.replace("\n", " ") for name in heading], *body]
     rows.insert(1, ["---", "---" if len(body[0][1]) > 12 else "---:", *["---:"] * (len(heading) - 2)])
     return [f"| {' | '.join(row)} |" for row in rows]
 

@@ -98,10 +98,11 @@ def tuned(document: Document) -> report.Table:
     body = []
     for each in document["tuned"]:
         before, after = (overview[each[which]]["typical"] for which in ("default", "chosen"))
+        settings = each["chosen"] if each["chosen"] != each["default"] else "the default"
         body.append(
             [
                 document["estimators"][each["default"]]["name"], report.percent(before[0]),
-                report.percent(after[0]), f"``{each['chosen']}``",
+                report.percent(after[0]), f"``{settings}``",
             ]
         )  # fmt: skip
     return ["estimator", "typical error, default", "tuned", "settings"], body
@@ -120,6 +121,8 @@ def substitutions(prefix: str, document: Document) -> str:
         "slow": plan["slow_seeds"],
         "rate": f"{conditions['sample_rate']:g} Hz",
         "stages": ", ".join(plan["stages"][1:]),
+        "rest": f"{conditions['rest']:g} s",
+        "drift": f"{conditions['drift']:g} s",
         "linear": f"{report.percent(linear['settled'][0])} %",
     }
     return "".join(f".. |{prefix} {name}| replace:: {value}\n" for name, value in values.items())

@@ -49,7 +49,7 @@ class Conditions:
         Length of the drift [s].
     updates : int
         Updates of the compensator's model in a period of the wave; the default is one in
-        four milliseconds at 5 Hz.
+        eight milliseconds at 5 Hz.
     creep : bool
         Whether the stage creeps.
     stage : str
@@ -69,7 +69,7 @@ class Conditions:
     after: int = 10
     rest: float = 5.0
     drift: float = 5.0
-    updates: int = 50
+    updates: int = 25
     creep: bool = True
     stage: str = PAPER
 

@@ -58,7 +58,7 @@ def overview_table(document: Document) -> Table:
     document : dict
         From `piezoest.bench.table.describe`.
     """
-    heading = ["estimator", "settles", "first", "settled", "not re-\npeated", "other\nstages", "step\n[µs]"]
+    heading = ["estimator", "settles", "first", "settled", "not\nrepeated", "other\nstages", "step\n[µs]"]
     best = sorted(document["overview"], key=lambda row: row["typical"][0] if row["typical"] else math.inf)
     body = []
     for row in best:

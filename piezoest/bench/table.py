@@ -227,7 +227,7 @@ def describe(
     times : dict
         From `costs`.
     tuned : sequence of str
-        Estimators that were found by tuning.
+        Estimators that were found by tuning; they are in no order of ``needs``.
 
     Returns
     -------
@@ -265,7 +265,7 @@ def describe(
         "overview": [_overview(frame, text, plan) for text in names],
         "cells": cells,
         "needs": [
-            {**asdict(need), "order": order(frame, need, plan.stages)}
+            {**asdict(need), "order": order(frame[~frame["estimator"].isin(tuned)], need, plan.stages)}
             for need in NEEDS
             if need.applies(plan.scenarios)
         ],

@@ -194,8 +194,7 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
             say("timing each estimator alone")
             times = {} if runs.logs else table.costs(plan.estimators, plan.given)
             say("summing up")
-            chosen = [each["chosen"] for each in tuned]
-            document = table.describe(rows, plan, times, chosen)
+            document = table.describe(rows, plan, times, _changed(tuned))
     return {**document, **origin(began), "tuned": table.rounded(tuned)}
 
 
@@ -226,8 +225,12 @@ def _with_tuned(plan: Any, tuned: list[dict[str, Any]]) -> Any:
     """Plan with the estimators that tuning has chosen beside their defaults."""
     from dataclasses import replace
 
-    chosen = [each["chosen"] for each in tuned if each["chosen"] != each["default"]]
-    return replace(plan, estimators=tuple(dict.fromkeys([*plan.estimators, *chosen])))
+    return replace(plan, estimators=tuple(dict.fromkeys([*plan.estimators, *_changed(tuned)])))
+
+
+def _changed(tuned: list[dict[str, Any]]) -> list[str]:
+    """What tuning has chosen where that is not the default."""
+    return [each["chosen"] for each in tuned if each["chosen"] != each["default"]]
 
 
 def compare(
