@@ -161,7 +161,7 @@ def test_missing_and_foreign_values_of_frames() -> None:
         pd.DataFrame({"t": TIME, "u": ["a"] * N, "x": TIME}),
         pl.DataFrame({"t": TIME, "u": ["a"] * N, "x": TIME}),
     ):
-        with pytest.raises(ValueError, match="frame: column 'u' holds no numbers"):
+        with pytest.raises(ValueError, match="frame, row 1, column 'u': 'a' is not a number"):
             Record.from_frame(frame)
 
 

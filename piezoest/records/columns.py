@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from piezoest.records.source import Source, shown
+from piezoest.records.source import LogError, Source, shown
 
 # Names by which logs call the quantities, in lower case; the unit stands beside them.
 NAMES = {
@@ -52,7 +52,7 @@ def choose(
     """
     for argument, given in (("columns", named), ("units", units)):
         if unknown := sorted(set(given) - set(NAMES)):
-            raise ValueError(f"{argument} has {unknown}: known are time, voltage and displacement")
+            raise LogError(f"{argument} has {unknown}: known are time, voltage and displacement")
     factors = {quantity: _stated_factor(quantity, text) for quantity, text in units.items()}
     if not source.titles and not named:
         return _by_position(source, wanted, factors)
@@ -67,7 +67,7 @@ def choose(
     indices = [column.position for column in chosen.values()]
     for quantity, column in chosen.items():
         if indices.count(column.position) > 1:
-            raise ValueError(
+            raise LogError(
                 f"{source.path}: column {column.title!r} would be {quantity} and something else: "
                 "name the columns"
             )
@@ -78,7 +78,7 @@ def has_column(source: Source, quantity: str) -> bool:
     """Whether a column of the quantity would be found by its name or unit."""
     try:
         _guess(source, quantity)
-    except ValueError:
+    except LogError:
         return False
     return True
 
@@ -87,7 +87,7 @@ def _by_position(
     source: Source, wanted: tuple[str, ...], factors: dict[str, tuple[float, str]]
 ) -> dict[str, Column]:
     if source.width < len(wanted):
-        raise ValueError(
+        raise LogError(
             f"{source.path}: {source.width} columns without a header, {len(wanted)} are needed: "
             f"{', '.join(wanted)}"
         )
@@ -106,13 +106,13 @@ def _find(source: Source, quantity: str, name: str) -> int:
             return candidates.index(name)
         several = max(several, candidates.count(name))
     if several:
-        raise ValueError(
+        raise LogError(
             f"{source.path}: {several} columns are called {name!r}: name the one for {quantity} by its "
             f"number, from 1 to {source.width}"
         )
     if name.isdigit() and 1 <= int(name) <= source.width:
         return int(name) - 1
-    raise ValueError(f"{source.path}: no column {name!r} for {quantity}; there {_listed(source)}")
+    raise LogError(f"{source.path}: no column {name!r} for {quantity}; there {_listed(source)}")
 
 
 def _guess(source: Source, quantity: str) -> int:
@@ -130,11 +130,11 @@ def _guess(source: Source, quantity: str) -> int:
         return found[0]
     if found:
         titles = ", ".join(shown(source.names[i]) for i in found[:MOST_LISTED])
-        raise ValueError(
+        raise LogError(
             f"{source.path}: the columns {titles} could all be the {quantity}: name the one that is"
         )
     hint = " or give the sample rate" if quantity == "time" else ""
-    raise ValueError(f"{source.path}: no column for {quantity} found; there {_listed(source)}: name it{hint}")
+    raise LogError(f"{source.path}: no column for {quantity} found; there {_listed(source)}: name it{hint}")
 
 
 def _listed(source: Source) -> str:
@@ -157,6 +157,12 @@ def split_unit(title: str) -> tuple[str, str]:
     return plain.replace("_", " "), ""
 
 
+def titled(name: str, unit: str) -> str:
+    """Name with the unit that the file states beside it, in place of one that the name states."""
+    plain, own = split_unit(name)
+    return f"{plain if own else name} [{unit}]" if unit else name
+
+
 def _plain(text: str) -> str:
     """With u for the signs of micro, one of which is what a wrong encoding leaves of them."""
     return text.replace("µ", "u").replace("μ", "u").replace("\N{REPLACEMENT CHARACTER}", "u")
@@ -168,7 +174,7 @@ def _factor(path: Path, title: str, quantity: str) -> tuple[float, str]:
     _, unit = split_unit(title)
     base = BASE_UNITS[quantity]
     if unit and unit not in UNITS[quantity]:
-        raise ValueError(
+        raise LogError(
             f"{path}: column {title!r} has the unit {unit}, but {quantity} must be in {base}: convert it, "
             f"or say what one of it is: units {quantity}='2 {base}' where a volt stands for 2 {base}"
         )
@@ -183,7 +189,7 @@ def _stated_factor(quantity: str, text: str) -> tuple[float, str]:
     match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)?\s*([^\W\d_]+)\s*", _plain(str(text)))
     known = UNITS[quantity]
     if match is None or match[2].lower() not in known:
-        raise ValueError(
+        raise LogError(
             f"units has {text!r} for {quantity}: known are {', '.join(known)}, with a number before it "
             f"where the log counts in something else: '0.2 {next(iter(known))}'"
         )
@@ -193,6 +199,6 @@ def _stated_factor(quantity: str, text: str) -> tuple[float, str]:
         scale = math.nan
     factor = scale * known[match[2].lower()]
     if not math.isfinite(factor) or factor == 0.0 or (quantity == "time" and factor < 0.0):
-        raise ValueError(f"units has {text!r} for {quantity}: the number must be finite and not zero")
+        raise LogError(f"units has {text!r} for {quantity}: the number must be finite and not zero")
     note = "" if factor == 1.0 else f"{quantity}: converted to {BASE_UNITS[quantity]} (factor {factor:g})"
     return factor, note

@@ -6,24 +6,24 @@ import importlib
 import zipfile
 from pathlib import Path
 
-from piezoest.records.source import Source
-from piezoest.records.text_lines import PACKED, beginning
+from piezoest.records.lines import PACKED, beginning
+from piezoest.records.source import LogError, Source
 
 # Name, what files begin with, endings of their names, and the function that opens them.
 FORMATS: tuple[tuple[str, tuple[bytes, ...], tuple[str, ...], str], ...] = (
-    ("Parquet", (b"PAR1",), (".parquet", ".pq"), "binary:open_parquet"),
-    ("HDF5", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), (".h5", ".hdf5", ".hdf", ".he5"), "hdf5:open_hdf5"),
-    ("MATLAB", (b"MATLAB 5.0",), (".mat",), "binary:open_mat"),
-    ("NumPy", (b"\x93NUMPY",), (".npy",), "binary:open_npy"),
-    ("TDMS", (b"TDSm",), (".tdms",), "tdms:open_tdms"),
+    ("Parquet", (b"PAR1",), (".parquet", ".pq"), "parquet:Parquet"),
+    ("HDF5", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), (".h5", ".hdf5", ".hdf", ".he5"), "formats:open_hdf5"),
+    ("MATLAB", (b"MATLAB 5.0",), (".mat",), "formats:open_mat"),
+    ("NumPy", (b"\x93NUMPY",), (".npy",), "formats:open_npy"),
+    ("TDMS", (b"TDSm",), (".tdms",), "formats:open_tdms"),
     (
         "spreadsheet",
         (b"PK\x03\x04", b"\xd0\xcf\x11\xe0"),
         (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
-        "sheet:open_sheet",
+        "frame:open_sheet",
     ),
-    ("NumPy", (b"PK\x03\x04",), (".npz",), "binary:open_npz"),
-    ("LabVIEW", (b"LabVIEW Measurement", b"\xef\xbb\xbfLabVIEW Measurement"), (), "lvm:open_lvm"),
+    ("NumPy", (b"PK\x03\x04",), (".npz",), "formats:open_npz"),
+    ("LabVIEW", (b"LabVIEW Measurement", b"\xef\xbb\xbfLabVIEW Measurement"), (), "lvm:Lvm"),
 )
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat")
 TEXT = "text:open_text"
@@ -46,27 +46,27 @@ def open_source(path: Path) -> Source:
     start = beginning(path, 128)
     ending = path.suffix.lower()
     if not start.strip():
-        raise ValueError(f"{path}: the file is empty")
+        raise LogError(f"{path}: the file is empty")
     with path.open("rb") as file:
         packed = file.read(2) == PACKED
     for name, beginnings, endings, opener in FORMATS:
         begins = start.startswith(beginnings) and _is_what_it_may_be(path, opener)
         if begins and packed and name != "LabVIEW":
-            raise ValueError(f"{path}: a packed {name} file: unpack it first; only text is read packed")
+            raise LogError(f"{path}: a packed {name} file: unpack it first; only text is read packed")
         if begins:
             return _opened(opener, path)
         # Files of MATLAB before version 5 have no mark.
         if ending in endings and name != "MATLAB":
-            raise ValueError(
+            raise LogError(
                 f"{path}: this is no {name} file, although its name ends in {ending}: "
                 "it may be truncated, or of another format under a wrong name"
             )
-    return _opened("binary:open_mat" if ending == ".mat" else TEXT, path)
+    return _opened("formats:open_mat" if ending == ".mat" else TEXT, path)
 
 
 def _is_what_it_may_be(path: Path, opener: str) -> bool:
     """Whether an archive is a spreadsheet or NumPy's; true of all other formats."""
-    if opener not in ("sheet:open_sheet", "binary:open_npz"):
+    if opener not in ("frame:open_sheet", "formats:open_npz"):
         return True
     names: frozenset[str] = frozenset()
     try:
@@ -74,7 +74,7 @@ def _is_what_it_may_be(path: Path, opener: str) -> bool:
             names = frozenset(archive.namelist())
     except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
         pass
-    if opener == "sheet:open_sheet":
+    if opener == "frame:open_sheet":
         return bool(names & OF_SPREADSHEETS) or path.suffix.lower() in (".xls", ".xlsx", ".xlsm", ".ods")
     return path.suffix.lower() not in TEXT_ENDINGS
 

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, fraction, positive
-from piezoest.records.columns import choose
 from piezoest.records.frame import frame_source
+from piezoest.records.log import FEWEST_ROWS, Log
 from piezoest.records.opening import open_source
-from piezoest.records.source import ROWS
-from piezoest.records.stream import FEWEST_ROWS, RecordStream, sane
-from piezoest.records.timing import scan
+from piezoest.records.stream import RecordStream, sane
 from piezoest.records.writing import write_columns
 
 if TYPE_CHECKING:
@@ -126,7 +124,7 @@ class Record:
         1000.0
         """
         source = frame_source(frame)
-        return _record(RecordStream(source, columns=columns, units=units, sample_rate=sample_rate))
+        return _record(RecordStream(source, columns=columns, units=units, sample_rate=sample_rate, held=True))
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -245,7 +243,7 @@ def read_record(
     ImportError
         If reading the format needs a package of the extra ``formats`` that is not installed.
     """
-    return _record(RecordStream(path, columns=columns, units=units, sample_rate=sample_rate))
+    return _record(RecordStream(path, columns=columns, units=units, sample_rate=sample_rate, held=True))
 
 
 def _record(stream: RecordStream) -> Record:
@@ -287,33 +285,20 @@ def read_reference(
     """
     from piezoest.signals import Signal
 
-    source = open_source(Path(path))
-    wanted = ("reference",) if sample_rate is not None else ("time", "reference")
-    chosen = choose(source, wanted, {} if column is None else {"reference": column}, {})
-    positions = [chosen[quantity].position for quantity in wanted]
-    source.check(positions)
-    blocks = list(source.read(positions, ROWS))
-    if not blocks:
-        raise ValueError(f"{path}: the file has no rows")
-    numbers = np.concatenate([block.numbers for block in blocks])
-    values = [
-        chosen[quantity].factor * np.concatenate([block.values[i] for block in blocks])
-        for i, quantity in enumerate(wanted)
-    ]
-    bad = np.flatnonzero(~np.all(np.isfinite(values), axis=0))
-    if bad.size:
-        raise ValueError(
-            f"{path}, {source.place} {numbers[bad[0]]}: no number in the time or the reference; "
-            "a reference must have no gaps"
-        )
-    if numbers.size < FEWEST_ROWS:
-        raise ValueError(f"{path}: only {numbers.size} rows, at least {FEWEST_ROWS} are needed")
-    if sample_rate is None:
-        timing = scan(str(path), source.place, lambda: [(numbers, values[0])])
-        if timing.usual is not None and timing.samples > timing.rows:
-            gap = int(np.argmax(np.rint(np.diff(values[0]) / timing.usual) > 1.0))
+    wanted = {} if column is None else {"reference": column}
+    log = Log(open_source(Path(path)), ("reference",), wanted, sample_rate=sample_rate, held=True)
+    where, rows = f"{path}, {log.source.place}", 0
+    for block in log.read():
+        rows += block.numbers.size
+        bad = np.flatnonzero(~np.all(np.isfinite(block.values), axis=0))
+        if bad.size:
             raise ValueError(
-                f"{path}, {source.place} {numbers[gap + 1]}: time jumps here; a reference must have no gaps"
+                f"{where} {block.numbers[bad[0]]}: no number in the time or the reference; "
+                "a reference must have no gaps"
             )
-        sample_rate = timing.sample_rate
-    return Signal(values[-1], sample_rate, None, Path(path).stem)
+    if rows < FEWEST_ROWS:
+        raise ValueError(f"{path}: only {rows} rows, at least {FEWEST_ROWS} are needed")
+    if log.timing is not None and log.timing.samples > log.timing.rows:
+        raise ValueError(f"{where} {log.timing.jump}: time jumps here; a reference must have no gaps")
+    values = np.concatenate([values for _, values in log.samples()])
+    return Signal(values, log.sample_rate, None, Path(path).stem)

@@ -12,8 +12,8 @@ import numpy as np
 from piezoest import _extras
 from piezoest._checks import FloatArray, array_1d
 from piezoest._files import replacing
-from piezoest.records.binary import EXTRA
 from piezoest.records.opening import TEXT_ENDINGS
+from piezoest.records.source import EXTRA
 
 Columns = Mapping[str, FloatArray]
 
