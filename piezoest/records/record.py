@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +11,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, fraction, positive
 from piezoest.records.frame import frame_source
-from piezoest.records.log import FEWEST_ROWS, Log
-from piezoest.records.opening import open_source
-from piezoest.records.stream import RecordStream, sane
+from piezoest.records.stream import FEWEST_ROWS, RecordStream, sane
 from piezoest.records.writing import write_columns
 
 if TYPE_CHECKING:
@@ -161,16 +159,8 @@ class Record:
         return self._cut(slice(0, cut)), self._cut(slice(cut, None))
 
     def _cut(self, part: slice) -> Record:
-        unusable = int(np.sum(~self.usable[part]))
-        return Record(
-            self.time[part],
-            self.voltage[part],
-            self.displacement[part],
-            self.sample_rate,
-            self.source,
-            unusable,
-            self.notes,
-        )
+        kept = {name: getattr(self, name)[part] for name in ("time", "voltage", "displacement")}
+        return replace(self, **kept, skipped=int(np.sum(~self.usable[part])))
 
     def write(self, path: str | Path) -> None:
         """Write the columns time_s, voltage_V, displacement_um in any format that `read_record` reads.
@@ -285,19 +275,23 @@ def read_reference(
     """
     from piezoest.signals import Signal
 
-    wanted = {} if column is None else {"reference": column}
-    log = Log(open_source(Path(path)), ("reference",), wanted, sample_rate=sample_rate, held=True)
-    where, rows = f"{path}, {log.source.place}", 0
-    for block in log.read():
-        rows += block.numbers.size
-        bad = np.flatnonzero(~np.all(np.isfinite(block.values), axis=0))
-        if bad.size:
+    log = RecordStream(
+        path,
+        columns={} if column is None else {"reference": column},
+        sample_rate=sample_rate,
+        wanted=("reference",),
+        held=True,
+    )
+    where, count = f"{path}, {log.source.place}", 0
+    for block in log.rows():
+        count += block.numbers.size
+        if not np.isfinite(block.values).all():
+            bad = block.numbers[~np.isfinite(block.values).all(axis=0)][0]
             raise ValueError(
-                f"{where} {block.numbers[bad[0]]}: no number in the time or the reference; "
-                "a reference must have no gaps"
+                f"{where} {bad}: no number in the time or the reference; a reference must have no gaps"
             )
-    if rows < FEWEST_ROWS:
-        raise ValueError(f"{path}: only {rows} rows, at least {FEWEST_ROWS} are needed")
+    if count < FEWEST_ROWS:
+        raise ValueError(f"{path}: only {count} rows, at least {FEWEST_ROWS} are needed")
     if log.timing is not None and log.timing.samples > log.timing.rows:
         raise ValueError(f"{where} {log.timing.jump}: time jumps here; a reference must have no gaps")
     values = np.concatenate([values for _, values in log.samples()])

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from piezoest._checks import WILDEST, FloatArray, integer
-from piezoest.records.log import FEWEST_ROWS, Log, Progress
+from piezoest._checks import WILDEST, FloatArray, integer, positive
+from piezoest.records.columns import BASE_UNITS, Column, choose, has_column
 from piezoest.records.opening import open_source
-from piezoest.records.source import ROWS, Source
+from piezoest.records.source import ROWS, Rows, Source
+from piezoest.records.timing import Timing, placed, scan
+
+FEWEST_ROWS = 10
+
+# Called with how much is done, and of how much.
+Progress = Callable[[int, int], object]
 
 
 class Block(NamedTuple):
@@ -42,6 +48,8 @@ class RecordStream:
         As for `read_record`, or what is open already.
     columns, units, sample_rate, rows, progress
         As for `stream_record`.
+    wanted : tuple of str
+        Quantities beside time.
     held : bool
         Whether the columns are read once, and held in memory.
 
@@ -53,12 +61,16 @@ class RecordStream:
         As `read_record`.
     """
 
-    __slots__ = ("_log", "_rows", "notes", "sample_rate")
+    __slots__ = ("_chosen", "_held", "_positions", "_rows", "notes", "sample_rate", "source", "timing")
 
     #: [Hz].
     sample_rate: float
     #: What had to be assumed or converted to read the log, in plain sentences.
     notes: tuple[str, ...]
+    #: The file, opened.
+    source: Source
+    #: Where the samples lie in time, by a column of time; None if the sample rate says so.
+    timing: Timing | None
 
     def __init__(
         self,
@@ -68,15 +80,28 @@ class RecordStream:
         units: Mapping[str, str] | None = None,
         sample_rate: float | None = None,
         rows: int = ROWS,
-        held: bool = False,
         progress: Progress | None = None,
+        wanted: tuple[str, ...] = ("voltage", "displacement"),
+        held: bool = False,
     ) -> None:
+        named = dict(columns or {})
         self._rows = integer("rows", rows, 1)
-        source = path if isinstance(path, Source) else open_source(Path(path))
-        self._log = Log(
-            source, ("voltage", "displacement"), columns, units, sample_rate, held=held, progress=progress
-        )
-        self.sample_rate, self.notes = self._log.sample_rate, self._log.notes
+        self.source = source = path if isinstance(path, Source) else open_source(Path(path))
+        notes = []
+        if sample_rate is None and "time" not in named and _states_its_rate(source):
+            sample_rate = source.sample_rate
+            notes.append(f"sample rate of {sample_rate:g} Hz as the file states it")
+        timed = ("time",) if sample_rate is None else ()
+        self._chosen = choose(source, (*timed, *wanted), named, dict(units or {}))
+        self._positions = [column.position for column in self._chosen.values()]
+        source.check(self._positions)
+        self._held = list(source.read(self._positions, ROWS)) if held else None
+        self.timing = None
+        if sample_rate is None:
+            self.timing = scan(str(source.path), source.place, lambda: self._times(progress))
+            sample_rate = self.timing.sample_rate
+        self.sample_rate = positive("sample_rate", sample_rate)
+        self.notes = (*notes, *_notes(source, self._chosen), *(self.timing.notes if self.timing else ()))
 
     def __repr__(self) -> str:
         return f"RecordStream({str(self.path)!r}, {self.sample_rate:g} Hz)"
@@ -84,16 +109,16 @@ class RecordStream:
     @property
     def path(self) -> Path:
         """The file."""
-        return self._log.source.path
+        return self.source.path
 
     @property
     def whole(self) -> str:
         """Why the file is held in memory as a whole while it is read; empty if it is not."""
-        return self._log.source.whole
+        return self.source.whole
 
     def count(self) -> int:
         """Return the number of samples; of text without a column of time, its lines are counted."""
-        return self._log.count()
+        return self.source.count(self._positions) if self.timing is None else self.timing.samples
 
     def __iter__(self) -> Iterator[Block]:
         """Yield the log in blocks, from its start."""
@@ -126,12 +151,39 @@ class RecordStream:
         100%
         """
         usable = 0
-        for time, voltage, displacement in self._log.samples(self._rows, progress):
+        for time, voltage, displacement in self.samples(progress):
             block = Block(time, sane(voltage), sane(displacement))
             usable += int(np.sum(np.isfinite(block.voltage) & np.isfinite(block.displacement)))
             yield block
         if usable < FEWEST_ROWS:
             raise ValueError(f"{self.path}: only {usable} usable rows, at least {FEWEST_ROWS} are needed")
+
+    def samples(self, progress: Progress | None = None) -> Iterator[list[FloatArray]]:
+        """Yield blocks of time and the wanted columns, evenly sampled, NaN where a row is missing."""
+        blocks = (block.values for block in self.rows(rows=self._rows, progress=progress))
+        first = 0
+        for values in blocks if self.timing is None else placed(self.timing, blocks):
+            count = values[0].size
+            even = np.arange(first, first + count) / self.sample_rate
+            yield [even if self.timing is None else self.timing.times(first, count), *values]
+            first += count
+
+    def rows(self, *quantities: str, rows: int = ROWS, progress: Progress | None = None) -> Iterator[Rows]:
+        """Yield blocks of the file's rows, in s, V and µm."""
+        columns = [self._chosen[quantity] for quantity in quantities or self._chosen]
+        positions = [column.position for column in columns]
+        places = [self._positions.index(position) for position in positions]
+        total = self.source.size or self.source.count(positions)
+        for block in self.source.read(positions, rows) if self._held is None else self._held:
+            kept = block.values if self._held is None else [block.values[k] for k in places]
+            yield block._replace(values=[c.factor * each for c, each in zip(columns, kept, strict=True)])
+            if progress is not None and block.done < total:
+                progress(block.done, total)
+        if progress is not None:
+            progress(total, total)
+
+    def _times(self, progress: Progress | None) -> Iterator[tuple[Any, FloatArray]]:
+        return ((block.numbers, block.values[0]) for block in self.rows("time", progress=progress))
 
 
 def stream_record(
@@ -195,3 +247,18 @@ def stream_record(
 def sane(values: FloatArray) -> FloatArray:
     """Values with NaN for what no stage can have."""
     return np.where(np.abs(values) < WILDEST, values, np.nan)
+
+
+def _states_its_rate(source: Source) -> bool:
+    if source.sample_rate is None:
+        return False
+    return not has_column(source, "time") if source.titles else source.width == 2
+
+
+def _notes(source: Source, chosen: dict[str, Column]) -> list[str]:
+    said = [column.note for column in chosen.values() if column.note]
+    if not source.titles:
+        names = ", ".join(f"{quantity} = {column.title}" for quantity, column in chosen.items())
+        units = ", ".join(BASE_UNITS[quantity] for quantity in chosen)
+        said.insert(0, f"columns without names: taken as {names}, in {units}")
+    return said
