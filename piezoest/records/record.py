@@ -237,8 +237,11 @@ def read_record(
 
 
 def _record(stream: RecordStream) -> Record:
-    blocks = list(stream)
-    time, voltage, displacement = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    columns, count = np.empty((3, stream.count())), 0
+    for block in stream:
+        columns[:, count : count + block.time.size] = block
+        count += block.time.size
+    time, voltage, displacement = columns
     notes = list(stream.notes)
     if skipped := int(np.sum(~(np.isfinite(voltage) & np.isfinite(displacement)))):
         noun = "sample is" if skipped == 1 else "samples are"

@@ -118,7 +118,11 @@ class RecordStream:
 
     def count(self) -> int:
         """Return the number of samples; of text without a column of time, its lines are counted."""
-        return self.source.count(self._positions) if self.timing is None else self.timing.samples
+        if self.timing is not None:
+            return self.timing.samples
+        if self._held is not None:
+            return sum(block.numbers.size for block in self._held)
+        return self.source.count(self._positions)
 
     def __iter__(self) -> Iterator[Block]:
         """Yield the log in blocks, from its start."""

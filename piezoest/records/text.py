@@ -228,8 +228,9 @@ class Text(Source):
             values = cells.to_numpy()
         if bad >= 0:
             title = self.layout.header[position] if self.layout.header else str(position + 1)
+            cell = self._rows(block)[bad][position].strip()
             raise LogError(
-                f"{self.path}, line {block.numbers[bad]}, column {shown(title)!r}: {shown(cells[bad])!r} is "
+                f"{self.path}, line {block.numbers[bad]}, column {shown(title)!r}: {shown(cell)!r} is "
                 f"not {what}"
             )
         return finite(values)
