@@ -13,7 +13,7 @@ import numpy as np
 
 from piezoest import _extras
 from piezoest._checks import FloatArray
-from piezoest.records.cells import MISSING
+from piezoest.records.cells import is_missing
 from piezoest.records.columns import NAMES, split_unit, titled
 from piezoest.records.source import EXTRA, LogError, Rows, Source, check_size, damaged, floats, shown
 
@@ -132,10 +132,10 @@ def open_sheet(path: Path) -> Frame:
     with damaged(path, "a spreadsheet"):
         # As objects, so that text stays text: 1.234 may be 1234 where it was typed.
         sheets = pd.read_excel(
-            path, sheet_name=None, header=None, dtype=object, engine="calamine",
-            na_values=MISSING, keep_default_na=False,
-        )  # fmt: skip
+            path, sheet_name=None, header=None, dtype=object, engine="calamine", na_filter=False
+        )
     for sheet in sheets.values():
+        sheet = sheet.mask(sheet.map(lambda cell: is_missing(str(cell))))
         numeric = np.flatnonzero((_are_numbers(sheet) & sheet.notna()).sum(axis=1) > 1)
         if numeric.size:
             break
@@ -162,7 +162,7 @@ def _typed(cells: Any) -> Any:
 
     known = cells.dropna()
     if known.map(lambda cell: isinstance(cell, datetime.time)).all():
-        return pd.to_timedelta(cells.astype(str), errors="coerce")
+        return pd.Timestamp(0) + pd.to_timedelta(cells.astype(str), errors="coerce")
     if known.map(lambda cell: isinstance(cell, datetime.date)).all():
         return pd.to_datetime(cells)
     return cells.infer_objects()

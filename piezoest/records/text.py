@@ -180,12 +180,13 @@ class Text(Source):
 
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("error")  # it only warns of a first row that is too long
+                # It only warns of a first row that is too long.
+                warnings.simplefilter("error", pd.errors.ParserWarning)
                 table = pd.read_csv(
                     io.StringIO(text),
                     sep=r"\s+" if delimiter == " " else delimiter,
                     header=None,
-                    names=range(self.layout.width + 1),
+                    names=list(range(self.layout.width + 1)),
                     index_col=False,
                     na_values=MISSING,
                     keep_default_na=False,
@@ -193,7 +194,7 @@ class Text(Source):
                     skipinitialspace=True,
                     low_memory=False,
                 )
-        except (ValueError, Warning):
+        except (ValueError, pd.errors.ParserWarning):
             return None
         whole = len(table) == block.numbers.size and table[self.layout.width].isna().all()
         return table if whole else None
