@@ -11,7 +11,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, fraction, positive
 from piezoest.records.frame import frame_source
-from piezoest.records.stream import FEWEST_ROWS, RecordStream, sane
+from piezoest.records.stream import RecordStream, sane, without_gaps
 from piezoest.records.writing import write_columns
 
 if TYPE_CHECKING:
@@ -285,17 +285,4 @@ def read_reference(
         wanted=("reference",),
         held=True,
     )
-    where, count = f"{path}, {log.source.place}", 0
-    for block in log.rows():
-        count += block.numbers.size
-        if not np.isfinite(block.values).all():
-            bad = block.numbers[~np.isfinite(block.values).all(axis=0)][0]
-            raise ValueError(
-                f"{where} {bad}: no number in the time or the reference; a reference must have no gaps"
-            )
-    if count < FEWEST_ROWS:
-        raise ValueError(f"{path}: only {count} rows, at least {FEWEST_ROWS} are needed")
-    if log.timing is not None and log.timing.samples > log.timing.rows:
-        raise ValueError(f"{where} {log.timing.jump}: time jumps here; a reference must have no gaps")
-    values = np.concatenate([values for _, values in log.samples()])
-    return Signal(values, log.sample_rate, None, Path(path).stem)
+    return Signal(without_gaps(log), log.sample_rate, None, Path(path).stem)

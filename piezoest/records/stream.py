@@ -61,16 +61,12 @@ class RecordStream:
         As `read_record`.
     """
 
-    __slots__ = ("_chosen", "_held", "_positions", "_rows", "notes", "sample_rate", "source", "timing")
+    __slots__ = ("_chosen", "_held", "_positions", "_rows", "_source", "_timing", "notes", "sample_rate")
 
     #: [Hz].
     sample_rate: float
     #: What had to be assumed or converted to read the log, in plain sentences.
     notes: tuple[str, ...]
-    #: The file, opened.
-    source: Source
-    #: Where the samples lie in time, by a column of time; None if the sample rate says so.
-    timing: Timing | None
 
     def __init__(
         self,
@@ -86,7 +82,7 @@ class RecordStream:
     ) -> None:
         named = dict(columns or {})
         self._rows = integer("rows", rows, 1)
-        self.source = source = path if isinstance(path, Source) else open_source(Path(path))
+        self._source = source = path if isinstance(path, Source) else open_source(Path(path))
         notes = []
         if sample_rate is None and "time" not in named and _states_its_rate(source):
             sample_rate = source.sample_rate
@@ -96,12 +92,12 @@ class RecordStream:
         self._positions = [column.position for column in self._chosen.values()]
         source.check(self._positions)
         self._held = list(source.read(self._positions, ROWS)) if held else None
-        self.timing = None
+        self._timing: Timing | None = None
         if sample_rate is None:
-            self.timing = scan(str(source.path), source.place, lambda: self._times(progress))
-            sample_rate = self.timing.sample_rate
+            self._timing = scan(str(source.path), source.place, lambda: self._times(progress))
+            sample_rate = self._timing.sample_rate
         self.sample_rate = positive("sample_rate", sample_rate)
-        self.notes = (*notes, *_notes(source, self._chosen), *(self.timing.notes if self.timing else ()))
+        self.notes = (*notes, *_notes(source, self._chosen), *(self._timing.notes if self._timing else ()))
 
     def __repr__(self) -> str:
         return f"RecordStream({str(self.path)!r}, {self.sample_rate:g} Hz)"
@@ -109,20 +105,20 @@ class RecordStream:
     @property
     def path(self) -> Path:
         """The file."""
-        return self.source.path
+        return self._source.path
 
     @property
     def whole(self) -> str:
         """Why the file is held in memory as a whole while it is read; empty if it is not."""
-        return self.source.whole
+        return self._source.whole
 
     def count(self) -> int:
         """Return the number of samples; of text without a column of time, its lines are counted."""
-        if self.timing is not None:
-            return self.timing.samples
+        if self._timing is not None:
+            return self._timing.samples
         if self._held is not None:
             return sum(block.numbers.size for block in self._held)
-        return self.source.count(self._positions)
+        return self._source.count(self._positions)
 
     def __iter__(self) -> Iterator[Block]:
         """Yield the log in blocks, from its start."""
@@ -155,30 +151,30 @@ class RecordStream:
         100%
         """
         usable = 0
-        for time, voltage, displacement in self.samples(progress):
+        for time, voltage, displacement in self._samples(progress):
             block = Block(time, sane(voltage), sane(displacement))
             usable += int(np.sum(np.isfinite(block.voltage) & np.isfinite(block.displacement)))
             yield block
         if usable < FEWEST_ROWS:
             raise ValueError(f"{self.path}: only {usable} usable rows, at least {FEWEST_ROWS} are needed")
 
-    def samples(self, progress: Progress | None = None) -> Iterator[list[FloatArray]]:
+    def _samples(self, progress: Progress | None = None) -> Iterator[list[FloatArray]]:
         """Yield blocks of time and the wanted columns, evenly sampled, NaN where a row is missing."""
-        blocks = (block.values for block in self.rows(rows=self._rows, progress=progress))
+        blocks = (block.values for block in self._read(rows=self._rows, progress=progress))
         first = 0
-        for values in blocks if self.timing is None else placed(self.timing, blocks):
+        for values in blocks if self._timing is None else placed(self._timing, blocks):
             count = values[0].size
             even = np.arange(first, first + count) / self.sample_rate
-            yield [even if self.timing is None else self.timing.times(first, count), *values]
+            yield [even if self._timing is None else self._timing.times(first, count), *values]
             first += count
 
-    def rows(self, *quantities: str, rows: int = ROWS, progress: Progress | None = None) -> Iterator[Rows]:
+    def _read(self, *quantities: str, rows: int = ROWS, progress: Progress | None = None) -> Iterator[Rows]:
         """Yield blocks of the file's rows, in s, V and µm."""
         columns = [self._chosen[quantity] for quantity in quantities or self._chosen]
         positions = [column.position for column in columns]
         places = [self._positions.index(position) for position in positions]
-        total = self.source.size or self.source.count(positions)
-        for block in self.source.read(positions, rows) if self._held is None else self._held:
+        total = self._source.size or self._source.count(positions)
+        for block in self._source.read(positions, rows) if self._held is None else self._held:
             kept = block.values if self._held is None else [block.values[k] for k in places]
             yield block._replace(values=[c.factor * each for c, each in zip(columns, kept, strict=True)])
             if progress is not None and block.done < total:
@@ -187,7 +183,7 @@ class RecordStream:
             progress(total, total)
 
     def _times(self, progress: Progress | None) -> Iterator[tuple[Any, FloatArray]]:
-        return ((block.numbers, block.values[0]) for block in self.rows("time", progress=progress))
+        return ((block.numbers, block.values[0]) for block in self._read("time", progress=progress))
 
 
 def stream_record(
@@ -266,3 +262,20 @@ def _notes(source: Source, chosen: dict[str, Column]) -> list[str]:
         units = ", ".join(BASE_UNITS[quantity] for quantity in chosen)
         said.insert(0, f"columns without names: taken as {names}, in {units}")
     return said
+
+
+def without_gaps(log: RecordStream) -> FloatArray:
+    """Return the one column of a log, evenly sampled; ValueError that names the line of a gap."""
+    where, count = f"{log.path}, {log._source.place}", 0
+    for block in log._read():
+        count += block.numbers.size
+        if not np.isfinite(block.values).all():
+            bad = block.numbers[~np.isfinite(block.values).all(axis=0)][0]
+            raise ValueError(
+                f"{where} {bad}: no number in the time or the reference; a reference must have no gaps"
+            )
+    if count < FEWEST_ROWS:
+        raise ValueError(f"{log.path}: only {count} rows, at least {FEWEST_ROWS} are needed")
+    if log._timing is not None and log._timing.samples > count:
+        raise ValueError(f"{where} {log._timing.jump}: time jumps here; a reference must have no gaps")
+    return np.concatenate([values for _, values in log._samples()])

@@ -25,8 +25,8 @@ class Timing(NamedTuple):
 
     Parameters
     ----------
-    rows, samples : int
-        Rows of the file; samples of the record, which are more where rows are missing.
+    samples : int
+        Samples of the record, more than rows of the file where some are missing.
     start, period : float
         Time of the first sample and from one to the next [s].
     usual : float or None
@@ -37,7 +37,6 @@ class Timing(NamedTuple):
         What had to be assumed.
     """
 
-    rows: int
     samples: int
     start: float
     period: float
@@ -144,7 +143,7 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
     period = float((last[1] - first[1]) / (last[0] + absent - first[0]))
     notes = f"time is uneven by up to {100.0 * jitter:.0f} % of a sample; taken as even"
     return Timing(
-        rows, rows + absent, float(first[1] - first[0] * period), period, usual if moved else None, jump,
+        rows + absent, float(first[1] - first[0] * period), period, usual if moved else None, jump,
         (notes,) if jitter > MENTIONED_JITTER else (),
     )  # fmt: skip
 
