@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "piezoest"
 
 # Each takes longer to load than all of `import piezoest` may.
-HEAVY = ("casadi", "filterpy", "matplotlib", "numba", "scipy.signal")
+HEAVY = ("casadi", "filterpy", "matplotlib", "numba", "pandas", "pyarrow", "scipy.signal")
 
 
 def public_objects() -> Iterator[tuple[str, Any]]:

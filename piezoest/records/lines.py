@@ -14,7 +14,7 @@ from typing import Any, BinaryIO, NamedTuple, cast
 
 import numpy as np
 
-from piezoest.records.source import check_size
+from piezoest.records.source import LogError, check_size
 
 # Bytes for recognising the encoding.
 HEAD_BYTES = 1 << 16
@@ -47,6 +47,16 @@ class Lines(NamedTuple):
     text: str
     done: int
 
+    @classmethod
+    def of(cls, kept: list[tuple[int, str]], done: int) -> Lines:
+        """Lines of their numbers and texts."""
+        return cls(np.array([number for number, _ in kept]), "\n".join(line for _, line in kept), done)
+
+    @classmethod
+    def all(cls, first: int, text: str, done: int) -> Lines:
+        """All lines of a text."""
+        return cls(np.arange(first, first + text.count("\n") + 1), text, done)
+
 
 @contextlib.contextmanager
 def unpacked(path: Path) -> Iterator[tuple[BinaryIO, BinaryIO]]:
@@ -54,14 +64,10 @@ def unpacked(path: Path) -> Iterator[tuple[BinaryIO, BinaryIO]]:
     with path.open("rb") as raw:
         packed = raw.read(2) == PACKED
         raw.seek(0)
-        if not packed:
-            yield raw, raw
-            return
         try:
-            with gzip.GzipFile(fileobj=raw) as file:
-                yield raw, cast(BinaryIO, file)
+            yield raw, cast(BinaryIO, gzip.GzipFile(fileobj=raw)) if packed else raw
         except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-            raise ValueError(f"{path}: cannot be unpacked, it may be truncated: {error}") from None
+            raise LogError(f"{path}: cannot be unpacked, it may be truncated: {error}") from None
 
 
 def beginning(path: Path, size: int) -> bytes:
@@ -76,7 +82,7 @@ def encoding_of(path: Path) -> str:
     if raw.startswith(UTF_16):
         return "utf-16"
     if CONTROL.intersection(raw[:4096]):
-        raise ValueError(
+        raise LogError(
             f"{path}: this is not a text file: save the log as CSV, or name it by its format "
             "(.mat, .h5, .parquet, .tdms, .xlsx, .npy, .npz)"
         )
@@ -92,9 +98,9 @@ def chunks(path: Path, encoding: str, rows: int) -> Iterator[tuple[int, str, int
     """Whole lines, of about so many rows at most: number of the first, text, bytes read so far."""
     size = min(max(BYTES_OF_A_ROW * rows, FEWEST_BYTES), MOST_BYTES)
     decoder = io.IncrementalNewlineDecoder(codecs.getincrementaldecoder(encoding)(errors="replace"), True)
-    number, rest, held = 1, "", 0
+    number, rest, held, data = 1, "", 0, b"first"
     with unpacked(path) as (raw, file):
-        while True:
+        while data:
             data = file.read(size)
             held += len(data)
             check_size(path, held)
@@ -102,31 +108,21 @@ def chunks(path: Path, encoding: str, rows: int) -> Iterator[tuple[int, str, int
             cut = text.rfind("\n") + 1 if data else len(text)
             whole, rest = text[:cut], text[cut:]
             if whole:
-                yield number, whole, raw.tell()
+                yield number, whole.removesuffix("\n"), raw.tell()
             number += whole.count("\n")
             if len(rest) >= LONGEST_LINE:
-                raise ValueError(
-                    f"{path}, line {number}: more than {LONGEST_LINE} characters: this is no log"
-                )
-            if not data:
-                return
-
-
-def numbered(first: int, text: str) -> Iterator[tuple[int, str]]:
-    """Lines of a text and their numbers."""
-    return enumerate(text.split("\n"), first)
+                raise LogError(f"{path}, line {number}: more than {LONGEST_LINE} characters: this is no log")
 
 
 def sample_lines(path: Path, encoding: str, begins: int, skip_blank: bool, rows: int) -> Iterator[Lines]:
     """Lines with samples, from the line `begins` on; a blank one is a sample if another follows it."""
     blank: list[tuple[int, str]] = []
     for first, text, done in chunks(path, encoding, rows):
-        text = text.removesuffix("\n")
         if first >= begins and not blank and not SPECIAL.search("\n" + text):
-            yield Lines(np.arange(first, first + text.count("\n") + 1), text, done)
+            yield Lines.all(first, text, done)
             continue
         kept: list[tuple[int, str]] = []
-        for number, line in numbered(first, text):
+        for number, line in enumerate(text.split("\n"), first):
             if number < begins or line.lstrip().startswith("#"):
                 continue
             if line.strip():
@@ -135,5 +131,4 @@ def sample_lines(path: Path, encoding: str, begins: int, skip_blank: bool, rows:
             elif not skip_blank:
                 blank.append((number, ""))
         if kept:
-            numbers = np.fromiter((number for number, _ in kept), np.int64, len(kept))
-            yield Lines(numbers, "\n".join(line for _, line in kept), done)
+            yield Lines.of(kept, done)
