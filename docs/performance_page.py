@@ -76,6 +76,7 @@ def numbers(document: Document) -> str:
         "machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
         "numba": f"Numba {document['versions']['numba']}",
         "compiler": f"``{document['compiler']}``",
+        "load": f"{document['load']:.1f}",
         "samples": document["samples"],
         "slow": document["slow"],
         "rounds": document["rounds"],
