@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import functools
 import itertools
+import os
 import subprocess
 import sys
 import time
@@ -336,7 +337,7 @@ def main() -> int:
     given = parser.parse_args()
     few = max(1, given.rounds // 5)
     c, (r, u, x) = peers.Reference(), record(given.samples)
-    began = time.perf_counter()
+    began, load = time.perf_counter(), os.getloadavg()[0]
     against_c = compared(FAST, fast_work(c, r, u, x), given.samples, given.rounds)
     against_python = compared(SLOW, slow_work(u[: given.slow], x[: given.slow]), given.slow, few)
     rows = against_c + against_python
@@ -350,7 +351,7 @@ def main() -> int:
         "suite": "speed", "compiler": " ".join(peers.COMMAND), "samples": given.samples, "slow": given.slow,
         "rounds": given.rounds, "against_c": against_c, "against_python": against_python,
         "bank": bank(c, 16 * given.samples, few), "calls": live(r, u, x, given.turns),
-        "once": in_seconds(few), "fits": fits(few), **origin(began),
+        "once": in_seconds(few), "fits": fits(few), "load": load, **origin(began),
     }  # fmt: skip
     for name in ("bank", "calls", "once", "fits", "machine", "versions"):
         print(f"{name}: {document[name]}")

@@ -130,14 +130,14 @@ def numbers(stage: Any, reference: paper.Reference) -> Any:
 def follow(stage: Any, reference: paper.Reference, compensator: Any, model: Any) -> tuple[Any, float]:
     """Parameters and largest error in the end; what is learnt starts from `model`, None: nothing is."""
     stage.reset()
-    learner = (
-        None
-        if model is None
-        else pz.HysteresisRLS(paper.SAMPLE_RATE, initial_model=model, memory=paper.MEMORY)
-    )
-    r = reference.signal(SETTLING + paper.STATIONARY_PERIODS / (reference.frequency or 1.0))
+    options = {"initial_model": model, "memory": paper.MEMORY}
     record = pz.track(
-        r, stage=stage, compensator=compensator, estimator=learner, update_interval=paper.UPDATE_INTERVAL
+        reference.signal(SETTLING + paper.STATIONARY_PERIODS / (reference.frequency or 1.0)),
+        stage=stage,
+        compensator=compensator,
+        estimator=None if model is None else pz.HysteresisRLS(paper.SAMPLE_RATE, **options),
+        update_interval=paper.UPDATE_INTERVAL,
+        supervisor=False,  # the paper has none
     )
     return record.theta[-record.period :].mean(axis=0), record.max_error(paper.STATIONARY_PERIODS)
 

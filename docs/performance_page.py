@@ -59,7 +59,8 @@ def against(rows: list[Document], *, faster: bool) -> tuple[list[str], list[list
             ratio, asked = 1.0 / ratio, asked and 1.0 / asked
         body.append(
             [
-                row["ours"], f"{row['ns']:.0f}", row["peer"], f"{row['peer_ns']:.0f}", f"{ratio:.3g}{mark}",
+                row["ours"], f"{row['ns']:.0f}", row["peer"], f"{row['peer_ns']:.0f}",
+                f"{ratio:.0f}{mark}" if ratio >= 100.0 else f"{ratio:.2g}{mark}",
                 "" if asked is None else f"{asked:g}", row["peer_does"],
             ]
         )  # fmt: skip
@@ -76,6 +77,7 @@ def numbers(document: Document) -> str:
         "machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
         "numba": f"Numba {document['versions']['numba']}",
         "compiler": f"``{document['compiler']}``",
+        "load": f"{document['load']:.1f}",
         "samples": document["samples"],
         "slow": document["slow"],
         "rounds": document["rounds"],
