@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from paper_page import table, write_pieces
+from page_parts import percent, replacements, short, table, write_pieces
 
 from piezoest.bench.cases import Conditions
 
@@ -244,24 +244,9 @@ def firsts(document: Document) -> list[str]:
 # ---------------------------------------------------------------- words
 
 
-def replacements(values: dict[str, Any]) -> str:
-    """Substitutions for numbers that stand in sentences."""
-    return "".join(f".. |{name}| replace:: {value}\n" for name, value in values.items())
-
-
 def listed(words: Sequence[str]) -> str:
     """As in a sentence: a, b and c."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
-
-
-def percent(share: float | None) -> str:
-    """A share in per cent."""
-    return "—" if share is None else f"{100.0 * share:.3g} %"
-
-
-def short(value: float | None) -> str:
-    """About three significant digits; a dash for what is infinite or not known."""
-    return "—" if value is None else f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
 def times(ratio: float | None) -> str:

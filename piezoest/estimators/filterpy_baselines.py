@@ -228,6 +228,14 @@ class FilterPyEKF(_FilterPyBaseline):
     -----
     Equal to ``HysteresisEKF(..., project=False)`` at the cost of filterpy. The filterpy
     object is at hand as `filter`. Source: R. Labbe, filterpy.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> estimator = pz.FilterPyEKF(1000.0)
+    >>> estimator.step(1.0, 0.15)
+    >>> type(estimator.filter).__mro__[1].__name__
+    'ExtendedKalmanFilter'
     """
 
     __slots__ = ()
@@ -279,6 +287,14 @@ class FilterPyUKF(_FilterPyBaseline):
     -----
     Merwe's scaled sigma points with alpha = 0.1, beta = 2, kappa = 3 - n. The filterpy object
     is at hand as `filter`. Source: R. Labbe, filterpy; R. van der Merwe, thesis (2004).
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> estimator = pz.FilterPyUKF(1000.0)
+    >>> estimator.step(1.0, 0.15)
+    >>> type(estimator.filter).__name__
+    'UnscentedKalmanFilter'
     """
 
     __slots__ = ()

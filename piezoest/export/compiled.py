@@ -66,7 +66,7 @@ def _load(code: CCode, kind: str) -> tuple[Any, Any, Any]:
 
 
 class CompiledController(Ring):
-    """Generated code, compiled by this computer's C compiler, with the face of `Controller`.
+    """Generated code, compiled by this computer's C compiler, with the methods of `Controller`.
 
     For checks of the code against the library and against logs from a target. Each object has
     a state of its own.

@@ -159,6 +159,13 @@ def identify_stream(
     ------
     ValueError
         As `identify`; the excitation is that of the first 50 000 samples.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> found = pz.identify_stream(pz.stream_record(pz.records.example_log()))
+    >>> found.chosen
+    'plays-asymmetric'
     """
     if not isinstance(log, RecordStream):
         raise ValueError(f"log must be a RecordStream, got {type(log).__name__}: use stream_record(path)")

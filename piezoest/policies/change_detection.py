@@ -1,4 +1,4 @@
-"""Adapt anew where the innovation says that something changed."""
+"""Adapt again when the innovation shows a change."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from piezoest.policies.base import Policy
 
 @dataclass(frozen=True, slots=True)
 class ChangeDetection(Policy):
-    """Add the initial covariance to P when the innovation says that something changed.
+    """Add the initial covariance to P when the innovation shows a change.
 
     A cumulative sum over the travel of the voltage: of the innovation's energy relative to its usual
     one, less 1 + drift. As long as nothing changes it gains nothing over a swing, whatever the loop

@@ -217,6 +217,13 @@ def stream_record(
         If the file cannot be read.
     ValueError
         As `read_record`; also if the format cannot be read in parts.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> log = pz.stream_record(pz.records.example_log())
+    >>> sum(block.voltage.size for block in log)
+    14155
     """
     stream = RecordStream(
         path, columns=columns, units=units, sample_rate=sample_rate, rows=rows, progress=progress

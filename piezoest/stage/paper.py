@@ -66,6 +66,13 @@ class PaperStage(SimulatedStage):
     -----
     Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), Sec. IV,
     Tables I and II.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> stage = pz.PaperStage(sample_rate=10_000.0, seed=0)
+    >>> x = stage.step(10.0)  # the reading [µm] after a voltage [V]
+    >>> true = stage.displacement  # [µm]
     """
 
     __slots__ = ()

@@ -79,6 +79,13 @@ class SimulatedStage:
     ValueError
         If a value is out of its range, a part is of another class, or a filter's cut-off is
         not below half the sample rate.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> model = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+    >>> stage = pz.SimulatedStage(10_000.0, model, gauge=pz.Gauge(noise=1e-3), seed=0)
+    >>> x = stage.step(10.0)
     """
 
     __slots__ = (
