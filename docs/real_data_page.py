@@ -28,7 +28,7 @@ def pieces(document: Document) -> dict[str, str]:
             },
         ),
         "models": table_of(
-            "Error of the simulated displacement [µm], rms except in the last column; the marked model was chosen",
+            "Error of the simulated displacement [µm rms, last column: largest]",
             found["candidates"],
             {
                 "model": lambda row: "▸ " * row["chosen"] + row["label"],

@@ -12,7 +12,6 @@ from page_parts import DOCS, Document
 
 import piezoest as pz
 from piezoest._files import save_figure
-from piezoest.bench.adaptation import in_parallel, jobs_for, summarise
 from piezoest.bench.origin import origin, put
 from piezoest.stage import PaperStage
 
@@ -24,6 +23,8 @@ NOISE_MEMORIES = (0.025, 0.1, 0.4)  # s
 LAGS = (0, 2, 5, 10, 20)  # samples
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
 LEARN, JUDGE = 3.0, 2.0  # s
+BEFORE, AFTER = 4, 20  # periods before and after a change
+LEVEL = 0.012  # of the amplitude: below it an error has settled
 # Headings of the tables, which the figure reads.
 WORST, SETTLED, NOISE, LAG = "worst [µm]", "settled [µm]", "noise [nm rms]", "lag [samples]"
 DEFAULT, GIVEN, UNTOLD, TOLD = "default", "default, noise= given", "delay=0", "delay= the true lag"
@@ -59,19 +60,33 @@ def settled(stage: LateStage, **options: Any) -> float:
 
 
 def memories() -> list[Document]:
-    """After a step of the gain by 20 %: worst and settled error, and the time until it has settled."""
-    names = ["HysteresisRLS", *(f"HysteresisRLS(memory={memory:g})" for memory in MEMORIES)]
-    work = jobs_for(["gain-step"], names, range(SEEDS), {"sample_rate": RATE, "after": 20})
-    rows = {row["estimator"]: row for row in summarise([run for some in in_parallel(work) for run in some])}
-    return [
-        {
-            "estimator": name,
-            WORST: rows[name]["worst_error"]["median"],
-            SETTLED: rows[name]["settled_max"]["median"],
-            "settles after [periods]": rows[name]["settling_periods"]["median"],
-        }
-        for name in names
-    ]
+    """After the gain has fallen by 20 %: worst error, settled error, and periods until it has settled."""
+    r = pz.signals.triangle(AMPLITUDE, FREQUENCY, BEFORE + AFTER, RATE)
+    change = (BEFORE + 0.05) / FREQUENCY  # s, on a slope of the triangle
+    schedule = [[0.0, 1.0], [change, 1.0], [change + 1.0 / RATE, 0.8]]
+    rows = []
+    for memory in ("period", *MEMORIES):
+        errors = []
+        for seed in range(SEEDS):
+            record = pz.track(
+                r,
+                stage=PaperStage(RATE, seed=seed, gain_schedule=schedule),
+                compensator=pz.InverseCompensator(START),
+                estimator=pz.HysteresisRLS(RATE, initial_model=START, memory=memory),
+            )
+            errors.append(record.max_error_per_period()[BEFORE:])
+        error = np.median(errors, axis=0)
+        late = np.flatnonzero(error > LEVEL * AMPLITUDE)
+        settled = 0 if late.size == 0 else int(late[-1]) + 1
+        rows.append(
+            {
+                "memory": "default" if memory == "period" else f"{memory:g} s",
+                WORST: float(error.max()),
+                SETTLED: float(error[AFTER // 2 :].max()),
+                "settles after [periods]": settled if settled < AFTER else None,
+            }
+        )
+    return rows
 
 
 def noises() -> list[Document]:

@@ -1,4 +1,4 @@
-"""The supervisor of the loop: a model must explain the recent readings better than a straight line."""
+"""The guard in the ring: a model has to explain what has just happened better than a straight line."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ NO_LOOP = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """An action of a supervisor or a controller.
+    """Something a supervisor did.
 
     Parameters
     ----------
     time : float
         Seconds since its start.
     action : str
-        ``"kept"`` (a proposed model had too large an error, the present one stays), ``"fell back"`` (to the
-        last good model or to a line) or ``"resumed"``.
+        ``"kept"`` (a proposed model that misses more than is allowed was not taken, the present one
+        stays), ``"fell back"`` (to the last good model or to a line) or ``"resumed"``.
     reason : str
-        The reason, with numbers.
+        Why, with the figures.
     """
 
     time: float
@@ -53,25 +53,26 @@ class Event:
 
 
 class Supervisor:
-    """Passes a model to the compensator only if it is better than linear feed-forward.
+    """Lets only those models through to the compensator that are better than linear feed-forward.
 
-    About sixteen times per swing it simulates the proposed model over the last swings of the voltage. It
-    compares the error with that of the best straight line x = K u + offset. If the error is above `limit`
-    times the line's, or above that of the present model, the model is not used. Then the compensator keeps
-    the present model if it is good enough, or gets the last good model, or the line. The line also takes
-    over if the error of the stage stays larger than a line's, or if the voltage rests at a limit while the
-    reference is within reach. A decision holds until the next one; a very different model is checked
-    immediately. While the error is clearly smaller than a line's, a model close to the last good one is
-    accepted without a check. The error is the root mean square, or half the largest value if that is more;
-    recent values weigh more. At the start, until the line's gain is known, a model must be clearly better
-    than the one in use.
+    About sixteen times a swing the proposed model is run over the last swings of the voltage, and its
+    error against the measured displacement compared with that of the straight line x = K u + offset that
+    fits them best. A model whose error is above `limit` times the line's, or above that of the present
+    model, is not handed on: the compensator keeps its present model if that one passes, else gets the
+    last one that had passed if it still does, else the line itself. The line takes over, too, where the
+    stage misses the reference by more than a line would all the time, or the voltage rests at a limit
+    while the reference moves within reach. Between two verdicts the last one holds, but for a model far
+    from the one last judged, which is judged at once. While the stage tracks clearly better than a line
+    would, a model near the last good one is taken without more ado. Errors are root mean
+    squares, or half the largest value where that is more; the recent past weighs more. At the start,
+    until the line's gain is known, a model must be clearly better than the one in use.
 
     Parameters
     ----------
     sample_rate : float
         [Hz].
     limit : float
-        Largest error that is accepted, relative to the line's.
+        Error that is allowed, relative to the line's.
 
     Raises
     ------
@@ -80,24 +81,13 @@ class Supervisor:
 
     Notes
     -----
-    Points are taken by the travel of voltage and reference, 64 per swing, and not by time, so a rest adds
-    nothing. Readings that stand still while the voltage moves are not used; meanwhile the model in use stays.
-    The line's gain has the sign of the first model's gain. It stays within a factor of twenty of it, or of
-    the first line that was fitted over two swings.
+    What counts is the travel of voltage and reference, 64 points a swing, whatever the time and the
+    interval: a rest adds nothing. Readings that stand still while the voltage moves teach nothing: while
+    there are no others the model in use stays. The line's gain keeps the sign of the first model's, and
+    lies within a factor of twenty of it, or of the first line's that was found over two swings.
 
-    A `ColemanHodgdon` is simulated from the state that follows from the recent path of the voltage. For other
-    models with a memory the mean error is left out. Source: a rule of this library.
-
-    Examples
-    --------
-    >>> import piezoest as pz
-    >>> fs = 10_000.0
-    >>> r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=3, sample_rate=fs)
-    >>> stage, estimator, supervisor = pz.PaperStage(fs, seed=0), pz.HysteresisRLS(fs), pz.Supervisor(fs)
-    >>> loop = {"compensator": pz.InverseCompensator(estimator.model), "estimator": estimator}
-    >>> record = pz.track(r, stage=stage, supervisor=supervisor, **loop)
-    >>> len(supervisor.events)
-    1
+    A `ColemanHodgdon` is run from where the voltage's recent path puts it; of any other model with a
+    memory the mean error is left out. Source: a rule of this library.
     """
 
     __slots__ = (
@@ -124,12 +114,12 @@ class Supervisor:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """Its actions, oldest first."""
+        """What it did, oldest first."""
         return tuple(self._events)
 
     @property
     def holding(self) -> bool:
-        """Whether the compensator uses a fallback model."""
+        """Whether the compensator is on a model to fall back to."""
         return self._held is not None
 
     def review(self, r: FloatArray, u: FloatArray, x: FloatArray, present: Model, proposed: Model) -> Model:

@@ -1,4 +1,4 @@
-"""Compile and load all that a live loop will call, before it runs."""
+"""Compile and load everything that a live loop will call, before it runs."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class Job:
     overrides : dict
         Fields of `piezoest.bench.cases.Conditions`.
     guard : bool
-        Whether the supervisor of the loop is on.
+        Whether the supervisor of the ring is on.
     title : str, optional
         What the runs are said to be of, where the overrides make it more than the scenario.
     """
@@ -104,7 +104,7 @@ def follow(
     guard: bool = False,
     watch: Callable[[Any], Any] = lambda estimator: estimator,
 ) -> TrackingRecord:
-    """Run the loop over a case.
+    """Send a case round the ring.
 
     Parameters
     ----------
@@ -113,9 +113,9 @@ def follow(
     estimator : str or None
         As `piezoest.bench.candidates.candidate` reads it; None for linear feed-forward.
     guard : bool
-        Whether the supervisor of the loop is on.
+        Whether the supervisor of the ring is on.
     watch : callable
-        Is given the estimator and returns what replaces it in the loop.
+        Is given the estimator and returns what goes into the ring in its place.
 
     Returns
     -------

@@ -79,7 +79,7 @@ def adaptation(
 ) -> None:
     """How fast estimators adapt: scenarios × estimators × seeds, beside linear feed-forward.
 
-    Errors are those of the true displacement in the loop of the simulated stage and the inverse
+    Errors are those of the true displacement in the ring of the simulated stage and the inverse
     compensator, 5 µm at 5 Hz where nothing else is said.
     """
     if targets and (runs.scenario or runs.estimator or policies):

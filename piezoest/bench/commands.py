@@ -58,7 +58,7 @@ def estimators(
     ] = None,
     html: Html = None,
 ) -> None:
-    """Settled error, time to settle and cost of every estimator, in the same loop.
+    """Settled error, time to settle and cost of every estimator, in the same ring.
 
     Each starts from the same wrong parameters and drives the inverse compensator of the simulated
     stage: a smoothed triangle of 5 µm at 5 Hz, noise and quantisation on.

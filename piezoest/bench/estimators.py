@@ -1,4 +1,4 @@
-"""Every estimator in the same loop: its settled error, its time to settle, and its cost."""
+"""Every estimator in the same ring: what it reaches, how soon, and at what cost."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ UPDATE_INTERVAL = 1e-3  # s between two updates of the compensator's model
 SETTLED = 0.012  # of the amplitude
 REFERENCE = "linear feed-forward"
 
-# What an estimator needs beside its defaults to be useful in the loop; printed and written with the results.
+# What an estimator needs beside its defaults to be of use in the ring; printed and written with the results.
 OPTIONS: dict[str, dict[str, Any]] = {
     # Without hop it would fit the whole record anew at every update of the compensator: here as often as
     # MovingHorizon solves. The first period, under the wrong model, is a larger loop than all that follow,
@@ -83,7 +83,7 @@ class Scenario:
         return signals.triangle(AMPLITUDE, FREQUENCY, self.seconds * FREQUENCY, self.sample_rate)
 
     def run(self, estimator: Any, compensator: Any) -> TrackingRecord:
-        """Run the loop over the reference, with a stage of its own.
+        """Send the reference through the ring, on a stage of its own.
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ def make(cls: type, sample_rate: float) -> Any:
 def compare(
     estimators: Mapping[str, type], scenario: Scenario, say: Callable[[str], None] = lambda _: None
 ) -> list[Row]:
-    """Run the loop with every estimator; linear feed-forward comes first.
+    """Send every estimator round the ring; linear feed-forward comes first.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Typical faults in a laboratory, by name, and their effect on the control loop.
+"""What goes wrong in a laboratory, by name, and what becomes of it in the ring.
 
 `piezoest.track` runs with a faulty stage as with a sound one.
 """
@@ -36,7 +36,7 @@ class Fault:
     description : str
         One line.
     outcome : str
-        Its effect on the loop.
+        What the ring makes of it.
     stage : callable
         ``stage(make, sample_rate, seed)`` builds the faulty stage; ``make(sample_rate)`` is a
         sound one.
@@ -47,7 +47,7 @@ class Fault:
     recovers : bool
         Whether an estimator that rejects outliers settles again, or in spite of it.
     carried : float
-        Error that no loop can see, because its sensor has this error [µm].
+        Error that no ring can know of, since its gauge is off by it [µm].
     """
 
     name: str
@@ -67,7 +67,7 @@ class Fault:
         make : callable
             Sound stage for a sample rate [Hz], such as `PaperStage`.
         sample_rate : float
-            Sample rate that the loop assumes [Hz].
+            What the ring takes for it [Hz].
         seed : int
             Start of the fault's random numbers.
 

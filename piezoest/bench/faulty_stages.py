@@ -1,4 +1,4 @@
-"""Stages with a fault between them and the rest of the loop.
+"""Stages with something wrong between them and the rest of the ring.
 
 Every fault is seeded, and `step` and `run` give the same bits.
 """
@@ -13,7 +13,7 @@ from piezoest._checks import FloatArray, array_1d, finite, fraction, integer, no
 
 
 class FaultyStage:
-    """A stage with something between it and the rest of the loop; the base class adds nothing.
+    """A stage with something between it and the rest of the ring; by itself, nothing.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class FaultyStage:
         return u
 
     def _reading(self, x: FloatArray) -> FloatArray:
-        """What the loop gets instead of the stage's reading [µm]; `_count` is the first sample's index."""
+        """What the ring gets for the stage's reading [µm]; `_count` is the first sample's index."""
         return x
 
     def _within(self, size: int, start: float, duration: float) -> Any:
@@ -52,7 +52,7 @@ class FaultyStage:
 
     @property
     def sample_rate(self) -> float:
-        """Sample rate that the rest of the loop assumes [Hz]."""
+        """What the rest of the ring takes for the sample rate [Hz]."""
         return float(self._stage.sample_rate)
 
     @property
@@ -289,14 +289,14 @@ class WeakAmplifier(FaultyStage):
 
 
 class WrongRate(FaultyStage):
-    """The loop assumes a sample rate that is too high.
+    """The ring takes the samples for faster than they are.
 
     Parameters
     ----------
     stage : object
         See `FaultyStage`.
     factor : float
-        Sample rate that the loop assumes, relative to the true one.
+        Sample rate that the ring believes in, over the true one.
     seed : int
         Not used: the fault is certain.
     """
@@ -307,5 +307,5 @@ class WrongRate(FaultyStage):
 
     @property
     def sample_rate(self) -> float:
-        """Sample rate that the rest of the loop assumes [Hz]."""
+        """What the rest of the ring takes for the sample rate [Hz]."""
         return self._factor * float(self._stage.sample_rate)

@@ -1,7 +1,7 @@
-"""One run of the paper's experiment: a reference, a compensation, the control loop until it is stationary.
+"""One run of the paper's experiment: a reference, a compensation, the ring until it is stationary.
 
-The procedure is the paper's. Reference, compensator, stage and estimator form a loop at
-50 kHz, with noise and converters; the parameters are estimated while the loop runs, and the
+The procedure is the paper's. Reference, compensator, stage and estimator form the ring at
+50 kHz, with noise and converters; the parameters are estimated while the ring runs, and the
 error is max |r - x| of the true displacement over the stationary part. Nothing is fitted to
 a record afterwards.
 
@@ -86,7 +86,7 @@ TRIANGLES = tuple(Reference("triangle", *row) for row in ((2.5, 5.0), (5.0, 2.5)
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """One run of the loop.
+    """One way round the ring.
 
     Parameters
     ----------

@@ -58,7 +58,7 @@ class Settings:
     stage : {"paper", "preisach"}
         `PaperStage` or `PreisachStage`.
     guard : bool
-        Whether the supervisor of the loop is on.
+        Whether the supervisor of the ring is on.
 
     Raises
     ------
@@ -270,7 +270,7 @@ def _numbers(metrics: Metrics, case: Case) -> Row:
 
 
 class _Clock:
-    """Time of this thread that an estimator takes, without the rest of the loop."""
+    """Time of this thread that an estimator takes, without the rest of the ring."""
 
     def __init__(self) -> None:
         self.seconds = 0.0

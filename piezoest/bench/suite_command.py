@@ -93,7 +93,7 @@ class Ring:
 
     sample_rate: Annotated[float | None, typer.Option(min=2000.0, help="Hz; default 5000.")] = None
     stage: Annotated[str, typer.Option(help="paper or preisach.")] = "paper"
-    guard: Annotated[bool, typer.Option("--guard", help="With the supervisor of the loop.")] = False
+    guard: Annotated[bool, typer.Option("--guard", help="With the supervisor of the ring.")] = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -85,9 +85,11 @@ class IntegralFeedback:
         Parameters
         ----------
         r : float
-            Reference displacement [µm]; NaN, infinity and what is no number hold the last voltage.
+            Reference displacement [µm]; NaN, infinity and anything that is not a number hold the last
+            voltage.
         x : float or None
-            Displacement measured last [µm]; None, NaN, infinity or what is no number if there is none.
+            Displacement measured last [µm]; None, NaN, infinity or anything that is not a number if there
+            is none.
 
         Returns
         -------

@@ -140,7 +140,8 @@ class LeadFilter:
         Parameters
         ----------
         r : float
-            Reference displacement [µm]; NaN, infinity and what is no number hold the last voltage.
+            Reference displacement [µm]; NaN, infinity and anything that is not a number hold the last
+            voltage.
 
         Returns
         -------

@@ -161,7 +161,7 @@ def _outside(state: Any, learnt_on: Any) -> dict[str, str]:
 
 
 def misses(state: Any) -> list[float | None]:
-    """Return what the line and each candidate has missed of late [µm]; None if nothing is known.
+    """Return the recent error of the line and of each candidate [µm]; None if it is unknown.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from typing import Any
 from piezoest.compile import inlined
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, record
 
-# Readings seen since what is usual was learnt anew, their usual change [µm], how far the voltage has
+# Readings seen since what is usual was learnt again, their usual change [µm], how far the voltage has
 # travelled since the reading last changed [V].
 BELIEF = record(seen=COUNT, usual_step=DISTANCE, same=AMOUNT)
 

@@ -311,7 +311,7 @@ class EstimatorBase(ABC):
             "format": _FORMAT,
             "arguments": copy.deepcopy(self._arguments),
             "state": by_name(self._layout, self._state),
-            # JSON knows no NaN.
+            # JSON has no NaN.
             "pending": "missing"
             if self._pending is not None and not np.isfinite(self._pending)
             else self._pending,

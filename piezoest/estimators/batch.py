@@ -353,7 +353,7 @@ class BatchFit(Hopping):
         self._forget()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return arguments and record as a JSON-safe dictionary; `from_dict` resumes bit for bit."""
+        """Return arguments and record as a JSON-safe dictionary, from which `from_dict` continues exactly."""
         rows = self._record[:, : self._count].tolist()
         given = ([value if np.isfinite(value) else None for value in row] for row in rows)
         return super().to_dict() | dict(zip(self._saved_too, given, strict=True))

@@ -106,7 +106,7 @@ class _FilterPyBaseline(EstimatorBase):
         return self._ekf
 
     def to_dict(self) -> dict[str, Any]:
-        """Return arguments and state as a JSON-safe dictionary; `from_dict` resumes bit for bit."""
+        """Return arguments and state as a JSON-safe dictionary, from which `from_dict` continues exactly."""
         self._in_step()
         return super().to_dict()
 
@@ -154,7 +154,7 @@ class _FilterPyBaseline(EstimatorBase):
         state.last = UPDATED
 
     def _guarded(self, function: Any, *arguments: Any) -> bool:
-        """Let the filter predict or update; where it breaks, the parameters stay and P starts anew.
+        """Let the filter predict or update; where it breaks, the parameters stay and P starts again.
 
         A stream must not stop, and what is not a number would stay in the filter for good.
         """

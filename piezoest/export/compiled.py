@@ -191,12 +191,12 @@ class CompiledFeedforward:
         self.reset()
 
     def reset(self, voltage: float | None = None) -> None:
-        """Return to the state that was exported, or begin anew.
+        """Return to the state that was exported, or start again.
 
         Parameters
         ----------
         voltage : float, optional
-            Voltage at which the stage rests, to begin anew [V]. Default: what was exported.
+            Voltage at which the stage rests, to start again [V]. Default: what was exported.
 
         Raises
         ------
@@ -230,7 +230,7 @@ class CompiledFeedforward:
         Parameters
         ----------
         u : float or None
-            Voltage [V]; None or NaN where nobody knows what was written.
+            Voltage [V]; None or NaN if it is unknown what was written.
         x : float or None
             Measured displacement [µm]; None or NaN where there is none.
         """

@@ -48,7 +48,7 @@ class CovarianceResetting(Policy):
 
 @inlined
 def before_update(own: Any, fixed: Any, state: Any, settings: Any) -> None:
-    """Let P start anew where an eigenvalue is not above the floor."""
+    """Let P start again where an eigenvalue is not above the floor."""
     if fixed is None:
         return
     law = state.law

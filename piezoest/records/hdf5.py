@@ -42,7 +42,7 @@ def _table(h5py: Any, path: Path, file: Any) -> Table:
     for name, value in file.attrs.items():
         if name.lower() in RATES:
             table.sample_rate = stated_rate(value)
-    # A link is followed by nobody here, but a column that is not found for it would be a riddle.
+    # Links are not followed, but they are noted: otherwise nobody could see why a column is not found.
     if outside := file.visititems_links(
         lambda name, link: name if isinstance(link, h5py.ExternalLink) else None
     ):

@@ -11,7 +11,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 
-# Rows that are read at a time where nobody says how many: some megabytes.
+# Default number of rows that are read at a time: some megabytes.
 ROWS = 1 << 17
 
 

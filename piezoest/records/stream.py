@@ -40,7 +40,7 @@ class Block(NamedTuple):
 class RecordStream:
     """A recorded log that is read in blocks, as often as it is iterated over.
 
-    Made by `stream_record`. The blocks together hold the same numbers, to the last bit, as the
+    Made by `stream_record`. The blocks together contain exactly the same numbers as the
     `Record` that `read_record` makes of the file.
 
     Parameters
@@ -189,7 +189,7 @@ def stream_record(
         for block in log:
             estimator.run(block.voltage, block.displacement, every=block.voltage.size)
 
-    leaves the estimator in the same state, to the last bit, as one run over the whole record.
+    leaves the estimator in exactly the same state as one run over the whole record.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ class Line:
 
 
 class Parts:
-    """`InverseCompensator`, `HysteresisRLS` and `Supervisor` in a hand-written loop, with default settings.
+    """`InverseCompensator`, `HysteresisRLS` and `Supervisor` in a ring, with all their defaults.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ import numpy as np
 from piezoest import signals
 from piezoest._checks import FloatArray
 
-# Where a wave may begin, as a fraction of a period: in the middle, rising, or at its lowest point.
+# Where a wave may begin, in parts of a period: in the middle, rising, or at its lowest point.
 BEGINNINGS = (0.0, 0.75)
 SMALLEST = (0.1, 0.4)  # amplitude of a growing wave where it is least, relative to the largest
 # Most sweeps of a growing or decaying amplitude; where there is one, the held-out part has other amplitudes.
