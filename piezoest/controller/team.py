@@ -72,7 +72,7 @@ def _made(name: str, factory: Any, sample_rate: float, given: dict[str, Any]) ->
     gain = estimator.model.line[0]
     if estimator.status.samples or not LEAST < gain < MOST:
         raise ValueError(
-            f"{name} must start again from the initial_model that it is given, of a gain of about one, "
+            f"{name} must begin anew from the initial_model that it is given, of a gain of about one, "
             f"got {estimator.model} after {estimator.status.samples} samples: pass it on"
         )
     return estimator
