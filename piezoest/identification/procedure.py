@@ -68,7 +68,7 @@ def identify(
         ``"auto"``, or the kind to fit, as for `piezoest.fit`: ``"line"``, ``"coleman-hodgdon"``, ``"plays"``,
         ``"plays-creep"``, ``"plays-asymmetric"``, ``"plays-asymmetric-creep"``.
     train : float
-        Fraction of the log to fit, from its start, 0.1 to 0.9; the rest is held out.
+        The fraction of the log to fit, from its start, 0.1 to 0.9; the rest is held out.
     delay : float or "auto"
         Samples by which the displacement lags the voltage, 0 to 10, fractions too. ``"auto"`` estimates it if
         the log contains swings of several sizes or frequencies, which show the difference between a delay and
