@@ -72,16 +72,10 @@ def broken(folder: Path) -> Iterator[str]:
                 yield f"{place}: no such anchor"
 
 
-def main() -> None:
-    folder = Path(sys.argv[1])
-    found = list(broken(folder))
+if __name__ == "__main__":
+    found = list(broken(Path(sys.argv[1])))
     for sentence in found:
         print(sentence, file=sys.stderr)
     if found:
         sys.exit(f"{len(found)} broken links")
-    pages = sum(1 for _ in folder.rglob("*.html"))
-    print(f"links of {pages} pages lead somewhere")
-
-
-if __name__ == "__main__":
-    main()
+    print("all links lead somewhere")

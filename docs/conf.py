@@ -16,6 +16,7 @@ import paper_page
 import performance_page
 import real_data_page
 import safety_page
+import start_page
 import table_page
 import tuning_page
 
@@ -60,23 +61,15 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
+# Pages without sections of their own have nothing to show beside them.
 html_sidebars: dict[str, list[str]] = {
-    "start": [],
-    "adaptive_feedforward": [],
-    "safety": [],
-    "your_own_stage": [],
-    "real_data": [],
-    "tuning": [],
-    "coming_from": [],
-    "mathematics": [],
-    "paper": [],
-    "policies": [],
-    "performance": [],
-    "which_estimator": [],
-    "adaptation_speed": [],
-    "controller": [],
-    "design": [],
-}
+    page: []
+    for page in (
+        "start", "adaptive_feedforward", "safety", "your_own_stage", "real_data", "tuning", "coming_from",
+        "controller", "which_estimator", "adaptation_speed", "policies", "performance", "mathematics",
+        "paper", "design", "contributing", "changelog",
+    )
+}  # fmt: skip
 
 sphinx_gallery_conf = {
     "examples_dirs": "examples",
@@ -117,13 +110,10 @@ def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, li
 
 
 def setup(app: Any) -> None:
-    app.connect("builder-inited", paper_page.write)
-    app.connect("builder-inited", performance_page.write)
-    app.connect("builder-inited", controller_page.write)
-    app.connect("builder-inited", tuning_page.write)
-    app.connect("builder-inited", real_data_page.write)
-    app.connect("builder-inited", logs_page.write)
-    app.connect("builder-inited", safety_page.write)
-    app.connect("builder-inited", table_page.write)
+    for page in (
+        controller_page, logs_page, paper_page, performance_page, real_data_page, safety_page, start_page,
+        table_page, tuning_page,
+    ):  # fmt: skip
+        app.connect("builder-inited", page.write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from paper_page import DOCS, table, write_pieces
+from page_parts import DOCS, table, write_pieces
 
 Document = dict[str, Any]
 

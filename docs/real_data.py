@@ -1,7 +1,7 @@
-"""A recorded stage, as the page `real_data` shows it; writes docs/data/real_data.json and its figure.
+"""Identify the recording that comes with the package; writes docs/data/real_data.json and its figure.
 
-The recording comes with the package. Another one of the same stage, which the model is to predict, does not:
-PIEZOEST_DATA, or --data, names its folder. Without it, what the page says of that one stays as it is.
+The model also predicts another recording of the same stage, which does not come with the package.
+PIEZOEST_DATA, or --data, names its folder. Without it, the old numbers of that recording are kept.
 
     python docs/real_data.py [--data DIR] [--json FILE] [--figures DIR]
 """

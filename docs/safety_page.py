@@ -1,24 +1,12 @@
-"""Tables and sentences of the page `safety`, from docs/data/safety.json; no number is typed by hand.
-
-Runs at the start of every Sphinx build; by itself: python docs/safety_page.py
-"""
+"""Tables and numbers of the page `safety`, from docs/data/safety.json; written at every Sphinx build."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
-from pathlib import Path
+from functools import partial
 from typing import Any
 
-from paper_page import table, write_pieces
-from safety_more_page import besides, dwell, of_all, places, singles, told
-from which_estimator_page import listed, percent, replacements, short
-
-DOCS = Path(__file__).resolve().parent
-SOURCE = DOCS / "data" / "safety.json"
-TARGET = DOCS / "generated" / "safety"
-
-Document = dict[str, Any]
+import page_parts
+from page_parts import Document, of_all, percent, short, table, table_of
 
 GROUPS = {"all": "all", "healthy": "healthy", "often": "called often"}
 WHO = {
@@ -26,203 +14,85 @@ WHO = {
     "parts": "by hand",
 }  # fmt: skip
 CRITERIA = {
-    "failed": "raised an error",
-    "not finite": "a voltage that is not finite",
-    "outside the limits": "a voltage outside its limits",
-    "rests at a limit": "rests at a limit without need",
-    "ratio": "ratio above 1",
-    "cycle_ratio": "ratio above 1 in any one cycle",
-    "last_ratio": "ratio above 1 in the last cycle",
-}
-RATIOS = {"ratio": "after two swings", "cycle_ratio": "any one cycle", "last_ratio": "last cycle"}
-FAMILIES = {
-    "backlash": "a play, and a dead zone behind it",
-    "bouc-wen": "Bouc-Wen, with the power and the roundness of its loop drawn",
-    "coleman-hodgdon": "Coleman-Hodgdon",
-    "duhem": "Duhem, another law up than down",
-    "paper": "the plays of :class:`PaperStage`, stretched",
-    "preisach": "plays under a bell, as :class:`PreisachStage`",
-    "relays": "a Preisach plane of relays, whose density does not separate",
-}
-# Whose estimators learn the very model; the others are nobody's.
-RELATED = {
-    "coleman-hodgdon": "Coleman-Hodgdon estimators",
-    "paper": "play estimators",
-    "preisach": "play estimators",
-}
-FAULTS = {
-    "none": "a healthy rig",
-    "amplifier-frozen": "the amplifier holds its last voltage",
-    "stage-stuck": "the stage stands still",
-    "sensor-constant": "the gauge repeats its last reading",
-    "sensor-noise": "the gauge gives nothing but noise",
-    "sensor-saturated": "the gauge ends inside the swing",
-    "sensor-factor": "the gauge reads a thousand times too much or too little, or with the wrong sign",
-    "zero-off": "the gauge's zero is off by 20 µm or the whole stroke",
-    "zero-off-shifted": "the same, and the reference goes along",
-    "spikes": "single readings that are far off",
-    "dropouts": "readings that are missing here and there",
-    "gap": "no readings at all",
-    "hum": "50 Hz on the readings",
-    "drift": "the stage drifts",
-    "gain-step": "the stage's gain changes by 30 %",
-    "amplitude-drop": "the reference becomes small",
-    "glitch": "the very first reading is wrong",
-    "dwell": "the reference rests",
+    "failed": "error raised", "not finite": "voltage not finite", "outside the limits": "outside the limits",
+    "rests at a limit": "rests at a limit", "ratio": "ratio above 1", "cycle_ratio": "any cycle above 1",
+    "last_ratio": "last cycle above 1",
 }  # fmt: skip
-FEWEST = 5  # runs of which a share says something
-NAMED = 3  # of what fails most
+DRAWN = {
+    "family": "family of the hysteresis", "reference": "reference", "fault": "fault",
+    "mode": "time of the fault", "mechanics": "mechanics", "limits": "limits of the voltage [V]",
+}  # fmt: skip
+SPANS = {
+    "amplitude": "amplitude of the reference [µm]", "frequency": "frequency of the reference [Hz]",
+    "gain": "gain [µm/V]", "width": "width of the loop, relative to the stroke",
+    "sample_rate": "sample rate [Hz]", "delay": "delay of the readings [samples]",
+    "block": "samples in a block", "sensor_noise": "noise of the readings [µm]",
+    "creep": "creep per decade of time, relative to the displacement",
+}  # fmt: skip
+CHANGES = {
+    "cold start": "cold-start", "60 % of the amplitude": "switch", "20 %": "drop", "100 %": "switch-back",
+    "gain changes by 30 %": "gain-step",
+}  # fmt: skip
 
 
 def write(app: Any = None) -> None:
     """Write what the page includes."""
-    write_pieces(TARGET, pieces(json.loads(SOURCE.read_text(encoding="utf-8"))))
+    target = page_parts.DOCS / "generated" / "safety"
+    page_parts.write_pieces(target, pieces(page_parts.read("safety")))
 
 
 def pieces(document: Document) -> dict[str, str]:
     """Texts by the name of their file."""
+    mine = document["controller"]
     return {
         "numbers": numbers(document),
-        "families": families(document),
-        "drawn": drawn(document),
-        "verdict": "".join(f"- {sentence}\n" for sentence in verdict(document)),
+        "drawn": drawn(document["drawn"]),
         "violations": violations(document),
         "quantiles": quantiles(document),
-        "faults": faults(document),
-        "told": told(document),
-        "map": places(document, "by_family", "family"),
-        "places": places(document, "by_place", "amplitude", "frequency"),
-        "other_places": places(document, "other_places", "amplitude", "frequency"),
-        "singles": singles(document),
-        "dwell": dwell(document),
-        "controller": crossed(document, "controller"),
-        "line": crossed(document, "line"),
-        "mechanics": mechanics(document),
-        "worst": worst(document),
-        "show": show(document),
+        "found": found(document),
+        "by_fault": by(document, "fault", "fault"),
+        "by_mode": table_of(
+            "By fault and its time: median of the ratio; runs above 1",
+            [row for row in mine["by_mode"] if row["judged"]],
+            {"fault": "fault", "time": "mode", "ratio": cell},
+        ),
+        "by_mechanics": by(document, "mechanics", "mechanics"),
+        "by_often": by(document, "often", "called often"),
+        "crossed": crossed(mine),
+        "worst": worst(mine["worst"]),
+        "told": told(mine["told"]),
+        **settling(document),
+        "singles": singles(document["singles"]),
+        "dwell": dwell(document.get("dwell")),
     }
 
 
 def numbers(document: Document) -> str:
     """Numbers that stand in sentences."""
-    machine, criteria = document["machine"], document["criteria"]
-    first, runs = document["seed"], document["runs"]
-    return replacements(
-        {
-            "safety runs": runs,
-            "safety seeds": f"{first} to {first + runs - 1}",
-            "safety families": len(document["drawn"]["family"]),
-            "safety date": document["date"][:10],
-            "safety machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
-            "safety line": f"{criteria['line']:g}",
-            "safety noise": f"{criteria['noise']:g}",
-            "safety swing": f"{100.0 * criteria['swing']:g} %",
-            "safety calls": f"{criteria['calls']:g}",
-            "safety late": f"1/{1.0 / criteria['late']:g}",
-            "safety others": document["others"],
-            "safety back": f"{criteria['back']:g}",
-            "safety soon": criteria["soon"],
-            "safety settled": percent(criteria["settled"]),
-            "safety slow": percent(criteria["slow"]),
-            "safety large": f"{criteria['large']:g}",
-        }
-    )
+    criteria, first, runs = document["criteria"], document["seed"], document["runs"]
+    values = {
+        "runs": runs,
+        "others": document["others"],
+        "seeds": f"{first} to {first + runs - 1}",
+        "worst seed": document["controller"]["worst"][0]["seed"],
+        "late": f"1/{1.0 / criteria['late']:g}",
+        **{name: percent(criteria[name]) for name in ("swing", "settled", "slow", "enough")},
+        **{name: f"{criteria[name]:g}" for name in ("line", "noise", "calls", "back", "soon", "large")},
+    }
+    named = {f"safety {name}": value for name, value in values.items()}
+    return page_parts.replacements(page_parts.made("safety", document) | named)
 
 
-def families(document: Document) -> str:
-    """Families of the hysteresis, and which estimators know them."""
+def drawn(of: Document) -> str:
+    """Names with their runs, and spans of numbers."""
     body = [
-        [name, FAMILIES.get(name, ""), RELATED.get(name, "none"), str(runs)]
-        for name, runs in document["drawn"]["family"].items()
+        [title, "; ".join(f"{each} {runs}" for each, runs in of[name].items())]
+        for name, title in DRAWN.items()
     ]
-    return table("Families of the hysteresis", ["family", "what it is", "of the family of", "runs"], body)
-
-
-def drawn(document: Document) -> str:
-    """Everything else that is drawn."""
-    of = document["drawn"]
-    units = {
-        "amplitude": ("amplitude of the reference", "µm"), "frequency": ("its frequency", "Hz"),
-        "gain": ("gain", "µm/V"), "width": ("width of the loop over the reach, of its stroke", ""),
-        "sample_rate": ("sample rate", "Hz"), "delay": ("delay of the readings", "samples"),
-        "block": ("samples handed over at a time", ""), "sensor_noise": ("noise of the readings", "µm"),
-        "creep": ("creep in a decade of time, of the displacement", ""),
-    }  # fmt: skip
-    names = {
-        "limits": "limits of the voltage [V]", "mechanics": "mechanics", "reference": "reference",
-        "mode": "fault there",
-    }  # fmt: skip
-    body = [
-        [title, "; ".join(f"{each}: {runs}" for each, runs in of[name].items())]
-        for name, title in names.items()
-    ]
-    body += [
-        [title, f"{short(of['spans'][name][0])} to {short(of['spans'][name][1])} {unit}".strip()]
-        for name, (title, unit) in units.items()
-    ]
-    return table("What else was drawn: names with their runs, numbers from least to largest",
-                 ["what", "drawn"], body)  # fmt: skip
-
-
-def share(row: Document) -> float | None:
-    """Part of the judged runs with a ratio above 1."""
-    return row["over"] / row["judged"] if row["judged"] else None
-
-
-def verdict(document: Document) -> list[str]:
-    """Whether the promise is kept and where it is not, in sentences."""
-    mine = document["controller"]
-    said = [hard(mine["all"])]
-    over = mine["all"]["violations"]["ratio"]
-    if not over:
-        said.append(
-            f"No ratio of the {mine['all']['judged']} runs that are judged is above 1: as to errors the "
-            "promise is kept here. That is no proof for rigs that were not drawn."
-        )
-        return said + besides(document)
-    counts = {name: of_all(mine[name]["violations"]["ratio"], mine[name]["judged"]) for name in GROUPS}
-    said.append(
-        f"**The promise is not kept yet.** The ratio is above 1 in {counts['all']} runs; on healthy rigs in "
-        f"{counts['healthy']}, and where the controller is called often in {counts['often']}. The largest "
-        f"ratio is {short(mine['all']['quantiles']['ratio']['100 %'])}."
+    body += [[title, " to ".join(map(short, of["spans"][name]))] for name, title in SPANS.items()]
+    return table(
+        "What is drawn: names with their runs, or smallest and largest number", ["quantity", "drawn"], body
     )
-    said.append(
-        "What counts in the long run is the last cycle: there it is above 1 in "
-        f"{of_all(mine['all']['violations']['last_ratio'], mine['all']['judged'])} runs, on healthy rigs in "
-        f"{of_all(mine['healthy']['violations']['last_ratio'], mine['healthy']['judged'])}."
-    )
-    others = [
-        f"{title} in {of_all(document[who]['all']['violations']['ratio'], document[who]['all']['judged'])}"
-        for who, title in WHO.items()
-        if who != "controller"
-    ]
-    said.append(f"Of the others the ratio is above 1: {listed(others)}.")
-    for title, column in (
-        ("fault", "fault"), ("family", "family"), ("reference", "reference"), ("mechanics", "mechanics"),
-    ):  # fmt: skip
-        if found := most([row for row in mine[f"by_{column}"] if row[column] != "none"], column):
-            said.append(f"By {title} it fails most often with {listed(found)}.")
-    return said + besides(document)
-
-
-def hard(group: Document) -> str:
-    """What must never happen, of a group of runs."""
-    broken = group["violations"]
-    hard = ("failed", "not finite", "outside the limits", "rests at a limit")
-    found = [f"{CRITERIA[name]}: {broken[name]}" for name in hard if broken[name]]
-    if found:
-        return f"Of {group['runs']} runs some broke what must never break: {listed(found)}."
-    return (
-        f"In all {group['runs']} runs the voltage is finite and within its limits, rests at none of them "
-        "without need, and no error is raised."
-    )
-
-
-def most(rows: Sequence[Document], column: str) -> list[str]:
-    """Where the share above 1 is largest, of what has been drawn a few times."""
-    known = [row for row in rows if row["judged"] >= FEWEST and row["over"]]
-    known.sort(key=lambda row: row["over"] / row["judged"], reverse=True)
-    return [f"*{row[column]}* ({row['over']} of {row['judged']})" for row in known[:NAMED]]
 
 
 def violations(document: Document) -> str:
@@ -231,114 +101,144 @@ def violations(document: Document) -> str:
     for who, title in WHO.items():
         for group, which in GROUPS.items():
             of = document[who][group]
-            counts = (
-                f"{of['violations'][name]}/{of['judged' if 'ratio' in name else 'runs']}" for name in CRITERIA
-            )
+            totals = {name: of["judged" if "ratio" in name else "runs"] for name in CRITERIA}
+            counts = [f"{of['violations'][name]}/{total}" for name, total in totals.items()]
             body.append([title, which, *counts])
-    heading = ["", "runs", *CRITERIA.values()]
-    return table("Runs that violate a criterion, of all that are judged by it", heading, body)
+    return table(
+        "Runs that break a promise, of the runs that are judged by it", ["", "runs", *CRITERIA.values()], body
+    )
 
 
 def quantiles(document: Document) -> str:
-    """Quantiles of the ratio, and of that of the last cycle."""
+    """Quantiles of the ratio over the whole run and of that of the last cycle."""
+    ratios = {"ratio": "whole run", "last_ratio": "last cycle"}
     body = [
-        [WHO[who], GROUPS[group], title, *map(short, document[who][group]["quantiles"][name].values())]
-        for who in WHO
-        for group in GROUPS
-        for name, title in RATIOS.items()
-    ]
-    levels = list(document["controller"]["all"]["quantiles"]["ratio"])
+        [WHO[who], GROUPS[group], title, *document[who][group]["quantiles"][name].values()]
+        for who in WHO for group in GROUPS for name, title in ratios.items()
+    ]  # fmt: skip
+    levels = document["controller"]["all"]["quantiles"]["ratio"]
     return table("Quantiles of the ratio", ["", "runs", "ratio", *levels], body)
 
 
-def faults(document: Document) -> str:
-    """Median and share above 1 for each fault, and when it came."""
-    modes = {(row["fault"], row["mode"]): row for row in document["controller"]["by_mode"]}
-    line = {row["fault"]: row for row in document["line"]["by_fault"]}
-    body = []
-    for row in document["controller"]["by_fault"]:
-        name = row["fault"]
-        body.append(
-            [
-                name, FAULTS.get(name, ""), str(row["judged"]), short(row["median"]), percent(share(row)),
-                *(counted(modes.get((name, mode))) for mode in ("from-start", "transient", "permanent")),
-                cell(line.get(name)),
-            ]
-        )  # fmt: skip
-    heading = [
-        "fault", "what it is", "runs", "median", "above 1", "from the start", "for a time", "for good",
-        "line: median; above 1",
-    ]  # fmt: skip
-    return table("By fault: median of the ratio, and runs above 1", heading, body)
-
-
-def counted(row: Document | None) -> str:
-    return f"{row['over']}/{row['judged']}" if row and row["judged"] else "—"
-
-
-def crossed(document: Document, who: str) -> str:
-    """Median, and share above 1, for each family under each reference."""
-    rows = {
-        (row["family"], row["reference"]): row for row in document[who]["by_family_and_reference"]
-    }  # fmt: skip
-    totals = {row["family"]: row for row in document[who]["by_family"]}
-    below = {row["reference"]: row for row in document[who]["by_reference"]}
-    references = list(below)
-    body = [
-        [family, *(cell(rows.get((family, each))) for each in references), cell(totals[family])]
-        for family in totals
-    ]
-    body.append(["all", *(cell(below[each]) for each in references), ""])
-    title = f"By family and reference, {WHO[who]}: median of the ratio; runs above 1"
-    return table(title, ["family", *references, "all"], body)
-
-
 def cell(row: Document | None) -> str:
-    return f"{short(row['median'])}; {counted(row)}" if row and row["judged"] else "—"
+    """Median of the ratio, and runs above 1."""
+    return f"{short(row['median'])}; {row['over']}/{row['judged']}" if row and row["judged"] else "—"
 
 
-def mechanics(document: Document) -> str:
-    """Median and share above 1 for each kind of mechanics, and by how often the controller is called."""
-    body = []
-    for column, title in (("mechanics", "mechanics: {}"), ("often", "called often: {}")):
-        line = {row[column]: row for row in document["line"][f"by_{column}"]}
-        for row in document["controller"][f"by_{column}"]:
-            word = {True: "yes", False: "no"}.get(row[column], row[column])
-            body.append([title.format(word), cell(row), percent(share(row)), cell(line.get(row[column]))])
-    heading = ["runs with", "median; above 1", "above 1", "line: median; above 1"]
-    return table("By mechanics, and by how often the controller is called", heading, body)
+def by(document: Document, column: str, name: str) -> str:
+    """The controller beside the straight line alone."""
+    line = {row[column]: row for row in document["line"][f"by_{column}"]}
+    columns = {
+        name: column,
+        "controller": cell,
+        "without candidates": lambda row: cell(line.get(row[column])),
+    }
+    title = f"By {name}: median of the ratio; runs above 1"
+    return table_of(title, document["controller"][f"by_{column}"], columns)
 
 
-def worst(document: Document) -> str:
-    """The worst runs, with their seeds."""
+def crossed(mine: Document) -> str:
+    """Each family with each reference."""
+    rows = {(row["family"], row["reference"]): row for row in mine["by_family_and_reference"]}
+    below = {row["reference"]: row for row in mine["by_reference"]}
     body = [
-        [
-            str(row["seed"]), row["family"], row["reference"],
-            row["fault"] if row["fault"] == "none" else f"{row['fault']}, {row['mode']}",
-            *(short(row[name]) for name in ("ratio", "last_ratio", "after_ratio", "rail")),
-            row["driver"] or "—", row["failure"] or "",
-        ]
-        for row in document["controller"]["worst"]
-    ]  # fmt: skip
-    heading = [
-        "seed", "family", "reference", "fault", "ratio", "last cycle", "after the fault",
-        "at a limit [quarter swings]", "drove last", "error",
-    ]  # fmt: skip
-    others = "".join(
-        f"- {title}: "
-        + ", ".join(f"{row['seed']} ({short(row['ratio'])})" for row in document[who]["worst"])
-        + "\n"
-        for who, title in WHO.items()
-        if who != "controller"
+        [row["family"], *(cell(rows.get((row["family"], each))) for each in below), cell(row)]
+        for row in mine["by_family"]
+    ]
+    body.append(["all", *map(cell, below.values()), ""])
+    return table(
+        "By family and reference: median of the ratio; runs above 1", ["family", *below, "all"], body
     )
-    mine = table(f"The worst {len(body)} runs of the controller", heading, body)
-    return f"{mine}\nThe worst of the others, seeds with their ratios:\n\n{others}"
 
 
-def show(document: Document) -> str:
-    """The command that draws the worst run."""
-    seed = document["controller"]["worst"][0]["seed"]
-    return f".. code-block:: bash\n\n   piezoest bench safety --show {seed}\n"
+def worst(rows: list[Document]) -> str:
+    """The worst runs, with their seeds."""
+    names = {
+        "family": "family", "reference": "reference", "fault": "fault", "time": "mode", "ratio": "ratio",
+        "last cycle": "last_ratio", "at a limit [quarter swings]": "rail", "drove last": "driver",
+        "error": "failure",
+    }  # fmt: skip
+    return table_of("The worst runs of the controller", rows, {"seed": lambda row: str(row["seed"]), **names})
+
+
+def found(document: Document) -> str:
+    """One line for each of the other questions."""
+    rows = document["controller"]["told"]
+    asked, named, left, recovered = (
+        sum(row[name] for row in rows) for name in ("to_name", "named", "to_recover", "recovered_soon")
+    )
+    body = [
+        ["faults that got their right name", of_all(named, asked)],
+        ["errors as before within three cycles after a fault", of_all(recovered, left)],
+    ]
+    if rested := document.get("dwell"):
+        body.append(
+            ["errors as before in the first period after a rest", of_all(rested["kept"], rested["runs"])]
+        )
+    if alone := document["singles"]:
+        title = f"cells with a settled error of at most {alone['allowed']:g} times that of the best estimator"
+        body.append([title, of_all(alone["kept"], len(alone["cells"]))])
+    if cells := document["map"] and document["map"]["cells"]:
+        for title, name in CHANGES.items():
+            body.append([f"cells that settle soon: {title}", of_all(cells["kept"][name], cells["asked"])])
+    return table("The other questions, in short", ["", "yes"], body)
+
+
+def told(rows: list[Document]) -> str:
+    """Names of faults, and recovery."""
+    columns = {
+        "fault": "fault",
+        "time": "mode",
+        "right name": lambda row: of_all(row["named"], row["to_name"]),
+        "after [periods]": "named_periods",
+        "as before in the first cycle": lambda row: of_all(row["recovered_first"], row["to_recover"]),
+        "in the first three": lambda row: of_all(row["recovered_soon"], row["to_recover"]),
+    }
+    asked = [row for row in rows if row["to_name"] or row["to_recover"]]
+    return table_of("Faults that got their right name, and errors that were as before", asked, columns)
+
+
+def settling(document: Document) -> dict[str, str]:
+    """Share of runs that settled soon after each change, by family and by place of the map."""
+    parts = {
+        "by_family": ("required", ["family"]),
+        "by_place": ("required", ["amplitude", "frequency"]),
+        "other_places": ("not required", ["amplitude", "frequency"]),
+    }
+    texts = {}
+    for part, (asked, names) in parts.items():
+        rows = document["map"][part] if document["map"] else []
+        title = f"Runs that settled within {document['criteria']['soon']} periods, where this is {asked}"
+        shares = {each: partial(share, name=name) for each, name in CHANGES.items()}
+        columns = {name: name for name in [*names, "runs"]} | shares
+        texts[f"map_{part}"] = table_of(title, rows, columns)
+    return texts
+
+
+def share(row: Document, name: str) -> str:
+    return percent(row[name])
+
+
+def singles(alone: Document | None) -> str:
+    """Settled errors beside those of the best single estimator."""
+    columns = {
+        "family": "family", "reference": "reference", "controller": partial(share, name="settled"),
+        "best single estimator": partial(share, name="best_settled"), "which": "best", "ratio": "ratio",
+    }  # fmt: skip
+    return table_of(
+        "Settled error relative to the amplitude, medians", alone["cells"] if alone else [], columns
+    )
+
+
+def dwell(rested: Document | None) -> str:
+    """Errors after a long rest."""
+    columns = {
+        "creep": "creep", "feedback": "feedback", "noise": "noise",
+        "as before in the first period": lambda row: of_all(row["kept"], row["runs"]),
+        "first": "first", "second": "second", "third": "third", "largest first": "largest",
+        "travel": "excursion", "longest travel": "farthest",
+    }  # fmt: skip
+    return table_of("After a long rest", rested["groups"] if rested else [], columns)
 
 
 if __name__ == "__main__":

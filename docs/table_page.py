@@ -5,21 +5,15 @@ Runs at the start of every Sphinx build; by itself: python docs/table_page.py
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Any
 
-from paper_page import table, write_pieces
+from page_parts import DOCS, Document, made, read, replacements, table, write_pieces
 
 from piezoest.bench import report
 from piezoest.bench.estimators import LINEAR
 from piezoest.bench.scenarios import UNREPEATED
 
-DOCS = Path(__file__).resolve().parent
-DATA = DOCS / "data"
 TARGET = DOCS / "generated" / "table"
-
-Document = dict[str, Any]
 
 
 def write(app: Any = None) -> None:
@@ -36,10 +30,6 @@ def write(app: Any = None) -> None:
         "policies": table("", *settles(policies)),
     }
     write_pieces(TARGET, pieces)
-
-
-def read(name: str) -> Document:
-    return dict(json.loads((DATA / f"{name}.json").read_text(encoding="utf-8")))
 
 
 def names(document: Document) -> list[str]:
@@ -110,11 +100,9 @@ def tuned(document: Document) -> report.Table:
 
 def substitutions(prefix: str, document: Document) -> str:
     """Numbers that stand in sentences."""
-    plan, conditions, machine = document["plan"], document["conditions"], document["machine"]
+    plan, conditions = document["plan"], document["conditions"]
     linear = next(row for row in document["overview"] if row["estimator"] == LINEAR)
     values = {
-        "date": document["date"][:10],
-        "machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
         "minutes": f"{document['seconds'] / 60.0:.0f} minutes",
         "runs": document["runs"],
         "seeds": plan["seeds"],
@@ -125,7 +113,9 @@ def substitutions(prefix: str, document: Document) -> str:
         "drift": f"{conditions['drift']:g} s",
         "linear": f"{report.percent(linear['settled'][0])} %",
     }
-    return "".join(f".. |{prefix} {name}| replace:: {value}\n" for name, value in values.items())
+    return replacements(
+        made(prefix, document) | {f"{prefix} {name}": value for name, value in values.items()}
+    )
 
 
 if __name__ == "__main__":

@@ -1,23 +1,19 @@
-"""What memory, noise, excitation and delay do to the default estimator: numbers of the page `tuning`.
+"""Effect of memory, noise, excitation and delay on the default estimator: numbers of the page `tuning`.
 
-Writes docs/data/tuning.json and docs/figures/tuning.png, in about a minute.
-
-    python docs/tuning.py [--json FILE] [--figure FILE]
+Writes docs/data/tuning.json and docs/figures/tuning.png, in about a minute: python docs/tuning.py
 """
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from page_parts import DOCS, Document
 
 import piezoest as pz
 from piezoest._files import save_figure
 from piezoest.bench.origin import origin, put
-from piezoest.bench.run import Task, play
+from piezoest.stage import PaperStage
 
 RATE, FREQUENCY, AMPLITUDE = 10_000.0, 5.0, 5.0  # Hz, Hz, µm
 SEEDS = 3
@@ -27,97 +23,12 @@ NOISE_MEMORIES = (0.025, 0.1, 0.4)  # s
 LAGS = (0, 2, 5, 10, 20)  # samples
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
 LEARN, JUDGE = 3.0, 2.0  # s
-
-
-def settled(reference: pz.Signal, gauge_noise: float, **options: Any) -> float:
-    """Largest error of the last two periods on the simulated stage [µm]."""
-    record = pz.track(
-        reference,
-        stage=pz.PaperStage(RATE, seed=0, noise=gauge_noise),
-        compensator=pz.InverseCompensator(START),
-        estimator=pz.HysteresisRLS(RATE, initial_model=START, **options),
-    )
-    return float(record.max_error(last_periods=2))
-
-
-def memories() -> list[dict[str, Any]]:
-    """After a step of the gain by 20 %: worst and settled error, and how long it takes."""
-    names = ["HysteresisRLS", *(f"HysteresisRLS(memory={memory:g})" for memory in MEMORIES)]
-    given = {"sample_rate": RATE, "after": 20}
-    rows = {name: [play(Task("gain-step", name, seed, given)) for seed in range(SEEDS)] for name in names}
-    return [
-        {
-            "estimator": name,
-            "memory_s": memory,
-            **{
-                key: sorted(float("inf") if row[column] is None else row[column] for row in rows[name])[
-                    SEEDS // 2
-                ]
-                for key, column in (
-                    ("worst_um", "worst"),
-                    ("settled_um", "settled"),
-                    ("settling_periods", "settles"),
-                )
-            },
-        }
-        for name, memory in zip(names, (None, *MEMORIES), strict=True)
-    ]
-
-
-def noises() -> list[dict[str, Any]]:
-    """With more noise in the gauge than the estimator is told, and as much."""
-    r = pz.signals.triangle(AMPLITUDE, FREQUENCY, LEARN * FREQUENCY, RATE)
-    return [
-        {
-            "noise_um": noise,
-            "untold_um": settled(r, noise),
-            "told_um": settled(r, noise, noise=max(noise, 1e-4)),
-            **{f"memory_{memory:g}_um": settled(r, noise, memory=memory) for memory in NOISE_MEMORIES},
-        }
-        for noise in NOISES
-    ]
-
-
-def references(seconds: float) -> dict[str, pz.Signal]:
-    """Trajectories to learn on and to be judged on."""
-    signals = pz.signals
-    return {
-        "triangle, 5 µm": signals.triangle(AMPLITUDE, FREQUENCY, seconds * FREQUENCY, RATE),
-        "triangle, 2.5 µm": signals.triangle(AMPLITUDE / 2.0, FREQUENCY, seconds * FREQUENCY, RATE),
-        "growing and shrinking": signals.amplitude_modulated(
-            AMPLITUDE, FREQUENCY, 1.0, seconds, RATE, depth=0.5
-        ),
-        "two tones": signals.two_tone([3.5, 1.5], [2.0, 7.0], seconds, RATE),
-    }
-
-
-def excitation() -> list[dict[str, Any]]:
-    """Learnt on one trajectory, frozen, and judged on all [µm]."""
-    kinds: dict[str, Callable[[], Any]] = {
-        "HysteresisRLS": lambda: pz.HysteresisRLS(RATE, initial_model=START),
-        "PrandtlIshlinskiiRLS": lambda: pz.PrandtlIshlinskiiRLS(RATE),
-    }
-    rows = []
-    for name, new in kinds.items():
-        for learnt, reference in references(LEARN).items():
-            estimator = new()
-            pz.track(
-                reference,
-                stage=pz.PaperStage(RATE, seed=0),
-                compensator=pz.InverseCompensator(START),
-                estimator=estimator,
-            )
-            row: dict[str, Any] = {"estimator": name, "learnt": learnt}
-            for judged, other in references(JUDGE).items():
-                record = pz.track(
-                    other,
-                    stage=pz.PaperStage(RATE, seed=1),
-                    compensator=pz.InverseCompensator(estimator.model),
-                )
-                # Half of it, for the stage starts without a history.
-                row[judged] = float(np.max(np.abs(record.error[record.error.size // 2 :])))
-            rows.append(row)
-    return rows
+BEFORE, AFTER = 4, 20  # periods before and after a change
+INTERVAL = 40  # samples between two models
+LEVEL = 0.012  # of the amplitude: below it an error has settled
+# Headings of the tables, which the figure reads.
+WORST, SETTLED, NOISE, LAG = "worst [µm]", "settled [µm]", "noise [nm rms]", "lag [samples]"
+DEFAULT, GIVEN, UNTOLD, TOLD = "default", "default, noise= given", "delay=0", "delay= the true lag"
 
 
 class LateStage:
@@ -125,8 +36,8 @@ class LateStage:
 
     sample_rate = RATE
 
-    def __init__(self, lag: int) -> None:
-        self._stage = pz.PaperStage(RATE, seed=0)
+    def __init__(self, lag: int = 0, **options: Any) -> None:
+        self._stage = PaperStage(RATE, **{"seed": 0, **options})
         self._waiting = [0.0] * lag
 
     def step(self, u: float) -> float:
@@ -138,74 +49,132 @@ class LateStage:
         return float(self._stage.displacement)
 
 
-def delays() -> list[dict[str, Any]]:
-    """A sensor that lags, and an estimator that is told of it or not."""
-    r = pz.signals.triangle(AMPLITUDE, FREQUENCY, LEARN * FREQUENCY, RATE)
+def settled(stage: LateStage, **options: Any) -> float:
+    """Largest error of the last two periods of a triangle [nm]."""
+    record = pz.track(
+        pz.signals.triangle(AMPLITUDE, FREQUENCY, LEARN * FREQUENCY, RATE),
+        stage=stage,
+        compensator=pz.InverseCompensator(START),
+        estimator=pz.HysteresisRLS(RATE, initial_model=START, **options),
+    )
+    return 1e3 * float(record.max_error(last_periods=2))
+
+
+def follow(r: pz.Signal, stage: PaperStage, estimator: pz.HysteresisRLS) -> Any:
+    """True errors of a plain loop [µm]: every model that is learnt is used."""
+    compensator, errors = pz.InverseCompensator(START), []
+    for k, r_k in enumerate(r.values.tolist()):
+        u = compensator.step(r_k)
+        estimator.step(u, stage.step(u))
+        errors.append(r_k - stage.displacement)
+        if k % INTERVAL == 0:
+            compensator.model = estimator.model
+    return np.array(errors)
+
+
+def memories() -> list[Document]:
+    """After the gain has fallen by 20 %: worst error, settled error, and periods until it has settled."""
+    r = pz.signals.triangle(AMPLITUDE, FREQUENCY, BEFORE + AFTER, RATE)
+    change = (BEFORE + 0.05) / FREQUENCY  # s, on a slope of the triangle
+    schedule = [[0.0, 1.0], [change, 1.0], [change + 1.0 / RATE, 0.8]]
     rows = []
-    for lag in LAGS:
-        row: dict[str, Any] = {"lag_samples": lag}
-        for name, delay in (("untold", 0.0), ("told", float(lag))):
-            record = pz.track(
-                r,
-                stage=LateStage(lag),
-                compensator=pz.InverseCompensator(START),
-                estimator=pz.HysteresisRLS(RATE, initial_model=START, delay=delay),
-            )
-            row[f"{name}_um"] = float(record.max_error(last_periods=2))
-        rows.append(row)
+    for memory in ("period", *MEMORIES):
+        errors = []
+        for seed in range(SEEDS):
+            estimator = pz.HysteresisRLS(RATE, initial_model=START, memory=memory)
+            error = follow(r, PaperStage(RATE, seed=seed, gain_schedule=schedule), estimator)
+            errors.append(np.abs(error).reshape(BEFORE + AFTER, -1).max(axis=1)[BEFORE:])
+        error = np.median(errors, axis=0)
+        late = np.flatnonzero(error > LEVEL * AMPLITUDE)
+        settled = 0 if late.size == 0 else int(late[-1]) + 1
+        rows.append(
+            {
+                "memory": "default" if memory == "period" else f"{memory:g} s",
+                WORST: float(error.max()),
+                SETTLED: float(error[AFTER // 2 :].max()),
+                "settles after [periods]": settled if settled < AFTER else None,
+            }
+        )
     return rows
 
 
-def draw(document: dict[str, Any], path: Path) -> None:
+def noises() -> list[Document]:
+    """A sensor with noise; the estimator has the default `noise`, or the true one."""
+    return [
+        {
+            NOISE: 1e3 * noise,
+            DEFAULT: settled(LateStage(noise=noise)),
+            GIVEN: settled(LateStage(noise=noise), noise=max(noise, 1e-4)),
+            **{
+                f"memory={memory:g}": settled(LateStage(noise=noise), memory=memory)
+                for memory in NOISE_MEMORIES
+            },
+        }
+        for noise in NOISES
+    ]
+
+
+def delays() -> list[Document]:
+    """A sensor that lags; the estimator has no delay, or the true one."""
+    return [
+        {LAG: lag, UNTOLD: settled(LateStage(lag)), TOLD: settled(LateStage(lag), delay=float(lag))}
+        for lag in LAGS
+    ]
+
+
+def references(seconds: float) -> dict[str, pz.Signal]:
+    """Trajectories to learn on and to be judged on."""
+    signals = pz.signals
+    return {
+        "triangle, 5 µm": signals.triangle(AMPLITUDE, FREQUENCY, seconds * FREQUENCY, RATE),
+        "triangle, 2.5 µm": signals.triangle(AMPLITUDE / 2.0, FREQUENCY, seconds * FREQUENCY, RATE),
+        "growing and shrinking": signals.amplitude_modulated(AMPLITUDE, FREQUENCY, 1.0, seconds, RATE),
+        "two tones": signals.two_tone([3.5, 1.5], [2.0, 7.0], seconds, RATE),
+    }
+
+
+def excitation() -> list[Document]:
+    """Learnt on one trajectory, then frozen and used on all; largest error of the second half [nm]."""
+    rows = []
+    for new in (pz.HysteresisRLS, pz.PrandtlIshlinskiiRLS):
+        for learnt, reference in references(LEARN).items():
+            estimator, compensator = new(RATE, initial_model=START), pz.InverseCompensator(START)
+            pz.track(reference, stage=PaperStage(RATE, seed=0), compensator=compensator, estimator=estimator)
+            row: Document = {"estimator": new.__name__, "learnt on": learnt}
+            for judged, other in references(JUDGE).items():
+                inverse = pz.InverseCompensator(estimator.model)
+                error = pz.track(other, stage=PaperStage(RATE, seed=1), compensator=inverse).error
+                row[judged] = 1e3 * float(np.max(np.abs(error[error.size // 2 :])))
+            rows.append(row)
+    return rows
+
+
+def draw(document: Document) -> None:
     """Memory, noise and delay, side by side."""
     import matplotlib.pyplot as plt
 
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 3.9), layout="constrained")
     default, *fixed = document["memories"]
-    memory = [row["memory_s"] for row in fixed]
-    for key, color, label in (("worst_um", "C3", "worst, after the step"), ("settled_um", "C0", "settled")):
-        left.loglog(memory, [row[key] for row in fixed], "o-", color=color, label=f"memory=…: {label}")
-        left.axhline(default[key], color=color, ls="--", lw=1.2, label=f"default: {label}")
-    left.axvline(1.0 / FREQUENCY, color="0.6", lw=0.8)
-    left.annotate("one period", (1.0 / FREQUENCY, left.get_ylim()[1]), (3, -12), textcoords="offset points",
-                  color="0.4", fontsize="small")  # fmt: skip
+    for name, color in ((WORST, "C3"), (SETTLED, "C0")):
+        left.loglog(MEMORIES, [row[name] for row in fixed], "o-", color=color, label=f"memory=…: {name}")
+        left.axhline(default[name], color=color, ls="--", lw=1.2, label=f"default: {name}")
+    left.axvline(1.0 / FREQUENCY, color="0.6", lw=0.8, label="one period")
     left.set(xlabel="memory [s]", ylabel="largest error [µm]", title="The gain falls by 20 %")
-    rows = document["noises"]
-    noise = [1e3 * row["noise_um"] for row in rows]
-    for key, style, label in (
-        ("untold_um", "o-", "default"),
-        ("told_um", "s--", "default, noise= as it is"),
-        *((f"memory_{memory:g}_um", "^-", f"memory={memory:g}") for memory in NOISE_MEMORIES),
+    for axes, rows, x, title in (
+        (middle, document["noises"], NOISE, "Noise of the sensor"),
+        (right, document["delays"], LAG, "Lag of the sensor"),
     ):
-        middle.plot(noise, [1e3 * row[key] for row in rows], style, label=label)
-    middle.set(
-        xlabel="noise of the sensor [nm rms]", ylabel="largest settled error [nm]", title="Noise",
-        ylim=(0.0, None),
-    )  # fmt: skip
-    rows = document["delays"]
-    lag = [1e3 * row["lag_samples"] / RATE for row in rows]
-    for key, style, label in (("untold_um", "o-", "delay=0"), ("told_um", "s--", "delay= as it is")):
-        right.plot(lag, [1e3 * row[key] for row in rows], style, label=label)
-    right.set(
-        xlabel="lag of the sensor [ms]", ylabel="largest settled error [nm]", title="A sensor that lags",
-        ylim=(0.0, None),
-    )  # fmt: skip
+        for name in list(rows[0])[1:]:
+            axes.plot([row[x] for row in rows], [row[name] for row in rows], "o-", label=name)
+        axes.set(xlabel=x, ylabel="largest settled error [nm]", title=title, ylim=(0.0, None))
     for axes in (left, middle, right):
         axes.grid(alpha=0.3, which="both")
         axes.legend(fontsize="small")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    save_figure(figure, path, dpi=110)
+    save_figure(figure, DOCS / "figures" / "tuning.png", dpi=110)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    docs = Path(__file__).resolve().parent
-    parser.add_argument("--json", type=Path, default=docs / "data" / "tuning.json")
-    parser.add_argument("--figure", type=Path, default=docs / "figures" / "tuning.png")
-    given = parser.parse_args()
-    document = {
+if __name__ == "__main__":
+    found = {
         **origin(),
         "conditions": {"sample_rate_Hz": RATE, "amplitude_um": AMPLITUDE, "frequency_Hz": FREQUENCY},
         "memories": memories(),
@@ -213,9 +182,5 @@ def main() -> None:
         "excitation": excitation(),
         "delays": delays(),
     }
-    put(document, given.json)
-    draw(document, given.figure)
-
-
-if __name__ == "__main__":
-    main()
+    put(found, DOCS / "data" / "tuning.json")
+    draw(found)

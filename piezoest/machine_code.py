@@ -1,4 +1,4 @@
-"""Where the machine code of compiled functions is kept, and when it is made anew.
+"""Where the machine code of compiled functions is kept, and when it is made again.
 
 Numba's own cache knows a function by the file that it stands in, its name, and a number that counts the
 functions of a process. That is not enough here: an equation is inlined into loops of other files, which would
@@ -169,7 +169,7 @@ class MachineCode(_Cache):  # type: ignore[misc]
     """Machine code of one function in one file for each signature, which says what it was made of.
 
     A file begins with the fingerprint of what it was made of and what it holds, so that one made of other
-    sources, by another Numba or for another processor, and one that is damaged, are all compiled anew.
+    sources, by another Numba or for another processor, and one that is damaged, are all compiled again.
     """
 
     def __init__(self, function: Any, options: dict[str, Any]) -> None:
@@ -211,7 +211,7 @@ class MachineCode(_Cache):  # type: ignore[misc]
         return rebuild(self, target_context, pickle.loads(kept[size:]))
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a function; where the disk is full, the next start compiles anew."""
+        """Keep a function; where the disk is full, the next start compiles again."""
         place = self._place(sig)
         if place is None or data.library.has_dynamic_globals:
             return

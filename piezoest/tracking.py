@@ -1,4 +1,4 @@
-"""The ring: reference, compensator, stage, estimator, and back to the compensator."""
+"""The control loop: reference, compensator, stage, estimator, and back to the compensator."""
 
 from __future__ import annotations
 
@@ -15,20 +15,23 @@ from piezoest.signals import check_continuity
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# More parameters than this are not shown in a table: it would be wider than a terminal.
+MOST_COLUMNS = 3
+
 
 @dataclass(frozen=True, slots=True)
 class TrackingRecord:
-    """What went round the ring, sample by sample.
+    """Record of a control loop, one number per sample.
 
     Parameters
     ----------
     reference, voltage, measured, displacement : ndarray, shape (N,)
-        r [µm], u [V], measured x [µm], true x [µm] (the measured one where the stage does
-        not know better).
+        r [µm], u [V], measured x [µm], true x [µm] (the measured one if the true one is unknown).
     parameters : ndarray, shape (M, n)
-        Parameters of the compensator's model, a row for each `update_interval` samples; n = 0
-        without an estimator, or with a controller. Where a model had another number of them than the
-        last, as a start of another kind, those of the next one stand. `theta` has a row for each sample.
+        Parameters of the compensator's model, one row for each `update_interval` samples; n = 0
+        without an estimator, or with a controller. If the number of parameters changes, as after a start
+        with another kind of model, the parameters of the next model are shown. `theta` has one row per
+        sample.
     parameter_names : tuple of str
         Names of the columns of `theta`.
     sample_rate : float
@@ -44,14 +47,14 @@ class TrackingRecord:
     measured: FloatArray = field(repr=False)
     displacement: FloatArray = field(repr=False)
     parameters: FloatArray = field(repr=False)
-    parameter_names: tuple[str, ...]
+    parameter_names: tuple[str, ...] = field(repr=False)
     sample_rate: float
     period: int | None
     update_interval: int = 1
 
     @property
     def theta(self) -> FloatArray:
-        """Parameters of the compensator's model at each sample, shape (N, n); made when asked for."""
+        """Parameters of the compensator's model at each sample, shape (N, n)."""
         return np.repeat(self.parameters, self.update_interval, axis=0)[: self.reference.size]
 
     @property
@@ -121,13 +124,14 @@ class TrackingRecord:
         return whole.reshape(self.periods, period).max(axis=1)
 
     def table(self) -> str:
-        """Text table of the largest and rms error, and the parameters, at the end of each period."""
+        """Text table: largest and rms error of each period, and up to three parameters at its end."""
         period = self._period()
-        names = "".join(f"{name:>14}" for name in self.parameter_names)
+        shown = len(self.parameter_names) if len(self.parameter_names) <= MOST_COLUMNS else 0
+        names = "".join(f"{name:>14}" for name in self.parameter_names[:shown])
         lines = [f"{'period':>6}{'max error [µm]':>16}{'rms error [µm]':>16}{names}"]
         for k in range(self.periods):
             error = self.error[k * period : (k + 1) * period]
-            values = "".join(f"{value:14.5g}" for value in self._row((k + 1) * period - 1))
+            values = "".join(f"{value:14.5g}" for value in self._row((k + 1) * period - 1)[:shown])
             lines.append(f"{k + 1:6d}{np.max(np.abs(error)):16.4f}{np.sqrt(np.mean(error**2)):16.4f}{values}")
         return "\n".join(lines)
 
@@ -184,7 +188,7 @@ def track(
     sample_rate: float | None = None,
     allow_jumps: bool = False,
 ) -> TrackingRecord:
-    """Let a stage follow a reference, and the compensator learn from the estimator, or a controller from all.
+    """Run a control loop over a reference: compensator, stage and estimator, or a controller and a stage.
 
     Parameters
     ----------
@@ -203,7 +207,7 @@ def track(
     update_interval : int
         Samples between two updates of the compensator's model (default 50: 1 ms at 50 kHz).
     sample_rate : float, optional
-        [Hz]; needed if r is a plain array and the stage does not name its own.
+        [Hz]; needed if r is a plain array and the stage has no sample rate.
     allow_jumps : bool
         Take a reference with unfiltered steps instead of refusing it; without a slew-rate limit
         they reach the voltage.
@@ -220,8 +224,20 @@ def track(
 
     Notes
     -----
-    Feed-forward needs no measurement within an interval, so objects that also have ``run``
-    are run an interval at a time; the result is that of a loop of ``step``.
+    Objects that have ``run`` are run one update interval at a time. The result is the same as with a loop of
+    ``step``.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> fs = 10_000.0
+    >>> r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=5, sample_rate=fs)
+    >>> stage = pz.PaperStage(fs, seed=0)
+    >>> estimator = pz.HysteresisRLS(fs)
+    >>> compensator = pz.InverseCompensator(estimator.model)
+    >>> record = pz.track(r, stage=stage, compensator=compensator, estimator=estimator)
+    >>> round(record.max_error(last_periods=1), 2)
+    0.03
     """
     _check_driver(compensator, estimator, controller)
     reference = array_1d("r", r, minimum_length=1)

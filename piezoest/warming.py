@@ -1,4 +1,4 @@
-"""Compile and load all that a live loop will call, before it runs."""
+"""Compile and load everything that a live loop will call, before it runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray, instance
-from piezoest.compensators import InverseCompensator, LinearCompensator, VoltageLimits
+from piezoest.compensators import Compensator, InverseCompensator, LinearCompensator, VoltageLimits
 from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
 from piezoest.estimators.bank import EstimatorBank
 from piezoest.estimators.base import EstimatorBase
@@ -22,18 +22,18 @@ from piezoest.stage import PaperStage
 
 
 def warmup(*used: Any) -> float:
-    """Compile and load the kernels of estimators, compensators, stages and controllers.
+    """Compile and load the machine code that a live loop will call.
 
-    The first process after an installation compiles, which takes about a minute, and up to another one for a
-    controller; every later one loads from the disk in a second. Call it before a live loop starts, or once
-    after the installation.
+    Call it before the loop starts, or once after the installation. The first call after an installation
+    compiles. This takes about a minute, and up to another minute for a controller. Later calls load the
+    compiled code from the disk, in about a second.
 
     Parameters
     ----------
-    *used : estimator, EstimatorBank, AdaptiveFeedforward or the class AdaptiveFeedforward
-        Those that the loop will use: what is compiled goes by their settings. They are left as they
-        are. Estimators as they are by default are warmed up in any case, a controller if it is asked for:
-        the class stands for one as it is by default, for any sample rate and limits.
+    *used : estimator, compensator, EstimatorBank, AdaptiveFeedforward or the class AdaptiveFeedforward
+        The objects that the loop will use. Their state is not changed. The class `AdaptiveFeedforward`
+        stands for a controller with default settings, at any sample rate and with any limits. Estimators
+        and compensators with default settings are always compiled; a controller only if it is given.
 
     Returns
     -------
@@ -52,11 +52,14 @@ def warmup(*used: Any) -> float:
     >>> seconds = pz.warmup(pz.AdaptiveFeedforward)  # the next one is there at once
     """
     expected = (
-        "estimators of piezoest, an EstimatorBank or a controller: warm up one of your own by a step of it"
+        "estimators of piezoest, compensators, an EstimatorBank or a controller: call step once to compile "
+        "one of your own"
     )
     for each in used:
         if each is not AdaptiveFeedforward:
-            instance("used", each, EstimatorBase | EstimatorBank | AdaptiveFeedforward, expected)
+            instance(
+                "used", each, EstimatorBase | EstimatorBank | Compensator | AdaptiveFeedforward, expected
+            )
     began = time.perf_counter()
     sample_rate = 50_000.0
     u = np.linspace(0.0, 1.0, 8)
@@ -74,14 +77,9 @@ def warmup(*used: Any) -> float:
     ):
         _use(learner, u, x)
     RecursiveLeastSquares(2).update(1.0, np.ones(2))
-    for compensator in (
-        LinearCompensator(LinearGain(0.15)),
-        InverseCompensator(loop),
-        InverseCompensator(plays),
-    ):
-        compensator.step(0.0)
-        compensator.run(x)
-        compensator.model = compensator.model
+    for model in (loop, plays):
+        _use(InverseCompensator(model), u, x)
+    _use(LinearCompensator(LinearGain(0.15)), u, x)
     stage = PaperStage(sample_rate)
     stage.step(0.0)
     stage.run(u)
@@ -97,6 +95,14 @@ def _use(learner: Any, u: FloatArray, x: FloatArray) -> None:
     copy.step(0.0, 0.0)
     copy.run(u, x)
     _ = copy.model
+
+
+@_use.register
+def _(learner: Compensator, u: FloatArray, x: FloatArray) -> None:
+    compensator = learner.copy()
+    compensator.step(0.0)
+    compensator.run(x)
+    compensator.model = compensator.model
 
 
 @_use.register

@@ -102,6 +102,13 @@ def test_triangle_peak_against_the_ratios_in_the_papers_tables() -> None:
     assert signals.triangle(1.0, 5.0, 1, FS, continuity=2).amplitude == pytest.approx(low, abs=0.004)
 
 
+def test_triangle_has_the_peak_that_is_asked_for() -> None:
+    usual, scaled = (signals.triangle(5.0, 5.0, 2, FS, exact_peak=exact) for exact in (False, True))
+    assert usual.amplitude == pytest.approx(4.84375)
+    assert scaled.amplitude == pytest.approx(5.0)
+    np.testing.assert_allclose(scaled.values * usual.amplitude, 5.0 * usual.values, atol=1e-12)
+
+
 @pytest.mark.parametrize("continuity", [1, 2, 3, 4])
 def test_triangle_continuity_order(continuity: int) -> None:
     def largest_change(order: int, n: int) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,11 @@ def test_table_and_plot() -> None:
     lines = record.table().splitlines()
     assert len(lines) == 3
     assert "alpha" in lines[0]
+    wide = dataclasses.replace(
+        record, parameters=np.zeros((record.parameters.shape[0], 66)), parameter_names=("weight",) * 66
+    )
+    assert "weight" not in wide.table() + repr(wide)
+    assert max(map(len, (*lines, *wide.table().splitlines()))) <= 80
     figure = record.plot(last_periods=1)
     series, loop, error = figure.axes
     assert series.get_ylabel() == "displacement [µm]"

@@ -32,6 +32,19 @@ def test_a_controller_is_left_as_it_is() -> None:
     assert controller.to_dict() == before
 
 
+def test_a_compensator_is_compiled_and_left_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    from piezoest.compensators import inverse_kernel
+
+    for loop in (inverse_kernel.step, inverse_kernel.run):
+        monkeypatch.setattr(loop, "_entries", {})
+    model = pz.PrandtlIshlinskii(0.1, [1.0, 2.0, 3.0], [0.02, 0.01, 0.01])
+    compensator = pz.InverseCompensator(model, sample_rate=1000.0)
+    pz.warmup(compensator)
+    assert compensator.status.samples == 0
+    assert compensator.layouts in inverse_kernel.step._entries
+    assert compensator.layouts in inverse_kernel.run._entries
+
+
 def test_another_class_is_refused_before_anything_compiles() -> None:
     with pytest.raises(
         ValueError, match=r"used must be estimators of piezoest, .* or a controller, got type"

@@ -1,9 +1,9 @@
 """
-A controller that needs to know nothing
-=======================================
+A complete controller
+=====================
 
-`AdaptiveFeedforward` finds the gain of a stage, goes to the reference, learns the hysteresis, and says when
-the readings cannot be believed.
+`AdaptiveFeedforward` measures the gain of a stage, moves to the reference, learns the hysteresis, and reports
+implausible readings.
 """
 
 import matplotlib.pyplot as plt
@@ -13,11 +13,11 @@ import piezoest as pz
 
 fs = 10_000.0  # Hz
 r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=20, sample_rate=fs)  # µm
-limits = pz.VoltageLimits(minimum=-50.0, maximum=100.0)  # V: all that is known of the stage
-broken = (1.9, 2.5)  # s: the sensor hangs
+limits = pz.VoltageLimits(minimum=-50.0, maximum=100.0)  # V: the only thing it is told
+broken = (1.9, 2.5)  # s: the sensor repeats its last reading
 
 # %%
-# The loop, as it would stand before hardware. The straight line alone, ``estimators=()``, goes the same way.
+# The same loop for the controller and for the straight line alone, ``estimators=()``.
 
 
 def drive(controller: pz.AdaptiveFeedforward) -> np.ndarray:
@@ -29,7 +29,7 @@ def drive(controller: pz.AdaptiveFeedforward) -> np.ndarray:
         if not broken[0] <= k / fs < broken[1]:
             reading = x
         controller.learn(u, reading)
-        error[k] = r_k - stage.displacement  # the true one
+        error[k] = r_k - stage.displacement  # of the true displacement
     return error
 
 
@@ -40,7 +40,7 @@ errors = {
 }
 
 # %%
-# What was noticed, and who drives in the end:
+# The events, and the models at the end:
 
 for event in controller.events:
     print(f"{event.time:.2f} s, {event.action}: {event.reason}")
@@ -48,7 +48,7 @@ for candidate in controller.candidates:
     print(f"{candidate.name:>21} missed {candidate.missed:.4f} µm{', drives' * candidate.drives}")
 
 # %%
-# The true error. While the sensor hangs nobody learns, and the straight line drives.
+# The true error. While the sensor hangs, nothing is learnt and the straight line drives.
 
 figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
 for name, error in errors.items():

@@ -2,8 +2,7 @@
 When the stage changes
 ======================
 
-The gain of the stage falls by 20 % while it runs. How fast an estimator follows is a matter of what it
-remembers.
+The gain of the stage falls by 20 % while it runs. How fast an estimator follows depends on its memory.
 """
 
 import matplotlib.pyplot as plt
@@ -21,7 +20,7 @@ def gain(t: np.ndarray) -> np.ndarray:
 
 
 # %%
-# The default counts its memory in periods of the reference; a number is a time constant in seconds.
+# By default the memory is counted in periods of the reference. A number is a time constant in seconds.
 
 estimators = {
     "default": pz.HysteresisRLS(fs, initial_model=model),

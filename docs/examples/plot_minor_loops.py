@@ -2,8 +2,8 @@
 Minor loops
 ===========
 
-A sum of two tones makes small loops within larger ones. A Coleman-Hodgdon model has no memory of them;
-plays have.
+A sum of two tones makes small loops within larger ones. Plays remember such loops; a Coleman-Hodgdon model
+does not.
 """
 
 import matplotlib.pyplot as plt
@@ -15,7 +15,7 @@ fs = 10_000.0  # Hz
 r = pz.signals.two_tone([3.5, 1.5], [2.0, 7.0], 4.0, fs)  # µm
 
 # %%
-# The same ring with two estimators, on a Preisach plane, which is a model of neither kind:
+# The same loop with two estimators, on a Preisach stage, which is neither of the two models:
 
 records = {}
 for estimator in (pz.HysteresisRLS(fs), pz.PrandtlIshlinskiiRLS(fs)):

@@ -2,8 +2,8 @@
 A recorded log
 ==============
 
-From a file that another program wrote to a compensated stage: columns and units named, a model and how far
-to trust it, and its inverse tried on the stage that was recorded.
+From a file of another program to a compensated stage: name columns and units, identify a model, and use its
+inverse on the recorded stage.
 """
 
 import tempfile
@@ -15,8 +15,8 @@ import numpy as np
 import piezoest as pz
 
 # %%
-# A log, as a data logger might leave it: millivolts of the controller, volts of the gauge, a sample rate
-# that somebody wrote down, and a sensor that failed for a while.
+# A log as a data logger may write it: millivolts of the controller, volts of the sensor, a sample rate, and
+# missing readings.
 
 fs = 5000.0  # Hz
 u = pz.signals.amplitude_modulated(35.0, 5.0, 1.0, 4.0, fs, depth=0.6).values  # V
@@ -26,7 +26,7 @@ path = Path(tempfile.mkdtemp()) / "log.npz"
 np.savez(path, command=u / 20.0 * 1e3, gauge=x / 5.0, fs=fs)
 
 # %%
-# The controller's volts count twenty times at the stage, and one volt of the gauge is 5 µm.
+# One millivolt of the controller is 20 mV at the stage, and one volt of the sensor is 5 µm.
 
 record = pz.read_record(
     path,
@@ -36,7 +36,7 @@ record = pz.read_record(
 print(*record.notes, sep="\n")
 
 # %%
-# The first half is fitted, with models of all kinds; the second is predicted from the voltage alone.
+# Models of all kinds are fitted to the first half. The second half is predicted from the voltage alone.
 
 found = pz.identify(record)
 print(found)
@@ -55,7 +55,7 @@ series.set(xlabel="time [s]", ylabel="measured − model [µm]")
 series.legend()
 
 # %%
-# Its inverse, without any adaptation, beside the best straight line:
+# The inverse of the model without adaptation, and the best straight line:
 
 r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=4, sample_rate=fs)
 for name, compensator in {

@@ -2,8 +2,8 @@
 Linear against adaptive compensation
 ====================================
 
-The paper's experiment on its simulated stage: a triangle, first with a gain learnt on the way, then
-with the inverse of a hysteresis model learnt on the way.
+The paper's experiment on its simulated stage. The reference is a triangle. First a gain is learnt while the
+stage runs, then a hysteresis model, whose inverse computes the voltage.
 """
 
 import matplotlib.pyplot as plt
@@ -15,7 +15,7 @@ fs = 50_000.0  # Hz
 r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=10, sample_rate=fs)  # µm
 
 # %%
-# The same reference and the same stage twice. Both start from parameters that are wrong for this stage.
+# The same reference and the same stage, twice. Both runs start with parameters that are wrong for this stage.
 
 start = {
     "linear": pz.LinearGain(0.12),
@@ -31,14 +31,14 @@ for name, model in start.items():
     )
 
 # %%
-# The largest error of the last two periods, against the true displacement:
+# The largest true error of the last two periods:
 
 for name, record in records.items():
     print(f"{name:>16}: {record.max_error(last_periods=2):.3f} µm")
 
 # %%
-# How the error goes down as the parameters are learnt, and the map from reference to displacement in
-# the last period, as in the paper's Fig. 4.
+# The error while the parameters are learnt, and displacement over reference in the last period, as in the
+# paper's Fig. 4.
 
 figure, (series, loop) = plt.subplots(1, 2, figsize=(10, 4), width_ratios=[2, 1], layout="constrained")
 last = slice(-int(r.period), None)
@@ -50,7 +50,7 @@ series.legend()
 loop.set(xlabel="reference [µm]", ylabel="displacement [µm]")
 
 # %%
-# What was learnt on the way, in parts of the start:
+# The parameters, relative to their start values:
 
 record = records["adaptive inverse"]
 figure, axes = plt.subplots(figsize=(7, 3.5), layout="constrained")

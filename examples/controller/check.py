@@ -1,9 +1,9 @@
-"""Generate the controller, build the loop of main.c, feed it a log and compare with the library.
+"""Generate the controller, compile the loop of main.c, run it with a log and compare it with the library.
 
     python examples/controller/check.py [LOG.csv] [--precision float] [--folder DIR]
 
-The log has the columns reference_um and displacement_um, displacement measured after the voltage of the
-same line; a board that streams both gives one. Without a log one is made on the simulated stage.
+The log has the columns reference_um and displacement_um; the displacement is measured after the voltage of
+the same line. Without a log, one is made with the simulated stage.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from piezoest.export.compiled import compiler
 HERE = Path(__file__).resolve().parent
 SAMPLE_RATE = 50_000.0  # Hz
 LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
-LARGEST_DIFFERENCE = {"double": 1e-12, "float": 2e-3}  # in parts of the largest voltage
+LARGEST_DIFFERENCE = {"double": 1e-12, "float": 2e-3}  # relative to the largest voltage
 
 
 def objects() -> tuple[Any, Any]:
-    """What runs on the board, and what it is compared with."""
+    """Estimator and compensator that run on the board."""
     start = pz.ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)
     return pz.HysteresisRLS(SAMPLE_RATE, initial_model=start), pz.InverseCompensator(start, LIMITS)
 

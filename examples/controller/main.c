@@ -1,8 +1,8 @@
-/* A control loop for a generic board: a timer calls loop_step() once a sample, the rest is for the host.
+/* A control loop for a generic board: a timer calls loop_step() once per sample; the rest is for the host.
  *
- * What a board has to supply are the three functions below: a converter each way, and the reference. On a
- * board they touch registers; here, for the host, they read and write a log, so that the same loop can be
- * checked against the library (check.py). */
+ * A board must supply the three functions below: two converters and the reference. On a board they access
+ * registers. Here, on the host, they read and write a log, so that the same loop can be compared with the
+ * library (check.py). */
 #include "piezoest_controller.h"
 
 #include <math.h>
@@ -14,15 +14,15 @@
 
 /* ------------------------------------------------------------------ the board */
 
-static REAL read_sensor(void);       /* displacement [um]; NAN if the converter had none */
-static REAL next_reference(void);    /* where the stage shall be next [um] */
+static REAL read_sensor(void);       /* displacement [um]; NAN if there is none */
+static REAL next_reference(void);    /* next value of the reference [um] */
 static void write_voltage(REAL u);   /* to the amplifier [V] */
 
 /* ------------------------------------------------------------------ the loop */
 
 static piezoest_controller_state controller;
 
-/* Samples whose error was too large, one after the other. */
+/* Number of successive samples with too large an error. */
 static int strikes;
 
 enum { MOST_STRIKES = 100 };
@@ -34,7 +34,7 @@ static void loop_start(void)
     write_voltage(piezoest_controller_get_voltage(&controller));
 }
 
-/* Called by the timer, once a sample: first the measurement that belongs to the previous voltage. */
+/* Called by the timer once per sample. It first reads the measurement that belongs to the previous voltage. */
 static void loop_step(void)
 {
     static REAL wanted;

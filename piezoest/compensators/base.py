@@ -1,4 +1,4 @@
-"""What linear and inverse feed-forward share: the model's inverse, limits, bumpless change."""
+"""What linear and inverse feed-forward share: the model's inverse, limits, gradual change of the model."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class CompensatorStatus:
     samples : int
         Reference samples seen.
     saturated, slewed : int
-        Samples at which the voltage range or the slew rate was in the way.
+        Number of samples at which the voltage was limited by the range or by the slew rate.
     missing : int
         Samples without a usable reference: the voltage was held.
     projected : bool
@@ -92,7 +92,7 @@ class Compensator:
 
     @property
     def state(self) -> Any:
-        """What it remembers, by name: a NumPy structured array; ``state["voltage"]``."""
+        """Its state: a NumPy structured array with named fields, such as ``state["voltage"]``."""
         return self._state
 
     @property
@@ -141,20 +141,18 @@ class Compensator:
 
     @property
     def model(self) -> Model:
-        """Model whose inverse is used. Setting it is bumpless.
+        """Model whose inverse is used. It can be set; the voltage then changes without a jump.
 
-        It takes effect by travel: when the reference has moved by 1/64 of its last leg since the last one
-        did, at once if it has, or has not moved at all; less than 1e-4 of the range is no movement. Until
-        then the model in use drives on, and of several that are set the last one waits. Where models
-        follow one another soon, the voltage stays in a corridor around linear feed-forward, of which the gain
-        is at least half the first model's (`piezoest.compensators.corridor`).
+        A new model takes effect when the reference has moved by 1/64 of its last stroke since the last change
+        of the model. Movements of less than 1e-4 of the range do not count. Until then the old model is used,
+        and the last one that was set waits. When models are set often, the voltage stays in a corridor around
+        linear feed-forward, whose gain is at least half the first model's (`piezoest.compensators.corridor`).
 
-        The new model's w_h is found as `hand_over` says, and plays as the voltage's turning
-        points have left them. What the new model makes of the present voltage differs
-        from what the old one made of it; that difference is paid back exponentially over
-        `transfer_samples`. An inadmissible model is replaced by its nearest admissible one, a
-        `PrandtlIshlinskii` or `LinearGain`, or one with parameters beyond 1e9, not taken, and
-        `status` says so: a stream must not stop.
+        The state w_h of the new model follows from `hand_over`, and its plays from the turning points of the
+        voltage. The difference between the two models at the present voltage decays exponentially over
+        `transfer_samples`. An inadmissible model is replaced by the nearest admissible one. An inadmissible
+        `PrandtlIshlinskii` or `LinearGain`, or a model with parameters beyond 1e9, is ignored. `status`
+        reports both cases.
         """
         return self._model
 
@@ -166,7 +164,7 @@ class Compensator:
 
     @property
     def hand_over_due(self) -> bool:
-        """Whether a model that is set now takes effect at once."""
+        """Whether a model that is set now takes effect immediately."""
         return bool(self._state["corridor"]["due"])
 
     def _use_waiting(self) -> None:
@@ -213,12 +211,12 @@ class Compensator:
 
     @property
     def voltage(self) -> float:
-        """Voltage given out last [V]."""
+        """The last voltage [V]."""
         return float(self._state["voltage"])
 
     @property
     def limited(self) -> int:
-        """Sign of what the limits withheld at the last sample: +1, -1, or 0 if nothing."""
+        """+1 or -1 if the last voltage was limited from above or below, 0 if it was not limited."""
         return int(self._state["limited"])
 
     @property
@@ -239,7 +237,8 @@ class Compensator:
         Parameters
         ----------
         r : float
-            Reference displacement [µm]; NaN, infinity and what is no number hold the last voltage.
+            Reference displacement [µm]; NaN, infinity and anything that is not a number hold the last
+            voltage.
 
         Returns
         -------

@@ -21,8 +21,8 @@ class IntegralFeedback:
     compensator : LinearCompensator or InverseCompensator
         The feed-forward.
     gain : float
-        Integral gain [1/s]: the bandwidth of the correction in rad/s. Keep it far below the
-        lowest resonance times its damping ratio, 2 zeta omega_0.
+        Integral gain [1/s], which is the bandwidth of the correction in rad/s. Keep it far below
+        2 zeta omega_0 of the lowest resonance.
     sample_rate : float
         [Hz].
 
@@ -33,9 +33,16 @@ class IntegralFeedback:
 
     Notes
     -----
-    Anti-windup: the integral stands still while the voltage is limited in the direction in
-    which it would grow, and over samples without a measurement.
+    The integral does not grow while the voltage is limited in that direction, and stays constant in samples
+    without a measurement.
     Source: K. J. Åström, R. M. Murray, Feedback Systems, Princeton 2008, sec. 10.4.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> compensator = pz.LinearCompensator(pz.LinearGain(0.15))
+    >>> feedback = pz.IntegralFeedback(compensator, gain=5.0, sample_rate=1000.0)
+    >>> u = feedback.step(1.5, None)  # reference and last reading [µm]; None: no reading yet
     """
 
     __slots__ = ("_compensator", "_gain", "_integral", "_step_gain")
@@ -78,9 +85,11 @@ class IntegralFeedback:
         Parameters
         ----------
         r : float
-            Reference displacement [µm]; NaN, infinity and what is no number hold the last voltage.
+            Reference displacement [µm]; NaN, infinity and anything that is not a number hold the last
+            voltage.
         x : float or None
-            Displacement measured last [µm]; None, NaN, infinity or what is no number if there is none.
+            Displacement measured last [µm]; None, NaN, infinity or anything that is not a number if there
+            is none.
 
         Returns
         -------

@@ -17,15 +17,16 @@ class InverseCompensator(Compensator):
     limits : VoltageLimits, optional
         Limits of the voltage (default none).
     method : {"closed-form", "bogacki-shampine"}
-        How w_h is found: by the closed form (C7), (C10), exact for monotone reference
+        How w_h is computed: with the closed form (C7), (C10), which is exact if the reference is monotone
         between samples, or by integrating (17) with the paper's Runge-Kutta method.
     transfer_samples : int
-        Time constant of a bumpless change of model, in samples (default 500); 0 for none.
+        When the model changes, the voltage changes gradually, with this time constant in samples (default
+        500); 0 for a jump.
     sample_rate : float, optional
         [Hz]. Only a model with creep needs it; default that of the limits, or the model's own.
     hand_over : {"path", "place"}
-        Where w_h stands when another Coleman-Hodgdon model is taken up: where the recent path of the
-        voltage would have brought it, or at the same part of its limit b/a as before.
+        w_h after a change to another Coleman-Hodgdon model: the value that follows from the recent path of
+        the voltage, or the same fraction of its limit b/a as before.
 
     Raises
     ------
@@ -35,13 +36,21 @@ class InverseCompensator(Compensator):
 
     Notes
     -----
-    The state follows the voltage that was really given out, so that limits do not wind it
-    up. Start: 0 V and w_h = 0, the equilibrium of the paper.
-    The inverse of a `PrandtlIshlinskii` is exact for each sample: one walk over its thresholds,
-    creep being known from the past. `method` does not apply to it.
+    The state follows the limited voltage, so there is no wind-up at the limits. It starts at 0 V and w_h =
+    0, the equilibrium of the paper. The inverse of a `PrandtlIshlinskii` is exact in each sample; `method`
+    does not apply to it.
 
     Sources: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012); Krejci and
     Kuhnen, IEE Proc. Control Theory Appl. 148 (2001) 185-192.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> model = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+    >>> compensator = pz.InverseCompensator(model, pz.VoltageLimits(minimum=-50.0, maximum=100.0))
+    >>> u = compensator.step(1.0)  # µm to V
+    >>> round(u, 3)
+    6.631
     """
 
     __slots__ = ()

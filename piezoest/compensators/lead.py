@@ -41,10 +41,10 @@ def _run(state: Record, settings: Record, r: Vector) -> None:
 
 
 class LeadFilter:
-    """A second-order lead before a feed-forward, for references that reach towards the resonance.
+    """A second-order lead filter before a feed-forward, for references that are close to the resonance.
 
-    The compensator gets r + c1 r' + c2 r'', which is what the stage's mechanics and delay will turn
-    into r again. Worth it for references that reach a twentieth of the resonance or have corners there.
+    The compensator gets r + c1 r' + c2 r''. The stage's mechanics and delay turn this into r again. Use it
+    for references with frequencies above a twentieth of the resonance, or with sharp corners.
 
     Parameters
     ----------
@@ -55,11 +55,11 @@ class LeadFilter:
     sample_rate : float
         [Hz].
     delay : float
-        From the voltage to the force on the stage [s], such as an amplifier's filter; half a sample
-        of hold is known of and not part of it, nor is the delay of the sensor.
+        Delay from the voltage to the force on the stage [s], such as that of an amplifier's filter. Half a
+        sample of hold is added automatically; the delay of the sensor is not part of it.
     smoothing : float, optional
-        Time constant of the differences [s]; default 1/omega of the mechanics. What is faster is
-        amplified by 1 + c1/smoothing + c2/smoothing², about twice by default.
+        Time constant of the differences [s]; default 1/omega of the mechanics. Higher frequencies are
+        amplified by 1 + c1/smoothing + c2/smoothing², which is about two by default.
 
     Raises
     ------
@@ -68,10 +68,18 @@ class LeadFilter:
 
     Notes
     -----
-    Stable for all settings: its one pole lies within the unit circle. The voltage stays within the
-    compensator's limits. An estimator beside it has to know the same lag, or learns it as
-    hysteresis and compensates twice: see `mechanics` and `delay` of `PrandtlIshlinskiiRLS`.
+    The filter is stable for all settings: its pole lies within the unit circle. The voltage stays within the
+    compensator's limits. An estimator in the same loop must know the same lag. Otherwise it learns the lag as
+    hysteresis, and the lag is compensated twice: see `mechanics` and `delay` of `PrandtlIshlinskiiRLS`.
     Equations: `piezoest.equations.lead`.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> mechanics = pz.MassSpringDamper(natural_frequency=780.0, damping_ratio=0.02)
+    >>> compensator = pz.LinearCompensator(pz.LinearGain(0.15))
+    >>> lead = pz.LeadFilter(compensator, mechanics=mechanics, sample_rate=10_000.0)
+    >>> u = lead.step(0.0)
     """
 
     __slots__ = ("_compensator", "_settings", "_state")
@@ -132,7 +140,8 @@ class LeadFilter:
         Parameters
         ----------
         r : float
-            Reference displacement [µm]; NaN, infinity and what is no number hold the last voltage.
+            Reference displacement [µm]; NaN, infinity and anything that is not a number hold the last
+            voltage.
 
         Returns
         -------

@@ -27,6 +27,14 @@ class VoltageLimits:
     ------
     ValueError
         If a limit is no number, the range is empty, or the slew rate comes without a sample rate.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> limits = pz.VoltageLimits(minimum=0.0, maximum=100.0)
+    >>> compensator = pz.LinearCompensator(pz.LinearGain(0.15), limits)
+    >>> compensator.step(30.0)  # would need 200 V
+    100.0
     """
 
     minimum: float = -math.inf

@@ -17,12 +17,20 @@ class LinearCompensator(Compensator):
     limits : VoltageLimits, optional
         Limits of the voltage (default none).
     transfer_samples : int
-        Time constant of a bumpless change of model, in samples (default 500); 0 for none.
+        When the model changes, the voltage changes gradually, with this time constant in samples (default
+        500); 0 for a jump.
 
     Raises
     ------
     ValueError
         If the model is of another kind, its gain is zero, or the limits are no `VoltageLimits`.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> compensator = pz.LinearCompensator(pz.LinearGain(0.15))
+    >>> compensator.step(1.5)  # µm to V
+    10.0
     """
 
     __slots__ = ()

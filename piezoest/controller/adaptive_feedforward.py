@@ -1,4 +1,4 @@
-"""Adaptive feed-forward as one object: a reference in, a voltage out, and what was measured back in."""
+"""Adaptive feed-forward as one object: it takes a reference, returns a voltage, and learns from readings."""
 
 from __future__ import annotations
 
@@ -25,45 +25,44 @@ _log = logging.getLogger(__name__)
 
 
 class AdaptiveFeedforward(Face):
-    """Lets a stage follow a reference of which nothing is known but the voltage that it bears.
+    """A complete adaptive feed-forward controller that needs only sample rate and voltage limits.
 
-    It finds out the gain by two small steps of the voltage, goes to where the reference is, and then learns
-    the hysteresis while it runs: a straight line and up to four estimators learn side by side, and the model
-    that has missed least of late drives. The voltage stays in a corridor around the straight line, and always
-    within the limits. Readings that cannot be believed have a name in `status` and `events`: nothing is
-    learnt from them, and the straight line drives meanwhile.
+    It measures the gain with small steps of the voltage and moves to the reference. Then it learns the
+    hysteresis while it runs, with a straight line and up to four estimators in parallel. The model with the
+    smallest recent error computes the voltage (it *drives*). The voltage stays in a corridor around the
+    straight line, and always within the limits. Implausible readings are reported in `status` and `events`.
+    Nothing is learnt from them, and the straight line drives as long as they last.
 
     Parameters
     ----------
     sample_rate : float
         [Hz].
     limits : VoltageLimits
-        What stage and amplifier bear, a finite range [V]: all that keeps the stage whole.
+        Finite voltage range that stage and amplifier tolerate [V]. It protects the stage.
     estimators : tuple of callable, optional
-        Up to four, called as ``factory(sample_rate, initial_model=..., noise=...)``: classes of estimators
-        (`HysteresisRLS`, `OutputErrorRLS`, `HysteresisEKF`, `PrandtlIshlinskiiRLS`), or a
-        ``functools.partial`` of one. Default: the first, the second and the last of these; ``()`` is the
-        straight line alone. Estimators are made here, since they are given voltages and readings in units
-        of half a swing, in which the stage has a gain of about one, and an initial model and a noise for
-        that.
+        Up to four classes of estimators (`HysteresisRLS`, `OutputErrorRLS`, `HysteresisEKF`,
+        `PrandtlIshlinskiiRLS`), or a ``functools.partial`` of one. Default: the first, the second and the
+        last of these; ``()`` is the straight line alone. They are called as ``factory(sample_rate,
+        initial_model=..., noise=...)``, because they work in units of half a swing, in which the stage has
+        a gain of about one.
     corridor : float
-        How far the voltage goes from the straight line at most, as a fraction of half the recent swing,
-        0 to 1.
+        Largest distance of the voltage from the straight line, as a fraction of half the recent swing, 0 to
+        1.
     gain : float, optional
-        What the stage does [µm/V], about; below zero if it falls with the voltage. The start seeks nothing
-        then: the first few per cent of the range check it, and what is a factor of three off is sought.
+        Approximate gain of the stage [µm/V]; negative if the displacement falls with the voltage. It is
+        checked at the start. If it is wrong by more than a factor of three, the gain is measured.
     stroke : float, optional
-        The same as displacement over the whole range of the limits [µm].
+        Instead of `gain`: displacement over the whole range of the limits [µm].
     model : Model, path or Identification, optional
-        The same as a model, of which its slope counts; also as the JSON file that `piezoest identify` wrote,
-        or as what `identify` returned. Where these say on which voltages and displacements it was learnt, an
-        event warns, once, when the run leaves them by more than 5 %. At most one of the three.
+        Instead of `gain`: a model, whose slope is used. Also the JSON file that `piezoest identify` wrote,
+        or what `identify` returned. An event warns, once, when the run leaves the ranges that the model was
+        learnt on by more than 5 %. Give at most one of the three.
     feedback : float, optional
-        Integral gain of a feedback from the readings that are believed [1/s], as of `IntegralFeedback`; it
-        corrects no more than the corridor's width. Default: none.
+        Integral gain of a feedback from plausible readings [1/s], as in `IntegralFeedback`. Its correction
+        is at most the corridor's width. Default: no feedback.
     resonance : float, optional
-        Lowest resonance of the stage [Hz], of which a warning knows: an event, once, where the reference is
-        above 5 % of it. Default: nobody knows it.
+        Lowest resonance of the stage [Hz]. An event warns, once, when the reference is above 5 % of it.
+        Default: unknown, no warning.
 
     Raises
     ------
@@ -75,9 +74,9 @@ class AdaptiveFeedforward(Face):
 
     Notes
     -----
-    What is learnt counts by the travel of the voltage and not by time. A gain below zero is found, too: the
-    models then fall with the voltage. The first controller of a layout compiles, in up to a minute; every
-    later one loads. Source: a rule of this library.
+    Learning depends on how far the voltage travels and not on time. A negative gain is found as well. The
+    first controller with a choice of estimators is compiled, in up to a minute; later ones load the
+    compiled code. Source: a rule of this library.
 
     Examples
     --------
@@ -131,14 +130,14 @@ class AdaptiveFeedforward(Face):
         self.reset()
 
     def reset(self, voltage: float | None = None, displacement: float | None = None) -> None:
-        """Return to the state after construction: nothing is known but what was said then.
+        """Return to the state after construction: forget everything but the arguments given there.
 
         Parameters
         ----------
         voltage : float, optional
             Voltage at which the stage rests [V], within the limits. Default: the one nearest to 0 V.
         displacement : float, optional
-            What the sensor reads there [µm]. Default: the first readings say it.
+            Reading of the sensor there [µm]. Default: taken from the first readings.
 
         Raises
         ------
@@ -165,21 +164,23 @@ class AdaptiveFeedforward(Face):
         return self._loops
 
     def home(self, amplitude: float | None = None, frequency: float = 1.0, cycles: int = 10) -> None:
-        """Begin a sweep of the voltage that erases what hysteresis remembers.
+        """Start a decaying oscillation of the voltage that erases the memory of the hysteresis.
 
-        After a power cut, or writes of which nobody knows the outcome, the models and the stage remember
-        different things. The next steps ignore the reference: the voltage swings about the rest voltage, or
-        about the middle of the limits where that has no room for it, less and less far; `status` says
-        ``"homing"``. Then it approaches the reference, or seeks the gain if that is not known.
+        Use it after a power cut or lost writes, when the past of the voltage is unknown. The next steps
+        ignore the reference. The voltage oscillates around the rest voltage, or around the middle of the
+        limits if there is no room, with decreasing amplitude; `status` shows ``"homing"``. Then the
+        controller approaches the reference, or measures the gain if it is unknown.
 
         Parameters
         ----------
         amplitude : float, optional
-            Of the first swing [V]. Default: half the range of the limits, which erases everything.
+            Amplitude of the first oscillation [V]. Default: half the range of the limits, which erases
+            everything.
         frequency : float
-            [Hz]; lower where the slew rate asks for it.
+            [Hz]; reduced if the slew rate requires it.
         cycles : int
-            How many, 1 to 10 000: with ten each swing is a tenth less than the one before.
+            Number of oscillations, 1 to 10 000. With ten, each is smaller than the last by a tenth of the
+            first.
 
         Raises
         ------
@@ -197,13 +198,13 @@ class AdaptiveFeedforward(Face):
         Parameters
         ----------
         r : float
-            Reference displacement [µm], in the sensor's own coordinates; NaN, infinity and what is no number
-            hold the last one.
+            Reference displacement [µm], in the sensor's coordinates. NaN, infinity and anything that is not
+            a number repeat the last one.
 
         Returns
         -------
         float
-            Voltage [V], within the limits. `learn` is then given what was written and measured.
+            Voltage [V], within the limits. Pass it and the measurement to `learn`.
         """
         if type(r) is not float:
             r = number_or_nan(r)
@@ -212,10 +213,10 @@ class AdaptiveFeedforward(Face):
         return voltage
 
     def run(self, r: Any) -> FloatArray:
-        """Voltages for a block of the reference, planned at once and written later.
+        """Voltages for a block of the reference, which are written later.
 
-        Nothing is learnt within the block, so a loop of `step` and `learn` does better. `learn` is to be
-        given the whole block, as written and measured; a block without it was never written.
+        Nothing is learnt within the block, so a loop of `step` and `learn` is more accurate. Call `learn`
+        with the whole block; without this call the block counts as never written.
 
         Parameters
         ----------
@@ -244,17 +245,17 @@ class AdaptiveFeedforward(Face):
         return u
 
     def learn(self, u: Any, x: Any) -> None:
-        """Learn from the voltage that was written and what was measured then.
+        """Learn from the voltage that was written and the displacement measured with it.
 
         Parameters
         ----------
         u : float or None, or array_like, shape (N,)
-            Voltage [V] of the last `step`; of the last `run`, as an array. None or NaN says that nobody
-            knows whether it was written: if that matters, the straight line drives until the models have
-            shown again what they do.
+            Voltage [V] of the last `step`, or the array of the last `run`. None or NaN means that it is
+            unknown whether it was written. If this matters, the straight line drives until the models have
+            proved their accuracy again.
         x : float or None, or array_like, shape (N,)
-            Measured displacement [µm]; None, NaN or infinity where there is none. What is no number counts
-            as missing, as in `HysteresisRLS.step`: a stream must not stop.
+            Measured displacement [µm]; None, NaN or infinity if there is none. Anything that is not a number
+            counts as missing.
 
         Raises
         ------
@@ -311,7 +312,7 @@ class AdaptiveFeedforward(Face):
         return kept, {**own, "_loops": None}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all as a JSON-safe dictionary; `from_dict` resumes bit for bit."""
+        """Return everything as a JSON-safe dictionary; `from_dict` continues with identical numbers."""
         return {
             "controller": type(self).__name__,
             "format": saved.FORMAT,

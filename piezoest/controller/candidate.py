@@ -1,9 +1,9 @@
-"""A candidate: a compiled estimator, the model it last handed over, and what that model has missed.
+"""A candidate: a compiled estimator, its current model, and the recent error of this model.
 
-The model in use runs free along the voltage that was written: what it misses of the readings is what the
-stage would have missed of the reference, had this model driven. Estimator and model work in units in which
-the line has gain one and the voltage swings from about -1 to 1, so that nothing need be known of the stage
-beforehand; what they give to others is z = (x - zero)/unit, a voltage.
+The model is simulated along the voltage that was written. Its error is the error that the stage would have
+had if this model had computed the voltage. Estimator and model work in units in which the line has gain one
+and the voltage swings from about -1 to 1, so nothing need be known of the stage beforehand. Their output is
+z = (x - zero)/unit, a voltage.
 """
 
 from __future__ import annotations

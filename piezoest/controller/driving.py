@@ -1,4 +1,4 @@
-"""Which model drives, the line or a candidate, by what each has missed of late; changes without a bump."""
+"""Which model drives, the line or a candidate, by their recent errors; the voltage changes gradually."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _faked(state: Any) -> float:
 
 @register_jitable
 def _choose(state: Any) -> float:
-    """The model that has missed least of late, if it is clearly better than the present one.
+    """The model with the smallest recent error, if it is clearly better than the present one.
 
     Who learns from late readings is right about them: the line gets what the models lose by that.
     """

@@ -182,7 +182,7 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
 
 @register_jitable
 def _leave_limit(state: Any, settings: Any, moved: Any) -> None:
-    """Where the voltage rests at a limit for long, all that is known may be wrong: begin anew."""
+    """Where the voltage rests at a limit for long, all that is known may be wrong: start again."""
     rests = state.u <= settings.minimum or state.u >= settings.maximum
     # Beside a line that was learnt from wrong readings, right ones look scaled or moved.
     fault = state.readings.fault

@@ -1,7 +1,7 @@
 """The straight line x = gain u + centre that readings show: linear feed-forward, always a candidate.
 
 Least squares over the last two legs of the reference, up and down, so that a loop's width cancels. It is
-drawn anew at each turn; between turns nothing that a resonance or a lag does can lead it astray.
+fitted again at each turn; between turns nothing that a resonance or a lag does can lead it astray.
 """
 
 from __future__ import annotations

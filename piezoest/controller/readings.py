@@ -72,7 +72,7 @@ BACKLASH = 0.35
 # enough: readings that lie do not agree with the line either.
 KEPT, ENOUGH = 0.9, 6.0
 # No sample speaks for more than this, in swings, nor for a reading that stands still: it may be late by some
-# samples, or ring.
+# samples, or oscillate.
 MOST, MOST_STILL = 0.03, 0.01
 # For so many swings.
 WEAK_FOR, WRONG_FOR, LARGE_FOR, STOPPED_FOR, OFF_FOR = 0.35, 0.15, 0.15, 0.04, 0.3

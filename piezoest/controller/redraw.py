@@ -1,4 +1,4 @@
-"""When the line is drawn anew, and how a change of model is paid.
+"""When the line is fitted again, and how a change of model is paid.
 
 What changes at one sample would shake the stage: the difference is owed, and paid on the way.
 """

@@ -114,7 +114,7 @@ def _changed(field: Any) -> Any:
 
 
 def block(r: FloatArray | None) -> Any:
-    """Reference of a block that was planned and not learnt from; JSON knows no NaN."""
+    """Reference of a block that was planned and not learnt from; JSON has no NaN."""
     return None if r is None else [value if np.isfinite(value) else None for value in r.tolist()]
 
 

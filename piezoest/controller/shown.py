@@ -69,18 +69,18 @@ class ControllerStatus:
     samples : int
         Samples learnt from.
     missing : int
-        Samples without a usable reference, at which the last one held.
+        Samples without a usable reference; the last reference was used.
     stage : str
-        ``"seeking"`` (finds out the gain), ``"approaching"`` (goes to the reference), ``"running"`` or
-        ``"homing"`` (sweeps).
+        ``"seeking"`` (measures the gain), ``"approaching"`` (moves to the reference), ``"running"`` or
+        ``"homing"`` (erases the memory of the hysteresis).
     driving : str
         ``"line"``, or the name of the estimator whose model drives.
     fault : str
-        What is wrong with the readings; empty if nothing.
+        Name of the fault of the readings; empty if there is none.
     saturated, slewed : int
-        Samples at which the voltage range or the slew rate was in the way.
+        Number of samples at which the voltage was limited by the range or by the slew rate.
     switches : int
-        How many times another model took over.
+        Number of times that another model took over.
     """
 
     samples: int
@@ -102,11 +102,11 @@ class Candidate:
     name : str
         ``"line"``, or that of its estimator.
     missed : float or None
-        What it has missed of the readings of late, root mean square [µm]; None if nothing is known.
+        Recent error of the model, root mean square [µm]; None if unknown.
     drives : bool
-        Whether it drives.
+        Whether it computes the voltage.
     model : Model or None
-        In µm and V; None until there is one.
+        Model in µm and V; None until there is one.
     """
 
     name: str

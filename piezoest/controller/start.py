@@ -74,7 +74,7 @@ def begin(start: Any, u: Any) -> None:
 
 @register_jitable
 def begin_again(start: Any, settings: Any, u: Any) -> None:
-    """Begin anew from a voltage where the stage may not be at rest yet: back to where nothing is strained."""
+    """Start again from a voltage where the stage may not be at rest yet, at the place nearest to 0 V."""
     rest = min(max(0.0, settings.lowest), settings.highest)
     begin(start, rest)
     start.stage, start.voltage, start.from_u, start.target = GO, u, u, rest

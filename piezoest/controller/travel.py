@@ -1,6 +1,6 @@
 """How far a signal goes from one turn to the next: the unit in which a controller counts.
 
-Hysteresis forgets by travel and knows no time: what is learnt, scored and handed over counts in swings.
+Hysteresis depends on travel and not on time, so everything is counted in swings of the voltage.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LEAST = 0.02
 
 @register_jitable
 def begin(travel: Any, value: Any, least: Any) -> None:
-    """Begin, or begin anew, at a value; no swing is smaller than `least` until two turns were seen."""
+    """Begin, or start again, at a value; no swing is smaller than `least` until two turns were seen."""
     travel.furthest = travel.turned = travel.last = value
     travel.direction = travel.leg = travel.turns = travel.count = travel.usual = 0.0
     travel.swing = travel.least = least

@@ -76,9 +76,9 @@ def project_admissible(theta, P, alpha_least, beta_least, margin):
     """Move theta (n,) in place to the nearest admissible point in the metric of P; False if there is none.
 
     theta[:3] = (alpha, beta, gamma); further entries (an offset) move with them as P's
-    correlations say. P (n, n) is not changed. Where anything is NaN or beyond all measure
-    the result is False, and theta is not to be used: a clamp would make NaN the least gain there is,
-    and with it the largest voltage.
+    correlations say. P (n, n) is not changed. If anything is NaN or unreasonably large, the
+    result is False and theta must not be used: a clamp would turn NaN into the smallest gain, and so
+    into the largest voltage.
     """
     _onto_least(theta, P, 0, alpha_least)
     _onto_least(theta, P, 1, beta_least)
@@ -96,9 +96,9 @@ def project_admissible(theta, P, alpha_least, beta_least, margin):
 
 @register_jitable
 def kept_gain(gain, start, least):
-    """Gain to hand out: of the start's sign and at least its part `least`; the start's where it is no number.
+    """Gain with the start's sign and at least `least` times its size; the start's if it is not a number.
 
-    A small gain commands a large voltage: a sensor that reads zero must not.
+    A small gain means a large voltage; a sensor that reads zero must not cause one.
     """
     if not np.abs(gain) < LARGEST:
         return start
@@ -107,9 +107,9 @@ def kept_gain(gain, start, least):
 
 @register_jitable
 def has_inverse(alpha, beta, gamma):
-    """True if the parameters are admissible to the letter: a > 0, beta > 0, b > 0 and c >= 2b.
+    """True if the parameters are exactly admissible: a > 0, beta > 0, b > 0 and c >= 2b.
 
-    Numbers that overflow on the way from a displacement to its voltage are not.
+    Numbers that overflow in the inverse are not admissible.
     """
     if not (alpha > SMALLEST and alpha < LARGEST and beta > 0.0):
         return False

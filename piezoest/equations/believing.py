@@ -1,6 +1,6 @@
-"""Which readings a stage can have made: no spikes, no jumps of the sensor, no reading that stands still.
+"""Plausible readings: no spikes, no jumps of the sensor, no readings that stand still.
 
-Rules of this library: what a voltage explains of a change is its travel times a slope, that of (2) or (12).
+Rules of this library: a voltage explains a change of its travel times the slope of (2) or (12).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 from piezoest.compile import inlined
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, record
 
-# Readings seen since what is usual was learnt anew, their usual change [µm], how far the voltage has
+# Readings seen since what is usual was learnt again, their usual change [µm], how far the voltage has
 # travelled since the reading last changed [V].
 BELIEF = record(seen=COUNT, usual_step=DISTANCE, same=AMOUNT)
 
@@ -23,13 +23,13 @@ STANDS_STILL = 5e-3
 
 @inlined
 def stands_still(belief: Any, dx: Any, travel: Any, swing: Any) -> Any:
-    """Whether the reading has not changed by a bit while the voltage travelled too far for that."""
+    """Whether the reading is exactly constant although the voltage has travelled far."""
     return dx == 0.0 and belief.same + travel > STANDS_STILL * swing
 
 
 @inlined
 def believable(belief: Any, dx: Any, slope: Any, travel: Any, warm_up: Any) -> Any:
-    """Whether a change `dx` over a `travel` is one that the stage can make; learns from what is."""
+    """Whether a change `dx` over a `travel` is plausible; learns from plausible changes."""
     limit = BELIEVED_STEPS * belief.usual_step + BELIEVED_SLOPES * slope * travel
     if abs(dx) > limit and belief.seen >= warm_up:
         return False

@@ -1,4 +1,4 @@
-"""Plays whose output bends: the Prandtl-Ishlinskii operator for asymmetric loops.
+"""Plays with bends: the Prandtl-Ishlinskii operator for asymmetric loops.
 
 One-sided dead zones change the slope of a play's output above a voltage. K. Kuhnen, European
 Journal of Control 9 (2003) 407-418, lets them act on the sum of all plays; here they act on
@@ -21,19 +21,19 @@ SAME = 1e-13
 
 @register_jitable
 def dead_zone(p, d):
-    """What p has above d, less what zero has: 0 at p = 0."""
+    """The part of p above d, minus the same for zero: 0 at p = 0."""
     return np.fmax(p - d, 0.0) - np.fmax(-d, 0.0)
 
 
 @register_jitable
 def between(p, low, high):
-    """p, or the nearer of two bends where it is outside."""
+    """p, limited to the range between two bends."""
     return np.fmin(np.fmax(p, low), high)
 
 
 @register_jitable
 def segment(p, low, high):
-    """What p has between two bends, counted from zero: segments add up to p.
+    """The part of p between two bends, counted from zero; all segments add up to p.
 
     `PrandtlIshlinskiiRLS` keeps what zero has.
     """
@@ -51,7 +51,7 @@ def bent(p, slope, bends, changes, column, columns):
 
 @register_jitable
 def bent_plays_output(y, u, gain, weights, bends, changes):
-    """w of the voltage u and the play states y (n,), which are left alone."""
+    """w of the voltage u and the play states y (n,), which are not changed."""
     if len(bends) == 0:
         return gain * u + weighted_sum(weights, y)
     columns = len(y) + 1
@@ -89,7 +89,7 @@ def bent_plays_inverse(y, u, w, gain, thresholds, weights, bends, changes):
 
     w rises with u along straight pieces. From the last voltage this walks from breakpoint
     to breakpoint, each a play that begins to move or an output that bends, until w lies on
-    the piece at hand: exact, without a tolerance, and most samples pass none or one.
+    the current piece. This is exact; most samples pass no breakpoint or one.
     """
     n = len(y)
     columns = n + 1
@@ -118,7 +118,7 @@ def bent_plays_inverse(y, u, w, gain, thresholds, weights, bends, changes):
 
 @register_jitable
 def prandtl_ishlinskii_voltage(y, u, w, gain, thresholds, weights, bends, changes):
-    """The next voltage for w, by the shorter walk where nothing bends."""
+    """The next voltage for w; faster if there are no bends."""
     if len(bends) == 0:
         return prandtl_ishlinskii_inverse(y, w, gain, thresholds, weights)
     return bent_plays_inverse(y, u, w, gain, thresholds, weights, bends, changes)

@@ -30,7 +30,7 @@ def loop_parameters(alpha, beta, gamma):
 
 @register_jitable
 def rate_parameters(a, b, c):
-    """(alpha, beta, gamma) of the first form (1) from (a, b, c): (4) the other way."""
+    """(alpha, beta, gamma) of the first form (1) from (a, b, c): the inverse of (4)."""
     return a, c - b, a * c
 
 
@@ -50,7 +50,7 @@ def hysteresis_rate(w_h, u_dot, a, b):
 def relative_decay(travel):
     """(1 - exp(-travel)) / travel, which is 1 at travel = 0.
 
-    For a short travel, such as that of a sample, its series: as exact, at a fraction of the cost.
+    For a short travel, such as that of a sample, a series is used: equally exact and much faster.
     """
     if isinstance(travel, float) and travel < _SHORT:
         square = travel * travel
@@ -66,7 +66,7 @@ def hysteresis_step(w_h, du, a, b):
     """w_h after a monotone change of voltage du: (B12)-(B15), the exact solution of (3).
 
     w_h exp(-a|du|) - sign(du) (b/a)(1 - exp(-a|du|)), written with the relative decay
-    R = (1 - exp(-a|du|))/(a|du|), so that a = 0 and du = 0 are no special cases.
+    R = (1 - exp(-a|du|))/(a|du|), so that a = 0 and du = 0 need no special case.
     """
     travel = a * np.abs(du)
     return _decayed(w_h, du, travel, b, relative_decay(travel))
@@ -79,7 +79,7 @@ def _decayed(w_h, du, travel, b, decay):
 
 @register_jitable
 def hysteresis_linearised(w_h, du, a, b):
-    """`hysteresis_step` and its derivatives by w_h, a and b, for the price of one exponential."""
+    """`hysteresis_step` and its derivatives by w_h, a and b, with a single exponential."""
     distance = np.abs(du)
     travel = a * distance
     decay = relative_decay(travel)
@@ -115,7 +115,7 @@ def regressor(w, u, u_dot):
 
 @register_jitable
 def sample_regressor(u_0, u_1):
-    """Voltage's part of the regressor (20) integrated over one sample, du taken monotone.
+    """The voltage terms of the regressor (20), integrated over one sample with a monotone voltage.
 
     Returns (du, |du| u, |du|): |u'|u integrates exactly. With the mean displacement w over
     the sample (trapezoidal rule, error of third order in du), w_1 - w_0 =

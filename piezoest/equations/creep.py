@@ -28,9 +28,9 @@ def creep_step(z, w, gains, decays):
 
 @inlined
 def unit_creep_step(z, w, decays):
-    """`creep_step` with all gains one: the states `z` (n,) [µm] follow w, in place.
+    """`creep_step` with all gains equal to one: the states `z` (n,) [µm] follow w, in place.
 
-    x_creep = sum_i gains[i] z[i]; such states stay right when the gains change.
+    x_creep = sum_i gains[i] z[i]; these states remain valid when the gains change.
     """
     for i in range(len(z)):
         z[i] = z[i] + (1.0 - decays[i]) * (w - z[i])
@@ -40,9 +40,8 @@ def unit_creep_step(z, w, decays):
 def creep_to_come(z, gains, decays):
     """(held, share) of the next sample: x_creep = held + share w, for the w held over it.
 
-    What the past makes of the next sample is known before it, and what the sample itself
-    adds is linear in w: creep is inverted without iteration. `z` are the states of
-    `unit_creep_step`.
+    The contribution of the past is known before the sample, and that of the sample itself is linear
+    in w. So creep is inverted without iteration. `z` are the states of `unit_creep_step`.
     """
     held = 0.0
     share = 0.0

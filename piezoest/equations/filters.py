@@ -24,7 +24,7 @@ def low_pass_step(y, x, pole):
 
 @register_jitable
 def high_pass_step(low, x, pole):
-    """Next (low-pass state, output) of s/(s + omega): what the low-pass leaves."""
+    """Next (low-pass state, output) of s/(s + omega): the input minus its low-pass."""
     low = low_pass_step(low, x, pole)
     return low, x - low
 

@@ -23,7 +23,7 @@ def relative(energy, y, S):
 
 @inlined
 def learn(energy, y, S, fraction):
-    """Learn from an innovation over a fraction of a swing; the one at which it was forgotten is left out."""
+    """Learn from an innovation over a fraction of a swing; the first one after `forget` is left out."""
     if energy.swings < 0.0:
         energy.swings = 0.0
         return
@@ -33,13 +33,13 @@ def learn(energy, y, S, fraction):
 
 @inlined
 def forget(energy):
-    """Learn anew, from the next innovation on."""
+    """Start learning again with the next innovation."""
     energy.swings = -1.0
 
 
 @inlined
 def nominal(energy, forgetting):
-    """Forgetting factor that gives the memory wanted at the usual energy; next to 1 until that is known."""
+    """Forgetting factor that gives the desired memory at the usual energy; close to 1 until that is known."""
     if energy.swings < ENOUGH:
         return 1.0 - (1.0 - forgetting) / 1e30
     return 1.0 - (1.0 - forgetting) / max(energy.usual, 1e-30)

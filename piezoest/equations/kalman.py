@@ -19,7 +19,7 @@ LARGEST, LARGEST_TRACE = 1e200, 1e60
 
 @inlined
 def bilinear_variance(P, du, a):
-    """Variance that the product a w_h adds to w_h over du, beyond the filter's first order.
+    """Variance of second order that the product a w_h adds to w_h over du.
 
     With errors of a and w_h of covariance P, -a w_h |u'| (3) has the variance of a product of
     Gaussians, P_aa P_ww + P_aw². That error keeps its sign while the voltage travels about
@@ -34,7 +34,7 @@ def bilinear_variance(P, du, a):
 
 @inlined
 def predict_covariance(P, row, m, q):
-    """P = F P F' + diag(q), F the identity but for the first m of its first `row`."""
+    """P = F P F' + diag(q), where F is the identity except for the first m numbers of its first `row`."""
     n = len(row)
     first = like(row)
     for j in range(n):
@@ -92,7 +92,7 @@ def innovation_variance(P, h, R, product):
 
 @inlined
 def is_safe(y, S):
-    """Whether an update by the innovation y of variance S moves nothing beyond all measure.
+    """Whether an update by the innovation y of variance S gives reasonable numbers.
 
     Asked before the update, as `least_squares.is_safe`: NaN or infinity anywhere in the state, P, h or the
     measurement ends up in one of these numbers.
@@ -102,7 +102,7 @@ def is_safe(y, S):
 
 @inlined
 def is_covariance(P):
-    """Whether no variance of P is lost, and the first, which alone can grow without end, is a number."""
+    """Whether all variances of P are valid and the first one, which can grow without limit, is finite."""
     least = P[0, 0]
     for i in range(1, len(P)):
         least = min(least, P[i, i])

@@ -64,7 +64,7 @@ def innovation(theta, P, phi, z, product):
 
 @inlined
 def is_covariance(P):
-    """Whether all variances of P are above zero: rounding can take more than there is."""
+    """Whether all variances of P are above zero; rounding can make them negative."""
     least = P[0, 0]
     for i in range(1, len(P)):
         least = min(least, P[i, i])
@@ -73,11 +73,11 @@ def is_covariance(P):
 
 @inlined
 def is_safe(P, y, spread, product):
-    """Whether an update by the gain P phi/spread moves nothing beyond all measure; `product` holds P phi.
+    """Whether an update by the gain P phi/spread gives reasonable numbers; `product` holds P phi.
 
-    Asked before the update: what is not safe is not taken, and the last good estimate stays. NaN or
-    infinity anywhere in theta, P, phi or z ends up in one of these numbers. A covariance that
-    rounding has taken a variance from is not safe either.
+    This is checked before the update. An update that is not safe is skipped, and the last good estimate
+    stays. NaN or infinity anywhere in theta, P, phi or z makes one of these numbers NaN or infinite. A
+    covariance with a variance that is not above zero is not safe either.
     """
     least = min(spread, P[0, 0])  # one comparison for all: this is asked of every sample
     for i in range(1, len(P)):
@@ -92,8 +92,8 @@ def discrete_update(theta, P, phi, z, forgetting, R, bound):
 
     With mu = `forgetting` (mu = exp(-dt/memory) forgets as (A4) does):
     S = phi' P phi / mu + R, K = P phi / (mu S), theta += K y, P = (P - K phi' P) / mu.
-    P keeps its value where the update would take its trace above `bound` (R0 of A6; unlike
-    (A6) to the letter this cannot freeze P for good).
+    P is kept if the update would take its trace above `bound` (R0 of A6). Unlike (A6) taken
+    literally, this cannot freeze P for ever.
     """
     product = like(theta)
     y, quadratic = innovation(theta, P, phi, z, product)
@@ -170,10 +170,9 @@ def continuous_step(theta, P, phi, z, h, forgetting_rate, normalised, rates):
 
 @register_jitable
 def continuous_is_safe(P, phi, y, S, h, rates):
-    """Whether a `continuous_step` moves nothing beyond all measure, as `is_safe`, and is stable.
+    """Whether a `continuous_step` gives reasonable numbers, as in `is_safe`, and is stable.
 
-    A step that is too long for the gain, as without the normalisation it can be, would leave more of the
-    innovation than there was, and the next one more than that.
+    Without normalisation a step can be too long for the gain. The innovation would then grow in every step.
     """
     n = len(P)
     reach = (y * y + S * S) + trace(P) * TRACE_WEIGHT
@@ -207,8 +206,8 @@ def directional_update(theta, P, phi, z, forgetting, R, bound):
     R. Kulhavy, Restricted exponential forgetting in real-time identification, Automatica 23
     (1987) 589-600; in terms of the information matrix, L. Cao, H. Schwartz, Automatica 36 (2000)
     1725-1731. With q = phi' P phi and mu = `forgetting`: K = P phi/(R + q),
-    P^-1 += (mu - (1 - mu) R/q) phi phi'/R. Along phi this is exponential forgetting, across it
-    nothing is lost. `bound` as in `discrete_update`.
+    P^-1 += (mu - (1 - mu) R/q) phi phi'/R. This is exponential forgetting along phi; other directions
+    are kept. `bound` as in `discrete_update`.
     """
     product = like(theta)
     y, q = innovation(theta, P, phi, z, product)
@@ -241,7 +240,7 @@ def directional_correction(theta, P, y, q, forgetting, R, bound, product):
 
 @inlined
 def variable_forgetting(y, quadratic, R, forgetting, least):
-    """Forgetting factor from the innovation's energy: short where the model no longer fits.
+    """Forgetting factor from the innovation's energy: a short memory when the model no longer fits.
 
     T. Fortescue, L. Kershenbaum, B. Ydstie, Implementation of self-tuning regulators with variable
     forgetting factors, Automatica 17 (1981) 831-835: mu = 1 - (1 - phi' K) y²/(N_0 R), N_0 the
@@ -263,7 +262,7 @@ def cusum(total, value, drift):
 
 @inlined
 def random_walk(variance, growth, ceiling):
-    """P_ii after the parameter has walked: it grows by a constant as long as it is below a ceiling.
+    """P_ii after a step of a random walk: it grows by a constant while it is below a limit.
 
     L. Ljung, System Identification, 2nd ed. (1999), sec. 11.2, the Kalman filter's
     interpretation of recursive least squares. Unlike division by a forgetting factor this grows
@@ -304,7 +303,7 @@ def propagate_error(C, phi, gain, filtered, pole, ratio, differenced):
 def above_floor(P, floor, root):
     """1.0 if every eigenvalue of P exceeds `floor`, else 0.0: Cholesky on P - floor I, into `root` (n, n).
 
-    Exact for the price of n³/6 products.
+    Exact; needs n³/6 products.
     """
     n = len(P)
     positive = 1.0
@@ -325,7 +324,7 @@ def above_floor(P, floor, root):
 
 @inlined
 def add_covariance(P, P_0):
-    """Say that a change was seen: P += P_0, the start's uncertainty on top of the present one.
+    """Announce a change: P += P_0, which adds the initial uncertainty to the present one.
 
     F. Gustafsson, Adaptive Filtering and Change Detection (2000), sec. 5.1.
     """

@@ -50,7 +50,7 @@ def wanted(state: Any, settings: Any, r: Any) -> Any:
 
 @inlined
 def follow(state: Any, settings: Any, wanted: Any, given: Any) -> None:
-    """Let w_h follow the voltage given out."""
+    """Update w_h with the voltage."""
     own, model = state.inverse, settings.inverse
     if given == wanted:
         own.w_h = own.following
@@ -66,7 +66,7 @@ def expected(state: Any, settings: Any) -> Any:
 
 @register_jitable
 def place(state: Any, settings: Any) -> None:
-    """Bring w_h to where the voltage's recent path leads it."""
+    """Set w_h from the recent path of the voltage."""
     if settings.inverse.b > 0.0:
         recent_path.use_decay(state.path, settings.inverse.a)
     state.inverse.w_h = settings.inverse.b * recent_path.hysteresis(state.path)

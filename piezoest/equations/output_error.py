@@ -38,10 +38,10 @@ def recentre(s, P, step):
 
 @register_jitable
 def walk_covariance(b, c, Q):
-    """Covariance Q (3, 3) of (b, c, d) if alpha, beta and gamma each move by one part of themselves.
+    """Covariance Q (3, 3) of (b, c, d) if alpha, beta and gamma have a relative standard deviation of 1.
 
     To first order, by (4): c = gamma/alpha moves by c (e_gamma - e_alpha), b = c - beta by as much less
-    beta e_beta, d by b e_alpha. So b, a small difference of large numbers, may move by parts of c.
+    beta e_beta, d by b e_alpha. So b, a small difference of large numbers, may change by a fraction of c.
     """
     beta = c - b
     Q[0, 0] = 2.0 * c * c + beta * beta

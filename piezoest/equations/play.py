@@ -28,7 +28,7 @@ def weighted_sum(weights, y):
 
 @register_jitable(inline="always")
 def sum_of_first(n, weights, y):
-    """sum_i weights[i] y[i] of the first n, in four sums of which none waits for another's last product."""
+    """sum_i weights[i] y[i] of the first n, as four independent sums, which is faster."""
     first, second, third, fourth = 0.0, 0.0, 0.0, 0.0
     fours = n // 4
     for k in range(fours):
@@ -53,7 +53,7 @@ def prandtl_ishlinskii_step(y, u, gain, thresholds, weights):
 
 @inlined
 def prandtl_ishlinskii_inverse(y, w, gain, thresholds, weights):
-    """The u for which `prandtl_ishlinskii_step` gives w; the states `y` (n,) are left alone.
+    """The u for which `prandtl_ishlinskii_step` gives w; the states `y` (n,) are not changed.
 
     Seen from the states y, w is a piecewise linear function of u: between the breakpoints
     y[0] - r[0] and y[0] + r[0] no play moves and its slope is the gain; each breakpoint

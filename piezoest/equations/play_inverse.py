@@ -53,7 +53,7 @@ def wanted(state: Any, settings: Any, r: Any) -> Any:
 
 @register_jitable
 def follow(state: Any, settings: Any, wanted: Any, given: Any) -> None:
-    """Let plays and creep follow the voltage given out; creep goes on while it is held, too."""
+    """Update plays and creep with the voltage; creep continues while the voltage is held."""
     own, model = state.inverse, settings.inverse
     w = bent_plays_step(
         own.y, given, model.gain, model.thresholds, model.weights, model.bends, model.bend_weights
@@ -73,13 +73,13 @@ def expected(state: Any, settings: Any) -> Any:
 
 @register_jitable
 def place(state: Any, settings: Any) -> None:
-    """Bring the plays to where the voltage's turning points have left them."""
+    """Set the plays from the turning points of the voltage."""
     for i in range(len(state.inverse.y)):
         state.inverse.y[i] = recall(state.memory, settings.inverse.thresholds[i])
 
 
 def stays(before: Any, now: Any) -> bool:
-    """Whether the states of a model with settings `before` are those of one with settings `now`."""
+    """Whether the states of a model with settings `before` are valid for settings `now`."""
     return before["decays"].size == now["decays"].size and np.array_equal(
         before["thresholds"], now["thresholds"]
     )

@@ -1,11 +1,11 @@
-"""The Preisach operator with a density that separates into width and place of the relays.
+"""The Preisach operator with a density that is a product of functions of width and place of the relays.
 
 A relay that switches up at alpha and down at beta has the half-width r = (alpha - beta)/2 and the
 place s = (alpha + beta)/2. The relays of one r together are a function of the play of
 threshold r: x = sum over r of g_r(play_r[u]), with g_r' the density over s (M. Brokate, J.
 Sprekels, Hysteresis and Phase Transitions, Springer 1996, sec. 2.4). Here the density over s is
-a bell, sech²((s - centre)/width), the same for all r: minor loops of one size differ with their
-place, which no Prandtl-Ishlinskii operator can do.
+bell-shaped, sech²((s - centre)/width), the same for all r. Minor loops of one size then depend on
+their place, which no Prandtl-Ishlinskii operator can do.
 Symbols: voltage u [V], play states y [V], thresholds r [V], displacement w [µm].
 """
 

@@ -1,8 +1,8 @@
-"""The recent path of a voltage: its last turning points, whether or not a larger loop wiped them out.
+"""The recent path of a voltage: its last turning points, also those that a larger loop has wiped out.
 
-The Coleman-Hodgdon model forgets by travel alone, see (3). Where any model of that kind stands now follows
-from the last few swings, so that a compensator can take up a new one as if it had always had it.
-Like `turning_points` this is bookkeeping, with branches, for numbers alone.
+The Coleman-Hodgdon model forgets with the travel of the voltage, see (3). The present state of any such model
+follows from the last few swings, so a compensator can change to a new model as if it had always used it.
+Unlike the equations, these functions have branches and work on numbers only.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ NOISE = record(variance=AMOUNT, change=MEASURED, change_before=MEASURED, seen=wh
 
 @inlined
 def measure(noise, change):
-    """Learn from a change of x: from its third differences, for a stage moves more smoothly."""
+    """Learn from the third differences of x, in which the smooth motion of a stage is small."""
     if noise is None:
         return
     third = change - 2.0 * noise.change + noise.change_before
@@ -32,10 +32,10 @@ def measure(noise, change):
 
 @inlined
 def memory_squared(noise, swing, slope, unit, factor):
-    """Square of the memory in swings that it takes for the noise to move the gain by no more than PRECISION.
+    """Square of the memory in swings with which the noise changes the gain by at most PRECISION.
 
     Over a swing of the displacement noise behind W_p leaves the slope (`slope` times `unit`) uncertain by
-    sqrt(2) parts of its size; `factor` says how much of it the filter lets through.
+    sqrt(2) times its relative size; `factor` says how much of it passes the filter.
     """
     if noise is None:
         return 0.0

@@ -1,6 +1,6 @@
-"""How far and how long the voltage goes from one turning point to the next: the unit of what is counted.
+"""Size and duration of a swing, from one turning point of the voltage to the next: the unit of counting.
 
-Hysteresis forgets by travel, see (3), and knows no time.
+Hysteresis depends on travel, see (3), and not on time.
 """
 
 from __future__ import annotations
@@ -55,17 +55,17 @@ def follow(swing: Any, u: Any) -> None:
 
 @inlined
 def half_period(swing: Any, otherwise: Any) -> Any:
-    """Samples of half a period; `otherwise` until there was a turn, and never less than the swing at hand."""
+    """Samples of half a period, at least those of the present swing; `otherwise` before the first turn."""
     usual = swing.usual if swing.usual > 0.0 else otherwise
     return min(max(usual, swing.since), LONGEST)
 
 
 @inlined
 def fraction_of_swing(swing: Any, travel: Any, otherwise: Any) -> Any:
-    """What fraction of a whole swing a travel of the voltage is: half a period in unit of motion.
+    """A travel of the voltage as a fraction of a whole swing, which is half a period.
 
-    Hysteresis knows no time: what is remembered and what drifts is counted in this. Until the
-    voltage has turned once nobody knows how far it will go, and time has to do.
+    Memory and drift are counted in this unit. Before the first turning point the size of a swing is
+    unknown, and time is used instead.
     """
     if swing.usual == 0.0:
         return (travel > 0.0) / max(otherwise, swing.since)

@@ -1,4 +1,4 @@
-"""What a change of temperature makes of a coefficient.
+"""The effect of temperature on a coefficient.
 
 An assumption: no law is given in Eielsen, Gravdahl and Pettersen (2012), who only name
 temperature among the causes of a changing gain (Sec. I). To first order every material

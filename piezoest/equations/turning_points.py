@@ -2,7 +2,7 @@
 
 Plays of any thresholds can be set from it, which is what a model with new thresholds needs.
 Source: I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991 (wiping-out).
-Unlike the equations beside it this is bookkeeping, with branches, for numbers alone.
+Unlike the equations, these functions have branches and work on numbers only.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The face that every estimator shows, and what they share behind it."""
+"""The methods and attributes that all estimators have in common."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _FORMAT = 1
 
 
 class EstimatorBase(ABC):
-    """Shared behaviour: one state of named numbers, from which all else is derived.
+    """Base class of all estimators.
 
-    A subclass keeps everything that changes in ``self._state`` (a structured array, see `piezoest.layout`)
-    and its constructor's JSON-safe arguments in ``self._arguments``; copying, saving, resetting and
-    pickling then need nothing more. What it shows is by default the state's number of that name.
+    A subclass keeps everything that changes in ``self._state`` (a structured array, see `piezoest.layout`),
+    and its constructor's arguments, JSON-safe, in ``self._arguments``. Copying, saving, resetting and
+    pickling need nothing more. Properties such as `theta` return the number of that name in the state.
     """
 
     __slots__ = ("_arguments", "_layout", "_pending", "_start", "_state")
 
-    #: Promises of the face this class does not keep: name of the promise to the reason.
+    #: Tests of estimators that this class does not pass: name of the test, and the reason.
     conformance_exceptions: ClassVar[dict[str, str]] = {}
 
     #: What the class saves beside its state.
@@ -64,12 +64,12 @@ class EstimatorBase(ABC):
 
     @property
     def state(self) -> Any:
-        """All that changes, by name: a NumPy structured array, a view; ``state["law"]["P"]``."""
+        """Its state: a NumPy structured array with named fields, such as ``state["law"]["P"]``; a view."""
         return self._state
 
     @property
     def layout(self) -> Record:
-        """What `state` consists of, and what its numbers can be."""
+        """The fields of `state`, and the values that they may have."""
         return self._layout
 
     @abstractmethod
@@ -88,6 +88,20 @@ class EstimatorBase(ABC):
         index = np.arange(every - 1, rows * every, every)
         return Trace(index=index, parameter_names=self.parameter_names, **kept)
 
+    def __repr__(self) -> str:
+        """Class, sample rate, the arguments that are not the defaults, and the model."""
+        new: Any = type(self)
+        try:
+            usual = new(self.sample_rate)._arguments
+        except (TypeError, ValueError):  # the defaults do not fit the rate, or there are none
+            usual = {}
+        given = "".join(
+            f", {name}={value!r}"
+            for name, value in self._revive(self._arguments).items()
+            if self._arguments[name] != usual.get(name)
+        )
+        return f"<{type(self).__name__}({self.sample_rate:g}{given}): {self.model}>"
+
     @property
     def sample_rate(self) -> float:
         """[Hz]."""
@@ -96,11 +110,11 @@ class EstimatorBase(ABC):
     @property
     @abstractmethod
     def model(self) -> Model:
-        """Admissible model as known now, ready for a compensator."""
+        """The current model. It is admissible, so a compensator can use it."""
 
     @property
     def theta(self) -> FloatArray:
-        """Parameters as estimated, shape (n,), in the order of `parameter_names`."""
+        """Estimated parameters, shape (n,), in the order of `parameter_names`."""
         return np.array(self._state["theta"])
 
     @property
@@ -135,7 +149,7 @@ class EstimatorBase(ABC):
 
     @property
     def status(self) -> Status:
-        """What happened to the samples so far; what the state does not count is zero."""
+        """How many samples were used, missing or left out; counts that an estimator does not have are 0."""
         known = self._state.dtype.names
         counted = ("samples", "updates", "missing", "held", "resets", "outliers")
         counts = {name: int(self._state[name]) for name in counted if name in known}
@@ -160,8 +174,8 @@ class EstimatorBase(ABC):
         Parameters
         ----------
         u : float
-            Voltage [V]; of any kind, as in `step`. A second `predict` without an `update` between them
-            makes the first a sample without a measurement.
+            Voltage [V]; any kind of number, as in `step`. A second `predict` without `update` means that the
+            first sample had no measurement.
         """
         if self._pending is not None:
             self._sample(self._pending, np.nan)
@@ -173,7 +187,7 @@ class EstimatorBase(ABC):
         Parameters
         ----------
         x : float or None
-            Displacement [µm]; of any kind, as in `step`; None, NaN or infinity where there is none.
+            Displacement [µm]; any kind of number, as in `step`; None, NaN or infinity if there is none.
 
         Raises
         ------
@@ -186,21 +200,21 @@ class EstimatorBase(ABC):
         self._sample(u, number_or_nan(x))
 
     def step(self, u: float | None, x: float | None) -> None:
-        """Go through one sample: ``predict(u)`` and ``update(x)``.
+        """Process one sample: ``predict(u)`` and ``update(x)``.
 
         Parameters
         ----------
         u : float
             Voltage [V].
         x : float or None
-            Measured displacement [µm]; None, NaN or infinity where there is none: the
-            sample is skipped and `status` says so.
+            Measured displacement [µm]; None, NaN or infinity if there is none. The sample is then
+            skipped and counted in `status`.
 
         Notes
         -----
-        Nothing is raised: a stream must not stop. Both may be what a driver returns: a number of any kind,
-        or an array, a list or a tuple of one. Whatever else comes (text, a masked value, another shape)
-        counts as missing.
+        No error is raised, because a stream must not stop. Both arguments may be any kind of number, or an
+        array, a list or a tuple of one. Anything else (text, a masked value, another shape) counts as
+        missing.
         """
         if type(u) is not float:
             u = number_or_nan(u)
@@ -213,7 +227,7 @@ class EstimatorBase(ABC):
         self._sample(u, x)
 
     def run(self, u: Any, x: Any, *, every: int = 1, record: tuple[str, ...] = ()) -> Trace:
-        """Go through a whole record; continues from the current state, the same as a loop of `step`.
+        """Process a whole record, starting from the current state; the same as a loop of `step`.
 
         Parameters
         ----------
@@ -222,7 +236,7 @@ class EstimatorBase(ABC):
         every : int
             Keep every k-th sample in the trace, the last of each k.
         record : tuple of str
-            What to keep beside theta: any of ``"y"``, ``"S"``, ``"P"``.
+            What the trace contains besides theta: any of ``"y"``, ``"S"``, ``"P"``.
 
         Returns
         -------
@@ -254,7 +268,7 @@ class EstimatorBase(ABC):
         return u, x
 
     def absorb(self, u: FloatArray, x: FloatArray) -> None:
-        """Do as `run`, but keep nothing.
+        """Do the same as `run`, but return no trace.
 
         Parameters
         ----------
@@ -291,13 +305,13 @@ class EstimatorBase(ABC):
             setattr(self, name, value)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return arguments and state as a JSON-safe dictionary; `from_dict` resumes bit for bit."""
+        """Return arguments and state as a JSON-safe dictionary, from which `from_dict` continues exactly."""
         return {
             "estimator": type(self).__name__,
             "format": _FORMAT,
             "arguments": copy.deepcopy(self._arguments),
             "state": by_name(self._layout, self._state),
-            # JSON knows no NaN.
+            # JSON has no NaN.
             "pending": "missing"
             if self._pending is not None and not np.isfinite(self._pending)
             else self._pending,
@@ -322,7 +336,7 @@ class EstimatorBase(ABC):
         Parameters
         ----------
         data : dict
-            What `to_dict` returned, also after a round trip through JSON.
+            What `to_dict` returned, also after conversion to JSON and back.
 
         Raises
         ------

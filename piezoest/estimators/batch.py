@@ -32,42 +32,41 @@ STATE = record(samples=COUNT)
 
 
 class BatchFit(Hopping):
-    """Output-error fit of a whole record: the free-running model misses the displacement least.
+    """Output-error fit of a whole record: minimises the error of the simulated displacement.
 
-    Statistically the best that a record allows, at the cost of keeping it. `fit` takes a
-    record; with the face of a streaming estimator, samples are collected and fitted when `model` or
-    another result is asked for.
+    This is the most accurate use of a record, but the record must be stored. `fit` fits a record. With
+    ``step`` and ``run`` samples are collected, and fitted when `model` or another result is read.
 
     Parameters
     ----------
     sample_rate : float
         [Hz].
     initial_model : FreeRunning, optional
-        A ColemanHodgdon, a LinearGain or another of its face: its class is fitted. The start is the
-        better of it and, for Coleman-Hodgdon, the linear least-squares fit of the derivative form
-        (`HysteresisRLS` without forgetting). By default a Coleman-Hodgdon model of the record's size.
+        A ColemanHodgdon, a LinearGain or another model that can be fitted; a model of this class is fitted.
+        The fit starts from it or, for Coleman-Hodgdon, from the linear least-squares fit of the derivative
+        form, whichever is better. Default: a Coleman-Hodgdon model that is scaled to the record.
     offset : bool
-        Fit the displacement at zero voltage and w_h = 0 too; else it stays at `initial_model`'s, or 0.
+        Also fit the displacement at zero voltage and w_h = 0; else it is `initial_model`'s, or 0.
     creep : Creep, optional
-        Creep terms: the time constants stay, the gains are fitted from those given. The terms are
-        at rest, z = 0, before the first sample.
+        Creep terms. The gains are fitted and the time constants are kept. Before the first sample the terms
+        are at rest, z = 0.
     method : {"single-shooting", "multiple-shooting"}
-        One simulation with its sensitivities, by scipy's trust-region reflective method; or 20
-        segments with states of their own and continuity as constraints, by IPOPT with the Gauss-Newton
-        Hessian, for records on which the former fails.
+        ``"single-shooting"``: one simulation with its sensitivities, by scipy's trust-region reflective
+        method. ``"multiple-shooting"``: 20 segments with continuity as constraints, by IPOPT with the
+        Gauss-Newton Hessian, for records on which the first method fails.
     loss : {"linear", "huber", "soft_l1", "cauchy"}
-        ``"linear"`` is least squares; the others weigh outliers down, with the scale that gives them
-        95 % efficiency on Gaussian noise.
+        ``"linear"`` is least squares. The others reduce the weight of outliers; their scale gives 95 %
+        efficiency for Gaussian noise.
     noise : float, optional
-        Standard deviation of the displacement's noise [µm]; by default estimated from the residual.
+        Standard deviation of the displacement's noise [µm]. Default: estimated from the residual.
     fixed : mapping, optional
-        Values of parameters to hold: any of ``alpha``, ``beta``, ``gamma`` (or ``gain``), ``offset`` [µm],
-        ``initial_state`` [µm], ``creep_gains[0]``, …
+        Values of parameters that are not fitted: any of ``alpha``, ``beta``, ``gamma`` (or ``gain``),
+        ``offset`` [µm], ``initial_state`` [µm], ``creep_gains[0]``, …
     max_iterations : int
-        Most passes over the record of the one method, most iterations of the other.
+        Largest number of passes over the record, or of iterations with multiple shooting.
     hop : float, optional
-        Seconds of record between fits: results then are those of the last whole multiple. By default,
-        all samples collected are fitted whenever a result is asked for.
+        Seconds of record between fits; results then belong to the last whole multiple. Default: all
+        collected samples are fitted whenever a result is read.
 
     Raises
     ------
@@ -76,9 +75,19 @@ class BatchFit(Hopping):
 
     Notes
     -----
-    The fit's coordinates are (alpha, beta, gamma/(alpha beta)), in which the admissible set is a box.
-    Standard errors take the residual for white noise. Source: L. Ljung, System Identification,
+    The fit uses the coordinates (alpha, beta, gamma/(alpha beta)), in which the admissible set is a box.
+    Standard errors assume that the residual is white noise. Source: L. Ljung, System Identification,
     2nd ed. (1999), ch. 7, 9 and 10.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> fs, true = 1000.0, pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+    >>> u = pz.signals.triangle(amplitude=33.0, frequency=5.0, periods=3, sample_rate=fs).values
+    >>> estimator = pz.BatchFit(fs)
+    >>> trace = estimator.run(u, true.simulate(u))
+    >>> estimator.theta.round(5)
+    array([0.021  , 0.147  , 0.00429])
     """
 
     _saved_too = ("u", "x")
@@ -344,7 +353,7 @@ class BatchFit(Hopping):
         self._forget()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return arguments and record as a JSON-safe dictionary; `from_dict` resumes bit for bit."""
+        """Return arguments and record as a JSON-safe dictionary, from which `from_dict` continues exactly."""
         rows = self._record[:, : self._count].tolist()
         given = ([value if np.isfinite(value) else None for value in row] for row in rows)
         return super().to_dict() | dict(zip(self._saved_too, given, strict=True))

@@ -107,7 +107,7 @@ def x_from_centre(centre: Any, x: Any) -> Any:
 
 @inlined
 def learn_anew(belief: Any) -> None:
-    """Learn anew which changes of a reading are usual."""
+    """Learn again which changes of a reading are usual."""
     if belief is None:
         return
     belief.seen = 0.0
@@ -130,7 +130,7 @@ def is_believable(belief: Any, rejection: Any, state: Any, estimate: Any, unit: 
 
 @inlined
 def prime(state: Any, u: Any, x: Any) -> None:
-    """Start from (u, x) as the last good sample; what is usual is learnt anew."""
+    """Start from (u, x) as the last good sample; what is usual is learnt again."""
     learn_anew(state.belief)
     if state.primed == 0.0:
         _centre(state.centre, u, x)

@@ -22,39 +22,38 @@ GROWING, GREATEST = 1e5, 1e10
 
 
 class HysteresisEKF(CompiledEstimator):
-    """Extended Kalman filter for the loop's state and the model's parameters together.
+    """Extended Kalman filter for the state of the loop and the parameters together.
 
-    The state `s` is (w_h, a, b, c), with the offset as a fifth on request: in this second form
-    of the Coleman-Hodgdon model (2)-(3) the measurement x = w_h + c u + offset is linear,
-    w_h is linear in b, and the admissible set has flat faces. Between samples the exact
-    step and its exact Jacobian are used, so that the filter is the same at any sample rate;
-    the one product of unknowns, a w_h, adds its second-order variance.
+    The state `s` is (w_h, a, b, c), optionally with an offset. In this second form of the
+    Coleman-Hodgdon model (2)-(3) the measurement x = w_h + c u + offset is linear. Between samples the
+    filter uses the exact step and its exact Jacobian, so it works at any sample rate. The variance of
+    the product a w_h is added to second order.
 
     Parameters
     ----------
     sample_rate : float
         [Hz].
     initial_model : ColemanHodgdon or LinearGain, optional
-        Model to start from; its kind is the kind that is estimated. Default
+        Initial model; a model of the same kind is estimated. Default
         ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack actuator.
     uncertainty : float
         Standard deviation of each initial parameter (a, b, c or the gain), relative to its value.
     noise : float
         Standard deviation of the displacement's noise [µm].
     drift : float
-        Random walk of each parameter, relative to its initial value per root second. The
-        filter's memory: 0 for constant parameters.
+        Random walk of each parameter, relative to its initial value, per root second. It sets the
+        memory of the filter; 0 for constant parameters.
     mismatch : float
-        Random walk of w_h [µm per root second]: how far the true stage strays from the model
-        within a second; 0 if the model is true. For a `LinearGain`, which has no w_h: its error
-        averaged over a second [µm].
+        Random walk of w_h [µm per root second]: how far the stage deviates from the model within
+        a second; 0 for an exact model. For a `LinearGain`, which has no w_h: its error averaged
+        over a second [µm].
     offset : bool
-        Estimate an offset of the displacement too, which walks as `mismatch` says: what a larger
-        loop leaves behind after a change of amplitude.
+        Also estimate an offset of the displacement, with the random walk `mismatch`. A larger loop
+        leaves such an offset after a change of amplitude.
     delay : float
         Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     project : bool
-        Keep the estimate in the admissible set, by projection in the metric of P.
+        Keep the estimate in the admissible set by a projection in the metric of P.
 
     Raises
     ------
@@ -63,12 +62,22 @@ class HysteresisEKF(CompiledEstimator):
 
     Notes
     -----
-    Joseph's form of the update; process noise is given per second, so that a tuning
-    survives a change of sample rate. `theta` and `P` are (alpha, beta, gamma) by (4), the
-    covariance to first order; `s` and `state_covariance` are the filter's own.
+    The update has Joseph's form. Process noise is given per second, so it need not be changed with the
+    sample rate. `theta` is (alpha, beta, gamma) from (4), and `P` its covariance to first order. `s` and
+    `state_covariance` belong to the filter itself.
 
     Source: D. Simon, Optimal State Estimation (2006), sec. 13.2; the model: Eielsen, Gravdahl
     and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), (2)-(4).
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> fs = 10_000.0
+    >>> u = pz.signals.triangle(amplitude=33.0, frequency=5.0, periods=5, sample_rate=fs).values
+    >>> x = pz.PaperStage(fs, seed=0).run(u)
+    >>> estimator = pz.HysteresisEKF(fs)
+    >>> trace = estimator.run(u, x)
+    >>> compensator = pz.InverseCompensator(estimator.model)
     """
 
     __slots__ = ("_initial",)

@@ -146,7 +146,7 @@ def measurement_row(h: Any, u: Any, least: Any, centre: Any) -> None:
 
 @register_jitable
 def _restart(state: Any, settings: Any, least: Any) -> None:
-    """Let P start anew, and with it the hysteresis w_h; the parameters stay."""
+    """Let P start again, and with it the hysteresis w_h; the parameters stay."""
     P = state.filter.P
     for i in range(len(P)):
         for j in range(len(P)):

@@ -106,7 +106,7 @@ class _FilterPyBaseline(EstimatorBase):
         return self._ekf
 
     def to_dict(self) -> dict[str, Any]:
-        """Return arguments and state as a JSON-safe dictionary; `from_dict` resumes bit for bit."""
+        """Return arguments and state as a JSON-safe dictionary, from which `from_dict` continues exactly."""
         self._in_step()
         return super().to_dict()
 
@@ -154,7 +154,7 @@ class _FilterPyBaseline(EstimatorBase):
         state.last = UPDATED
 
     def _guarded(self, function: Any, *arguments: Any) -> bool:
-        """Let the filter predict or update; where it breaks, the parameters stay and P starts anew.
+        """Let the filter predict or update; where it breaks, the parameters stay and P starts again.
 
         A stream must not stop, and what is not a number would stay in the filter for good.
         """
@@ -228,6 +228,14 @@ class FilterPyEKF(_FilterPyBaseline):
     -----
     Equal to ``HysteresisEKF(..., project=False)`` at the cost of filterpy. The filterpy
     object is at hand as `filter`. Source: R. Labbe, filterpy.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> estimator = pz.FilterPyEKF(1000.0)
+    >>> estimator.step(1.0, 0.15)
+    >>> type(estimator.filter).__mro__[1].__name__
+    'ExtendedKalmanFilter'
     """
 
     __slots__ = ()
@@ -279,6 +287,14 @@ class FilterPyUKF(_FilterPyBaseline):
     -----
     Merwe's scaled sigma points with alpha = 0.1, beta = 2, kappa = 3 - n. The filterpy object
     is at hand as `filter`. Source: R. Labbe, filterpy; R. van der Merwe, thesis (2004).
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> estimator = pz.FilterPyUKF(1000.0)
+    >>> estimator.step(1.0, 0.15)
+    >>> type(estimator.filter).__name__
+    'UnscentedKalmanFilter'
     """
 
     __slots__ = ()

@@ -1,7 +1,7 @@
 """How a compiled estimator writes its model into the settings of the model's inverse.
 
 `write_model` of a kernel does so for a controller: it returns `NO_MODEL` where the estimate has no inverse,
-`CHANGED`, or `TO_BE_PLACED` where what the inverse remembers of the voltage has to be found anew.
+`CHANGED`, or `TO_BE_PLACED` where what the inverse remembers of the voltage has to be found again.
 """
 
 from __future__ import annotations

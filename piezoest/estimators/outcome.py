@@ -1,4 +1,4 @@
-"""What `piezoest.track` needs of an estimator, and what every one says of its samples."""
+"""What `piezoest.track` needs of an estimator, and the status and the trace that estimators return."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from piezoest.models import Model
 
 @runtime_checkable
 class Estimator(Protocol):
-    """What `piezoest.track` needs of an estimator; any class with these two will do.
+    """What `piezoest.track` needs of an estimator: any class with these two members.
 
     An estimator may also have ``run(u, x)``, which `track` then prefers to a loop of ``step``.
     """
 
     @property
     def model(self) -> Model:
-        """Model as known now."""
+        """The current model."""
 
     def step(self, u: float, x: float | None) -> None:
-        """Go through one sample.
+        """Process one sample.
 
         Parameters
         ----------
@@ -43,21 +43,21 @@ class Status:
     samples : int
         Samples seen.
     updates : int
-        Samples that moved the estimate.
+        Samples that changed the estimate.
     missing : int
         Samples without a usable voltage or displacement (None, NaN, infinite).
     held : int
-        Samples with a measurement that moved nothing: too little excitation to say anything, or an update
-        that would not be a number, or one beyond all measure.
+        Samples with a measurement that changed nothing: too little excitation, or an update that would not
+        be a reasonable number.
     resets : int
-        Times the covariance was reset, also where it was lost or an update was left out for that reason.
+        Number of covariance resets, also after a numerical failure.
     projected : bool
         Whether `model` is the nearest admissible one and not `theta` itself.
     last : str
-        What became of the last sample: ``"waiting"``, ``"updated"``, ``"missing"``, ``"held"``
+        What happened to the last sample: ``"waiting"``, ``"updated"``, ``"missing"``, ``"held"``
         or ``"rejected"``.
     outliers : int
-        Measurements that were rejected as ones the stage cannot have made.
+        Measurements that were rejected as impossible.
     """
 
     samples: int
@@ -77,7 +77,7 @@ class Trace:
     Parameters
     ----------
     index : ndarray of int, shape (M,)
-        Positions in the record that was run.
+        Indices in the record.
     theta : ndarray, shape (M, n)
         Parameters after that sample.
     parameter_names : tuple of str

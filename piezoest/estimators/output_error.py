@@ -32,32 +32,31 @@ POLICIES = (RandomWalk(), OutlierRejection())
 class OutputErrorRLS(Freezable):
     """Recursive least squares of a Coleman-Hodgdon model in output-error form.
 
-    For a fixed decay a the displacement x = c u + b h_a(u) + offset (2)-(3) is linear in
-    (c, b, offset), with regressors from the voltage alone: free of the sensor's noise, which then
-    makes no bias, and x is never differentiated. A bank of decays around the start runs along with the
-    voltage; least squares works around the member of the bank that is nearest, with the derivative by the
-    decay as a fourth regressor, and goes on to the next member as the estimate does.
+    For a fixed decay a, the displacement x = c u + b h_a(u) + offset (2)-(3) is linear in
+    (c, b, offset). The regressors depend on the voltage alone, so noise of the sensor causes no
+    bias, and x is not differentiated. h_a is simulated for a bank of decays around the initial one.
+    Least squares uses the nearest member of the bank, with the derivative by the decay as a fourth
+    regressor, and changes the member when the estimated decay changes.
 
     Parameters
     ----------
     sample_rate : float
         [Hz].
     initial_model : ColemanHodgdon, optional
-        Model to start from. Default ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack
-        actuator.
+        Initial model. Default ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack actuator.
     uncertainty : float
         Standard deviation of each initial parameter (alpha, beta, gamma), relative to its value.
     noise : float
-        Least standard deviation of the displacement's noise [µm]; what is measured comes on top.
+        Smallest standard deviation of the displacement's noise [µm]; the measured noise is added.
     span : float
-        Factor: the bank reaches from the initial decay divided by it to the decay times it.
+        Factor: the bank covers the initial decay divided by `span` to the initial decay times `span`.
     members : int
-        Decays in the bank, 3 to 1000.
+        Number of decays in the bank, 3 to 1000.
     delay : float
         Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     policies : tuple of policies, optional
-        `policies.RandomWalk`, which sets the memory, and `policies.OutlierRejection`, which
-        may be left out. Default both.
+        `policies.RandomWalk`, which sets the memory, and optionally `policies.OutlierRejection`.
+        Default: both.
 
     Raises
     ------
@@ -66,17 +65,27 @@ class OutputErrorRLS(Freezable):
 
     Notes
     -----
-    The law is a Kalman filter. Parameters walk by parts of alpha, beta and gamma as in
-    `HysteresisRLS`, by the reference's own swings. What no parameter explains (creep, the shape that the
-    model does not have) is a disturbance of its own that lasts a part of a swing, a Markov
-    process of first order; so a slow error of the level does not weigh as often as it is sampled. The
-    model's offset is the loop's centre and that disturbance together. At rest nothing moves.
+    The law is a Kalman filter. As in `HysteresisRLS`, the parameters perform a random walk that is relative
+    to alpha, beta and gamma and counted in swings of the reference. Creep and other errors of the model
+    are described by a disturbance that lasts a fraction of a swing (a first-order Markov process), so a
+    slow error is not counted once per sample. The model's offset is the centre of the loop plus this
+    disturbance. At rest nothing changes.
 
-    `theta` is (alpha, beta, gamma, offset), `P` its covariance to first order as the law sees it.
-    A decay beyond the bank is taken for its end.
+    `theta` is (alpha, beta, gamma, offset), and `P` its covariance to first order. A decay outside the
+    bank is replaced by the nearest end of the bank.
 
     Sources: L. Ljung, System Identification, 2nd ed. (1999), sec. 10.3, 11.2 and 11.4 (law); Eielsen,
     Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), (2)-(4) (model).
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> fs = 10_000.0
+    >>> u = pz.signals.triangle(amplitude=33.0, frequency=5.0, periods=5, sample_rate=fs).values
+    >>> x = pz.PaperStage(fs, seed=0).run(u)
+    >>> estimator = pz.OutputErrorRLS(fs)
+    >>> trace = estimator.run(u, x)
+    >>> compensator = pz.InverseCompensator(estimator.model)
     """
 
     __slots__ = ("_initial",)

@@ -182,7 +182,7 @@ def start_covariance(P: Any, start_b: Any, spread: Any) -> None:
 
 @register_jitable
 def _hold(state: Any, settings: Any) -> None:
-    """Count a sample whose update is not safe: the estimate stays, P starts anew."""
+    """Count a sample whose update is not safe: the estimate stays, P starts again."""
     law = state.law
     start_covariance(law.P, settings.start_b, settings.spread)
     law.resets += 1.0

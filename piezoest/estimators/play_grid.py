@@ -260,7 +260,7 @@ def output(theta: Any, plays: Any) -> Any:
 
 @register_jitable
 def begin_window(window: Any, plays: Any) -> None:
-    """Begin the sums and the travel anew."""
+    """Begin the sums and the travel again."""
     window.elapsed = window.count = window.x = plays.travel = 0.0
     phi, way = window.phi, plays.way
     for i in range(len(phi)):

@@ -43,30 +43,28 @@ class PrandtlIshlinskiiRLS(Freezable):
     sample_rate : float
         [Hz].
     initial_model : PrandtlIshlinskii, ColemanHodgdon or LinearGain, optional
-        Model to start from. A `PrandtlIshlinskii` also brings thresholds, bends and time
-        constants of creep, which are then kept. A `ColemanHodgdon` (default
-        ``ColemanHodgdon(0.02, 0.12, 0.0036)``) is turned into weights that have its loop. A
-        `LinearGain` stands for itself: the gain alone is estimated.
+        Initial model. The thresholds, bends and time constants of creep of a `PrandtlIshlinskii` are
+        kept. A `ColemanHodgdon` (default ``ColemanHodgdon(0.02, 0.12, 0.0036)``) is converted to
+        weights with the same loop. With a `LinearGain` only the gain is estimated.
     voltage_range : tuple of float, optional
-        Least and largest voltage [V]. Default: learnt. The grid then grows with the voltage,
-        and once shrinks to it if after four turns it was laid too wide.
+        Smallest and largest voltage [V]. Default: learnt. The grid then grows with the voltage. If it
+        is too wide after four turning points, it shrinks once.
     thresholds : int
-        Number n of plays, up to 200. Rule: the i-th threshold is i/n of half the voltage range.
+        Number n of plays, up to 200. The i-th threshold is i/n of half the voltage range.
     bends : int
         Number k of voltages at which slopes may change, up to 50, evenly over the range; 0 for a
         symmetric loop.
     creep : tuple of float
         Time constants of creep [s]; empty for none.
     uncertainty : float
-        Standard deviation of the start's scale, relative to itself; what is uncertain within is
-        the shape of the loop.
+        Relative standard deviation of the initial model's scale and of the shape of its loop.
     noise : float
         Standard deviation of the displacement's noise [µm].
     delay : float
         Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     mechanics : MassSpringDamper, optional
-        Resonance that the voltage goes through before it is compared, so that it is not learnt
-        as hysteresis: for references that reach towards it, with a `LeadFilter`.
+        Resonance through which the voltage is filtered first, so that it is not learnt as hysteresis.
+        Use it with a `LeadFilter`, for references close to the resonance.
 
     Raises
     ------
@@ -75,19 +73,29 @@ class PrandtlIshlinskiiRLS(Freezable):
 
     Notes
     -----
-    The law is a Kalman filter whose parameters walk, and it counts by the travel of the voltage
-    and not by time. Samples are averaged until the voltage has travelled 1/32 of half
-    the range; then one update is made. Each parameter's variance grows by the travel of its own
-    regressor, up to its start: a weight whose play does not move is not forgotten. A level
-    walks fast along with them and takes what changes slowly and is no parameter's. At a dwell only
-    the level moves. `theta` holds slopes and creep gains; in `model` they are zero or more, by the
-    shortest way in the metric of P, and the level, averaged over a period, is the offset.
+    The law is a Kalman filter with random-walk parameters. It depends on the travel of the voltage and not
+    on time: samples are averaged until the voltage has travelled 1/32 of half the range; then one update
+    is made. The variance of each parameter grows with the travel of its own regressor, at most to its
+    initial value. So a weight whose play does not move is not forgotten. An additional parameter, the level,
+    may change fast and absorbs slow disturbances. At rest only the level changes. `theta` holds slopes and
+    creep gains. In `model` negative ones are moved to zero, along the shortest way in the metric of P, and
+    the offset is the level averaged over a period.
 
-    An update costs some 3 N² multiplications for N = (1 + n)(1 + k) + m + 1 parameters, a
-    sample some 3 N.
+    An update costs about 3 N² multiplications for N = (1 + n)(1 + k) + m + 1 parameters (m creep terms), a
+    sample about 3 N.
 
     Sources: K. Kuhnen, European Journal of Control 9 (2003) 407-418 (model); L. Ljung, System
     Identification, 2nd ed. (1999), sec. 11.2 (law).
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> fs = 10_000.0
+    >>> u = pz.signals.two_tone([20.0, 10.0], [2.0, 7.0], 1.0, fs).values
+    >>> x = pz.PaperStage(fs, seed=0).run(u)
+    >>> estimator = pz.PrandtlIshlinskiiRLS(fs)
+    >>> trace = estimator.run(u, x)
+    >>> compensator = pz.InverseCompensator(estimator.model)
     """
 
     __slots__ = ("_creep", "_initial", "_scale")
@@ -98,7 +106,7 @@ class PrandtlIshlinskiiRLS(Freezable):
         "learns_the_parameters": "Its parameters are slopes of plays, not those of the Coleman-Hodgdon "
         "plant of that test.",
         "a_dwell_moves_nothing": "At a dwell creep shows, and its gains are learnt; no slope moves.",
-        "works_in_the_ring": "Its model has another number of parameters than the ring's first one.",
+        "works_in_the_ring": "Its model has another number of parameters than the loop's first one.",
         "a_missing_sample_changes_nothing_but_itself": "Samples are taken in windows of travel, and "
         "weights near zero differ by more than parts of themselves.",
     }

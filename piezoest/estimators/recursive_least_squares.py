@@ -55,6 +55,15 @@ class RecursiveLeastSquares:
     Notes
     -----
     Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), App. A.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> law = pz.RecursiveLeastSquares(2)
+    >>> for z, phi in ((1.0, [1.0, 0.0]), (3.0, [1.0, 1.0])):
+    ...     law.update(z, phi)
+    >>> law.theta.round(3)
+    array([1., 2.])
     """
 
     __slots__ = ("_layouts", "_settings", "_state")

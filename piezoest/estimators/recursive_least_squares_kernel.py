@@ -68,14 +68,14 @@ def law_settings(policies: tuple[Policy, ...], at: Conditions, noise: float) -> 
 
 @inlined
 def restart(law: Any, settings: Any) -> None:
-    """Let P start anew."""
+    """Let P start again."""
     equations.restore_covariance(law.P, settings.P_0)
     law.resets += 1.0
 
 
 @inlined
 def _settle(law: Any, settings: Any, safe: Any, y: Any, S: Any) -> None:
-    """Count a sample: an update, or one that was not safe; then theta stays and P starts anew."""
+    """Count a sample: an update, or one that was not safe; then theta stays and P starts again."""
     if safe:
         law.innovation = y
         law.innovation_variance = S

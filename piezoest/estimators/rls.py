@@ -50,53 +50,51 @@ def default_policies(memory: Any, initial: Model) -> tuple[Policy, ...]:
 
 
 class HysteresisRLS(Freezable):
-    """Recursive least squares on the derivative form of a model, from raw (u, x).
+    """The paper's estimator: recursive least squares on the derivative form of a model.
 
-    The paper's estimator: z = dx/dt against the regressor (20) of the Coleman-Hodgdon model
-    (18)-(20), or z = x against u for the linear gain (12), both sides through the same
-    low-pass W_p, into the law of App. A.
+    It takes voltage and displacement. For the Coleman-Hodgdon model it regresses z = dx/dt on the
+    regressor (20); for the linear gain it regresses z = x on u (12). Both sides pass the same
+    low-pass filter W_p. The adaptation law is that of App. A.
 
     Parameters
     ----------
     sample_rate : float
         [Hz].
     initial_model : ColemanHodgdon or LinearGain, optional
-        Model to start from; its kind is the kind that is estimated. Default
+        Initial model; a model of the same kind is estimated. Default
         ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack actuator.
     memory : float, None or "period"
-        ``"period"`` (default): random-walk forgetting with a memory relative to the
-        reference's own period, see `policies.RandomWalk` and, for a `LinearGain`,
-        `policies.PeriodicForgetting`. A number: time constant of
-        exponential forgetting [s], as in the paper. None: no forgetting. With the continuous
-        time base ``"period"`` means 0.4 s.
+        ``"period"`` (default): the memory is counted in periods of the reference, see
+        `policies.RandomWalk` and, for a `LinearGain`, `policies.PeriodicForgetting`. A number:
+        time constant of exponential forgetting [s], as in the paper. None: no forgetting. With
+        the continuous time base ``"period"`` means 0.4 s.
     uncertainty : float
         Standard deviation of each initial parameter, relative to its value.
     noise : float
-        Standard deviation of the displacement's noise [µm]; weighs the start against the data.
+        Standard deviation of the displacement's noise [µm]; it weighs the initial model against the data.
     cutoff : float
         Cut-off frequency of W_p [Hz], at least 1e-9 of the sample rate.
     high_pass : float, optional
-        Cut-off frequency of a first-order high-pass on both sides [Hz], against a biased
-        sensor (last remark of App. A). Below the reference's lowest frequency. It can only
-        remove what is constant: a bias enters as |du/dt|, so for anything but a sharp
-        triangle `offset` is the better way.
+        Cut-off frequency of a first-order high-pass filter on both sides [Hz], for a biased
+        sensor (last remark of App. A); below the reference's lowest frequency. It removes
+        constants only. A bias enters as |du/dt|, so `offset` is better unless the reference is
+        a sharp triangle.
     offset : bool, optional
-        Estimate the loop's centre too, by one more regressor |du/dt|: a biased sensor or a
-        unipolar voltage then needs no high-pass, and what a larger loop leaves behind is taken out.
-        Default: with ``memory="period"``, except for a `LinearGain`; not with the paper's memory.
+        Also estimate the centre of the loop, with |du/dt| as an additional regressor. A biased
+        sensor or a unipolar voltage then needs no high-pass, and the offset that a larger loop has left is
+        removed. Default: true with ``memory="period"``, except for a `LinearGain`; else false.
     delay : float
         Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     time_base : {"discrete", "continuous"}
         Time base of the law, see `RecursiveLeastSquares`; ``"continuous"`` is the paper's,
         in seconds.
     errors : bool
-        Follow the covariance of the estimate's error, for `standard_errors`, and the mean square of the
-        regressor, for `excitation`. They cost about as much as the law itself: :doc:`/performance`.
+        Compute the covariance of the estimate's error, for `standard_errors`, and the mean square of the
+        regressor, for `excitation`. This costs about as much as the law itself: :doc:`/performance`.
     policies : tuple of policies, optional
-        Policies beside `memory`. Default with ``memory="period"``: ``(RandomWalk(), DeadZone(),
-        OutlierRejection())``, for a `LinearGain` with `PeriodicForgetting` for
-        `RandomWalk`; else ``(NormBound(), DeadZone(), Normalisation())``, the paper's with a dead
-        zone.
+        Policies in addition to `memory`. Default with ``memory="period"``: ``(RandomWalk(), DeadZone(),
+        OutlierRejection())``, or ``(PeriodicForgetting(), DeadZone())`` for a `LinearGain`. Else
+        ``(NormBound(), DeadZone(), Normalisation())``, which is the paper's law with a dead zone.
 
     Raises
     ------
@@ -111,6 +109,19 @@ class HysteresisRLS(Freezable):
 
     Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), sec. III B
     and App. A.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> fs = 10_000.0
+    >>> u = pz.signals.triangle(amplitude=33.0, frequency=5.0, periods=5, sample_rate=fs).values
+    >>> x = pz.PaperStage(fs, seed=0).run(u)
+    >>> estimator = pz.HysteresisRLS(fs)
+    >>> for u_k, x_k in zip(u, x, strict=True):
+    ...     estimator.step(u_k, x_k)
+    >>> compensator = pz.InverseCompensator(estimator.model)
+    >>> estimator.status.last
+    'updated'
     """
 
     __slots__ = ("_followed", "_initial", "_scale")
@@ -239,19 +250,19 @@ class HysteresisRLS(Freezable):
         return history / (unit if name == "y" else unit**2)
 
     def reset_covariance(self) -> None:
-        """Put P back to its initial value: covariance resetting on call."""
+        """Set P to its initial value (covariance resetting)."""
         own = self._state["law"]
         own["P"] = self._settings["law"]["P_0"]
         own["resets"] += 1.0
 
     def announce_change(self, amplitude: float | None = None) -> None:
-        """Say that the stage or the reference is about to change: adds the initial covariance to P.
+        """Announce a change of the stage or the reference: adds the initial covariance to P.
 
         Parameters
         ----------
         amplitude : float, optional
-            Of the reference from now on [µm]: if it is known to `profile`, the estimate goes to what was
-            learnt there, and P only as far as that is uncertain. Needs `policies.AmplitudeMemory`.
+            New amplitude of the reference [µm]. If `profile` contains it, the estimate is set to what was
+            learnt there, and P grows only by its uncertainty. Needs `policies.AmplitudeMemory`.
 
         Raises
         ------
@@ -268,10 +279,9 @@ class HysteresisRLS(Freezable):
 
     @property
     def profile(self) -> AmplitudeProfile:
-        """What was learnt at each swing of the voltage, with `policies.AmplitudeMemory`; settable.
+        """What was learnt at each swing of the voltage, with `policies.AmplitudeMemory`; it can be set.
 
-        Parameters move with the stage's amplitude: a profile that was saved spares the next start
-        what this one had to learn.
+        The parameters depend on the amplitude. With a saved profile the next start need not learn them again.
         """
         return amplitude_memory.profile_of(self._state["policies"]["amplitude_memory"], self._scale)
 
@@ -282,11 +292,11 @@ class HysteresisRLS(Freezable):
 
     @property
     def excitation(self) -> float:
-        """Least eigenvalue of the regressor's mean square over a swing, relative to the mean one.
+        """Smallest eigenvalue of the regressor's mean square over a swing, relative to the mean eigenvalue.
 
-        The alpha_0 of (A8) for the scaled regressor, normalised: 1 if every direction is
-        excited alike, 0 if one is not excited at all. NaN with ``errors=False``, unless
-        `policies.ExcitationGate` is on: nobody follows it then.
+        This is alpha_0 of (A8) for the scaled regressor, normalised: 1 if all directions are
+        equally excited, 0 if one is not excited. NaN with ``errors=False``, unless
+        `policies.ExcitationGate` is on.
         """
         if "products" not in self._followed:
             return np.nan
@@ -315,10 +325,10 @@ class HysteresisRLS(Freezable):
     def standard_errors(self) -> FloatArray:
         """Standard deviations of `theta`, shape (n,), for white noise in the displacement.
 
-        Differencing and W_p colour that noise, so that P is not the covariance of `theta`:
-        these follow the noise through the filters and the law (see
-        `least_squares.propagate_error`), for parameters that are constant: the model's own
-        mismatch is not in them. With the continuous time base, or ``errors=False``, they are those of `P`.
+        Differentiation and W_p colour that noise, so P is not the covariance of `theta`. The standard
+        errors follow the noise through the filters and the law (see `least_squares.propagate_error`). They
+        hold for constant parameters and do not contain errors of the model. With the continuous time
+        base, or ``errors=False``, they are those of `P`.
         """
         if "errors" not in self._followed or self._state["law"]["updates"] == 0.0:
             return np.sqrt(np.fmax(np.diag(self.P), 0.0))

@@ -43,7 +43,7 @@ LEAST, MARGIN = 1e-2, 1e-3
 # By how much the slopes up and down differ where nothing is off centre, relative to them; and the levels,
 # relative to half a swing.
 SLOPES_DIFFER, LEVELS_DIFFER = 3e-3, 2e-2
-# Beyond this trace the covariance of the estimate's error says nothing, and starts anew.
+# Beyond this trace the covariance of the estimate's error says nothing, and starts again.
 LARGEST_ERROR = 1e60
 
 

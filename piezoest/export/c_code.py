@@ -72,6 +72,15 @@ def c(
     ValueError
         If an object is of a kind that cannot be exported, the name is no identifier, or the
         precision is unknown.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> fs, start = 50_000.0, pz.ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)
+    >>> estimator = pz.HysteresisRLS(fs, initial_model=start)
+    >>> code = pz.export.c(estimator, pz.InverseCompensator(start), precision="float")
+    >>> "piezoest_controller_step" in code.header
+    True
     """
     if isinstance(estimator, AdaptiveFeedforward):
         if compensator is not None or update_interval != _INTERVAL:

@@ -23,7 +23,7 @@ _HELPERS = {
     "squared": "return x * x;",
 }
 # exp(x) - 1 loses its digits near zero. In double it is math.h's expm1, the one that the library runs:
-# with exponential forgetting the ring makes 1e-10 of a difference in the last digit. In float a power
+# with exponential forgetting the loop makes 1e-10 of a difference in the last digit. In float a power
 # series does, and is several times faster on a small target; from the end on nothing is left of exp(-x).
 _SERIES_LIMIT, _SERIES_TERMS, _SERIES_END = 0.35, 7, 20.0
 _SERIES = f"""/* By the power series of a half, a quarter, ... of x, doubled as often. */

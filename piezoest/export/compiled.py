@@ -54,7 +54,7 @@ def _load(code: CCode, kind: str) -> tuple[Any, Any, Any]:
 
 
 class CompiledController(Ring):
-    """Generated code, compiled by this computer's C compiler, with the face of `Controller`.
+    """Generated code, compiled by this computer's C compiler, with the methods of `Controller`.
 
     For checks of the code against the library and against logs from a target. Each object has
     a state of its own.
@@ -179,12 +179,12 @@ class CompiledFeedforward:
         self.reset()
 
     def reset(self, voltage: float | None = None) -> None:
-        """Return to the state that was exported, or begin anew.
+        """Return to the state that was exported, or start again.
 
         Parameters
         ----------
         voltage : float, optional
-            Voltage at which the stage rests, to begin anew [V]. Default: what was exported.
+            Voltage at which the stage rests, to start again [V]. Default: what was exported.
 
         Raises
         ------
@@ -218,7 +218,7 @@ class CompiledFeedforward:
         Parameters
         ----------
         u : float or None
-            Voltage [V]; None or NaN where nobody knows what was written.
+            Voltage [V]; None or NaN if it is unknown what was written.
         x : float or None
             Measured displacement [µm]; None or NaN where there is none.
         """

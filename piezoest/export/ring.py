@@ -1,4 +1,4 @@
-"""One turn of the ring as a controller runs it: measurement in, estimate, model, voltage out."""
+"""One sample of the control loop on a controller: measurement, estimate, model, voltage."""
 
 from __future__ import annotations
 

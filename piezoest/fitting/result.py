@@ -17,7 +17,7 @@ from piezoest.models import Model
 
 
 class Prediction(NamedTuple):
-    """Displacement (N,) [µm], and between what a reading is to be expected, 95 times in 100."""
+    """Displacement (N,) [µm], and bounds between which 95 of 100 readings are expected."""
 
     x: FloatArray
     lower: FloatArray
@@ -35,33 +35,31 @@ class Fit:
     form : str
         Its kind, one of `FORMS`.
     parameters : int
-        How many were fitted; slopes at their bound do not count.
+        Number of fitted parameters; slopes at their bound do not count.
     standard_errors : dict of str to float
-        Of the parameters that were estimated, by their names, in their units; honest for residuals that are
-        not white.
+        Of the estimated parameters, by name, in their units; valid for residuals that are not white.
     delay : float
         Samples by which the displacement lags the voltage.
     delay_estimated : bool
         Whether the delay was estimated.
     initial_state : float or ndarray
-        What `model.simulate` is to begin with on this record, in V of plays, in µm of a loop and of creep.
+        Initial state for `model.simulate` on this record: of plays in V, of a loop and of creep in µm.
     held_out : float
-        Root of the mean square of what each of five blocks but the first misses under the fit of the
-        others [µm].
+        Prediction error of each of five blocks except the first, from a fit to the others [µm rms].
     ahead : float
-        The same of the last two blocks under the fit of those before them [µm].
+        Prediction error of the last two blocks, from a fit to those before them [µm rms].
     spread : Spread
-        How far readings lie from the prediction, 95 times in 100 [µm].
+        Distance from the prediction that 95 of 100 readings do not exceed [µm].
     counts : ndarray of bool, shape (N,)
-        Which samples were fitted: not those that are missing, spikes, or not yet settled.
+        True for samples that were fitted: not missing, no spike, settled.
     left_out : int
         Samples at the start that were left out, because the stage had not settled.
     spikes : int
-        Samples that were left out because they alone are far off.
+        Samples that were left out because they are single and far off.
     drift : float
-        Drift over the record that was fitted beside the model [µm].
+        Drift over the record, fitted together with the model [µm].
     solver : str
-        What solved, and what checked it.
+        Name of the solver, and the result of the check.
     """
 
     model: Model
@@ -90,13 +88,13 @@ class Fit:
         return FORMS[self.form].label
 
     def predict(self, u: FloatArray | None = None) -> Prediction:
-        """Free-running displacement, which sees only the voltage.
+        """Displacement simulated from the voltage alone.
 
         Parameters
         ----------
         u : array_like, shape (N,), optional
-            Voltage [V] of another record, from a stage that rests at 0 V before it; by default the fitted
-            record's, with its drift and jumps.
+            Voltage [V] of another record, before which the stage rests at 0 V. Default: that of the fitted
+            record, with its drift and jumps.
         """
         if u is None:
             return self.continued(self._u)
@@ -105,9 +103,7 @@ class Fit:
         return Prediction(x, x - half, x + half)
 
     def elsewhere(self, u: FloatArray, *, sample_rate: float | None = None) -> FloatArray:
-        """Displacement along a voltage, from a stage that rests at 0 V before it [µm].
-
-        Drift and jumps are not in it.
+        """Displacement for a voltage, from a stage that has rested at 0 V [µm], without drift and jumps.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""A log larger than memory in parts of one size, whatever the blocks of its file."""
+"""A log larger than memory in parts of equal size, for any size of the blocks of its file."""
 
 from __future__ import annotations
 

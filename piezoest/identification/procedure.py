@@ -1,4 +1,4 @@
-"""From a recorded log to a model: does it make sense, what fits it best, how far to trust that."""
+"""From a recorded log to a model: checks of the log, the best model, and its accuracy."""
 
 from __future__ import annotations
 
@@ -46,11 +46,12 @@ def identify(
     strict: bool = False,
     say: Say | None = None,
 ) -> Identification:
-    """Identify a stage from a recorded log: the model that fits it best, and how far to trust it.
+    """Find the model of a stage that fits a recorded log best, and how accurate it is.
 
-    The log is looked at first: units, columns, direction of the loop, clipping, spikes, jumps. Then models
-    of all kinds, or of one, are fitted to its first part, see `piezoest.fit`. The kind is chosen by blocks
-    of that part, each predicted from the others, and judged on the rest of the log, which no fit has seen.
+    First the log is checked: units, columns, direction of the loop, clipping, spikes, jumps. Then models of
+    all kinds, or of one kind, are fitted to its first part, see `piezoest.fit`. The kind is chosen by
+    cross-validation on blocks of that part. The model is tested on the rest of the log, which no fit has
+    seen.
 
     Parameters
     ----------
@@ -67,18 +68,18 @@ def identify(
         ``"auto"``, or the kind to fit, as for `piezoest.fit`: ``"line"``, ``"coleman-hodgdon"``, ``"plays"``,
         ``"plays-creep"``, ``"plays-asymmetric"``, ``"plays-asymmetric-creep"``.
     train : float
-        Part of the log to fit, from its start; the rest is held out. 0.1 to 0.9.
+        The fraction of the log to fit, from its start, 0.1 to 0.9; the rest is held out.
     delay : float or "auto"
-        Samples by which the displacement lags the voltage, 0 to 10, fractions too. ``"auto"`` estimates it
-        where the log can tell it from the width of the loop, by swings of several sizes or frequencies;
-        else it is 0.
+        Samples by which the displacement lags the voltage, 0 to 10, fractions too. ``"auto"`` estimates it if
+        the log contains swings of several sizes or frequencies, which show the difference between a delay and
+        a wider loop; else it is 0.
     settle : float, optional
-        Seconds to leave out at the start; by default as long as the start is off the model by more than four
-        robust standard deviations, at most a tenth of the fitted part.
+        Seconds to leave out at the start. Default: while the error exceeds four robust standard deviations,
+        at most a tenth of the fitted part.
     validate : sequence
-        Other logs of the stage, each a record, a file or a table: the model predicts them.
+        Other logs of the stage, each a record, a file or a table, which the model predicts.
     strict : bool
-        Raise an error for what is doubtful about the log.
+        Raise an error if the log is doubtful.
     say : callable, optional
         Called with a few words before each step.
 
@@ -89,7 +90,7 @@ def identify(
     Raises
     ------
     ValueError
-        If the log is too short, its voltage excites too little (with the figure), its displacement falls as
+        If the log is too short, its voltage moves too little (with the number), its displacement falls when
         the voltage rises, an argument is out of its range, or `strict` and the log is doubtful.
     OSError
         If a file cannot be read.

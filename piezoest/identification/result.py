@@ -58,10 +58,10 @@ class Candidate:
     train, held_out : Misfit
         Free-running error where it was fitted and where it was not.
     prediction : Prediction
-        Free-running displacement over the record, and between what readings are to be expected [µm].
+        Simulated displacement over the record, and the bounds within which readings are expected [µm].
     residual : ndarray, shape (N,)
-        Measured displacement less that, and less jumps of the sensor behind the fitted part [µm]; NaN where a
-        sample is missing or flawed.
+        Measured minus simulated displacement, without jumps of the sensor after the fitted part [µm]; NaN
+        where a sample is missing or faulty.
     """
 
     fit: Fit
@@ -87,15 +87,15 @@ class Candidate:
 
     @property
     def parameters(self) -> int:
-        """How many were fitted."""
+        """Number of fitted parameters."""
         return self.fit.parameters
 
     @property
     def cross_validated(self) -> float:
-        """Error on blocks of the fitted part that were left out of the fit [µm rms]: it decides.
+        """Error on blocks of the fitted part that were left out of the fit [µm rms]; it decides the choice.
 
-        Geometric mean of the errors on blocks between others, and on blocks behind all others. Of what
-        follows a log, the latter says more; the former is surer.
+        It is the geometric mean of two errors: on blocks between others, and on blocks after all others. The
+        second says more about the time after the log; the first is less noisy.
         """
         return left_out_error(self.fit)
 
@@ -113,9 +113,9 @@ class Candidate:
 
 
 class Validation(NamedTuple):
-    """How a model predicts another log of the stage, but for a start that has not settled.
+    """Error of a model on another log of the stage, without a start that has not settled.
 
-    The error as it is, and without its mean: an offset is what moves between two days.
+    The error is given as it is and without its mean, because the offset may change between two days.
     """
 
     source: str
@@ -141,7 +141,7 @@ class Validation(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """A model identified from a record, and how far to trust it.
+    """A model identified from a record, and its accuracy.
 
     Parameters
     ----------
@@ -208,12 +208,12 @@ class Identification:
 
     @property
     def standard_errors(self) -> dict[str, float]:
-        """Of the parameters, the offset and the delay; zero where a value was given or ended at a bound."""
+        """Of parameters, offset and delay; zero if a value was given or is at a bound."""
         return self.fit.standard_errors
 
     @property
     def initial_state(self) -> Any:
-        """What `model.simulate` is to begin with on this record."""
+        """Initial state for `model.simulate` on this record."""
         return self.fit.initial_state
 
     @property
@@ -233,12 +233,12 @@ class Identification:
 
     @property
     def train(self) -> Misfit:
-        """Free-running error where the model was fitted."""
+        """Error of the simulated displacement on the fitted part."""
         return self.best.train
 
     @property
     def held_out(self) -> Misfit:
-        """Free-running error where it was not: it sees only the voltage."""
+        """Error of the simulated displacement on the held-out part."""
         return self.best.held_out
 
     @property
@@ -248,12 +248,12 @@ class Identification:
 
     @property
     def line_train(self) -> Misfit:
-        """Error of the straight line where it was fitted."""
+        """Error of the straight line on the fitted part."""
         return self.candidates[0].train
 
     @property
     def line_held_out(self) -> Misfit:
-        """Error of the straight line where it was not."""
+        """Error of the straight line on the held-out part."""
         return self.candidates[0].held_out
 
     @property

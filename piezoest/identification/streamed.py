@@ -46,7 +46,7 @@ class StreamedIdentification:
     delay : float
         Samples by which the displacement lags the voltage.
     train, held_out : Misfit
-        Free-running error of the model on the part it was fitted on and on the part held out.
+        Error of the simulated displacement on the fitted and on the held-out part.
     line : Model
         The best straight line of the fitted part, for comparison.
     line_train, line_held_out : Misfit
@@ -66,7 +66,7 @@ class StreamedIdentification:
     prediction : ndarray
         Free-running displacement [µm] at the samples of `thinned`.
     notes, advice : tuple of str
-        What was assumed to read the log, and what to know before using the model, in plain sentences.
+        Assumptions made to read the log, and what to know before using the model, in sentences.
     """
 
     model: Model
@@ -159,6 +159,13 @@ def identify_stream(
     ------
     ValueError
         As `identify`; the excitation is that of the first 50 000 samples.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> found = pz.identify_stream(pz.stream_record(pz.records.example_log()))
+    >>> found.chosen
+    'plays-asymmetric'
     """
     if not isinstance(log, RecordStream):
         raise ValueError(f"log must be a RecordStream, got {type(log).__name__}: use stream_record(path)")

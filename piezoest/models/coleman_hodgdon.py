@@ -44,7 +44,7 @@ class ColemanHodgdon(FreeRunning):
     gamma : float
         alpha times the slope of the asymptote [µm/V²].
     offset : float
-        Displacement at zero voltage and w_h = 0 [µm]; holds a sensor bias or the
+        Displacement at zero voltage and w_h = 0 [µm]: a sensor bias, or the
         centre of a unipolar loop.
 
     Raises
@@ -54,9 +54,20 @@ class ColemanHodgdon(FreeRunning):
 
     Notes
     -----
-    Admissible, so that the slope dx/du keeps the sign of u' and the inverse exists, are
-    alpha > 0, beta > 0, alpha beta < gamma <= 2 alpha beta; that is a > 0, b > 0, c >= 2b.
+    The parameters are admissible if x rises with u, so that the inverse exists: alpha > 0, beta > 0,
+    alpha beta < gamma <= 2 alpha beta, which means a > 0, b > 0, c >= 2b.
     Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezoest as pz
+    >>> model = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+    >>> x = model.simulate(np.array([0.0, 10.0, 20.0, 10.0]))  # V to µm
+    >>> x.round(3)
+    array([0.   , 1.526, 3.15 , 1.801])
+    >>> model.invert(x).round(6)  # µm to V
+    array([ 0., 10., 20., 10.])
     """
 
     alpha: float

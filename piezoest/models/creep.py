@@ -34,6 +34,14 @@ class Creep(EqualByContent):
     Notes
     -----
     Source: K. Kuhnen, P. Krejci, IEEE Trans. Autom. Control 54 (2009) 537-550.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezoest as pz
+    >>> creep = pz.Creep(gains=[0.01, 0.01], time_constants=[0.1, 1.0])
+    >>> creep.simulate(np.ones(4), sample_rate=10.0).round(4)
+    array([0.0073, 0.0105, 0.0121, 0.0131])
     """
 
     gains: FloatArray

@@ -1,4 +1,4 @@
-"""What a model was learnt on: ranges beyond which nobody has seen whether it holds."""
+"""The ranges of the log that a model was learnt on; outside them it has not been tested."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ class LearntOn:
     voltage : tuple of float
         Lowest and highest [V].
     displacement : tuple of float
-        Lowest and highest [µm], but for one reading in 2000 at either end.
+        Lowest and highest [µm], without one reading in 2000 at either end.
     rate : float
-        Largest |du/dt| [V/s]: of the samples at which the voltage moves 99.5 % are slower, so that a step or
-        a spike does not count.
+        Largest |du/dt| [V/s]. 99.5 % of the samples at which the voltage moves are slower, so a step or a
+        spike does not count.
     frequency : tuple of float, optional
-        Lowest and highest of the voltage's swings [Hz], but for 5 % of the periods at either end. None if it
-        turned less than twice.
+        Lowest and highest frequency of the voltage's swings [Hz], without 5 % of the periods at either end.
+        None if it has fewer than two turning points.
 
     Raises
     ------

@@ -32,6 +32,14 @@ class LinearGain(FreeRunning):
     ------
     ValueError
         If a parameter is not a finite number.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezoest as pz
+    >>> model = pz.LinearGain(0.15, offset=1.0)
+    >>> model.simulate(np.array([0.0, 10.0]))
+    array([1. , 2.5])
     """
 
     gain: float

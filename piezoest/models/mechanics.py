@@ -27,6 +27,14 @@ class MassSpringDamper:
     ------
     ValueError
         If the natural frequency is not above zero or the damping ratio is negative.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezoest as pz
+    >>> mechanics = pz.MassSpringDamper(natural_frequency=780.0, damping_ratio=0.02)
+    >>> mechanics.simulate(np.ones(3), sample_rate=10_000.0).round(3)
+    array([0.117, 0.437, 0.883])
     """
 
     natural_frequency: float

@@ -45,28 +45,32 @@ class PrandtlIshlinskii(Model, EqualByContent):
     bends : array_like, shape (k,), optional
         Voltages at which slopes change [V], rising.
     bend_weights : array_like, shape (k, 1 + n), optional
-        Change of slope above each bend [µm/V]: of the gain, where the voltage is above it, then
-        of each weight, where that play is.
+        Change of slope above each bend [µm/V], of the gain and of each weight.
     sample_rate : float, optional
         Rate at which creep proceeds where no other is given [Hz].
 
     Raises
     ------
     ValueError
-        If a value is not finite, the thresholds are not above zero and rising, the bends not
-        rising, the shapes do not fit, or the creep is no `Creep`.
+        If a value is out of its range, the bends or thresholds do not rise, or the shapes do not fit.
 
     Notes
     -----
-    Admissible, so that x rises with u and the inverse exists, are gain > 0 and
-    gain + weights[0] + … + weights[i] > 0 for every i, with bends for the least that each
-    of them becomes, and negative creep gains that do not sum to -1 or less. `theta` holds the
-    gain, the thresholds, the weights, then the creep gains and the bend weights row by row.
+    The inverse exists if x rises with u: gain > 0 and gain + weights[0] + … + weights[i] > 0 for every i,
+    with bends for the smallest value of each, and negative creep gains that sum to more than -1. `theta`
+    holds the gain, the thresholds, the weights, the creep gains, and the bend weights row by row.
 
-    Sources: P. Krejci, K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001) 185-192; K.
-    Kuhnen, European Journal of Control 9 (2003) 407-418 (one-sided dead zones, here on
-    each play, see `piezoest.equations.bent_plays`); K. Kuhnen, P. Krejci,
-    IEEE Trans. Autom. Control 54 (2009) 537-550 (creep).
+    Sources: P. Krejci, K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001) 185-192; K. Kuhnen, European
+    Journal of Control 9 (2003) 407-418 (one-sided dead zones, here on each play, see
+    `piezoest.equations.bent_plays`); K. Kuhnen, P. Krejci, IEEE Trans. Autom. Control 54 (2009) 537-550
+    (creep).
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> model = pz.PrandtlIshlinskii(gain=0.1, thresholds=[2.0, 5.0], weights=[0.03, 0.02])
+    >>> model.simulate([0.0, 10.0, 20.0, 10.0]).round(3)  # V to µm
+    array([0.  , 1.34, 2.84, 1.66])
     """
 
     gain: float
@@ -109,6 +113,13 @@ class PrandtlIshlinskii(Model, EqualByContent):
         object.__setattr__(self, "bend_weights", changes)
         rate = None if sample_rate is None else positive("sample_rate", sample_rate)
         object.__setattr__(self, "sample_rate", rate)
+
+    def __repr__(self) -> str:
+        reach = f" up to {self.thresholds[-1]:.3g} V" if self.thresholds.size else ""
+        return (
+            f"PrandtlIshlinskii(gain={self.gain:.4g}, {self.thresholds.size} plays{reach}, {self.bends.size} "
+            f"bends, {self._creep_gains.size} creep terms, offset={self.offset:.4g})"
+        )
 
     @property
     def is_plain(self) -> bool:
@@ -263,11 +274,8 @@ class PrandtlIshlinskii(Model, EqualByContent):
         ----------
         r : array_like, shape (N,)
             Reference displacement [µm].
-        initial_state : array_like, shape (n,) or (n + m,), optional
-            Play states [V] before the first sample, and after them those of the creep terms
-            relative to their gains [µm]; zeros if not given.
-        sample_rate : float, optional
-            [Hz]; needed with creep only, and there the model's own if not given.
+        initial_state, sample_rate
+            As in `simulate`.
 
         Returns
         -------

@@ -46,6 +46,14 @@ class Preisach(Model, EqualByContent):
     Made for simulation: it has no `invert`. `theta` holds gain, thresholds, weights, centre and
     width. Sources: I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991; M.
     Brokate, J. Sprekels, Hysteresis and Phase Transitions, Springer 1996, sec. 2.4.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezoest as pz
+    >>> model = pz.PreisachStage(1000.0).hysteresis
+    >>> model.simulate(np.array([0.0, 10.0, 20.0, 10.0])).round(3)
+    array([0.   , 1.199, 2.731, 1.614])
     """
 
     gain: float

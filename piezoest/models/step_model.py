@@ -1,20 +1,21 @@
-"""A model that two functions of one sample describe: the short way to a model of one's own.
+"""A model described by two functions of one sample: the shortest way to a model of your own.
 
-They stand in the module of the class, plain functions for numbers, compiled loops and CasADi's symbols alike:
+They are in the module of the class, and are used with numbers, in compiled loops and with CasADi symbols:
 
 - ``displacement(state, u_0, u, constants)``: displacement [µm], without offset, after the voltage has gone
-  from u_0 to u; updates the array ``state``, and changes nothing where u is u_0;
-- ``voltage(state, u_0, x, constants)``: the voltage u after which ``displacement`` is x; leaves ``state``
-  alone.
+  from u_0 to u; it updates the array ``state``, and changes nothing if u is u_0;
+- ``voltage(state, u_0, x, constants)``: the voltage u after which ``displacement`` is x; it does not change
+  ``state``.
 
 Both, and the functions that they call, are marked ``@inlined``; ``constants`` are read by index, in the order
-of `parameter_names`. Symbols have no value: ``displacement`` goes without ``if``, ``while``, ``min`` and
-``max`` of them, by `np.abs`, `np.sign`, `np.fmin`, `np.fmax`. ``voltage`` may branch and iterate.
+of `parameter_names`. Symbols have no value, so ``displacement`` must not use ``if``, ``while``, ``min`` and
+``max``, but `np.abs`, `np.sign`, `np.fmin`, `np.fmax`. ``voltage`` may branch and iterate.
 
-Simulation, inverse, compensator, stage and fit are made of these two. The state is zero at rest at 0 V; a new
-model in a compensator finds it from the turning points of the voltage (wiping-out: I. D. Mayergoyz,
-Mathematical Models of Hysteresis, Springer 1991). There a step is as long as a swing: one that is integrated
-numerically has to be accurate for it, too, and a model that does not wipe out is placed about right only.
+Simulation, inverse, compensator, stage and fit use these two. The state is zero at rest at 0 V. A new model
+in a compensator computes its state from the turning points of the voltage (wiping-out: I. D. Mayergoyz,
+Mathematical Models of Hysteresis, Springer 1991). There a step is as long as a swing. A numerically
+integrated model must be accurate for such steps, and the state of a model without wiping-out is only
+approximate.
 """
 
 from __future__ import annotations
@@ -68,11 +69,11 @@ def _check_functions(module: str) -> None:
 
 
 class StepModel(FreeRunning):
-    """Base of models that ``displacement`` and ``voltage`` in their module describe.
+    """Base class of models that are described by ``displacement`` and ``voltage`` in their module.
 
-    A subclass is a frozen dataclass that names its `state_names`, one or more. Where some parameters may be
-    zero or less it says when it `is_admissible`, and the `bounds` of a fit. A fit needs an initial model,
-    unless the class can `guess` one.
+    A subclass is a frozen dataclass with one or more `state_names`. If some parameters may be zero or
+    negative, it defines `is_admissible` and the `bounds` of a fit. A fit needs an initial model, unless the
+    class has a method `guess`.
 
     Raises
     ------

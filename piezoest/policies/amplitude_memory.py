@@ -1,4 +1,4 @@
-"""What was learnt at each swing of the voltage is taken up again on return."""
+"""Remembers what was learnt at each size of the swing, and uses it again."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MIXED = 2.0
 
 @dataclass(frozen=True, slots=True)
 class AmplitudeMemory(Policy):
-    """Remember what was learnt at each swing of the voltage, and start from there on return.
+    """Remember what was learnt at each amplitude, and start from it when the amplitude returns.
 
     The last paragraph of sec. IV of Eielsen et al. (2012): parameters scheduled by amplitude. At the end
     of a swing like those before it the mean estimate over the swing is stored with its size; when
@@ -38,9 +38,9 @@ class AmplitudeMemory(Policy):
     places : int
         Amplitudes that are remembered, up to 1000; a further one replaces the nearest.
     tolerance : float
-        Sizes that differ by less, in parts, are the same amplitude.
+        Sizes with a smaller relative difference are the same amplitude.
     uncertainty : float
-        Standard deviation of what was stored when it is taken up, relative to the initial model.
+        Standard deviation of the stored parameters when they are used again, relative to the initial model.
 
     Raises
     ------

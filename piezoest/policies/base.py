@@ -1,4 +1,4 @@
-"""What a policy of recursive least squares is: numbers with names, and compiled hooks.
+"""A policy of recursive least squares: named numbers and compiled hooks.
 
 A policy is a frozen dataclass in a file of its own, with those of these functions beside it that it has
 something to do in. Those of the policies that are on are called once for each sample, as

@@ -1,4 +1,4 @@
-"""Adapt anew where the innovation says that something changed."""
+"""Adapt again when the innovation shows a change."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from piezoest.policies.base import Policy
 
 @dataclass(frozen=True, slots=True)
 class ChangeDetection(Policy):
-    """Add the initial covariance to P when the innovation says that something changed.
+    """Add the initial covariance to P when the innovation shows a change.
 
     A cumulative sum over the travel of the voltage: of the innovation's energy relative to its usual
     one, less 1 + drift. As long as nothing changes it gains nothing over a swing, whatever the loop
-    does within it; after a detection the usual energy is learnt anew over two swings.
+    does within it; after a detection the usual energy is learnt again over two swings.
 
     E. Page, Biometrika 41 (1954) 100-115; F. Gustafsson, Adaptive Filtering and Change Detection
     (2000), sec. 2.6 and 5.1.
@@ -53,7 +53,7 @@ class ChangeDetection(Policy):
 
 @inlined
 def after_update(own: Any, fixed: Any, state: Any, settings: Any) -> None:
-    """Add P_0 to P where the sum of what is unusual passes the threshold; what is usual is learnt anew."""
+    """Add P_0 to P where the sum of what is unusual passes the threshold; what is usual is learnt again."""
     if fixed is None:
         return
     law, energy = state.law, state.energy

@@ -1,4 +1,4 @@
-"""A covariance that became too small to adapt starts anew."""
+"""Reset a covariance that has become too small to adapt."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from piezoest.policies.base import Conditions, Policy
 
 @dataclass(frozen=True, slots=True)
 class CovarianceResetting(Policy):
-    """Put P back to its start when it became too small to adapt: lambda_min(P) <= floor.
+    """Set P to its initial value when it has become too small to adapt: lambda_min(P) <= floor.
 
     Ioannou and Sun, Robust Adaptive Control, sec. 4.3.6.
 
@@ -48,7 +48,7 @@ class CovarianceResetting(Policy):
 
 @inlined
 def before_update(own: Any, fixed: Any, state: Any, settings: Any) -> None:
-    """Let P start anew where an eigenvalue is not above the floor."""
+    """Let P start again where an eigenvalue is not above the floor."""
     if fixed is None:
         return
     law = state.law

@@ -1,4 +1,4 @@
-"""No update where the regressor says nothing."""
+"""No update when the regressor contains no information."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from piezoest.policies.base import Policy
 
 @dataclass(frozen=True, slots=True)
 class DeadZone(Policy):
-    """Leave the estimate and its covariance alone where the regressor says nothing.
+    """No update of estimate and covariance when the regressor contains no information.
 
-    Without it a dwell lets forgetting grow P on no information (wind-up).
+    Without it, forgetting increases P during a rest although no data arrive (wind-up).
 
     Parameters
     ----------
     threshold : float
-        Least phi' P0 phi, in units of the noise variance, that counts as information.
+        Smallest phi' P0 phi, in units of the noise variance, that counts as information.
 
     Raises
     ------

@@ -13,7 +13,7 @@ from piezoest.policies.periodic_forgetting import weight
 
 @dataclass(frozen=True, slots=True)
 class DirectionalForgetting(Policy):
-    """Forget only along the present regressor: what the data do not renew is kept.
+    """Forget only along the present regressor; directions without new data are kept.
 
     R. Kulhavy, Automatica 23 (1987) 589-600; L. Cao, H. Schwartz, Automatica 36 (2000) 1725-1731.
     See `piezoest.equations.least_squares.directional_update`.

@@ -1,4 +1,4 @@
-"""No update while a direction is not excited."""
+"""No update while a direction of the parameters is not excited."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ EVERY = 64.0
 
 @dataclass(frozen=True, slots=True)
 class ExcitationGate(Policy):
-    """Adapt only while every direction is excited: `HysteresisRLS.excitation` above a level.
+    """Adapt only while all directions are excited: `HysteresisRLS.excitation` above a level.
 
     The condition (A8) of Eielsen et al. (2012) for convergence, over the last swing; Ioannou and Sun,
-    Robust Adaptive Control (1996), sec. 4.3. Looked at once in 64 samples. While it is shut samples
+    Robust Adaptive Control (1996), sec. 4.3. Checked every 64 samples. While it is closed, samples
     count as held, and P does not grow.
 
     Parameters
     ----------
     least : float
-        Least excitation, of 0 to 1.
+        Smallest excitation, 0 to 1.
 
     Raises
     ------

@@ -12,10 +12,10 @@ from piezoest.policies.base import Conditions, Policy
 
 @dataclass(frozen=True, slots=True)
 class NormBound(Policy):
-    """Bound R0 on the trace of the covariance (A6): P is not updated where that would pass it.
+    """Bound R0 on the trace of the covariance (A6): an update of P that would exceed it is skipped.
 
-    To the letter (A6) freezes P for as long as ||P|| > R0, which is for good once it
-    happened; here only an update that would pass the bound is left out.
+    Taken literally, (A6) freezes P for ever once ||P|| > R0. Here only an update that would
+    exceed the bound is skipped.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Readings that the stage cannot have made are left out."""
+"""Impossible readings are ignored."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from piezoest.policies.base import Policy
 
 @dataclass(frozen=True, slots=True)
 class OutlierRejection(Policy):
-    """Leave out readings that the stage cannot have made: spikes, jumps, and those that stand still.
+    """Ignore impossible readings: spikes, jumps, and readings that stand still.
 
     Parameters
     ----------
     warm_up : int
-        Samples from which the usual change between two samples is taken.
+        Number of samples from which the usual change between two samples is measured.
 
     Raises
     ------
@@ -24,10 +24,10 @@ class OutlierRejection(Policy):
 
     Notes
     -----
-    A change is believed up to 20 times the usual one plus three times what the present slope
-    explains. Where x stays at its new level, it is taken for the new one after 2 ms. A reading
-    that is the same to the last bit while the voltage travels more than 0.5 % of a swing is that of a
-    saturated converter or a dead sensor.
+    A change of x is accepted up to 20 times the usual change plus three times the change that the present
+    slope explains. If x stays at a new level, the level is accepted after 2 ms. A reading that is
+    exactly constant while the voltage travels more than 0.5 % of a swing is that of a saturated converter
+    or a dead sensor.
     Source: rules of this library.
     """
 

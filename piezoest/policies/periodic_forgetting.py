@@ -15,7 +15,7 @@ from piezoest.policies.forgetting import check_memory
 class PeriodicForgetting(Policy):
     """Exponential forgetting with a memory in periods of the reference.
 
-    For a linear gain: over less than a period it would follow the shape of the loop.
+    For a linear gain. With a memory below one period the gain would follow the shape of the loop.
 
     Parameters
     ----------

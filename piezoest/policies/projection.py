@@ -1,4 +1,4 @@
-"""The estimate itself is kept admissible."""
+"""Keep the estimate itself admissible."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LEAST = 1e-2
 class Projection(Policy):
     """Keep theta itself in the admissible set: after each update the nearest point in the metric of P.
 
-    Without it theta goes where the data say, and only the model handed out is projected.
+    Without it theta is not restricted, and only `model` is projected.
 
     P. Ioannou, J. Sun, Robust Adaptive Control (1996), sec. 4.4; G. Goodwin, K. Sin, Adaptive
     Filtering, Prediction and Control (1984), sec. 3.7; D. Simon, IET Control Theory Appl. 4 (2010)
@@ -29,7 +29,7 @@ class Projection(Policy):
     Parameters
     ----------
     margin : float
-        Distance from the faces alpha beta < gamma <= 2 alpha beta, relative to alpha beta.
+        Distance from the limits of alpha beta < gamma <= 2 alpha beta, relative to alpha beta.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Forgetting by parameters that walk, counted in swings of the voltage."""
+"""Forgetting by a random walk of the parameters, counted in swings of the voltage."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ OFF_CENTRE, LEAST_STEP, CEILING = 0.3, 1e-6, 1e4
 
 @dataclass(frozen=True, slots=True)
 class RandomWalk(Policy):
-    """Forgetting by parameters that walk: P grows by a constant, not by a factor.
+    """Forgetting by a random walk of the parameters: P grows by a constant and not by a factor.
 
     A direction without excitation is forgotten linearly and not exponentially, and each
-    direction at the pace at which the data renew it. Everything is counted in travel of the
-    voltage and not in time, for hysteresis knows no time: at rest nothing is forgotten, and one
-    setting serves any amplitude, frequency and unit. A swing, from one turning point of the
-    voltage to the next, is half a period.
+    direction is forgotten as fast as new data arrive for it. Everything depends on the travel of
+    the voltage and not on time, as hysteresis does. So nothing is forgotten at rest, and one setting
+    works for every amplitude, frequency and unit. A swing, from one turning point of the voltage
+    to the next, is half a period.
 
     L. Ljung, System Identification, 2nd ed. (1999), sec. 11.2; L. Guo, L. Ljung, IEEE Trans.
     Autom. Control 40 (1995) 1353-1385.
@@ -40,8 +40,8 @@ class RandomWalk(Policy):
     memory : float
         Memory of the best excited direction, in periods.
     drift : float
-        Random walk of each parameter over a period, relative to its own value. It sets how fast the
-        start is forgotten; once settled, only `memory` matters.
+        Random walk of each parameter over a period, relative to its value. It sets how fast the
+        initial model is forgotten; later only `memory` matters.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Forgetting that shortens where the model no longer fits."""
+"""A memory that becomes shorter when the model no longer fits."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from piezoest.policies.periodic_forgetting import weight
 
 @dataclass(frozen=True, slots=True)
 class VariableForgetting(Policy):
-    """Exponential forgetting whose memory shortens as the innovation's energy rises.
+    """Exponential forgetting with a memory that becomes shorter as the innovation's energy rises.
 
     T. Fortescue, L. Kershenbaum, B. Ydstie, Automatica 17 (1981) 831-835. See
-    `piezoest.equations.least_squares.variable_forgetting`. `HysteresisRLS` takes the innovation's
-    usual variance over the memory for that of the noise: much of it is the model's own error.
+    `piezoest.equations.least_squares.variable_forgetting`. `HysteresisRLS` uses the innovation's
+    usual variance over the memory in the place of the noise, because much of it is error of the model.
 
     Parameters
     ----------
     memory : float
         Time constant while the innovation is as usual, in units of `unit`.
     shortest : float
-        Least time constant, relative to memory.
+        Shortest time constant, relative to memory.
     unit : {"period", "second"}
         Of memory: the reference's own period, or seconds (the unit of `step` in
         `RecursiveLeastSquares`).

@@ -51,7 +51,8 @@ def as_record(
 
     Examples
     --------
-    >>> as_record([0.0, 1.0, 2.0], [0.0, 0.1, 0.2], sample_rate=100.0).duration
+    >>> import piezoest as pz
+    >>> pz.records.as_record([0.0, 1.0, 2.0], [0.0, 0.1, 0.2], sample_rate=100.0).duration
     0.03
     """
     given = {"displacement": displacement, "sample_rate": sample_rate, "columns": columns, "units": units}

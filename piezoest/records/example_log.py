@@ -21,6 +21,7 @@ def example_log() -> Path:
 
     Examples
     --------
+    >>> import piezoest as pz
     >>> len(pz.read_record(pz.records.example_log()))
     14155
     """

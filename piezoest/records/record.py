@@ -232,6 +232,13 @@ def read_record(
         file, line and column.
     ImportError
         If reading the format needs a package of the extra ``formats`` that is not installed.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> record = pz.read_record(pz.records.example_log())
+    >>> len(record), record.sample_rate
+    (14155, 200.0)
     """
     return _record(RecordStream(path, columns=columns, units=units, sample_rate=sample_rate, held=True))
 

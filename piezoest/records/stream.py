@@ -39,7 +39,7 @@ class Block(NamedTuple):
 class RecordStream:
     """A recorded log that is read in blocks, as often as it is iterated over.
 
-    Made by `stream_record`. The blocks together hold the same numbers, to the last bit, as the
+    Made by `stream_record`. The blocks together contain exactly the same numbers as the
     `Record` that `read_record` makes of the file.
 
     Parameters
@@ -204,7 +204,7 @@ def stream_record(
         for block in log:
             estimator.run(block.voltage, block.displacement, every=block.voltage.size)
 
-    leaves the estimator in the same state, to the last bit, as one run over the whole record.
+    leaves the estimator in exactly the same state as one run over the whole record.
 
     Parameters
     ----------
@@ -233,6 +233,13 @@ def stream_record(
         If the file cannot be read.
     ValueError
         As `read_record`; also if the format cannot be read in parts.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> log = pz.stream_record(pz.records.example_log())
+    >>> sum(block.voltage.size for block in log)
+    14155
     """
     stream = RecordStream(
         path, columns=columns, units=units, sample_rate=sample_rate, rows=rows, progress=progress

@@ -46,6 +46,13 @@ class Signal:
     ValueError
         If `values` is empty, not of shape (N,), or holds NaN or infinity; if `sample_rate` or `period`
         is not above zero.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> r = pz.Signal([0.0, 1.0, 2.0, 1.0], sample_rate=10.0, period=4)
+    >>> r + 40.0
+    Signal('signal', 4 samples at 10 Hz, period 4 samples, amplitude 42)
     """
 
     values: FloatArray

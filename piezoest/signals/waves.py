@@ -26,8 +26,13 @@ def triangle(
     smoothing: float = 0.1,
     continuity: int = 3,
     phase: float = 0.0,
+    *,
+    exact_peak: bool = False,
 ) -> Signal:
-    """Triangle wave with its corners rounded by a polynomial.
+    """Triangle wave with rounded corners; it peaks at about 97 % of `amplitude`.
+
+    ``triangle(amplitude=5.0, ...)`` peaks at 4.84, because its corners are rounded as in the paper. With
+    ``exact_peak=True`` it peaks at 5.0.
 
     The ideal triangle of the nominal amplitude keeps its slopes, ±4·amplitude·frequency, and its straight
     lines up to (1 − smoothing)·amplitude. Around each of the two extrema of a period, `smoothing`/2 of the
@@ -62,6 +67,8 @@ def triangle(
         Number of continuous derivatives, 1 to 8.
     phase : float
         Start, in periods. 0: at zero, rising.
+    exact_peak : bool
+        Scale the wave so that its peak, not that of the ideal triangle, is `amplitude`.
 
     Returns
     -------
@@ -76,6 +83,13 @@ def triangle(
     Notes
     -----
     Eielsen, Gravdahl and Pettersen (2012), Sec. IV and Fig. 4.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=2, sample_rate=1000.0)
+    >>> r
+    Signal('triangle', 400 samples at 1000 Hz, period 200 samples, amplitude 4.84375)
     """
     amplitude = non_negative("amplitude", amplitude)
     sample_rate = positive("sample_rate", sample_rate)
@@ -83,6 +97,8 @@ def triangle(
     n = number_of_samples("periods", positive("periods", periods) / frequency, sample_rate)
     _, turns = _turns(n, frequency, sample_rate, finite("phase", phase))
     wave = _unit_wave(turns, "triangle", smoothing, continuity)
+    if exact_peak:
+        wave /= _unit_wave(np.array([0.25]), "triangle", smoothing, continuity)
     return Signal(amplitude * wave, sample_rate, sample_rate / frequency, "triangle")
 
 
@@ -113,6 +129,12 @@ def sine(
     ------
     ValueError
         If an argument is out of its range.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> pz.signals.sine(amplitude=5.0, frequency=5.0, periods=2, sample_rate=1000.0)
+    Signal('sine', 400 samples at 1000 Hz, period 200 samples, amplitude 5)
     """
     amplitude = non_negative("amplitude", amplitude)
     sample_rate = positive("sample_rate", sample_rate)

@@ -30,7 +30,7 @@ GAUGE_SETTINGS = record(
 
 
 def gauge_layout(delay: int) -> Record:
-    """Layout of a gauge's state: its line is a ring of one value more than the samples of delay."""
+    """Layout of a gauge's state; its delay line is a circular buffer of one more value than `delay`."""
     line = numbers(Length("length", delay + 1), kind=MEASURED)
     return record(place=COUNT, filter=numbers(2), line=line)
 
@@ -55,7 +55,7 @@ def finite_or_held(u: Any, held: Any) -> Any:
 
 @inlined
 def next_place(place: Any, length: Any) -> Any:
-    """The place after `place` in a ring of `length`."""
+    """The place after `place` in a circular buffer of `length`."""
     return place + 1 if place + 1 < length else 0
 
 

@@ -20,23 +20,22 @@ from piezoest.stage.stage import Schedule, SimulatedStage
 class PaperStage(SimulatedStage):
     """The stage of Eielsen, Gravdahl and Pettersen (2012), simulated.
 
-    The true plant is a Prandtl-Ishlinskii operator with creep, fitted to the triangle rows of
-    Tables I and II, with mechanics and instruments around it; it is not a Coleman-Hodgdon
-    model, so that the mismatch of that model near the extrema comes out by itself. Every
-    number, with where it comes from, stands in ``piezoest/stage/paper_stage.json`` (what
-    temperature does, in `TemperatureLaw`).
+    It is a Prandtl-Ishlinskii operator with creep, fitted to the triangle rows of Tables I and II,
+    with mechanics and instruments. It is not a Coleman-Hodgdon model, so the error of that model near
+    the extrema is a result and not an assumption. All numbers and their sources are in
+    ``piezoest/stage/paper_stage.json``; the effect of temperature is in `TemperatureLaw`.
 
     From the paper: sample rate, amplifier gain of 20 V/V, gauge of 5 µm/V, a scaling
-    amplifier before the converter, programmable filters. Assumed, for the paper does not
-    say: resonance (780 Hz, damping ratio 0.02), 16-bit converters of ±10 V (6.1 mV a step at
+    amplifier before the converter, programmable filters. Assumed, because the paper does not
+    state them: resonance (780 Hz, damping ratio 0.02), 16-bit converters of ±10 V (6.1 mV a step at
     the stage), a voltage range of ±100 V and a slew rate of 1e5 V/s, a gauge range scaled to
     ±12.5 µm, white gauge noise of 1.2 nm rms, filters of second order at 10 kHz.
 
     Parameters
     ----------
     sample_rate : float
-        [Hz]; 50 kHz as in the paper. At twice the filters' cut-off and below, the filters
-        are left out.
+        [Hz]; 50 kHz as in the paper. The filters are left out if it is at most twice their
+        cut-off.
     seed : int
         Start of the random numbers of the gauge's noise.
     gain_schedule : callable or array_like, shape (M, 2), optional
@@ -49,9 +48,9 @@ class PaperStage(SimulatedStage):
         Standard deviation of the gauge's white noise [µm]; the data file's if not given, 0
         for none.
     quantisation : bool
-        Whether the converters have steps.
+        Whether the converters quantise.
     filters : bool
-        Whether there are a reconstruction and an anti-alias filter.
+        Whether there are a reconstruction filter and an anti-aliasing filter.
     creep : bool
         Whether the stage creeps.
     mechanics : bool
@@ -66,6 +65,13 @@ class PaperStage(SimulatedStage):
     -----
     Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), Sec. IV,
     Tables I and II.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> stage = pz.PaperStage(sample_rate=10_000.0, seed=0)
+    >>> x = stage.step(10.0)  # the reading [µm] after a voltage [V]
+    >>> true = stage.displacement  # [µm]
     """
 
     __slots__ = ()

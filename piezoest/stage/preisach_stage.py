@@ -54,6 +54,12 @@ class PreisachStage(SimulatedStage):
     An assumption throughout, chosen to be like a soft piezo ceramic and to be no model's own
     kind. Source of the operator: M. Brokate, J. Sprekels, Hysteresis and Phase Transitions,
     Springer 1996.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> stage = pz.PreisachStage(sample_rate=10_000.0, seed=0)
+    >>> x = stage.step(10.0)  # the reading [µm] after a voltage [V]
     """
 
     __slots__ = ()

@@ -1,4 +1,4 @@
-"""A simulated stage, put together from parts: amplifier, hysteresis, creep, mechanics, gauge."""
+"""A simulated stage: amplifier, hysteresis, creep, mechanics, gauge."""
 
 from __future__ import annotations
 
@@ -40,13 +40,12 @@ _NO_MECHANICS = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
 
 
 class SimulatedStage:
-    """A stage in software: voltage in, measured and true displacement out.
+    """A simulated stage: from a voltage to the measured and the true displacement.
 
-    One sample runs through amplifier → hysteresis → creep → mechanics → gauge. The voltage
-    of `step` is held for one sample interval and the reading is taken at its end, so that
-    without filters, mechanics and delay the reading is the hysteresis of the voltage itself.
-    The stage starts at rest at 0 V; `step`, `run` and a run in pieces give the same bits,
-    noise included.
+    Each sample passes amplifier → hysteresis → creep → mechanics → gauge. The voltage of `step` is
+    held for one sample interval, and the reading is taken at its end. So without filters, mechanics
+    and delay the reading belongs to this voltage. The stage starts at rest at 0 V. `step`, `run` and
+    several shorter runs give identical numbers, including the noise.
 
     Parameters
     ----------
@@ -59,18 +58,18 @@ class SimulatedStage:
     mechanics : MassSpringDamper, optional
         Resonance of the stage (5).
     amplifier : Amplifier, optional
-        Converter and amplifier that drive the stage; ideal if not given.
+        Converter and amplifier before the stage; ideal if not given.
     gauge : Gauge, optional
-        Gauge and converter that measure it; ideal if not given.
+        Sensor and converter after the stage; ideal if not given.
     gain_schedule : callable or array_like, shape (M, 2), optional
         Factor of the hysteresis (not of its offset) over time. An array holds rows of time
-        [s] and factor, joined by straight lines and constant outside. A callable gets an
-        array of times [s], shape (N,), and returns the factors.
+        [s] and factor, interpolated linearly, constant outside. A callable receives an array of
+        times [s], shape (N,), and returns the factors.
     temperature : float, callable or array_like, shape (M, 2), optional
         Temperature [°C] over time, in the same ways, or one for all times. Gain and shape of
         the hysteresis then follow `temperature_law`; without it nothing changes.
     temperature_law : TemperatureLaw, optional
-        What temperature does; its defaults if not given.
+        Effect of temperature; its defaults if not given.
     seed : int
         Start of the random numbers of the gauge's noise.
 
@@ -79,6 +78,13 @@ class SimulatedStage:
     ValueError
         If a value is out of its range, a part is of another class, or a filter's cut-off is
         not below half the sample rate.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> model = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+    >>> stage = pz.SimulatedStage(10_000.0, model, gauge=pz.Gauge(noise=1e-3), seed=0)
+    >>> x = stage.step(10.0)
     """
 
     __slots__ = (
@@ -213,8 +219,8 @@ class SimulatedStage:
         Parameters
         ----------
         u : float
-            Voltage [V]. For NaN, infinity and what is no number the last finite voltage is held: a
-            program may compute a NaN, an amplifier cannot put it out.
+            Voltage [V]. For NaN, infinity and anything that is not a number the last finite voltage is
+            held: a program may compute a NaN, an amplifier cannot put it out.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""The CasADi face of the equations: derivatives, whole-record simulation, and solvers.
+"""The equations with CasADi symbols: derivatives, whole-record simulation, and solvers.
 
 The only package that imports CasADi. The functions of `piezoest.equations` are called with SX
 symbols, so nothing is written a second time.

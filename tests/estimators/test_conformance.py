@@ -65,6 +65,15 @@ def record(
     return u, model.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
 
 
+def test_it_says_what_it_is(kind: Any) -> None:
+    for rate in (RATE, 5.0):
+        shown = repr(kind(rate))
+        assert shown.startswith(f"<{kind.__name__}({rate:g}): ")
+        assert "=" not in shown.partition(": ")[0]
+        assert len(shown) < 150
+    assert "noise=0.0123" in repr(kind(RATE, noise=0.0123))
+
+
 def steps(estimator: Any, u: FloatArray, x: FloatArray) -> None:
     for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
         estimator.step(u_k, x_k)

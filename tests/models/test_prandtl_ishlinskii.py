@@ -127,6 +127,13 @@ def test_creep() -> None:
         creep.simulate(np.ones(5), sample_rate=1000.0, initial_state=np.zeros(3))
 
 
+def test_many_plays_are_counted_not_listed() -> None:
+    model = PrandtlIshlinskii(0.1, np.arange(1.0, 41.0), np.full(40, 0.002), offset=1.5)
+    assert (
+        repr(model) == "PrandtlIshlinskii(gain=0.1, 40 plays up to 40 V, 0 bends, 0 creep terms, offset=1.5)"
+    )
+
+
 def test_mechanics() -> None:
     mechanics = MassSpringDamper(780.0, 0.02)
     assert MassSpringDamper.from_dict(mechanics.to_dict()) == mechanics

@@ -1,0 +1,95 @@
+"""What the programs of the pages share: reading docs/data, tables, and numbers that stand in sentences."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from piezoest._files import write_text
+
+DOCS = Path(__file__).resolve().parent
+
+Document = dict[str, Any]
+
+
+def read(name: str) -> Document:
+    """What docs/data/NAME.json holds."""
+    return dict(json.loads((DOCS / "data" / f"{name}.json").read_text(encoding="utf-8")))
+
+
+def write_pieces(target: Path, texts: dict[str, str]) -> None:
+    """Write texts by the name of their file; untouched where nothing changed, so that no rebuild follows."""
+    target.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        path = target / f"{name}.inc"
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            write_text(path, text)
+
+
+def table(title: str, heading: Iterable[str], body: Iterable[Iterable[Any]]) -> str:
+    """A csv-table; ✗ in bold."""
+    body = list(body)
+    if not body:
+        return "*There are none.*\n"
+    written = io.StringIO()
+    writer = csv.writer(written, lineterminator="\n", quoting=csv.QUOTE_ALL)
+    writer.writerow(name.replace("\n", " ") for name in heading)
+    for row in body:
+        texts = [shown(cell) for cell in row]
+        writer.writerow(f"**{text}**" if text.endswith("✗") else text for text in texts)
+    header, *lines = written.getvalue().splitlines()
+    rows = "".join(f"   {line}\n" for line in lines)
+    return f".. csv-table:: {title}\n   :header: {header}\n   :widths: auto\n\n{rows}"
+
+
+def table_of(
+    title: str, rows: Iterable[Any], columns: Mapping[str, str | Callable[[Any], Any]] | None = None
+) -> str:
+    """A csv-table with a line for each row; for each heading, the row's key or what to show of the row.
+
+    Without columns, the keys of the rows are the headings.
+    """
+    rows = list(rows)
+    columns = {key: key for key in rows[0]} if columns is None else columns
+    body = [[row[what] if isinstance(what, str) else what(row) for what in columns.values()] for row in rows]
+    return table(title, columns, body)
+
+
+def shown(cell: Any) -> str:
+    """A cell of a table."""
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    return str(cell) if isinstance(cell, str | int) else short(cell)
+
+
+def replacements(values: dict[str, Any]) -> str:
+    """Substitutions for numbers that stand in sentences."""
+    return "".join(f".. |{name}| replace:: {value}\n" for name, value in values.items())
+
+
+def made(name: str, document: Document) -> dict[str, str]:
+    """When and where the numbers of a page were made."""
+    machine = document["machine"]
+    return {
+        f"{name} date": document["date"][:10],
+        f"{name} machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
+    }
+
+
+def percent(share: float | None) -> str:
+    """A share in per cent."""
+    return "—" if share is None else f"{100.0 * share:.3g} %"
+
+
+def short(value: float | None) -> str:
+    """About three significant digits; a dash for what is infinite or not known."""
+    return "—" if value is None else f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
+
+
+def of_all(count: int, total: int) -> str:
+    """A count, the total, and the share in per cent."""
+    return f"{count} of {total} ({percent(count / total)})" if total else "—"

@@ -1,0 +1,35 @@
+"""What the code of the page `start` prints: it runs at every Sphinx build."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import tempfile
+import textwrap
+from typing import Any
+
+from page_parts import DOCS, write_pieces
+
+CODE = re.compile(r"^\.\. code-block:: python\n\n(.*?)(?=^\S|\Z)", re.S | re.M)
+
+
+def write(app: Any = None) -> None:
+    """Write what the page includes."""
+    page = (DOCS / "start.rst").read_text(encoding="utf-8")
+    write_pieces(DOCS / "generated" / "start", pieces(page))
+
+
+def pieces(page: str) -> dict[str, str]:
+    """For the number of each block of code, what it prints."""
+    texts, names = {}, dict[str, Any]()
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        for number, block in enumerate(CODE.findall(page), 1):
+            with contextlib.redirect_stdout(io.StringIO()) as printed:
+                exec(textwrap.dedent(block), names)
+            texts[str(number)] = ".. code-block:: text\n\n" + textwrap.indent(printed.getvalue(), "   ")
+    return texts
+
+
+if __name__ == "__main__":
+    write()

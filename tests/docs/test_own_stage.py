@@ -1,0 +1,106 @@
+"""The program for hardware, `examples/own_stage.py`, on simulated drivers, of which some fail."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    monkeypatch.chdir(tmp_path)
+    specification = importlib.util.spec_from_file_location("own_stage", ROOT / "examples" / "own_stage.py")
+    assert specification is not None
+    assert specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+def driver(program: Any, fails_at: int | None = None, error: BaseException | None = None) -> Any:
+    """The program's own driver, which keeps what was written and may fail once."""
+
+    class Watched(program.Driver):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__()
+            self.written: list[float] = []
+            self.closed = False
+
+        def write(self, voltage: float) -> None:
+            if len(self.written) == fails_at and error is not None:
+                self.written.append(np.nan)
+                raise error
+            self.written.append(voltage)
+            super().write(voltage)
+
+        def close(self) -> None:
+            self.closed = True
+
+    return Watched()
+
+
+def test_it_follows_and_ends_at_rest(program: Any) -> None:
+    used = driver(program)
+    assert program.main(used) == 0
+    record = np.load("run.npz")
+    error = record["reference"] - record["displacement"]
+    assert error.size == 2000
+    assert np.max(np.abs(error[-400:])) < 0.1
+    u = np.array(used.written)
+    assert u.min() >= program.LIMITS.minimum
+    assert u.max() <= program.LIMITS.maximum
+    ramp = int(program.BIAS / program.SLOPE * program.RATE)
+    largest = program.SLOPE / program.RATE * (1.0 + 1e-9)
+    assert np.max(np.abs(np.diff(u[:ramp], prepend=program.REST))) <= largest
+    assert u[-1] == program.REST
+    assert abs(u[-2]) <= largest
+    assert used.closed
+
+
+@pytest.mark.parametrize("error", [OSError("the cable is off"), KeyboardInterrupt()])
+def test_a_run_that_is_cut_short_is_kept_and_ends_at_rest(
+    program: Any, error: BaseException, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ramp = int(program.BIAS / program.SLOPE * program.RATE)
+    used = driver(program, fails_at=ramp + 700, error=error)
+    assert program.main(used) == 1
+    assert f"stopped: {type(error).__name__}" in capsys.readouterr().err
+    record = np.load("run.npz")
+    assert record["voltage"].size == 700
+    assert np.all(np.isfinite(record["voltage"]))
+    assert used.written[-1] == program.REST
+    after = np.array(used.written[ramp + 701 :])
+    assert (
+        np.max(np.abs(np.diff(after, prepend=record["voltage"][-1]))) <= program.SLOPE / program.RATE * 1.001
+    )
+    assert used.closed
+
+
+def test_a_displacement_that_is_too_far_stops_the_run(program: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(program, "FARTHEST", 1.0)
+    used = driver(program)
+    assert program.main(used) == 1
+    assert used.written[-1] == program.REST
+    assert 0 < np.load("run.npz")["displacement"].size < 2000
+
+
+def test_samples_that_start_late_are_counted_and_not_caught_up(
+    program: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(program.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(program.time, "sleep", lambda left: now.__setitem__(0, now[0] + left + 1e-3))
+    pace = program.Pace(100.0)
+    starts = []
+    for busy in (0.0, 0.0, 0.055, 0.0, 0.0):
+        pace.wait()
+        starts.append(round(now[0], 6))
+        now[0] += busy
+    assert pace.late == 1
+    assert starts == [0.0, 0.01, 0.02, 0.075, 0.085]
