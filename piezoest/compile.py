@@ -34,8 +34,6 @@ from piezoest.compiled_records import like as like
 from piezoest.compiled_records import local as local
 from piezoest.compiled_records import local_rows as local_rows
 from piezoest.compiled_records import nth as nth
-from piezoest.compiled_records import own_copy as own_copy
-from piezoest.compiled_records import put_back as put_back
 from piezoest.compiled_records import record_type
 from piezoest.machine_code import MachineCode
 

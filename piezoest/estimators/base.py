@@ -135,15 +135,17 @@ class EstimatorBase(ABC):
 
     @property
     def status(self) -> Status:
-        """What happened to the samples so far; what the state does not count is zero."""
-        known = self._state.dtype.names
+        """What happened to the samples so far; what neither the state nor its law counts is zero."""
         counted = ("samples", "updates", "missing", "held", "resets", "outliers")
-        counts = {name: int(self._state[name]) for name in counted if name in known}
-        return Status(
-            **{**dict.fromkeys(counted, 0), **counts},
-            projected=self._is_projected(),
-            last=samples.NAMES[int(self._state["last"])],
-        )
+        places = [self._state, *(self._state[name] for name in ("law",) if name in self._state.dtype.names)]
+        known = {
+            name: int(each[name])
+            for each in places
+            for name in (*counted, "last")
+            if name in each.dtype.names
+        }
+        last = samples.NAMES[known.pop("last")]
+        return Status(**{**dict.fromkeys(counted, 0), **known}, projected=self._is_projected(), last=last)
 
     def _is_projected(self) -> bool:
         """Whether `model` is not `theta` itself."""

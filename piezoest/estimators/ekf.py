@@ -10,8 +10,7 @@ import numpy as np
 from piezoest._checks import FloatArray, check_start, moderate
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import ekf_kernel
-from piezoest.estimators.base import Trace
-from piezoest.estimators.compiled import NONE, CompiledEstimator
+from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.saved_state import Rule, no_more_than
 from piezoest.models import ColemanHodgdon, LinearGain, Model
@@ -148,21 +147,19 @@ class HysteresisEKF(CompiledEstimator):
         # Without projection a decay below zero is an exponential that grows: not without end.
         return bool(-GROWING * least["a"] <= a and abs(c) <= GREATEST * least["margin"])
 
-    def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        rows, n = u.size // every, self.s.size
-        theta = np.empty((rows, len(self.parameter_names)))
-        y = np.empty(rows) if "y" in want else NONE
-        S = np.empty(rows) if "S" in want else NONE
-        kept = rows if "P" in want else 0
-        P, s = np.empty((kept, n * n)), np.empty((kept, n))
-        self._through(u, x, every, (theta, y, S, P, s))
-        wanted = {"y": y, "S": S, "P": parameter_covariance(s, P.reshape(-1, n, n))}
-        return Trace(
-            index=np.arange(every - 1, rows * every, every),
-            theta=theta,
-            parameter_names=self.parameter_names,
-            **{name: wanted[name] for name in want},
-        )
+    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
+        return parameter_covariance(rows, history) if name == "P" else history
+
+    @property
+    def covariance_size(self) -> int:
+        """Of the filter's state."""
+        return int(self._state["filter"]["s"].size)
+
+    row_size = covariance_size
+
+    def theta_of(self, rows: FloatArray) -> FloatArray:
+        """Parameters (…, n) of states (…, row_size)."""
+        return parameters(rows)
 
     @property
     def s(self) -> FloatArray:

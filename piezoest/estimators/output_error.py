@@ -10,11 +10,9 @@ from piezoest._checks import FloatArray, check_start, integer, moderate, non_neg
 from piezoest.equations import coleman_hodgdon, output_error, sensor_noise, swing
 from piezoest.estimators import output_error_kernel as kernel
 from piezoest.estimators import saved_state
-from piezoest.estimators.base import Status
 from piezoest.estimators.compiled import Freezable
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.derivative_form import FIRST_HALF_PERIOD, LONGEST_GAP
-from piezoest.estimators.samples import NAMES
 from piezoest.models import ColemanHodgdon
 from piezoest.policies import OutlierRejection, Policy, RandomWalk, check_policies, policy_to_dict
 from piezoest.policies.base import Conditions
@@ -166,7 +164,7 @@ class OutputErrorRLS(Freezable):
     def _rules(self, state: Any) -> Any:
         law = state["law"]
         yield saved_state.no_more_than(
-            state["samples"], state["missed"], state["outliers"], law["updates"], law["held"]
+            state["samples"], state["missing"], state["outliers"], law["updates"], law["held"]
         )
         yield swing.has_a_size(state["swing"])
 
@@ -251,11 +249,6 @@ class OutputErrorRLS(Freezable):
         return self._theta_covariance(self._row, self._state["law"]["P"])
 
     @property
-    def standard_errors(self) -> FloatArray:
-        """Square roots of the diagonal of `P`, shape (4,): for parameters that walk as the law expects."""
-        return np.sqrt(np.fmax(np.diag(self.P), 0.0))
-
-    @property
     def y(self) -> float:
         """Last innovation [µm]."""
         return float(self._state["law"]["innovation"] * self._initial.c)
@@ -270,22 +263,9 @@ class OutputErrorRLS(Freezable):
         """Last gain, in `theta` per innovation, shape (4,)."""
         return np.asarray(self._jacobian(self._row) @ self._state["law"]["gain"] / self._initial.c)
 
-    @property
-    def status(self) -> Status:
-        """What happened to the samples so far."""
-        state, law = self._state, self._state["law"]
-        b, c = law["s"][:2].tolist()
-        admissible = c >= kernel.LEAST_C and kernel.LEAST_B * c <= b <= 0.5 * (1.0 - kernel.MARGIN) * c
-        return Status(
-            samples=int(state["samples"]),
-            updates=int(law["updates"]),
-            missing=int(state["missed"]),
-            held=int(law["held"]),
-            resets=int(law["resets"]),
-            projected=not admissible,
-            last=NAMES[int(law["last"])],
-            outliers=int(state["outliers"]),
-        )
+    def _is_projected(self) -> bool:
+        b, c = self._state["law"]["s"][:2].tolist()
+        return not (c >= kernel.LEAST_C and kernel.LEAST_B * c <= b <= 0.5 * (1.0 - kernel.MARGIN) * c)
 
     @property
     def model(self) -> ColemanHodgdon:

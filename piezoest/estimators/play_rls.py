@@ -250,16 +250,6 @@ class PrandtlIshlinskiiRLS(Freezable):
         return P
 
     @property
-    def y(self) -> float:
-        """Last innovation [µm], of the mean over a window of travel."""
-        return float(self._state["y"])
-
-    @property
-    def S(self) -> float:
-        """Variance of the last innovation as the law saw it [µm²]."""
-        return float(self._state["S"])
-
-    @property
     def K(self) -> FloatArray:
         """Gain that the present covariance gives the last regressor, shape (n,)."""
         state, settings = self._state, self._settings

@@ -11,11 +11,9 @@ from piezoest.equations import admissible, swing
 from piezoest.estimators import derivative_form as form
 from piezoest.estimators import recursive_least_squares_kernel as law
 from piezoest.estimators import rls_kernel, saved_state
-from piezoest.estimators.base import Status
 from piezoest.estimators.compiled import NO_ROWS, NONE, Freezable
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.recursive_least_squares import TimeBase, is_discrete
-from piezoest.estimators.samples import NAMES
 from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain, Model
 from piezoest.policies import (
     DeadZone,
@@ -216,7 +214,7 @@ class HysteresisRLS(Freezable):
     def _rules(self, state: Any) -> Any:
         own = state["law"]
         yield saved_state.no_more_than(
-            state["samples"], state["missed"], state["outliers"], own["updates"], own["held"]
+            state["samples"], state["missing"], state["outliers"], own["updates"], own["held"]
         )
         if state["swing"].size:
             yield swing.has_a_size(state["swing"])
@@ -353,27 +351,12 @@ class HysteresisRLS(Freezable):
         # Where it overflows, the sample moved nothing.
         return gain if np.all(np.isfinite(gain)) else np.zeros(phi.size)
 
-    @property
-    def status(self) -> Status:
-        """What happened to the samples so far."""
-        state, own = self._state, self._state["law"]
-        return Status(
-            samples=int(state["samples"]),
-            updates=int(own["updates"]),
-            missing=int(state["missed"]),
-            held=int(own["held"]),
-            outliers=int(state["outliers"]),
-            resets=int(own["resets"]),
-            projected=not self._as_estimated_is_admissible(),
-            last=NAMES[int(own["last"])],
-        )
-
-    def _as_estimated_is_admissible(self) -> bool:
+    def _is_projected(self) -> bool:
         theta = self.theta
         if isinstance(self._initial, LinearGain):
             gain = float(theta[0])
-            return gain == admissible.kept_gain(gain, self._initial.gain, rls_kernel.LEAST)
-        return bool(rls_kernel.is_admissible(theta, self._scale))
+            return gain != admissible.kept_gain(gain, self._initial.gain, rls_kernel.LEAST)
+        return not rls_kernel.is_admissible(theta, self._scale)
 
     @property
     def model(self) -> Model:
