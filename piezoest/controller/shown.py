@@ -62,26 +62,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class ControllerStatus:
-    """What happened to the samples that a controller was given.
-
-    Parameters
-    ----------
-    samples : int
-        Samples learnt from.
-    missing : int
-        Samples without a usable reference, at which the last one held.
-    stage : str
-        ``"seeking"`` (finds out the gain), ``"approaching"`` (goes to the reference), ``"running"`` or
-        ``"homing"`` (sweeps).
-    driving : str
-        ``"line"``, or the name of the estimator whose model drives.
-    fault : str
-        What is wrong with the readings; empty if nothing.
-    saturated, slewed : int
-        Samples at which the voltage range or the slew rate was in the way.
-    switches : int
-        How many times another model took over.
-    """
+    """What happened to the samples that a controller was given: see `AdaptiveFeedforward.status`."""
 
     samples: int
     missing: int
@@ -95,19 +76,7 @@ class ControllerStatus:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A model that can drive.
-
-    Parameters
-    ----------
-    name : str
-        ``"line"``, or that of its estimator.
-    missed : float or None
-        What it has missed of the readings of late, root mean square [µm]; None if nothing is known.
-    drives : bool
-        Whether it drives.
-    model : Model or None
-        In µm and V; None until there is one.
-    """
+    """A model that can drive: see `AdaptiveFeedforward.candidates`."""
 
     name: str
     missed: float | None
