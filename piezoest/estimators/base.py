@@ -9,16 +9,18 @@ from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, integer, number_or_nan
+from piezoest._checks import FloatArray, array_1d, check_start, instance, integer, number_or_nan
 from piezoest.estimators import samples, saved_state
 from piezoest.estimators.outcome import Estimator as Estimator
 from piezoest.estimators.outcome import Status as Status
 from piezoest.estimators.outcome import Trace as Trace
 from piezoest.layout import Record, by_name, from_bytes, new, write
-from piezoest.models import Model, model_from_dict
+from piezoest.models import ColemanHodgdon, Model, model_from_dict
 from piezoest.policies import policy_from_dict
 
 _FORMAT = 1
+# Starts from here where the user gives no model: a common stack actuator.
+DEFAULT_MODEL = ColemanHodgdon(0.02, 0.12, 0.0036)
 
 
 class EstimatorBase(ABC):
@@ -29,7 +31,7 @@ class EstimatorBase(ABC):
     pickling then need nothing more. What it shows is by default the state's number of that name.
     """
 
-    __slots__ = ("_arguments", "_layout", "_pending", "_start", "_state")
+    __slots__ = ("_arguments", "_initial", "_layout", "_pending", "_start", "_state")
 
     #: Promises of the face this class does not keep: name of the promise to the reason.
     conformance_exceptions: ClassVar[dict[str, str]] = {}
@@ -41,10 +43,18 @@ class EstimatorBase(ABC):
     _layouts_of: ClassVar[dict[str, str]] = {"_state": "_layout", "_start": "_layout"}
 
     _arguments: dict[str, Any]
+    _initial: Any
     _layout: Record
     _pending: float | None
     _start: Any
     _state: Any
+
+    def _start_from(self, initial_model: Any, kinds: Any, expected: str) -> Any:
+        """Keep and return the model to start from, the user's or the default one."""
+        model = DEFAULT_MODEL if initial_model is None else initial_model
+        self._initial = instance("initial_model", model, kinds, expected)
+        check_start(model)
+        return model
 
     def _begin(self, arguments: dict[str, Any], layout: Record, values: dict[str, Any]) -> None:
         """Start with a state of zeros but for `values`."""

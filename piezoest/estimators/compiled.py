@@ -111,12 +111,13 @@ class CompiledEstimator(EstimatorBase):
         """
         return rows
 
-    def _proposed(self) -> list[float]:
-        """Numbers of the admissible model as known now: four, see ``kernel.proposed``."""
-        values = np.zeros(4)
+    @property
+    def model(self) -> Any:
+        """Admissible model as known now: `theta` itself, or its nearest point in the metric of P."""
+        values, kind = np.zeros(4), type(self._initial)
         loops.propose.of(*self.layouts)(self._state, self._settings, values)
-        numbers: list[float] = values.tolist()
-        return numbers
+        numbers = values.tolist()
+        return kind(*numbers[: len(kind.parameter_names)], numbers[3])
 
 
 class Freezable(CompiledEstimator):

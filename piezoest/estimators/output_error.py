@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from piezoest._checks import FloatArray, check_start, integer, moderate, non_negative
+from piezoest._checks import FloatArray, integer, moderate, non_negative
 from piezoest.equations import coleman_hodgdon, output_error, sensor_noise, swing
 from piezoest.estimators import output_error_kernel as kernel
 from piezoest.estimators import saved_state
@@ -77,7 +77,7 @@ class OutputErrorRLS(Freezable):
     Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), (2)-(4) (model).
     """
 
-    __slots__ = ("_initial",)
+    __slots__ = ()
 
     kernel: ClassVar[Any] = kernel
 
@@ -98,12 +98,9 @@ class OutputErrorRLS(Freezable):
         policies: tuple[Policy, ...] = POLICIES,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
-        if not isinstance(initial, ColemanHodgdon):
-            raise ValueError(f"initial_model must be a ColemanHodgdon, got {initial!r}")
+        initial = self._start_from(initial_model, ColemanHodgdon, "a ColemanHodgdon")
         if not initial.is_admissible:
             raise ValueError(f"initial_model {initial} is not admissible: use nearest_admissible()")
-        check_start(initial)
         if moderate("span", span) <= 1.0:
             raise ValueError(f"span must be above 1, got {span:g}")
         members = integer("members", members, 3, MOST_MEMBERS)
@@ -118,7 +115,6 @@ class OutputErrorRLS(Freezable):
             raise ValueError(f"policies: {unknown[0]!r} is none of RandomWalk and OutlierRejection")
         rejects = OutlierRejection in given
         line, empty = delay_line(delay)
-        self._initial = initial
         b, decays = initial.b / initial.c, initial.a * np.geomspace(1.0 / span, span, members)
         spread = moderate("uncertainty", uncertainty) ** 2
         self._configure(
@@ -270,4 +266,5 @@ class OutputErrorRLS(Freezable):
     @property
     def model(self) -> ColemanHodgdon:
         """Admissible model as known now: `theta` itself, or its nearest point in the metric of P."""
-        return ColemanHodgdon(*self._proposed())
+        found: ColemanHodgdon = super().model
+        return found

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from piezoest._checks import FloatArray, check_start, moderate
+from piezoest._checks import FloatArray, moderate
 from piezoest.equations import admissible, swing
 from piezoest.estimators import derivative_form as form
 from piezoest.estimators import recursive_least_squares_kernel as law
@@ -111,7 +111,7 @@ class HysteresisRLS(Freezable):
     and App. A.
     """
 
-    __slots__ = ("_followed", "_initial", "_scale")
+    __slots__ = ("_followed", "_scale")
 
     kernel: ClassVar[Any] = rls_kernel
     unneeded: ClassVar[tuple[Any, ...]] = (rls_kernel.propagate_error,)
@@ -135,10 +135,9 @@ class HysteresisRLS(Freezable):
         policies: tuple[Policy, ...] | None = None,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
-        if not isinstance(initial, ColemanHodgdon | LinearGain):
-            raise ValueError(f"initial_model must be a ColemanHodgdon or a LinearGain, got {initial!r}")
-        check_start(initial)
+        initial = self._start_from(
+            initial_model, ColemanHodgdon | LinearGain, "a ColemanHodgdon or a LinearGain"
+        )
         if np.any(initial.theta == 0.0):
             raise ValueError(f"initial_model must have no parameter at zero, got {initial}")
         if memory is not None and memory != "period":
@@ -171,7 +170,6 @@ class HysteresisRLS(Freezable):
             "time_base": time_base,
             "errors": bool(errors),
         }
-        self._initial = initial
         scale = np.abs(initial.theta)
         self._scale = np.append(scale, OFFSET_VOLTS * scale[-1]) if offset else scale
         P_0 = np.diag(np.full(self._scale.size, uncertainty**2))
@@ -357,11 +355,3 @@ class HysteresisRLS(Freezable):
             gain = float(theta[0])
             return gain != admissible.kept_gain(gain, self._initial.gain, rls_kernel.LEAST)
         return not rls_kernel.is_admissible(theta, self._scale)
-
-    @property
-    def model(self) -> Model:
-        """Admissible model as known now: `theta` itself, or its nearest point in the metric of P."""
-        alpha, beta, gamma, offset = self._proposed()
-        if isinstance(self._initial, LinearGain):
-            return LinearGain(alpha, offset)
-        return ColemanHodgdon(alpha, beta, gamma, offset)
