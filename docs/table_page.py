@@ -108,7 +108,7 @@ def substitutions(prefix: str, document: Document) -> str:
         "seeds": plan["seeds"],
         "slow": plan["slow_seeds"],
         "rate": f"{conditions['sample_rate']:g} Hz",
-        "stages": ", ".join(plan["stages"][1:]),
+        "stages": ", ".join(plan["stages"][1:]) or "none",
         "rest": f"{conditions['rest']:g} s",
         "drift": f"{conditions['drift']:g} s",
         "linear": f"{report.percent(linear['settled'][0])} %",

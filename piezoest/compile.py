@@ -34,8 +34,6 @@ from piezoest.compiled_records import like as like
 from piezoest.compiled_records import local as local
 from piezoest.compiled_records import local_rows as local_rows
 from piezoest.compiled_records import nth as nth
-from piezoest.compiled_records import own_copy as own_copy
-from piezoest.compiled_records import put_back as put_back
 from piezoest.compiled_records import record_type
 from piezoest.machine_code import MachineCode
 
@@ -94,7 +92,7 @@ def is_marked(function: Any) -> bool:
 class Compiled:
     """A function that is compiled for the layouts of its records, see `compiled`."""
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+    def __init__(self, function: Callable[..., Any]) -> None:
         if "<locals>" in function.__qualname__:
             raise TypeError(f"{function.__qualname__} must stand at module level to be compiled and kept")
         self.function = function
@@ -108,8 +106,8 @@ class Compiled:
             for parameter in inspect.signature(function).parameters.values()
         ]
         self._entries: dict[tuple[named.Record, ...], Any] = {}
-        self.dispatcher: Any = njit(**options)(function)
-        self.dispatcher._cache = MachineCode(function, options)
+        self.dispatcher: Any = njit(**_OPTIONS)(function)
+        self.dispatcher._cache = MachineCode(function, _OPTIONS)
 
     def of(self, *layouts: named.Record) -> Callable[..., Any]:
         """Return the machine code for records of these layouts, in the order of the arguments.
@@ -154,24 +152,10 @@ class Compiled:
         return self.__name__  # found in its module
 
 
-def compiled(function: Callable[..., Any] | None = None, *, makes_arrays: bool = False) -> Any:
+def compiled(function: Callable[..., Any]) -> Any:
     """Compile a function of numbers, arrays and records, with the machine code kept on the disk.
 
     Its annotations say what its arguments are: ``float``, ``int``, `Vector`, `Matrix`, `Cube`; else a record.
-
-    Parameters
-    ----------
-    function : callable
-        At module level.
-    makes_arrays : bool
-        Whether arrays are made in it, which then are counted.
-
-    Raises
-    ------
-    TypeError
-        If the function is made within another: two such functions can have one name.
+    It stands at module level: two such functions within others can have one name.
     """
-    if function is None:
-        return lambda function: compiled(function, makes_arrays=makes_arrays)
-    options = {key: value for key, value in _OPTIONS.items() if key != "_nrt" or not makes_arrays}
-    return Compiled(function, options)
+    return Compiled(function)

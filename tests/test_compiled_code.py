@@ -18,7 +18,7 @@ import pytest
 from numba.core.dispatcher import Dispatcher
 
 import piezoest
-from piezoest import machine_code
+from piezoest import compile, machine_code
 from piezoest.compile import Compiled, compiled
 
 PACKAGE = Path(piezoest.__file__).parent
@@ -166,8 +166,8 @@ def kept_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def compiled_anew(**options: bool) -> Any:
-    return compiled(tripled.function, **options)
+def compiled_anew() -> Any:
+    return compiled(tripled.function)
 
 
 def test_a_damaged_file_is_compiled_anew(kept_in: Path) -> None:
@@ -196,7 +196,8 @@ def test_other_sources_options_or_versions_are_compiled_anew(
             again = compiled_anew()
             assert again(2.0) == 6.0
             assert sum(again.dispatcher.stats.cache_hits.values()) == 0
-    other = compiled_anew(makes_arrays=True)
+    monkeypatch.setitem(compile._OPTIONS, "nogil", False)
+    other = compiled_anew()
     assert other(2.0) == 6.0
     assert sum(other.dispatcher.stats.cache_hits.values()) == 0
 

@@ -6,7 +6,7 @@ import copy
 import math
 from typing import Self
 
-from piezoest._checks import number_or_nan, positive
+from piezoest._checks import instance, number_or_nan, positive
 from piezoest.compensators.base import Compensator
 from piezoest.models import Model
 
@@ -51,11 +51,8 @@ class IntegralFeedback:
     needs_measurement = True
 
     def __init__(self, compensator: Compensator, *, gain: float, sample_rate: float) -> None:
-        if not isinstance(compensator, Compensator):
-            raise ValueError(
-                f"compensator must be a LinearCompensator or an InverseCompensator, got {compensator!r}"
-            )
-        self._compensator = compensator
+        expected = "a LinearCompensator or an InverseCompensator"
+        self._compensator = instance("compensator", compensator, Compensator, expected)
         self._gain = positive("gain", gain)
         self._step_gain = self._gain / positive("sample_rate", sample_rate)
         self._integral = 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import logging
 from collections import deque
 from typing import Any, Self, cast
@@ -317,7 +318,7 @@ class AdaptiveFeedforward(Face):
             "controller": type(self).__name__,
             "format": saved.FORMAT,
             "sample_rate": self._sample_rate,
-            "limits": saved.limits(self._limits),
+            "limits": dataclasses.asdict(self._limits),
             **self._options,
             "estimators": [team.saved(estimator) for estimator in self._estimators],
             "state": by_name(self._layouts[0], self._state),
@@ -356,7 +357,9 @@ class AdaptiveFeedforward(Face):
         """Go on from what was saved."""
         state = saved.read_state(data["state"], self._layouts[0], self._state)
         settings = saved.read_models(data["models"], self._layouts[1], self._settings)
-        planned, events = saved.read_block(data["planned"]), saved.read_events(data["events"])
+        planned, events = data["planned"], saved.read_events(data["events"])
+        if planned is not None:
+            planned = array_1d("planned", planned, allow_nan=True).copy()
         write(self._state, state)
         write(self._settings, settings)
         self._planned = planned

@@ -6,7 +6,8 @@ from collections import deque
 from typing import Any
 
 from piezoest.compensators.limits import VoltageLimits
-from piezoest.controller import shown, slots
+from piezoest.controller import shown
+from piezoest.controller.readings import FAULTS
 from piezoest.controller.shown import Candidate, ControllerStatus, Event
 from piezoest.layout import Record
 from piezoest.models import Model
@@ -70,9 +71,9 @@ class Face:
         state = self._state
         counted = ("samples", "missing", "saturated", "slewed", "switches")
         return ControllerStatus(
-            stage=shown.stage_name(state["stage"]),
+            stage=shown.STAGES[int(state["stage"])],
             driving=self._names[int(state["driving"])],
-            fault=shown.fault_name(state["readings"]["fault"]),
+            fault=FAULTS[int(state["readings"]["fault"])],
             **{name: int(state[name]) for name in counted},
         )
 
@@ -113,4 +114,4 @@ class Face:
         if number == 0:
             return shown.line(self._state)
         start = self._estimators[number - 1].model
-        return shown.model(start, self._state, self._settings, slots.NAMES[number - 1])
+        return shown.model(start, self._state, self._settings, number - 1)

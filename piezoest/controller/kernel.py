@@ -20,14 +20,14 @@ from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
 from piezoest.controller.learning import begin_homing, take
 from piezoest.controller.voltage import RUN, plan
-from piezoest.layout import AMOUNT, COUNT, FIXED, MEASURED, NUMBER, record, whole
+from piezoest.layout import AMOUNT, COUNT, FIXED, MEASURED, NUMBER, Field, record, whole
 from piezoest.layout import Record as Layout
 
 # Half-width of the corridor, as a fraction of half the recent swing of the reference.
 WIDTH = 0.3
 
 
-def layouts(candidates: Layout, candidate_settings: Layout) -> tuple[Layout, Layout]:
+def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layout]:
     """Layouts of state and settings."""
     state = record(
         samples=COUNT, missing=COUNT, saturated=COUNT, slewed=COUNT,

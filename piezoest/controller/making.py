@@ -158,14 +158,14 @@ def room(
     """Layouts of state and settings, and both as they are before the start."""
     states: list[Field] = []
     settings: list[Field] = []
-    values, given = {}, {}
-    for name, estimator in zip(slots.NAMES, estimators, strict=False):
+    values, given = [], []
+    for estimator in estimators:
         inverse = estimator.model.inverse_settings(sample_rate)
         pair = candidate.layouts(estimator.layouts, estimator.model.inverse.layouts(inverse))
         states.append(pair[0])
         settings.append(pair[1])
-        values[name] = {"estimator": estimator.state}
-        given[name] = {"estimator": estimator.settings, "inverse": inverse, "by_path": 1.0}
+        values.append({"estimator": estimator.state})
+        given.append({"estimator": estimator.settings, "inverse": inverse, "by_path": 1.0})
     layouts = kernel.layouts(slots.layout(states), slots.layout(settings))
-    fixed = _settings_of(sample_rate, limits, options) | {"candidates": given}
-    return layouts, (new(layouts[0], candidates=values), new(layouts[1], **fixed))
+    fixed = _settings_of(sample_rate, limits, options) | {"candidates": slots.values(given)}
+    return layouts, (new(layouts[0], candidates=slots.values(values)), new(layouts[1], **fixed))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, dictionary, fields, finite, instance
+from piezoest._checks import FloatArray, dictionary, fields, finite, instance
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import slots, start, team
 from piezoest.controller.shown import Event
@@ -35,11 +34,6 @@ def check_head(name: str, data: Any) -> None:
     fields("data", data, _FIELDS)
 
 
-def limits(given: VoltageLimits) -> dict[str, Any]:
-    """Limits as a dictionary."""
-    return dataclasses.asdict(given)
-
-
 def read_limits(data: Any) -> VoltageLimits:
     """Limits from a dictionary."""
     return VoltageLimits(**fields("limits", data, ("minimum", "maximum", "slew_rate", "sample_rate")))
@@ -48,13 +42,13 @@ def read_limits(data: Any) -> VoltageLimits:
 def read_estimators(data: Any, state: Any) -> tuple[CompiledEstimator, ...]:
     """Estimators as they were made; what the state says of each is checked."""
     data = instance("estimators", data, list, "a list")
-    if len(data) > len(slots.NAMES):
-        raise ValueError(f"estimators must be at most {len(slots.NAMES)}, got {len(data)}")
-    saved = dictionary(dictionary(state).get("candidates"))
-    return tuple(
-        team.revived(each, dictionary(saved.get(name)).get("estimator"))
-        for name, each in zip(slots.NAMES, data, strict=False)
-    )
+    if len(data) > slots.MOST:
+        raise ValueError(f"estimators must be at most {slots.MOST}, got {len(data)}")
+    found, chain = [], dictionary(dictionary(state).get("candidates"))
+    for each in data:
+        found.append(team.revived(each, dictionary(chain.get("model")).get("estimator")))
+        chain = dictionary(chain.get("others"))
+    return tuple(found)
 
 
 def read_state(data: Any, layout: Record, begun: Any) -> Any:
@@ -68,37 +62,27 @@ def _rules(state: Any) -> Iterator[tuple[str, Any]]:
     yield "the readings at rest have a place each", not rests or seeking["samples"] < start.FIRST
 
 
-def models(layout: Record, settings: Any) -> dict[str, Any]:
+def models(layout: Record, settings: Any) -> list[dict[str, Any]]:
     """Numbers of the models in use, by name, which change though settings do not."""
-    return {
-        name: by_name(_inverse(layout, name), settings["candidates"][name]["inverse"])
-        for name in _used(layout)
-    }
+    return [by_name(*each) for each in _inverses(layout, settings)]
 
 
 def read_models(data: Any, layout: Record, settings: Any) -> Any:
     """Settings of a controller with the models that were saved."""
     settings = settings.copy()
-    fields("models", data, _used(layout))
-    for name in _used(layout):
-        inverse = settings["candidates"][name]["inverse"]
-        kept = changeable(_inverse(layout, name))
-        settings["candidates"][name]["inverse"] = saved_state.check(
-            data[name], kept, inverse, lambda state: ()
-        )
+    inverses = list(_inverses(layout, settings))
+    if len(instance("models", data, list, "a list")) != len(inverses):
+        raise ValueError(f"models must be {len(inverses)}, one for each estimator, got {len(data)}")
+    for each, (kept, numbers) in zip(data, inverses, strict=True):
+        numbers[...] = saved_state.check(each, changeable(kept), numbers, lambda state: ())
     return settings
 
 
-def _used(layout: Record) -> list[str]:
-    """Names of the candidates that there are."""
-    candidates: Any = layout.by_name["candidates"]
-    return [name for name, field in candidates.fields if isinstance(field, Record)]
-
-
-def _inverse(layout: Record, name: str) -> Any:
-    """Layout of the numbers of a candidate's model."""
-    candidates: Any = layout.by_name["candidates"]
-    return candidates.by_name[name].by_name["inverse"]
+def _inverses(layout: Record, settings: Any) -> Iterator[tuple[Any, Any]]:
+    """Layout and numbers of each candidate's model."""
+    numbers = slots.every(settings["candidates"])
+    for each, own in zip(slots.layouts_in(layout.by_name["candidates"]), numbers, strict=True):
+        yield each.by_name["inverse"], own["inverse"]
 
 
 def changeable(layout: Record) -> Record:
@@ -116,11 +100,6 @@ def _changed(field: Any) -> Any:
 def block(r: FloatArray | None) -> Any:
     """Reference of a block that was planned and not learnt from; JSON has no NaN."""
     return None if r is None else [value if np.isfinite(value) else None for value in r.tolist()]
-
-
-def read_block(data: Any) -> FloatArray | None:
-    """Reference of a block from a list."""
-    return None if data is None else array_1d("planned", data, allow_nan=True).copy()
 
 
 def read_events(data: Any) -> list[Event]:

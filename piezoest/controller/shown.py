@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from piezoest.controller import candidate, slots
 from piezoest.controller.pace import WAVE
@@ -62,26 +62,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class ControllerStatus:
-    """What happened to the samples that a controller was given.
-
-    Parameters
-    ----------
-    samples : int
-        Samples learnt from.
-    missing : int
-        Samples without a usable reference; the last reference was used.
-    stage : str
-        ``"seeking"`` (measures the gain), ``"approaching"`` (moves to the reference), ``"running"`` or
-        ``"homing"`` (erases the memory of the hysteresis).
-    driving : str
-        ``"line"``, or the name of the estimator whose model drives.
-    fault : str
-        Name of the fault of the readings; empty if there is none.
-    saturated, slewed : int
-        Number of samples at which the voltage was limited by the range or by the slew rate.
-    switches : int
-        Number of times that another model took over.
-    """
+    """What happened to the samples that a controller was given: see `AdaptiveFeedforward.status`."""
 
     samples: int
     missing: int
@@ -95,19 +76,7 @@ class ControllerStatus:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A model that can drive.
-
-    Parameters
-    ----------
-    name : str
-        ``"line"``, or that of its estimator.
-    missed : float or None
-        Recent error of the model, root mean square [µm]; None if unknown.
-    drives : bool
-        Whether it computes the voltage.
-    model : Model or None
-        Model in µm and V; None until there is one.
-    """
+    """A model that can drive: see `AdaptiveFeedforward.candidates`."""
 
     name: str
     missed: float | None
@@ -115,20 +84,10 @@ class Candidate:
     model: Model | None
 
 
-def fault_name(number: Any) -> str:
-    """Name of a fault, empty if there is none."""
-    return FAULTS[int(number)]
-
-
-def stage_name(number: Any) -> str:
-    """Name of a stage of the work."""
-    return STAGES[int(number)]
-
-
 def event(state: Any, sample_rate: float, learnt_on: Any) -> Event:
     """Return what was noticed last."""
     number, time = state["notice"], float(state["samples"]) / sample_rate
-    name = fault_name(number)
+    name = FAULTS[int(number)]
     if not name:
         return Event(time, "resumed", "the readings follow the voltage again")
     action = "fell back" if number == state["readings"]["fault"] else "went on"
@@ -158,10 +117,8 @@ def _outside(state: Any, learnt_on: Any) -> dict[str, str]:
 
 def misses(state: Any) -> list[float | None]:
     """Return what the line and each candidate has missed of late [µm]; None if nothing is known."""
-    unit, every = abs(float(state["unit"])), state["candidates"]
-    used = [name for name in slots.NAMES if every[name].dtype.names is not None]
-    found: list[float | None] = []
-    for score in (state["score"], *(every[name]["score"] for name in used)):
+    unit, found = abs(float(state["unit"])), list[float | None]()
+    for score in (state["score"], *(each["score"] for each in slots.every(state["candidates"]))):
         missed = unit * float(candidate.missed(Named(score)))
         found.append(missed if score["weight"] > 0.0 and math.isfinite(missed) else None)
     return found
@@ -174,28 +131,19 @@ def line(state: Any) -> LinearGain | None:
     return LinearGain(gain, centre) if known else None
 
 
-def model(start: Model, state: Any, settings: Any, name: str) -> Model | None:
+def model(start: Model, state: Any, settings: Any, place: int) -> Model | None:
     """Return the model in use of a candidate, in µm and V; None until there is one."""
-    own = state["candidates"][name]
+    own, fixed = (list(slots.every(each["candidates"]))[place] for each in (state, settings))
     if own["usable"] == 0.0:
         return None
     units = Units(
         *(float(each) for each in (own["centre"], own["scale"], own["shift"], state["zero"], state["unit"]))
     )
-    return in_micrometres(start, settings["candidates"][name]["inverse"], units)
+    return _KINDS[start.inverse](start, fixed["inverse"], units)
 
 
-@dataclass(frozen=True, slots=True)
-class Units:
-    """What a model's numbers are relative to: u = centre + scale v, x = zero + unit (shift + scale f(v)).
-
-    Parameters
-    ----------
-    centre, scale, shift : float
-        [V].
-    zero, unit : float
-        [µm], [µm/V].
-    """
+class Units(NamedTuple):
+    """What a model's numbers are relative to: u = centre + scale v, x = zero + unit (shift + scale f(v))."""
 
     centre: float
     scale: float
@@ -206,11 +154,6 @@ class Units:
     def offset(self, own: Any, slope: float) -> float:
         """Displacement at 0 V from a model's own offset and its slope, both in its units [µm]."""
         return self.zero + self.unit * (self.shift + self.scale * float(own) - slope * self.centre)
-
-
-def in_micrometres(start: Model, numbers: Any, units: Units) -> Model:
-    """Return a model in µm and V from the numbers of its inverse."""
-    return _KINDS[start.inverse](start, numbers, units)
 
 
 def _loop(start: Any, numbers: Any, units: Units) -> Model:

@@ -37,8 +37,8 @@ def made(factories: Any, sample_rate: float) -> tuple[CompiledEstimator, ...]:
     """Estimators for a controller."""
     hint = "a tuple of classes: pass (HysteresisRLS,), or () for the straight line alone"
     factories = tuple(instance("estimators", factories, tuple | list, hint))
-    if len(factories) > len(slots.NAMES):
-        raise ValueError(f"estimators must be at most {len(slots.NAMES)}, got {len(factories)}: choose")
+    if len(factories) > slots.MOST:
+        raise ValueError(f"estimators must be at most {slots.MOST}, got {len(factories)}: choose")
     given = {"initial_model": START, "noise": NOISE}
     return tuple(_made(f"estimators[{i}]", factories[i], sample_rate, given) for i in range(len(factories)))
 

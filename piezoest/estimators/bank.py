@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from piezoest._checks import FloatArray, as_floats, integer, number_or_nan
+from piezoest.estimators import loops
 from piezoest.estimators.base import Status
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import write
@@ -92,7 +93,7 @@ class EstimatorBank:
         channels, reader = len(self), self._reader
         rows = np.empty((u.shape[0] // every, channels, reader.row_size))
         parts = min(self._threads, max(1, u.size // SAMPLES_PER_CORE), channels)
-        loop = reader.kernel.step_channels.of(*reader.layouts)
+        loop = loops.step_channels.of(*reader.layouts)
         edges = [channels * i // parts for i in range(parts + 1)]
         arguments: list[Any] = [
             (self._states, reader.settings, u, x, first, stop, every, rows)

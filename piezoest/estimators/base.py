@@ -9,16 +9,18 @@ from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, integer, number_or_nan
+from piezoest._checks import FloatArray, array_1d, check_start, instance, integer, number_or_nan
 from piezoest.estimators import samples, saved_state
 from piezoest.estimators.outcome import Estimator as Estimator
 from piezoest.estimators.outcome import Status as Status
 from piezoest.estimators.outcome import Trace as Trace
 from piezoest.layout import Record, by_name, from_bytes, new, write
-from piezoest.models import Model, model_from_dict
+from piezoest.models import ColemanHodgdon, Model, model_from_dict
 from piezoest.policies import policy_from_dict
 
 _FORMAT = 1
+# Starts from here where the user gives no model: a common stack actuator.
+DEFAULT_MODEL = ColemanHodgdon(0.02, 0.12, 0.0036)
 
 
 class EstimatorBase(ABC):
@@ -29,7 +31,7 @@ class EstimatorBase(ABC):
     pickling need nothing more. Properties such as `theta` return the number of that name in the state.
     """
 
-    __slots__ = ("_arguments", "_layout", "_pending", "_start", "_state")
+    __slots__ = ("_arguments", "_initial", "_layout", "_pending", "_start", "_state")
 
     #: Tests of estimators that this class does not pass: name of the test, and the reason.
     conformance_exceptions: ClassVar[dict[str, str]] = {}
@@ -41,10 +43,18 @@ class EstimatorBase(ABC):
     _layouts_of: ClassVar[dict[str, str]] = {"_state": "_layout", "_start": "_layout"}
 
     _arguments: dict[str, Any]
+    _initial: Any
     _layout: Record
     _pending: float | None
     _start: Any
     _state: Any
+
+    def _start_from(self, initial_model: Any, kinds: Any, expected: str) -> Any:
+        """Keep and return the model to start from, the user's or the default one."""
+        model = DEFAULT_MODEL if initial_model is None else initial_model
+        self._initial = instance("initial_model", model, kinds, expected)
+        check_start(model)
+        return model
 
     def _begin(self, arguments: dict[str, Any], layout: Record, values: dict[str, Any]) -> None:
         """Start with a state of zeros but for `values`."""
@@ -150,14 +160,16 @@ class EstimatorBase(ABC):
     @property
     def status(self) -> Status:
         """How many samples were used, missing or left out; counts that an estimator does not have are 0."""
-        known = self._state.dtype.names
         counted = ("samples", "updates", "missing", "held", "resets", "outliers")
-        counts = {name: int(self._state[name]) for name in counted if name in known}
-        return Status(
-            **{**dict.fromkeys(counted, 0), **counts},
-            projected=self._is_projected(),
-            last=samples.NAMES[int(self._state["last"])],
-        )
+        places = [self._state, *(self._state[name] for name in ("law",) if name in self._state.dtype.names)]
+        known = {
+            name: int(each[name])
+            for each in places
+            for name in (*counted, "last")
+            if name in each.dtype.names
+        }
+        last = samples.NAMES[known.pop("last")]
+        return Status(**{**dict.fromkeys(counted, 0), **known}, projected=self._is_projected(), last=last)
 
     def _is_projected(self) -> bool:
         """Whether `model` is not `theta` itself."""

@@ -11,11 +11,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from piezoest._checks import WILDEST, FloatArray, array_1d, finite, instance, integer, moderate, positive
-from piezoest.estimators.base import Status
+from piezoest.estimators.base import DEFAULT_MODEL, Status
 from piezoest.estimators.batch_result import BatchFitResult
 from piezoest.estimators.coordinates import Coordinates, bridged, coordinates
 from piezoest.estimators.fit import TUNING, Problem, best_start, outcome, robust, single_shooting
-from piezoest.estimators.hopping import DEFAULT_MODEL, LEAST_HANDED_OUT, Hopping
+from piezoest.estimators.hopping import LEAST_HANDED_OUT, Hopping
 from piezoest.estimators.multiple_shooting import multiple_shooting
 from piezoest.layout import COUNT, MOST, record
 from piezoest.models import Creep, FreeRunning
@@ -116,7 +116,9 @@ class BatchFit(Hopping):
         hop: float | None = None,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        self._start_from(initial_model).coordinate_values()  # refuses what has no admissible model near it
+        self._start_from(
+            initial_model, FreeRunning, "a ColemanHodgdon or a LinearGain"
+        ).coordinate_values()  # refuses what has no admissible model near it
         self._creep = instance("creep", creep, Creep | None, "a Creep: its time constants are kept")
         for name, given, known in (("method", method, METHODS), ("loss", loss, TUNING)):
             if given not in tuple(known):

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.estimators import loops
 from piezoest.estimators.base import EstimatorBase, Trace
 from piezoest.layout import Record, new
 
@@ -17,11 +18,11 @@ NONE, NO_ROWS = np.empty(0), np.empty((0, 0))
 class CompiledEstimator(EstimatorBase):
     """An estimator whose samples go through compiled functions on named numbers.
 
-    Its `kernel` is a module with functions at module level: ``sample(state, settings, u, x)``, what becomes
-    of one sample; the compiled ``step``, ``run`` and ``step_channels`` around it;
-    ``proposed(state, settings, model)``, the admissible model as known now: gain, or alpha, beta and
-    gamma, and fourth the offset; the compiled ``propose`` around it. A class that has `model` itself does
-    without these two, and cannot be exported to C.
+    Its `kernel` is a module, named by the layout of the state, with functions that compiled code can call:
+    ``sample(state, settings, u, x)``, what becomes of one sample; ``write_row(state, settings, row)`` and
+    ``write_outcome(state, row, y, S, P)``, what a `run` keeps of it; ``proposed(state, settings, model)``,
+    the admissible model as known now: gain, or alpha, beta and gamma, and fourth the offset. A class that has
+    `model` itself does without the last, and cannot be exported to C.
     """
 
     __slots__ = ("_run_loop", "_settings", "_settings_layout", "_step_loop")
@@ -63,13 +64,13 @@ class CompiledEstimator(EstimatorBase):
 
     def _sample(self, u: float, x: float) -> None:
         if self._step_loop is None:
-            self._step_loop = self.kernel.step.of(*self.layouts)
+            self._step_loop = loops.step.of(*self.layouts)
         self._step_loop(self._state, self._settings, u, x)
 
     def _through(self, u: FloatArray, x: FloatArray, every: int, histories: tuple[FloatArray, ...]) -> None:
         """Run checked records; every k-th sample goes into those histories that have room."""
         if self._run_loop is None:
-            self._run_loop = self.kernel.run.of(*self.layouts)
+            self._run_loop = loops.run.of(*self.layouts)
         self._run_loop(self._state, self._settings, u, x, every, *histories)
 
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
@@ -106,16 +107,17 @@ class CompiledEstimator(EstimatorBase):
         Parameters
         ----------
         rows : ndarray, shape (…, row_size)
-            As ``kernel.run`` and ``kernel.step_channels`` wrote them.
+            As ``kernel.write_row`` wrote them.
         """
         return rows
 
-    def _proposed(self) -> list[float]:
-        """Numbers of the admissible model as known now: four, see ``kernel.proposed``."""
-        values = np.zeros(4)
-        self.kernel.propose.of(*self.layouts)(self._state, self._settings, values)
-        numbers: list[float] = values.tolist()
-        return numbers
+    @property
+    def model(self) -> Any:
+        """Admissible model as known now: `theta` itself, or its nearest point in the metric of P."""
+        values, kind = np.zeros(4), type(self._initial)
+        loops.propose.of(*self.layouts)(self._state, self._settings, values)
+        numbers = values.tolist()
+        return kind(*numbers[: len(kind.parameter_names)], numbers[3])
 
 
 class Freezable(CompiledEstimator):

@@ -7,14 +7,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from piezoest._checks import FloatArray, check_start, moderate
+from piezoest._checks import FloatArray, moderate
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators import ekf_kernel
-from piezoest.estimators.base import Trace
-from piezoest.estimators.compiled import NONE, CompiledEstimator
+from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.saved_state import Rule, no_more_than
-from piezoest.models import ColemanHodgdon, LinearGain, Model
+from piezoest.models import ColemanHodgdon, LinearGain
 
 # How far the parameters of a filter that does not project may be outside of the admissible set: a relative to
 # its least value, c relative to the least c - 2b. They are 1e-2 and 1e-3 of the start's.
@@ -80,7 +79,7 @@ class HysteresisEKF(CompiledEstimator):
     >>> compensator = pz.InverseCompensator(estimator.model)
     """
 
-    __slots__ = ("_initial",)
+    __slots__ = ()
 
     kernel: ClassVar[Any] = ekf_kernel
 
@@ -100,12 +99,11 @@ class HysteresisEKF(CompiledEstimator):
         project: bool = True,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
-        if not isinstance(initial, ColemanHodgdon | LinearGain):
-            raise ValueError(f"initial_model must be a ColemanHodgdon or a LinearGain, got {initial!r}")
+        initial = self._start_from(
+            initial_model, ColemanHodgdon | LinearGain, "a ColemanHodgdon or a LinearGain"
+        )
         if not initial.is_admissible:
             raise ValueError(f"initial_model {initial} is not admissible: use nearest_admissible()")
-        check_start(initial)
         uncertainty = moderate("uncertainty", uncertainty)
         drift = moderate("drift", drift, or_zero=True)
         mismatch = moderate("mismatch", mismatch, or_zero=True)
@@ -114,7 +112,6 @@ class HysteresisEKF(CompiledEstimator):
         hysteretic = isinstance(initial, ColemanHodgdon)
         # The linear gain has no state that could stray: there the mismatch is noise.
         stray = 0.0 if hysteretic else mismatch**2 * sample_rate
-        self._initial = initial
         self._configure(
             ekf_kernel.settings_layout(start.size, hysteretic=hysteretic),
             {
@@ -157,21 +154,19 @@ class HysteresisEKF(CompiledEstimator):
         # Without projection a decay below zero is an exponential that grows: not without end.
         return bool(-GROWING * least["a"] <= a and abs(c) <= GREATEST * least["margin"])
 
-    def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        rows, n = u.size // every, self.s.size
-        theta = np.empty((rows, len(self.parameter_names)))
-        y = np.empty(rows) if "y" in want else NONE
-        S = np.empty(rows) if "S" in want else NONE
-        kept = rows if "P" in want else 0
-        P, s = np.empty((kept, n * n)), np.empty((kept, n))
-        self._through(u, x, every, (theta, y, S, P, s))
-        wanted = {"y": y, "S": S, "P": parameter_covariance(s, P.reshape(-1, n, n))}
-        return Trace(
-            index=np.arange(every - 1, rows * every, every),
-            theta=theta,
-            parameter_names=self.parameter_names,
-            **{name: wanted[name] for name in want},
-        )
+    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
+        return parameter_covariance(rows, history) if name == "P" else history
+
+    @property
+    def covariance_size(self) -> int:
+        """Of the filter's state."""
+        return int(self._state["filter"]["s"].size)
+
+    row_size = covariance_size
+
+    def theta_of(self, rows: FloatArray) -> FloatArray:
+        """Parameters (…, n) of states (…, row_size)."""
+        return parameters(rows)
 
     @property
     def s(self) -> FloatArray:
@@ -210,14 +205,6 @@ class HysteresisEKF(CompiledEstimator):
     def _is_projected(self) -> bool:
         projection = self._state["projection"]
         return projection.dtype.names is not None and bool(projection["moved"])
-
-    @property
-    def model(self) -> Model:
-        """Admissible model as known now."""
-        alpha, beta, gamma, offset = self._proposed()
-        if isinstance(self._initial, LinearGain):
-            return LinearGain(alpha, offset)
-        return ColemanHodgdon(alpha, beta, gamma, offset)
 
 
 def is_hysteretic(s: FloatArray) -> bool:

@@ -11,19 +11,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.compile import (
-    Cube,
-    Matrix,
-    Record,
-    Vector,
-    compiled,
-    inlined,
-    like,
-    local,
-    nth,
-    own_copy,
-    put_back,
-)
+from piezoest.compile import inlined, like, local
 from piezoest.equations import admissible, kalman
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators.delay_line import delayed
@@ -191,12 +179,12 @@ def _project(projection: Any, s: Any, P: Any, least: Any) -> None:
 
 
 @inlined
-def advance(state: Any, line: Any, settings: Any, u: Any, x: Any) -> None:
-    """Take one sample; `line` is the storage of the delay."""
+def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """Take one sample."""
     s, P = state.filter.s, state.filter.P
     state.samples += 1.0
     if np.abs(u) < WILDEST:
-        u = from_first_voltage(state.centre, state.primed, delayed(line, u))
+        u = from_first_voltage(state.centre, state.primed, delayed(state.line, u))
         if state.primed == 0.0:
             state.primed = 1.0
             state.u_last = u
@@ -226,70 +214,6 @@ def advance(state: Any, line: Any, settings: Any, u: Any, x: Any) -> None:
     state.S = S
     state.updates += 1.0
     state.last = UPDATED
-
-
-@inlined
-def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
-    """Take one sample."""
-    advance(state, state.line, settings, u, x)
-
-
-# ---------------------------------------------------------------- what Python calls
-
-
-@inlined
-def _write_parameters(s: Any, least: Any, theta: Any) -> None:
-    """Parameters of the state s into theta."""
-    if least is None:
-        for i in range(len(s)):
-            theta[i] = s[i]
-    else:
-        theta[0], theta[1], theta[2] = equations.rate_parameters(s[1], s[2], s[3])
-        for i in range(4, len(s)):
-            theta[i - 1] = s[i]
-
-
-@compiled
-def step(state: Record, settings: Record, u: float, x: float) -> None:
-    """Take one sample."""
-    sample(state, settings, u, x)
-
-
-@compiled
-def run(
-    state: Record, settings: Record, u: Vector, x: Vector, every: int,
-    theta: Matrix, y: Vector, S: Vector, P: Matrix, s: Matrix,
-) -> None:  # fmt: skip
-    """Take records; every k-th sample goes into those histories that have room; P is that of s."""
-    row, due = 0, every
-    own, fixed = own_copy(state), own_copy(settings)
-    for k in range(u.size):
-        advance(own, state.line, fixed, u[k], x[k])
-        due -= 1
-        if due == 0:
-            _write_parameters(own.filter.s, fixed.least, theta[row])
-            keep_outcome(row, own.y, own.S, own.filter.P, y, S, P)
-            if s.size > 0:
-                for i in range(len(own.filter.s)):
-                    s[row, i] = own.filter.s[i]
-            row, due = row + 1, every
-    put_back(state, own)
-
-
-@compiled
-def step_channels(
-    states: Record, settings: Record, u: Matrix, x: Matrix, first: int, stop: int, every: int, theta: Cube
-) -> None:
-    """Take samples of the channels first..stop; every k-th theta goes into ``theta[row, channel]``."""
-    for c in range(first, stop):
-        state = nth(states, c)
-        row, due = 0, every
-        for k in range(len(u)):
-            sample(state, settings, u[k, c], x[k, c])
-            due -= 1
-            if due == 0:
-                _write_parameters(state.filter.s, settings.least, theta[row, c])
-                row, due = row + 1, every
 
 
 # ---------------------------------------------------------------- the model handed out
@@ -370,7 +294,17 @@ def write_model(state: Any, settings: Any, model: Any) -> float:
     return write_loop(found, settings.least is not None, model)
 
 
-@compiled
-def propose(state: Record, settings: Record, model: Vector) -> None:
-    """Compiled `proposed`."""
-    proposed(state, settings, model)
+# ---------------------------------------------------------------- what loops keep of a sample
+
+
+@inlined
+def write_row(state: Any, settings: Any, row: Any) -> None:
+    """The filter's state."""
+    for i in range(len(state.filter.s)):
+        row[i] = state.filter.s[i]
+
+
+@inlined
+def write_outcome(state: Any, row: Any, y: Any, S: Any, P: Any) -> None:
+    """Innovation, its variance and the state's covariance."""
+    keep_outcome(row, state.y, state.S, state.filter.P, y, S, P)

@@ -17,9 +17,9 @@ from piezoest._checks import WILDEST, FloatArray
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations import kalman
 from piezoest.estimators import ekf_kernel as kernel
-from piezoest.estimators.base import EstimatorBase, Trace
+from piezoest.estimators.base import EstimatorBase
 from piezoest.estimators.delay_line import delayed
-from piezoest.estimators.ekf import HysteresisEKF, is_hysteretic, parameter_covariance, parameters
+from piezoest.estimators.ekf import HysteresisEKF, is_hysteretic
 from piezoest.estimators.samples import HELD, MISSING, UPDATED
 from piezoest.estimators.saved_state import Rule
 from piezoest.layout import Named
@@ -178,23 +178,6 @@ class _FilterPyBaseline(EstimatorBase):
         P = self._filter.P
         numbers = np.concatenate([np.ravel(a) for a in (self._filter.x, P, self._filter.K, self._filter.S)])
         return bool(np.all(np.abs(numbers) < kalman.LARGEST_TRACE) and np.all(np.diag(P) >= 0.0))
-
-    def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        rows, n = u.size // every, self._filter.x.size
-        s, y, S, P = np.empty((rows, n)), np.empty(rows), np.empty(rows), np.empty((rows, n, n))
-        for k in range(u.size):
-            self._sample(float(u[k]), float(x[k]))
-            if (k + 1) % every == 0:
-                row = k // every
-                s[row], P[row] = self._filter.x, self._filter.P
-                y[row], S[row] = self._state["y"], self._state["S"]
-        wanted = {"y": y, "S": S, "P": parameter_covariance(s, P)}
-        return Trace(
-            index=np.arange(every - 1, rows * every, every),
-            theta=parameters(s),
-            parameter_names=self._ekf.parameter_names,
-            **{name: wanted[name] for name in want},
-        )
 
 
 class FilterPyEKF(_FilterPyBaseline):

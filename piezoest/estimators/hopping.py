@@ -6,13 +6,11 @@ from abc import abstractmethod
 
 import numpy as np
 
-from piezoest._checks import FloatArray, check_start, instance
+from piezoest._checks import FloatArray
 from piezoest.estimators.base import EstimatorBase, Trace
 from piezoest.estimators.coordinates import Coordinates
-from piezoest.models import ColemanHodgdon, FreeRunning
+from piezoest.models import FreeRunning
 
-# Starts from here where the user gives no model: a common stack actuator.
-DEFAULT_MODEL = ColemanHodgdon(0.02, 0.12, 0.0036)
 # Slope of a model that is handed out, relative to that of the model to start from.
 LEAST_HANDED_OUT = 1e-2
 
@@ -20,16 +18,9 @@ LEAST_HANDED_OUT = 1e-2
 class Hopping(EstimatorBase):
     """Base of estimators that fit a `FreeRunning` model at the end of every hop."""
 
-    __slots__ = ("_initial",)
+    __slots__ = ()
 
     _initial: FreeRunning
-
-    def _start_from(self, initial_model: FreeRunning | None) -> FreeRunning:
-        """Keep and return the model to start from, the user's or the default one."""
-        model = DEFAULT_MODEL if initial_model is None else initial_model
-        self._initial = instance("initial_model", model, FreeRunning, "a ColemanHodgdon or a LinearGain")
-        check_start(model)
-        return model
 
     @property
     @abstractmethod

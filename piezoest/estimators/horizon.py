@@ -114,7 +114,7 @@ class MovingHorizon(Hopping):
             raise ValueError(f"window must be at most {LONGEST:g} samples long, got {window:g} s")
         if round(hop * sample_rate) >= round(window * sample_rate):
             raise ValueError(f"hop must be shorter than the window of {window:g} s, got {hop:g} s")
-        initial = self._start_from(initial_model)
+        initial = self._start_from(initial_model, FreeRunning, "a ColemanHodgdon or a LinearGain")
         if not initial.is_admissible:
             raise ValueError(f"initial_model must be admissible, got {initial}: use nearest_admissible()")
         self._window, self._hop = max(2, round(window * sample_rate)), max(1, round(hop * sample_rate))
@@ -139,7 +139,7 @@ class MovingHorizon(Hopping):
         deviation[varied.where("offset")] *= OFFSET_UNCERTAINTY
         deviation[~np.isin(varied.free, initial.state_names)] *= self._arguments["uncertainty"]
         values = {
-            "noise": noise, "variance": noise**2, "q": q, "mean": q, "root": np.diag(1.0 / deviation),
+            "noise": noise, "S": noise**2, "q": q, "mean": q, "root": np.diag(1.0 / deviation),
             "u": kernel.NOTHING, "x": kernel.NOTHING, **self._held_at(q, np.diag(deviation**2)),
         }  # fmt: skip
         self._begin(self._arguments, kernel.layout(q.size, m, self._window, noise), values)
@@ -274,7 +274,7 @@ class MovingHorizon(Hopping):
         row = run.jacobian[-1] @ by_q
         variance = self._state["noise"] ** 2 + row @ covariance @ row
         T = self._coordinates(found.q, self._held)[3][: len(self.parameter_names)]
-        values = {"variance": variance, "gain": T @ covariance @ row / variance}
+        values = {"S": variance, "K": T @ covariance @ row / variance}
         fill(self._state, self._layout, values | self._held_at(found.q, covariance, w_h=run.end[0]))
         return True
 
@@ -296,34 +296,9 @@ class MovingHorizon(Hopping):
     # ------------------------------------------------------------ methods of all estimators
 
     @property
-    def theta(self) -> FloatArray:
-        """Parameters as held, shape (n,)."""
-        return np.array(self._state["theta"])
-
-    @property
     def model(self) -> FreeRunning:
         """Admissible model as held: of the last good solve, its slope at least 1 % of the start's."""
         return self._model_of(self._state["theta"]).lifted(self._initial, LEAST_HANDED_OUT)
-
-    @property
-    def P(self) -> FloatArray:
-        """Covariance of `theta` at the last good solve, shape (n, n)."""
-        return np.array(self._state["P"])
-
-    @property
-    def y(self) -> float:
-        """Last measured displacement less that of the held model [µm]."""
-        return float(self._state["innovation"])
-
-    @property
-    def S(self) -> float:
-        """Variance of an innovation at the last good solve [µm²]."""
-        return float(self._state["variance"])
-
-    @property
-    def K(self) -> FloatArray:
-        """Gain of the window's last sample on `theta`, at the last good solve, shape (n,)."""
-        return np.array(self._state["gain"])
 
     @property
     def status(self) -> Status:

@@ -41,9 +41,9 @@ def layout(n: int, m: int, window: int, noise: float) -> Any:
         samples=COUNT, missing=COUNT, updates=COUNT, solves=COUNT, failures=COUNT,
         last=whole(WAITING, HELD),
         known=FLAG, u_last=MEASURED,
-        model=MODEL, innovation=NUMBER, variance=AMOUNT, noise=Kind(noise),
+        model=MODEL, y=NUMBER, S=AMOUNT, noise=Kind(noise),
         q=numbers(n, kind=PARAMETER), mean=numbers(n, kind=PARAMETER), root=numbers(n, n),
-        theta=numbers(m, kind=PARAMETER), P=numbers(m, m, kind=COVARIANCE), gain=numbers(m),
+        theta=numbers(m, kind=PARAMETER), P=numbers(m, m, kind=COVARIANCE), K=numbers(m),
         u=ring, x=ring,
     )  # fmt: skip
 
@@ -65,7 +65,7 @@ def sample(state: Any, u: float, x: float) -> None:
     state.x[k] = x if measured else NOTHING
     state.samples += 1.0
     if measured:
-        state.innovation = x - (model.c * u + model.w_h + model.offset)
+        state.y = x - (model.c * u + model.w_h + model.offset)
         state.last = HELD
     else:
         state.missing += 1.0
@@ -83,4 +83,4 @@ def run(state: Record, u: Vector, x: Vector, y: Vector) -> None:
     """Samples; their innovations go into `y`."""
     for k in range(u.size):
         sample(state, u[k], x[k])
-        y[k] = state.innovation
+        y[k] = state.y

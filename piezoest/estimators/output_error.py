@@ -6,15 +6,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from piezoest._checks import FloatArray, check_start, integer, moderate, non_negative
+from piezoest._checks import FloatArray, integer, moderate, non_negative
 from piezoest.equations import coleman_hodgdon, output_error, sensor_noise, swing
 from piezoest.estimators import output_error_kernel as kernel
 from piezoest.estimators import saved_state
-from piezoest.estimators.base import Status
 from piezoest.estimators.compiled import Freezable
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.derivative_form import FIRST_HALF_PERIOD, LONGEST_GAP
-from piezoest.estimators.samples import NAMES
 from piezoest.models import ColemanHodgdon
 from piezoest.policies import OutlierRejection, Policy, RandomWalk, check_policies, policy_to_dict
 from piezoest.policies.base import Conditions
@@ -88,7 +86,7 @@ class OutputErrorRLS(Freezable):
     >>> compensator = pz.InverseCompensator(estimator.model)
     """
 
-    __slots__ = ("_initial",)
+    __slots__ = ()
 
     kernel: ClassVar[Any] = kernel
 
@@ -109,12 +107,9 @@ class OutputErrorRLS(Freezable):
         policies: tuple[Policy, ...] = POLICIES,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
-        if not isinstance(initial, ColemanHodgdon):
-            raise ValueError(f"initial_model must be a ColemanHodgdon, got {initial!r}")
+        initial = self._start_from(initial_model, ColemanHodgdon, "a ColemanHodgdon")
         if not initial.is_admissible:
             raise ValueError(f"initial_model {initial} is not admissible: use nearest_admissible()")
-        check_start(initial)
         if moderate("span", span) <= 1.0:
             raise ValueError(f"span must be above 1, got {span:g}")
         members = integer("members", members, 3, MOST_MEMBERS)
@@ -129,7 +124,6 @@ class OutputErrorRLS(Freezable):
             raise ValueError(f"policies: {unknown[0]!r} is none of RandomWalk and OutlierRejection")
         rejects = OutlierRejection in given
         line, empty = delay_line(delay)
-        self._initial = initial
         b, decays = initial.b / initial.c, initial.a * np.geomspace(1.0 / span, span, members)
         spread = moderate("uncertainty", uncertainty) ** 2
         self._configure(
@@ -175,7 +169,7 @@ class OutputErrorRLS(Freezable):
     def _rules(self, state: Any) -> Any:
         law = state["law"]
         yield saved_state.no_more_than(
-            state["samples"], state["missed"], state["outliers"], law["updates"], law["held"]
+            state["samples"], state["missing"], state["outliers"], law["updates"], law["held"]
         )
         yield swing.has_a_size(state["swing"])
 
@@ -260,11 +254,6 @@ class OutputErrorRLS(Freezable):
         return self._theta_covariance(self._row, self._state["law"]["P"])
 
     @property
-    def standard_errors(self) -> FloatArray:
-        """Square roots of the diagonal of `P`, shape (4,): for parameters that walk as the law expects."""
-        return np.sqrt(np.fmax(np.diag(self.P), 0.0))
-
-    @property
     def y(self) -> float:
         """Last innovation [µm]."""
         return float(self._state["law"]["innovation"] * self._initial.c)
@@ -279,24 +268,12 @@ class OutputErrorRLS(Freezable):
         """Last gain, in `theta` per innovation, shape (4,)."""
         return np.asarray(self._jacobian(self._row) @ self._state["law"]["gain"] / self._initial.c)
 
-    @property
-    def status(self) -> Status:
-        """What happened to the samples so far."""
-        state, law = self._state, self._state["law"]
-        b, c = law["s"][:2].tolist()
-        admissible = c >= kernel.LEAST_C and kernel.LEAST_B * c <= b <= 0.5 * (1.0 - kernel.MARGIN) * c
-        return Status(
-            samples=int(state["samples"]),
-            updates=int(law["updates"]),
-            missing=int(state["missed"]),
-            held=int(law["held"]),
-            resets=int(law["resets"]),
-            projected=not admissible,
-            last=NAMES[int(law["last"])],
-            outliers=int(state["outliers"]),
-        )
+    def _is_projected(self) -> bool:
+        b, c = self._state["law"]["s"][:2].tolist()
+        return not (c >= kernel.LEAST_C and kernel.LEAST_B * c <= b <= 0.5 * (1.0 - kernel.MARGIN) * c)
 
     @property
     def model(self) -> ColemanHodgdon:
         """Admissible model as known now: `theta` itself, or its nearest point in the metric of P."""
-        return ColemanHodgdon(*self._proposed())
+        found: ColemanHodgdon = super().model
+        return found

@@ -12,7 +12,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, local, local_rows, nth
+from piezoest.compile import inlined, like, local, local_rows
 from piezoest.equations import believing, kalman, least_squares, sensor_noise, swing
 from piezoest.equations import output_error as equations
 from piezoest.estimators.delay_line import delayed
@@ -62,7 +62,7 @@ def layout(members: int, *, rejects: bool, line: Field) -> Layout:
     )  # fmt: skip
     return record(
         __name__,
-        primed=FLAG, u_last=MEASURED, x_last=MEASURED, travel=AMOUNT, gap=COUNT, samples=COUNT, missed=COUNT,
+        primed=FLAG, u_last=MEASURED, x_last=MEASURED, travel=AMOUNT, gap=COUNT, samples=COUNT, missing=COUNT,
         outliers=COUNT, frozen=FLAG, rested=COUNT, centre=record(u=MEASURED, x=MEASURED),
         # The regressors, those of the last update, and the bank's members of then and now.
         phi=numbers(SIZE), phi_before=numbers(3), member=member, member_before=member,
@@ -235,7 +235,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     known = np.abs(u) < WILDEST
     measured = known and np.abs(x) < WILDEST
     if not measured:
-        state.missed += 1.0
+        state.missing += 1.0
         law.last = MISSING
     if state.primed == 0.0:
         if measured:
@@ -309,54 +309,15 @@ def write_model(state: Any, settings: Any, model: Any) -> float:
     return write_loop(found, True, model)
 
 
-@compiled
-def propose(state: Record, settings: Record, model: Vector) -> None:
-    """Compiled `proposed`."""
-    proposed(state, settings, model)
-
-
-@compiled
-def step(state: Record, settings: Record, u: float, x: float) -> None:
-    """One sample."""
-    sample(state, settings, u, x)
-
-
 @inlined
-def _keep_row(state: Any, row: Any) -> None:
+def write_row(state: Any, settings: Any, row: Any) -> None:
     """The filter's vector and the member in use into a row of six."""
     for i in range(SIZE):
         row[i] = state.law.s[i]
     row[SIZE] = state.member
 
 
-@compiled
-def run(
-    state: Record, settings: Record, u: Vector, x: Vector, every: int,
-    s: Matrix, y: Vector, S: Vector, P: Matrix,
-) -> None:  # fmt: skip
-    """Records; every `every`-th sample goes into the histories that have room."""
-    law = state.law
-    row, due = 0, every
-    for k in range(u.size):
-        sample(state, settings, u[k], x[k])
-        due -= 1
-        if due == 0:
-            _keep_row(state, s[row])
-            keep_outcome(row, law.innovation, law.innovation_variance, law.P, y, S, P)
-            row, due = row + 1, every
-
-
-@compiled
-def step_channels(
-    states: Record, settings: Record, u: Matrix, x: Matrix, first: int, stop: int, every: int, s: Cube
-) -> None:
-    """Records (K, N) of the channels from `first` to `stop`, each with a state of its own."""
-    for c in range(first, stop):
-        state = nth(states, c)
-        row, due = 0, every
-        for k in range(u.shape[0]):
-            sample(state, settings, u[k, c], x[k, c])
-            due -= 1
-            if due == 0:
-                _keep_row(state, s[row, c])
-                row, due = row + 1, every
+@inlined
+def write_outcome(state: Any, row: Any, y: Any, S: Any, P: Any) -> None:
+    """Innovation, its variance and P."""
+    keep_outcome(row, state.law.innovation, state.law.innovation_variance, state.law.P, y, S, P)

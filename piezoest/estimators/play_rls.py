@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, integer, moderate
+from piezoest._checks import FloatArray, array_1d, instance, integer, moderate
 from piezoest.equations import swing
 from piezoest.estimators import play_grid
 from piezoest.estimators import play_rls_kernel as kernel
@@ -98,7 +98,7 @@ class PrandtlIshlinskiiRLS(Freezable):
     >>> compensator = pz.InverseCompensator(estimator.model)
     """
 
-    __slots__ = ("_creep", "_initial", "_scale")
+    __slots__ = ("_creep", "_scale")
 
     kernel: ClassVar[Any] = kernel
 
@@ -126,7 +126,11 @@ class PrandtlIshlinskiiRLS(Freezable):
         mechanics: MassSpringDamper | None = None,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
+        initial = self._start_from(
+            initial_model,
+            PrandtlIshlinskii | ColemanHodgdon | LinearGain,
+            "a PrandtlIshlinskii, a ColemanHodgdon or a LinearGain",
+        )
         plan = play_grid.plan(
             initial,
             voltage_range,
@@ -139,12 +143,10 @@ class PrandtlIshlinskiiRLS(Freezable):
                 f"thresholds, bends and creep make {parameters} parameters, more than {MOST_PARAMETERS}: "
                 "take fewer"
             )
-        if mechanics is not None and not isinstance(mechanics, MassSpringDamper):
-            raise ValueError(f"mechanics must be a MassSpringDamper, got {mechanics!r}")
+        instance("mechanics", mechanics, MassSpringDamper | None, "a MassSpringDamper")
         theta, spread, P = play_grid.prior(plan, moderate("uncertainty", uncertainty))
         line, line_start = delay_line(delay)
         coefficients = {} if mechanics is None else {"coefficients": mechanics.coefficients(sample_rate)}
-        self._initial = initial
         self._creep = plan.times
         self._scale = np.append(np.full(plan.slopes.size, plan.unit), np.ones(plan.times.size))
         self._configure(
@@ -256,16 +258,6 @@ class PrandtlIshlinskiiRLS(Freezable):
         """Covariance of `theta` as the law sees it, shape (n, n)."""
         P: FloatArray = self._state["law"]["P"][:-1, :-1] * np.outer(self._scale, self._scale)
         return P
-
-    @property
-    def y(self) -> float:
-        """Last innovation [µm], of the mean over a window of travel."""
-        return float(self._state["y"])
-
-    @property
-    def S(self) -> float:
-        """Variance of the last innovation as the law saw it [µm²]."""
-        return float(self._state["S"])
 
     @property
     def K(self) -> FloatArray:

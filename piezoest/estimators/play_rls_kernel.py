@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, nth
+from piezoest.compile import inlined
 from piezoest.equations.believing import BELIEF, believable, stands_still
 from piezoest.equations.least_squares import restore_covariance
 from piezoest.equations.mechanics import mechanics_step
@@ -354,47 +354,15 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
 write_model = write_plays
 
 
-@compiled
-def step(state: Record, settings: Record, u: float, x: float) -> None:
-    """Go one sample on."""
-    sample(state, settings, u, x)
+@inlined
+def write_row(state: Any, settings: Any, row: Any) -> None:
+    """Parameters in their own units."""
+    law, slopes = state.law, len(state.plays.y)
+    for i in range(len(row)):
+        row[i] = law.theta[i] * settings.unit if i < slopes else law.theta[i]
 
 
 @inlined
-def _write_parameters(state: Any, settings: Any, theta: Any) -> None:
-    """Parameters in their own units into theta."""
-    law, slopes = state.law, len(state.plays.y)
-    for i in range(len(theta)):
-        theta[i] = law.theta[i] * settings.unit if i < slopes else law.theta[i]
-
-
-@compiled
-def run(
-    state: Record, settings: Record, u: Vector, x: Vector, every: int,
-    theta: Matrix, y: Vector, S: Vector, P: Matrix,
-) -> None:  # fmt: skip
-    """Go through records; every k-th sample goes into the histories that have room."""
-    row, due = 0, every
-    for k in range(u.size):
-        sample(state, settings, u[k], x[k])
-        due -= 1
-        if due == 0:
-            _write_parameters(state, settings, theta[row])
-            keep_outcome(row, state.y, state.S, state.law.P, y, S, P)
-            row, due = row + 1, every
-
-
-@compiled
-def step_channels(
-    states: Record, settings: Record, u: Matrix, x: Matrix, first: int, stop: int, every: int, theta: Cube
-) -> None:
-    """Go through samples of the channels first..stop; every k-th theta goes into ``theta[row, channel]``."""
-    for c in range(first, stop):
-        state = nth(states, c)
-        row, due = 0, every
-        for k in range(len(u)):
-            sample(state, settings, u[k, c], x[k, c])
-            due -= 1
-            if due == 0:
-                _write_parameters(state, settings, theta[row, c])
-                row, due = row + 1, every
+def write_outcome(state: Any, row: Any, y: Any, S: Any, P: Any) -> None:
+    """Innovation, its variance and P."""
+    keep_outcome(row, state.y, state.S, state.law.P, y, S, P)

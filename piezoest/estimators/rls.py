@@ -6,16 +6,14 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from piezoest._checks import FloatArray, check_start, moderate
+from piezoest._checks import FloatArray, moderate
 from piezoest.equations import admissible, swing
 from piezoest.estimators import derivative_form as form
 from piezoest.estimators import recursive_least_squares_kernel as law
 from piezoest.estimators import rls_kernel, saved_state
-from piezoest.estimators.base import Status
 from piezoest.estimators.compiled import NO_ROWS, NONE, Freezable
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.recursive_least_squares import TimeBase, is_discrete
-from piezoest.estimators.samples import NAMES
 from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain, Model
 from piezoest.policies import (
     DeadZone,
@@ -124,7 +122,7 @@ class HysteresisRLS(Freezable):
     'updated'
     """
 
-    __slots__ = ("_followed", "_initial", "_scale")
+    __slots__ = ("_followed", "_scale")
 
     kernel: ClassVar[Any] = rls_kernel
     unneeded: ClassVar[tuple[Any, ...]] = (rls_kernel.propagate_error,)
@@ -148,10 +146,9 @@ class HysteresisRLS(Freezable):
         policies: tuple[Policy, ...] | None = None,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = ColemanHodgdon(0.02, 0.12, 0.0036) if initial_model is None else initial_model
-        if not isinstance(initial, ColemanHodgdon | LinearGain):
-            raise ValueError(f"initial_model must be a ColemanHodgdon or a LinearGain, got {initial!r}")
-        check_start(initial)
+        initial = self._start_from(
+            initial_model, ColemanHodgdon | LinearGain, "a ColemanHodgdon or a LinearGain"
+        )
         if np.any(initial.theta == 0.0):
             raise ValueError(f"initial_model must have no parameter at zero, got {initial}")
         if memory is not None and memory != "period":
@@ -184,7 +181,6 @@ class HysteresisRLS(Freezable):
             "time_base": time_base,
             "errors": bool(errors),
         }
-        self._initial = initial
         scale = np.abs(initial.theta)
         self._scale = np.append(scale, OFFSET_VOLTS * scale[-1]) if offset else scale
         P_0 = np.diag(np.full(self._scale.size, uncertainty**2))
@@ -227,7 +223,7 @@ class HysteresisRLS(Freezable):
     def _rules(self, state: Any) -> Any:
         own = state["law"]
         yield saved_state.no_more_than(
-            state["samples"], state["missed"], state["outliers"], own["updates"], own["held"]
+            state["samples"], state["missing"], state["outliers"], own["updates"], own["held"]
         )
         if state["swing"].size:
             yield swing.has_a_size(state["swing"])
@@ -363,32 +359,9 @@ class HysteresisRLS(Freezable):
         # Where it overflows, the sample moved nothing.
         return gain if np.all(np.isfinite(gain)) else np.zeros(phi.size)
 
-    @property
-    def status(self) -> Status:
-        """What happened to the samples so far."""
-        state, own = self._state, self._state["law"]
-        return Status(
-            samples=int(state["samples"]),
-            updates=int(own["updates"]),
-            missing=int(state["missed"]),
-            held=int(own["held"]),
-            outliers=int(state["outliers"]),
-            resets=int(own["resets"]),
-            projected=not self._as_estimated_is_admissible(),
-            last=NAMES[int(own["last"])],
-        )
-
-    def _as_estimated_is_admissible(self) -> bool:
+    def _is_projected(self) -> bool:
         theta = self.theta
         if isinstance(self._initial, LinearGain):
             gain = float(theta[0])
-            return gain == admissible.kept_gain(gain, self._initial.gain, rls_kernel.LEAST)
-        return bool(rls_kernel.is_admissible(theta, self._scale))
-
-    @property
-    def model(self) -> Model:
-        """Admissible model as known now: `theta` itself, or its nearest point in the metric of P."""
-        alpha, beta, gamma, offset = self._proposed()
-        if isinstance(self._initial, LinearGain):
-            return LinearGain(alpha, offset)
-        return ColemanHodgdon(alpha, beta, gamma, offset)
+            return gain != admissible.kept_gain(gain, self._initial.gain, rls_kernel.LEAST)
+        return not rls_kernel.is_admissible(theta, self._scale)

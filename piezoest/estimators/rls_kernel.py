@@ -8,7 +8,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, local, nth
+from piezoest.compile import inlined, like, local
 from piezoest.equations import admissible, believing, least_squares, sensor_noise, swing
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations.innovation_energy import ENERGY
@@ -62,7 +62,7 @@ def layout(n: int, follows: set[str], law_layout: Field, policies: Field, line: 
         __name__,
         # The last good sample, and the voltage's path since: integrals of |du|, u |du| and du.
         primed=FLAG, u_last=MEASURED, x_last=MEASURED, travel=AMOUNT, moment=NUMBER, rise=NUMBER, gap=COUNT,
-        samples=COUNT, missed=COUNT, outliers=COUNT, frozen=FLAG,
+        samples=COUNT, missing=COUNT, outliers=COUNT, frozen=FLAG,
         centre=where("centre", record(u=MEASURED, x=MEASURED)),
         low_pass=filters_of, high_pass=where("high_pass", filters_of), phi=numbers(n),
         swing=where("swings", swing.SWING), fraction=where("swings", WORK), level=where("level", level.LEVEL),
@@ -182,7 +182,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     known = np.abs(u) < WILDEST
     measured = known and np.abs(x) < WILDEST
     if not measured:
-        state.missed += 1.0
+        state.missing += 1.0
         outcome.last = MISSING
     if waiting:
         if measured:
@@ -313,50 +313,6 @@ def proposed(state: Any, settings: Any, model: Any) -> None:
     _proposed(settings.loop, state, settings, theta, model)
 
 
-# ---------------------------------------------------------------- what Python calls
-
-
-@compiled
-def step(state: Record, settings: Record, u: float, x: float) -> None:
-    """One sample."""
-    sample(state, settings, u, x)
-
-
-@compiled
-def run(
-    state: Record, settings: Record, u: Vector, x: Vector, every: int,
-    theta: Matrix, y: Vector, S: Vector, P: Matrix,
-) -> None:  # fmt: skip
-    """Records; every `every`-th sample goes into the histories that have room."""
-    own = state.law
-    row, due = 0, every
-    for k in range(u.size):
-        sample(state, settings, u[k], x[k])
-        due -= 1
-        if due == 0:
-            for i in range(len(own.theta)):
-                theta[row, i] = own.theta[i] * settings.parameter_scale[i]
-            keep_outcome(row, own.innovation, own.innovation_variance, own.P, y, S, P)
-            row, due = row + 1, every
-
-
-@compiled
-def step_channels(
-    states: Record, settings: Record, u: Matrix, x: Matrix, first: int, stop: int, every: int, theta: Cube
-) -> None:
-    """Records (K, N) of the channels from `first` to `stop`, each with a state of its own."""
-    for c in range(first, stop):
-        state = nth(states, c)
-        row, due = 0, every
-        for k in range(u.shape[0]):
-            sample(state, settings, u[k, c], x[k, c])
-            due -= 1
-            if due == 0:
-                for i in range(len(state.law.theta)):
-                    theta[row, c, i] = state.law.theta[i] * settings.parameter_scale[i]
-                row, due = row + 1, every
-
-
 @register_jitable
 def write_model(state: Any, settings: Any, model: Any) -> float:
     """Write the model as known now into settings of its inverse; what became of them, see `model_writing`."""
@@ -365,7 +321,17 @@ def write_model(state: Any, settings: Any, model: Any) -> float:
     return write_loop(found, settings.loop is not None, model)
 
 
-@compiled
-def propose(state: Record, settings: Record, model: Vector) -> None:
-    """Compiled `proposed`."""
-    proposed(state, settings, model)
+# ---------------------------------------------------------------- what loops keep of a sample
+
+
+@inlined
+def write_row(state: Any, settings: Any, row: Any) -> None:
+    """The estimate, in its own units."""
+    for i in range(len(state.law.theta)):
+        row[i] = state.law.theta[i] * settings.parameter_scale[i]
+
+
+@inlined
+def write_outcome(state: Any, row: Any, y: Any, S: Any, P: Any) -> None:
+    """Innovation, its variance and P."""
+    keep_outcome(row, state.law.innovation, state.law.innovation_variance, state.law.P, y, S, P)

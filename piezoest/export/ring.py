@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from piezoest._checks import WILDEST, FloatArray, array_1d, integer
+from piezoest._checks import WILDEST, FloatArray, array_1d, instance, integer
 from piezoest.compensators import Compensator
 from piezoest.compile import local
 from piezoest.layout import COUNT, FLAG, MEASURED, Record, numbers, record
@@ -138,12 +138,9 @@ class Controller(Ring):
     __slots__ = ("_compensator", "_estimator", "_interval", "_voltage", "_waited")
 
     def __init__(self, estimator: Any, compensator: Compensator, *, update_interval: int = 50) -> None:
-        if not isinstance(compensator, Compensator):
-            raise ValueError(
-                f"compensator must be a LinearCompensator or an InverseCompensator, got {compensator!r}"
-            )
         self._estimator = estimator
-        self._compensator = compensator
+        expected = "a LinearCompensator or an InverseCompensator"
+        self._compensator: Compensator = instance("compensator", compensator, Compensator, expected)
         self._interval = integer("update_interval", update_interval, 1)
         self._voltage: float | None = None
         self._waited = 0

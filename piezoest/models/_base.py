@@ -33,9 +33,16 @@ def finite_voltage(model: Model, u: FloatArray) -> FloatArray:
 
 
 class EqualByContent:
-    """Equality of frozen values that hold arrays: of one class, with one `to_dict`."""
+    """Frozen values that hold arrays: they are equal if of one class, with one `to_dict`."""
 
     __slots__ = ()
+
+    def _keep(self, **values: Any) -> None:
+        """Set the fields, once; arrays are then nobody's to write to."""
+        for name, value in values.items():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+            object.__setattr__(self, name, value)
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe dictionary."""
@@ -51,7 +58,7 @@ class EqualByContent:
 
 
 def rising_pair(name: str, thresholds: Any, other: str, weights: Any) -> tuple[FloatArray, FloatArray]:
-    """Rising thresholds and as many weights, as arrays that nobody else can write to."""
+    """Rising thresholds and as many weights, as arrays of their own."""
     thresholds = array_1d(name, thresholds).copy()
     weights = array_1d(other, weights).copy()
     if thresholds.size != weights.size:
@@ -64,8 +71,6 @@ def rising_pair(name: str, thresholds: Any, other: str, weights: Any) -> tuple[F
             f"{name} must rise from entry to entry, got {thresholds}: "
             "sort them together with the weights and merge equal ones"
         )
-    thresholds.flags.writeable = False
-    weights.flags.writeable = False
     return thresholds, weights
 
 
@@ -171,7 +176,11 @@ class Model(ABC):
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe dictionary with the class name under ``"model"``."""
-        return {"model": type(self).__name__, **dataclasses.asdict(self)}  # type: ignore[call-overload]
+        values = {name: getattr(self, name) for name in _field_names(type(self))}
+        plain = {
+            name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()
+        }
+        return {"model": type(self).__name__, **plain}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:

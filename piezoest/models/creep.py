@@ -57,10 +57,7 @@ class Creep(EqualByContent):
             )
         if np.any(time_constants <= 0.0):
             raise ValueError(f"time_constants must be above zero, got {time_constants.min():g}")
-        gains.flags.writeable = False
-        time_constants.flags.writeable = False
-        object.__setattr__(self, "gains", gains)
-        object.__setattr__(self, "time_constants", time_constants)
+        self._keep(gains=gains, time_constants=time_constants)
 
     @classmethod
     def logarithmic(

@@ -104,15 +104,11 @@ class PrandtlIshlinskii(Model, EqualByContent):
             )
         instance("creep", creep, Creep | None, "a Creep or None")
         bends, changes = _bends(bends, bend_weights, weights.size)
-        object.__setattr__(self, "gain", finite("gain", gain))
-        object.__setattr__(self, "thresholds", thresholds)
-        object.__setattr__(self, "weights", weights)
-        object.__setattr__(self, "offset", finite("offset", offset))
-        object.__setattr__(self, "creep", creep)
-        object.__setattr__(self, "bends", bends)
-        object.__setattr__(self, "bend_weights", changes)
-        rate = None if sample_rate is None else positive("sample_rate", sample_rate)
-        object.__setattr__(self, "sample_rate", rate)
+        self._keep(
+            gain=finite("gain", gain), thresholds=thresholds, weights=weights,
+            offset=finite("offset", offset), creep=creep, bends=bends, bend_weights=changes,
+            sample_rate=None if sample_rate is None else positive("sample_rate", sample_rate),
+        )  # fmt: skip
 
     def __repr__(self) -> str:
         reach = f" up to {self.thresholds[-1]:.3g} V" if self.thresholds.size else ""
@@ -181,21 +177,10 @@ class PrandtlIshlinskii(Model, EqualByContent):
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe dictionary with the class name under ``"model"``."""
-        data: dict[str, Any] = {
-            "model": type(self).__name__,
-            "gain": self.gain,
-            "thresholds": self.thresholds.tolist(),
-            "weights": self.weights.tolist(),
-            "offset": self.offset,
-        }
-        if self.creep is not None:
-            data["creep"] = self.creep.to_dict()
-        if self.bends.size:
-            data["bends"] = self.bends.tolist()
-            data["bend_weights"] = self.bend_weights.tolist()
-        if self.sample_rate is not None:
-            data["sample_rate"] = self.sample_rate
-        return data
+        creep = None if self.creep is None else self.creep.to_dict()
+        data = super(PrandtlIshlinskii, self).to_dict() | {"creep": creep}
+        absent = ("bends", "bend_weights") * (not self.bends.size)
+        return {name: value for name, value in data.items() if value is not None and name not in absent}
 
     @classmethod
     def _read(cls, values: dict[str, Any]) -> dict[str, Any]:
@@ -351,7 +336,7 @@ class PrandtlIshlinskii(Model, EqualByContent):
 
 
 def _bends(bends: Any, weights: Any, plays: int) -> tuple[FloatArray, FloatArray]:
-    """Rising voltages and a row of changes for each, as arrays that nobody else can write to."""
+    """Rising voltages and a row of changes for each, as arrays of their own."""
     bends = array_1d("bends", bends).copy()
     shape = (bends.size, 1 + plays)
     changes = as_floats("bend_weights", weights).copy()
@@ -365,8 +350,6 @@ def _bends(bends: Any, weights: Any, plays: int) -> tuple[FloatArray, FloatArray
     array_1d("bend_weights", changes.ravel())
     if np.any(np.diff(bends) <= 0.0):
         raise ValueError(f"bends must rise from entry to entry, got {bends}: sort them with their weights")
-    bends.flags.writeable = False
-    changes.flags.writeable = False
     return bends, changes
 
 

@@ -77,12 +77,10 @@ class Preisach(Model, EqualByContent):
             raise ValueError(f"thresholds must be above zero, got {thresholds[0]:g} first: leave it out")
         if np.any(weights < 0.0):
             raise ValueError(f"weights must be zero or more, got {weights.min():g}")
-        object.__setattr__(self, "gain", positive("gain", gain))
-        object.__setattr__(self, "thresholds", thresholds)
-        object.__setattr__(self, "weights", weights)
-        object.__setattr__(self, "centre", finite("centre", centre))
-        object.__setattr__(self, "width", positive("width", width))
-        object.__setattr__(self, "offset", finite("offset", offset))
+        self._keep(
+            gain=positive("gain", gain), thresholds=thresholds, weights=weights,
+            centre=finite("centre", centre), width=positive("width", width), offset=finite("offset", offset),
+        )  # fmt: skip
 
     @property
     def parameter_names(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -102,18 +100,6 @@ class Preisach(Model, EqualByContent):
         """Gain, thresholds, weights, centre and width in one vector, shape (3 + 2n,)."""
         return np.concatenate(([self.gain], self.thresholds, self.weights, [self.centre, self.width]))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary with the class name under ``"model"``."""
-        return {
-            "model": type(self).__name__,
-            "gain": self.gain,
-            "thresholds": self.thresholds.tolist(),
-            "weights": self.weights.tolist(),
-            "centre": self.centre,
-            "width": self.width,
-            "offset": self.offset,
-        }
-
     @property
     def is_admissible(self) -> bool:
         """Whether x rises with u: always, for these parameters."""
@@ -121,13 +107,7 @@ class Preisach(Model, EqualByContent):
 
     def stage_settings(self) -> dict[str, Any]:
         """How the model sits in a `SimulatedStage`: see `piezoest.stage.kernel.hysteresis_layouts`."""
-        return {
-            "gain": self.gain,
-            "thresholds": self.thresholds,
-            "weights": self.weights,
-            "centre": self.centre,
-            "width": self.width,
-        }
+        return {name: getattr(self, name) for name in ("gain", "thresholds", "weights", "centre", "width")}
 
     def simulate(self, u: FloatArray, *, initial_state: FloatArray | None = None) -> FloatArray:
         """Displacement for a voltage record; exact, whatever the sample rate.

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from piezoest._checks import class_named, fields
+from piezoest._checks import class_named, fields, instance
 from piezoest.policies.amplitude_memory import AmplitudeMemory as AmplitudeMemory
 from piezoest.policies.base import REGISTERED, Conditions
 from piezoest.policies.base import Policy as Policy
@@ -31,11 +31,8 @@ __all__ = sorted(policy.__name__ for policy in REGISTERED.values())
 
 def check_policies(policies: tuple[Policy, ...], at: Conditions) -> tuple[Policy, ...]:
     """Return policies, if there is one of each, and one way to forget, and all go with their conditions."""
-    if not isinstance(policies, tuple | list):
-        raise ValueError(f"policies must be a tuple of policies, got {policies!r}")
-    for policy in policies:
-        if not isinstance(policy, Policy):
-            raise ValueError(f"policies must be made of policies, got {policy!r}: see piezoest.policies")
+    for policy in instance("policies", policies, tuple | list, "a tuple of policies"):
+        instance("policies", policy, Policy, "made of policies: see piezoest.policies")
         same = [other for other in policies if type(other) is type(policy)]
         if len(same) > 1:
             raise ValueError(f"policies holds {len(same)} of {type(policy).__name__}: pass one")

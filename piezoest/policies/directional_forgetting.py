@@ -11,8 +11,32 @@ from piezoest.policies.forgetting import Forgetting, Unit, check_memory
 from piezoest.policies.periodic_forgetting import weight
 
 
+class InUnits:
+    """What policies share whose `memory` is in periods or in seconds, as their `unit` says."""
+
+    __slots__ = ()
+
+    memory: float
+    unit: Unit
+
+    @property
+    def counts_periods(self) -> bool:
+        """Whether its memory is counted in periods of the reference."""
+        return self.unit == "period"
+
+    def check(self, at: Conditions) -> None:
+        """Refuse a memory in periods where nobody follows the swings of a voltage."""
+        super().check(at)  # type: ignore[misc]
+        if self.counts_periods and not at.has_swings:
+            raise ValueError(f"policies: {self!r} needs the swings of a voltage: see HysteresisRLS")
+
+    def law(self, at: Conditions) -> dict[str, float]:
+        """Factor over a step of the law; none for a memory in periods, which is set sample by sample."""
+        return {} if self.counts_periods else Forgetting(self.memory).law(at)
+
+
 @dataclass(frozen=True, slots=True)
-class DirectionalForgetting(Policy):
+class DirectionalForgetting(InUnits, Policy):
     """Forget only along the present regressor; directions without new data are kept.
 
     R. Kulhavy, Automatica 23 (1987) 589-600; L. Cao, H. Schwartz, Automatica 36 (2000) 1725-1731.
@@ -40,34 +64,9 @@ class DirectionalForgetting(Policy):
     def __post_init__(self) -> None:
         check_memory(self.memory, self.unit)
 
-    @property
-    def counts_periods(self) -> bool:
-        """Whether its memory is counted in periods of the reference."""
-        return self.unit == "period"
-
-    def check(self, at: Conditions) -> None:
-        """Refuse a memory in periods where there are none."""
-        check_unit(self, self.unit, at)
-
-    def law(self, at: Conditions) -> dict[str, float]:
-        """Factor over a step of the law, where it is one in time."""
-        return law_of(self.memory, self.unit, at)
-
     def numbers(self, at: Conditions) -> dict[str, float]:
         """Memory in periods; zero where it is one in time."""
         return {"periods": self.memory if self.unit == "period" else 0.0}
-
-
-def check_unit(policy: Policy, unit: str, at: Conditions) -> None:
-    """Refuse a memory in periods where nobody follows the swings of a voltage."""
-    Policy.check(policy, at)
-    if unit == "period" and not at.has_swings:
-        raise ValueError(f"policies: {policy!r} needs the swings of a voltage: see HysteresisRLS")
-
-
-def law_of(memory: float, unit: str, at: Conditions) -> dict[str, float]:
-    """Numbers of the law for a memory in seconds; none for one in periods, which is set sample by sample."""
-    return Forgetting(memory).law(at) if unit == "second" else {}
 
 
 @inlined

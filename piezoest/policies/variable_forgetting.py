@@ -11,13 +11,13 @@ from piezoest._checks import fraction, positive
 from piezoest.compile import inlined
 from piezoest.equations import innovation_energy, least_squares
 from piezoest.policies.base import Conditions, Policy
-from piezoest.policies.directional_forgetting import check_unit, forget_by_period, law_of
+from piezoest.policies.directional_forgetting import InUnits, forget_by_period
 from piezoest.policies.forgetting import LEAST_KEPT, LEAST_WEIGHT, Unit, check_memory
 from piezoest.policies.periodic_forgetting import weight
 
 
 @dataclass(frozen=True, slots=True)
-class VariableForgetting(Policy):
+class VariableForgetting(InUnits, Policy):
     """Exponential forgetting with a memory that becomes shorter as the innovation's energy rises.
 
     T. Fortescue, L. Kershenbaum, B. Ydstie, Automatica 17 (1981) 831-835. See
@@ -61,19 +61,6 @@ class VariableForgetting(Policy):
             Time between samples, in the unit of `memory`.
         """
         return max(float(np.exp(-step / (self.shortest * self.memory))), LEAST_WEIGHT)
-
-    @property
-    def counts_periods(self) -> bool:
-        """Whether its memory is counted in periods of the reference."""
-        return self.unit == "period"
-
-    def check(self, at: Conditions) -> None:
-        """Refuse a memory in periods where there are none."""
-        check_unit(self, self.unit, at)
-
-    def law(self, at: Conditions) -> dict[str, float]:
-        """Factor over a step of the law, where it is one in time."""
-        return law_of(self.memory, self.unit, at)
 
     def numbers(self, at: Conditions) -> dict[str, float]:
         """Memories in periods, usual and shortest, zero where they are in time; and the least factor then."""

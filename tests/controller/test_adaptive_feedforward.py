@@ -257,7 +257,8 @@ WRONG: dict[str, tuple[tuple[Any, ...], Any]] = {
     "finite": (("state", "line", "gain"), np.nan),
     "driving must be a whole number": (("state", "driving"), 7.0),
     "readings at rest": (("state", "start"), {"stage": 0.0, "samples": 9.0}),
-    "models must be a dictionary": (("models",), None),
+    "models must be a list": (("models",), None),
+    "models must be 0": (("models",), [{}]),
     "planned must": (("planned",), "x"),
     "events must be a list": (("events",), None),
     "events must be .time": (("events",), [[1.0, 2.0, 3.0]]),
@@ -281,12 +282,12 @@ def test_a_damaged_file_is_refused(message: str) -> None:
 @pytest.mark.parametrize(
     ("path", "value"),
     [
-        (("state", "candidates", "first", "estimator", "samples"), -1.0),
-        (("state", "candidates", "third", "estimator", "plays"), {}),
-        (("models", "third", "thresholds"), [1.0]),
-        (("models", "third", "plays"), 1e6),
-        (("models", "first", "a"), np.nan),
-        (("models", "first"), None),
+        (("state", "candidates", "model", "estimator", "samples"), -1.0),
+        (("state", "candidates", "others", "others", "model", "estimator", "plays"), {}),
+        (("models", 2, "thresholds"), [1.0]),
+        (("models", 2, "plays"), 1e6),
+        (("models", 0, "a"), np.nan),
+        (("models", 0), None),
         (("estimators", 0, "arguments"), {}),
     ],
 )

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import piezoest as pz
+from piezoest.estimators import loops
 
 SAMPLE_RATE = 50_000.0
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
@@ -157,10 +158,9 @@ def test_warmup_says_how_long_it_took() -> None:
     pz.warmup(estimator, bank)
     assert 0.0 < pz.warmup(estimator, bank) < 10.0
     assert estimator.status.samples == bank.status[0].samples == 0
-    kernel = type(estimator).kernel
-    for function in (kernel.step, kernel.run, kernel.propose):
+    for function in (loops.step, loops.run, loops.propose):
         assert estimator.layouts in function._entries
-    assert pz.HysteresisEKF(SAMPLE_RATE).layouts in pz.HysteresisEKF.kernel.step_channels._entries
+    assert pz.HysteresisEKF(SAMPLE_RATE).layouts in loops.step_channels._entries
     with pytest.raises(ValueError, match=r"used must be estimators of piezoest, .* or a controller, got int"):
         pz.warmup(3)
 

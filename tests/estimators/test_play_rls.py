@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.estimators import play_rls_kernel as kernel
+from piezoest.estimators import loops
 
 RATE = 10_000.0
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
@@ -102,13 +102,13 @@ def test_settings_without_asymmetry_or_creep() -> None:
 
 def test_one_machine_code_serves_all_sizes() -> None:
     u = 30.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(100) / RATE)
-    loops = []
+    found = []
     for sizes in ({}, {"thresholds": 0, "bends": 0, "creep": ()}, {"thresholds": 40, "bends": 3}):
         estimator = pz.PrandtlIshlinskiiRLS(RATE, **sizes)
         estimator.run(u, 0.1 * u)
         assert np.all(np.isfinite(estimator.theta))
-        loops.append(kernel.run.of(*estimator.layouts))
-    assert loops[0] is loops[1] is loops[2]
+        found.append(loops.run.of(*estimator.layouts))
+    assert found[0] is found[1] is found[2]
 
 
 @pytest.mark.parametrize(
