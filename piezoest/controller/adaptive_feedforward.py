@@ -47,8 +47,8 @@ class AdaptiveFeedforward(Face):
         of half a swing, in which the stage has a gain of about one, and an initial model and a noise for
         that.
     corridor : float
-        How far the voltage goes from the straight line at most, as a fraction of half the recent swing,
-        0 to 1.
+        How far the voltage goes from the straight line at most, as a fraction of half the widest swing of
+        late, 0 to 1.
     gain : float, optional
         What the stage does [µm/V], about; below zero if it falls with the voltage. The start seeks nothing
         then: the first few per cent of the range check it, and what is a factor of three off is sought.
