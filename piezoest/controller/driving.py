@@ -10,6 +10,7 @@ from numba.extending import register_jitable
 from piezoest.controller import candidate, slots
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
+from piezoest.controller import travel as travels
 
 # What a change of model owes is paid within this fraction of a swing of the reference: faster, a loop through
 # the models would feed a resonance.
@@ -113,20 +114,19 @@ def _disappoints(state: Any) -> bool:
 
     A model can be right and still shake a resonance, which every model then misses alike.
     """
-    swing = state.travel.swing
-    missed = candidate.missed(state.score) / swing
+    swing = travels.widest(state.travel)
     if state.driving == 0.0:
         if state.since > SEEN:
-            state.line_missed, state.line_peak = missed, state.score.peak / swing
+            state.line_missed = candidate.missed(state.score) / swing
+            state.line_peak = state.score.peak / swing
         return False
-    state.line_missed = min(state.line_missed, missed)
     return state.since > SEEN and candidate.missed(state.outcome) > state.line_missed * swing + _floor(state)
 
 
 @register_jitable
 def watch(state: Any, off: Any) -> None:
     """Fall back to the line at once where the stage is farther off than it ever was under the line."""
-    most = TRIP * state.line_peak * state.travel.swing + 3.0 * _floor(state)
+    most = TRIP * state.line_peak * travels.widest(state.travel) + 3.0 * _floor(state)
     if state.driving > 0.0 and off > most and state.since > CALM:
         _change(state, 0.0)
         state.shaken += 1.0

@@ -23,7 +23,7 @@ from piezoest.controller.voltage import RUN, plan
 from piezoest.layout import AMOUNT, COUNT, FIXED, MEASURED, NUMBER, Field, record, whole
 from piezoest.layout import Record as Layout
 
-# Half-width of the corridor, as a fraction of half the recent swing of the reference.
+# Half-width of the corridor, as a fraction of half the widest swing of the reference of late.
 WIDTH = 0.3
 
 

@@ -17,7 +17,7 @@ from piezoest.controller import travel as travels
 from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK, is_held
 
 # Models are handed over after this fraction of a swing; legs of the line before another model drives.
-HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 2.0
+HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 1.0
 # The way to the reference is over within this fraction of its length, or after so many times what a doubling
 # takes: a fast reference is never caught.
 NEAR, LONGEST = 0.05, 50.0

@@ -14,10 +14,11 @@ from piezoest.layout import COUNT, DISTANCE, FLAG, MEASURED, SIGN, record
 
 # Direction of travel, furthest value in it, where this leg began, length of the last leg; size of a usual
 # swing, least one before two turns were seen; turns so far, the last value, whether it has just turned;
-# samples of this leg and of the last one.
+# samples of this leg and of the last one; the extremes of late.
 TRAVEL = record(
     direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE, swing=DISTANCE, least=DISTANCE,
     turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, usual=COUNT,
+    highest=MEASURED, lowest=MEASURED,
 )  # fmt: skip
 
 # A way back of this fraction of a swing is a turn; so many turns show a swing. Before, a smaller one is: the
@@ -27,12 +28,14 @@ TURN, SHOWN, FIRST_TURN = 0.05, 2.0, 0.02
 LONG = 2.0
 # No swing counts for less than this fraction of the one before: noise at rest would.
 LEAST = 0.02
+# At each turn the extremes come nearer to the present leg by this fraction of the way there.
+FADES = 0.1
 
 
 @register_jitable
 def begin(travel: Any, value: Any, least: Any) -> None:
     """Begin, or start again, at a value; no swing is smaller than `least` until two turns were seen."""
-    travel.furthest = travel.turned = travel.last = value
+    travel.furthest = travel.turned = travel.last = travel.highest = travel.lowest = value
     travel.direction = travel.leg = travel.turns = travel.count = travel.usual = 0.0
     travel.swing = travel.least = least
 
@@ -59,8 +62,17 @@ def follow(travel: Any, value: Any) -> float:
         travel.turned = travel.furthest
         travel.furthest = value
         travel.direction = -travel.direction
+        travel.highest += FADES * (max(travel.turned, value) - travel.highest)
+        travel.lowest += FADES * (min(travel.turned, value) - travel.lowest)
+    travel.highest, travel.lowest = max(travel.highest, value), min(travel.lowest, value)
     travel.swing = max(travel.swing, np.abs(value - travel.turned))
     return gone
+
+
+@register_jitable
+def widest(travel: Any) -> float:
+    """How far the signal has swung of late: what a wide swing has strained no smaller one wipes out."""
+    return max(travel.swing, travel.highest - travel.lowest)
 
 
 @register_jitable

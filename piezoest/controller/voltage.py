@@ -11,6 +11,7 @@ from piezoest._checks import WILDEST
 from piezoest.controller import homing, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
+from piezoest.controller import travel as travels
 
 # The gain is sought; the voltage goes to where the reference needs it; all is learnt; hysteresis is erased.
 SEEK, APPROACH, RUN, HOME = 0.0, 1.0, 2.0, 3.0
@@ -40,16 +41,18 @@ def _feed_forward(state: Any, settings: Any, r: Any) -> float:
     r += state.feedback
     straight = wanted = lines.voltage(line, r - state.owed * kept * state.unit)
     if state.pending <= 1.0 and state.readings.fault == reading.NONE and state.driving > 0.0:
-        z = (r - state.zero) / state.unit - slots.owed(state.candidates, state.driving, 0.0) * kept
+        owed = slots.owed(state.candidates, state.driving, 0.0)
+        z = (r - state.zero) / state.unit - owed * kept
         wanted = slots.voltage(state.candidates, settings.candidates, state.driving, z, straight)
         # Near a turn the inverse of a wide loop leaps, which would shake a resonance.
         before = state.reference.last + state.back
-        ahead = straight - lines.voltage(line, before - state.owed * state.unit)
+        ahead = lines.voltage(line, r - owed * kept * state.unit)
+        ahead -= lines.voltage(line, before - owed * state.unit)
         most = (RATE - 1.0) * np.abs(ahead)
         wanted = min(max(wanted, state.u + ahead - most), state.u + ahead + most)
     if not np.abs(wanted) < WILDEST:
         wanted = straight
-    room = np.abs(settings.corridor * 0.5 * swing / line.gain)
+    room = np.abs(settings.corridor * 0.5 * max(swing, travels.widest(state.reference)) / line.gain)
     # No model can gain more on the line than the line has missed of late.
     missed = np.abs(state.unit) * state.widest + 3.0 * np.sqrt(state.readings.noise)
     room = min(room, WIDER * missed / np.abs(line.gain))
