@@ -21,6 +21,9 @@ from piezoest.models import Creep, Model
 CHUNK = 8192
 # After so many time constants nothing is left.
 LONG_AGO = 60.0
+# Behind the record that was fitted a drift goes on as creep does, with the logarithm of time, at first with
+# this fraction of its rate: what warms up or creeps becomes slower.
+SLOWER = 0.6
 NO_CREEP = Creep(np.empty(0), np.empty(0))
 
 
@@ -41,6 +44,10 @@ class Basis(Protocol):
     @property
     def goes_on(self) -> bool:
         """Whether a model may have what goes on beyond the record."""
+
+    @property
+    def foretells(self) -> bool:
+        """Whether the model says by itself how a stage goes on beyond the voltages of the record."""
 
     def begin(self) -> Any:
         """State before the first sample."""
@@ -186,8 +193,8 @@ class Along:
             # Numbers below the normal range would make all that follows a hundred times slower.
             rows[:, design.crept] = np.where(past < LONG_AGO, np.exp(-np.minimum(past, LONG_AGO)), 0.0)
         rows[:, design.offset] = 1.0
-        # What has drifted stays when the record that was fitted is over.
-        rows[:, design.offset + 1] = np.minimum(index, design.samples) / design.samples
+        t = index / design.samples
+        rows[:, design.offset + 1] = np.minimum(t, 1.0) + SLOWER * np.log(np.maximum(t, 1.0))
         rows[:, design.offset + 2 :] = index[:, None] >= design.jumps
         return rows
 

@@ -16,9 +16,9 @@ from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.fitting.forms import FORMS, Form
 from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.outliers import lonely, unsettled
-from piezoest.fitting.play_columns import PlayColumns
+from piezoest.fitting.play_columns import PlayColumns, Start
 from piezoest.fitting.polish import polished
-from piezoest.fitting.regression import Fitted, Log, Regression, sums_of
+from piezoest.fitting.regression import Fitted, Log, Regression
 from piezoest.fitting.result import Fit
 from piezoest.models import Model
 from piezoest.symbolic import quadratic_solver
@@ -88,7 +88,10 @@ def fit(
     0.02
     """
     _known(model)
-    return Fitter(u, x, sample_rate=sample_rate, delay=delay, flaws=flaws, settle=settle).form(model)
+    fitter = Fitter(
+        u, x, sample_rate=sample_rate, delay=delay, flaws=flaws, settle=settle, plays=FORMS[model].plays
+    )
+    return fitter.form(model)
 
 
 def _known(model: str) -> None:
@@ -99,8 +102,9 @@ def _known(model: str) -> None:
 class Fitter:
     """A record made ready for fits of all kinds, with one delay, one start and the same samples left out.
 
-    The parameters are those of `fit`. `start` says where plays were before the record, `delay` is the one
-    used, and `delay_estimated`, `left_out` and `spikes` are as in `Fit`.
+    The parameters are those of `fit`; without `plays` it is only for kinds that have none, and faster.
+    `start` says where plays were before the record, `delay` is the one used, and `delay_estimated`,
+    `left_out` and `spikes` are as in `Fit`.
     """
 
     def __init__(
@@ -112,6 +116,7 @@ class Fitter:
         delay: float | Literal["auto"] = 0.0,
         flaws: Flaws | None = None,
         settle: float | None = None,
+        plays: bool = True,
     ) -> None:
         u, x = (array_1d(name, each, allow_nan=True) for name, each in (("u", u), ("x", x)))
         if u.size != x.size:
@@ -140,32 +145,40 @@ class Fitter:
             raise ValueError(
                 f"x must rise with u, a straight line has {gain:.4g} µm/V: change the sign of one of them"
             )
-        self.start = search.best_start(self._log)
+        self._plays = plays
+        self._begin(plays or self.delay_estimated)
         self.delay = search.best_delay(self._log, self.start) if isinstance(delay, str) else delay
-        self._log = replace(self._log, u=late(self._given, self.delay))
-        self.start = search.best_start(self._log)
+        if self.delay > 0.0:
+            self._log = replace(self._log, u=late(self._given, self.delay))
+            self._begin(plays)
         self._leave_out(settle)
 
+    def _begin(self, plays: bool) -> None:
+        """Find where plays were before the record; anywhere will do where there are none."""
+        first = float(self._log.u[0])
+        self.start = search.best_start(self._log) if plays else Start(first, first)
+
     def _leave_out(self, settle: float | None) -> None:
-        """Do without what plays with bends show to be spikes, and a start that has not settled."""
+        """Do without what a first fit shows to be spikes, and a start that has not settled."""
         given, self.left_out = self._log, 0
         if settle is not None:
             self.left_out = int(fraction("settle", settle, 0.0, 0.5 * given.u.size / self._rate) * self._rate)
         for _ in range(PASSES):
-            fitted = self._bent.best(search.SMOOTH)
+            fitted = self._first.best(search.SMOOTH)
             residual = np.where(given.counts, given.x - fitted.design.output(given.u, fitted.w), np.nan)
             further = self.left_out if settle is not None else max(unsettled(residual), self.left_out)
             spikes = lonely(residual)
             spikes[:further] = False
             counts = given.counts & ~spikes
             counts[:further] = False
-            self._log, settled = replace(given, counts=counts), further == self.left_out
-            self.left_out = further
-            del self._bent
+            settled, self.left_out = further == self.left_out, further
+            if not np.array_equal(counts, self._log.counts):
+                self._log = replace(given, counts=counts)
+                del self._first
             if settled:
                 break
             # What had not settled had looked like another start, and moved the fit.
-            self.start = search.best_start(self._log)
+            self._begin(self._plays)
         self.spikes = int(np.count_nonzero(spikes))
 
     @property
@@ -173,14 +186,18 @@ class Fitter:
         return search.plays(self._log, self.start, bends=search.BENDS)
 
     @cached_property
-    def _bent(self) -> Regression:
-        """Sums of plays with bends, from which those without follow."""
-        return search.regression(self._log, self._bent_plays)
+    def _first(self) -> Regression:
+        """Sums of plays with bends, from which those without follow; or of a loop."""
+        return search.regression(self._log, self._bent_plays if self._plays else self._loop)
+
+    @property
+    def _loop(self) -> LoopColumns:
+        return LoopColumns(search.best_alpha(self._log))
 
     @cached_property
     def _plain(self) -> dict[bool, Fitted]:
         """Plays without creep, with and without bends."""
-        bent = self._bent
+        bent = self._first
         return {True: bent.best(), False: bent.combined(*self._bent_plays.merged()).best()}
 
     def form(self, name: str) -> Fit:
@@ -197,8 +214,8 @@ class Fitter:
 
     def _fitted(self, form: Form) -> Fitted:
         if form.loop:
-            every = max(1, int(np.count_nonzero(self._log.counts)) // 20_000)
-            return search.regression(self._log, LoopColumns(search.best_alpha(self._log, every))).best()
+            loop = search.regression(self._log, self._loop) if self._plays else self._first
+            return loop.best()
         if not form.plays:
             return search.regression(self._log, search.plays(self._log, self.start, 1)).best()
         plain = self._plain[form.bends]
@@ -210,19 +227,16 @@ class Fitter:
         delay = self.delay
         if form.loop:
             given = replace(log, u=self._given)
-            fitted, delay, errors = polished(given, fitted, delay, fit_delay=self.delay_estimated)
+            basis, w, delay, errors = polished(given, fitted, delay, fit_delay=self.delay_estimated)
             log = replace(log, u=late(self._given, delay))
-            again = search.regression(log, fitted.design.basis).best()
-            fitted = replace(again, w=fitted.w)
+            fitted = replace(search.regression(log, basis).best(), w=w)
             solver, parameters = NONLINEAR, 5 + self.delay_estimated
         else:
-            regressed = Regression(fitted.design, sums_of(fitted.design, log, fitted.w))
-            solver = LINEAR.format(quadratic_solver(), regressed.gap(fitted))
+            solver = LINEAR.format(quadratic_solver(), fitted.regression.gap(fitted))
             # Creep gains are no columns of the last linear program, but they were fitted as well.
             with_gains = replace(fitted, used=np.union1d(fitted.used, np.r_[fitted.design.gains]))
-            errors = trust.standard_errors(regressed, with_gains, log)
-            parameters = int(trust.free_columns(regressed, with_gains).size)
-        missed = trust.residuals(fitted, log)
+            errors = trust.standard_errors(with_gains, log)
+            parameters = int(trust.free_columns(with_gains).size)
         wider, rest = _beyond(fitted)
         design, w = wider if fitted.design.basis.goes_on else (fitted.design, fitted.w)
         model = design.model(w)
@@ -238,7 +252,7 @@ class Fitter:
             initial_state=_initial_state(design, w, model),
             held_out=fitted.held_out,
             ahead=fitted.ahead,
-            spread=trust.spread_of(missed, log, model.line[0]),
+            spread=trust.spread_of(fitted, log),
             counts=log.counts,
             left_out=self.left_out,
             spikes=self.spikes,

@@ -36,6 +36,7 @@ class LoopColumns:
     size: ClassVar[int] = 3
     free: ClassVar[int] = 1
     goes_on: ClassVar[bool] = True
+    foretells: ClassVar[bool] = True
 
     def begin(self) -> FloatArray:
         """Voltage, f, and what is left of the start; the first sample says the voltage."""

@@ -82,6 +82,11 @@ class PlayColumns:
         return 0
 
     @property
+    def foretells(self) -> bool:
+        """No: of plays wider than those that moved nothing is known."""
+        return False
+
+    @property
     def size(self) -> int:
         """Slopes: segment by segment, and in each of them play by play."""
         return int(self.thresholds.size * (self.bends.size + 1))

@@ -6,11 +6,11 @@ CasADi makes end in it, and give the standard errors of all, the delay among the
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from piezoest._checks import FloatArray
 from piezoest.estimators.coordinates import coordinates
 from piezoest.estimators.fit import Problem, outcome, single_shooting
 from piezoest.fitting.loop_columns import LoopColumns
@@ -23,9 +23,10 @@ MOST_PASSES, TOLERANCE = 20, 1e-8
 
 
 class Polished(NamedTuple):
-    """A fit with another alpha, its delay, and the standard errors of all parameters by name."""
+    """Columns of another alpha, coefficients, delay, and the standard errors of all parameters by name."""
 
-    fitted: Fitted
+    basis: LoopColumns
+    w: FloatArray
     delay: float
     standard_errors: dict[str, float]
 
@@ -49,5 +50,4 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     w = w.copy()
     w[: offset + 1] = found.beta, found.b, value["initial_state"], found.offset
     errors = dict(zip(end.parameter_names, end.standard_errors.tolist(), strict=True))
-    design = replace(fitted.design, basis=LoopColumns(found.alpha))
-    return Polished(replace(fitted, design=design, w=w), value["delay"], errors)
+    return Polished(LoopColumns(found.alpha), w, value["delay"], errors)

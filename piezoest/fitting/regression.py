@@ -21,7 +21,7 @@ SMOOTHNESS = tuple(10.0**k for k in range(-8, 1))
 AS_GOOD = 1.01
 # So many blocks predict those behind them; a drift is fitted where it makes the squares there as small as
 # this.
-EARLIER, DRIFTS = 3, 0.8
+EARLIER, DRIFTS = 3, 0.95
 # What creep had at the start costs this times its square, for slow creep and offset look alike.
 CREPT = 1e-3
 # ... and so does a drift, which is what amplitudes that change along the record look like, too.
@@ -97,7 +97,7 @@ class Fitted:
 
     Parameters
     ----------
-    design : Design
+    regression : Regression
         What they belong to.
     w : ndarray, shape (columns,)
         All of them.
@@ -115,7 +115,7 @@ class Fitted:
         Coefficients of the fit of the first `EARLIER` blocks.
     """
 
-    design: Design
+    regression: Regression
     w: FloatArray
     smoothness: float
     used: IntArray
@@ -123,6 +123,11 @@ class Fitted:
     without: list[FloatArray]
     ahead: float
     earlier: FloatArray
+
+    @property
+    def design(self) -> Design:
+        """The columns."""
+        return self.regression.design
 
 
 class Regression:
@@ -229,7 +234,7 @@ class Regression:
         ahead = later.missed(earlier) / max(later.rows, 1.0)
         w = self.solved(smoothness, used)
         return Fitted(
-            self.design, w, smoothness, used, float(np.sqrt(score)), without, float(np.sqrt(ahead)), earlier
+            self, w, smoothness, used, float(np.sqrt(score)), without, float(np.sqrt(ahead)), earlier
         )
 
     def _smoothness(self) -> tuple[float, ...]:

@@ -123,7 +123,7 @@ class Fit:
     def continued(self, u: FloatArray) -> Prediction:
         """Displacement along a voltage that begins as the fitted one does, and goes on.
 
-        What had drifted by the end of the record stays.
+        What drifted in the record goes on, at a rate that becomes less, as that of creep does.
 
         Parameters
         ----------
@@ -132,7 +132,7 @@ class Fit:
         """
         u = _without_gaps(u)
         x = self._design.output(late(u, self.delay), self._w)
-        half = self.spread.along(u, np.maximum(np.arange(u.size) - self._u.size, 0.0))
+        half = self.spread.along(u, np.maximum(np.arange(u.size) / self._u.size - 1.0, 0.0))
         return Prediction(x, x - half, x + half)
 
     def __repr__(self) -> str:

@@ -25,16 +25,17 @@ from piezoest.models import Creep
 THRESHOLDS, BENDS = 20, 2
 # The widest play moves by this fraction of the voltage's range.
 MOVES = 0.1
-# Rows by which delays and starts are compared, and with which smoothness.
+# Rows by which delays, starts and alphas are compared, and with which smoothness.
 FEW, SMOOTH = 4000, 1e-4
 # Largest delay that is looked for [samples], and how closely it is found.
 LONGEST_DELAY, CLOSE = 10.0, 0.02
 # Gauss-Newton steps of the creep gains, the relative change at which they have settled, the least of them.
 STEPS, SETTLED, LEAST_CREEP = 8, 1e-3, 1e-3
-# Creep terms are a decade apart, from so many samples to this fraction of the record.
-SHORTEST_CREEP, LONGEST_CREEP, MOST_TERMS = 20.0, 0.5, 4
-# Range of alpha times the range of the voltage, and how closely its logarithm is found.
-ALPHAS, CLOSE_ALPHA = (0.03, 300.0), 0.003
+# Creep terms are a decade apart, from so many samples to so many times the record.
+SHORTEST_CREEP, LONGEST_CREEP, MOST_TERMS = 20.0, 1.0, 4
+# Range of alpha times the range of the voltage, and how closely its logarithm is found: what ends in the
+# optimum of all parameters begins there.
+ALPHAS, CLOSE_ALPHA = (0.03, 300.0), 0.03
 
 
 def plays(log: Log, start: Start, thresholds: int = THRESHOLDS, bends: int = 0) -> PlayColumns:
@@ -93,12 +94,11 @@ def best_delay(log: Log, start: Start) -> float:
     return _least(cost, np.linspace(0.0, LONGEST_DELAY, 11), CLOSE)
 
 
-def best_alpha(log: Log, every: int) -> float:
+def best_alpha(log: Log) -> float:
     """alpha [1/V] of the Coleman-Hodgdon model that misses least."""
 
     def cost(logarithm: float) -> float:
-        found = regression(log, LoopColumns(float(np.exp(logarithm))), every)
-        return found.all.missed(found.solved(0.0, found.columns(drift=False))) / max(found.all.rows, 1.0)
+        return missed(log, LoopColumns(float(np.exp(logarithm))))
 
     low, high = np.log(np.array(ALPHAS) / (2.0 * log.half))
     return float(np.exp(_least(cost, np.linspace(low, high, 10), CLOSE_ALPHA)))

@@ -11,7 +11,7 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
-from piezoest.fitting import FORMS
+from piezoest.fitting import FORMS, Fitter
 from piezoest.fitting.flaws import flawed
 from piezoest.fitting.play_columns import PlayColumns, Start
 from tests.fitting.stages import RATE, N, T, noise, rms, stage, voltage
@@ -189,3 +189,14 @@ def _without_wider_plays(found: Any, u: FloatArray) -> FloatArray:
     # Wider plays may stand beside zero, and add something of their own.
     own = found.continued(u).x
     return np.asarray(x - np.mean(x[: N // 2] - own[: N // 2]))
+
+
+def test_a_loop_alone_is_what_it_is_beside_plays() -> None:
+    x = pz.ColemanHodgdon(0.03, 0.12, 0.0066, offset=1.5).simulate(U) + noise(5e-3)
+    x[1000] += 1.0
+    alone = fit(x=x, model="coleman-hodgdon")
+    beside = Fitter(U, x, sample_rate=RATE).form("coleman-hodgdon")
+    np.testing.assert_allclose(alone.model.theta, beside.model.theta, rtol=1e-3)
+    # That plays miss the start, as they do here, is nothing to a loop.
+    assert alone.left_out == 0
+    np.testing.assert_array_equal(np.flatnonzero(~alone.counts), [1000])

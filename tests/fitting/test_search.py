@@ -103,11 +103,11 @@ def test_a_delay_is_found_where_the_voltage_has_several_frequencies(delay: float
 
 
 def test_creep_is_found() -> None:
-    u, x, sigma = drawn(5, creep=pz.Creep([0.05], [2.5]))
+    u, x, sigma = drawn(5, creep=pz.Creep([0.05], [0.5]))
     found: Any = fit(u, x + noise(sigma), "plays-creep")
-    # 2.5 s is one of the time constants that are tried.
+    # 0.5 s is one of the time constants that are tried.
     creep = dict(zip(found.model.creep.time_constants.tolist(), found.model.creep.gains, strict=True))
-    assert creep[2.5] == pytest.approx(0.05, abs=0.015)
+    assert creep[0.5] == pytest.approx(0.05, abs=0.015)
     assert sum(creep.values()) == pytest.approx(0.05, abs=0.01)
     assert fit(u, x + noise(sigma), "plays").held_out > 1.5 * found.held_out
 
@@ -163,7 +163,7 @@ def test_spikes_dropouts_and_gaps_do_not_move_a_fit() -> None:
     v = u.copy()
     v[2500:2510] = np.nan
     found = fit(v, y, "plays")
-    assert rms(found.predict().x - without) < 0.3 * sigma
+    assert rms(found.predict().x - without) < 0.35 * sigma
     assert not found.counts[3000:3200].any()
     assert np.all(np.isfinite(found.predict().x))
 

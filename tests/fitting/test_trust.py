@@ -54,7 +54,7 @@ def test_standard_errors_of_plays_and_creep_are_of_the_size_of_their_scatter() -
     """Of a stage whose thresholds and time constants are those of the fit."""
     u = voltage(np.random.default_rng(1), centre=40.0)
     thresholds = 0.45 * np.ptp(u) * np.arange(1, 20) / 19.0
-    creep = pz.Creep([0.05], [2.5])
+    creep = pz.Creep([0.05], [0.5])
     model = pz.PrandtlIshlinskii(0.1, thresholds, np.full(19, 4e-3), creep=creep, sample_rate=RATE)
     state = np.clip(0.0, u[0] - thresholds, u[0] + thresholds)
     x = model.simulate(u, initial_state=np.append(state, 0.0))
@@ -103,9 +103,16 @@ def test_intervals_hold_what_they_promise(model: str) -> None:
 
 
 def test_an_interval_widens_behind_the_record_and_beyond_its_range() -> None:
-    spread = Spread(1.0, 0.01, 0.1, (-10.0, 10.0))
-    half = spread.along(np.array([0.0, 10.0, 20.0, -15.0]), np.array([0.0, 0.0, 0.0, 100.0]))
-    np.testing.assert_allclose(half, [1.0, 1.0, 2.0, 2.5])
+    spread = Spread(3.0, 4.0, 0.4, (-10.0, 10.0))
+    half = spread.along(np.array([0.0, 10.0, 20.0, 0.0]), np.array([0.0, 0.0, 0.0, np.expm1(1.0)]))
+    np.testing.assert_allclose(half, [3.0, 3.0, 5.0, 5.0])
+
+
+def test_a_loop_is_trusted_beyond_the_range_and_plays_are_not() -> None:
+    u = voltage(np.random.default_rng(3))
+    x = LOOP.simulate(u) + noise(5e-3)
+    wide = [pz.fit(u, x, sample_rate=RATE, model=name).spread for name in ("coleman-hodgdon", "plays")]
+    assert wide[0].by_volt < 0.1 * wide[1].by_volt
 
 
 def test_runs_are_where_marks_are_set() -> None:

@@ -170,7 +170,7 @@ def test_the_kind_that_a_stage_needs_is_chosen(kinds: dict[str, Any], wanted: se
     found = [identify(plays_log(seed, **kinds), delay=0.0) for seed in range(3)]
     assert len([each for each in found if each.chosen in wanted]) >= 2
     for each in found:
-        assert each.held_out.rms < 1.4 * min(item.held_out.rms for item in each.candidates)
+        assert each.held_out.rms < 1.6 * min(item.held_out.rms for item in each.candidates)
 
 
 def test_the_simplest_that_will_do_is_chosen() -> None:
