@@ -50,11 +50,3 @@ def test_solves_the_differential_equation(damping: float) -> None:
         )
         expected = solution.y[:, -1]
         assert x == pytest.approx(expected[0], abs=1e-9)
-
-
-def test_static_gain_is_one_and_rest_is_kept() -> None:
-    coefficients = mechanics_coefficients(780.0, 0.02, 2e-5)
-    state = np.array([4.0, 0.0])
-    for _ in range(1000):
-        mechanics_step(state, 4.0, coefficients)
-    assert state[0] == pytest.approx(4.0, abs=1e-12)

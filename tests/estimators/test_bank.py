@@ -117,16 +117,6 @@ def test_copies_are_independent() -> None:
     np.testing.assert_array_equal(bank.theta, other.theta)
 
 
-def test_wrong_arguments_are_named() -> None:
-    with pytest.raises(ValueError, match="list of estimators"):
-        pz.EstimatorBank(pz.FilterPyEKF(SAMPLE_RATE), 2)  # type: ignore[arg-type]
-    bank = pz.EstimatorBank(pz.HysteresisRLS(SAMPLE_RATE), 2)
-    with pytest.raises(ValueError, match=r"u must have shape \(2,\)"):
-        bank.step(np.zeros(3), np.zeros(2))
-    with pytest.raises(ValueError, match=r"x must have shape \(K, 2\)"):
-        bank.run(np.zeros((4, 2)), np.zeros(4))
-
-
 @pytest.mark.parametrize("make", [pz.HysteresisRLS, pz.HysteresisEKF])
 def test_streaming_keeps_nothing_and_needs_no_collector(make: Any) -> None:
     u, x = (values[:, 0].tolist() for values in records(3000, 4))
@@ -149,20 +139,6 @@ def test_streaming_keeps_nothing_and_needs_no_collector(make: Any) -> None:
     for u_k, x_k in zip(u, x, strict=True):
         other.step(u_k, x_k)
     np.testing.assert_array_equal(estimator.theta, other.theta)
-
-
-def test_warmup_says_how_long_it_took() -> None:
-    estimator = pz.HysteresisRLS(SAMPLE_RATE, memory=0.4, errors=False)
-    bank = pz.EstimatorBank(pz.HysteresisEKF(SAMPLE_RATE), 3)
-    pz.warmup(estimator, bank)
-    assert 0.0 < pz.warmup(estimator, bank) < 10.0
-    assert estimator.status.samples == bank.status[0].samples == 0
-    kernel = type(estimator).kernel
-    for function in (kernel.step, kernel.run, kernel.propose):
-        assert estimator.layouts in function._entries
-    assert pz.HysteresisEKF(SAMPLE_RATE).layouts in pz.HysteresisEKF.kernel.step_channels._entries
-    with pytest.raises(ValueError, match=r"used must be estimators of piezoest, .* or a controller, got int"):
-        pz.warmup(3)
 
 
 def test_what_is_read_of_a_channel_stays_that_channels() -> None:

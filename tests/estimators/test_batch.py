@@ -358,29 +358,3 @@ def test_saves_and_resumes() -> None:
     assert whole.to_dict() == BatchFit(RATE, **options).to_dict()
     with pytest.raises(ValueError, match="u and x must hold the state's 200 samples"):
         BatchFit.from_dict(half.to_dict() | {"u": [1.0]})
-
-
-def test_wrong_arguments() -> None:
-    u, x = record(0.2)
-    with pytest.raises(ValueError, match="method must be one of"):
-        BatchFit(RATE, method="shooting")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="loss must be one of"):
-        BatchFit(RATE, loss="absolute")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="creep must be a Creep"):
-        BatchFit(RATE, creep=[0.1])  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=r"fixed holds unknown names \['apha'\]"):
-        BatchFit(RATE, fixed={"apha": 0.02})
-    with pytest.raises(ValueError, match="fixed parameters are not admissible"):
-        BatchFit(RATE, fixed={"alpha": 0.02, "beta": 0.1, "gamma": 1.0})
-    with pytest.raises(ValueError, match="must be above zero"):
-        BatchFit(RATE, fixed={"beta": -0.1})
-    with pytest.raises(ValueError, match="nothing to fit"):
-        BatchFit(RATE, initial_model=pz.LinearGain(1.0), fixed={"gain": 1.0})
-    with pytest.raises(ValueError, match="gain of zero"):
-        BatchFit(RATE, initial_model=pz.LinearGain(0.0))
-    with pytest.raises(ValueError, match="u and x must have the same length, got 200 and 199"):
-        BatchFit(RATE).fit(u, x[:-1])
-    with pytest.raises(ValueError, match=r"x has 3 samples .* needs at least 5"):
-        BatchFit(RATE).fit(u[:3], x[:3])
-    with pytest.raises(ValueError, match="u never changes"):
-        BatchFit(RATE).fit(np.ones(50), x[:50])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import pickle
 from typing import Any
 
 import numpy as np
@@ -66,33 +64,6 @@ def test_solves_once_a_hop_and_holds_between(monkeypatch: pytest.MonkeyPatch) ->
     assert "satisfied" in estimator.solver_message
 
 
-@pytest.mark.parametrize("offset", [False, True])
-def test_step_run_and_split_run_are_the_same_bits(offset: bool) -> None:
-    u, x = record(0.8)
-    x[[333, 800]] = np.nan
-    u[500] = np.nan
-    whole, steps, halves = (MovingHorizon(RATE, window=0.3, offset=offset) for _ in range(3))
-    trace = whole.run(u, x, record=("y", "S", "P"))
-    for k in range(u.size):
-        steps.step(float(u[k]), float(x[k]))
-    halves.run(u[:711], x[:711])
-    resumed = MovingHorizon.from_dict(json.loads(json.dumps(halves.to_dict(), allow_nan=False)))
-    later = pickle.loads(pickle.dumps(resumed)).run(u[711:], x[711:], every=3, record=("y",))
-    np.testing.assert_array_equal(later.theta, trace.theta[713::3])
-    resumed.run(u[711:], x[711:])
-    for other in (steps, resumed, whole.copy()):
-        np.testing.assert_array_equal(other.theta, whole.theta)
-        np.testing.assert_array_equal(other.P, whole.P)
-        np.testing.assert_array_equal(other.K, whole.K)
-        assert (other.y, other.S, other.status) == (whole.y, whole.S, whole.status)
-    assert trace.y is not None
-    assert trace.P is not None
-    assert trace.y[-1] == whole.y
-    np.testing.assert_array_equal(trace.P[-1], whole.P)
-    whole.reset()
-    np.testing.assert_array_equal(whole.run(u, x).theta, trace.theta)
-
-
 def test_tracks_a_step_of_the_gain() -> None:
     u, before = record(2.0)
     later = pz.ColemanHodgdon(0.021, 0.147 * 1.2, 0.00429 * 1.2)
@@ -148,19 +119,6 @@ def test_a_bad_solve_keeps_the_last_good_model() -> None:
     assert estimator.status.updates == 0
     assert np.all(trace.theta == [0.02, 0.12, 0.0036])
     assert np.all(np.isfinite(estimator.P))
-
-
-def test_dwell_keeps_the_model() -> None:
-    u, x = record()
-    estimator = MovingHorizon(RATE)
-    estimator.run(u, x)
-    before = estimator.theta
-    noise = NOISE * np.random.default_rng(1).standard_normal(10_000)
-    estimator.run(np.full(10_000, u[-1]), TRUE.simulate(u)[-1] + noise)
-    np.testing.assert_allclose(estimator.theta, before, rtol=0.02)
-    assert estimator.model.is_admissible
-    estimator.run(u, x)
-    np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=0.01)
 
 
 def test_missing_samples_and_nothing_at_all() -> None:
@@ -222,14 +180,3 @@ def test_decimation_costs_no_accuracy() -> None:
     full.run(u, x)
     few.run(u, x)
     np.testing.assert_allclose(few.standard_errors, full.standard_errors, rtol=0.15)
-
-
-def test_wrong_arguments() -> None:
-    with pytest.raises(ValueError, match="hop must be shorter than the window"):
-        MovingHorizon(RATE, window=0.1, hop=0.1)
-    with pytest.raises(ValueError, match="initial_model must be admissible"):
-        MovingHorizon(RATE, initial_model=pz.ColemanHodgdon(0.02, 0.12, 1.0))
-    with pytest.raises(ValueError, match="decimation"):
-        MovingHorizon(RATE, decimation=0)
-    with pytest.raises(ValueError, match="process_noise"):
-        MovingHorizon(RATE, process_noise=-1.0)

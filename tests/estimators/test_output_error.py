@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -182,23 +180,6 @@ def test_holes_and_spikes_are_left_out() -> None:
 
 
 # ---------------------------------------------------------------- arguments
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"span": 1.0}, "span"),
-        ({"members": 2}, "members"),
-        ({"noise": 0.0}, "noise"),
-        ({"uncertainty": -1.0}, "uncertainty"),
-        ({"policies": ()}, "RandomWalk"),
-        ({"policies": (pz.policies.RandomWalk(), pz.policies.NormBound())}, "NormBound"),
-        ({"initial_model": pz.ColemanHodgdon(0.02, 0.2, 0.0036)}, "not admissible"),
-    ],
-)
-def test_refuses_what_it_cannot_use(options: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        pz.OutputErrorRLS(RATE, **options)
 
 
 def test_settles_within_two_periods_from_a_bad_start() -> None:

@@ -136,21 +136,6 @@ def test_saved_numbers_that_cannot_be_are_refused(record: str, name: str, value:
         pz.PrandtlIshlinskiiRLS.from_dict(data)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "name"),
-    [
-        ({"voltage_range": (3.0, 1.0)}, "voltage_range"),
-        ({"creep": (0.0,)}, "creep"),
-        ({"thresholds": -1}, "thresholds"),
-        ({"initial_model": pz.LinearGain(-1.0)}, "initial_model"),
-        ({"initial_model": pz.PrandtlIshlinskii(-0.1, [], [])}, "initial_model"),
-    ],
-)
-def test_refuses(arguments: dict[str, Any], name: str) -> None:
-    with pytest.raises(ValueError, match=name):
-        pz.PrandtlIshlinskiiRLS(RATE, **arguments)
-
-
 def test_a_piezo_recorded(data_dir: Path) -> None:
     record = pz.read_record(data_dir / "discrete_backlash_operator" / "test_1hz.csv")
     u, x, rate = record.voltage, record.displacement, record.sample_rate
