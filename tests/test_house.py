@@ -7,8 +7,6 @@ import graphlib
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parents[1]
 # Private by their spelling alone: of tuples with names, of Python itself, of Numba.
 PUBLIC = ("_replace", "_asdict", "_fields", "_exit", "_reduce")

@@ -25,7 +25,7 @@ HEAVY = ("casadi", "filterpy", "matplotlib", "numba", "scipy.signal")
 
 OBJECTS = public_objects()
 # Protocols describe what others make; a base class without a keyword of its own is not made by users.
-MADE_BY_USERS = {
+MADE_BY_USERS: dict[str, Any] = {
     name: value
     for name, value in OBJECTS.items()
     if inspect.isclass(value)

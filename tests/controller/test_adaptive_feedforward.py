@@ -325,7 +325,7 @@ def test_a_damaged_estimator_is_refused(path: tuple[Any, ...], value: Any) -> No
 )  # fmt: skip
 def test_wrong_arguments_are_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        pz.AdaptiveFeedforward(**({"sample_rate": FS, "limits": LIMITS} | options))
+        pz.AdaptiveFeedforward(**{"sample_rate": FS, "limits": LIMITS, **options})
 
 
 @pytest.mark.parametrize(

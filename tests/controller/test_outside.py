@@ -97,9 +97,3 @@ def test_a_sweep_may_go_farther() -> None:
     driven(driver, np.zeros(3000))
     assert driver.status.stage != "homing"
     assert notes(driver) == []
-
-
-def test_two_warnings_within_a_block_are_both_told() -> None:
-    known = LearntModel(LOOP, LearntOn((-60.0, 60.0), (-3.0, 3.0), 1.0))
-    driver = driven(controller(known, resonance=100.0), np.tile(LARGE, 4), block=2000)
-    assert sorted(event.reason.split(":")[0] for event in driver.events) == ["outside", "resonance"]

@@ -66,24 +66,6 @@ def test_each_channel_is_a_single_estimator(estimator: Any, threads: int) -> Non
     np.testing.assert_array_equal(bank.theta[0], estimator.theta)
 
 
-def test_a_covariance_that_winds_up_starts_anew_in_its_channel_alone() -> None:
-    estimator = pz.HysteresisRLS(1000.0, memory=0.01, policies=(), errors=False)
-    K, N = 3000, 6
-    rng = np.random.default_rng(1)
-    u = np.cumsum(rng.standard_normal((K, N)), axis=0) * 0.2
-    for c in (1, N - 1):
-        u[100 + c : 2500, c] = u[100 + c, c]
-    x = 0.15 * u + 1e-3 * rng.standard_normal(u.shape)
-    bank = pz.EstimatorBank(estimator, N)
-    theta = bank.run(u, x, every=7)
-    for c in range(N):
-        single = estimator.copy()
-        trace = single.run(u[:, c].copy(), x[:, c].copy(), every=7)
-        np.testing.assert_array_equal(theta[:, c], trace.theta)
-        assert bank.channel(c).to_dict() == single.to_dict()
-        assert (single.status.resets > 0) == (c in (1, N - 1))
-
-
 def test_a_channel_without_a_number_is_missing_and_stops_no_other() -> None:
     plain, listed, masked = (pz.EstimatorBank(pz.HysteresisRLS(SAMPLE_RATE), 3) for _ in range(3))
     for k in range(20):

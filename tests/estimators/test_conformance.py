@@ -593,8 +593,8 @@ def test_refuses_a_save_that_is_not_its_own(kind: Any) -> None:
     for name in arguments:
         lacking = {key: value for key, value in arguments.items() if key != name}
         wrong.append((data | {"arguments": lacking}, f"arguments has no '{name}'"))
-    for value in ("7", None, np.nan, [1.0], 10**400, {}):
-        wrong.append((data | {"state": state | {"samples": value}}, "state"))
+    odd: tuple[Any, ...] = ("7", None, np.nan, [1.0], 10**400, {})
+    wrong += [(data | {"state": state | {"samples": value}}, "state") for value in odd]
     for changed, message in wrong:
         with pytest.raises(ValueError, match=message):
             kind.from_dict(changed)

@@ -10,7 +10,6 @@ import pytest
 
 import piezoest as pz
 from piezoest.bench.faults import FAULTS
-from piezoest.estimators import play_rls_kernel as kernel
 
 RATE = 10_000.0
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
@@ -90,26 +89,6 @@ def test_grid_follows_the_voltage() -> None:
     assert estimator.thresholds[-1] == pytest.approx(60.0, rel=0.15)
     assert estimator.status.resets > 1
     assert estimator.model.is_admissible
-
-
-def test_settings_without_asymmetry_or_creep() -> None:
-    u = 30.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(6000) / RATE)
-    estimator = pz.PrandtlIshlinskiiRLS(RATE, bends=0, creep=(), thresholds=8)
-    estimator.run(u, pz.PaperStage(RATE, creep=False).run(u))
-    assert estimator.parameter_names == ("gain", *(f"weights[{i}]" for i in range(8)))
-    model: Any = estimator.model
-    assert model.is_plain
-
-
-def test_one_machine_code_serves_all_sizes() -> None:
-    u = 30.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(100) / RATE)
-    loops = []
-    for sizes in ({}, {"thresholds": 0, "bends": 0, "creep": ()}, {"thresholds": 40, "bends": 3}):
-        estimator = pz.PrandtlIshlinskiiRLS(RATE, **sizes)
-        estimator.run(u, 0.1 * u)
-        assert np.all(np.isfinite(estimator.theta))
-        loops.append(kernel.run.of(*estimator.layouts))
-    assert loops[0] is loops[1] is loops[2]
 
 
 @pytest.mark.parametrize(

@@ -104,13 +104,14 @@ POLICIES: list[tuple[Any, dict[str, Any]]] = [
     (p.AmplitudeMemory, {"uncertainty": -1.0}),
 ]
 REMEMBERING: Any = {"policies": (p.RandomWalk(), p.AmplitudeMemory(places=1))}
+PROFILE: Any = pz.AmplitudeProfile
 CALLS: list[tuple[Any, str]] = [
     (lambda: pz.HysteresisRLS(RATE).profile, "needs policies"),
     (lambda: pz.HysteresisRLS(RATE, **REMEMBERING).profile.at(1.0), "empty"),
     (lambda: pz.HysteresisRLS(RATE, **REMEMBERING).announce_change(amplitude=0.0), "amplitude must be"),
     (lambda: setattr(pz.HysteresisRLS(RATE, **REMEMBERING), "profile",
-                     pz.AmplitudeProfile([1.0, 2.0], [LOOP.theta] * 2)), "AmplitudeMemory has 1 places"),
-    (lambda: pz.AmplitudeProfile([2.0, 1.0], [LOOP.theta] * 2), "ascend"),
+                     PROFILE([1.0, 2.0], [LOOP.theta] * 2)), "AmplitudeMemory has 1 places"),
+    (lambda: PROFILE([2.0, 1.0], [LOOP.theta] * 2), "ascend"),
     (lambda: p.policy_from_dict({"policy": "Magic"}), "policy 'Magic' is unknown"),
     (lambda: pz.BatchFit(RATE).fit(U, X[:-1]), "u and x must have the same length, got 50 and 49"),
     (lambda: pz.BatchFit(RATE).fit(U[:3], X[:3]), r"x has 3 samples .* needs at least 5"),

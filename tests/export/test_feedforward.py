@@ -169,16 +169,6 @@ def test_writes_that_may_be_lost_are_told() -> None:
     assert [event.reason.split(":")[0] for event in library.events].count("unknown voltage") == 1
 
 
-def test_track_takes_it_as_a_controller() -> None:
-    r = pz.signals.triangle(5.0, 20.0, 4, FS)
-    voltages = []
-    library = controller("line")
-    for driver in (library, pz.export.CompiledFeedforward(pz.export.c(library))):
-        record = pz.track(r, stage=pz.PaperStage(FS, seed=0), controller=driver)
-        voltages.append(record.voltage)
-    np.testing.assert_array_equal(voltages[0], voltages[1])
-
-
 # ---------------------------------------------------------------- float
 
 
@@ -238,15 +228,6 @@ def test_compiles_without_a_warning(estimators: str, precision: Any, cc: str, tm
     assert names <= own | {"memcpy", "memmove", "memset", "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
     held = subprocess.run(["nm", "stage.o"], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert not {line.split()[-2] for line in held.stdout.splitlines()} & set("bBdDC"), "global state"
-
-
-def test_names_are_those_of_python() -> None:
-    code = pz.export.c(controller("ekf"))
-    for words in ("&state->settings", "&state->line", "    double noise;"):
-        assert words in code.header + code.source
-    assert "HysteresisEKF" in code.header
-    assert "0 none, 1 no response, 2 reversed" in code.header
-    assert "-100 V to 100 V" in code.header
 
 
 DRIVER = """#include "stage.h"

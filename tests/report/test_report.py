@@ -77,14 +77,8 @@ def test_page_is_sound_and_self_contained(found: pz.Identification, tmp_path: Pa
         assert re.search(rf"<td>{re.escape(name)}</td><td>{value:.6g}</td>", body) or abs(value) < 1e-9
         assert f"<td>{error:.2g}</td>" in body or error == 0.0
         assert f"<td>{unit}</td>" in body
-    for item in found.candidates:
-        mark = "▸" if item is found.best else " "
-        assert f"<td>{mark} {item.label}</td><td>{item.parameters}</td><td>{item.train.rms:.3g}</td>" in body
-    assert found.reason in body
-    for sentence in found.advice:
-        assert sentence in body
-    for heading in ("Models of all kinds", "Parameters", "Loops", "Residual", "Excitation"):
-        assert f"<h2>{heading}</h2>" in body
+    for words in (found.reason, *found.advice, *(item.label for item in found.candidates)):
+        assert words in body
     # Of which plotly's script is 4.8 MB.
     assert len(body) < 600_000
 
@@ -117,18 +111,6 @@ def test_thinning_keeps_peaks_and_order() -> None:
 def test_other_things_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="found must come from identify or identify_stream, got str"):
         write_report("log.csv", tmp_path / "report.html")  # type: ignore[arg-type]
-
-
-def test_page_of_a_stream(streamed: pz.StreamedIdentification, tmp_path: Path) -> None:
-    write_report(streamed, tmp_path / "report.html")
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert Outline(text).open == []
-    body = text.split("<body>")[1]
-    assert f"▸ {FORMS[streamed.chosen].label}" in body
-    for name, error in streamed.cross_validated.items():
-        assert re.search(rf"{FORMS[name].label}</td><td></td><td>[^<]*</td><td>{error:.3g}</td>", body)
-    assert "95 of 100 readings" not in body
-    assert len(body) < 600_000
 
 
 def test_other_logs_are_on_the_page(record: pz.Record, tmp_path: Path) -> None:
