@@ -149,6 +149,7 @@ def test_double_equals_the_library(name: str, log: tuple[Any, Any]) -> None:
     np.testing.assert_array_equal(ours, theirs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["HysteresisRLS", "HysteresisEKF"])
 def test_double_equals_the_library_over_every_scenario(kind: str) -> None:
     total = 0

