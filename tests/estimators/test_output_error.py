@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 import piezoest as pz
+from piezoest.equations import output_error
 from tests.reference.output_error import OutputErrorFilter
 
 FloatArray = NDArray[np.float64]
@@ -22,6 +23,18 @@ def voltage(periods: float = 8.0) -> FloatArray:
 def loop_error(model: pz.ColemanHodgdon, u: FloatArray, offset: float = 0.0) -> float:
     """Largest difference over the last period [µm]."""
     return float(np.abs(model.simulate(u) - TRUE.simulate(u) - offset)[-400:].max())
+
+
+def test_recentre_describes_the_same_decay() -> None:
+    rng = np.random.default_rng(0)
+    root = rng.standard_normal((5, 5))
+    s, P = np.array([0.3, 1.0, 0.06, 0.1, 0.2]), root @ root.T
+    T = np.eye(5)
+    T[2, 0] = -0.15
+    expected_s, expected_P = T @ s, T @ P @ T.T
+    output_error.recentre(s, P, 0.15)
+    np.testing.assert_allclose(s, expected_s, rtol=1e-14)
+    np.testing.assert_allclose(P, expected_P, rtol=1e-12, atol=1e-14)
 
 
 # ---------------------------------------------------------------- what it learns
