@@ -68,9 +68,10 @@ test: $(VENV)/.installed-test  ## Run the tests (ARGS="-k name" passes options t
 test-slow: $(VENV)/.installed-test  ## Run the tests that take long: caches of many processes, random sweeps
 	$(BIN)/python -m pytest -m slow $(ARGS)
 
-lint: $(VENV)/.installed-lint  ## Check style and formatting
+lint: $(VENV)/.installed-lint  ## Check style, formatting and docstrings
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python docs/check_docstrings.py
 
 format: $(VENV)/.installed-lint  ## Mend what lint can mend by itself
 	$(BIN)/ruff check --fix .

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import TypingError, njit, types
+from numba import TypingError
 from numba.core import config
 from numba.core.errors import LoweringError
 from numba.extending import register_jitable
 
-from piezoest.compile import Cube, Matrix, Record, Vector, compiled, inlined, like, local, local_rows, nth
+from piezoest.compile import Cube, Matrix, Record, compiled, inlined, like, local, local_rows, nth
 from piezoest.compiled_records import record_type
 from piezoest.layout import (
     ABSENT,
@@ -101,12 +101,6 @@ def step_channels(states: Record, given: Record, x: Matrix, first: int, stop: in
         for k in range(x.shape[0]):
             sample(state, given, x[k, c])
             history[k, c, 0] = state.total
-
-
-@compiled
-def tripled(x: Vector, factor: int) -> None:
-    for i in range(len(x)):
-        x[i] *= factor
 
 
 @compiled
@@ -204,12 +198,6 @@ def test_without_machine_code_the_function_itself_runs(monkeypatch: pytest.Monke
     assert plain.tobytes() == machine.tobytes()
 
 
-def test_functions_without_records_are_called_as_they_are() -> None:
-    x = np.arange(3.0)
-    tripled(x, 3)
-    assert x.tolist() == [0.0, 3.0, 6.0]
-
-
 def test_a_record_s_functions_are_those_of_its_module() -> None:
     layout = Layout(layout_of().fields, __name__)
     state = new(layout, total=3.0)
@@ -275,29 +263,6 @@ def test_no_two_layouts_share_machine_code() -> None:
         assert record_type(nested[0]) != record_type(nested[1])
     entries = {id(step.of(layout, GAIN)) for layout in LAYOUTS}
     assert len(entries) == 2  # with and without a memory, whatever its lengths
-
-
-def test_machine_code_does_not_go_by_what_numbers_can_be() -> None:
-    changed = record(**{**dict(INNER.fields), "count": NUMBER})
-    assert record_type(changed) == record_type(INNER)
-
-
-def test_what_is_absent_costs_nothing() -> None:
-    """Neither a number of room nor an instruction."""
-
-    def instructions(layout: Layout) -> int:
-        kinds = (record_type(layout), record_type(GAIN), types.float64)
-        anew: Any = njit(_nrt=False, error_model="numpy")(step.function)  # what was kept cannot be looked at
-        anew.compile(kinds)
-        assembler = anew.inspect_asm(kinds)
-        return sum(line.startswith("\t") for line in assembler.splitlines())
-
-    bare = record(total=NUMBER, law=INNER, memory=ABSENT, tail=numbers(2))
-    assert bare.dtype.itemsize == layout_of(None).dtype.itemsize
-    assert instructions(layout_of(None)) < 0.8 * instructions(layout_of(4))
-    assert instructions(record(**dict(layout_of(None).fields), other=ABSENT)) <= 1.02 * instructions(
-        layout_of(None)
-    )
 
 
 @compiled

@@ -49,22 +49,6 @@ def test_numbers_stand_where_names_say() -> None:
     assert layout.dtype.itemsize // 8 == 1 + (1 + 3 + 9) + (1 + 1 + 4 + 8) == state.nbytes // 8
 
 
-def test_what_compiled_code_cannot_place_stands_last() -> None:
-    layout = lengthy(4)
-    assert [name for name, _ in layout.fields] == ["law", "work", "level", "memory"]
-    assert [name for name, _ in layout.by_name["memory"].fields] == ["plays", "last", "u", "thetas"]  # type: ignore[union-attr]
-    assert LAW.is_fixed
-    assert not layout.is_fixed
-
-
-def test_what_is_absent_takes_no_room() -> None:
-    law = record(updates=COUNT, theta=numbers(3), P=numbers(3, 3))
-    assert law.dtype.itemsize == LAW.dtype.itemsize
-    assert new(LAW, rates=None)["rates"].size == 0
-    assert "rates" not in by_name(LAW, new(LAW))
-    assert "rates" not in {name for name, _, _ in leaves(LAW, new(LAW))}
-
-
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(KeyError, match="thetta"):
         new(LAW, thetta=[1.0, 2.0, 3.0])
@@ -72,11 +56,6 @@ def test_unknown_names_are_refused() -> None:
         new(lengthy(2), law={"updatse": 1.0})
     with pytest.raises(ValueError, match=r"\['plays'\] are names of fields and of lengths"):
         record(plays=COUNT, u=numbers(Length("plays", 3)))
-
-
-def test_wrong_shapes_are_refused() -> None:
-    with pytest.raises(ValueError, match="broadcast"):
-        new(LAW, theta=[1.0, 2.0])
 
 
 def test_saved_numbers_have_names_and_no_work_space() -> None:
@@ -142,27 +121,6 @@ def test_named_reads_and_writes_the_array() -> None:
     for misspelt in (lambda: named.law.thetta, lambda: setattr(named.law, "thetta", 1.0)):
         with pytest.raises((ValueError, KeyError, AttributeError), match="thetta"):
             misspelt()
-
-
-def test_named_calls_functions_of_the_module_that_a_record_names() -> None:
-    named: Any = Named(new(Record(LAW.fields, "math")), Record(LAW.fields, "math"))
-    assert named.hypot(3.0, 4.0) == 5.0
-    assert named.updates == 0.0
-
-
-def test_named_without_a_layout_goes_by_the_array() -> None:
-    named: Any = Named(new(lengthy(2), law={"updates": 3.0}))
-    assert named.law.updates == 3.0
-    assert named.level is named.law.rates is None
-    named.memory.thetas[1, 1] = 2.0
-    assert named.memory.thetas[1].tolist() == [0.0, 2.0]
-
-
-def test_an_array_of_length_zero_is_there() -> None:
-    layout = record(u=numbers(Length("plays", 0)), rates=ABSENT)
-    named: Any = Named(new(layout), layout)
-    assert named.u.shape == (0,)
-    assert named.rates is None
 
 
 def test_a_length_has_one_count() -> None:

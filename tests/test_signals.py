@@ -434,13 +434,6 @@ def test_jump_message_says_where_and_how_large() -> None:
         signals.from_array(STEP, 1000.0).require_continuous()
 
 
-def test_allowed_step_lets_a_quantiser_flicker() -> None:
-    flicker = np.where(np.arange(500) % 50 == 0, 0.0003, 0.0)
-    with pytest.raises(ValueError, match="jumps"):
-        check_continuity(flicker, 1000.0)
-    check_continuity(flicker, 1000.0, allowed_step=0.0003)
-
-
 @settings(max_examples=100, deadline=None)
 @given(
     scale=st.floats(1e-6, 1e6),

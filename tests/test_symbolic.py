@@ -10,7 +10,6 @@ import pytest
 import piezoest as pz
 from piezoest import symbolic
 from piezoest.equations import coleman_hodgdon as equations
-from piezoest.equations.creep import creep_step
 from piezoest.estimators.coordinates import coordinates
 
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429, 0.3)
@@ -26,32 +25,6 @@ def voltage(samples: int = 1777) -> Any:
 
 def parameters(*gains: float) -> Any:
     return np.array([TRUE.a, TRUE.b, TRUE.c, TRUE.offset, *gains])
-
-
-@pytest.mark.parametrize(
-    ("function", "arguments"),
-    [
-        (equations.hysteresis_step, (0.7, -0.3, 0.021, 0.057)),
-        (equations.hysteresis_step, (0.7, 0.0, 0.021, 0.057)),
-        (equations.rate, (0.7, 3.0, -90.0, 0.021, 0.147, 0.00429)),
-        (equations.branch, (3.0, 1.0, 0.2, 0.021, 0.147, 0.00429)),
-        (equations.inverse_increment, (0.7, -0.01, 0.021, 0.057, 0.204)),
-        (equations.loop_parameters, (0.021, 0.147, 0.00429)),
-    ],
-)
-def test_an_equation_is_the_same_on_symbols(function: Any, arguments: tuple[float, ...]) -> None:
-    traced = symbolic.trace(function, *[0] * len(arguments))
-    np.testing.assert_allclose(
-        traced(*arguments).full()[:, 0], np.atleast_1d(function(*arguments)), rtol=1e-12, atol=1e-15
-    )
-
-
-def test_an_equation_that_writes_into_its_state() -> None:
-    gains, decays = np.array([0.02, 0.03]), np.array([0.9, 0.99])
-    traced = symbolic.trace(creep_step, 2, 0, 2, 2)
-    z = np.array([0.1, -0.2])
-    expected = creep_step(z.copy(), 3.0, gains, decays)
-    assert float(traced(z, 3.0, gains, decays)) == pytest.approx(expected, rel=1e-14)
 
 
 def test_derivative_of_an_equation() -> None:

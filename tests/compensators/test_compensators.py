@@ -116,8 +116,6 @@ def test_without_transfer_the_jump_is_what_the_parameters_explain() -> None:
 
 def test_inadmissible_model() -> None:
     wrong = pz.ColemanHodgdon(0.021, 0.147, 0.02)
-    with pytest.raises(ValueError, match="nearest_admissible"):
-        pz.InverseCompensator(wrong)
     compensator = pz.InverseCompensator(MODEL)
     compensator.model = wrong
     assert compensator.status.projected
@@ -127,29 +125,45 @@ def test_inadmissible_model() -> None:
     assert not compensator.status.projected
 
 
-def test_wrong_arguments() -> None:
-    with pytest.raises(ValueError, match="minimum must be below maximum"):
-        pz.VoltageLimits(1.0, -1.0)
-    with pytest.raises(ValueError, match="slew_rate needs sample_rate"):
-        pz.VoltageLimits(slew_rate=10.0)
-    with pytest.raises(ValueError, match="maximum must be a number of volts, got '100'"):
-        pz.VoltageLimits(maximum="100")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="minimum must be below maximum, got -inf V and nan V"):
-        pz.VoltageLimits(maximum=float("nan"))
-    with pytest.raises(ValueError, match=r"limits must be VoltageLimits\(minimum, maximum\), got \(0, 5\)"):
-        pz.InverseCompensator(MODEL, (0, 5))  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="its gain must not be zero"):
-        pz.LinearCompensator(pz.LinearGain(0.0))
-    with pytest.raises(ValueError, match="compensator must be a LinearCompensator or"):
-        pz.IntegralFeedback(MODEL, gain=1.0, sample_rate=1e3)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="use InverseCompensator"):
-        pz.LinearCompensator(MODEL)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="method must be"):
-        pz.InverseCompensator(MODEL, method="euler")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=r"r must have shape \(N,\), got \(3, 1\): pass r\[:, 0\]"):
-        pz.InverseCompensator(MODEL).run(np.zeros((3, 1)))
-    with pytest.raises(AttributeError):
-        pz.InverseCompensator(MODEL).modle = MODEL  # type: ignore[attr-defined]
+def made(kind: Any = pz.InverseCompensator, *arguments: Any, **options: Any) -> Any:
+    return lambda: kind(*(arguments or (MODEL,)), **options)
+
+
+def led(**options: Any) -> Any:
+    given: dict[str, Any] = {"mechanics": pz.MassSpringDamper(780.0, 0.02), "sample_rate": FS} | options
+    return lambda: pz.LeadFilter(given.pop("compensator", pz.LinearCompensator(pz.LinearGain(0.15))), **given)
+
+
+CREEPING = pz.PrandtlIshlinskii(0.1, [1.0], [0.2], creep=pz.Creep([0.1], [1.0]))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (made(pz.VoltageLimits, 1.0, -1.0), "minimum must be below maximum"),
+        (made(pz.VoltageLimits, 0.0, slew_rate=10.0), "slew_rate needs sample_rate"),
+        (made(pz.VoltageLimits, 0.0, "100"), "maximum must be a number of volts, got '100'"),
+        (made(pz.VoltageLimits, -np.inf, np.nan), "minimum must be below maximum, got -inf V and nan V"),
+        (made(limits=(0, 5)), r"limits must be VoltageLimits\(minimum, maximum\), got \(0, 5\)"),
+        (made(method="euler"), "method must be"),
+        (made(pz.InverseCompensator, pz.ColemanHodgdon(0.021, 0.147, 0.02)), "nearest_admissible"),
+        (made(pz.InverseCompensator, pz.PrandtlIshlinskii(-0.1, [1.0], [0.2])), "slopes"),
+        (made(pz.InverseCompensator, CREEPING), "sample_rate"),
+        (made(pz.InverseCompensator, pz.models.Preisach(0.1, [1.0], [0.1], 0.0, 5.0)), "with an inverse"),
+        (made(pz.LinearCompensator, pz.LinearGain(0.0)), "its gain must not be zero"),
+        (made(pz.LinearCompensator), "use InverseCompensator"),
+        (made(pz.IntegralFeedback, gain=1.0, sample_rate=1e3), "compensator must be a LinearCompensator or"),
+        (led(compensator=3), "compensator"),
+        (led(mechanics=780.0), "mechanics"),
+        (led(sample_rate=0.0), "sample_rate"),
+        (led(delay=np.nan), "delay"),
+        (led(smoothing=0.0), "smoothing"),
+        (lambda: pz.InverseCompensator(MODEL).run(np.zeros((3, 1))), r"r must have shape .*pass r\[:, 0\]"),
+    ],
+)
+def test_wrong_arguments(make: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
 
 
 def test_integral_feedback_removes_a_constant_error() -> None:

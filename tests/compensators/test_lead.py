@@ -67,35 +67,3 @@ def test_error_at_a_twentieth_of_the_resonance(stage: Any) -> None:
     triangle = pz.signals.triangle(5.0, 39.0625, 40, FS)
     assert settled(stage, triangle, True) < 0.8 * settled(stage, triangle, False)
     assert settled(stage, pz.signals.sine(5.0, 39.0625, 40, FS), True) < 0.05
-
-
-def test_estimator_with_mechanics_can_be_stored() -> None:
-    estimator = pz.PrandtlIshlinskiiRLS(FS, mechanics=MECHANICS)
-    u = 30.0 * np.sin(np.arange(5000) * 5e-3)
-    estimator.run(u, 0.15 * u)
-    again = pz.PrandtlIshlinskiiRLS.from_dict(estimator.to_dict())
-    for each in (estimator, again):
-        each.run(u, 0.15 * u)
-    np.testing.assert_array_equal(again.theta, estimator.theta)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        ({"compensator": 3}, "compensator"),
-        ({"mechanics": 780.0}, "mechanics"),
-        ({"sample_rate": 0.0}, "sample_rate"),
-        ({"delay": np.nan}, "delay"),
-        ({"smoothing": 0.0}, "smoothing"),
-    ],
-)
-def test_wrong_arguments_are_refused(arguments: dict[str, Any], word: str) -> None:
-    good = {
-        "compensator": pz.LinearCompensator(pz.LinearGain(0.15)),
-        "mechanics": MECHANICS,
-        "sample_rate": FS,
-    }
-    with pytest.raises(ValueError, match=word):
-        pz.LeadFilter(**{**good, **arguments})
-    with pytest.raises(ValueError, match="mechanics"):
-        pz.PrandtlIshlinskiiRLS(FS, mechanics=780.0)  # type: ignore[arg-type]

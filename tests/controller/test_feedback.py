@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -56,12 +55,13 @@ def test_creep_in_a_dwell_is_taken_back(gain: float) -> None:
     assert errors[1] < 0.1 * errors[0]
 
 
-@pytest.mark.parametrize("noise", [(0.0, 0.0), (0.02, 0.02), (0.2, 0.2)])
-@pytest.mark.parametrize("moved", [True, False])
+@pytest.mark.parametrize(
+    ("noise", "moved"), [((0.0, 0.0), True), ((0.02, 0.02), False), ((0.2, 0.2), True), ((0.2, 0.2), False)]
+)
 def test_a_long_dwell_ends_where_it_should(noise: tuple[float, float], moved: bool) -> None:
-    r = np.concatenate([WAVE if moved else [], np.full(60_000, 3.0)])
+    r = np.concatenate([WAVE if moved else [], np.full(40_000, 3.0)])
     u, x, _ = drive(controller(10.0), r, none, noise)
-    assert np.abs(u)[-30_000:].max() < 25.0
+    assert np.abs(u)[-20_000:].max() < 25.0
     assert np.abs(r - x)[-10_000:].max() < 0.01 + 5.0 * noise[0]
     assert abs(np.mean((r - x)[-10_000:])) < 0.005 + 0.1 * noise[0]
 
@@ -118,23 +118,3 @@ def test_a_stage_that_answers_late_does_not_swing() -> None:
         driver.learn(u, x)
         far[k] = abs(x - r_k)
     assert far[-5000:].max() < 0.01
-
-
-def test_it_is_kept() -> None:
-    driver = controller(3.0)
-    drive(driver, WAVE, lambda t: 0.1 * t)
-    assert driver.state["feedback"] != 0.0
-    data = json.loads(json.dumps(driver.to_dict()))
-    assert data["feedback"] == 3.0
-    other = pz.AdaptiveFeedforward.from_dict(data)
-    drive(driver, WAVE, none)
-    drive(other, WAVE, none)
-    assert driver.to_dict() == other.to_dict()
-    driver.reset()
-    assert driver.to_dict() == controller(3.0).to_dict()
-
-
-@pytest.mark.parametrize("wrong", [-1.0, np.nan, np.inf, "x", 251.0])
-def test_a_wrong_gain_is_refused(wrong: Any) -> None:
-    with pytest.raises(ValueError, match="feedback must"):
-        controller(wrong)

@@ -160,27 +160,6 @@ def test_it_goes_on_in_copies_files_and_blocks(after: int) -> None:
         blocks.learn(planned, stages[2].run(planned))
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"amplitude": 0.0}, "amplitude must be above zero"),
-        ({"amplitude": 61.0}, "amplitude must be at most 60 V, half the range, got 61 V"),
-        ({"amplitude": np.nan}, "amplitude must be finite"),
-        ({"frequency": 0.0}, "frequency must"),
-        ({"frequency": 400.0}, "frequency must be at most 312.5 Hz"),
-        ({"cycles": 0}, "cycles must"),
-        ({"cycles": 1.5}, "cycles must"),
-        ({"cycles": 10**6}, "cycles must"),
-    ],
-)
-def test_a_sweep_that_cannot_be_is_refused(options: dict[str, Any], message: str) -> None:
-    driver = controller()
-    before = driver.to_dict()
-    with pytest.raises(ValueError, match=message):
-        driver.home(**options)
-    assert driver.to_dict() == before
-
-
 # ---------------------------------------------------------------- writes that may be lost
 
 
@@ -250,7 +229,7 @@ def test_nothing_is_lost_before_it_runs() -> None:
 VALUE: Any = st.one_of(
     st.floats(-10.0, 10.0),
     st.floats(allow_nan=True, allow_infinity=True),
-    st.sampled_from([None, "x", 1e300]),
+    st.sampled_from([None, "x", 1e300, np.ma.masked, 1j]),
 )
 CALL = st.one_of(
     st.tuples(st.just("step"), VALUE),
@@ -266,12 +245,14 @@ CALL = st.one_of(
 @hypothesis.given(
     calls=st.lists(CALL, min_size=1, max_size=30),
     before=st.sampled_from([0, 50, 400]),
-    known=st.sampled_from([{}, {"gain": 0.2}, {"gain": -5.0}, {"stroke": 1e-3, "feedback": 20.0}]),
+    known=st.sampled_from(
+        [{}, {"gain": 0.2}, {"gain": -5.0}, {"stroke": 1e-3, "feedback": 20.0}, {"estimators": None}]
+    ),
     slew_rate=st.sampled_from([None, 1e3]),
 )
 @hypothesis.settings(derandomize=True, deadline=None, max_examples=150)
 def test_whatever_is_called_the_voltage_is_finite_and_within_limits(
-    calls: list[Any], before: int, known: dict[str, float], slew_rate: float | None
+    calls: list[Any], before: int, known: dict[str, Any], slew_rate: float | None
 ) -> None:
     limits = pz.VoltageLimits(-20.0, 100.0, slew_rate, None if slew_rate is None else FS)
     driver, stage = controller(limits, **{"feedback": 5.0, **known}), pz.SimulatedStage(FS, LOOP)
@@ -308,3 +289,5 @@ def test_whatever_is_called_the_voltage_is_finite_and_within_limits(
     assert max(voltages) <= 100.0
     assert driver.status.stage in shown.STAGES
     assert read_back(driver).to_dict() == driver.to_dict()
+    json.dumps(driver.to_dict(), allow_nan=False)
+    assert all(each.missed is None or each.missed >= 0.0 for each in driver.candidates)

@@ -91,29 +91,9 @@ def test_a_file_and_what_identify_returns_will_do(tmp_path: Path) -> None:
         controller(tmp_path / "none.json")
 
 
-def test_it_is_kept() -> None:
-    known = LearntModel(LOOP, LearntOn((-60.0, 60.0), (-3.0, 3.0), 1.0))
-    driver = driven(controller(known), np.concatenate((SMALL, LARGE)))
-    data = json.loads(json.dumps(driver.to_dict()))
-    for other in (driver.copy(), pz.AdaptiveFeedforward.from_dict(data)):
-        assert other.to_dict() == driver.to_dict()
-        assert len(notes(driven(other, LARGE))) == 1
-        other.reset()
-        assert other.to_dict() == controller(known).to_dict()
-        assert len(notes(driven(other, LARGE))) == 1
-    with pytest.raises(ValueError, match="rate must"):
-        pz.AdaptiveFeedforward.from_dict(data | {"learnt_on": WIDE.to_dict() | {"rate": -1.0}})
-
-
 def test_a_sweep_may_go_farther() -> None:
     driver = driven(controller(LearntModel(LOOP, LearntOn((-30.0, 30.0), (-5.0, 5.0), 1.0))), SMALL)
     driver.home(amplitude=55.0, frequency=20.0, cycles=3)
     driven(driver, np.zeros(3000))
     assert driver.status.stage != "homing"
     assert notes(driver) == []
-
-
-def test_two_warnings_within_a_block_are_both_told() -> None:
-    known = LearntModel(LOOP, LearntOn((-60.0, 60.0), (-3.0, 3.0), 1.0))
-    driver = driven(controller(known, resonance=100.0), np.tile(LARGE, 4), block=2000)
-    assert sorted(event.reason.split(":")[0] for event in driver.events) == ["outside", "resonance"]

@@ -12,14 +12,13 @@ LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
 LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-3])
-@pytest.mark.parametrize("part", [0.1, 0.3, 0.4, 0.6, 0.85])
+@pytest.mark.parametrize(("part", "noise"), [(0.1, 1e-3), (0.3, 0.0), (0.4, 1e-3), (0.6, 0.0), (0.85, 1e-3)])
 def test_a_rest_does_not_count_as_a_leg(part: float, noise: float) -> None:
     """A minute is hundreds of legs, in which a stage creeps and a loop is at one side."""
     rng, period = np.random.default_rng(0), 500
     wave = np.tile(5.0 * np.sin(2.0 * np.pi * np.arange(period) / period), 10)
     k = 6 * period + round(part * period)
-    rest = wave[k - 1] + noise * rng.normal(size=60_000)
+    rest = wave[k - 1] + noise * rng.normal(size=30_000)
     r = np.concatenate((wave[:k], rest, wave[k:]))
     driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=()), pz.SimulatedStage(FS, LOOP)
     gains = []

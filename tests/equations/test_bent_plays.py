@@ -63,20 +63,6 @@ def test_creep_needs_a_sample_rate() -> None:
     np.testing.assert_allclose(model.simulate(u, sample_rate=RATE), stage.run(u), atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("fields", "name"),
-    [
-        ({"bends": [1.0]}, "bend_weights"),
-        ({"bends": [2.0, 1.0], "bend_weights": np.zeros((2, 2))}, "bends"),
-        ({"creep": 3.0}, "creep"),
-        ({"sample_rate": 0.0}, "sample_rate"),
-    ],
-)
-def test_refuses(fields: dict[str, Any], name: str) -> None:
-    with pytest.raises(ValueError, match=name):
-        pz.PrandtlIshlinskii(0.1, [1.0], [0.02], **fields)
-
-
 @given(seed=st.integers(0, 10_000), scale=st.floats(0.1, 10.0))
 def test_turning_points_hold_all_the_memory_of_plays(seed: int, scale: float) -> None:
     u = np.round(scale * np.cumsum(np.random.default_rng(seed).standard_normal(150)), 1)
@@ -120,12 +106,3 @@ def test_preisach_loops_differ_with_their_place_and_direction() -> None:
     assert np.abs(asymmetry[-100:]).max() > 0.05
     with pytest.raises(ValueError, match="weights"):
         pz.Preisach(0.1, [1.0], [-0.1], 0.0, 10.0)
-
-
-def test_preisach_stage_runs_as_it_steps() -> None:
-    u = 30.0 * np.sin(np.arange(300) / 20.0)
-    ran, stepped = pz.PreisachStage(10_000.0, seed=3), pz.PreisachStage(10_000.0, seed=3)
-    x = ran.run(u)
-    np.testing.assert_array_equal(x, [stepped.step(value) for value in u.tolist()])
-    quiet = pz.SimulatedStage(10_000.0, PREISACH)
-    np.testing.assert_allclose(quiet.run(u), PREISACH.simulate(u), atol=1e-12)

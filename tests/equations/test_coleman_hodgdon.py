@@ -5,13 +5,11 @@ from __future__ import annotations
 import itertools
 from typing import Any
 
-import casadi
 import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit
 from scipy.integrate import solve_ivp
 
 from piezoest import ColemanHodgdon, signals
@@ -121,14 +119,6 @@ def test_invert_and_simulate_are_inverse(
         np.testing.assert_allclose(back, u, atol=1e-9 * 100.0)
 
 
-@given(loops(), st.lists(st.floats(-50.0, 50.0), min_size=1, max_size=8))
-def test_simulate_after_invert(loop: tuple[float, float, float], turning_points: list[float]) -> None:
-    model = ColemanHodgdon.from_loop(*loop).nearest_admissible()
-    r = ramps(turning_points)
-    u = model.invert(r, allow_jumps=True)
-    np.testing.assert_allclose(model.simulate(u, allow_jumps=True), r, atol=1e-9)
-
-
 @given(loops(), st.floats(-1.0, 1.0), st.floats(-300.0, 300.0))
 def test_increment_is_lambert_w(loop: tuple[float, float, float], place: float, dr: float) -> None:
     """(C7) and (C10), evaluated with fifty digits, where the literal formula overflows too."""
@@ -169,27 +159,6 @@ def test_runge_kutta_has_order_three() -> None:
     orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     assert orders[-1] >= 2.9
     assert errors[-1] < 1e-6
-
-
-def test_numpy_numba_and_casadi_agree() -> None:
-    functions: list[tuple[Any, tuple[float, ...]]] = [
-        (ch.rate, (0.8, 20.0, -3.0, 0.02, 0.15, 0.004)),
-        (ch.hysteresis_rate, (0.8, -3.0, 0.02, 0.05)),
-        (ch.hysteresis_step, (0.8, -3.0, 0.02, 0.05)),
-        (ch.hysteresis_step, (0.8, 0.0, 0.02, 0.05)),
-        (ch.branch, (12.0, 10.0, 1.2, 0.02, 0.15, 0.004)),
-        (ch.inverse_rate, (0.8, -3.0, 0.02, 0.05, 0.2)),
-        (ch.inverse_increment, (0.8, 1.5, 0.02, 0.05, 0.2)),
-        (ch.inverse_increment, (-0.8, 0.0, 0.02, 0.05, 0.2)),
-        (ch.relative_decay, (1e-3,)),
-    ]
-    casadi.GlobalOptions.setNumpyMode(1)
-    for function, arguments in functions:
-        plain = function(*arguments)
-        symbols = [casadi.SX.sym(f"v{i}") for i in range(len(arguments))]
-        symbolic = casadi.Function("f", symbols, [function(*symbols)])
-        assert njit(function)(*arguments) == pytest.approx(plain, rel=1e-14)
-        assert float(symbolic(*arguments)) == pytest.approx(plain, rel=1e-14)
 
 
 def test_jumps_are_answered_with_what_to_do() -> None:

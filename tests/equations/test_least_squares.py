@@ -52,15 +52,6 @@ def test_discrete_update_is_the_textbook() -> None:
     assert np.array_equal(P, P.T)
 
 
-def test_without_forgetting_is_lstsq() -> None:
-    phi, z, _ = problem(300)
-    theta, P = np.zeros(N), 1e8 * np.eye(N)
-    for k in range(300):
-        ls.discrete_update(theta, P, phi[k], z[k], 1.0, 1.0, np.inf)
-    np.testing.assert_allclose(theta, np.linalg.lstsq(phi, z)[0], rtol=1e-7)
-    np.testing.assert_allclose(P, np.linalg.inv(phi.T @ phi), rtol=1e-6)
-
-
 def test_forgetting_is_weighted_least_squares() -> None:
     phi, z, _ = problem(300)
     mu = 0.97
@@ -70,21 +61,6 @@ def test_forgetting_is_weighted_least_squares() -> None:
     weight = np.sqrt(mu ** np.arange(299, -1, -1))
     expected = np.linalg.lstsq(phi * weight[:, None], z * weight)[0]
     np.testing.assert_allclose(theta, expected, rtol=1e-7)
-
-
-@pytest.mark.parametrize("normalised", [True, False])
-def test_continuous_update_is_the_textbook(normalised: bool) -> None:
-    phi, z, _ = problem(100)
-    theta, P = start()
-    expected_theta, expected_P = start()
-    for k in range(100):
-        arguments = (phi[k], z[k])
-        continuous_update(theta, P, *arguments, (0.02, 0.7, float(normalised), np.inf))
-        expected_theta, expected_P = reference.bogacki_shampine(
-            expected_theta, expected_P, 0.02, *arguments, 0.7, normalised
-        )
-    np.testing.assert_allclose(theta, expected_theta, rtol=1e-11)
-    np.testing.assert_allclose(P, expected_P, rtol=1e-11)
 
 
 def test_continuous_law_converges_to_the_discrete_one() -> None:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import casadi
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.signal import cont2discrete
 
@@ -52,27 +50,3 @@ def test_solves_the_differential_equation(damping: float) -> None:
         )
         expected = solution.y[:, -1]
         assert x == pytest.approx(expected[0], abs=1e-9)
-
-
-def test_static_gain_is_one_and_rest_is_kept() -> None:
-    coefficients = mechanics_coefficients(780.0, 0.02, 2e-5)
-    state = np.array([4.0, 0.0])
-    for _ in range(1000):
-        mechanics_step(state, 4.0, coefficients)
-    assert state[0] == pytest.approx(4.0, abs=1e-12)
-
-
-def test_numpy_numba_and_casadi_agree() -> None:
-    coefficients = mechanics_coefficients(780.0, 0.02, 2e-5)
-    casadi.GlobalOptions.setNumpyMode(1)
-    s, f = casadi.SX.sym("s", 2), casadi.SX.sym("f")
-    after = casadi.SX(s)
-    symbolic = casadi.Function("g", [s, f], [mechanics_step(after, f, coefficients), after])
-    compiled = njit(mechanics_step)
-    plain, jitted, traced = np.zeros(2), np.zeros(2), np.zeros(2)
-    for value in (1.0, -3.0, 2.5):
-        expected = mechanics_step(plain, value, coefficients)
-        assert compiled(jitted, value, coefficients) == expected
-        by_casadi, state = symbolic(traced, value)
-        traced = np.array(state).ravel()
-        assert float(by_casadi) == pytest.approx(expected, rel=1e-14)

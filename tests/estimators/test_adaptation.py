@@ -55,19 +55,21 @@ def test_needs_no_tuning(amplitude: float, frequency: float) -> None:
     assert np.all(errors[3:] < 0.012 * amplitude)
 
 
-def test_dwell_leaves_the_parameters_alone() -> None:
+@pytest.mark.parametrize("memory", ["period", 0.4])
+def test_a_dwell_of_half_a_minute_moves_nothing(memory: Any) -> None:
     u, x = record(2.0)
     half = u.size // 2
-    estimator = pz.HysteresisRLS(FS)
+    estimator = pz.HysteresisRLS(FS, memory=memory)
     estimator.run(u[:half], x[:half])
     before, P = estimator.theta, estimator.P
     noise = 1e-3 * np.random.default_rng(1).standard_normal(50_000)
-    for _ in range(60):
+    for _ in range(30):
         estimator.run(np.full(50_000, u[half]), x[half] + noise, every=50_000)
-    np.testing.assert_allclose(estimator.theta[:3], before[:3], rtol=1e-3)
+    np.testing.assert_allclose(estimator.theta[:3], before[:3], rtol=2e-3)
     assert np.trace(estimator.P) <= 1.01 * np.trace(P)
+    assert estimator.status.held > 1_400_000
     estimator.run(u[half:], x[half:])
-    np.testing.assert_allclose(estimator.theta[:3], TRUE.theta, rtol=0.1)
+    np.testing.assert_allclose(estimator.theta[:3], TRUE.theta, rtol=0.1 if memory == "period" else 0.02)
 
 
 def test_covariance_of_a_direction_that_is_not_excited_grows_no_faster_than_it_walks() -> None:
@@ -78,7 +80,6 @@ def test_covariance_of_a_direction_that_is_not_excited_grows_no_faster_than_it_w
     relative = estimator.P / np.outer([0.02, 0.12, 0.0036, 0.036], [0.02, 0.12, 0.0036, 0.036])
     periods, walk = 20, 0.4**2
     assert np.all(np.diag(relative) <= 0.25 + 1.05 * periods * walk)
-    assert np.all(np.linalg.eigvalsh(relative) > 0.0)
     assert np.all(np.linalg.eigvalsh(relative) > 0.0)
 
 
@@ -140,12 +141,3 @@ def test_excitation() -> None:
     branch = pz.HysteresisRLS(FS)
     branch.run(ramp, TRUE.simulate(ramp))
     assert branch.excitation < 0.1 * over_a_period
-
-
-def test_wrong_arguments() -> None:
-    with pytest.raises(ValueError, match="RandomWalk goes with memory='period'"):
-        pz.HysteresisRLS(FS, memory=0.4, policies=(pz.policies.RandomWalk(),))
-    with pytest.raises(ValueError, match="memory must be above zero"):
-        pz.policies.RandomWalk(memory=0.0)
-    with pytest.raises(ValueError, match="warm_up"):
-        pz.policies.OutlierRejection(warm_up=0)

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.estimators import loops
 
 SAMPLE_RATE = 50_000.0
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
@@ -67,24 +66,6 @@ def test_each_channel_is_a_single_estimator(estimator: Any, threads: int) -> Non
     np.testing.assert_array_equal(bank.theta[0], estimator.theta)
 
 
-def test_a_covariance_that_winds_up_starts_anew_in_its_channel_alone() -> None:
-    estimator = pz.HysteresisRLS(1000.0, memory=0.01, policies=(), errors=False)
-    K, N = 3000, 6
-    rng = np.random.default_rng(1)
-    u = np.cumsum(rng.standard_normal((K, N)), axis=0) * 0.2
-    for c in (1, N - 1):
-        u[100 + c : 2500, c] = u[100 + c, c]
-    x = 0.15 * u + 1e-3 * rng.standard_normal(u.shape)
-    bank = pz.EstimatorBank(estimator, N)
-    theta = bank.run(u, x, every=7)
-    for c in range(N):
-        single = estimator.copy()
-        trace = single.run(u[:, c].copy(), x[:, c].copy(), every=7)
-        np.testing.assert_array_equal(theta[:, c], trace.theta)
-        assert bank.channel(c).to_dict() == single.to_dict()
-        assert (single.status.resets > 0) == (c in (1, N - 1))
-
-
 def test_a_channel_without_a_number_is_missing_and_stops_no_other() -> None:
     plain, listed, masked = (pz.EstimatorBank(pz.HysteresisRLS(SAMPLE_RATE), 3) for _ in range(3))
     for k in range(20):
@@ -118,16 +99,6 @@ def test_copies_are_independent() -> None:
     np.testing.assert_array_equal(bank.theta, other.theta)
 
 
-def test_wrong_arguments_are_named() -> None:
-    with pytest.raises(ValueError, match="list of estimators"):
-        pz.EstimatorBank(pz.FilterPyEKF(SAMPLE_RATE), 2)  # type: ignore[arg-type]
-    bank = pz.EstimatorBank(pz.HysteresisRLS(SAMPLE_RATE), 2)
-    with pytest.raises(ValueError, match=r"u must have shape \(2,\)"):
-        bank.step(np.zeros(3), np.zeros(2))
-    with pytest.raises(ValueError, match=r"x must have shape \(K, 2\)"):
-        bank.run(np.zeros((4, 2)), np.zeros(4))
-
-
 @pytest.mark.parametrize("make", [pz.HysteresisRLS, pz.HysteresisEKF])
 def test_streaming_keeps_nothing_and_needs_no_collector(make: Any) -> None:
     u, x = (values[:, 0].tolist() for values in records(3000, 4))
@@ -150,19 +121,6 @@ def test_streaming_keeps_nothing_and_needs_no_collector(make: Any) -> None:
     for u_k, x_k in zip(u, x, strict=True):
         other.step(u_k, x_k)
     np.testing.assert_array_equal(estimator.theta, other.theta)
-
-
-def test_warmup_says_how_long_it_took() -> None:
-    estimator = pz.HysteresisRLS(SAMPLE_RATE, memory=0.4, errors=False)
-    bank = pz.EstimatorBank(pz.HysteresisEKF(SAMPLE_RATE), 3)
-    pz.warmup(estimator, bank)
-    assert 0.0 < pz.warmup(estimator, bank) < 10.0
-    assert estimator.status.samples == bank.status[0].samples == 0
-    for function in (loops.step, loops.run, loops.propose):
-        assert estimator.layouts in function._entries
-    assert pz.HysteresisEKF(SAMPLE_RATE).layouts in loops.step_channels._entries
-    with pytest.raises(ValueError, match=r"used must be estimators of piezoest, .* or a controller, got int"):
-        pz.warmup(3)
 
 
 def test_what_is_read_of_a_channel_stays_that_channels() -> None:

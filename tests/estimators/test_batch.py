@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import pickle
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -213,16 +211,6 @@ def test_fixed_parameters_stay(names: tuple[str, ...]) -> None:
     assert fit.model.is_admissible
 
 
-def test_fixed_offset_and_start_state() -> None:
-    u, x = record()
-    fit = BatchFit(RATE, fixed={"offset": 0.5, "initial_state": 0.0}).fit(u, x + 0.5)
-    assert fit.model.offset == 0.5
-    assert fit.initial_state == 0.0
-    np.testing.assert_allclose(fit.theta[:3], TRUE.theta, rtol=2e-3)
-    model = pz.ColemanHodgdon(0.02, 0.12, 0.0036, 0.5)
-    assert BatchFit(RATE, initial_model=model).fit(u, x + 0.5).model.offset == 0.5
-
-
 # ---------------------------------------------------------------- bad data
 
 
@@ -331,56 +319,3 @@ def test_hop_bounds_the_number_of_fits() -> None:
     for k in range(u.size):
         steps.step(u[k], x[k])
     np.testing.assert_array_equal(steps.theta, estimator.theta)
-
-
-def test_saves_and_resumes() -> None:
-    u, x = record(0.5)
-    x[70] = np.nan
-    options: dict[str, Any] = {
-        "creep": pz.Creep([0.01], [0.1]),
-        "loss": "huber",
-        "offset": True,
-        "initial_model": TRUE,
-        "fixed": {"alpha": 0.021},
-        "noise": 2e-3,
-        "hop": 0.1,
-    }
-    whole, half = BatchFit(RATE, **options), BatchFit(RATE, **options)
-    whole.run(u, x)
-    half.run(u[:200], x[:200])
-    resumed = BatchFit.from_dict(json.loads(json.dumps(half.to_dict(), allow_nan=False)))
-    for other in (resumed, pickle.loads(pickle.dumps(half)), half.copy()):
-        other.run(u[200:], x[200:])
-        np.testing.assert_array_equal(other.theta, whole.theta)
-        np.testing.assert_array_equal(other.P, whole.P)
-        assert other.status == whole.status
-    whole.reset()
-    assert whole.to_dict() == BatchFit(RATE, **options).to_dict()
-    with pytest.raises(ValueError, match="u and x must hold the state's 200 samples"):
-        BatchFit.from_dict(half.to_dict() | {"u": [1.0]})
-
-
-def test_wrong_arguments() -> None:
-    u, x = record(0.2)
-    with pytest.raises(ValueError, match="method must be one of"):
-        BatchFit(RATE, method="shooting")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="loss must be one of"):
-        BatchFit(RATE, loss="absolute")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="creep must be a Creep"):
-        BatchFit(RATE, creep=[0.1])  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=r"fixed holds unknown names \['apha'\]"):
-        BatchFit(RATE, fixed={"apha": 0.02})
-    with pytest.raises(ValueError, match="fixed parameters are not admissible"):
-        BatchFit(RATE, fixed={"alpha": 0.02, "beta": 0.1, "gamma": 1.0})
-    with pytest.raises(ValueError, match="must be above zero"):
-        BatchFit(RATE, fixed={"beta": -0.1})
-    with pytest.raises(ValueError, match="nothing to fit"):
-        BatchFit(RATE, initial_model=pz.LinearGain(1.0), fixed={"gain": 1.0})
-    with pytest.raises(ValueError, match="gain of zero"):
-        BatchFit(RATE, initial_model=pz.LinearGain(0.0))
-    with pytest.raises(ValueError, match="u and x must have the same length, got 200 and 199"):
-        BatchFit(RATE).fit(u, x[:-1])
-    with pytest.raises(ValueError, match=r"x has 3 samples .* needs at least 5"):
-        BatchFit(RATE).fit(u[:3], x[:3])
-    with pytest.raises(ValueError, match="u never changes"):
-        BatchFit(RATE).fit(np.ones(50), x[:50])

@@ -126,13 +126,8 @@ def test_ekf_told_of_a_mismatch_is_cautious() -> None:
 # ---------------------------------------------------------------- the baselines
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        pz.FilterPyEKF,
-        pz.FilterPyUKF,
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [pz.FilterPyEKF, pz.FilterPyUKF])
 def test_filterpy_baselines_are_consistent(kind: Any) -> None:
     """Fewer samples and seeds, for filterpy is slow; `docs/consistency.py` takes all seeds."""
     runs, rate = 40, 250.0

@@ -80,22 +80,6 @@ def test_what_filterpy_is_told_reaches_the_estimator() -> None:
     np.testing.assert_array_equal(estimator.s, estimator.filter.x)
 
 
-def test_unscented_agrees_with_extended() -> None:
-    """On a true plant both know the same, within what they say that they do not know."""
-    fs = 2000.0
-    u, x = record(1200, fs)
-    extended, unscented = (
-        kind(fs, noise=1e-3, drift=0.0, mismatch=0.01) for kind in (pz.FilterPyEKF, pz.FilterPyUKF)
-    )
-    extended.run(u, x)
-    unscented.run(u, x)
-    apart = np.abs(extended.theta - unscented.theta)
-    assert np.all(apart < 3.0 * np.hypot(extended.standard_errors, unscented.standard_errors))
-    for each in (extended, unscented):
-        assert np.all(np.abs(each.theta - TRUE.theta) < 3.0 * each.standard_errors)
-        np.testing.assert_allclose(each.theta, TRUE.theta, rtol=0.05)
-
-
 def test_unscented_of_a_linear_gain_is_the_kalman_filter() -> None:
     u, x = record(400, 2000.0)
     options: dict[str, Any] = {"initial_model": pz.LinearGain(0.1), "mismatch": 0.0}
@@ -104,10 +88,3 @@ def test_unscented_of_a_linear_gain_is_the_kalman_filter() -> None:
     unscented.run(u, x)
     np.testing.assert_allclose(unscented.theta, extended.theta, rtol=1e-9)
     np.testing.assert_allclose(unscented.P, extended.P, rtol=1e-6)
-
-
-@pytest.mark.parametrize("kind", [pz.FilterPyEKF, pz.FilterPyUKF])
-def test_does_not_offer_projection(kind: Any) -> None:
-    with pytest.raises(TypeError, match="project"):
-        kind(1000.0, project=True)
-    assert "project" not in kind(1000.0).to_dict()["arguments"]

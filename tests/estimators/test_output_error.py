@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import piezoest as pz
-from piezoest.equations import coleman_hodgdon, output_error
+from piezoest.equations import output_error
 from tests.reference.output_error import OutputErrorFilter
 
 FloatArray = NDArray[np.float64]
@@ -25,42 +23,6 @@ def voltage(periods: float = 8.0) -> FloatArray:
 def loop_error(model: pz.ColemanHodgdon, u: FloatArray, offset: float = 0.0) -> float:
     """Largest difference over the last period [µm]."""
     return float(np.abs(model.simulate(u) - TRUE.simulate(u) - offset)[-400:].max())
-
-
-# ---------------------------------------------------------------- equations
-
-
-def test_slope_is_the_derivative_by_the_logarithm_of_the_decay() -> None:
-    u = voltage(1.0)
-    step = 1e-6
-
-    def h(a: float) -> float:
-        value = 0.0
-        for du in np.diff(u):
-            value = coleman_hodgdon.hysteresis_step(value, du, a, 1.0)
-        return value
-
-    value, slope = 0.0, 0.0
-    for du in np.diff(u):
-        value, slope = output_error.hysteresis_and_slope(value, slope, du, 0.021)
-    expected = (h(0.021 * np.exp(step)) - h(0.021 * np.exp(-step))) / (2.0 * step)
-    assert value == h(0.021)
-    assert slope == pytest.approx(expected, rel=1e-6)
-
-
-def test_walk_covariance_is_that_of_independent_parts() -> None:
-    a, b, c, step = 0.02, 0.06, 0.2, 1e-6
-    alpha, beta, gamma = coleman_hodgdon.rate_parameters(a, b, c)
-    columns = []
-    for i in range(3):
-        moved = np.array([alpha, beta, gamma])
-        moved[i] *= 1.0 + step
-        a_1, b_1, c_1 = coleman_hodgdon.loop_parameters(*moved)
-        columns.append([b_1 - b, c_1 - c, b_1 * np.log(a_1 / a)])
-    jacobian = np.array(columns).T / step
-    Q = np.zeros((3, 3))
-    output_error.walk_covariance(b, c, Q)
-    np.testing.assert_allclose(Q, jacobian @ jacobian.T, rtol=1e-4, atol=1e-9)
 
 
 def test_recentre_describes_the_same_decay() -> None:
@@ -182,23 +144,6 @@ def test_holes_and_spikes_are_left_out() -> None:
 
 
 # ---------------------------------------------------------------- arguments
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"span": 1.0}, "span"),
-        ({"members": 2}, "members"),
-        ({"noise": 0.0}, "noise"),
-        ({"uncertainty": -1.0}, "uncertainty"),
-        ({"policies": ()}, "RandomWalk"),
-        ({"policies": (pz.policies.RandomWalk(), pz.policies.NormBound())}, "NormBound"),
-        ({"initial_model": pz.ColemanHodgdon(0.02, 0.2, 0.0036)}, "not admissible"),
-    ],
-)
-def test_refuses_what_it_cannot_use(options: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        pz.OutputErrorRLS(RATE, **options)
 
 
 def test_settles_within_two_periods_from_a_bad_start() -> None:

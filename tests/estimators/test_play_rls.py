@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.estimators import loops
 
 RATE = 10_000.0
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
@@ -91,26 +90,6 @@ def test_grid_follows_the_voltage() -> None:
     assert estimator.model.is_admissible
 
 
-def test_settings_without_asymmetry_or_creep() -> None:
-    u = 30.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(6000) / RATE)
-    estimator = pz.PrandtlIshlinskiiRLS(RATE, bends=0, creep=(), thresholds=8)
-    estimator.run(u, pz.PaperStage(RATE, creep=False).run(u))
-    assert estimator.parameter_names == ("gain", *(f"weights[{i}]" for i in range(8)))
-    model: Any = estimator.model
-    assert model.is_plain
-
-
-def test_one_machine_code_serves_all_sizes() -> None:
-    u = 30.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(100) / RATE)
-    found = []
-    for sizes in ({}, {"thresholds": 0, "bends": 0, "creep": ()}, {"thresholds": 40, "bends": 3}):
-        estimator = pz.PrandtlIshlinskiiRLS(RATE, **sizes)
-        estimator.run(u, 0.1 * u)
-        assert np.all(np.isfinite(estimator.theta))
-        found.append(loops.run.of(*estimator.layouts))
-    assert found[0] is found[1] is found[2]
-
-
 @pytest.mark.parametrize(
     ("record", "name", "value", "words"),
     [
@@ -133,21 +112,6 @@ def test_saved_numbers_that_cannot_be_are_refused(record: str, name: str, value:
     place[key] = value
     with pytest.raises(ValueError, match=words):
         pz.PrandtlIshlinskiiRLS.from_dict(data)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "name"),
-    [
-        ({"voltage_range": (3.0, 1.0)}, "voltage_range"),
-        ({"creep": (0.0,)}, "creep"),
-        ({"thresholds": -1}, "thresholds"),
-        ({"initial_model": pz.LinearGain(-1.0)}, "initial_model"),
-        ({"initial_model": pz.PrandtlIshlinskii(-0.1, [], [])}, "initial_model"),
-    ],
-)
-def test_refuses(arguments: dict[str, Any], name: str) -> None:
-    with pytest.raises(ValueError, match=name):
-        pz.PrandtlIshlinskiiRLS(RATE, **arguments)
 
 
 def test_a_piezo_recorded(data_dir: Path) -> None:

@@ -99,14 +99,6 @@ def test_lengths_must_be_as_arguments_make_them() -> None:
                     type(estimator).from_dict(with_value(data, path, value))
 
 
-def test_the_message_says_what_would_be_right() -> None:
-    data = pz.HysteresisRLS(RATE, delay=7.0).to_dict()
-    with pytest.raises(
-        ValueError, match=r"state: line.position must be a whole number from -?\d to 7, got 1e\+09"
-    ):
-        pz.HysteresisRLS.from_dict(with_value(data, "line.position", 1e9))
-
-
 @pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)
 def test_names_and_shapes_must_be_its_own(estimator: Any) -> None:
     """Every name, in every record within the state: dropped, renamed, added, of another shape or type."""
@@ -135,15 +127,6 @@ def test_names_and_shapes_must_be_its_own(estimator: Any) -> None:
     refuse(saved)
     state = saved_state.check(saved, estimator.layout, estimator.state, estimator._rules)
     assert by_name(estimator.layout, state) == saved
-
-
-@pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)
-def test_a_state_of_other_options_is_refused(estimator: Any) -> None:
-    data = estimator.to_dict()
-    for other in ALL:
-        if other is not estimator:
-            with pytest.raises(ValueError, match="state"):
-                type(estimator).from_dict(data | {"state": other.to_dict()["state"]})
 
 
 @pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)
@@ -178,37 +161,6 @@ def test_work_space_is_not_saved() -> None:
     for path in idle:
         with pytest.raises(KeyError):
             value_at(saved, path)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda n: pz.HysteresisRLS(RATE, delay=n), "delay must be at most"),
-        (lambda n: pz.HysteresisEKF(RATE, delay=n), "delay must be at most"),
-        (lambda n: pz.OutputErrorRLS(RATE, delay=n), "delay must be at most"),
-        (lambda n: pz.FilterPyEKF(RATE, delay=n), "delay must be at most"),
-        (lambda n: pz.PrandtlIshlinskiiRLS(RATE, delay=n), "delay must be at most"),
-        (lambda n: pz.OutputErrorRLS(RATE, members=n), "members must be a whole number from 3 to 1000"),
-        (lambda n: pz.PrandtlIshlinskiiRLS(RATE, thresholds=n), "thresholds must be a whole number from 0"),
-        (lambda n: pz.PrandtlIshlinskiiRLS(RATE, bends=n), "bends must be a whole number from 0"),
-        (lambda n: pz.PrandtlIshlinskiiRLS(RATE, thresholds=200, bends=50), "more than 1000: take fewer"),
-        (lambda n: policies.AmplitudeMemory(places=n), "places must be a whole number from 1 to 1000"),
-        (lambda n: pz.MovingHorizon(RATE, window=n), "window must be at most"),
-        (lambda n: pz.BatchFit(RATE, hop=n * 1e20), "hop must be at most"),
-        (lambda n: pz.EstimatorBank(pz.HysteresisRLS(RATE), n), "channels must be a whole number from 1"),
-    ],
-)
-def test_arguments_that_become_sizes_are_bounded(make: Any, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        make(1e9 + 7)
-
-
-def test_an_argument_in_a_dictionary_is_bounded_too() -> None:
-    data = pz.HysteresisRLS(RATE, delay=7.0).to_dict()
-    with pytest.raises(ValueError, match="delay must be at most"):
-        pz.HysteresisRLS.from_dict(data | {"arguments": data["arguments"] | {"delay": 1e9}})
-    with pytest.raises(ValueError, match=r"arguments\['noise'\] must be zero or of a size"):
-        pz.HysteresisRLS.from_dict(data | {"arguments": data["arguments"] | {"noise": 1e-300}})
 
 
 @pytest.mark.parametrize("word", ["data", "text", 7, None, []])
@@ -252,7 +204,7 @@ def mutate(count: int, seed: int, seconds: float) -> None:
 
 
 def test_changed_dictionaries_are_refused_or_work() -> None:
-    mutate(2000, 1, 1200.0)
+    mutate(400, 1, 600.0)
 
 
 @pytest.mark.slow

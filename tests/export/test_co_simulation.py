@@ -54,13 +54,6 @@ def test_holds_sources_and_a_binary(unit: Path) -> None:
     assert any(name.startswith("binaries/") for name in names)
 
 
-def test_same_input_gives_the_same_description(unit: Path, tmp_path: Path) -> None:
-    again = pz.export.fmu(*pair(), tmp_path / "again.fmu")
-    first, second = zipfile.ZipFile(unit), zipfile.ZipFile(again)
-    for name in ("modelDescription.xml", "sources/piezoest_controller.c", "sources/fmi2.c"):
-        assert first.read(name) == second.read(name)
-
-
 def start(unit: Path, folder: Path) -> Any:
     description = fmpy.read_model_description(str(unit))
     fmpy.extract(str(unit), unzipdir=str(folder))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner, Result
@@ -17,6 +18,14 @@ MODEL = {"model": "ColemanHodgdon", "alpha": 0.02, "beta": 0.12, "gamma": 0.0036
 
 def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, ["export", *map(str, arguments)], env={"COLUMNS": "120"})
+
+
+def refused(result: Result, word: str) -> None:
+    """One sentence on stderr, exit code 1."""
+    assert result.exit_code == 1
+    assert result.stderr.startswith("error: ")
+    assert len(result.stderr.splitlines()) == 1
+    assert word in result.stderr
 
 
 @pytest.fixture
@@ -43,9 +52,7 @@ def test_plays_become_a_feed_forward(model: Path) -> None:
         "PrandtlIshlinskii of 2 plays, 0 bends and 1 creep" in Path("out/piezoest_controller.c").read_text()
     )
     for kind in ("rls", "ekf"):
-        refused = run("c", model, "-o", "out", "--sample-rate", 50_000, "--estimator", kind)
-        assert refused.exit_code == 1
-        assert "PrandtlIshlinskii" in refused.stderr
+        refused(run("c", model, "-o", "out", "--sample-rate", 50_000, "--estimator", kind), "Prandtl")
 
 
 @pytest.mark.parametrize("kind", ["rls", "ekf"])
@@ -65,41 +72,7 @@ def test_an_adaptive_feedforward_needs_no_model(tmp_path: Path) -> None:
     assert (tmp_path / "stage.c").read_text() == pz.export.c(controller, name="stage").source
     assert run("adaptive", *own, "--estimators", "none").exit_code == 0
     assert "Model that drives: 0 line. */" in (tmp_path / "stage.h").read_text()
-    refused = run("adaptive", *own, "--estimators", "kalman")
-    assert refused.exit_code == 1
-    assert "kalman" in refused.stderr
-
-
-@pytest.mark.parametrize(
-    ("part", "value", "words"),
-    [
-        ("arguments", None, "not what to_dict"),
-        ("arguments", {"no": 1}, "not what to_dict"),
-        ("arguments", {"sample_rate": 10**400}, "not what to_dict"),
-        ("arguments", "missing", "has no 'arguments'"),
-        ("state", "missing", "has no 'state'"),
-        ("state", {}, "not what to_dict"),
-    ],
-)
-def test_an_estimator_that_is_none(model: Path, part: str, value: object, words: str) -> None:
-    saved = {**pz.HysteresisRLS(50_000.0).to_dict(), part: value}
-    if value == "missing":
-        del saved[part]
-    model.write_text(json.dumps(saved))
-    refused = run("c", model, "-o", "out")
-    assert refused.exit_code == 1
-    assert refused.stderr.startswith("error: ")
-    assert "model.json: its estimator" in refused.stderr
-    assert words in refused.stderr
-    assert len(refused.stderr.splitlines()) == 1
-
-
-@pytest.mark.parametrize("limits", [[1], "x", 5, {"maximum": 10**400}, {"no": 1}])
-def test_limits_that_are_none(model: Path, limits: object) -> None:
-    model.write_text(json.dumps({"model": MODEL, "limits": limits}))
-    refused = run("c", model, "-o", "out")
-    assert refused.exit_code == 1
-    assert len(refused.stderr.splitlines()) == 1
+    refused(run("adaptive", *own, "--estimators", "kalman"), "kalman")
 
 
 def test_profile_is_the_same_as_the_objects(model: Path) -> None:
@@ -144,15 +117,34 @@ def test_tables_are_written(model: Path) -> None:
     ],
 )
 def test_mistakes_are_one_sentence(model: Path, arguments: tuple[object, ...], word: str) -> None:
-    result = run(*arguments)
-    assert result.exit_code == 1
-    assert result.stderr.startswith("error: ")
-    assert word in result.stderr
+    refused(run(*arguments), word)
 
 
-@pytest.mark.parametrize("text", ["no json", "[]", '{"model": "Unknown"}', '{"estimator": "Unknown"}'])
-def test_files_that_hold_no_model_are_refused(model: Path, text: str) -> None:
-    model.write_text(text)
-    result = run("c", model, "-o", "out")
-    assert result.exit_code == 1
-    assert "error: " in result.stderr
+SAVED = pz.HysteresisRLS(50_000.0).to_dict()
+LACKING = {
+    name: {key: value for key, value in SAVED.items() if key != name} for name in ("arguments", "state")
+}
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        ("no json", "model.json"),
+        ([], "no model"),
+        ({"model": "Unknown"}, "Unknown"),
+        ({"estimator": "Unknown"}, "Unknown"),
+        (SAVED | {"arguments": None}, "model.json: its estimator is not what to_dict"),
+        (SAVED | {"arguments": {"no": 1}}, "not what to_dict"),
+        (SAVED | {"arguments": {"sample_rate": 10**400}}, "not what to_dict"),
+        (SAVED | {"state": {}}, "not what to_dict"),
+        (LACKING["arguments"], "has no 'arguments'"),
+        (LACKING["state"], "has no 'state'"),
+        *(
+            ({"model": MODEL, "limits": wrong}, "")
+            for wrong in ([1], "x", 5, {"maximum": 10**400}, {"no": 1})
+        ),
+    ],
+)
+def test_files_that_hold_no_controller_are_refused(model: Path, content: Any, word: str) -> None:
+    model.write_text(content if isinstance(content, str) else json.dumps(content))
+    refused(run("c", model, "-o", "out"), word)

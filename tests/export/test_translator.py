@@ -10,12 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from piezoest.compile import Record, compiled, like, local_rows
-from piezoest.equations import admissible, coleman_hodgdon, least_squares, play, turning_points
-from piezoest.equations.integrators import NODES, bogacki_shampine
+from piezoest.compile import Record, compiled
+from piezoest.equations import least_squares, turning_points
+from piezoest.equations.integrators import NODES
 from piezoest.estimators.delay_line import delay_line, delayed
 from piezoest.export.c_file import File
 from piezoest.export.c_translator import translate
@@ -76,26 +74,6 @@ def pointer(values: Any) -> Any:
     return ctypes.c_void_p(values.ctypes.data)
 
 
-@pytest.fixture(scope="module")
-def inverse_increment(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
-    function = build(tmp_path_factory.mktemp("c"), coleman_hodgdon.inverse_increment, *reals(*"wrabc"))
-    function.argtypes = [ctypes.c_double] * 5  # type: ignore[attr-defined]
-    return function
-
-
-@given(st.floats(-1.0, 1.0), st.floats(-50.0, 50.0), st.floats(0.5, 1.0))
-def test_inverse_increment_is_the_same(
-    inverse_increment: Callable[..., Any], place: float, dr: float, part: float
-) -> None:
-    a, c = 0.02, 0.18
-    b = 0.5 * part * c
-    arguments = place * b / a, dr, a, b, c
-    # NumPy's expm1 may differ from the C library's by one unit in the last place.
-    assert inverse_increment(*arguments) == pytest.approx(
-        float(coleman_hodgdon.inverse_increment(*arguments)), rel=1e-14, abs=1e-300
-    )
-
-
 LAW = record(theta=numbers(4), P=numbers(4, 4, kind=COVARIANCE), phi=numbers(4), y=NUMBER, S=NUMBER)
 GIVEN = record(forgetting=FIXED, noise=FIXED)
 
@@ -146,42 +124,10 @@ def test_branches_loops_and_lengths_are_the_same(tmp_path: Path) -> None:
         assert function(pointer(own), u, 0.7) == remember.of(PATH)(state, u, 0.7)
 
 
-def test_prandtl_ishlinskii_is_the_same(tmp_path: Path) -> None:
-    n = 12
-    thresholds, weights = np.linspace(0.5, 30.0, n), np.full(n, 0.01)
-    arguments = [array("y", n), *reals("w", "gain"), array("thresholds", n), array("weights", n)]
-    function = build(tmp_path, play.prandtl_ishlinskii_inverse_step, *arguments)
-    y, own = np.zeros(n), np.zeros(n)
-    kind = ctypes.c_void_p
-    function.argtypes = [kind, ctypes.c_double, ctypes.c_double, kind, kind]  # type: ignore[attr-defined]
-    for w in 5.0 * np.sin(np.linspace(0.0, 20.0, 500)):
-        theirs = play.prandtl_ishlinskii_inverse_step(y, float(w), 0.1, thresholds, weights)
-        assert function(pointer(own), w, 0.1, pointer(thresholds), pointer(weights)) == theirs
-
-
 # ---------------------------------------------------------------- names
 
 
 NESTED = record(swing=record(size=NUMBER, turns=numbers(3)), gain=NUMBER)
-
-
-def follow(state: Any, u: Any) -> None:
-    """Follow u."""
-    swing = state.swing
-    for i in range(len(swing.turns)):
-        swing.turns[i] += u * state.gain
-    _grow(swing)
-
-
-def _grow(swing: Any) -> None:
-    swing.size += 1.0
-
-
-def test_c_has_the_names_of_python() -> None:
-    text, _ = text_of(follow, struct(NESTED), *reals("u"))
-    assert "state->swing.turns[i] += u * state->gain;" in text
-    assert "test_translator_grow(&state->swing);" in text
-    assert "typedef struct {\n    double size;\n    double turns[3];\n} test_swing;" in text
 
 
 def misspelt(state: Any) -> Any:
@@ -191,30 +137,6 @@ def misspelt(state: Any) -> Any:
 def test_a_misspelt_field_is_refused() -> None:
     with pytest.raises(TranslationError, match=r"state\.swing has no field sise"):
         text_of(misspelt, struct(NESTED))
-
-
-def read_only(state: Any, unused: Any) -> Any:
-    return state.gain + state.swing.size
-
-
-def test_what_is_not_written_is_const_and_unused_parameters_go() -> None:
-    text, _ = text_of(read_only, struct(NESTED), *reals("x"))
-    assert "(const test_state *state)" in text
-
-
-def room(P: Any, x: Any) -> Any:
-    Q, row = local_rows(2, 2), like(P)
-    for i in range(2):
-        for j in range(2):
-            row[i, j] = P[j, i]
-            Q[i, j] = x * row[i, j]
-    return Q[0, 1]
-
-
-def test_work_space_is_local() -> None:
-    text, _ = text_of(room, array("P", 2, 2), *reals("x"))
-    assert "double Q[2][2];" in text
-    assert "double row[2][2];" in text
 
 
 # ---------------------------------------------------------------- known values
@@ -244,15 +166,6 @@ def test_a_known_number_that_changes_is_a_variable(tmp_path: Path) -> None:
     assert (function(2.0, 3), function(-2.0, 3)) == (8.0, -6.0)
 
 
-def integrate(x: Any, a: Any) -> Any:
-    return bogacki_shampine(coleman_hodgdon.inverse_rate, x, 1.0, (0.1, a, 0.05, 0.2))
-
-
-def test_functions_and_tuples_are_passed_through() -> None:
-    text, _ = text_of(integrate, *reals("x", "a"))
-    assert text.count("coleman_hodgdon_inverse_rate(") == 4
-
-
 def where_there_is_one(x: Any, line: Any) -> Any:
     if line is not None and x > 0.0:
         x += line.gain
@@ -266,19 +179,6 @@ def test_what_is_not_handed_over_is_left_out() -> None:
     with_one, _ = text_of(where_there_is_one, *reals("x"), struct(NESTED, "line"))
     assert "line->gain" in with_one
     assert "2.0 * x" in with_one
-
-
-def test_settings_are_numbers_in_the_code() -> None:
-    text, _ = text_of(learn, struct(LAW, "law"), constants(GIVEN, forgetting=0.99, noise=0.1), *reals("z"))
-    assert "0.99, 0.1, 1000000000.0" in text
-    assert "settings" not in text
-
-
-def test_same_function_is_translated_once_for_each_size() -> None:
-    file = File("test", "double")
-    for n in (3, 4, 3):
-        translate(file, least_squares.trace, [array("P", n, n)])
-    assert [made.name for made in file.functions.values()] == ["least_squares_trace", "least_squares_trace_2"]
 
 
 # ---------------------------------------------------------------- order
@@ -439,10 +339,3 @@ def test_constant_arrays_cannot_be_written() -> None:
     weights = constants(layout, weights=[1.0, 2.0, 3.0]).field("weights")
     with pytest.raises(TranslationError, match="constant"):
         text_of(writes, weights)
-
-
-@given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3))
-def test_nearest_admissible_has_an_inverse(factors: list[float]) -> None:
-    theta = np.array([0.02, 0.12, 0.0036]) * factors
-    admissible.nearest_admissible(theta, admissible.NEAREST_MARGIN)
-    assert admissible.has_inverse(*theta)

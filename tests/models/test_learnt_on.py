@@ -75,16 +75,12 @@ def test_steps_spikes_rests_and_converters_are_no_rate() -> None:
 
 
 def test_noise_is_no_swing() -> None:
+    ramp = np.linspace(0.0, 10.0, 1000)
+    assert LearntOn.of(ramp, ramp, FS).frequency is None
     noise = 0.3 * np.random.default_rng(0).normal(size=wave().size)
     found = LearntOn.of(wave() + noise, 0.1 * wave() + noise, FS)
     assert found.frequency == pytest.approx((5.0, 5.0), rel=0.04)
     assert found.rate == pytest.approx(800.0, rel=0.5)
-
-
-def test_a_ramp_has_no_frequency() -> None:
-    ramp = np.linspace(0.0, 10.0, 1000)
-    assert LearntOn.of(ramp, ramp, FS).frequency is None
-    assert LearntOn.of(wave(periods=1), wave(periods=1), FS).frequency == pytest.approx((5.0, 5.0))
 
 
 @pytest.mark.parametrize(
@@ -150,21 +146,12 @@ def test_blocks_of_a_log_have_the_ranges_of_the_log() -> None:
         # Within 5 % of the width, of the frequency, a factor of 1.5.
         (LearntOn((-43.9, 43.9), (-6.5, 6.5), 1190.0, (3.9, 6.2)), ()),
         (LearntOn((-1.0, 1.0), (-0.1, 0.1), 1.0), ()),
-        (LearntOn((-44.1, 40.0), (-6.0, 6.0), 1.0), ("the voltage goes from -44.1 to 40 V",)),
-        (LearntOn((0.0, 44.1), (0.0, 6.7), 1.0), ("from 0 to 6.7 µm", "from 0 to 44.1 V")),
-        (
-            LearntOn((0.0, 1.0), (-6.7, 0.0), 1.0),
-            ("from -6.7 to 0 µm, the model was learnt from -6 to",),
-        ),
-        (
-            LearntOn((0.0, 1.0), (0.0, 1.0), 1234.5),
-            ("up to 1230 V/s, the model was learnt at up to 800",),
-        ),
+        (LearntOn((-44.1, 40.0), (-6.0, 6.0), 1.0), ("-44.1 to 40 V",)),
+        (LearntOn((0.0, 44.1), (0.0, 6.7), 1.0), ("0 to 6.7 µm", "0 to 44.1 V")),
+        (LearntOn((0.0, 1.0), (-6.7, 0.0), 1.0), ("-6.7 to 0 µm",)),
+        (LearntOn((0.0, 1.0), (0.0, 1.0), 1234.5), ("1230 V/s",)),
         (LearntOn((0.0, 1.0), (0.0, 1.0), 1.0, (5.0, 6.4)), ("5 to 6.4 Hz",)),
-        (
-            LearntOn((0.0, 1.0), (0.0, 1.0), 1.0, (3.5, 3.5)),
-            ("at 3.5 Hz, the model was learnt at 4 to 6",),
-        ),
+        (LearntOn((0.0, 1.0), (0.0, 1.0), 1.0, (3.5, 3.5)), ("3.5 Hz",)),
     ],
 )
 def test_who_leaves_a_range_is_told_the_figures(used: LearntOn, words: tuple[str, ...]) -> None:

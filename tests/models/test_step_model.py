@@ -86,10 +86,3 @@ def test_gain_and_temperature_change_it_as_any_other() -> None:
     options: dict[str, Any] = {"gain_schedule": [[0.0, 1.0], [0.4, 1.2]], "temperature": 40.0}
     stages = [pz.SimulatedStage(RATE, model, **options) for model in (MODEL, PLAYS)]
     np.testing.assert_allclose(stages[0].run(u), stages[1].run(u), atol=1e-12)
-
-
-def test_a_fit_finds_it() -> None:
-    fit = pz.BatchFit(RATE, initial_model=Slack(0.1, 0.05, 3.0), offset=True)
-    fit.run(8.0 * R, MODEL.simulate(8.0 * R))
-    np.testing.assert_allclose(fit.model.theta, MODEL.theta, rtol=1e-3)
-    assert fit.model.offset == pytest.approx(0.3, abs=1e-3)

@@ -8,7 +8,6 @@ import importlib.util
 import inspect
 import itertools
 import json
-import linecache
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,7 +19,6 @@ import pytest
 
 import piezoest as pz
 from piezoest import policies as p
-from piezoest.estimators import recursive_least_squares_kernel as law_kernel
 from piezoest.layout import ABSENT, new, record
 from piezoest.policies import base
 
@@ -149,29 +147,25 @@ def hook(name: str, body: str, arguments: str = "own, fixed, state, settings") -
     return f"def {name}({arguments}):\n    {body}\n"
 
 
-def test_a_policy_that_does_nothing_is_refused(policy_file: Maker) -> None:
-    policy = policy_file("Idle")
-    with pytest.raises(ValueError, match="Idle does nothing: its file has none of prepare, permits"):
-        base.layouts((policy(),), AT)
+OTHER_ARGUMENTS = hook("prepare", "pass") + hook("permits", "return True", "own, numbers, state, settings")
+CALLED = "\n\nclass Called:\n    def __call__(self, own, fixed, state, settings):\n        return True\n"
 
 
-def test_a_misspelt_hook_is_refused(policy_file: Maker) -> None:
-    policy = policy_file("Hasty", hook("prepair", "pass") + hook("permits", "return True"))
-    with pytest.raises(ValueError, match="Hasty: prepair are no hooks, these are prepare, permits"):
-        base.layouts((policy(),), AT)
-
-
-def test_a_hook_with_other_arguments_is_refused(policy_file: Maker) -> None:
-    hooks = hook("prepare", "pass") + hook("permits", "return True", "own, numbers, state, settings")
-    policy = policy_file("Renamed", hooks)
-    with pytest.raises(ValueError, match="Renamed: permits must have the arguments own, fixed"):
-        base.layouts((policy(),), AT)
-
-
-def test_a_hook_that_is_no_plain_function_is_refused(policy_file: Maker) -> None:
-    odd = "\n\nclass Called:\n    def __call__(self, own, fixed, state, settings):\n        return True\n"
-    policy = policy_file("Called", hook("prepare", "pass") + odd + "\n\npermits = Called()\n")
-    with pytest.raises(ValueError, match="permits must be a plain function, marked @inlined"):
+@pytest.mark.parametrize(
+    ("functions", "words"),
+    [
+        ("", "Mine does nothing: its file has none of prepare, permits"),
+        (hook("prepair", "pass") + hook("permits", "return True"), "prepair are no hooks, these are prepare"),
+        (OTHER_ARGUMENTS, "permits must have the arguments own, fixed"),
+        (
+            hook("prepare", "pass") + CALLED + "\n\npermits = Called()\n",
+            "permits must be a plain function, marked @inlined",
+        ),
+    ],
+)
+def test_what_cannot_be_carried_out_is_refused(policy_file: Maker, functions: str, words: str) -> None:
+    policy = policy_file("Mine", functions)
+    with pytest.raises(ValueError, match=words):
         base.layouts((policy(),), AT)
 
 
@@ -251,23 +245,6 @@ def test_all_policies_are_asked_for_their_permission(policy_file: Maker) -> None
         settings = SimpleNamespace(policies=SimpleNamespace(**off | given))
         assert base.chain("permits")(state, settings) is all(answers)
         assert state.asked == ["Yes", "No", "Maybe"]
-
-
-def test_a_hook_that_nobody_has_is_an_empty_chain(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(base, "REGISTERED", {})
-    monkeypatch.setattr(base, "_chained", {})
-    assert base.chain("prepare")(None, None) is None
-    assert base.chain("permits")(None, None) is True
-
-
-def test_chains_have_a_text_for_tracebacks_and_translators() -> None:
-    for name in base.HOOKS:
-        chain = getattr(law_kernel, name)
-        lines = linecache.getlines(chain.__code__.co_filename)
-        assert lines[0] == f"def {name}(state, settings):\n"
-        called = [each for each, policy in base.REGISTERED.items() if name in base.hooks_of(policy)]
-        places = [next(k for k, line in enumerate(lines) if f"{each}_{name}(" in line) for each in called]
-        assert places == sorted(places)
 
 
 def test_all_policies_are_saved_by_their_fields() -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from piezoest import PaperStage, PrandtlIshlinskii, signals
-from piezoest.stage.paper import _data
 
 # Amplitude [µm], K [µm/V] and maximum error of linear feed-forward [µm]: Tables I and II, 5 Hz.
 ROWS = [(2.5, 0.141, 0.20), (5.0, 0.155, 0.54), (7.5, 0.165, 0.93)]
@@ -30,15 +29,6 @@ def test_gain_and_linear_error(amplitude: float, gain: float, error: float) -> N
     assert np.max(np.abs(r - x)[last]) == pytest.approx(error, rel=0.05)
 
 
-def test_every_number_has_an_origin() -> None:
-    data = _data()
-    parts = {"hysteresis", "creep", "mechanics", "amplifier", "gauge"}
-    assert set(data) == {"description", "calibration", *parts}
-    for part in parts | {"calibration"}:
-        assert len(data[part]["origin"]) > 20, part
-    assert "PRBS row and Table III were not used" in data["hysteresis"]["origin"]
-
-
 def test_hysteresis_is_admissible_and_can_be_inverted() -> None:
     stage = PaperStage()
     model = stage.hysteresis
@@ -51,14 +41,6 @@ def test_hysteresis_is_admissible_and_can_be_inverted() -> None:
     assert stage.creep.gains.sum() < 0.1
     r = 7.5 * np.sin(np.linspace(0.0, 12.0, 500))
     np.testing.assert_allclose(model.simulate(model.invert(r)), r, atol=1e-9)
-
-
-def test_calibration_stays_within_its_tolerances() -> None:
-    calibration = _data()["calibration"]
-    assert calibration["worst_deviation"] <= 0.95
-    assert calibration["memory"] > 0.4  # s: longer than the slowest reference's period
-    assert len(calibration["rows"]) == 4
-    assert all(len(row) == len(calibration["columns"]) for row in calibration["rows"].values())
 
 
 def test_readings_lie_on_the_converter_and_carry_the_noise() -> None:
@@ -87,8 +69,3 @@ def test_voltage_stays_within_range() -> None:
     stage.reset()
     stage.run(np.full(5000, 100.0))
     np.testing.assert_array_equal(clipped, stage.displacement)
-
-
-def test_unknown_keywords_are_refused() -> None:
-    with pytest.raises(TypeError):
-        PaperStage(gain_shedule=None)  # type: ignore[call-arg]

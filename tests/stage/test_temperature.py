@@ -70,12 +70,6 @@ def test_step_run_and_split_run_give_the_same_bits(hysteresis: Any, temperature:
     np.testing.assert_array_equal([single.step(u) for u in U.tolist()], measured)
 
 
-def test_step_and_run_of_the_paper_stage_while_it_warms() -> None:
-    u = U[:600]
-    run, step = (PaperStage(seed=5, temperature=lambda t: 20.0 + 2000.0 * t) for _ in range(2))
-    np.testing.assert_array_equal([step.step(value) for value in u.tolist()], run.run(u))
-
-
 def test_gain_schedule_and_temperature_multiply() -> None:
     both = SimulatedStage(FS, PLAYS, gain_schedule=[[0.0, 1.1]], temperature=45.0, temperature_law=LAW)
     warm = SimulatedStage(FS, PLAYS, temperature=45.0, temperature_law=LAW)
