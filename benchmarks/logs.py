@@ -24,10 +24,9 @@ from log_judging import NEGLIGIBLE, PLAYS, TRAIN, clean_scores, judge
 from safety import short
 
 from piezoest._files import write_text
-from piezoest.bench.adaptation import json_safe
 from piezoest.bench.executors import in_processes
-from piezoest.bench.origin import origin, put
-from piezoest.bench.suite_command import counting
+from piezoest.bench.origin import json_safe, origin, put
+from piezoest.bench.shared import counting
 from piezoest.bench.zoo.logs import ADDED
 from piezoest.models import ColemanHodgdon
 

@@ -12,6 +12,7 @@ A run takes about half a second.
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import sys
 import time
@@ -22,19 +23,21 @@ from typing import Any
 import numpy as np
 
 from piezoest._files import save_figure
-from piezoest.bench.adaptation import json_safe
-from piezoest.bench.campaign import store_in
-from piezoest.bench.origin import origin, put
-from piezoest.bench.suite_command import counting
-from piezoest.bench.zoo import dwelling, judging, naming, settling, summary
-from piezoest.bench.zoo.contenders import DEFAULT, PARTS
+from piezoest.bench.origin import json_safe, origin, put
+from piezoest.bench.shared import counting
+from piezoest.bench.store import carry_out
+from piezoest.bench.table import store_in
+from piezoest.bench.zoo import contenders, dwelling, judging, naming, settling, summary
 from piezoest.bench.zoo.contest import contest, summarise_contest
 from piezoest.bench.zoo.summary import CRITERIA, summarise
-from piezoest.bench.zoo.tasks import Task, carry_out_all, cells, rests, runs
+from piezoest.bench.zoo.tasks import Task, cells, over_cores, rests, runs
 
 Row = dict[str, Any]
 
-CONTROLLERS = {"controller": DEFAULT, "no_corridor": "no-corridor", "line": "line", "parts": PARTS}
+DEFAULT = contenders.DEFAULT
+CONTROLLERS = {
+    "controller": DEFAULT, "no_corridor": "no-corridor", "line": "line", "parts": contenders.PARTS,
+}  # fmt: skip
 # A leg is half a wave of the reference. Called less often, or told later, nobody can follow it closely.
 CALLS, LATE = 16.0, 1.0 / 16.0
 FEATURES = ("family", "reference", "fault", "mode", "mechanics")
@@ -43,15 +46,13 @@ SPANS = ("amplitude", "frequency", "gain", "width", "sample_rate", "delay", "blo
 LEVELS = (*np.linspace(0.0, 0.9, 46), *np.linspace(0.9, 0.99, 19)[1:], *np.linspace(0.99, 1.0, 21)[1:])
 # How a fault was named, and how soon it was forgotten.
 TOLD = (
-    "fault",
-    "mode",
-    "to_name",
-    "named",
-    "named_periods",
-    "to_recover",
-    "recovered_first",
-    "recovered_soon",
-)
+    "fault", "mode", "to_name", "named", "named_periods", "to_recover", "recovered_first", "recovered_soon",
+)  # fmt: skip
+# Columns of the tables about controller and line.
+CROSSED = {
+    "by_fault": ("fault",), "by_family_and_reference": ("family", "reference"), "by_family": ("family",),
+    "by_reference": ("reference",), "by_mechanics": ("mechanics",), "by_often": ("often",),
+}  # fmt: skip
 COLOURS = {"controller": "#D55E00", "no_corridor": "#CC79A7", "line": "#0072B2", "parts": "#888888"}
 NAMES = {
     "controller": "AdaptiveFeedforward", "no_corridor": "without corridor",
@@ -75,9 +76,9 @@ PARTS: dict[str, Callable[[Row], bool]] = {
 }
 
 
-def judged(rows: Sequence[Row], column: str = "ratio") -> list[float]:
+def judged(rows: Sequence[Row]) -> list[float]:
     """Ratios that count."""
-    return [row[column] for row in rows if row.get(column) is not None]
+    return [row["ratio"] for row in rows if row.get("ratio") is not None]
 
 
 def part(rows: Sequence[Row], *, curve: bool = True) -> Row:
@@ -116,27 +117,14 @@ def table(rows: Sequence[Row], *names: str) -> list[Row]:
 
 def groups(rows: Sequence[Row]) -> Row:
     """What the page shows of each contender; of all runs together the curve is drawn."""
-    return {
-        **{
-            name: part([row for row in rows if belongs(row)], curve=name == "all")
-            for name, belongs in PARTS.items()
-        },
-        "worst": summarise(rows)["worst"],
-    }
+    found = {name: part(list(filter(belongs, rows)), curve=name == "all") for name, belongs in PARTS.items()}
+    return {**found, "worst": summarise(rows)["worst"]}
 
 
 def tables(rows: Sequence[Row]) -> Row:
     """What it shows of the line, too."""
     marked = [{**row, "often": often(row)} for row in rows]
-    return {
-        **groups(rows),
-        "by_fault": table(marked, "fault"),
-        "by_family_and_reference": table(marked, "family", "reference"),
-        "by_family": table(marked, "family"),
-        "by_reference": table(marked, "reference"),
-        "by_mechanics": table(marked, "mechanics"),
-        "by_often": table(marked, "often"),
-    }
+    return {**groups(rows), **{name: table(marked, *columns) for name, columns in CROSSED.items()}}
 
 
 def summed_up(rows: Sequence[Row]) -> Row:
@@ -144,7 +132,7 @@ def summed_up(rows: Sequence[Row]) -> Row:
     told = [row for row in summarise(rows)["by_fault"] if row["fault"] != "none"]
     return {
         **tables(rows),
-        **{name: part([row for row in rows if belongs(row)]) for name, belongs in PARTS.items()},
+        **{name: part(list(filter(belongs, rows))) for name, belongs in PARTS.items()},
         "by_mode": table(rows, "fault", "mode"),
         "told": [{name: row[name] for name in TOLD} for row in told],
     }
@@ -167,7 +155,7 @@ def drawn(rows: Sequence[Row]) -> Row:
 def played(what: str, tasks: Sequence[Task], folder: Path, workers: int | None) -> list[Row]:
     """Rows of some runs, of which those that are known are not made again."""
     with store_in(folder) as store, counting(f"runs of {what}") as count:
-        carry_out_all(tasks, store, workers, count)
+        carry_out(tasks, store, over_cores(workers), count)
         return list(store.rows(task.key for task in tasks))
 
 
@@ -206,13 +194,16 @@ def short(value: Any) -> Any:
 
 def main(given: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--runs", type=int, default=2000, help="rigs, one for each seed")
-    parser.add_argument("--others", type=int, help="rigs for what it is compared with; default as many")
-    parser.add_argument("--map", type=int, default=0, help="seeds for each place of the map")
-    parser.add_argument("--singles", type=int, default=0, help="seeds for each family and reference")
-    parser.add_argument("--dwell", type=int, default=0, help="rigs that rest for a minute")
-    parser.add_argument("--seed", type=int, default=0, help="the first one")
-    parser.add_argument("--workers", type=int, help="processes; default one for each core")
+    for name, default, words in (
+        ("runs", 2000, "rigs, one for each seed"),
+        ("others", None, "rigs for what it is compared with; default as many"),
+        ("map", 0, "seeds for each place of the map"),
+        ("singles", 0, "seeds for each family and reference"),
+        ("dwell", 0, "rigs that rest for a minute"),
+        ("seed", 0, "the first one"),
+        ("workers", None, "processes; default one for each core"),
+    ):
+        parser.add_argument(f"--{name}", type=int, default=default, help=words)
     parser.add_argument("--out", type=Path, default=Path("bench-results-safety"), help="of finished runs")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--figure", type=Path)
@@ -222,22 +213,13 @@ def main(given: Sequence[str] | None = None) -> int:
 
     began = time.perf_counter()
     others = min(arguments.runs, arguments.others or arguments.runs)
-
-    def play(what: str, tasks: Sequence[Task]) -> list[Row]:
-        return played(what, tasks, arguments.out, arguments.workers)
-
-    rows = {
-        name: play(
-            controller,
-            runs(
-                controller,
-                range(arguments.seed, arguments.seed + (arguments.runs if name == "controller" else others)),
-            ),
-        )
-        for name, controller in CONTROLLERS.items()
-    }
-    on_map = play("the map", cells(DEFAULT, settling.cells(range(arguments.map))))
+    play = functools.partial(played, folder=arguments.out, workers=arguments.workers)
     first = arguments.seed
+    rows = {}
+    for name, controller in CONTROLLERS.items():
+        count = arguments.runs if name == "controller" else others
+        rows[name] = play(controller, runs(controller, range(first, first + count)))
+    on_map = play("the map", cells(DEFAULT, settling.cells(range(arguments.map))))
     rested = play("rests", rests(DEFAULT, dwelling.dwells(range(first, first + arguments.dwell))))
     alone = play("single estimators", contest(DEFAULT, range(arguments.singles)))
     document = {

@@ -1,33 +1,77 @@
-"""Compare the library's speed with C written by hand, filterpy and padasip, and with its targets.
+"""Compare the library's speed with C written by hand, its own export to C, filterpy and padasip.
 
-All that is compared runs in the same rounds, one after the other; figures are medians over the rounds,
-ratios are medians of the ratios within a round. Beside each time stands the outcome. Needs gcc.
+All that is compared runs in the same rounds, one after the other; times are medians over the rounds, ratios
+medians of the ratios within a round. Ours must come to its peer's result. Needs gcc, and a quiet machine.
 
-    python benchmarks/speed.py [--samples N] [--rounds N] [--turns N] [--json FILE] [--figure FILE]
+    python benchmarks/speed.py [--samples N] [--slow N] [--rounds N] [--turns N] [--json FILE] [--figure FILE]
+
+It takes some minutes.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import functools
+import itertools
+import os
+import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from c_reference import COMMAND, Exported, FloatArray, Reference, ekf_settings, rls_settings
-from single_calls import Calls, calls, cold, disturbances
-from smoke import SAMPLE_RATE, START, TRUE
+import peers
+from peers import MEMORY, NOISE, SAMPLE_RATE, START, FloatArray
 
 import piezoest as pz
-from piezoest._files import save_figure, write_text
-from piezoest.bench.origin import origin
+from piezoest._files import save_figure
+from piezoest.bench.origin import origin, put
+from piezoest.policies import Forgetting
 
-NOISE, MEMORY, CUTOFF = 1.5e-3, 0.4, 2500.0
+TRUE = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
+LIMITS = pz.VoltageLimits(-100.0, 100.0)
 LARGEST_DIFFERENCE = 1e-6
+LATE = 20_000  # [ns], a sample at 50 kHz
 Work = Callable[[], Any]
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One of ours and who it is compared with: how many times as long it may take, and what is not alike."""
+
+    ours: str
+    peer: str
+    at_most: float | None
+    peer_does: str
+    is_same: bool = True  # whether both come to the same numbers
+
+
+RLS, EKF, PLAYS = "HysteresisRLS.run", "HysteresisEKF.run", "PrandtlIshlinskiiRLS.run"
+BARE_RLS, FREE_EKF = f"{RLS}, policies off", f"{EKF}, not projected"
+BOUNDED, FILTERPY, PADASIP = "C, bound and dead zone", "filterpy's EKF, bare loop", "padasip's RLS, bare loop"
+FAST = (
+    Pair(BARE_RLS, "C, the bare law", 1.3, "less: no look for missing samples, no status"),
+    Pair(f"{RLS}, the paper's", BOUNDED, 3.0, "less: no look for missing samples, no status"),
+    Pair(f"{RLS}, default", "exported C", 1.3, "the same, compiled by gcc"),
+    Pair(f"{RLS}, default", BOUNDED, 3.0, "less: no outliers, no level, no noise measured", False),
+    Pair(f"{RLS}, default, with errors", "exported C", 1.3, "less: no standard errors"),
+    Pair(EKF, "C, EKF", 1.5, "less: P - K S K', not Joseph's form; no projection, no checks"),
+    Pair("InverseCompensator.run", "C, inverse", 1.5, "the same series; less: no look for NaN, no count"),
+    Pair(f"{PLAYS}, plain", "C, 12 plays", 2.0, "more: learns at each sample; less: a fixed grid", False),
+    Pair(PLAYS, "C, 12 plays, bends, creep", 2.0, "as in the line above", False),
+)
+SLOW = (
+    Pair(FREE_EKF, FILTERPY, 0.001, "less: no look for missing samples; it keeps copies of x and P"),
+    Pair("HysteresisEKF.step, not projected", FILTERPY, None, "the same peer; ours called from Python, too"),
+    Pair(FREE_EKF, "FilterPyEKF.run", None, "filterpy with this library's checks and histories"),
+    Pair(FREE_EKF, "filterpy's UKF, bare loop", None, "more: nine sigma points, no Jacobian", False),
+    Pair("RecursiveLeastSquares.update", PADASIP, None, "less: no checks; both are called from Python"),
+    Pair(BARE_RLS, PADASIP, None, "less: is given regressors, unfiltered", False),
+)
 
 
 def record(samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -35,6 +79,83 @@ def record(samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     r = np.asarray(pz.signals.triangle(5.0, 5.0, samples * 5.0 / SAMPLE_RATE, SAMPLE_RATE)).copy()
     u = pz.InverseCompensator(TRUE).run(r)
     return r, u, TRUE.simulate(u) + np.random.default_rng(0).normal(scale=NOISE, size=r.size)
+
+
+def learnt(estimator: Any, u: FloatArray, x: FloatArray) -> FloatArray:
+    """Parameters at the end of a run, its history kept."""
+    return np.asarray(estimator.run(u, x).theta[-1])
+
+
+def stepped(estimator: Any, u: FloatArray, x: FloatArray) -> FloatArray:
+    """Parameters after a step from Python for each sample."""
+    step = estimator.step
+    for voltage, reading in zip(u.tolist(), x.tolist(), strict=True):
+        step(voltage, reading)
+    return np.asarray(estimator.theta)
+
+
+def updated(z: FloatArray, phi: FloatArray) -> FloatArray:
+    """Parameters that `RecursiveLeastSquares` learns with padasip's settings."""
+    learner = pz.RecursiveLeastSquares(3, P=peers.VARIANCE, policies=(Forgetting(MEMORY * SAMPLE_RATE),))
+    for output, regressor in zip(z.tolist(), phi, strict=True):
+        learner.update(output, regressor)
+    return learner.theta
+
+
+def our_rls(**options: Any) -> pz.HysteresisRLS:
+    return pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, **options)
+
+
+def our_plays(**options: Any) -> pz.PrandtlIshlinskiiRLS:
+    return pz.PrandtlIshlinskiiRLS(SAMPLE_RATE, thresholds=12, **options)
+
+
+def fast_work(c: peers.Reference, r: FloatArray, u: FloatArray, x: FloatArray) -> dict[str, Work]:
+    """What takes nanoseconds a sample, by name."""
+    off, on = peers.rls_settings(bounded=False), peers.rls_settings(bounded=True)
+    tuning = [0.99995, NOISE**2, 0.01, 1.0, *np.linspace(1.0, 35.0, 12)]
+    plays = np.array([*tuning, *np.ones(14)])
+    decays = np.exp(-1.0 / (SAMPLE_RATE * np.array([0.01, 0.1, 1.0])))
+    bent_plays = np.array([*tuning, -12.0, 12.0, *decays])
+    inverse = np.array([TRUE.a, TRUE.b, TRUE.c, LIMITS.minimum, LIMITS.maximum])
+    kalman = peers.ekf_settings()
+    exported = peers.Exported(our_rls(errors=False))
+    return {
+        BARE_RLS: lambda: learnt(our_rls(memory=MEMORY, policies=(), errors=False), u, x),
+        "C, the bare law": lambda: c.run("rls", 3, off, u, x)[-1],
+        f"{RLS}, the paper's": lambda: learnt(our_rls(memory=MEMORY, errors=False), u, x),
+        BOUNDED: lambda: c.run("rls", 3, on, u, x)[-1],
+        f"{RLS}, default": lambda: learnt(our_rls(errors=False), u, x),
+        f"{RLS}, default, with errors": lambda: learnt(our_rls(), u, x),
+        "exported C": lambda: exported(u, x)[-1],
+        EKF: lambda: learnt(pz.HysteresisEKF(SAMPLE_RATE, initial_model=START), u, x),
+        "C, EKF": lambda: peers.loop_parameters(c.run("ekf", 4, kalman, u, x)[-1]),
+        "InverseCompensator.run": lambda: pz.InverseCompensator(TRUE, limits=LIMITS).run(r)[-1:],
+        "C, inverse": lambda: c.run("inverse", 1, inverse, r)[-1],
+        f"{PLAYS}, plain": lambda: learnt(our_plays(bends=0, creep=()), u, x),
+        "C, 12 plays": lambda: c.run("plays", 14, plays, u, x)[-1],
+        PLAYS: lambda: learnt(our_plays(), u, x),
+        "C, 12 plays, bends, creep": lambda: c.run("bent_plays", 43, bent_plays, u, x)[-1],
+    }
+
+
+def slow_work(u: FloatArray, x: FloatArray) -> dict[str, Work]:
+    """What takes microseconds a sample, and ours on the same short record."""
+    z, phi = peers.regression(u, x)
+
+    def ekf() -> pz.HysteresisEKF:
+        return pz.HysteresisEKF(SAMPLE_RATE, initial_model=START, project=False)
+
+    return {
+        FREE_EKF: lambda: learnt(ekf(), u, x),
+        "HysteresisEKF.step, not projected": lambda: stepped(ekf(), u, x),
+        "FilterPyEKF.run": lambda: learnt(pz.FilterPyEKF(SAMPLE_RATE, initial_model=START), u, x),
+        FILTERPY: lambda: peers.loop_parameters(peers.filterpy_ekf(u, x)),
+        "filterpy's UKF, bare loop": lambda: peers.loop_parameters(peers.filterpy_ukf(u, x)),
+        BARE_RLS: lambda: learnt(our_rls(memory=MEMORY, policies=(), errors=False), u, x),
+        "RecursiveLeastSquares.update": lambda: updated(z, phi),
+        PADASIP: lambda: peers.padasip_rls(z, phi),
+    }
 
 
 def interleaved(
@@ -55,273 +176,149 @@ def interleaved(
     return {name: np.array(values) for name, values in seconds.items()}
 
 
-def rls(u: FloatArray, x: FloatArray, **options: Any) -> FloatArray:
-    """Run `HysteresisRLS` over the record, its history kept; theta at the end."""
-    estimator = pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, **options)
-    return estimator.run(u, x).theta[-1]
+def compared(pairs: tuple[Pair, ...], work: dict[str, Work], samples: int, rounds: int) -> list[Row]:
+    """Rows of the table: times, ratio, and how far the results of both are apart."""
+    seconds = interleaved(work, rounds)
+    rows = []
+    for pair in pairs:
+        ours, peer = seconds[pair.ours], seconds[pair.peer]
+        apart = None
+        if pair.is_same:
+            apart = float(np.max(np.abs(work[pair.ours]() / work[pair.peer]() - 1.0)))
+        rows.append(
+            {
+                "ours": pair.ours, "peer": pair.peer, "peer_does": pair.peer_does, "at_most": pair.at_most,
+                "ns": 1e9 * float(np.median(ours)) / samples,
+                "peer_ns": 1e9 * float(np.median(peer)) / samples,
+                "ratio": float(np.median(ours / peer)), "difference": apart,
+            }
+        )  # fmt: skip
+    return rows
 
 
-def ekf(u: FloatArray, x: FloatArray, estimator: Any) -> FloatArray:
-    """(alpha, beta, gamma) at the end of a run."""
-    estimator.run(u, x)
-    return np.asarray(estimator.theta)
+def bank(c: peers.Reference, samples: int, rounds: int) -> list[Row]:
+    """Nanoseconds per channel and sample of banks, and of C's.
 
-
-def padasip_rls(u: FloatArray, x: FloatArray) -> FloatArray:
-    """Learn from unfiltered differences with padasip's adapt, one call a sample."""
-    import padasip
-
-    learner = padasip.filters.FilterRLS(3, mu=float(np.exp(-1.0 / (MEMORY * SAMPLE_RATE))), w="zeros")
-    for k in range(1, u.size):
-        du = u[k] - u[k - 1]
-        phi = np.array([-0.5 * (x[k] + x[k - 1]) * abs(du), du, 0.5 * (u[k] + u[k - 1]) * abs(du)])
-        learner.adapt(x[k] - x[k - 1], phi)
-    return np.asarray(learner.w)
-
-
-def bank_scaling(c: Reference, samples: int, rounds: int) -> list[dict[str, Any]]:
-    """Nanoseconds per channel and sample against channels and threads, the C bank's, and the default's.
-
-    K rows for N channels, so that K N is about `samples`; but at least 20 ms of signal: what a bank does once
-    for every channel, whatever the number of rows, would be a tenth of 4 ms.
+    At least 20 ms of signal: what a bank does once for every channel would be a tenth of 4 ms.
     """
     shortest = min(samples // 64, int(0.02 * SAMPLE_RATE))
-    settings = rls_settings(SAMPLE_RATE, START, MEMORY, NOISE, CUTOFF, True)
-    paper = pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, memory=MEMORY, errors=False)
-    usual = pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, errors=False)
+    settings = peers.rls_settings(bounded=True)
     found = []
-    for channels in (64, 256, 1024, 8192):
+    for channels in (64, 1024, 8192):
         K = max(shortest, samples // channels)
-        _, u, x = record(K)
-        u, x = (np.ascontiguousarray(np.tile(v[:, None], (1, channels))) for v in (u, x))
+        _, u, x = (np.ascontiguousarray(np.tile(v[:, None], (1, channels))) for v in record(K))
         banks = {
-            name: pz.EstimatorBank(estimator, channels, threads=threads)
-            for name, estimator, threads in (("1", paper, 1), ("2", paper, 2), ("default, 2", usual, 2))
+            name: pz.EstimatorBank(our_rls(errors=False, **options), channels, threads=threads)
+            for name, options, threads in (
+                ("one thread", {"memory": MEMORY}, 1),
+                ("two threads", {"memory": MEMORY}, 2),
+                ("the default, two threads", {}, 2),
+            )
         }
 
-        def go(bank: pz.EstimatorBank, u: FloatArray = u, x: FloatArray = x, K: int = K) -> None:
+        def go(bank: pz.EstimatorBank, u: FloatArray = u, x: FloatArray = x) -> None:
             bank.reset()
-            bank.run(u, x, every=K)
+            bank.run(u, x, every=len(u))
 
-        work: dict[str, Work] = {name: (lambda bank=bank: go(bank)) for name, bank in banks.items()}
-        work["C"] = lambda u=u, x=x: c.bank(u, x, settings)
+        work: dict[str, Work] = {name: functools.partial(go, each) for name, each in banks.items()}
+        work["C, one thread"] = functools.partial(c.bank, u, x, settings)
         seconds = interleaved(work, rounds, time.perf_counter)
-        apart = float(np.max(np.abs(banks["2"].theta / c.bank(u, x, settings) - 1.0)))
-        found.append(
-            {"channels": channels, "samples": K, "difference_from_C": apart}
-            | {name: float(1e9 * np.median(values) / u.size) for name, values in seconds.items()}
-        )
+        apart = float(np.max(np.abs(banks["two threads"].theta / c.bank(u, x, settings) - 1.0)))
+        times = {name: float(1e9 * np.median(values) / u.size) for name, values in seconds.items()}
+        found.append({"channels": channels, "samples": K, "difference": apart, "ns": times})
     return found
 
 
-def verdict(row: dict[str, Any]) -> dict[str, Any]:
-    """Row with whether its figure is within the target."""
-    at_least = row.get("at_least", False)
-    met = row["figure"] >= row["target"] if at_least else row["figure"] <= row["target"]
-    return {**row, "met": bool(met)}
+def single_calls(function: Callable[..., Any], columns: tuple[FloatArray, ...], count: int) -> Row:
+    """Times of single calls [ns], less the clock's own; a call is late after a sample at 50 kHz."""
+    clock = time.perf_counter_ns
+    rows = itertools.cycle(list(zip(*(column.tolist() for column in columns), strict=True)))
+    times = np.empty(count)
+    began_all = clock()
+    for k, row in enumerate(itertools.islice(rows, count)):
+        began = clock()
+        function(*row)
+        times[k] = clock() - began
+    seconds = 1e-9 * (clock() - began_all)
+    own = float(np.median([-(clock() - clock()) for _ in range(1000)]))
+    median, rare = np.percentile(times - own, [50.0, 99.9]).tolist()
+    late = int(np.sum(times > LATE))
+    return {"calls": count, "median": median, "p99.9": rare, "late": late, "late_per_second": late / seconds}
 
 
-def measure(samples: int, rounds: int, slow: int, turns: int) -> dict[str, Any]:
-    """All figures."""
-    c = Reference()
-    r, u, x = record(samples)
-    off, on = (rls_settings(SAMPLE_RATE, START, MEMORY, NOISE, CUTOFF, flag) for flag in (False, True))
-    inverse = np.array([TRUE.a, TRUE.b, TRUE.c, 0.0, 0.0])
-    inverse[3:] = -100.0, 100.0
-    limits = pz.VoltageLimits(-100.0, 100.0)
-    thresholds = np.linspace(1.0, 35.0, 12)
-    tuning = [0.99995, NOISE**2, 0.01, 1.0, *thresholds]
-    plays = np.array([*tuning, *np.ones(14)])
-    decays = np.exp(-1.0 / (SAMPLE_RATE * np.array([0.01, 0.1, 1.0])))
-    bent_plays = np.array([*tuning, -12.0, 12.0, *decays])
-    exported = {
-        "policies off": Exported(
-            pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, memory=MEMORY, policies=(), errors=False)
-        ),
-        "default": Exported(pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, errors=False)),
-    }
-    work: dict[str, Work] = {
-        "C, RLS": lambda: c.rls(u, x, off)[-1],
-        "C, RLS, bound and dead zone": lambda: c.rls(u, x, on)[-1],
-        "HysteresisRLS, policies off": lambda: rls(u, x, memory=MEMORY, policies=(), errors=False),
-        "HysteresisRLS, the paper's": lambda: rls(u, x, memory=MEMORY, errors=False),
-        "HysteresisRLS, default": lambda: rls(u, x, errors=False),
-        "HysteresisRLS, policies off, standard errors": lambda: rls(u, x, memory=MEMORY, policies=()),
-        "HysteresisRLS, default, standard errors": lambda: rls(u, x),
-        "exported C, policies off": lambda: exported["policies off"](u, x)[-1, :3],
-        "exported C, default": lambda: exported["default"](u, x)[-1],
-        "C, EKF": lambda: c.ekf(u, x, ekf_settings(SAMPLE_RATE, START))[-1],
-        "HysteresisEKF": lambda: ekf(u, x, pz.HysteresisEKF(SAMPLE_RATE, initial_model=START)),
-        "C, inverse": lambda: c.inverse(r, inverse)[-1:],
-        "InverseCompensator": lambda: pz.InverseCompensator(TRUE, limits=limits).run(r)[-1:],
-        "C, 12 plays": lambda: c.plays(u, x, plays)[-1],
-        "C, 12 plays, bends, creep": lambda: c.bent_plays(u, x, bent_plays)[-1],
-        "PrandtlIshlinskiiRLS": lambda: (
-            pz.PrandtlIshlinskiiRLS(SAMPLE_RATE, thresholds=12).run(u, x).theta[-1]
-        ),
-        "PrandtlIshlinskiiRLS, no bends, no creep": lambda: (
-            pz.PrandtlIshlinskiiRLS(SAMPLE_RATE, thresholds=12, bends=0, creep=()).run(u, x).theta[-1]
-        ),
-    }
-    seconds = interleaved(work, rounds)
-    outcome = {name: np.asarray(function()).tolist() for name, function in work.items()}
-    s = ekf_outcome = outcome["C, EKF"]
-    outcome["C, EKF"] = [s[1], s[3] - s[2], s[1] * ekf_outcome[3]]
-    times = {name: float(1e9 * np.median(values) / samples) for name, values in seconds.items()}
-
-    def against(name: str, peer: str) -> float:
-        return float(np.median(seconds[name] / seconds[peer]))
-
-    u_slow, x_slow = u[:slow], x[:slow]
-    peers = interleaved(
-        {
-            "filterpy EKF": lambda: ekf(u_slow, x_slow, pz.FilterPyEKF(SAMPLE_RATE, initial_model=START)),
-            "padasip RLS": lambda: padasip_rls(u_slow, x_slow),
-        },
-        max(1, min(rounds, 3)),
-    )
-    for name, values in peers.items():
-        times[name] = float(1e9 * np.median(values) / slow)
-    theirs = ekf(u_slow, x_slow, pz.FilterPyEKF(SAMPLE_RATE, initial_model=START))
-    ours = ekf(u_slow, x_slow, pz.HysteresisEKF(SAMPLE_RATE, initial_model=START, project=False))
-    outcome["filterpy EKF"], outcome["padasip RLS"] = theirs.tolist(), padasip_rls(u_slow, x_slow).tolist()
-    estimator = pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, memory=MEMORY)
+def live(r: FloatArray, u: FloatArray, x: FloatArray, turns: int) -> dict[str, Row]:
+    """Single calls from Python, as a live loop makes them, and of a function that does nothing."""
+    estimator, inverse = our_rls(memory=MEMORY), pz.InverseCompensator(TRUE)
     estimator.step(0.0, 0.0)
-    disturbed = disturbances()
-    ring_estimator, ring_inverse = estimator.copy(), pz.InverseCompensator(TRUE)
 
     def turn(reference: float, displacement: float) -> None:
-        ring_estimator.step(ring_inverse.step(reference), displacement)
+        estimator.step(inverse.step(reference), displacement)
 
-    live = calls(
-        {
-            "step": Calls(estimator.step, (u, x), max(samples, turns // 10)),
-            "ring": Calls(turn, (r, x), turns),
-            "ring_without_gc": Calls(turn, (r, x), max(samples, turns // 10), collect=False),
-        }
-    )
-    single, ring = live["step"], live["ring"]
+    return {
+        "HysteresisRLS.step": single_calls(estimator.step, (u, x), turns),
+        "InverseCompensator.step and HysteresisRLS.step": single_calls(turn, (r, x), turns),
+        "a function that does nothing": single_calls(lambda r, x: None, (r, x), turns),
+    }
+
+
+def in_seconds(rounds: int) -> dict[str, float]:
+    """Seconds of what happens once, the first three in new processes with a warm cache."""
+    programs = {
+        "import": "import piezoest as pz",
+        "first step": "import piezoest as pz; pz.HysteresisRLS(5e4).step(0.0, 0.0)",
+        "warmup": "import piezoest as pz; pz.warmup()",
+    }
+    found = {}
+    for name, program in programs.items():
+        code = f"import time; s = time.perf_counter(); {program}; print(time.perf_counter() - s)"
+        command = [sys.executable, "-c", code]
+        texts = [subprocess.run(command, capture_output=True, check=True).stdout for _ in range(1 + rounds)]
+        found[name] = float(np.median([float(text) for text in texts[1:]]))  # the first may have compiled
     signal = pz.signals.triangle(5.0, 5.0, 5, SAMPLE_RATE)
 
     def track() -> Any:
-        return pz.track(
-            signal,
-            stage=pz.PaperStage(SAMPLE_RATE),
-            compensator=pz.InverseCompensator(START),
-            estimator=pz.HysteresisRLS(SAMPLE_RATE),
-        )
+        stage, inverse = pz.PaperStage(SAMPLE_RATE), pz.InverseCompensator(START)
+        return pz.track(signal, stage=stage, compensator=inverse, estimator=pz.HysteresisRLS(SAMPLE_RATE))
 
-    tracked = interleaved({"track": track}, max(1, min(rounds, 5)))["track"]
-    bank = bank_scaling(c, 16 * samples, max(1, rounds // 3))
-    began = cold()
-    rows = [
-        {"what": "HysteresisRLS.run, policies off, times C", "target": 1.3,
-         "figure": against("HysteresisRLS, policies off", "C, RLS")},
-        {"what": "HysteresisRLS.run, the paper's policies, times C", "target": 3.0,
-         "figure": against("HysteresisRLS, the paper's", "C, RLS, bound and dead zone")},
-        {"what": "HysteresisRLS.run, default policies (memory='period'), times C", "target": 3.0,
-         "figure": against("HysteresisRLS, default", "C, RLS, bound and dead zone")},
-        {"what": "HysteresisRLS.run, policies off, times the same estimator exported to C", "target": 1.3,
-         "figure": against("HysteresisRLS, policies off", "exported C, policies off")},
-        {"what": "HysteresisRLS.run, default policies, times the same estimator exported to C", "target": 1.3,
-         "figure": against("HysteresisRLS, default", "exported C, default")},
-        {"what": "HysteresisRLS.run, policies off, standard errors too, times C", "target": 1.3,
-         "figure": against("HysteresisRLS, policies off, standard errors", "C, RLS")},
-        {"what": "HysteresisRLS.run, default policies, standard errors too, times C", "target": 3.0,
-         "figure": against("HysteresisRLS, default, standard errors", "C, RLS, bound and dead zone")},
-        {"what": "HysteresisEKF.run, times C", "target": 1.5, "figure": against("HysteresisEKF", "C, EKF")},
-        {"what": "HysteresisEKF.run, times faster than filterpy", "target": 1000.0, "at_least": True,
-         "figure": times["filterpy EKF"] / times["HysteresisEKF"]},
-        {"what": "step(u, x) from Python, median [µs]", "target": 1.0, "figure": 1e-3 * single["median"]},
-        {"what": "step(u, x) from Python, 99.9 % [µs]", "target": 5.0, "figure": 1e-3 * single["p99.9"]},
-        {"what": "estimator and inverse, one turn, median [µs]", "target": 2.5,
-         "figure": 1e-3 * ring["median"]},
-        {"what": "turns within 20 µs [%]", "target": 99.99, "at_least": True,
-         "figure": 100.0 * ring["within_20us"]},
-        {"what": "InverseCompensator.run, times C", "target": 1.5,
-         "figure": against("InverseCompensator", "C, inverse")},
-        {"what": "track() on PaperStage, times real time", "target": 30.0, "at_least": True,
-         "figure": len(signal) / SAMPLE_RATE / float(np.median(tracked))},
-        {"what": "EstimatorBank, slowest of 64-8192 channels [ns per channel and sample]", "target": 10.0,
-         "figure": max(entry["2"] for entry in bank)},
-        {"what": "PrandtlIshlinskiiRLS.run, 12 thresholds, times C that learns as much", "target": 2.0,
-         "figure": against("PrandtlIshlinskiiRLS", "C, 12 plays, bends, creep")},
-        {"what": "the same without bends and creep, times C without them", "target": 2.0,
-         "figure": against("PrandtlIshlinskiiRLS, no bends, no creep", "C, 12 plays")},
-        {"what": "PrandtlIshlinskiiRLS.run with bends and creep, times C without them", "target": 2.0,
-         "figure": against("PrandtlIshlinskiiRLS", "C, 12 plays")},
-        {"what": "import [s]", "target": 0.15, "figure": began["import"]},
-        {"what": "first step, warm cache [s]", "target": 0.7, "figure": began["first step"]},
-    ]  # fmt: skip
-    pairs = (
-        ("HysteresisRLS, policies off", "C, RLS"),
-        ("HysteresisRLS, the paper's", "C, RLS, bound and dead zone"),
-        ("HysteresisRLS, policies off", "exported C, policies off"),
-        ("HysteresisRLS, default", "exported C, default"),
-        ("HysteresisEKF", "C, EKF"),
-        ("InverseCompensator", "C, inverse"),
-    )
-    differences = {
-        f"{one} and {other}": float(np.max(np.abs(np.array(outcome[one]) / np.array(outcome[other]) - 1.0)))
-        for one, other in pairs
-    }
-    differences["filterpy EKF"] = float(np.max(np.abs(ours / theirs - 1.0)))
-    differences["EstimatorBank"] = max(entry["difference_from_C"] for entry in bank)
-    return {
-        **origin(),
-        "compiler": " ".join(COMMAND),
-        "samples": samples,
-        "rounds": rounds,
-        "targets": [verdict(row) for row in rows],
-        "nanoseconds_per_sample": times,
-        "outcome": outcome,
-        "relative_difference": differences,
-        **live,
-        "disturbances": disturbed,
-        "bank": bank,
-        "cold": began,
-        "scaling": scaling(rounds),
-    }
+    found["one second of track()"] = float(np.median(interleaved({"track": track}, rounds)["track"]))
+    return found
 
 
-def scaling(rounds: int) -> dict[str, list[list[float]]]:
-    """Cost per sample [ns] against samples, and against the number of parameters."""
-    by_samples, by_parameters = [], []
-    for samples in (100, 1000, 10_000, 100_000):
-        _, u, x = record(samples)
-        seconds = interleaved({"run": lambda u=u, x=x: rls(u, x, memory=MEMORY)}, rounds)["run"]
-        by_samples.append([samples, float(1e9 * np.median(seconds) / samples)])
-    rng = np.random.default_rng(0)
-    for n in (2, 3, 4, 6, 8, 12, 16):
-        learner, phi = pz.RecursiveLeastSquares(n), rng.standard_normal(n)
+def fits(rounds: int) -> list[Row]:
+    """Seconds of fits of a record, and of solves of a moving window, also in simulations of the record."""
+    samples, hop = 200_000, 5000
+    _, u, x = record(samples)
+    works: dict[str, Work] = {"simulation": functools.partial(TRUE.simulate, u)}
+    for method in ("single-shooting", "multiple-shooting"):
+        fit = pz.BatchFit(SAMPLE_RATE, method=method)
+        works[f"BatchFit, {method}"] = functools.partial(fit.fit, u, x)
+    seconds = {name: float(np.median(each)) for name, each in interleaved(works, rounds).items()}
+    simulation = seconds.pop("simulation")
+    rows = [(name, samples, each) for name, each in seconds.items()]
+    for name, decimation in (("thinned", None), ("full rate", 1)):
+        horizon, solves = pz.MovingHorizon(SAMPLE_RATE, decimation=decimation), []
+        for start in range(0, samples, hop):
+            horizon.run(u[start : start + hop], x[start : start + hop])
+            solves.append(horizon.last_solve_seconds)
+        rows.append((f"MovingHorizon, {name}", int(MEMORY * SAMPLE_RATE), float(np.median(solves[5:]))))
+    return [
+        {"name": name, "samples": N, "seconds": each, "simulations": each / simulation * samples / N}
+        for name, N, each in rows
+    ]
 
-        def updates(learner: Any = learner, phi: FloatArray = phi) -> None:
-            for _ in range(1000):
-                learner.update(1.0, phi)
 
-        seconds = interleaved({"update": updates}, rounds)["update"]
-        by_parameters.append([n, float(1e6 * np.median(seconds))])
-    return {"samples": by_samples, "parameters": by_parameters}
-
-
-def draw(document: dict[str, Any], path: Path) -> None:
-    """Cost against samples, parameters and channels."""
+def draw(rows: list[Row], path: Path) -> None:
+    """Time of a sample, of ours and of its peers."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 3.2), layout="constrained")
-    axes = figure.subplots(1, 3)
-    for place, name, label in ((0, "samples", "samples of a run"), (1, "parameters", "parameters, update()")):
-        axes[place].loglog(*np.array(document["scaling"][name]).T, "o-")
-        axes[place].set(xlabel=label, ylabel="ns per sample")
-    axes[1].set_xscale("linear")  # too few to need decades
-    axes[1].set_yscale("linear")
-    axes[1].set_ylim(bottom=0.0)
-    channels = [entry["channels"] for entry in document["bank"]]
-    for name, label in (("1", "one thread"), ("2", "two threads"), ("C", "C, one thread")):
-        axes[2].semilogx(channels, [entry[name] for entry in document["bank"]], "o-", label=label)
-    axes[2].set(xlabel="channels of a bank", ylabel="ns per channel and sample")
-    axes[2].set_ylim(bottom=0.0)
-    axes[2].legend(loc="lower left")
+    times = {row["ours"]: (row["ns"], "#D55E00") for row in reversed(rows)}
+    times |= {row["peer"]: (row["peer_ns"], "0.6") for row in reversed(rows)}
+    names = sorted(times, key=lambda name: -times[name][0])
+    figure = Figure(figsize=(8.0, 0.27 * len(names) + 0.6), layout="constrained")
+    axes = figure.subplots()
+    axes.barh(names, [times[name][0] for name in names], color=[times[name][1] for name in names])
+    axes.set(xscale="log", xlabel="ns per sample; of this library in colour")
+    axes.tick_params(axis="y", labelsize=8)
     path.parent.mkdir(parents=True, exist_ok=True)
     save_figure(figure, path, dpi=110)
 
@@ -332,36 +329,41 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--samples", type=int, default=100_000, help="length of the record (default 100000)")
+    parser.add_argument("--slow", type=int, default=30_000, help="samples for filterpy and padasip")
     parser.add_argument("--rounds", type=int, default=15, help="rounds, of which the median counts")
-    parser.add_argument("--slow", type=int, default=5_000, help="samples for filterpy and padasip")
-    parser.add_argument("--turns", type=int, default=10_000_000, help="turns of the ring from Python")
+    parser.add_argument("--turns", type=int, default=2_000_000, help="single calls from Python")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file too")
-    parser.add_argument("--figure", type=Path, metavar="FILE", help="draw cost against size into this file")
-    arguments = parser.parse_args()
-    document = measure(
-        arguments.samples, arguments.rounds, min(arguments.slow, arguments.samples), arguments.turns
-    )
-    about = {**document["machine"], **document["versions"]}
-    print(*(f"{key:>10}: {value}" for key, value in about.items()), sep="\n")
-    for name, value in document["nanoseconds_per_sample"].items():
-        shown = ", ".join(f"{number:.4g}" for number in document["outcome"].get(name, [])[:4])
-        print(f"{name:<40}{value:12.1f} ns   {shown}")
-    print(f"\n{'':<72}{'figure':>10}{'target':>10}")
-    for row in document["targets"]:
+    parser.add_argument("--figure", type=Path, metavar="FILE", help="draw the times into this file")
+    given = parser.parse_args()
+    few = max(1, given.rounds // 5)
+    c, (r, u, x) = peers.Reference(), record(given.samples)
+    began, load = time.perf_counter(), os.getloadavg()[0]
+    against_c = compared(FAST, fast_work(c, r, u, x), given.samples, given.rounds)
+    against_python = compared(SLOW, slow_work(u[: given.slow], x[: given.slow]), given.slow, few)
+    rows = against_c + against_python
+    for row in rows:
+        apart = "" if row["difference"] is None else f"  {row['difference']:.0e} apart"
         print(
-            f"{row['what']:<72}{row['figure']:10.4g}{row['target']:10.4g}"
-            f"  {'met' if row['met'] else 'missed'}"
+            f"{row['ours']:<40}{row['ns']:8.1f} ns  {row['peer']:<28}{row['peer_ns']:9.1f} ns"
+            f"  {row['ratio']:.3g} times as long, asked {row['at_most'] or '-'}{apart}"
         )
-    if arguments.json is not None:
-        arguments.json.parent.mkdir(parents=True, exist_ok=True)
-        write_text(arguments.json, json.dumps(document, indent=2) + "\n")
-    if arguments.figure is not None:
-        draw(document, arguments.figure)
-    differences = document["relative_difference"]
-    apart = [f"{name} {value:.1e}" for name, value in differences.items() if not value <= LARGEST_DIFFERENCE]
-    if apart:
-        print(f"\nnot the result of its peer: {', '.join(apart)}", file=sys.stderr)
-    return 1 if apart else 0
+    document = {
+        "suite": "speed", "compiler": " ".join(peers.COMMAND), "samples": given.samples, "slow": given.slow,
+        "rounds": given.rounds, "against_c": against_c, "against_python": against_python,
+        "bank": bank(c, 16 * given.samples, few), "calls": live(r, u, x, given.turns),
+        "once": in_seconds(few), "fits": fits(few), "load": load, **origin(began),
+    }  # fmt: skip
+    for name in ("bank", "calls", "once", "fits", "machine", "versions"):
+        print(f"{name}: {document[name]}")
+    if given.json is not None:
+        put(document, given.json)
+    if given.figure is not None:
+        draw(rows, given.figure)
+    differences = [each["difference"] or 0.0 for each in rows + document["bank"]]
+    if not max(differences) <= LARGEST_DIFFERENCE:
+        print("not the result of its peer", file=sys.stderr)
+        return 1
+    return 0
 
 
 if __name__ == "__main__":

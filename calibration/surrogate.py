@@ -1,18 +1,18 @@
-"""The paper's experiment in its stationary state, without noise: what the ring settles to.
+"""The stage that is fitted, and the paper's experiment on it in its stationary state, without noise.
 
-One period of the reference, sampled coarsely, through the inverse of the model that least
-squares finds from that same period: the fixed point of estimator and compensator. It takes
-milliseconds where the ring takes seconds, and differs from it by a per cent or so; the
-calibration measures that difference with the ring and corrects for it.
+The stage has a smooth density of thresholds, a linear part and creep. One period of the reference, sampled
+coarsely, goes through the inverse of the model that least squares finds from that same period: the fixed
+point of estimator and compensator. It takes milliseconds where the ring takes seconds, and differs from it by
+a per cent or so; the calibration measures that difference with the ring and corrects for it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from scipy.interpolate import CubicSpline
 
 import piezoest as pz
 from piezoest.equations import coleman_hodgdon as equations
@@ -22,9 +22,26 @@ from piezoest.equations.play import prandtl_ishlinskii_step
 SAMPLE_RATE = 10_000.0  # Hz
 SETTLING = 20  # periods until the loop of the inverse has closed
 
+KNOTS = 50.0 * np.linspace(0.0, 1.0, 13) ** 2  # V, close where the density is steep
+TIME_CONSTANTS = np.array([0.011, 0.2])  # s, from an earlier fit to the same rows
+THRESHOLD_EDGES = 60.0 * np.linspace(0.0, 1.0, 65) ** 2  # V
+THRESHOLDS = 0.5 * (THRESHOLD_EDGES[1:] + THRESHOLD_EDGES[:-1])
+CREEP_UNIT = 0.02  # creep of 2 % costs as much as half a unit of curvature
+VOLTAGE_UNIT = 10.0  # V; curvature is that of the log density over r in tens of volts
 
-@dataclass(frozen=True)
-class Plant:
+_spline = CubicSpline(KNOTS / VOLTAGE_UNIT, np.eye(KNOTS.size), bc_type="natural", axis=0)
+_density = _spline(np.minimum(THRESHOLDS, KNOTS[-1]) / VOLTAGE_UNIT)  # constant beyond the last knot
+_fine = np.linspace(0.0, KNOTS[-1] / VOLTAGE_UNIT, 400)
+_curvature = _spline(_fine, 2) * np.sqrt(_fine[1])
+
+# A parameter vector, 16 numbers: log of the gain [µm/V], log of the density [µm/V²] at the knots, and the
+# creep's gains in units of CREEP_UNIT.
+DENSITY, CREEP = slice(1, 1 + KNOTS.size), slice(1 + KNOTS.size, None)
+LOWEST = np.concatenate(([-4.0], np.full(KNOTS.size, -14.0), np.full(TIME_CONSTANTS.size, -1e-9)))
+HIGHEST = np.concatenate(([-1.0], np.full(KNOTS.size, -1.0), np.full(TIME_CONSTANTS.size, 30.0)))
+
+
+class Plant(NamedTuple):
     """Prandtl-Ishlinskii operator with creep."""
 
     gain: float
@@ -34,19 +51,33 @@ class Plant:
     time_constants: Any
 
 
-@dataclass(frozen=True)
-class Row:
-    """A row of Tables I and II: its reference, one period from its minimum on."""
-
-    amplitude: float
-    frequency: float
-    reference: Any
+def start() -> Any:
+    """Where the search begins: a density that falls by half every few volts, then stays."""
+    density = np.interp(KNOTS, [0.0, 4.0, 10.0, 50.0], np.log([6e-3, 3e-3, 2e-3, 1.2e-3]))
+    return np.concatenate(([np.log(0.112)], density, np.full(TIME_CONSTANTS.size, 3.5)))
 
 
-def row(amplitude: float, frequency: float) -> Row:
-    """The row's reference is that of `piezoest.signals.triangle` with its defaults."""
-    period = np.asarray(pz.signals.triangle(amplitude, frequency, 1, SAMPLE_RATE))
-    return Row(amplitude, frequency, np.roll(period, -int(np.argmin(period))))
+def plant(p: Any) -> Plant:
+    """The stage's hysteresis and creep for a parameter vector."""
+    weights = np.exp(_density @ p[DENSITY]) * np.diff(THRESHOLD_EDGES)
+    creep_gains = CREEP_UNIT * np.maximum(p[CREEP], 0.0)
+    return Plant(float(np.exp(p[0])), THRESHOLDS, weights, creep_gains, TIME_CONSTANTS)
+
+
+def penalty(p: Any) -> Any:
+    """What is to be small: curvature of the log density, and creep."""
+    return np.concatenate((_curvature @ p[DENSITY], p[CREEP]))
+
+
+def roughness(p: Any) -> float:
+    """Integral of the squared curvature of the log density."""
+    return float(np.sum((_curvature @ p[DENSITY]) ** 2))
+
+
+def period(amplitude: float, frequency: float) -> Any:
+    """One period of a row's reference, from its minimum on."""
+    r = np.asarray(pz.signals.triangle(amplitude, frequency, 1, SAMPLE_RATE))
+    return np.roll(r, -int(np.argmin(r)))
 
 
 def lags(stage: pz.SimulatedStage) -> tuple[float, float]:
@@ -65,25 +96,14 @@ def lags(stage: pz.SimulatedStage) -> tuple[float, float]:
 
 
 @njit
-def _inverse(r: Any, a: float, b: float, c: float, settling: int) -> Any:
-    """Stationary voltage for one period of the reference, which starts at its minimum."""
-    low, high = r[0], r.max()
-    w_h = 0.0
-    du = equations.inverse_increment(w_h, low, a, b, c)
-    u = du
-    w_h = equations.hysteresis_step(w_h, du, a, b)
-    for _ in range(settling):
-        # Exact over any monotone travel, so one step a branch will do.
-        for dr in (high - low, low - high):
-            du = equations.inverse_increment(w_h, dr, a, b, c)
-            u = u + du
-            w_h = equations.hysteresis_step(w_h, du, a, b)
-    voltage = np.empty_like(r)
-    for k in range(r.size):
-        dr = r[k] - (r[k - 1] if k > 0 else r[0])
-        du = equations.inverse_increment(w_h, dr, a, b, c)
-        u = u + du
+def _inverse(path: Any, a: float, b: float, c: float) -> Any:
+    """Voltage along a path from rest; a step of it may be any monotone travel."""
+    voltage = np.empty_like(path)
+    u = w_h = r = 0.0
+    for k in range(path.size):
+        du = equations.inverse_increment(w_h, path[k] - r, a, b, c)
         w_h = equations.hysteresis_step(w_h, du, a, b)
+        u, r = u + du, path[k]
         voltage[k] = u
     return voltage
 
@@ -105,57 +125,36 @@ def _respond(u: Any, gain: float, thresholds: Any, weights: Any, gains: Any, dec
     return x
 
 
-@njit
 def _least_squares(u: Any, x: Any) -> Any:
     """Parameters of the derivative form over one period."""
-    A = np.zeros((3, 3))
-    B = np.zeros(3)
-    phi = np.zeros(3)
-    for k in range(u.size):
-        rise, moment, travel = equations.sample_regressor(u[k - 1], u[k])
-        phi[0] = -0.5 * (x[k] + x[k - 1]) * travel
-        phi[1] = rise
-        phi[2] = moment
-        for i in range(3):
-            B[i] += phi[i] * (x[k] - x[k - 1])
-            for j in range(3):
-                A[i, j] += phi[i] * phi[j]
-    scale = np.sqrt(np.diag(A))
-    return np.linalg.solve(A / np.outer(scale, scale), B / scale) / scale
+    u_0, x_0 = np.roll(u, 1), np.roll(x, 1)
+    rise, moment, travel = equations.sample_regressor(u_0, u)
+    A = np.column_stack([-0.5 * (x + x_0) * travel, rise, moment])
+    scale = np.sqrt(np.sum(A * A, axis=0))
+    return np.linalg.lstsq(A / scale, x - x_0, rcond=None)[0] / scale
 
 
-def _delayed(x: Any, lag: float) -> Any:
-    return x - 0.5 * lag * SAMPLE_RATE * (np.roll(x, -1) - np.roll(x, 1))
-
-
-def response(plant: Plant, u: Any, lag: tuple[float, float]) -> tuple[Any, Any]:
+def _response(plant: Plant, u: Any, lag: tuple[float, float]) -> list[Any]:
     """True and measured displacement for one stationary period of voltage."""
     decays = np.exp(-1.0 / (SAMPLE_RATE * plant.time_constants))
-    x = _respond(
-        u,
-        plant.gain,
-        plant.thresholds,
-        plant.weights,
-        plant.creep_gains,
-        decays,
-    )
-    return _delayed(x, lag[0]), _delayed(x, lag[1])
+    x = _respond(u, plant.gain, plant.thresholds, plant.weights, plant.creep_gains, decays)
+    slope = 0.5 * SAMPLE_RATE * (np.roll(x, -1) - np.roll(x, 1))
+    return [x - each * slope for each in lag]
 
 
-def stationary(plant: Plant, row: Row, lag: tuple[float, float], start: Any, rounds: int = 4) -> Any:
+def stationary(plant: Plant, r: Any, lag: tuple[float, float], start: Any, rounds: int) -> Any:
     """(alpha, beta, gamma, K, linear error, compensated error) of a row, from `start` (4,) on."""
-    r = row.reference
     K = start[3]
     for _ in range(max(2, rounds - 1)):
         u = r / K
-        true, measured = response(plant, u, lag)
+        true, measured = _response(plant, u, lag)
         linear = np.max(np.abs(r - true))
         K = (measured @ u) / (u @ u)
     theta = np.array(start[:3], dtype=float)
+    path = np.concatenate((r[:1], np.tile([r.max(), r[0]], SETTLING), r))
     for _ in range(rounds):
-        a, b, c = equations.loop_parameters(*theta)
-        u = _inverse(r, a, b, c, SETTLING)
-        true, measured = response(plant, u, lag)
+        u = _inverse(path, *equations.loop_parameters(*theta))[-r.size :]
+        true, measured = _response(plant, u, lag)
         used, theta = theta, _least_squares(u, measured)
         if not (theta[0] > 1e-3 and theta[2] / theta[0] > theta[1]):
             raise ArithmeticError(f"no admissible model: {theta}")

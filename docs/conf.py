@@ -10,19 +10,15 @@ from typing import Any
 import piezoest
 
 sys.path.insert(0, str(Path(__file__).parent))
-import adaptation_page
-import beyond_page
 import controller_page
-import estimators_page
-import faults_page
 import logs_page
 import paper_page
 import performance_page
 import real_data_page
 import safety_page
 import start_page
+import table_page
 import tuning_page
-import which_estimator_page
 
 project = "piezoest"
 author = "The piezoest developers"
@@ -70,7 +66,7 @@ html_sidebars: dict[str, list[str]] = {
     page: []
     for page in (
         "start", "adaptive_feedforward", "safety", "your_own_stage", "real_data", "tuning", "coming_from",
-        "controller", "which_estimator", "adaptation_speed", "estimators", "performance", "beyond",
+        "controller", "which_estimator", "adaptation_speed", "policies", "performance",
         "mathematics", "paper", "design", "contributing", "changelog",
     )
 }  # fmt: skip
@@ -115,8 +111,8 @@ def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, li
 
 def setup(app: Any) -> None:
     for page in (
-        adaptation_page, beyond_page, controller_page, estimators_page, faults_page, logs_page, paper_page,
-        performance_page, real_data_page, safety_page, start_page, tuning_page, which_estimator_page,
+        controller_page, logs_page, paper_page, performance_page, real_data_page, safety_page, start_page,
+        table_page, tuning_page,
     ):  # fmt: skip
         app.connect("builder-inited", page.write)
     # After numpydoc (500), which makes sections of the docstring.

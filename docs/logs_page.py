@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from paper_page import table, write_pieces
-from which_estimator_page import percent, replacements, short
+from page_parts import percent, replacements, short, table, write_pieces
 
 DOCS = Path(__file__).resolve().parent
 SOURCE = DOCS / "data" / "logs.json"

@@ -9,6 +9,7 @@ from .compensators import (
     VoltageLimits,
 )
 from .controller.adaptive_feedforward import AdaptiveFeedforward
+from .controller.shown import Event
 from .estimators.bank import EstimatorBank
 from .estimators.base import Estimator, Status, Trace
 from .estimators.batch import BatchFit
@@ -39,7 +40,6 @@ from .models import (
 from .records import Record, RecordStream, read_record, stream_record
 from .signals import Signal
 from .stage import Amplifier, Gauge, PaperStage, PreisachStage, SimulatedStage, TemperatureLaw
-from .supervisor import Event, Supervisor
 from .tracking import TrackingRecord, track
 from .warming import warmup
 
@@ -82,7 +82,6 @@ __all__ = [
     "SimulatedStage",
     "Status",
     "StreamedIdentification",
-    "Supervisor",
     "TemperatureLaw",
     "Trace",
     "TrackingRecord",

@@ -203,13 +203,7 @@ def _is_known(field: Field) -> bool:
 
 
 def new(layout: Record, **values: Any) -> Any:
-    """Structured array of a layout, of shape (): zeros but for `values`; records take dictionaries.
-
-    Raises
-    ------
-    KeyError
-        If there is no field of a name.
-    """
+    """Structured array of a layout, of shape (): zeros but for `values`; records take dictionaries."""
     array = np.zeros((), layout.dtype)
     _fill_lengths(array, layout)
     fill(array, layout, values)

@@ -11,7 +11,6 @@ from piezoest._checks import FloatArray, array_1d, integer, number_or_nan
 from piezoest.estimators.base import EstimatorBase
 from piezoest.estimators.compiled import NONE
 from piezoest.signals import check_continuity
-from piezoest.supervisor import Supervisor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -188,7 +187,6 @@ def track(
     update_interval: int = 50,
     sample_rate: float | None = None,
     allow_jumps: bool = False,
-    supervisor: Supervisor | bool | None = True,
 ) -> TrackingRecord:
     """Run a control loop over a reference: compensator, stage and estimator, or a controller and a stage.
 
@@ -204,17 +202,14 @@ def track(
     estimator : object with ``step(u, x)`` and ``model``, optional
         Such as `HysteresisRLS`; without one the compensator's model stays.
     controller : object with ``step(r) -> u`` and ``learn(u, x)``, optional
-        Such as `AdaptiveFeedforward`; it replaces compensator, estimator and supervisor. The loop then runs
-        sample by sample, and the record has no parameters.
+        Such as `AdaptiveFeedforward`; it replaces compensator and estimator. The loop then runs sample by
+        sample, and the record has no parameters.
     update_interval : int
         Samples between two updates of the compensator's model (default 50: 1 ms at 50 kHz).
     sample_rate : float, optional
         [Hz]; needed if r is a plain array and the stage has no sample rate.
     allow_jumps : bool
         Accept a reference with unfiltered steps. Without a slew-rate limit they reach the voltage.
-    supervisor : Supervisor or bool
-        Falls back to the last good model, or to linear feed-forward, when the error is larger than that of
-        linear feed-forward. True (default) makes one; False or None means no supervisor.
 
     Returns
     -------
@@ -224,7 +219,7 @@ def track(
     ------
     ValueError
         If r is not a finite 1-D array or jumps, no sample rate is known or two of them differ,
-        supervisor is none of these, or there is a controller beside a compensator, or neither.
+        or there is a controller beside a compensator, or neither.
 
     Notes
     -----
@@ -243,13 +238,12 @@ def track(
     >>> round(record.max_error(last_periods=1), 2)
     0.03
     """
-    _check_driver(compensator, estimator, controller, supervisor)
+    _check_driver(compensator, estimator, controller)
     reference = array_1d("r", r, minimum_length=1)
     rate = _sample_rate(sample_rate, r=r, stage=stage, estimator=estimator, controller=controller)
     if not allow_jumps:
         check_continuity(reference, rate, "r")
     interval = integer("update_interval", update_interval, 1)
-    guard = _guard(supervisor, rate)
     period = getattr(r, "period", None)
     period = None if period is None else round(period)
     N = reference.size
@@ -268,39 +262,25 @@ def track(
                 known, theta, names = present, present.theta, present.parameter_names
             history.append(theta)
             feed(estimator, voltage[part], measured[part])
-            due = bool(getattr(compensator, "hand_over_due", True))
-            model = estimator.model if due else present
-            if guard is not None:
-                model = guard.review(reference[part], voltage[part], measured[part], present, model)
-            if due and model is not present:
-                compensator.model = model
+            if getattr(compensator, "hand_over_due", True):
+                model = estimator.model
+                if model is not present:
+                    compensator.model = model
     parameters = _of_one_kind(history) if history else np.empty((-(-N // interval), 0))
     return TrackingRecord(
         reference, voltage, measured, displacement, parameters, names, rate, period, interval
     )
 
 
-def _check_driver(compensator: Any, estimator: Any, controller: Any, supervisor: Any) -> None:
+def _check_driver(compensator: Any, estimator: Any, controller: Any) -> None:
     """Refuse two that give the voltage, and none."""
     if controller is None:
         if compensator is None:
             raise ValueError("nothing gives the voltage: pass compensator= or controller=")
         return
     others = {"compensator": compensator, "estimator": estimator}
-    others["supervisor"] = None if isinstance(supervisor, bool) else supervisor
     if given := [name for name, value in others.items() if value is not None]:
         raise ValueError(f"controller does without {' and '.join(given)}: leave out one or the other")
-
-
-def _guard(supervisor: Any, rate: float) -> Supervisor | None:
-    """The guard that was asked for."""
-    if supervisor is None or supervisor is False:
-        return None
-    if supervisor is True:
-        return Supervisor(rate)
-    if not isinstance(supervisor, Supervisor):
-        raise ValueError(f"supervisor must be a Supervisor, True or False, got {supervisor!r}")
-    return supervisor
 
 
 def _turn(

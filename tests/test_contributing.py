@@ -50,7 +50,7 @@ def apply(block: str, folder: Path) -> Path:
 FOUND_BY = {
     "Adding a policy": (
         "VarianceLimit",
-        "tests/test_package.py", "tests/bench/test_adaptation.py", "tests/policies/test_base.py",
+        "tests/test_package.py", "tests/policies/test_base.py",
     ),
     "Adding a model": ("Backlash", "tests/test_package.py"),
     "Adding an estimator": ("SlopeFilter", "tests/test_package.py", "tests/estimators/test_conformance.py"),

@@ -62,7 +62,9 @@ def npy_that_declares_much(path: Path) -> None:
 
 
 def mat_that_declares_much(path: Path) -> None:
-    packed = zlib.compress(struct.pack("<2I", 14, 0xF0000000) + bytes(1000))
+    # An array of doubles of shape (1, 2**29), as its flags, shape and name say.
+    array = struct.pack("<4I", 6, 8, 6, 0) + struct.pack("<2I2i", 5, 8, 1, 2**29) + b"\1\0\1\0u\0\0\0"
+    packed = zlib.compress(struct.pack("<2I", 14, 0xF0000000) + array + bytes(1000))
     head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
     path.write_bytes(head + struct.pack("<2I", 15, len(packed)) + packed)
 
@@ -80,7 +82,7 @@ def parquet_of_nothing_but_zeros(path: Path) -> None:
         ("log.npz", npz_that_expands, "declares 537 MB of numbers"),
         ("log.npz", npz_that_lies, "cannot be read as NumPy"),
         ("log.npy", npy_that_declares_much, "cannot be read as NumPy"),
-        ("log.mat", mat_that_declares_much, "declares 4.03e[+]03 MB of numbers"),
+        ("log.mat", mat_that_declares_much, "declares 4.29e[+]03 MB of numbers"),
         ("log.parquet", parquet_of_nothing_but_zeros, "declares 537 MB of numbers"),
     ],
 )

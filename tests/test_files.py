@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from piezoest.bench import origin, suite, tables
-from piezoest.bench.runner import COLUMNS
+from piezoest.bench import origin, shared, table, tables
 from piezoest.export.generated import CCode
 from piezoest.export.tables import Table
 from piezoest.models import AmplitudeProfile
@@ -69,11 +68,11 @@ def figure(path: Path, seed: int) -> None:
 
 
 def rows(path: Path, seed: int, format: str) -> None:
-    row = {**dict.fromkeys(COLUMNS), "errors": columns(seed)["voltage_V"].tolist(), "seed": seed}
-    tables.write_tables([row], path.parent, format)
+    periods = [{"key": "run", "seed": seed, "period": k, "error": 0.1 * k} for k in range(SIZE)]
+    tables.write_table(tables.table_of(periods, table.PERIOD_COLUMNS), path.with_suffix(f".{format}"))
 
 
-def table(path: Path, seed: int) -> None:
+def waveform(path: Path, seed: int) -> None:
     values = columns(seed)["voltage_V"]
     Table(1e3, values, values, (np.column_stack([values, values]),)).write(path.parent)
 
@@ -91,8 +90,8 @@ OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
     "controller.c": lambda path, seed: CCode(
         "controller", f"{seed}" * SIZE, f"{seed}" * SIZE, "double", False
     ).write(path.parent),
-    "waveform.csv": table,
-    "suite.json": lambda path, seed: suite.write(columns(seed)["voltage_V"].tolist(), path),
+    "waveform.csv": waveform,
+    "table.json": lambda path, seed: shared.write_json(columns(seed)["voltage_V"].tolist(), path),
     "put.json": lambda path, seed: origin.put(columns(seed)["voltage_V"].tolist(), path),
     "periods.csv": lambda path, seed: rows(path, seed, "csv"),
     "periods.parquet": lambda path, seed: rows(path, seed, "parquet"),

@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "piezoest"
 
 # Each takes longer to load than all of `import piezoest` may.
-HEAVY = ("casadi", "filterpy", "matplotlib", "numba", "scipy.signal")
+HEAVY = ("casadi", "filterpy", "matplotlib", "numba", "pandas", "pyarrow", "scipy.signal")
 
 
 def public_objects() -> Iterator[tuple[str, Any]]:
@@ -253,7 +253,7 @@ def test_quantities_have_units(name: str) -> None:
 SOURCE = re.compile(
     r"\b(19|20)\d\d\b|\(\d+\)|\([ABC]\d+\)|App(endix|\.) [A-C]|Source:|Equations: |, sec\. \d"
 )
-METHOD_MODULES = ("models", "estimators", "compensators", "stage", "policies", "supervisor")
+METHOD_MODULES = ("models", "estimators", "compensators", "stage", "policies")
 # They hold values, describe an instrument, or are what others fill in.
 WITHOUT_A_METHOD = (
     "Amplifier", "BatchFitResult", "CompensatorStatus", "Estimator", "Event", "Gauge", "Status", "Trace",

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from piezoest.records import Record, read_record, stream_record, text
+from piezoest.records import Record, read_record, stream_record
 
 N = 60
 RATE = 1000.0
@@ -104,16 +104,12 @@ PARTS = (slice(0, 20), slice(20, 45), slice(45, N))
     ],
 )
 @pytest.mark.parametrize("x_columns", ["One", "No"])
-@pytest.mark.parametrize("arrow", [False, True])
 def test_lvm_of_several_segments(
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     starts: list[tuple[float, float]],
     rows: int,
     x_columns: str,
-    arrow: bool,
 ) -> None:
-    monkeypatch.setattr(text, "WORTH_ARROW", 0 if arrow else 1 << 60)
     segments = tuple((part, *start) for part, start in zip(PARTS, starts, strict=True))
     file = lvm(tmp_path / "log.lvm", segments, x_columns=x_columns)
     check(read_record(file))

@@ -135,18 +135,6 @@ def test_text_with_all_its_habits(tmp_path: Path, rows: int) -> None:
     same(stream_record(file, rows=rows), record)
 
 
-def test_fast_and_careful_reading_agree(tmp_path: Path) -> None:
-    numbers = np.random.default_rng(0).normal(0.0, 1.0, (400, 3)) * [1.0, 1e-3, 1e6]
-    numbers[:, 0] = np.arange(400) / RATE
-    lines = ["time_s,voltage_V,displacement_um", *(",".join(map(repr, row.tolist())) for row in numbers)]
-    plain = read_record(text(tmp_path / "plain.csv", lines))
-    # One word that is no number sends its whole block the careful way.
-    careful = read_record(text(tmp_path / "careful.csv", [*lines, "0.4,none,none"]))
-    np.testing.assert_array_equal(plain.voltage, careful.voltage[:-1])
-    np.testing.assert_array_equal(plain.displacement, careful.displacement[:-1])
-    np.testing.assert_array_equal(plain.voltage, numbers[:, 1])
-
-
 @pytest.mark.parametrize(
     ("line", "words"),
     [

@@ -50,7 +50,7 @@ def rows(time: list[Any], header: tuple[str, ...] = ("t", "drive_V", "gauge (nm)
     return [list(header), *values]
 
 
-@pytest.mark.parametrize("time", [TIME.tolist(), STAMPS])
+@pytest.mark.parametrize("time", [TIME.tolist(), STAMPS, [stamp.time() for stamp in STAMPS]])
 def test_spreadsheet(tmp_path: Path, time: list[Any]) -> None:
     check(read_record(sheets(tmp_path / "log.xlsx", log=rows(time))))
 
@@ -68,9 +68,9 @@ def test_the_first_sheet_with_numbers_is_read(tmp_path: Path) -> None:
 
 def test_cells_without_numbers(tmp_path: Path) -> None:
     table = rows(TIME.tolist())
-    table[8][1], table[9][2] = None, "N/A"
+    table[8][1], table[9][2], table[10][1] = None, "N/A", " "
     record = read_record(sheets(tmp_path / "log.xlsx", log=table))
-    assert np.flatnonzero(~record.usable).tolist() == [7, 8]
+    assert np.flatnonzero(~record.usable).tolist() == [7, 8, 9]
     table[12][1] = "off"
     with pytest.raises(ValueError, match=r"row 13, column 'drive_V': 'off' is not a number"):
         read_record(sheets(tmp_path / "log.xlsx", log=table))
@@ -161,7 +161,7 @@ def test_missing_and_foreign_values_of_frames() -> None:
         pd.DataFrame({"t": TIME, "u": ["a"] * N, "x": TIME}),
         pl.DataFrame({"t": TIME, "u": ["a"] * N, "x": TIME}),
     ):
-        with pytest.raises(ValueError, match="frame: column 'u' holds no numbers"):
+        with pytest.raises(ValueError, match="frame, row 1, column 'u': 'a' is not a number"):
             Record.from_frame(frame)
 
 

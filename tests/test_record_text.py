@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from piezoest.records import read_record, read_reference, stream_record, text
-from piezoest.records.text_cells import Style, number, stamp, style_of
+from piezoest.records import read_record, read_reference, stream_record
+from piezoest.records.cells import Style, number, style_of
 
 N = 80
 RATE = 200.0
@@ -123,16 +123,12 @@ def test_numbers_in_a_style() -> None:
         lambda text_: text_.replace("-", "/"),
     ],
 )
-@pytest.mark.parametrize("arrow", [False, True])
 @pytest.mark.parametrize("header", ["t_ms,u,x", "When,u,x", ""])
 def test_time_stamps(
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     write_stamp: Callable[[str], str],
-    arrow: bool,
     header: str,
 ) -> None:
-    monkeypatch.setattr(text, "WORTH_ARROW", 0 if arrow else 1 << 60)
     rows = [
         (write_stamp(t), f"{u:.3f}", f"{x:.3f}")
         for t, u, x in zip(STAMPS, VOLTAGE, DISPLACEMENT, strict=True)
@@ -143,7 +139,6 @@ def test_time_stamps(
 
 
 def test_time_stamps_of_several_zones_and_missing_ones(tmp_path: Path) -> None:
-    assert stamp("2026-10-25T02:59:59+02:00") == stamp("2026-10-25 00:59:59Z")
     rows = [(t[:-6] + "+02:00", "1.5", f"{k}") for k, t in enumerate(STAMPS)]
     rows[40:] = [
         (str(np.datetime64(t) - np.timedelta64(1, "h"))[:-6] + "+01:00", u, x)
@@ -157,11 +152,13 @@ def test_time_stamps_of_several_zones_and_missing_ones(tmp_path: Path) -> None:
         read_record(write(tmp_path / "log.csv", ",", rows))
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "latin-1"])
-def test_packed_text(tmp_path: Path, encoding: str) -> None:
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+def test_encodings_and_packed_text(tmp_path: Path, encoding: str) -> None:
     lines = ["t_s;u_V;Weg [µm]", *(";".join(row) for row in rows_of(lambda value: f"{value:.3f}"))]
-    packed = tmp_path / "log.csv.gz"
-    packed.write_bytes(gzip.compress("\r\n".join(lines).encode(encoding)))
+    plain, packed = tmp_path / "log.csv", tmp_path / "log.csv.gz"
+    plain.write_bytes("\r\n".join(lines).encode(encoding))
+    packed.write_bytes(gzip.compress(plain.read_bytes()))
+    check(plain)
     check(packed)
     stream = stream_record(packed, rows=7)
     np.testing.assert_array_equal(np.concatenate([block.voltage for block in stream]), VOLTAGE)
@@ -187,41 +184,29 @@ def test_packed_files_that_are_no_text_or_grow_without_end(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_arrow_reads_what_the_cells_hold(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, separator: str
-) -> None:
-    pytest.importorskip("pyarrow")
+# The second is a cell that pandas does not read, which sends its whole block the careful way.
+@pytest.mark.parametrize("word", ["", "none "])
+def test_every_bit_of_a_number_and_what_stands_between(tmp_path: Path, separator: str, word: str) -> None:
     numbers = np.random.default_rng(0).normal(0.0, 1.0, (3000, 3)) * [1.0, 1e-3, 1e6]
     numbers[:, 0] = np.arange(3000) / RATE
     rows = [tuple(map(repr, row)) for row in numbers.tolist()]
-    rows[100] = (rows[100][0], "", "N/A")
+    rows[100] = (rows[100][0], word, "N/A")
     rows[200] = (rows[200][0], " 1e400 ", "-inf")
     rows[300] = (rows[300][0], '"2.5"', "NaN")
     file = write(tmp_path / "log.csv", separator, rows)  # type: ignore[arg-type]
     lines = file.read_text().splitlines()
     lines[2000:2000] = ["# the amplifier was off", "", ""]
     file.write_text("\n".join(lines) + "\n\n# end\n")
-    monkeypatch.setattr(text, "WORTH_ARROW", 0)
-    calls = []
-    by_arrow = text.Reader._by_arrow
-
-    def counted(self: text.Reader, content: str, count: int) -> list[np.ndarray] | None:
-        found = by_arrow(self, content, count)
-        calls.append(found is not None)
-        return found
-
-    monkeypatch.setattr(text.Reader, "_by_arrow", counted)
-    fast = read_record(file)
-    assert any(calls)
-    monkeypatch.setattr(text, "WORTH_ARROW", 1 << 60)
-    slow = read_record(file)
+    record = read_record(file)
     # Blank rows are lost samples unless time goes on without them.
-    assert len(slow) == 3000
-    assert slow.skipped == 3
-    for name in ("time", "voltage", "displacement"):
-        np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
+    assert len(record) == 3000
+    assert record.skipped == 3
+    wanted = numbers.copy()
+    wanted[100, 1:] = wanted[200, 1:] = wanted[300, 2] = np.nan
+    wanted[300, 1] = 2.5
+    np.testing.assert_array_equal(record.voltage, wanted[:, 1])
+    np.testing.assert_array_equal(record.displacement, wanted[:, 2])
     rows[2500] = (rows[2500][0], "text", "1")
-    monkeypatch.setattr(text, "WORTH_ARROW", 0)
     with pytest.raises(ValueError, match="line 2502, column 'u': 'text' is not a number"):
         read_record(write(file, separator, rows))  # type: ignore[arg-type]
 

@@ -89,13 +89,6 @@ def test_columns_by_name_and_number(tmp_path: Path) -> None:
     check(read_record(file, columns={"voltage": "b_V", "displacement": "c"}, sample_rate=100.0))
 
 
-@pytest.mark.parametrize("encoding", ["latin-1", "utf-16", "utf-8-sig"])
-def test_encodings(tmp_path: Path, encoding: str) -> None:
-    file = log(tmp_path, "Time (s),Voltage (V),Position (µm)")
-    file.write_bytes(file.read_text(encoding="utf-8").replace("\n", "\r\n").encode(encoding))
-    check(read_record(file))
-
-
 @pytest.mark.parametrize(
     "line", ["0.080,nan,1.0", "0.080,1.0,", "0.080,,", "0.080", "0.080,inf,1.0", ",,", "", "0.08, N/A ,1"]
 )

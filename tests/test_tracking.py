@@ -180,31 +180,3 @@ def test_the_compiled_ring_is_the_loop_over_its_parts(model: Any, make: Any, opt
     for one, other in zip(results[0][0], results[1][0], strict=True):
         np.testing.assert_array_equal(one, other)
     assert results[0][1:] == results[1][1:]
-
-
-def test_the_guard_is_on_unless_it_is_told_not_to_be() -> None:
-    class Astray:
-        """An estimator whose model falls to a fifth of the gain after a while."""
-
-        def __init__(self) -> None:
-            self._samples = 0
-
-        def step(self, u: float, x: float | None) -> None:
-            self._samples += 1
-
-        @property
-        def model(self) -> pz.ColemanHodgdon:
-            gain = 0.03 if self._samples > 15_000 else 0.15
-            return pz.ColemanHodgdon.from_loop(0.02, 0.3 * gain, gain)
-
-    def follow(**options: Any) -> Any:
-        compensator = pz.InverseCompensator(pz.ColemanHodgdon.from_loop(0.02, 0.045, 0.15))
-        r = pz.signals.triangle(5.0, 5.0, 6, FS)
-        return pz.track(
-            r, stage=pz.PaperStage(FS), compensator=compensator, estimator=Astray(), **options
-        ).max_error(2)
-
-    assert follow() < 2.0
-    assert follow(supervisor=None) == follow(supervisor=False) > 4.0
-    with pytest.raises(ValueError, match="supervisor must be a Supervisor, True or False, got 'on'"):
-        follow(supervisor="on")

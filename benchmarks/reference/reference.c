@@ -3,6 +3,17 @@
 #include <math.h>
 #include <stdint.h>
 
+/* (1 - exp(-travel)) / travel, for a short travel the series that the library sums, too. */
+static inline double relative_decay(double travel) {
+    if (travel < 1.0 / 64.0) {
+        const double square = travel * travel;
+        const double low = (1.0 - travel * (1.0 / 2.0)) + square * ((1.0 / 6.0) - travel * (1.0 / 24.0));
+        const double high = ((1.0 / 120.0) - travel * (1.0 / 720.0)) + square * (1.0 / 5040.0);
+        return low + square * square * high;
+    }
+    return -expm1(-travel) / travel;
+}
+
 /* Recursive least squares of (alpha, beta, gamma) from raw (u, x), with W_p, forgetting, the bound on
  * the trace, a dead zone and the history of theta. par: pole, forgetting, bound, dead zone (< 0: none), scale
  * of the three parameters, scale of the output, initial variance, units of the three. */
@@ -94,7 +105,7 @@ void ekf(int64_t N, const double *u, const double *x, const double *par, double 
     for (int64_t k = 0; k < N; k++) {
         const double du = u[k] - u0, distance = fabs(du), travel = a * distance;
         u0 = u[k];
-        const double decay = travel == 0 ? 1 : -expm1(-travel) / travel, kept = 1 - travel * decay;
+        const double decay = relative_decay(travel), kept = 1 - travel * decay;
         const double slope = travel == 0 ? -0.5 : (kept - decay) / travel, pull = travel * w + b * du;
         const double by_a = -distance * (slope * pull + decay * w), by_b = -decay * du;
         const double extra = (p11 * p00 + p01 * p01) * distance / fabs(a);
@@ -126,14 +137,13 @@ void inverse(int64_t N, const double *r, const double *par, double *out) {
         const double slope = 1 - e - 0.5 * d;
         double z = fmin(2 * d / (slope + sqrt(slope * slope + 2 * d) + 1e-300), d + e);
         for (int j = 0; j < 3; j++) {
-            const double decayed = expm1(-z);
+            const double decayed = -z * relative_decay(z);
             z -= (z + e * decayed - d) / (1 - e * (1 + decayed) + 1e-300);
         }
         const double wanted = u + s * z / a;
         const double given = wanted < par[3] ? par[3] : wanted > par[4] ? par[4] : wanted;
         const double du = given - u, travel = a * fabs(du);
-        const double decay = travel == 0 ? 1 : -expm1(-travel) / travel;
-        w -= decay * (travel * w + b * du);
+        w -= relative_decay(travel) * (travel * w + b * du);
         u = given;
         out[k] = u;
     }

@@ -18,8 +18,6 @@ _COSTS = (
     (r"vdiv|vsqrt", 14),
     (r"vfma|vfms|vmla|vmls|vnmla|vnmls", 3),
     (r"vldr|vstr", 2),
-    (r"vmrs", 1),
-    (r"v", 1),
     (r"sdiv|udiv", 12),
     (r"mla|mls", 2),
     (r"ldrd|strd", 3),

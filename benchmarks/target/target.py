@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import copy
-import json
 import re
 import shutil
 import subprocess
@@ -22,7 +21,7 @@ import numpy as np
 from cycles import count_cycles
 
 import piezoest as pz
-from piezoest._files import write_text
+from piezoest.bench.origin import put
 from piezoest.bench.scenarios import SCENARIOS
 
 HERE = Path(__file__).resolve().parent
@@ -56,10 +55,7 @@ def controllers() -> dict[str, tuple[Any, Any]]:
         ),
         "RLS and inverse": (pz.HysteresisRLS(SAMPLE_RATE, initial_model=start), inverse()),
         # Outside of the admissible set, and sure of it: every model handed over has to be moved.
-        MOVED: (
-            pz.HysteresisRLS(SAMPLE_RATE, initial_model=OUTSIDE, uncertainty=1e-3),
-            inverse(),
-        ),
+        MOVED: (pz.HysteresisRLS(SAMPLE_RATE, initial_model=OUTSIDE, uncertainty=1e-3), inverse()),
         "RLS, the paper's memory": (
             pz.HysteresisRLS(SAMPLE_RATE, initial_model=start, memory=0.4),
             inverse(),
@@ -80,11 +76,9 @@ def prepare(name: str, samples: int) -> tuple[Any, Any, Any, Any]:
     teacher = estimator
     if name == MOVED:
         teacher = pz.HysteresisRLS(SAMPLE_RATE, initial_model=compensator.model)
-    pz.track(r[:learnt], stage=stage, compensator=compensator, estimator=teacher, supervisor=False)
+    pz.track(r[:learnt], stage=stage, compensator=compensator, estimator=teacher)
     estimator, before = copy.deepcopy(estimator), compensator.copy()
-    record = pz.track(
-        r[learnt:end], stage=stage, compensator=compensator, estimator=teacher, supervisor=False
-    )
+    record = pz.track(r[learnt:end], stage=stage, compensator=compensator, estimator=teacher)
     return estimator, before, r[learnt:end], np.concatenate([[np.nan], record.measured[:-1]])
 
 
@@ -176,10 +170,7 @@ def run(firmware: Path, precision: str) -> tuple[Any, int]:
 
 def trace(firmware: Path) -> tuple[Any, Any]:
     """Instructions and cycles of each step, from a trace of every instruction."""
-    listing = subprocess.run(
-        [f"{CROSS}objdump", "-d", "--no-show-raw-insn", str(firmware)],
-        capture_output=True, text=True, check=True,
-    ).stdout  # fmt: skip
+    listing = printed(f"{CROSS}objdump", "-d", "--no-show-raw-insn", str(firmware))
     path = firmware.with_suffix(".trace")
     emulate(firmware, "-singlestep", "-d", "exec,nochain", "-D", str(path))
     result = count_cycles(listing, path)
@@ -187,28 +178,21 @@ def trace(firmware: Path) -> tuple[Any, Any]:
     return result
 
 
+def printed(*command: str) -> str:
+    """What a program prints."""
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
 def flash_and_ram(folder: Path, firmware: Path) -> dict[str, int]:
     """Bytes of the controller's code and constants, of the whole firmware with its log, of the state."""
     subprocess.run([f"{CROSS}gcc", *CPU, *FLAGS, "-c", "controller.c", "-o", "c.o"], cwd=folder, check=True)
-    return {
-        "flash_controller": sizes(folder / "c.o")[0],
-        "flash_firmware": sizes(firmware)[0],
-        "ram_state": symbol_size(firmware, "state"),
-    }
-
-
-def sizes(binary: Path) -> list[int]:
-    """Bytes of code and constants, of data, of zeroed data."""
-    done = subprocess.run([f"{CROSS}size", str(binary)], capture_output=True, text=True, check=True)
-    return [int(number) for number in done.stdout.splitlines()[1].split()[:3]]
-
-
-def symbol_size(binary: Path, name: str) -> int:
-    """Bytes of a variable."""
-    command = [f"{CROSS}nm", "-S", "--defined-only", str(binary)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    rows = [line.split() for line in done.stdout.splitlines()]
-    return next(int(row[1], 16) for row in rows if len(row) == 4 and row[3] == name)
+    controller, whole = (
+        int(printed(f"{CROSS}size", str(binary)).splitlines()[1].split()[0])
+        for binary in (folder / "c.o", firmware)
+    )
+    symbols = map(str.split, printed(f"{CROSS}nm", "-S", "--defined-only", str(firmware)).splitlines())
+    state = next(int(row[1], 16) for row in symbols if len(row) == 4 and row[3] == "state")
+    return {"flash_controller": controller, "flash_firmware": whole, "ram_state": state}
 
 
 def main() -> int:
@@ -229,26 +213,18 @@ def main() -> int:
         for precision in ([arguments.precision] if arguments.precision else ("float", "double"))
     ]
     for row in rows:
-        print(
-            f"{row['controller']:<24} {row['precision']:<7}{row['instructions_mean']:6.0f} instructions, "
-            f"at most {row['instructions_largest']:5d}; {row['cycles_mean']:6.0f} cycles, "
-            f"at most {row['cycles_largest']:5d} ({100.0 * row['load_largest']:.0f} % of 50 kHz); "
-            f"flash {row['flash_controller']} B, state {row['ram_state']} B, stack {row['stack']} B; "
-            f"off host by {row['largest_difference_from_host']:.1e}"
-        )
+        print(", ".join(f"{name} {value}" for name, value in row.items()))
     if arguments.json is not None:
-        document = {"clock_Hz": CLOCK, "sample_rate_Hz": SAMPLE_RATE, "tools": tools(), "rows": rows}
-        write_text(arguments.json, json.dumps(document, indent=2) + "\n")
+        put(
+            {"clock_Hz": CLOCK, "sample_rate_Hz": SAMPLE_RATE, "tools": tools(), "rows": rows}, arguments.json
+        )
     apart = [row for row in rows if not row["largest_difference_from_host"] < 1e-5]
     return 1 if apart else 0
 
 
 def tools() -> list[str]:
     """First line of what each program says of itself."""
-    return [
-        subprocess.run([name, "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
-        for name in (f"{CROSS}gcc", EMULATOR)
-    ]
+    return [printed(name, "--version").splitlines()[0] for name in (f"{CROSS}gcc", EMULATOR)]
 
 
 if __name__ == "__main__":

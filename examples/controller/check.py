@@ -37,7 +37,7 @@ def simulated_log() -> tuple[Any, Any]:
     r = pz.signals.triangle(5.0, 5.0, 2.5, SAMPLE_RATE)
     estimator, compensator = objects()
     stage = pz.PaperStage(SAMPLE_RATE, seed=0)
-    record = pz.track(r, stage=stage, compensator=compensator, estimator=estimator, supervisor=False)
+    record = pz.track(r, stage=stage, compensator=compensator, estimator=estimator)
     x = record.measured.copy()
     x[12_000:12_040] = np.nan
     return record.reference, x

@@ -1,189 +1,154 @@
-"""Every estimator in the same ring: what it reaches, how soon, and at what cost."""
+"""Estimators as one writes them on a command line: a name, a class of one's own, with arguments."""
 
 from __future__ import annotations
 
+import ast
 import importlib
 import inspect
-import math
 import os
-import pickle
 import sys
-import time
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from piezoest import signals
-from piezoest._checks import FloatArray, positive
-from piezoest.compensators import InverseCompensator, LinearCompensator
-from piezoest.demo import AMPLITUDE, FREQUENCY, SETTLED_PERIODS, WRONG_GAIN, WRONG_MODEL
+from piezoest import policies
+from piezoest.compensators import VoltageLimits
+from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
 from piezoest.estimators.base import EstimatorBase
-from piezoest.estimators.rls import HysteresisRLS
-from piezoest.stage import PaperStage
-from piezoest.tracking import TrackingRecord, track
+from piezoest.models import Model
 
-# A fifth of the paper's rate: filterpy's filters take 0.2 and 0.5 ms a sample.
-SAMPLE_RATE = 10_000.0  # Hz
-SECONDS = 3.0
-UPDATE_INTERVAL = 1e-3  # s between two updates of the compensator's model
-SETTLED = 0.012  # of the amplitude
-REFERENCE = "linear feed-forward"
+LINEAR = "linear feed-forward"
+LIMITS = VoltageLimits(-100.0, 100.0)  # V, of every stage of the bench
 
-# What an estimator needs beside its defaults to be of use in the ring; printed and written with the results.
-OPTIONS: dict[str, dict[str, Any]] = {
-    # Without hop it would fit the whole record anew at every update of the compensator: here as often as
-    # MovingHorizon solves. The first period, under the wrong model, is a larger loop than all that follow,
-    # and leaves an offset behind.
-    "BatchFit": {"hop": 0.1, "offset": True},
-    # The same offset, with which a window tells the parameters apart less well: so it forgets more slowly.
-    "MovingHorizon": {"process_noise": 0.03, "offset": True},
+# All are given the same to know: that readings may have an offset, which some learn only on request. The two
+# fits solve as often as each other; they forget slowly, for with an offset a window tells the rest less well.
+KNOWN: dict[str, str] = {
+    "BatchFit": "BatchFit(hop=0.1, offset=True)",
+    "FilterPyEKF": "FilterPyEKF(offset=True)",
+    "FilterPyUKF": "FilterPyUKF(offset=True)",
+    "HysteresisEKF": "HysteresisEKF(offset=True)",
+    "MovingHorizon": "MovingHorizon(process_noise=0.03, offset=True)",
 }
-
-# One timed pass takes about so long: where a whole record takes longer, its beginning is timed.
-PASS_SECONDS, PASSES, LEAST_SAMPLES = 0.4, 3, 200
-
-
-@dataclass(frozen=True, slots=True)
-class Scenario:
-    """The run that all estimators share.
-
-    Parameters
-    ----------
-    seconds : float
-        Length; at least two periods of the reference.
-    sample_rate : float
-        [Hz].
-    seed : int
-        Start of the random numbers of the stage's noise.
-
-    Raises
-    ------
-    ValueError
-        If the run is shorter than the two periods of which the settled error is taken.
-    """
-
-    seconds: float = SECONDS
-    sample_rate: float = SAMPLE_RATE
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        least = SETTLED_PERIODS / FREQUENCY
-        if positive("seconds", self.seconds) < least:
-            raise ValueError(
-                f"seconds must be at least {least:g}, {SETTLED_PERIODS} periods: got {self.seconds:g}"
-            )
-        positive("sample_rate", self.sample_rate)
-
-    @property
-    def reference(self) -> signals.Signal:
-        """Smoothed triangle, 5 µm at 5 Hz."""
-        return signals.triangle(AMPLITUDE, FREQUENCY, self.seconds * FREQUENCY, self.sample_rate)
-
-    def run(self, estimator: Any, compensator: Any) -> TrackingRecord:
-        """Send the reference through the ring, on a stage of its own.
-
-        Parameters
-        ----------
-        estimator : object with ``step(u, x)`` and ``model``
-            New.
-        compensator : object with ``step(r)`` and ``model``
-            With the model to start from.
-
-        Returns
-        -------
-        TrackingRecord
-        """
-        return track(
-            self.reference,
-            stage=PaperStage(self.sample_rate, seed=self.seed),
-            compensator=compensator,
-            estimator=estimator,
-            update_interval=max(1, round(UPDATE_INTERVAL * self.sample_rate)),
-            supervisor=False,  # the estimators are compared, not the guard
-        )
+# The paper's law: 0.4 s is the memory that the simulated stage was calibrated with.
+PAPERS = "HysteresisRLS(memory=0.4, offset=True)"
+SLOW = ("BatchFit", "FilterPyEKF", "FilterPyUKF", "MovingHorizon")
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """What one estimator made of the scenario.
-
-    Parameters
-    ----------
-    name : str
-        The estimator's, or "linear feed-forward".
-    settled_error : float or None
-        Largest error over the last two periods [µm].
-    settling_periods : int or None
-        Periods after which the largest error of each period stays below 1.2 % of the
-        amplitude; None if it does not.
-    settling_time : float or None
-        The same [s].
-    run_microseconds, step_microseconds : float or None
-        Per sample, of the estimator alone on the recorded (u, x): as one `run` and as a loop of
-        `step`; medians of some passes after a warm-up.
-    longest_step_microseconds : float or None
-        The longest single step.
-    memory_bytes : int or None
-        Size of the pickled estimator after the run: its state and settings.
-    parameters : dict
-        Parameters of its model at the end.
-    errors : list of float
-        Largest error of each period [µm].
-    timed_samples : int
-        Samples of one timed pass.
-    options : dict
-        Arguments beside the estimator's defaults.
-    failure : str or None
-        Why there is nothing to report.
-    """
-
-    name: str
-    settled_error: float | None = None
-    settling_periods: int | None = None
-    settling_time: float | None = None
-    run_microseconds: float | None = None
-    step_microseconds: float | None = None
-    longest_step_microseconds: float | None = None
-    memory_bytes: int | None = None
-    parameters: dict[str, float] = field(default_factory=dict)
-    errors: list[float] = field(default_factory=list)
-    timed_samples: int = 0
-    options: dict[str, Any] = field(default_factory=dict)
-    failure: str | None = None
+def defaults() -> list[str]:
+    """What is compared where nothing is asked for: the controller, every estimator, and the paper's law."""
+    names = [KNOWN.get(name, name) for name in found()]
+    names.insert(names.index("HysteresisRLS") + 1, PAPERS)
+    return names
 
 
-def find_estimators() -> dict[str, type]:
-    """Every estimator among the public names of the package, by its name."""
+def found() -> dict[str, type]:
+    """Return the controller and every estimator among the public names of the package, by name."""
     import piezoest
 
     public = {name: getattr(piezoest, name) for name in piezoest.__all__}
     return {
         name: value
         for name, value in sorted(public.items())
-        if inspect.isclass(value) and issubclass(value, EstimatorBase) and not inspect.isabstract(value)
+        if inspect.isclass(value)
+        and issubclass(value, (EstimatorBase, AdaptiveFeedforward))
+        and not inspect.isabstract(value)
     }
 
 
-def load_estimator(path: str) -> type:
-    """Class of a user's own estimator.
+def name_of(text: str) -> str:
+    """Class of a description, without its arguments.
 
     Parameters
     ----------
-    path : str
-        ``module:Class``; the module may lie in the working directory.
+    text : str
+        As `candidate` reads it.
+    """
+    return text.partition("(")[0].strip()
+
+
+def is_slow(text: str) -> bool:
+    """Whether an estimator takes so long that it is run on fewer seeds and stages.
+
+    Parameters
+    ----------
+    text : str
+        As `candidate` reads it.
+    """
+    return name_of(text) in SLOW
+
+
+def candidate(text: str) -> Callable[..., Any]:
+    """Maker of new estimators from their description.
+
+    Parameters
+    ----------
+    text : str
+        ``HysteresisRLS``, ``my_module:MyEstimator``, or either with keyword arguments as in
+        ``HysteresisRLS(memory=0.4, policies=(NormBound(), DeadZone()))``: numbers, strings, tuples, and the
+        policies of `piezoest.policies`.
 
     Returns
     -------
-    type
+    callable
+        ``make(sample_rate, initial_model)``, a new estimator or controller; what its class does not take is
+        left out.
 
     Raises
     ------
     ValueError
-        If there is no such class, or it has no ``step`` and ``model``.
+        If there is no such class, or the arguments cannot be read.
     """
+    name = name_of(text)
+    cls = class_of(name)
+    given = _arguments(text) if "(" in text else {}
+    accepted = inspect.signature(cls).parameters
+    if unknown := [key for key in given if key not in accepted]:
+        raise ValueError(f"{text}: {name} takes no {', '.join(unknown)}; it takes {', '.join(accepted)}")
+
+    def make(sample_rate: float, initial_model: Model) -> Any:
+        offered = {"sample_rate": sample_rate, "initial_model": initial_model, "limits": LIMITS}
+        return cls(**{key: value for key, value in offered.items() if key in accepted}, **given)
+
+    return make
+
+
+def class_of(name: str) -> type:
+    """Class of the package, or of one's own as ``module:Class``.
+
+    Parameters
+    ----------
+    name : str
+        Without arguments.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    if ":" in name:
+        return _load(name)
+    known = found()
+    if name not in known:
+        raise ValueError(f"{name}: choose of {', '.join(known)}, or name your own as module:Class")
+    return known[name]
+
+
+def module_of(text: str) -> Path | None:
+    """File of an estimator of one's own; None for one of the package.
+
+    Parameters
+    ----------
+    text : str
+        As `candidate` reads it, or `LINEAR`.
+    """
+    if ":" not in name_of(text):
+        return None
+    source = inspect.getsourcefile(_load(name_of(text)))
+    return None if source is None else Path(source)
+
+
+def _load(path: str) -> type:
+    """Class of ``module:Class``; the module may lie in the working directory."""
     module_name, separator, class_name = path.partition(":")
     if not (module_name and separator and class_name):
         raise ValueError(f"an estimator of one's own must read like module:Class, got {path!r}")
@@ -193,153 +158,50 @@ def load_estimator(path: str) -> type:
         module = importlib.import_module(module_name)
     except ImportError as error:
         raise ValueError(f"{path}: {error}") from None
-    found = getattr(module, class_name, None)
-    if not inspect.isclass(found):
+    cls = getattr(module, class_name, None)
+    if not inspect.isclass(cls):
         raise ValueError(f"{path}: {module_name} has no class {class_name}")
-    if missing := [name for name in ("step", "model") if not hasattr(found, name)]:
+    needed = ("step", "learn") if hasattr(cls, "learn") else ("step", "model")
+    if missing := [name for name in needed if not hasattr(cls, name)]:
         raise ValueError(f"{path}: {class_name} has no {' and no '.join(missing)}: see piezoest.Estimator")
-    return found
+    return cls
 
 
-def options_of(cls: type) -> dict[str, Any]:
-    """Arguments that the package's own estimators get beside their defaults."""
-    own = issubclass(cls, EstimatorBase) and cls.__module__.startswith("piezoest.")
-    return dict(OPTIONS.get(cls.__name__, {})) if own else {}
-
-
-def make(cls: type, sample_rate: float) -> Any:
-    """New estimator of a class, from the wrong start where it takes one."""
-    accepted = inspect.signature(cls).parameters
-    offered = {"sample_rate": sample_rate, "initial_model": WRONG_MODEL, **options_of(cls)}
-    return cls(**{name: value for name, value in offered.items() if name in accepted})
-
-
-def compare(
-    estimators: Mapping[str, type], scenario: Scenario, say: Callable[[str], None] = lambda _: None
-) -> list[Row]:
-    """Send every estimator round the ring; linear feed-forward comes first.
-
-    Parameters
-    ----------
-    estimators : mapping
-        Name to class.
-    scenario : Scenario
-        The run they share.
-    say : callable
-        Called with a line before each part of the work.
-
-    Returns
-    -------
-    list of Row
-    """
-    rate = scenario.sample_rate
-    linear = partial(HysteresisRLS, rate, initial_model=WRONG_GAIN)
-    rows = [assess(REFERENCE, linear, LinearCompensator(WRONG_GAIN), scenario, say)]
-    for name, cls in estimators.items():
-        row = assess(name, partial(make, cls, rate), InverseCompensator(WRONG_MODEL), scenario, say)
-        rows.append(replace(row, options=options_of(cls)))
-    return rows
-
-
-def assess(
-    name: str, new: Callable[[], Any], compensator: Any, scenario: Scenario, say: Callable[[str], None]
-) -> Row:
-    """Run and time one estimator; whatever it raises is its own failure."""
-    say(f"{name}: in the ring")
+def _arguments(text: str) -> dict[str, Any]:
+    """Keyword arguments of a call that need nothing but literals and policies."""
     try:
-        estimator = new()
-        record = scenario.run(estimator, compensator)
-        say(f"{name}: timing")
-        return Row(name, **accuracy(record), **cost(new, record), memory_bytes=pickled_size(estimator))
-    except Exception as error:
-        return Row(name, failure=f"{type(error).__name__}: {error}")
+        # What comes before the parenthesis may be module:Class, which is no Python.
+        call = ast.parse("_" + text[text.index("(") :].strip(), mode="eval").body
+    except SyntaxError as error:
+        raise ValueError(f"{text}: {error.msg}") from None
+    match call:
+        case ast.Call(func=ast.Name()):
+            return _keywords(call, text)
+    raise ValueError(f"{text}: write it as Name(argument=value, ...)")
 
 
-def accuracy(record: TrackingRecord) -> dict[str, Any]:
-    """Errors of a run, and when they have settled."""
-    errors = record.max_error_per_period()
-    above = np.flatnonzero(~(errors < SETTLED * AMPLITUDE))
-    periods = int(above[-1]) + 1 if above.size else 0
-    settled = periods < errors.size
-    final = dict(zip(record.parameter_names, record.theta[-1].tolist(), strict=True))
-    return {
-        "settled_error": record.max_error(SETTLED_PERIODS),
-        "settling_periods": periods if settled else None,
-        "settling_time": periods / FREQUENCY if settled else None,
-        "parameters": final,
-        "errors": errors.tolist(),
-    }
+def _keywords(call: ast.Call, text: str) -> dict[str, Any]:
+    if call.args or any(keyword.arg is None for keyword in call.keywords):
+        raise ValueError(f"{text}: every argument needs its name, as in memory=0.4")
+    return {str(keyword.arg): _value(keyword.value, text) for keyword in call.keywords}
 
 
-def cost(new: Callable[[], Any], record: TrackingRecord) -> dict[str, Any]:
-    """Times per sample on what was recorded [µs], the longest step, and how many samples were timed."""
-    u, x = record.voltage, record.measured
-    samples = samples_within(new, u, x)
-    u, x = u[:samples], x[:samples]
-    u_list, x_list = u.tolist(), x.tolist()
-    run = seconds_of_run(new, u, x) if hasattr(new(), "run") else None
-    step = median(seconds_of_steps(new, u_list, x_list) for _ in range(PASSES))
-    return {
-        "run_microseconds": None if run is None else 1e6 * run / samples,
-        "step_microseconds": 1e6 * step / samples,
-        "longest_step_microseconds": 1e6 * longest_step(new, u_list, x_list),
-        "timed_samples": samples,
-    }
-
-
-def samples_within(new: Callable[[], Any], u: FloatArray, x: FloatArray) -> int:
-    """Samples that `PASS_SECONDS` suffice for, judged from a beginning that warms up as well."""
-    trial = min(u.size, max(LEAST_SAMPLES, u.size // 10))
-    seconds = seconds_of_steps(new, u[:trial].tolist(), x[:trial].tolist())
-    return max(trial, min(u.size, math.ceil(trial * PASS_SECONDS / max(seconds, 1e-9))))
-
-
-def seconds_of_run(new: Callable[[], Any], u: FloatArray, x: FloatArray) -> float:
-    """Time of one `run`, with the model asked for at its end."""
-
-    def once() -> float:
-        estimator = new()
-        began = time.perf_counter()
-        estimator.run(u, x)
-        _ = estimator.model
-        return time.perf_counter() - began
-
-    once()
-    return median(once() for _ in range(PASSES))
-
-
-def seconds_of_steps(new: Callable[[], Any], u: list[float], x: list[float]) -> float:
-    """Time of a loop of `step`, with the model asked for at its end."""
-    estimator = new()
-    step = estimator.step
-    began = time.perf_counter()
-    for u_k, x_k in zip(u, x, strict=True):
-        step(u_k, x_k)
-    _ = estimator.model
-    return time.perf_counter() - began
-
-
-def longest_step(new: Callable[[], Any], u: list[float], x: list[float]) -> float:
-    """Longest step [s]: each counts with the shorter of its times in two passes, free of interruptions."""
-    clock = time.perf_counter
-    times = np.empty((2, len(u)))
-    for row in times:
-        step = new().step
-        for k, (u_k, x_k) in enumerate(zip(u, x, strict=True)):
-            began = clock()
-            step(u_k, x_k)
-            row[k] = clock() - began
-    return float(times.min(axis=0).max())
-
-
-def median(times: Iterable[float]) -> float:
-    """The middle one."""
-    return float(np.median(list(times)))
-
-
-def pickled_size(estimator: Any) -> int | None:
-    """Bytes of the pickled estimator; None if it cannot be pickled."""
+def _value(node: ast.expr, text: str) -> Any:
+    match node:
+        case ast.Tuple(elts=items) | ast.List(elts=items):
+            return tuple(_value(item, text) for item in items)
+        case ast.Call(func=ast.Name(id=name)):
+            return _policy(name, _keywords(node, text), text)
     try:
-        return len(pickle.dumps(estimator))
-    except Exception:
-        return None
+        return ast.literal_eval(node)
+    except ValueError:
+        raise ValueError(f"{text}: {ast.unparse(node)} is no number, string, tuple or policy") from None
+
+
+def _policy(name: str, arguments: dict[str, Any], text: str) -> Any:
+    if name not in policies.__all__:
+        raise ValueError(f"{text}: {name} is no policy: choose of {', '.join(policies.__all__)}")
+    try:
+        return getattr(policies, name)(**arguments)
+    except TypeError as error:
+        raise ValueError(f"{text}: {error}") from None

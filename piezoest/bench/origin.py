@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from datetime import UTC, datetime
 from pathlib import Path
@@ -29,3 +30,21 @@ def put(document: dict[str, Any], path: Path | None) -> None:
         print(text)
     else:
         write_text(path, text + "\n")
+
+
+def json_safe(value: Any) -> Any:
+    """The same with plain lists, and None for what is not finite.
+
+    Parameters
+    ----------
+    value : object
+        Of dictionaries, lists, tuples and plain values.
+    """
+    match value:
+        case dict():
+            return {key: json_safe(item) for key, item in value.items()}
+        case list() | tuple():
+            return [json_safe(item) for item in value]
+        case float() if not math.isfinite(value):
+            return None
+    return value

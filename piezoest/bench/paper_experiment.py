@@ -142,7 +142,6 @@ class Experiment:
             compensator=compensator,
             estimator=estimator,
             update_interval=UPDATE_INTERVAL,
-            supervisor=False,  # the paper has none
         )
         last = record.theta[-(record.period or 1) :]
         return Run(

@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import math
-from collections.abc import Callable, Sequence
 from glob import glob
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.bench.candidates import candidate
+from piezoest.bench.estimators import candidate
+from piezoest.bench.metrics import DIVERGED
 from piezoest.identification.data import Data, prepare
 from piezoest.models import ColemanHodgdon, Model
 from piezoest.records import read_record
@@ -27,7 +27,6 @@ LOG = "log:"  # before a file's name, in the place of a scenario's
 LEARNT = 0.7  # of the samples
 AT_A_TIME = 1000  # samples, so that no estimator keeps its history of the whole
 SEGMENTS = 10  # of the rest, the largest error of each of which is taken
-DIVERGED = 1.5  # times the line's error
 
 
 def logs_of(pattern: str) -> list[str]:
@@ -77,9 +76,7 @@ def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
-def numbers(
-    path: Path, estimator: str | None, watch: Callable[[Any], Any] = lambda made: made
-) -> dict[str, Any]:
+def numbers(path: Path, estimator: str | None) -> dict[str, Any]:
     """Take the numbers of one estimator on one log.
 
     Parameters
@@ -87,14 +84,12 @@ def numbers(
     path : Path
         Of the log, as `piezoest.records.read_record` reads it.
     estimator : str or None
-        As `piezoest.bench.candidates.candidate` reads it; None for the straight line.
-    watch : callable
-        Is given the estimator and returns what learns in its place.
+        As `piezoest.bench.estimators.candidate` reads it; None for the straight line.
 
     Returns
     -------
     dict
-        Columns of `piezoest.bench.runner.COLUMNS` that a log has: there is no change to settle after.
+        Columns of `piezoest.bench.run.COLUMNS` that a log has: there is no change to settle after.
 
     Raises
     ------
@@ -110,19 +105,19 @@ def numbers(
     line_error = _missed(line, data, learnt)
     error = line_error
     if estimator is not None:
-        error = _missed(_learn(estimator, first, sample_rate, watch), data, learnt)
+        error = _missed(_learn(estimator, first, sample_rate), data, learnt)
     largest = [float(np.max(segment)) for segment in np.array_split(error, min(SEGMENTS, error.size))]
     settled, line_settled = float(np.max(error)), float(np.max(line_error))
     return {
         "amplitude": 0.5 * float(np.ptp(data.x[data.counts])),
         "period": error.size / SEGMENTS / sample_rate,
-        "samples": data.u.size,
-        "mean_error": math.exp(float(np.mean(np.log(np.maximum(largest, 1e-300))))),
-        "settled_max": settled,
+        "first": largest[0],
+        "worst": settled,
+        "typical": math.exp(float(np.mean(np.log(np.maximum(largest, 1e-300))))),
+        "settled": settled,
         "settled_rms": float(np.sqrt(np.mean(error**2))),
-        "worst_error": settled,
-        "linear_settled_max": line_settled,
-        "ratio": settled / line_settled if line_settled > 0.0 else math.inf,
+        "linear_settled": line_settled,
+        "linear_worst": line_settled,
         "diverged": not settled <= DIVERGED * line_settled,
         "errors": largest,
     }
@@ -134,9 +129,11 @@ def _read(path: Path) -> tuple[Data, float]:
     return prepare(record.voltage, record.displacement), record.sample_rate
 
 
-def _learn(estimator: str, data: Data, sample_rate: float, watch: Callable[[Any], Any]) -> Model:
+def _learn(estimator: str, data: Data, sample_rate: float) -> Model:
     """Model of an estimator after the part to learn from; it starts from a plain guess about the line."""
-    made = watch(candidate(estimator)(sample_rate, data.loop_about_line()))
+    made = candidate(estimator)(sample_rate, data.loop_about_line())
+    if hasattr(made, "learn"):
+        raise ValueError(f"{estimator} drives a stage: on a log only an estimator can learn")
     x = data.measured()
     for begins in range(0, data.u.size, AT_A_TIME):
         block = slice(begins, begins + AT_A_TIME)
@@ -156,19 +153,3 @@ def _missed(model: Any, data: Data, learnt: int) -> FloatArray:
     before = error[:learnt][data.counts[:learnt]]
     after: FloatArray = np.abs(error[learnt:][data.counts[learnt:]] - np.mean(before))
     return after
-
-
-def described(scenarios: Sequence[str], known: dict[str, str]) -> dict[str, str]:
-    """One line about each scenario.
-
-    Parameters
-    ----------
-    scenarios : sequence of str
-        Names, of logs among them.
-    known : dict
-        Of those that are no logs.
-    """
-    return {
-        name: f"Recorded log {file}." if (file := file_of(name)) is not None else known[name]
-        for name in scenarios
-    }

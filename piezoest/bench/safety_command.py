@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,12 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from piezoest._errors import INTERRUPTED
 from piezoest._files import write_text
 from piezoest._options import grouped
 from piezoest.bench.origin import origin
-from piezoest.bench.shared import json_target, progress
-from piezoest.bench.suite_command import Json
+from piezoest.bench.shared import Json, counting, json_target, json_text, progress, usage, write_json
 
 if TYPE_CHECKING:
     from piezoest.bench.zoo.tasks import Task
@@ -45,7 +42,7 @@ class Which:
             "-c",
             metavar="NAME|MODULE:NAME",
             help="Called with (sample_rate, limits=...). line, no-corridor or an estimator: the default one, "
-            "changed; parts: estimator, inverse and supervisor by hand.",
+            "changed; parts: estimator and inverse by hand.",
         ),
     ] = None
     given: Annotated[
@@ -108,15 +105,14 @@ def safety(
     none of them without need, and the error stays below 1.5 times that of the best straight line. Stopped and
     started again, it goes on where it was.
     """
-    from piezoest.bench.suite_command import counting, usage
-
     target = json_target(json_to)
     began = time.perf_counter()
     with usage():
         with progress() as say:
             say("loading (compiles once after the installation)")
             from piezoest.bench import tables
-            from piezoest.bench.campaign import store_in
+            from piezoest.bench.store import carry_out
+            from piezoest.bench.table import store_in
             from piezoest.bench.zoo import contenders, tasks
 
             name = which.controller or contenders.DEFAULT
@@ -129,28 +125,22 @@ def safety(
             say("drawing")
             planned = _plan(which, name, given)
             format = tables.checked_format(written.table)
-        try:
-            with store_in(written.output) as store, counting("runs") as count:
-                tasks.carry_out_all(planned, store, workers, count)
-                rows = list(store.rows(task.key for task in planned))
-        except KeyboardInterrupt:
-            Console(stderr=True).print(f"stopped: the same command goes on from {written.output}")
-            raise typer.Exit(INTERRUPTED) from None
+        with usage(written.output), store_in(written.output) as store, counting("runs") as count:
+            carry_out(planned, store, tasks.over_cores(workers), count)
+            rows = list(store.rows(task.key for task in planned))
     document = {"suite": "safety", **origin(began), "controller": name, "given": given}
     document |= _write(which, name, rows, written.output, format)
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    text = json_text(document)
     write_text(written.output / f"{which.title}.json", text)
     if json_to == "-":
-        typer.echo(text)
+        typer.echo(text, nl=False)
         return
     from piezoest.bench.zoo import report
 
     shown = {"map": report.print_map, "singles": report.print_contest, "dwell": report.print_dwells}
     shown.get(which.title, report.print_summary)(document, Console())
     typer.echo(f"Results: {written.output}")
-    if target is not None:
-        write_text(target, text)
-        typer.echo(f"JSON: {target}")
+    write_json(document, target)
 
 
 def _given(pairs: list[str]) -> dict[str, Any]:
@@ -189,16 +179,17 @@ def _write(
     which: Which, controller: str, rows: list[dict[str, Any]], folder: Path, format: str
 ) -> dict[str, Any]:
     """Write the table, and sum it up."""
-    from piezoest.bench.tables import write_table
+    from piezoest.bench.tables import table_of, write_table
     from piezoest.bench.zoo import columns, contest, dwelling, summary
 
     if which.settling:
-        write_table(columns.tidy_cells(rows), folder / f"map.{format}", columns.CELL_COLUMNS)
+        write_table(table_of(columns.tidy_cells(rows), columns.CELL_COLUMNS), folder / f"map.{format}")
         return summary.summarise_cells(rows)
     if which.dwell is not None:
-        write_table(rows, folder / f"dwell.{format}", columns.DWELL_COLUMNS)
+        write_table(table_of(rows, columns.DWELL_COLUMNS), folder / f"dwell.{format}")
         return dwelling.summarise_dwells(rows)
-    write_table(rows, folder / f"{'singles' if which.singles else 'runs'}.{format}", columns.COLUMNS)
+    name = "singles" if which.singles else "runs"
+    write_table(table_of(rows, columns.COLUMNS), folder / f"{name}.{format}")
     if which.singles:
         return contest.summarise_contest(rows, controller)
     return summary.summarise(rows)

@@ -1,9 +1,11 @@
-"""What the commands of `piezoest bench` share: progress, and checks of what is to be written."""
+"""What the commands of `piezoest bench` share: options, progress, and checks of what is to be written."""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,10 +13,12 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from piezoest import _extras
+from piezoest._errors import INTERRUPTED
+from piezoest._files import write_text
 
-Html = Annotated[
-    Path | None, typer.Option("--html", metavar="FILE", help="Write a page with interactive plots.")
+Html = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="Write a page of HTML.")]
+Json = Annotated[
+    str | None, typer.Option("--json", metavar="FILE", help="Write JSON; - prints it instead of the tables.")
 ]
 
 
@@ -34,18 +38,14 @@ def check_html(html: Path | None) -> None:
         raise typer.BadParameter(f"{html}: a report's name must end in .html", param_hint="--html")
     if html.is_dir() or not html.resolve().parent.is_dir():
         raise typer.BadParameter(f"{html} is no file that can be written", param_hint="--html")
-    try:
-        _extras.load("plotly", "report", "an HTML report")
-    except _extras.MissingExtraError as error:
-        raise typer.BadParameter(str(error), param_hint="--html") from None
 
 
 def write_html(document: dict[str, Any], html: Path | None) -> None:
     """Write the report, if one is wanted, and say so on stderr, for stdout may be JSON."""
     if html is not None:
-        from piezoest.bench import html_report
+        from piezoest.bench import pages
 
-        html_report.write_html(document, html)
+        pages.write_html(document, html)
         typer.echo(f"Report: {html}", err=True)
 
 
@@ -58,3 +58,56 @@ def progress() -> Iterator[Callable[[str], None]]:
         return
     with console.status("") as status:
         yield status.update
+
+
+@contextlib.contextmanager
+def counting(what: str) -> Iterator[Callable[[int, int], None]]:
+    """A function that shows how many of how many are done: a bar on a terminal, or else some lines."""
+    console = Console(stderr=True)
+    began = time.perf_counter()
+    if not console.is_terminal:
+        said: list[int] = []
+
+        def line(done: int, of: int) -> None:
+            # Some twenty lines where stderr is a file.
+            if not said or done == of or done * 20 // of > said[-1] * 20 // of:
+                said.append(done)
+                seconds = time.perf_counter() - began
+                print(f"{done} of {of} {what}, {seconds:.0f} s", file=sys.stderr, flush=True)
+
+        yield line
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        bar = progress.add_task(what, total=None)
+        yield lambda done, of: progress.update(bar, completed=done, total=of)
+
+
+@contextlib.contextmanager
+def usage(folder: Path | None = None) -> Iterator[None]:
+    """Turn a wrong name or value into a message, exit code 2, and an interruption into 130.
+
+    With a folder that finished runs are kept in, an interruption says how to go on.
+    """
+    try:
+        yield
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    except KeyboardInterrupt:
+        if folder is not None:
+            print(f"stopped: the same command goes on from {folder}", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
+
+
+def json_text(document: dict[str, Any]) -> str:
+    """Text of a document."""
+    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_json(document: dict[str, Any], target: Path | None) -> None:
+    """Write a document, if it is wanted, and say so."""
+    if target is not None:
+        write_text(target, json_text(document))
+        typer.echo(f"JSON: {target}")

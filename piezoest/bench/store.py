@@ -9,12 +9,24 @@ from __future__ import annotations
 import errno
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Self
+from typing import Any, BinaryIO, Protocol, Self, TypeVar
 
-from piezoest.bench.runner import Row
+Row = dict[str, Any]
+
+
+class Keyed(Protocol):
+    """A task whose row is kept under a key."""
+
+    @property
+    def key(self) -> str:
+        """Of the row."""
+        ...
+
+
+Task = TypeVar("Task", bound=Keyed)
 
 
 class Store:
@@ -103,7 +115,7 @@ class Store:
         Parameters
         ----------
         keys : iterable of str
-            From `piezoest.bench.runner.Task.key`.
+            Of the tasks.
 
         Raises
         ------
@@ -138,3 +150,31 @@ def _read(line: bytes) -> dict[str, Any] | None:
         case {"key": str()}:
             return dict(found)
     return None
+
+
+def carry_out(
+    tasks: Sequence[Task],
+    store: Store,
+    execute: Callable[[Iterable[Task]], Iterator[Row]],
+    progress: Callable[[int, int], None] = lambda done, of: None,
+) -> None:
+    """Run what the store does not hold yet.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        The whole campaign.
+    store : Store
+        Open; holds all of their rows afterwards.
+    execute : callable
+        Gives the row of each task it is given, in any order: see `piezoest.bench.executors`.
+    progress : callable
+        Called with the number of finished runs and of all, at first and after each.
+    """
+    todo = [task for task in tasks if task.key not in store]
+    done = len(tasks) - len(todo)
+    progress(done, len(tasks))
+    for row in execute(todo):
+        if store.append(row):
+            done += 1
+            progress(done, len(tasks))

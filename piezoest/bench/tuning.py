@@ -10,15 +10,23 @@ may be anything between them, evenly in its logarithm, or a list to choose from:
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from piezoest._checks import integer, positive
-from piezoest.bench.campaign import PAPERS, default_estimators
-from piezoest.bench.candidates import candidate, class_of
+from piezoest.bench.estimators import KNOWN, class_of, is_slow, name_of
+from piezoest.bench.run import COLUMNS, Task, code_of
+from piezoest.bench.stages import PAPER
+from piezoest.bench.statistics import over_scenarios, relative
+from piezoest.bench.store import Store, carry_out
+from piezoest.bench.tables import table_of
+
+TRAINING = ("cold-start", "amplitude-drop", "gain-step", "two-tone")
+TRAINING_SEEDS = (1000, 1001)  # no campaign judges by these
+SHIFT = 2026  # seed of the shift of the settings that are tried
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,23 +101,17 @@ class Tunable:
 
     Parameters
     ----------
-    name : str
-        What it is called in the ranking.
     default : str
-        As `piezoest.bench.candidates.candidate` reads it.
+        As `piezoest.bench.estimators.candidate` reads it.
     template : str
-        The same with ``{…}`` for each value; the default itself if nothing may be tuned.
+        The same with ``{…}`` for each value.
     space : mapping
         From the names in the template.
-    slow : bool
-        Whether a run takes so long that it is judged on fewer seeds.
     """
 
-    name: str
     default: str
     template: str = ""
     space: Space = field(default_factory=dict)
-    slow: bool = False
 
     def text(self, point: Sequence[float]) -> str:
         """Description of the estimator at a point of its space.
@@ -126,96 +128,84 @@ class Tunable:
         return self.template.format(**values)
 
 
+# All know of the offset alike; what else may be turned, and how far.
 FILTER: Space = {
     "drift": Between(0.02, 5.0),
     "mismatch": Between(0.02, 5.0),
     "uncertainty": Between(0.1, 1.0),
-    "offset": OneOf((False, True)),
 }
+NOISE = Between(5e-4, 1e-2)
 
 SPACES: dict[str, tuple[str, Space]] = {
     "HysteresisRLS": (
         "HysteresisRLS(noise={noise}, policies=(RandomWalk(memory={memory}, drift={drift}), DeadZone(), "
         "OutlierRejection()))",
-        {"memory": Between(0.05, 1.0), "drift": Between(0.1, 2.0), "noise": Between(5e-4, 1e-2)},
-    ),
-    PAPERS: (
-        "",
-        {
-            "memory": Between(0.05, 2.0),
-            "uncertainty": Between(0.1, 1.0),
-            "noise": Between(5e-4, 1e-2),
-            "offset": OneOf((False, True)),
-        },
+        {"memory": Between(0.05, 1.0), "drift": Between(0.1, 2.0), "noise": NOISE},
     ),
     "OutputErrorRLS": (
         "OutputErrorRLS(noise={noise}, uncertainty={uncertainty}, policies=("
-        "RandomWalk(memory={memory}, drift={drift}), "
-        "OutlierRejection()))",
+        "RandomWalk(memory={memory}, drift={drift}), OutlierRejection()))",
         {
             "memory": Between(0.05, 1.0),
             "drift": Between(0.1, 2.0),
             "uncertainty": Between(0.1, 1.0),
-            "noise": Between(5e-4, 1e-2),
+            "noise": NOISE,
         },
     ),
-    "HysteresisEKF": ("", FILTER),
-    "FilterPyEKF": ("", FILTER),
-    "FilterPyUKF": ("", FILTER),
+    **dict.fromkeys(("HysteresisEKF", "FilterPyEKF", "FilterPyUKF"), ("", FILTER)),
     "MovingHorizon": (
         "",
-        {
-            "window": Between(0.25, 0.8),
-            "hop": Between(0.05, 0.2),
-            "process_noise": Between(0.01, 1.0),
-            "offset": OneOf((False, True)),
-        },
+        {"window": Between(0.25, 0.8), "hop": Between(0.05, 0.2), "process_noise": Between(0.01, 1.0)},
     ),
-    "BatchFit": (
-        "",
-        {"hop": Between(0.08, 0.4), "offset": OneOf((False, True)), "loss": OneOf(("linear", "huber"))},
-    ),
+    "BatchFit": ("", {"hop": Between(0.08, 0.4), "loss": OneOf(("linear", "huber"))}),
     "PrandtlIshlinskiiRLS": (
         "",
         {
             "thresholds": Between(6, 20, whole=True),
             "bends": OneOf((0, 1, 2, 3)),
             "uncertainty": Between(0.1, 2.0),
-            "noise": Between(5e-4, 1e-2),
+            "noise": NOISE,
         },
     ),
 }
-NAMES = {PAPERS: "HysteresisRLS, the paper's law"}
-SLOW = ("BatchFit", "FilterPyUKF")
 
 
-def tunables(own: Sequence[str] = (), only: Sequence[str] = ()) -> list[Tunable]:
-    """Estimators of the package and those of one's own, with their spaces.
+def tunable(text: str) -> Tunable:
+    """What may be tuned of an estimator.
 
     Parameters
     ----------
-    own : sequence of str
-        ``module:Class``, or anything else that `piezoest.bench.candidates.candidate` reads; what is
-        written with arguments is taken as it stands.
-    only : sequence of str
-        Names of those of the package that are wanted; default all.
-
-    Returns
-    -------
-    list of Tunable
+    text : str
+        As `piezoest.bench.estimators.candidate` reads it. What is written with arguments is taken as it
+        stands, but for those that all of a class are given (`piezoest.bench.estimators.KNOWN`).
 
     Raises
     ------
     ValueError
-        If a name is unknown, or a class declares something that is no space.
+        If the class declares something that is no space.
     """
-    known = [_of_the_package(text) for text in default_estimators()]
-    if unknown := [name for name in only if name not in [each.name for each in known]]:
-        raise ValueError(
-            f"{', '.join(unknown)}: choose of {'; '.join(each.name for each in known)}, "
-            "or name your own as module:Class"
-        )
-    return [each for each in known if not only or each.name in only] + [_own(text) for text in own]
+    name = name_of(text)
+    if "(" in text and text != KNOWN.get(name):
+        return Tunable(text)
+    if ":" not in name:
+        template, space = SPACES.get(name, ("", {}))
+        given = ", offset=True" if "offset=True" in text else ""
+        return Tunable(text, template or _call(name, space, given), space)
+    space = {}
+    for key, values in getattr(class_of(name), "tuning_space", {}).items():
+        match values:
+            case tuple((low, high)):
+                space[key] = Between(low, high)
+            case list([_, *_]):
+                space[key] = OneOf(tuple(values))
+            case _:
+                message = f"tuning_space[{key!r}] must be (low, high) or a list, got {values!r}"
+                raise ValueError(f"{text}: {message}")
+    return Tunable(text, _call(name, space), space)
+
+
+def _call(name: str, space: Space, given: str = "") -> str:
+    return f"{name}({', '.join(f'{value}={{{value}}}' for value in space)}{given})" if space else name
 
 
 def draws(tunable: Tunable, number: int, seed: int) -> list[str]:
@@ -252,29 +242,60 @@ def draws(tunable: Tunable, number: int, seed: int) -> list[str]:
     return list(dict.fromkeys([tunable.default, *(tunable.text(point) for point in points)]))
 
 
-def _of_the_package(text: str) -> Tunable:
-    name = text if text in SPACES else text.partition("(")[0]
-    template, space = SPACES.get(name, ("", {}))
-    return Tunable(
-        NAMES.get(name, name), text, template or _call(text.partition("(")[0], space), space, name in SLOW
-    )
+def tune(
+    estimators: Sequence[str],
+    number: int,
+    given: dict[str, Any],
+    store: Store,
+    execute: Any,
+    progress: Callable[[int, int], None],
+) -> list[dict[str, Any]]:
+    """Find the best settings of each estimator, by the same budget, on seeds that nothing is judged on.
 
+    Parameters
+    ----------
+    estimators : sequence of str
+        As `piezoest.bench.estimators.candidate` reads them.
+    number : int
+        Settings of each that are tried beside the default; a power of two.
+    given : dict
+        Fields of `piezoest.bench.cases.Conditions`.
+    store : Store
+        Where runs are kept.
+    execute : callable
+        Such as `piezoest.bench.table.over_cores`.
+    progress : callable
+        As `piezoest.bench.store.carry_out` calls it.
 
-def _own(text: str) -> Tunable:
-    candidate(text)
-    declared = {} if "(" in text else getattr(class_of(text), "tuning_space", {})
-    space: dict[str, Between | OneOf] = {}
-    for name, values in declared.items():
-        match values:
-            case tuple((low, high)):
-                space[name] = Between(low, high)
-            case list([_, *_]):
-                space[name] = OneOf(tuple(values))
-            case _:
-                message = f"tuning_space[{name!r}] must be (low, high) or a list, got {values!r}"
-                raise ValueError(f"{text}: {message}")
-    return Tunable(text, text, _call(text, space), space)
-
-
-def _call(name: str, space: Space) -> str:
-    return f"{name}({', '.join(f'{value}={{{value}}}' for value in space)})" if space else name
+    Returns
+    -------
+    list of dict
+        Of each estimator that has a space and is not slow: its ``default``, its trials with their scores, and
+        the ``chosen`` one. A score is the geometric mean of the typical errors, relative to the amplitude.
+    """
+    spaces = [each for text in estimators if not is_slow(text) and (each := tunable(text)).space]
+    # The same points for all: two with the same space get the same settings.
+    trials = {each.default: draws(each, number, SHIFT) for each in spaces}
+    tasks = [
+        Task(scenario, text, seed, {**given, "stage": PAPER}, code_of(text))
+        for seed in TRAINING_SEEDS
+        for scenario in TRAINING
+        for text in dict.fromkeys(text for some in trials.values() for text in some)
+    ]
+    carry_out(tasks, store, execute, progress)
+    runs = relative(table_of(store.rows(task.key for task in tasks), COLUMNS))
+    scores = {str(text): over_scenarios(group, "typical") for text, group in runs.groupby("estimator")}
+    found = []
+    for each in spaces:
+        scored: list[dict[str, Any]] = [
+            {"estimator": text, "score": scores[text]} for text in trials[each.default]
+        ]
+        found.append(
+            {
+                "default": each.default,
+                "space": {name: asdict(values) for name, values in each.space.items()},
+                "trials": scored,
+                "chosen": min(scored, key=lambda trial: trial["score"])["estimator"],
+            }
+        )
+    return found

@@ -10,8 +10,6 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from piezoest import _extras
-
 FIGURE_FORMATS = (".png", ".pdf", ".svg", ".jpg", ".jpeg")
 
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
@@ -65,7 +63,7 @@ def check_figure(path: Path, keep: tuple[Path, ...] = ()) -> None:
 
 
 def check_outputs(output: Path | None, html: Path | None, keep: tuple[Path, ...]) -> None:
-    """Refuse what cannot be written, and a report by a name that no browser opens, or without plotly."""
+    """Refuse what cannot be written, and a report by a name that no browser opens."""
     if output is not None:
         check_writable(output, keep)
         keep = (*keep, output)
@@ -73,7 +71,6 @@ def check_outputs(output: Path | None, html: Path | None, keep: tuple[Path, ...]
         if html.suffix.lower() not in (".html", ".htm"):
             raise ValueError(f"{html}: a report's name must end in .html")
         check_writable(html, keep)
-        _extras.load("plotly", "report", "an HTML report")
 
 
 def check_writable(path: Path, keep: tuple[Path, ...] = ()) -> None:

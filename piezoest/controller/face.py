@@ -7,10 +7,9 @@ from typing import Any
 
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import shown, slots
-from piezoest.controller.shown import Candidate, ControllerStatus
+from piezoest.controller.shown import Candidate, ControllerStatus, Event
 from piezoest.layout import Record
 from piezoest.models import Model
-from piezoest.supervisor import Event
 
 
 class Face:

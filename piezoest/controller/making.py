@@ -19,13 +19,7 @@ LEAST_RANGE, LARGEST_VOLTAGE = 1e-6, 1e6
 
 
 def checked_limits(limits: Any, sample_rate: float) -> Any:
-    """Refuse limits that keep no stage whole.
-
-    Raises
-    ------
-    ValueError
-        If they are infinite, out of all range, or of another sample rate.
-    """
+    """Refuse limits that keep no stage whole."""
     expected = "VoltageLimits(minimum, maximum): give the voltages that the stage bears"
     limits = instance("limits", limits, VoltageLimits, expected)
     low, high = limits.minimum, limits.maximum
@@ -47,13 +41,7 @@ def checked_limits(limits: Any, sample_rate: float) -> Any:
 
 
 def known_gain(gain: Any, stroke: Any, model: LearntModel | None, limits: VoltageLimits) -> float:
-    """Return the gain that a user knows [µm/V]; zero if none is given.
-
-    Raises
-    ------
-    ValueError
-        If it is given twice, or is none.
-    """
+    """Return the gain that a user knows [µm/V]; zero if none is given."""
     given = {"gain": gain, "stroke": stroke, "model": model}
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
@@ -79,13 +67,7 @@ def _gain(name: str, value: Any) -> float:
 def options(
     sample_rate: float, corridor: Any, gain: Any, feedback: Any, resonance: Any, learnt_on: Any
 ) -> dict[str, Any]:
-    """Return what users choose beside limits and estimators, checked.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
-    """
+    """Return what users choose beside limits and estimators, checked."""
     feedback = 0.0 if feedback is None else non_negative("feedback", feedback)
     if feedback > FASTEST * sample_rate:
         raise ValueError(
@@ -102,13 +84,7 @@ def options(
 
 
 def rest(limits: VoltageLimits, voltage: Any) -> float:
-    """Return the voltage at which a stage rests; None for the one nearest to 0 V.
-
-    Raises
-    ------
-    ValueError
-        If it is none within the limits.
-    """
+    """Return the voltage at which a stage rests; None for the one nearest to 0 V."""
     u = limits.rest if voltage is None else finite("voltage", voltage)
     if not limits.minimum <= u <= limits.maximum:
         raise ValueError(
@@ -120,13 +96,7 @@ def rest(limits: VoltageLimits, voltage: Any) -> float:
 def sweep(
     limits: VoltageLimits, sample_rate: float, amplitude: Any, frequency: Any, cycles: Any
 ) -> tuple[float, float, float]:
-    """Return amplitude [V], cycles of a sample and cycles of a sweep that erases hysteresis.
-
-    Raises
-    ------
-    ValueError
-        If one is out of its range.
-    """
+    """Return amplitude [V], cycles of a sample and cycles of a sweep that erases hysteresis."""
     most = 0.5 * (limits.maximum - limits.minimum)
     amplitude = most if amplitude is None else positive("amplitude", amplitude)
     if amplitude > most:
@@ -141,13 +111,7 @@ def sweep(
 
 
 def measured(name: str, value: Any) -> float:
-    """Return a displacement, or a voltage, that can be.
-
-    Raises
-    ------
-    ValueError
-        If it is no number, or beyond all stages.
-    """
+    """Return a displacement, or a voltage, that can be."""
     return fraction(name, value, -0.5 * WILDEST, 0.5 * WILDEST)
 
 

@@ -11,10 +11,10 @@ import numpy as np
 from piezoest._checks import FloatArray, array_1d, dictionary, fields, finite, instance
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import slots, start, team
+from piezoest.controller.shown import Event
 from piezoest.estimators import saved_state
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import FIXED, NUMBER, Kind, Numbers, Record, by_name
-from piezoest.supervisor import Event
 
 FORMAT = 1
 _FIELDS = (
@@ -24,13 +24,7 @@ _FIELDS = (
 
 
 def check_head(name: str, data: Any) -> None:
-    """Refuse what is no dictionary of a controller of this version.
-
-    Raises
-    ------
-    ValueError
-        Naming what it is.
-    """
+    """Refuse what is no dictionary of a controller of this version."""
     instance("data", data, dict, "a dictionary that to_dict() gave")
     if "controller" not in data:
         raise ValueError('data has no "controller": pass what to_dict() of a controller gave')
@@ -52,13 +46,7 @@ def read_limits(data: Any) -> VoltageLimits:
 
 
 def read_estimators(data: Any, state: Any) -> tuple[CompiledEstimator, ...]:
-    """Estimators as they were made; what the state says of each is checked.
-
-    Raises
-    ------
-    ValueError
-        If they do not fit each other.
-    """
+    """Estimators as they were made; what the state says of each is checked."""
     data = instance("estimators", data, list, "a list")
     if len(data) > len(slots.NAMES):
         raise ValueError(f"estimators must be at most {len(slots.NAMES)}, got {len(data)}")
@@ -136,13 +124,7 @@ def read_block(data: Any) -> FloatArray | None:
 
 
 def read_events(data: Any) -> list[Event]:
-    """Events from a list.
-
-    Raises
-    ------
-    ValueError
-        If one is none.
-    """
+    """Events from a list."""
     events = []
     for each in instance("events", data, list, "a list"):
         if (

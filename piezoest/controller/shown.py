@@ -15,7 +15,6 @@ from piezoest.equations import loop_inverse, play_inverse
 from piezoest.layout import Named
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
 from piezoest.models.learnt_on import ends, figure
-from piezoest.supervisor import Event
 
 STAGES = ("seeking", "approaching", "running", "homing")
 # What each fault means.
@@ -40,6 +39,25 @@ MEANINGS = {
 }
 # Of what is noted beside faults, that which the user is to change.
 WARNINGS = (FAST, LATE, OUTSIDE)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that a controller noticed or did.
+
+    Parameters
+    ----------
+    time : float
+        Seconds since its start.
+    action : str
+        ``"fell back"`` (to a line, for the readings are at fault), ``"resumed"`` or ``"went on"``.
+    reason : str
+        Why, with the figures.
+    """
+
+    time: float
+    action: str
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,39 +116,17 @@ class Candidate:
 
 
 def fault_name(number: Any) -> str:
-    """Name of a fault, empty if there is none.
-
-    Parameters
-    ----------
-    number : float
-        As the state has it.
-    """
+    """Name of a fault, empty if there is none."""
     return FAULTS[int(number)]
 
 
 def stage_name(number: Any) -> str:
-    """Name of a stage of the work.
-
-    Parameters
-    ----------
-    number : float
-        As the state has it.
-    """
+    """Name of a stage of the work."""
     return STAGES[int(number)]
 
 
 def event(state: Any, sample_rate: float, learnt_on: Any) -> Event:
-    """Return what was noticed last.
-
-    Parameters
-    ----------
-    state : ndarray
-        Of the controller.
-    sample_rate : float
-        [Hz].
-    learnt_on : dict or None
-        Ranges of the user's model.
-    """
+    """Return what was noticed last."""
     number, time = state["notice"], float(state["samples"]) / sample_rate
     name = fault_name(number)
     if not name:
@@ -161,13 +157,7 @@ def _outside(state: Any, learnt_on: Any) -> dict[str, str]:
 
 
 def misses(state: Any) -> list[float | None]:
-    """Return the recent error of the line and of each candidate [µm]; None if it is unknown.
-
-    Parameters
-    ----------
-    state : ndarray
-        Of the controller.
-    """
+    """Return the recent error of the line and of each candidate [µm]; None if it is unknown."""
     unit, every = abs(float(state["unit"])), state["candidates"]
     used = [name for name in slots.NAMES if every[name].dtype.names is not None]
     found: list[float | None] = []
@@ -178,30 +168,14 @@ def misses(state: Any) -> list[float | None]:
 
 
 def line(state: Any) -> LinearGain | None:
-    """Return the straight line; None until its gain is known.
-
-    Parameters
-    ----------
-    state : ndarray
-        Of the controller.
-    """
+    """Return the straight line; None until its gain is known."""
     gain, centre = float(state["line"]["gain"]), float(state["line"]["centre"])
     known = gain != 0.0 and math.isfinite(gain) and math.isfinite(centre)
     return LinearGain(gain, centre) if known else None
 
 
 def model(start: Model, state: Any, settings: Any, name: str) -> Model | None:
-    """Return the model in use of a candidate, in µm and V; None until there is one.
-
-    Parameters
-    ----------
-    start : Model
-        One of its kind.
-    state, settings : ndarray
-        Of the controller.
-    name : str
-        Of the candidate's slot.
-    """
+    """Return the model in use of a candidate, in µm and V; None until there is one."""
     own = state["candidates"][name]
     if own["usable"] == 0.0:
         return None
@@ -235,22 +209,7 @@ class Units:
 
 
 def in_micrometres(start: Model, numbers: Any, units: Units) -> Model:
-    """Return a model in µm and V from the numbers of its inverse.
-
-    Parameters
-    ----------
-    start : Model
-        One of its kind.
-    numbers : ndarray
-        Settings of its inverse, by name.
-    units : Units
-        Of these numbers.
-
-    Raises
-    ------
-    ValueError
-        If the numbers make no model.
-    """
+    """Return a model in µm and V from the numbers of its inverse."""
     return _KINDS[start.inverse](start, numbers, units)
 
 

@@ -34,20 +34,7 @@ START, NOISE = ColemanHodgdon(alpha=0.8, beta=0.8, gamma=0.96), 2.5e-4
 
 
 def made(factories: Any, sample_rate: float) -> tuple[CompiledEstimator, ...]:
-    """Estimators for a controller.
-
-    Parameters
-    ----------
-    factories : tuple of callable
-        Up to four, called as ``factory(sample_rate, initial_model=..., noise=...)``.
-    sample_rate : float
-        [Hz].
-
-    Raises
-    ------
-    ValueError
-        If there are too many, or one makes no estimator that a controller can use.
-    """
+    """Estimators for a controller."""
     hint = "a tuple of classes: pass (HysteresisRLS,), or () for the straight line alone"
     factories = tuple(instance("estimators", factories, tuple | list, hint))
     if len(factories) > len(slots.NAMES):
@@ -79,13 +66,7 @@ def _made(name: str, factory: Any, sample_rate: float, given: dict[str, Any]) ->
 
 
 def checked(name: str, estimator: Any) -> None:
-    """Refuse what a controller cannot use.
-
-    Raises
-    ------
-    ValueError
-        Naming it.
-    """
+    """Refuse what a controller cannot use."""
     kernel = getattr(estimator, "kernel", None)
     if not isinstance(estimator, CompiledEstimator) or not hasattr(kernel, "write_model"):
         raise ValueError(
@@ -97,13 +78,7 @@ def checked(name: str, estimator: Any) -> None:
 
 
 def names(estimators: tuple[CompiledEstimator, ...]) -> tuple[str, ...]:
-    """Names of the line and of the estimators; the second one of a class is numbered.
-
-    Parameters
-    ----------
-    estimators : tuple
-        In their order.
-    """
+    """Names of the line and of the estimators; the second one of a class is numbered."""
     found = ["line"]
     for estimator in estimators:
         name, number = type(estimator).__name__, 2
@@ -114,31 +89,12 @@ def names(estimators: tuple[CompiledEstimator, ...]) -> tuple[str, ...]:
 
 
 def saved(estimator: CompiledEstimator) -> dict[str, Any]:
-    """Return class and arguments as a JSON-safe dictionary.
-
-    Parameters
-    ----------
-    estimator : CompiledEstimator
-        As it was made.
-    """
+    """Return class and arguments as a JSON-safe dictionary."""
     return {name: value for name, value in estimator.to_dict().items() if name != "state"}
 
 
 def revived(data: Any, state: Any) -> CompiledEstimator:
-    """Return an estimator as it was made.
-
-    Parameters
-    ----------
-    data : dict
-        What `saved` gave.
-    state : dict
-        Its state by name within a saved controller, which is checked.
-
-    Raises
-    ------
-    ValueError
-        If it is none that can be.
-    """
+    """Return an estimator as it was made."""
     cls = class_named(dictionary(data), "estimator", _known(CompiledEstimator))
     estimator: CompiledEstimator = cls.from_dict({**data, "state": state})
     checked("estimator", estimator)

@@ -13,13 +13,7 @@ LONGEST = 1e6
 
 
 def delay_line(delay: float) -> tuple[Field, dict[str, float]]:
-    """Layout and start of the storage for a delay in samples, whole or fractional; absent without one.
-
-    Raises
-    ------
-    ValueError
-        If the delay is negative or beyond a million.
-    """
+    """Layout and start of the storage for a delay in samples, whole or fractional; absent without one."""
     if non_negative("delay", delay) > LONGEST:
         raise ValueError(f"delay must be at most {LONGEST:g} samples, got {delay:g}")
     if delay == 0.0:

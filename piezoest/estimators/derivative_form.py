@@ -24,19 +24,7 @@ LONGEST_GAP = 0.002
 
 
 def settings(initial: Model, scale: FloatArray, options: dict[str, Any], at: Conditions) -> dict[str, Any]:
-    """Numbers that compiled code is given, without the law's and the policies'.
-
-    Parameters
-    ----------
-    initial : ColemanHodgdon or LinearGain
-        Model to start from.
-    scale : ndarray, shape (n,)
-        Scale of each parameter.
-    options : dict
-        Arguments of `HysteresisRLS`.
-    at : Conditions
-        Time base, and whether the model has hysteresis.
-    """
+    """Numbers that compiled code is given, without the law's and the policies'."""
     rate = options["sample_rate"]
     pole = float(filters.first_order_pole(options["cutoff"], rate))
     if pole == 1.0:

@@ -159,13 +159,7 @@ class RecursiveLeastSquares:
 
 
 def is_discrete(time_base: TimeBase) -> bool:
-    """Whether a time base is the discrete one.
-
-    Raises
-    ------
-    ValueError
-        If it is none.
-    """
+    """Whether a time base is the discrete one."""
     if time_base not in ("discrete", "continuous"):
         raise ValueError(f"time_base must be 'discrete' or 'continuous', got {time_base!r}")
     return time_base == "discrete"

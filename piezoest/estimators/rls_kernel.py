@@ -48,18 +48,7 @@ LARGEST_ERROR = 1e60
 
 
 def layout(n: int, follows: set[str], law_layout: Field, policies: Field, line: Field) -> Layout:
-    """What is kept between samples.
-
-    Parameters
-    ----------
-    n : int
-        Number of parameters.
-    follows : set of str
-        What is asked for beside the regression: ``"centre"``, ``"high_pass"``, ``"swings"``, ``"level"``,
-        ``"products"``, ``"noise"``, ``"belief"``, ``"energy"``, ``"errors"``.
-    law_layout, policies, line : Field
-        Of the law, of what policies keep, of the delay line.
-    """
+    """What is kept between samples."""
 
     def where(name: str, field: Field) -> Field:
         return field if name in follows else ABSENT

@@ -75,13 +75,7 @@ class Expressions(ast.NodeVisitor):
         return f"{name}_" if name in _RESERVED else name
 
     def visit(self, node: ast.AST) -> Any:
-        """Translate an expression or a statement.
-
-        Raises
-        ------
-        TranslationError
-            If there is no C for it.
-        """
+        """Translate an expression or a statement."""
         try:
             return super().visit(node)
         except Refused as problem:

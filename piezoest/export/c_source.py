@@ -43,13 +43,7 @@ class Source:
 
 @cache
 def read(function: Any) -> Source:
-    """Read a function's source.
-
-    Raises
-    ------
-    TranslationError
-        If it has none, or defaults, keyword or starred parameters.
-    """
+    """Read a function's source."""
     try:
         lines, first_line = inspect.getsourcelines(function)
     except (TypeError, OSError) as error:

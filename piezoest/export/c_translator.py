@@ -18,13 +18,7 @@ from piezoest.export.c_values import Array, Items, Known, Number, Refused, Room,
 
 
 def translate(file: File, function: Any, arguments: list[Value]) -> tuple[Function, list[Value]]:
-    """Translate a function for such arguments; returns also what of them is left to hand over.
-
-    Raises
-    ------
-    TranslationError
-        If there is no C for something in it.
-    """
+    """Translate a function for such arguments; returns also what of them is left to hand over."""
     source = read(getattr(function, "function", function))
     if len(arguments) != len(source.parameters):
         count = f"{len(source.parameters)} arguments, got {len(arguments)}"

@@ -22,13 +22,7 @@ _NUMBERS = {"double": (ctypes.c_double, np.float64), "float": (ctypes.c_float, n
 
 
 def compiler() -> str:
-    """The C compiler: what CC names, or else cc, gcc or clang.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
+    """The C compiler: what CC names, or else cc, gcc or clang."""
     for name in (os.environ.get("CC"), "cc", "gcc", "clang"):
         if name and (found := shutil.which(name)):
             return found
@@ -36,13 +30,7 @@ def compiler() -> str:
 
 
 def build_shared(folder: Path, sources: list[str], target: Path, *flags: str) -> None:
-    """Compile sources of a folder into a shared library.
-
-    Raises
-    ------
-    ValueError
-        If there is no compiler, or it refuses the sources.
-    """
+    """Compile sources of a folder into a shared library."""
     command = [compiler(), *FLAGS, *flags, "-shared", "-fPIC", "-o", str(target), *sources, "-lm"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != 0:

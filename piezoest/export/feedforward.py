@@ -24,13 +24,7 @@ static const {name}_state begun_state = {start};
 
 
 def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
-    """Generate the code of a controller in its present state.
-
-    Raises
-    ------
-    ValueError
-        If the name is no identifier, or the precision unknown.
-    """
+    """Generate the code of a controller in its present state."""
     data = controller.to_dict()
     estimators = saved.read_estimators(data["estimators"], data["state"])
     file = file_of(name, precision, tuple(each for known in estimators for each in known.unneeded))

@@ -79,13 +79,7 @@ class CCode:
 
 
 def file_of(name: Any, precision: Any, unneeded: tuple[Any, ...] = ()) -> File:
-    """A file to fill, after a look at its name and precision; calls of functions `unneeded` are left out.
-
-    Raises
-    ------
-    ValueError
-        If the name is no identifier, or the precision unknown.
-    """
+    """A file to fill, after a look at its name and precision; calls of functions `unneeded` are left out."""
     if not name.isidentifier() or not name.isascii() or keyword.iskeyword(name) or name.startswith("_"):
         raise ValueError(f"name must be an identifier of C, got {name!r}: use letters, digits and _")
     if precision not in ("double", "float"):

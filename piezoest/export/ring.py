@@ -132,8 +132,7 @@ class Controller(Ring):
 
     Notes
     -----
-    A loop of ``x = stage.step(u); u = controller.step(r, x)`` is `piezoest.track` without its
-    guard, bit for bit.
+    A loop of ``x = stage.step(u); u = controller.step(r, x)`` is `piezoest.track`, bit for bit.
     """
 
     __slots__ = ("_compensator", "_estimator", "_interval", "_voltage", "_waited")

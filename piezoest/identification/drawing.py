@@ -1,13 +1,18 @@
-"""The figure of an identification."""
+"""The figures of an identification."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from piezoest._checks import FloatArray
+from piezoest.identification.compared import Compared, Found, compared, label_of
+from piezoest.identification.data import prepare, turning_voltages
 from piezoest.identification.residual import autocorrelation
+from piezoest.identification.streamed import StreamedIdentification
+from piezoest.records import Record
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,8 +25,37 @@ ABOVE: dict[str, Any] = {
 }  # fmt: skip
 
 
-def draw(found: Any) -> Figure:
-    """Draw an `Identification`: over time, the loop, the residual, and the kinds compared."""
+class Drawn(NamedTuple):
+    """What is drawn of an identification: of a stream, every k-th sample.
+
+    Numbers of the samples that were left out at the start and of those that were fitted are of what is drawn.
+    """
+
+    record: Record
+    prediction: FloatArray
+    residual: FloatArray
+    left_out: int
+    trained: int
+    expected: tuple[FloatArray, FloatArray] | None
+
+
+def drawn(found: Found) -> Drawn:
+    """Take what is drawn."""
+    if isinstance(found, StreamedIdentification):
+        record, prediction = found.thinned, found.prediction
+        share = len(record) / found.samples
+        residual = record.displacement - prediction
+        return Drawn(
+            record, prediction, residual, -(-found.left_out * len(record) // found.samples),
+            min(round(share * found.trained), len(record) - 1), None,
+        )  # fmt: skip
+    expected = found.predict()
+    band = expected.lower - expected.x, expected.upper - expected.x
+    return Drawn(found.record, found.prediction, found.residual, found.left_out, found.trained, band)
+
+
+def draw(found: Found) -> Figure:
+    """Draw an identification: over time, the loop, the residual, and the kinds compared."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12, 8.5), layout="constrained")
@@ -33,58 +67,62 @@ def draw(found: Any) -> Figure:
     rows = columns[1].subgridspec(3, 1, height_ratios=[1.5, 1.0, 0.9])
     loop, kinds, correlation = (figure.add_subplot(rows[k]) for k in range(3))
 
-    record, error, start = found.record, found.residual, found.left_out
-    thin = slice(None, None, max(1, len(record) // MOST_POINTS))
+    shown = drawn(found)
+    record, thin = shown.record, slice(None, None, max(1, len(shown.record) // MOST_POINTS))
     voltage.plot(record.time[thin], record.voltage[thin], lw=0.8, color="C2")
     voltage.set_ylabel("voltage [V]")
     series.plot(record.time[thin], record.displacement[thin], lw=1.8, color="0.7", label="measured")
-    series.plot(record.time[thin], found.prediction[thin], lw=0.8, color="C0", label="model, free-running")
+    series.plot(record.time[thin], shown.prediction[thin], lw=0.8, color="C0", label="model, free-running")
     series.set_ylabel("displacement [µm]")
-    expected = found.predict()
-    lower, upper = expected.lower - expected.x, expected.upper - expected.x
-    residual.fill_between(
-        record.time[thin], lower[thin], upper[thin], color="C0", alpha=0.15, lw=0,
-        label="95 of 100 readings, as expected",
-    )  # fmt: skip
-    residual.plot(record.time[thin], error[thin], lw=0.6, color="C3")
-    residual.set(xlabel="time [s]", ylabel="measured − model [µm]")
-    # What was left out at the start would hide everything else.
-    largest = 1.1 * float(np.nanmax(np.abs(error[start:])))
-    residual.set_ylim(-largest, largest)
-    residual.legend(**ABOVE)
+    _draw_residual(residual, shown, thin)
     for axes in (voltage, series, residual):
-        _shade(axes, found)
+        _shade(axes, shown)
     series.legend(**ABOVE)
     for axes in (voltage, series):
         axes.tick_params(labelbottom=False)
 
-    part = slice(start, None, thin.step)
+    part = slice(shown.left_out, None, thin.step)
     loop.plot(record.voltage[part], record.displacement[part], lw=1.8, color="0.7", label="measured")
-    loop.plot(record.voltage[part], found.prediction[part], lw=0.6, color="C0", label="model")
+    loop.plot(record.voltage[part], shown.prediction[part], lw=0.6, color="C0", label="model")
     loop.set(xlabel="voltage [V]", ylabel="displacement [µm]", title="loop")
     loop.legend(loc="upper left", fontsize="small")
 
-    _draw_kinds(kinds, found)
-    _draw_autocorrelation(correlation, found)
+    _draw_kinds(kinds, compared(found))
+    _draw_autocorrelation(correlation, shown)
     figure.suptitle(
-        f"{Path(record.source).name}: {found.best.label}; held out {found.held_out.rms:.3g} µm rms, "
+        f"{Path(found.source).name}: {label_of(found)}; held out {found.held_out.rms:.3g} µm rms, "
         f"largest {found.held_out.max:.3g} µm (straight line {found.line_held_out.rms:.3g} µm rms)"
     )
     return figure
 
 
-def _draw_kinds(axes: Any, found: Any) -> None:
+def _draw_residual(axes: Any, shown: Drawn, thin: slice) -> None:
+    time = shown.record.time[thin]
+    if shown.expected is not None:
+        lower, upper = shown.expected
+        axes.fill_between(
+            time, lower[thin], upper[thin], color="C0", alpha=0.15, lw=0,
+            label="95 of 100 readings, as expected",
+        )  # fmt: skip
+        axes.legend(**ABOVE)
+    axes.plot(time, shown.residual[thin], lw=0.6, color="C3")
+    # What was left out at the start would hide everything else.
+    largest = 1.1 * float(np.nanmax(np.abs(shown.residual[shown.left_out :])))
+    axes.set(xlabel="time [s]", ylabel="measured − model [µm]", ylim=(-largest, largest))
+
+
+def _draw_kinds(axes: Any, kinds: list[Compared]) -> None:
     """Errors of all kinds as dots: a straight line's may be a thousand times those of the others."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-    items = found.candidates
-    places = np.arange(len(items))
-    chosen = next(k for k, item in enumerate(items) if item is found.best)
+    places = np.arange(len(kinds))
+    chosen = next(k for k, kind in enumerate(kinds) if kind.chosen)
     axes.axhspan(chosen - 0.5, chosen + 0.5, color="C0", alpha=0.15, lw=0)
-    axes.plot([item.cross_validated for item in items], places, "D", color="C0", label="blocks left out")
-    axes.plot([item.held_out.rms for item in items], places, "o", color="C1", label="held out")
-    axes.set(xscale="log", yticks=places, ylim=(len(items) - 0.5, -0.5), xlabel="error [µm rms]")
-    axes.set_yticklabels([item.label for item in items], fontsize="small")
+    axes.plot([kind.left_out for kind in kinds], places, "D", color="C0", label="blocks left out")
+    held_out = [np.nan if kind.held_out is None else kind.held_out.rms for kind in kinds]
+    axes.plot(held_out, places, "o", color="C1", label="held out")
+    axes.set(xscale="log", yticks=places, ylim=(len(kinds) - 0.5, -0.5), xlabel="error [µm rms]")
+    axes.set_yticklabels([kind.label for kind in kinds], fontsize="small")
     axes.grid(alpha=0.3)
     low, high = axes.get_xlim()
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 30.0 * low else (1.0,)))
@@ -93,24 +131,44 @@ def _draw_kinds(axes: Any, found: Any) -> None:
     axes.legend(**ABOVE)
 
 
-def _shade(axes: Any, found: Any) -> None:
-    time = found.record.time
-    axes.axvspan(time[found.trained], time[-1], color="C1", alpha=0.12, lw=0, label="held out")
-    if found.left_out:
-        axes.axvspan(time[0], time[found.left_out], color="0.5", alpha=0.3, lw=0)
+def _shade(axes: Any, shown: Drawn) -> None:
+    time = shown.record.time
+    axes.axvspan(time[shown.trained], time[-1], color="C1", alpha=0.12, lw=0, label="held out")
+    if shown.left_out:
+        axes.axvspan(time[0], time[shown.left_out], color="0.5", alpha=0.3, lw=0)
     axes.margins(x=0.01)
     axes.grid(alpha=0.3)
 
 
-def _draw_autocorrelation(axes: Any, found: Any) -> None:
-    residual = found.residual[found.left_out : found.trained]
+def _draw_autocorrelation(axes: Any, shown: Drawn) -> None:
+    residual = shown.residual[shown.left_out : shown.trained]
     lags = min(100, residual.size // 4)
     rho = autocorrelation(residual, lags)
     bound = 2.58 / np.sqrt(np.sum(np.isfinite(residual)))
     axes.vlines(np.arange(lags + 1), 0.0, rho, lw=1.0, color="C3")
     axes.axhspan(-bound, bound, color="C0", alpha=0.25, lw=0, label="white noise, 99 %")
     axes.set(
-        xlabel="lag [samples]", ylabel="autocorrelation", title="residual, fitted part", ylim=(-1.05, 1.05)
-    )
+        xlabel="lag [samples drawn]", ylabel="autocorrelation", title="residual, fitted part",
+        ylim=(-1.05, 1.05),
+    )  # fmt: skip
     axes.axhline(0.0, color="0.3", lw=0.6)
     axes.legend(loc="lower left", fontsize="small")
+
+
+def draw_excitation(found: Found) -> Figure:
+    """Draw where the voltage turns, and its spectrum."""
+    from matplotlib.figure import Figure
+    from scipy.signal import welch
+
+    record = drawn(found).record
+    data = prepare(record.voltage, record.displacement)
+    figure = Figure(figsize=(12, 3.4), layout="constrained")
+    turns, spectrum = figure.subplots(1, 2)
+    turns.hist(turning_voltages(data), bins=40, color="C2")
+    turns.set(xlabel="voltage [V]", ylabel="turns", title="where the voltage turns")
+    frequency, power = welch(data.u, record.sample_rate, nperseg=min(data.u.size, 8192), detrend="constant")
+    spectrum.loglog(frequency[1:], np.sqrt(np.maximum(power[1:], 1e-30)), color="C2", lw=0.8)
+    spectrum.set(xlabel="frequency [Hz]", ylabel="voltage [V/√Hz]", title="its spectrum")
+    for axes in (turns, spectrum):
+        axes.grid(alpha=0.3)
+    return figure

@@ -22,13 +22,7 @@ def _is_needed(field: Any) -> bool:
 
 
 def finite_voltage(model: Model, u: FloatArray) -> FloatArray:
-    """Return the voltage that a model's inverse gave.
-
-    Raises
-    ------
-    ValueError
-        If it is not a number somewhere.
-    """
+    """Return the voltage that a model's inverse gave."""
     bad = np.flatnonzero(~np.isfinite(u))
     if bad.size:
         raise ValueError(

@@ -30,13 +30,7 @@ __all__ = sorted(policy.__name__ for policy in REGISTERED.values())
 
 
 def check_policies(policies: tuple[Policy, ...], at: Conditions) -> tuple[Policy, ...]:
-    """Return policies, if there is one of each, and one way to forget, and all go with their conditions.
-
-    Raises
-    ------
-    ValueError
-        If not, naming the policy.
-    """
+    """Return policies, if there is one of each, and one way to forget, and all go with their conditions."""
     if not isinstance(policies, tuple | list):
         raise ValueError(f"policies must be a tuple of policies, got {policies!r}")
     for policy in policies:
@@ -62,13 +56,7 @@ def policy_to_dict(policy: Policy) -> dict[str, Any]:
 
 
 def policy_from_dict(data: Any) -> Policy:
-    """Make the policy that `policy_to_dict` described.
-
-    Raises
-    ------
-    ValueError
-        If there is no policy of that name, a field is missing or unknown, or a value is refused.
-    """
+    """Make the policy that `policy_to_dict` described."""
     cls = class_named(data, "policy", REGISTERED.values())
     names = [field.name for field in dataclasses.fields(cls)]
     values = dict(fields(cls.__name__, data, ["policy", *names]))

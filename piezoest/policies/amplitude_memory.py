@@ -204,13 +204,7 @@ def prepare(own: Any, fixed: Any, state: Any, settings: Any) -> None:
 
 
 def profile_of(own: Any, scale: FloatArray) -> AmplitudeProfile:
-    """What is stored, as an `AmplitudeProfile`; `scale` of the parameters.
-
-    Raises
-    ------
-    ValueError
-        If the policy is not among those of the estimator.
-    """
+    """What is stored, as an `AmplitudeProfile`; `scale` of the parameters."""
     _check_is_on(own)
     known = np.flatnonzero(own["sizes"] > 0.0)
     sizes, first = np.unique(own["sizes"][known], return_index=True)
@@ -218,13 +212,7 @@ def profile_of(own: Any, scale: FloatArray) -> AmplitudeProfile:
 
 
 def store_profile(own: Any, scale: FloatArray, profile: AmplitudeProfile) -> None:
-    """Remember a profile, and nothing else.
-
-    Raises
-    ------
-    ValueError
-        If the policy is not among those of the estimator, it is no profile, or there is no room for it.
-    """
+    """Remember a profile, and nothing else."""
     _check_is_on(own)
     if not isinstance(profile, AmplitudeProfile):
         raise ValueError(f"profile must be an AmplitudeProfile, got {profile!r}")

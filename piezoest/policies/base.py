@@ -206,13 +206,7 @@ def hooks_of(policy: type[Policy]) -> dict[str, Any]:
 
 
 def check_is_carried_out(policy: type[Policy]) -> None:
-    """Refuse a policy that would change nothing.
-
-    Raises
-    ------
-    ValueError
-        If compiled code does not call its hooks, or it has none and no numbers of the law.
-    """
+    """Refuse a policy that would change nothing."""
     name, hooks = field_name(policy), hooks_of(policy)
     if not (hooks or policy.law is not Policy.law or policy.follows & _ACTING):
         raise ValueError(f"{policy.__name__} does nothing: its file has none of {', '.join(HOOKS)}")
@@ -225,13 +219,7 @@ def check_is_carried_out(policy: type[Policy]) -> None:
 
 
 def layouts(policies: tuple[Policy, ...], at: Conditions) -> tuple[Record, Record, dict[str, Any]]:
-    """Layouts of what policies keep and of what they are given, and the latter's numbers.
-
-    Raises
-    ------
-    ValueError
-        If a policy would not be carried out.
-    """
+    """Layouts of what policies keep and of what they are given, and the latter's numbers."""
     for policy in policies:
         check_is_carried_out(type(policy))
     kept: dict[str, Field] = dict.fromkeys(REGISTERED, ABSENT)

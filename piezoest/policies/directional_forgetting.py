@@ -59,13 +59,7 @@ class DirectionalForgetting(Policy):
 
 
 def check_unit(policy: Policy, unit: str, at: Conditions) -> None:
-    """Refuse a memory in periods where nobody follows the swings of a voltage.
-
-    Raises
-    ------
-    ValueError
-        Naming what it needs.
-    """
+    """Refuse a memory in periods where nobody follows the swings of a voltage."""
     Policy.check(policy, at)
     if unit == "period" and not at.has_swings:
         raise ValueError(f"policies: {policy!r} needs the swings of a voltage: see HysteresisRLS")

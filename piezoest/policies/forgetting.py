@@ -19,13 +19,7 @@ LEAST_KEPT = 1e-6
 
 
 def check_memory(memory: float, unit: str = "period") -> None:
-    """Refuse a memory that is none.
-
-    Raises
-    ------
-    ValueError
-        If it is not above zero or less than 0.001 periods, or the unit is another.
-    """
+    """Refuse a memory that is none."""
     if moderate("memory", memory) < SHORTEST and unit == "period":
         raise ValueError(f"memory must be at least {SHORTEST:g} periods, got {memory:g}")
     if unit not in ("period", "second"):

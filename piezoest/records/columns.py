@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import NamedTuple
 
-from piezoest.records.source import Source, shown
+from piezoest.records.source import LogError, Source, shown
 
 # Names by which logs call the quantities, in lower case; the unit stands beside them.
 NAMES = {
@@ -52,22 +51,30 @@ def choose(
     """
     for argument, given in (("columns", named), ("units", units)):
         if unknown := sorted(set(given) - set(NAMES)):
-            raise ValueError(f"{argument} has {unknown}: known are time, voltage and displacement")
-    factors = {quantity: _stated_factor(quantity, text) for quantity, text in units.items()}
-    if not source.titles and not named:
-        return _by_position(source, wanted, factors)
-    chosen: dict[str, Column] = {}
-    for quantity in wanted:
-        index = _find(source, quantity, named[quantity]) if quantity in named else _guess(source, quantity)
-        title = source.titles[index] if source.titles else str(index + 1)
-        factor = factors.get(quantity)
-        chosen[quantity] = Column(
-            index, title, *(_factor(source.path, title, quantity) if factor is None else factor)
+            raise LogError(f"{argument} has {unknown}: known are time, voltage and displacement")
+    stated = {quantity: _stated_factor(quantity, text) for quantity, text in units.items()}
+    if not source.titles and not named and source.width < len(wanted):
+        raise LogError(
+            f"{source.path}: {source.width} columns without a header, {len(wanted)} are needed: "
+            f"{', '.join(wanted)}"
         )
+    chosen: dict[str, Column] = {}
+    for i, quantity in enumerate(wanted):
+        if quantity in named:
+            index = _find(source, quantity, named[quantity])
+        elif source.titles or named:
+            index = _guess(source, quantity)
+        else:
+            # Without a column of time wanted, a first of three columns is still time.
+            index = i + (source.width - len(wanted) if source.width == 3 and "time" not in wanted else 0)
+        title = source.titles[index] if source.titles else str(index + 1)
+        taken = (1.0, "") if not source.titles and not named else None
+        factor = stated.get(quantity) or taken or _factor(source, title, quantity)
+        chosen[quantity] = Column(index, title, *factor)
     indices = [column.position for column in chosen.values()]
     for quantity, column in chosen.items():
         if indices.count(column.position) > 1:
-            raise ValueError(
+            raise LogError(
                 f"{source.path}: column {column.title!r} would be {quantity} and something else: "
                 "name the columns"
             )
@@ -77,26 +84,9 @@ def choose(
 def has_column(source: Source, quantity: str) -> bool:
     """Whether a column of the quantity would be found by its name or unit."""
     try:
-        _guess(source, quantity)
-    except ValueError:
+        return _guess(source, quantity) >= 0
+    except LogError:
         return False
-    return True
-
-
-def _by_position(
-    source: Source, wanted: tuple[str, ...], factors: dict[str, tuple[float, str]]
-) -> dict[str, Column]:
-    if source.width < len(wanted):
-        raise ValueError(
-            f"{source.path}: {source.width} columns without a header, {len(wanted)} are needed: "
-            f"{', '.join(wanted)}"
-        )
-    # Without a column of time wanted, a first of three columns is still time.
-    shift = source.width - len(wanted) if source.width == 3 and "time" not in wanted else 0
-    return {
-        quantity: Column(i + shift, str(i + shift + 1), *factors.get(quantity, (1.0, "")))
-        for i, quantity in enumerate(wanted)
-    }
 
 
 def _find(source: Source, quantity: str, name: str) -> int:
@@ -106,13 +96,13 @@ def _find(source: Source, quantity: str, name: str) -> int:
             return candidates.index(name)
         several = max(several, candidates.count(name))
     if several:
-        raise ValueError(
+        raise LogError(
             f"{source.path}: {several} columns are called {name!r}: name the one for {quantity} by its "
             f"number, from 1 to {source.width}"
         )
     if name.isdigit() and 1 <= int(name) <= source.width:
         return int(name) - 1
-    raise ValueError(f"{source.path}: no column {name!r} for {quantity}; there {_listed(source)}")
+    raise LogError(f"{source.path}: no column {name!r} for {quantity}; there {_listed(source)}")
 
 
 def _guess(source: Source, quantity: str) -> int:
@@ -123,18 +113,17 @@ def _guess(source: Source, quantity: str) -> int:
     if not found:
         known = {name for names in NAMES.values() for name in names}
         found = [
-            i for i, (name, unit) in enumerate(split)
-            if unit in UNITS[quantity] and name.lower() not in known
-        ]  # fmt: skip
+            i for i, (name, unit) in enumerate(split) if unit in UNITS[quantity] and name.lower() not in known
+        ]
     if len(found) == 1:
         return found[0]
     if found:
         titles = ", ".join(shown(source.names[i]) for i in found[:MOST_LISTED])
-        raise ValueError(
+        raise LogError(
             f"{source.path}: the columns {titles} could all be the {quantity}: name the one that is"
         )
     hint = " or give the sample rate" if quantity == "time" else ""
-    raise ValueError(f"{source.path}: no column for {quantity} found; there {_listed(source)}: name it{hint}")
+    raise LogError(f"{source.path}: no column for {quantity} found; there {_listed(source)}: name it{hint}")
 
 
 def _listed(source: Source) -> str:
@@ -157,42 +146,49 @@ def split_unit(title: str) -> tuple[str, str]:
     return plain.replace("_", " "), ""
 
 
+def titled(name: str, unit: str) -> str:
+    """Name with the unit that the file states beside it, in place of one that the name states."""
+    plain, own = split_unit(name)
+    return f"{plain if own else name} [{unit}]" if unit else name
+
+
 def _plain(text: str) -> str:
     """With u for the signs of micro, one of which is what a wrong encoding leaves of them."""
     return text.replace("µ", "u").replace("μ", "u").replace("\N{REPLACEMENT CHARACTER}", "u")
 
 
-def _factor(path: Path, title: str, quantity: str) -> tuple[float, str]:
+def _factor(source: Source, title: str, quantity: str) -> tuple[float, str]:
     """Factor to the base unit, and a note where one was applied or a unit assumed."""
     # Only mega would differ from milli by case, and no log has it: units are in lower case here.
     _, unit = split_unit(title)
     base = BASE_UNITS[quantity]
     if unit and unit not in UNITS[quantity]:
-        raise ValueError(
-            f"{path}: column {title!r} has the unit {unit}, but {quantity} must be in {base}: convert it, "
-            f"or say what one of it is: units {quantity}='2 {base}' where a volt stands for 2 {base}"
+        raise LogError(
+            f"{source.path}: column {title!r} has the unit {unit}, but {quantity} must be in {base}: convert "
+            f"it, or say what one of it is: units {quantity}='2 {base}' where a volt stands for 2 {base}"
         )
     if not unit:
         return 1.0, f"column {title!r}: unit taken as {base}"
-    factor = UNITS[quantity][unit]
-    return factor, "" if factor == 1.0 else f"column {title!r}: converted to {base} (factor {factor:g})"
+    return _said(UNITS[quantity][unit], f"column {title!r}", quantity)
 
 
 def _stated_factor(quantity: str, text: str) -> tuple[float, str]:
     """Factor of a unit that was given, such as ``nm`` or, for a sensor's volts, ``0.2 um``."""
-    match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)?\s*([^\W\d_]+)\s*", _plain(str(text)))
+    match = re.fullmatch(
+        r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)?\s*([^\W\d_]+)\s*", _plain(str(text))
+    )
     known = UNITS[quantity]
     if match is None or match[2].lower() not in known:
-        raise ValueError(
+        raise LogError(
             f"units has {text!r} for {quantity}: known are {', '.join(known)}, with a number before it "
             f"where the log counts in something else: '0.2 {next(iter(known))}'"
         )
-    try:
-        scale = float(match[1] or 1.0)
-    except ValueError:
-        scale = math.nan
-    factor = scale * known[match[2].lower()]
+    factor = float(match[1] or 1.0) * known[match[2].lower()]
     if not math.isfinite(factor) or factor == 0.0 or (quantity == "time" and factor < 0.0):
-        raise ValueError(f"units has {text!r} for {quantity}: the number must be finite and not zero")
-    note = "" if factor == 1.0 else f"{quantity}: converted to {BASE_UNITS[quantity]} (factor {factor:g})"
-    return factor, note
+        raise LogError(f"units has {text!r} for {quantity}: the number must be finite and not zero")
+    return _said(factor, quantity, quantity)
+
+
+def _said(factor: float, what: str, quantity: str) -> tuple[float, str]:
+    note = f"{what}: converted to {BASE_UNITS[quantity]} (factor {factor:g})"
+    return factor, "" if factor == 1.0 else note

@@ -1,20 +1,83 @@
-"""Columns of a table in memory, of pandas or Polars, neither of which is imported for it."""
+"""Columns of a table in memory: a DataFrame of pandas or Polars, or the sheet of a spreadsheet."""
 
 from __future__ import annotations
 
+import datetime
+import zipfile
 from collections.abc import Iterator, Sequence
+from numbers import Number
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from piezoest import _extras
 from piezoest._checks import FloatArray
-from piezoest.records.binary import column
-from piezoest.records.columns import NAMES, split_unit
-from piezoest.records.source import Rows, Source, shown
-from piezoest.records.text_cells import seconds
+from piezoest.records.cells import is_missing
+from piezoest.records.columns import NAMES, split_unit, titled
+from piezoest.records.source import EXTRA, LogError, Rows, Source, check_size, damaged, floats, shown
 
-FRAME = Path("frame")
+TIMES = datetime.date | datetime.time | datetime.timedelta
+
+
+class Frame(Source):
+    """A DataFrame of pandas, whose columns may have any names.
+
+    Parameters
+    ----------
+    path : Path
+        What to call it.
+    series : list of Series
+        The columns.
+    names, titles : list of str
+        As for `Source`; of columns with times the title need not say the unit.
+    first : int
+        Number of the first row.
+    whole : str
+        As for `Source`.
+    """
+
+    def __init__(
+        self, path: Path, series: list[Any], names: list[str], titles: list[str], first: int, whole: str
+    ) -> None:
+        titles = [
+            titled(title, "s") if each.dtype.kind in "mM" else title
+            for title, each in zip(titles, series, strict=False)
+        ]
+        super().__init__(path, names, titles, len(series))
+        self._series, self._first, self.whole = series, first, whole
+
+    def count(self, positions: Sequence[int]) -> int:
+        """Number of rows."""
+        return len(self._series[0])
+
+    def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:
+        """Yield blocks of at most so many rows."""
+        columns = [self._floats(position) for position in positions]
+        for start in range(0, self.count(positions), rows):
+            numbers = np.arange(start, min(start + rows, self.count(positions))) + self._first
+            yield Rows(numbers, [each[start : start + rows] for each in columns], start + numbers.size)
+
+    def _floats(self, position: int) -> FloatArray:
+        cells = self._series[position]
+        bad = (
+            np.zeros(1) if cells.dtype.kind in "mMfiu" else (cells.notna() & ~_are_numbers(cells)).to_numpy()
+        )
+        if not bad.any():
+            return floats(cells)
+        k = int(np.argmax(bad))
+        title = self.names[position] if self.names else str(position + 1)
+        raise LogError(
+            f"{self.path}, row {self._first + k}, column {shown(title)!r}: {shown(str(cells.iloc[k]))!r} is "
+            "not a number: make it one"
+        )
+
+
+def _are_numbers(cells: Any) -> Any:
+    return cells.map(lambda cell: isinstance(cell, Number | TIMES) and not isinstance(cell, bool | np.bool_))
+
+
+# ---------------------------------------------------------------- DataFrames
 
 
 def is_frame(data: Any) -> bool:
@@ -22,90 +85,84 @@ def is_frame(data: Any) -> bool:
     return (hasattr(data, "iloc") or hasattr(data, "get_columns")) and hasattr(data, "columns")
 
 
-def frame_source(frame: Any) -> Source:
-    """Columns of a DataFrame.
-
-    Raises
-    ------
-    ValueError
-        If it is none, or has no columns or no rows.
-    """
+def frame_source(frame: Any) -> Frame:
+    """Columns of a DataFrame; ValueError if it is none, or has no columns or no rows."""
     if hasattr(frame, "collect") and not is_frame(frame):
-        raise ValueError("frame is a LazyFrame, which holds no numbers yet: pass frame.collect()")
+        raise LogError("frame is a LazyFrame, which holds no numbers yet: pass frame.collect()")
     if not is_frame(frame):
-        raise ValueError(f"frame must be a DataFrame of pandas or Polars, got {type(frame).__name__}")
-    series = (
-        [frame.iloc[:, i] for i in range(len(frame.columns))]
-        if hasattr(frame, "iloc")
-        else frame.get_columns()
-    )
-    names = [_name(each) for each in frame.columns]
+        raise LogError(f"frame must be a DataFrame of pandas or Polars, got {type(frame).__name__}")
+    import pandas as pd
+
+    names = ["/".join(map(str, name)) if isinstance(name, tuple) else str(name) for name in frame.columns]
+    if hasattr(frame, "iloc"):
+        series = [frame.iloc[:, i] for i in range(len(names))]
+    else:
+        series = [pd.Series(each.to_numpy()) for each in frame.get_columns()]
     # The columns of an array that became a frame are only numbered.
     nameless = list(frame.columns) == list(range(len(series)))
-    index = getattr(frame, "index", None)
-    if index is not None and _is_time(index):
-        series, nameless = [index, *series], False
-        names = [_name(index.name) if index.name is not None else "index", *names]
-    if not series or not len(series[0]):
-        raise ValueError("frame has no rows" if series else "frame has no columns")
-    titles = [
-        f"{split_unit(name)[0]} [s]" if _is_stamped(each) else name
-        for name, each in zip(names, series, strict=True)
-    ]
-    if series[0] is index:
+    titles = list(names)
+    index = getattr(frame, "index", pd.RangeIndex(0))
+    if index.dtype.kind in "mM" or (index.dtype.kind in "fiu" and _is_time(str(index.name))):
+        names = [str(index.name) if index.name is not None else "index", *names]
         # Whatever its name is: the index is the time.
-        titles[0] = "time [s]" if _is_stamped(index) else names[0]
-    length = len(series[0])
-
-    def read(positions: Sequence[int], rows: int) -> Iterator[Rows]:
-        columns = [_values(series[i], names[i]) for i in positions]
-        for start in range(0, length, rows):
-            stop = min(start + rows, length)
-            yield Rows(np.arange(start + 1, stop + 1), [each[start:stop] for each in columns], stop)
-
-    return Source(
-        FRAME, [] if nameless else names, [] if nameless else titles, len(series), read,
-        lambda positions: length, whole="it is in memory already",
-    )  # fmt: skip
+        titles = [names[0] if _is_time(names[0]) else "time", *titles]
+        series, nameless = [index.to_series(), *series], False
+    if not series or not len(series[0]):
+        raise LogError("frame has no rows" if series else "frame has no columns")
+    if nameless:
+        names = titles = []
+    return Frame(Path("frame"), series, names, titles, 1, "it is in memory already")
 
 
-def _name(name: Any) -> str:
-    return "/".join(map(str, name)) if isinstance(name, tuple) else str(name)
+def _is_time(name: str) -> bool:
+    return split_unit(name)[0].lower() in NAMES["time"]
 
 
-def _is_time(index: Any) -> bool:
-    """Whether an index of pandas is a column of time: by what it holds, or by its name."""
-    if _is_stamped(index):
-        return True
-    numeric = getattr(index.dtype, "kind", "O") in "fiu"
-    return numeric and index.name is not None and split_unit(_name(index.name))[0].lower() in NAMES["time"]
+# ---------------------------------------------------------------- spreadsheets
 
 
-def _is_stamped(values: Any) -> bool:
-    """Whether times of day or durations, with or without a time zone."""
-    return str(values.dtype).lower().startswith(("datetime", "timestamp", "timedelta", "duration"))
+def open_sheet(path: Path) -> Frame:
+    """Open an Excel or OpenDocument file: the first sheet with a table of numbers, its header above them."""
+    _extras.load("python_calamine", EXTRA, "reading spreadsheets")
+    import pandas as pd
+
+    if zipfile.is_zipfile(path):
+        with damaged(path, "a spreadsheet"), zipfile.ZipFile(path) as packed:
+            check_size(path, sum(part.file_size for part in packed.infolist()))
+    with damaged(path, "a spreadsheet"):
+        # As objects, so that text stays text: 1.234 may be 1234 where it was typed.
+        sheets = pd.read_excel(
+            path, sheet_name=None, header=None, dtype=object, engine="calamine", na_filter=False
+        )
+    for sheet in sheets.values():
+        sheet = sheet.mask(sheet.map(lambda cell: is_missing(str(cell))))
+        numeric = np.flatnonzero((_are_numbers(sheet) & sheet.notna()).sum(axis=1) > 1)
+        if numeric.size:
+            break
+    else:
+        raise LogError(
+            f"{path}: no sheet has a table of numbers in it; there are {', '.join(map(shown, sheets))}"
+        )
+    begins = int(numeric[0])
+    table = sheet.iloc[begins:].dropna(axis=1, how="all")
+    table = table.loc[: table.last_valid_index()]
+    above = sheet.iloc[:begins][table.columns].dropna(how="all")
+    names = [] if above.empty else [str(name).strip() for name in above.iloc[-1].fillna("")]
+    # A title above the table is no header.
+    header = names if sum(map(bool, names)) > 1 else []
+    series = [_typed(table[i]) for i in table.columns]
+    return Frame(
+        path, series, header, header, begins + 1, "a spreadsheet is read as a whole: save the log as CSV"
+    )
 
 
-def _values(values: Any, name: str) -> FloatArray:
-    try:
-        if _is_stamped(values):
-            return _seconds(values)
-        # A missing value of pandas' own types is no number for NumPy.
-        if hasattr(values, "iloc"):
-            return column(values.to_numpy(dtype=np.float64, na_value=np.nan))
-        return column(values.to_numpy())
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"frame: column {shown(name)!r} holds no numbers: {shown(str(error))}") from None
+def _typed(cells: Any) -> Any:
+    """Column with dates and times of day as pandas has them."""
+    import pandas as pd
 
-
-def _seconds(values: Any) -> FloatArray:
-    """Seconds since the first time of day, or of durations as they are."""
-    if hasattr(values, "dt") and hasattr(values, "iloc") and getattr(values.dt, "tz", None) is not None:
-        values = values.dt.tz_convert(None)
-    elif getattr(values, "tz", None) is not None:
-        values = values.tz_convert(None)
-    ticks = np.asarray(values.to_numpy())
-    if ticks.dtype.kind == "m":
-        nanoseconds = ticks.astype("timedelta64[ns]")
-        return np.where(np.isnat(nanoseconds), np.nan, nanoseconds.astype(np.int64) / 1e9)
-    return seconds(ticks.astype("datetime64[ns]"), {}, 0)
+    known = cells.dropna()
+    if known.map(lambda cell: isinstance(cell, datetime.time)).all():
+        return pd.Timestamp(0) + pd.to_timedelta(cells.astype(str), errors="coerce")
+    if known.map(lambda cell: isinstance(cell, datetime.date)).all():
+        return pd.to_datetime(cells)
+    return cells.infer_objects()

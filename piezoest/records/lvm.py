@@ -9,16 +9,16 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.records.binary import with_units
-from piezoest.records.source import Rows, Source
-from piezoest.records.text import Reader
-from piezoest.records.text_cells import Style, number, stamp
-from piezoest.records.text_layout import Layout
-from piezoest.records.text_lines import Lines, chunks, encoding_of, numbered
+from piezoest.records.cells import Style, number
+from piezoest.records.columns import titled
+from piezoest.records.lines import Lines, chunks, encoding_of
+from piezoest.records.source import LogError, Rows
+from piezoest.records.text import Layout, Text
 
 SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";"}
 # The line with the names of the columns begins with this; rows follow it.
@@ -41,7 +41,7 @@ class _Header:
     def take(self, text: str) -> None:
         """Take a line ``key, value of each channel``."""
         key, *values = (cell.strip() for cell in text.split(self.separator))
-        if key == "Separator" or text.startswith("Separator"):
+        if text.startswith("Separator"):
             word = re.split(r"[\t,;]", text.strip())[-1].lower()
             self.separator = SEPARATORS.get(word, self.separator)
         elif key == "Decimal_Separator" and values:
@@ -49,124 +49,110 @@ class _Header:
         if values:
             self.entries[key] = values
 
-    def number(self, key: str, default: float) -> float:
+    def first(self, key: str, otherwise: str = "") -> str:
+        """What an entry says of the first channel."""
+        return self.entries.get(key, [otherwise])[0]
+
+    def number(self, key: str, otherwise: float) -> float:
         """Number of the first channel."""
         try:
-            return number(self.entries[key][0], Style(self.decimal))
-        except (KeyError, ValueError):
-            return default
+            return number(self.first(key), Style(self.decimal))
+        except ValueError:
+            return otherwise
 
     @property
-    def begins(self) -> int | None:
-        """Nanoseconds at which the segment begins, since 1970; None if it does not say so."""
-        date, time = (self.entries.get(key, [""])[0] for key in ("Date", "Time"))
-        try:
-            return stamp(f"{date} {time}") if date else None
-        except ValueError:
-            return None
+    def begins(self) -> Any:
+        """When the segment begins; NaT if it does not say so."""
+        import pandas as pd
+
+        at = f"{self.first('Date')} {self.first('Time')}".replace(",", ".")
+        return pd.to_datetime(at, format="ISO8601", errors="coerce")
 
 
-def open_lvm(path: Path) -> Source:
-    """Open a .lvm file; ValueError if it has no segment with rows."""
-    encoding = encoding_of(path)
-    first = next(_segments(path, encoding, 1), None)
-    if first is None:
-        raise ValueError(f"{path}: no rows below the header")
-    header = first[0]
-    names = [name for name in header.names if name != COMMENT]
-    channels = [i for i, name in enumerate(names) if name != NAMES]
-    units = header.entries.get("Y_Unit_Label", [])
-    titles = list(names)
-    for i, unit in zip(channels, units, strict=False):
-        titles[i] = with_units([names[i]], [unit])[0]
-    # With a column of X for each channel, the first stands for all.
-    for k, i in enumerate(i for i, name in enumerate(header.names) if name == NAMES):
-        names[i] = titles[i] = f"{NAMES} {k + 1}" if k else NAMES
-    if header.entries.get("X_Dimension", ["Time"])[0] == "Time":
-        titles[0] = "time [s]"
-    layout = Layout(
-        path, encoding, header.separator, header.names, len(header.names), header.line + 1, True,
-        Style(header.decimal), frozenset(),
-    )  # fmt: skip
+class Lvm(Text):
+    """A .lvm file; ValueError if it has no segment with rows."""
 
-    def read(positions: Sequence[int], rows: int) -> Iterator[Rows]:
-        return _read(layout, positions, rows)
+    def __init__(self, path: Path) -> None:
+        self._path, self._encoding = path, encoding_of(path)
+        header = next((header for header, _ in self._segments(1)), None)
+        if header is None:
+            raise LogError(f"{path}: no rows below the header")
+        names = [name for name in header.names if name != COMMENT]
+        self._channels = [i for i, name in enumerate(names) if name != NAMES]
+        self._steps = header.entries.get("Delta_X", [])
+        titles = list(names)
+        for i, unit in zip(self._channels, header.entries.get("Y_Unit_Label", []), strict=False):
+            titles[i] = titled(names[i], unit)
+        # With a column of X for each channel, the first stands for all.
+        for k, i in enumerate(i for i, name in enumerate(names) if name == NAMES):
+            names[i] = titles[i] = f"{NAMES} {k + 1}" if k else NAMES
+        if header.first("X_Dimension", "Time") == "Time":
+            titles[0] = "time [s]"
+        layout = Layout(
+            path, self._encoding, header.separator, header.names, len(header.names), header.line + 1, True,
+            Style(header.decimal), {},
+        )  # fmt: skip
+        super().__init__(layout, names, titles)
+        self.width = len(names)
 
-    def count(positions: Sequence[int]) -> int:
-        return sum(lines.numbers.size for _, lines in _segments(path, encoding, 1 << 20))
-
-    def check(positions: Sequence[int]) -> None:
-        steps = header.entries.get("Delta_X", [])
-        used = {steps[channels.index(i)] for i in positions if i in channels[: len(steps)]}
+    def check(self, positions: Sequence[int]) -> None:
+        """Refuse channels of different rates."""
+        rated = self._channels[: len(self._steps)]
+        used = {self._steps[rated.index(i)] for i in positions if i in rated}
         if len(used) > 1:
-            raise ValueError(
-                f"{path}: the columns are sampled at different rates, Delta_X is {' and '.join(sorted(used))}"
+            raise LogError(
+                f"{self.path}: the columns are sampled at different rates, Delta_X is "
+                f"{' and '.join(sorted(used))}"
             )
 
-    return Source(
-        path, names, titles, len(names), read, count, path.stat().st_size, place="line", check=check
-    )
+    def lines(self, rows: int) -> Iterator[Lines]:
+        """Lines with samples."""
+        return (lines for _, lines in self._segments(rows))
 
+    def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:
+        """Yield blocks of at most so many rows."""
+        clock = _Clock(self.path)
+        for header, lines in self._segments(rows):
+            if header.names != self.layout.header:
+                raise LogError(
+                    f"{self.path}, line {header.line}: this segment has other columns than the first one: "
+                    "save it as a file of its own"
+                )
+            values = self.values(lines, positions)
+            if 0 in positions:
+                place = list(positions).index(0)
+                values[place] = clock.times(header, lines, values[place])
+            yield from self.cut(lines, values, rows)
 
-def _segments(path: Path, encoding: str, rows: int) -> Iterator[tuple[_Header, Lines]]:
-    """Rows, with the header above them; a new header object begins a new segment."""
-    header, in_rows, special = _Header(), False, False
-    for first, text, done in chunks(path, encoding, rows):
-        text = text.removesuffix("\n")
-        if in_rows and not HEADING.search("\n" + text):
-            yield header, Lines(np.arange(first, first + text.count("\n") + 1), text, done)
-            continue
-        kept: list[tuple[int, str]] = []
-        for line_number, line in numbered(first, text):
-            special = (special or line.startswith(START)) and not line.startswith(END)
-            key = line.split(header.separator)[0].strip()
-            if special or line.startswith("***"):
+    def _segments(self, rows: int) -> Iterator[tuple[_Header, Lines]]:
+        """Rows, with the header above them; a new header object begins a new segment."""
+        header, in_rows, special = _Header(), False, False
+        for first, text, done in chunks(self._path, self._encoding, rows):
+            if in_rows and not HEADING.search("\n" + text):
+                yield header, Lines.all(first, text, done)
                 continue
-            if key == NAMES:
-                names = [name.strip() for name in line.split(header.separator)]
-                header.names, header.line, in_rows = names, line_number, True
-            elif in_rows and line.strip() and key != "Channels":
-                kept.append((line_number, line))
-            elif in_rows and key == "Channels":
-                if kept:
-                    yield header, _joined(kept, done)
-                    kept = []
-                header = _Header(header.separator, header.decimal, dict(header.entries))
-                header.take(line)
-                in_rows = False
-            elif not in_rows:
-                header.take(line)
-        if kept:
-            yield header, _joined(kept, done)
-
-
-def _joined(kept: list[tuple[int, str]], done: int) -> Lines:
-    numbers = np.fromiter((line_number for line_number, _ in kept), np.int64, len(kept))
-    return Lines(numbers, "\n".join(line for _, line in kept), done)
-
-
-def _read(layout: Layout, positions: Sequence[int], rows: int) -> Iterator[Rows]:
-    values_of = Reader(layout, positions).values
-    clock = _Clock(layout.path)
-    for header, lines in _segments(layout.path, layout.encoding, rows):
-        if header.names != layout.header:
-            raise ValueError(
-                f"{layout.path}, line {header.line}: this segment has other columns than the first one: "
-                "save it as a file of its own"
-            )
-        text = lines.text
-        if layout.header[-1] == COMMENT and text.count(header.separator) == (layout.width - 2) * (
-            lines.numbers.size
-        ):
-            # Rows end before the comment where there is none; complete rows are read much faster.
-            text = text.replace("\n", f"{header.separator}\n") + header.separator
-        values = values_of(lines._replace(text=text))
-        if 0 in positions:
-            place = list(positions).index(0)
-            values[place] = clock.times(header, lines, values[place])
-        for start in range(0, lines.numbers.size, rows):
-            part = slice(start, start + rows)
-            yield Rows(lines.numbers[part], [each[part] for each in values], lines.done)
+            kept: list[tuple[int, str]] = []
+            for line_number, line in enumerate(text.split("\n"), first):
+                special = (special or line.startswith(START)) and not line.startswith(END)
+                key = line.split(header.separator)[0].strip()
+                if special or line.startswith("***"):
+                    continue
+                if key == NAMES:
+                    names = [name.strip() for name in line.split(header.separator)]
+                    header.names, header.line, in_rows = names, line_number, True
+                elif in_rows and key == "Channels":
+                    if kept:
+                        yield header, Lines.of(kept, done)
+                        kept = []
+                    header = _Header(header.separator, header.decimal, dict(header.entries))
+                    header.take(line)
+                    in_rows = False
+                elif in_rows and line.strip():
+                    kept.append((line_number, line))
+                elif not in_rows:
+                    header.take(line)
+            if kept:
+                yield header, Lines.of(kept, done)
 
 
 class _Clock:
@@ -175,34 +161,30 @@ class _Clock:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._header: _Header | None = None
-        self._start: int | None = None  # of the first segment [ns]
+        self._start: Any = None  # of the first segment
         self._last, self._shift, self._row = -np.inf, 0.0, 0
 
     def times(self, header: _Header, lines: Lines, x: FloatArray) -> FloatArray:
         """Times of rows, by their X_Value or, where the file has none, by X0 and Delta_X."""
         new = header is not self._header
         if new:
-            self._row = 0
-            self._start = header.begins if self._header is None else self._start
-            self._header = header
-        if header.entries.get("X_Columns", [""])[0] == "No" or not np.isfinite(x).any():
+            self._row, self._header = 0, header
+            self._start = header.begins if self._start is None else self._start
+        if header.first("X_Columns") == "No" or not np.isfinite(x).any():
             rows = np.arange(self._row, self._row + x.size)
             x = np.asarray(header.number("X0", 0.0) + header.number("Delta_X", np.nan) * rows)
         self._row += x.size
         known = x[np.isfinite(x)]
-        if new and known.size and known[0] <= self._last:
-            self._shift = self._shift_of(header)
-            if known[0] + self._shift <= self._last:
-                raise ValueError(
-                    f"{self._path}, line {lines.numbers[0]}: time begins anew with this segment, and no date "
-                    "and time above it says when: give the sample rate, or save the segments as files"
-                )
-        elif new:
+        if new:
             self._shift = 0.0
+            if known.size and known[0] <= self._last:
+                shift = (header.begins - self._start).total_seconds()
+                self._shift = 0.0 if np.isnan(shift) else shift
         times = x + self._shift
+        if new and known.size and known[0] + self._shift <= self._last:
+            raise LogError(
+                f"{self._path}, line {lines.numbers[0]}: time begins anew with this segment, and no date "
+                "and time above it says when: give the sample rate, or save the segments as files"
+            )
         self._last = float(known[-1] + self._shift) if known.size else self._last
         return times
-
-    def _shift_of(self, header: _Header) -> float:
-        begins = header.begins
-        return 0.0 if begins is None or self._start is None else (begins - self._start) / 1e9

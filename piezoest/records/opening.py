@@ -6,29 +6,26 @@ import importlib
 import zipfile
 from pathlib import Path
 
-from piezoest.records.source import Source
-from piezoest.records.text_lines import PACKED, beginning
+from piezoest.records.lines import PACKED, beginning
+from piezoest.records.source import LogError, Source
 
-# Name, what files begin with, endings of their names, and the function that opens them.
-FORMATS: tuple[tuple[str, tuple[bytes, ...], tuple[str, ...], str], ...] = (
-    ("Parquet", (b"PAR1",), (".parquet", ".pq"), "binary:open_parquet"),
-    ("HDF5", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), (".h5", ".hdf5", ".hdf", ".he5"), "hdf5:open_hdf5"),
-    ("MATLAB", (b"MATLAB 5.0",), (".mat",), "binary:open_mat"),
-    ("NumPy", (b"\x93NUMPY",), (".npy",), "binary:open_npy"),
-    ("TDMS", (b"TDSm",), (".tdms",), "tdms:open_tdms"),
-    (
-        "spreadsheet",
-        (b"PK\x03\x04", b"\xd0\xcf\x11\xe0"),
-        (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
-        "sheet:open_sheet",
-    ),
-    ("NumPy", (b"PK\x03\x04",), (".npz",), "binary:open_npz"),
-    ("LabVIEW", (b"LabVIEW Measurement", b"\xef\xbb\xbfLabVIEW Measurement"), (), "lvm:open_lvm"),
-)
 TEXT_ENDINGS = (".csv", ".txt", ".tsv", ".dat")
-TEXT = "text:open_text"
+SHEET_ENDINGS = (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods")
+ARCHIVE = b"PK\x03\x04"
+# Name, what files begin with, endings of their names, and what opens them.
+FORMATS: tuple[tuple[str, tuple[bytes, ...], tuple[str, ...], str], ...] = (
+    ("Parquet", (b"PAR1",), (".parquet", ".pq"), "parquet:Parquet"),
+    ("HDF5", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), (".h5", ".hdf5", ".hdf", ".he5"), "formats:open_hdf5"),
+    ("MATLAB", (b"MATLAB 5.0",), (), "formats:open_mat"),
+    ("NumPy", (b"\x93NUMPY",), (".npy",), "formats:open_npy"),
+    ("TDMS", (b"TDSm",), (".tdms",), "formats:open_tdms"),
+    ("spreadsheet", (ARCHIVE, b"\xd0\xcf\x11\xe0"), SHEET_ENDINGS, "frame:open_sheet"),
+    ("NumPy", (ARCHIVE,), (".npz",), "formats:open_npz"),
+    ("LabVIEW", (b"LabVIEW Measurement", b"\xef\xbb\xbfLabVIEW Measurement"), (), "lvm:Lvm"),
+    ("MATLAB", (), (".mat",), "formats:open_mat"),  # before version 5 it has no mark
+)
 # A file in the archive by which a spreadsheet is known.
-OF_SPREADSHEETS = frozenset({"xl/workbook.xml", "xl/workbook.bin", "content.xml"})
+OF_SPREADSHEETS = {"xl/workbook.xml", "xl/workbook.bin", "content.xml"}
 
 
 def open_source(path: Path) -> Source:
@@ -43,43 +40,37 @@ def open_source(path: Path) -> Source:
     MissingExtraError
         If its format needs a package that is not installed.
     """
-    start = beginning(path, 128)
-    ending = path.suffix.lower()
+    start, ending = beginning(path, 128), path.suffix.lower()
     if not start.strip():
-        raise ValueError(f"{path}: the file is empty")
+        raise LogError(f"{path}: the file is empty")
     with path.open("rb") as file:
         packed = file.read(2) == PACKED
-    for name, beginnings, endings, opener in FORMATS:
-        begins = start.startswith(beginnings) and _is_what_it_may_be(path, opener)
-        if begins and packed and name != "LabVIEW":
-            raise ValueError(f"{path}: a packed {name} file: unpack it first; only text is read packed")
-        if begins:
-            return _opened(opener, path)
-        # Files of MATLAB before version 5 have no mark.
-        if ending in endings and name != "MATLAB":
-            raise ValueError(
+    opener = "text:open_text"
+    for name, beginnings, endings, function in FORMATS:
+        if start.startswith(beginnings) and not (start.startswith(ARCHIVE) and _is_other(path, name)):
+            if packed and name != "LabVIEW":
+                raise LogError(f"{path}: a packed {name} file: unpack it first; only text is read packed")
+            opener = function
+            break
+        if ending in endings and not beginnings:
+            opener = function
+        elif ending in endings:
+            raise LogError(
                 f"{path}: this is no {name} file, although its name ends in {ending}: "
                 "it may be truncated, or of another format under a wrong name"
             )
-    return _opened("binary:open_mat" if ending == ".mat" else TEXT, path)
-
-
-def _is_what_it_may_be(path: Path, opener: str) -> bool:
-    """Whether an archive is a spreadsheet or NumPy's; true of all other formats."""
-    if opener not in ("sheet:open_sheet", "binary:open_npz"):
-        return True
-    names: frozenset[str] = frozenset()
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = frozenset(archive.namelist())
-    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
-        pass
-    if opener == "sheet:open_sheet":
-        return bool(names & OF_SPREADSHEETS) or path.suffix.lower() in (".xls", ".xlsx", ".xlsm", ".ods")
-    return path.suffix.lower() not in TEXT_ENDINGS
-
-
-def _opened(opener: str, path: Path) -> Source:
-    """Source of a file; what a format needs is imported only now."""
+    # What a format needs is imported only now.
     module, _, function = opener.partition(":")
     return getattr(importlib.import_module(f"piezoest.records.{module}"), function)(path)
+
+
+def _is_other(path: Path, name: str) -> bool:
+    """Whether an archive is not of the format."""
+    ending = path.suffix.lower()
+    if name != "spreadsheet":
+        return ending in TEXT_ENDINGS
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return ending not in SHEET_ENDINGS and OF_SPREADSHEETS.isdisjoint(archive.namelist())
+    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError):
+        return ending not in SHEET_ENDINGS

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, fraction, positive
-from piezoest.records.columns import choose
 from piezoest.records.frame import frame_source
-from piezoest.records.opening import open_source
-from piezoest.records.source import ROWS
-from piezoest.records.stream import FEWEST_ROWS, RecordStream, sane
-from piezoest.records.timing import scan
+from piezoest.records.stream import RecordStream, sane, without_gaps
 from piezoest.records.writing import write_columns
 
 if TYPE_CHECKING:
@@ -126,7 +122,7 @@ class Record:
         1000.0
         """
         source = frame_source(frame)
-        return _record(RecordStream(source, columns=columns, units=units, sample_rate=sample_rate))
+        return _record(RecordStream(source, columns=columns, units=units, sample_rate=sample_rate, held=True))
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -163,16 +159,8 @@ class Record:
         return self._cut(slice(0, cut)), self._cut(slice(cut, None))
 
     def _cut(self, part: slice) -> Record:
-        unusable = int(np.sum(~self.usable[part]))
-        return Record(
-            self.time[part],
-            self.voltage[part],
-            self.displacement[part],
-            self.sample_rate,
-            self.source,
-            unusable,
-            self.notes,
-        )
+        kept = {name: getattr(self, name)[part] for name in ("time", "voltage", "displacement")}
+        return replace(self, **kept, skipped=int(np.sum(~self.usable[part])))
 
     def write(self, path: str | Path) -> None:
         """Write the columns time_s, voltage_V, displacement_um in any format that `read_record` reads.
@@ -252,12 +240,15 @@ def read_record(
     >>> len(record), record.sample_rate
     (14155, 200.0)
     """
-    return _record(RecordStream(path, columns=columns, units=units, sample_rate=sample_rate))
+    return _record(RecordStream(path, columns=columns, units=units, sample_rate=sample_rate, held=True))
 
 
 def _record(stream: RecordStream) -> Record:
-    blocks = list(stream)
-    time, voltage, displacement = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    columns, count = np.empty((3, stream.count())), 0
+    for block in stream:
+        columns[:, count : count + block.time.size] = block
+        count += block.time.size
+    time, voltage, displacement = columns
     notes = list(stream.notes)
     if skipped := int(np.sum(~(np.isfinite(voltage) & np.isfinite(displacement)))):
         noun = "sample is" if skipped == 1 else "samples are"
@@ -294,33 +285,11 @@ def read_reference(
     """
     from piezoest.signals import Signal
 
-    source = open_source(Path(path))
-    wanted = ("reference",) if sample_rate is not None else ("time", "reference")
-    chosen = choose(source, wanted, {} if column is None else {"reference": column}, {})
-    positions = [chosen[quantity].position for quantity in wanted]
-    source.check(positions)
-    blocks = list(source.read(positions, ROWS))
-    if not blocks:
-        raise ValueError(f"{path}: the file has no rows")
-    numbers = np.concatenate([block.numbers for block in blocks])
-    values = [
-        chosen[quantity].factor * np.concatenate([block.values[i] for block in blocks])
-        for i, quantity in enumerate(wanted)
-    ]
-    bad = np.flatnonzero(~np.all(np.isfinite(values), axis=0))
-    if bad.size:
-        raise ValueError(
-            f"{path}, {source.place} {numbers[bad[0]]}: no number in the time or the reference; "
-            "a reference must have no gaps"
-        )
-    if numbers.size < FEWEST_ROWS:
-        raise ValueError(f"{path}: only {numbers.size} rows, at least {FEWEST_ROWS} are needed")
-    if sample_rate is None:
-        timing = scan(str(path), source.place, lambda: [(numbers, values[0])])
-        if timing.usual is not None and timing.samples > timing.rows:
-            gap = int(np.argmax(np.rint(np.diff(values[0]) / timing.usual) > 1.0))
-            raise ValueError(
-                f"{path}, {source.place} {numbers[gap + 1]}: time jumps here; a reference must have no gaps"
-            )
-        sample_rate = timing.sample_rate
-    return Signal(values[-1], sample_rate, None, Path(path).stem)
+    log = RecordStream(
+        path,
+        columns={} if column is None else {"reference": column},
+        sample_rate=sample_rate,
+        wanted=("reference",),
+        held=True,
+    )
+    return Signal(without_gaps(log), log.sample_rate, None, Path(path).stem)

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+import abc
+import contextlib
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from piezoest._checks import FloatArray
 
-# Default number of rows that are read at a time: some megabytes.
+EXTRA = "formats"
+# Rows that are read at a time where nobody says how many: some megabytes.
 ROWS = 1 << 17
-
-
 # A file may declare numbers for some 30 million rows, or for so many times its own size: what compresses
 # better is no log, and would fill the memory.
 PLENTY, MOST_PACKED = 1 << 28, 200
 LONGEST_SHOWN = 60
+# Names under which a file may state its sample rate [Hz], in lower case.
+RATES = ("fs", "f_s", "sample_rate", "samplerate", "sampling_rate", "sample_rate_hz")
+
+
+class LogError(ValueError):
+    """A log cannot be read; the sentence is complete and names the file."""
 
 
 class Rows(NamedTuple):
@@ -27,9 +33,9 @@ class Rows(NamedTuple):
     Parameters
     ----------
     numbers : ndarray of int64, shape (n,)
-        Number of each row in its file.
+        Number of each row in its file, the first being 1.
     values : list of ndarray, shape (n,)
-        The columns.
+        The columns, NaN where there is no number.
     done : int
         Bytes or rows of the file that are read by then, see `Source`.
     """
@@ -39,8 +45,7 @@ class Rows(NamedTuple):
     done: int
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
+class Source(abc.ABC):
     """A file with columns.
 
     Parameters
@@ -54,46 +59,58 @@ class Source:
         columns have no names.
     width : int
         Number of columns.
-    read : callable
-        ``read(positions, rows)`` yields blocks of at most so many rows of the columns at these positions.
-    count : callable
-        ``count(positions)`` is the number of rows of these columns.
-    size : int
-        Bytes of a file whose `Rows.done` counts bytes; 0 where it counts rows.
+
+    Attributes
+    ----------
     place : str
         What the file calls a row: ``"line"`` or ``"row"``.
+    size : int
+        Bytes of a file whose `Rows.done` counts bytes; 0 where it counts rows.
     whole : str
         Why the file cannot be read in parts; empty if it can.
-    sample_rate : float, optional
+    sample_rate : float or None
         [Hz], if the file states it beside the columns.
-    check : callable
-        ``check(positions)`` refuses columns that do not belong together.
     """
 
-    path: Path
-    names: list[str]
-    titles: list[str]
-    width: int
-    read: Callable[[Sequence[int], int], Iterator[Rows]]
-    count: Callable[[Sequence[int]], int]
-    size: int = 0
-    place: str = "row"
-    whole: str = ""
+    place: ClassVar[str] = "row"
+    size = 0
+    whole = ""
     sample_rate: float | None = None
-    check: Callable[[Sequence[int]], None] = lambda positions: None
+
+    def __init__(self, path: Path, names: list[str], titles: list[str], width: int) -> None:
+        self.path, self.names, self.titles, self.width = path, names, titles, width
+
+    @abc.abstractmethod
+    def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:
+        """Yield blocks of at most so many rows of the columns at these positions."""
+
+    @abc.abstractmethod
+    def count(self, positions: Sequence[int]) -> int:
+        """Number of rows of these columns."""
+
+    def check(self, positions: Sequence[int]) -> None:  # noqa: B027
+        """Refuse columns that do not belong together."""
+
+
+@contextlib.contextmanager
+def damaged(path: Path, format_: str) -> Iterator[None]:
+    """Turn whatever a library raises about a damaged file into one sentence."""
+    try:
+        yield
+    except LogError:
+        raise
+    except Exception as error:
+        # None of them keeps to exceptions of its own: IndexError, TypeError and MemoryError happen too.
+        raise LogError(
+            f"{path}: cannot be read as {format_}, it may be truncated: {shown(str(error), 200)}"
+        ) from None
 
 
 def check_size(path: Path, size: int) -> None:
-    """Refuse a file that declares more bytes of numbers than a log of its size can hold.
-
-    Raises
-    ------
-    ValueError
-        If so.
-    """
+    """Refuse a file that declares more bytes of numbers than a log of its size can hold."""
     held = path.stat().st_size
     if size > max(PLENTY, MOST_PACKED * held):
-        raise ValueError(
+        raise LogError(
             f"{path}: a file of {held / 1e6:.3g} MB that declares {size / 1e6:.3g} MB of numbers is damaged "
             "or no log"
         )
@@ -103,3 +120,32 @@ def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
     """Text of a file for a message: its beginning, if it is long, on one line, and nothing but signs."""
     text = " ".join(text[:longest].split()) + ("…" if len(text) > longest else "")
     return "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text)
+
+
+def stated_rate(value: Any) -> float | None:
+    """Sample rate that a file states [Hz]; None if it is not one number above zero."""
+    try:
+        number = float(np.asarray(value).reshape(()))
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return number if 0.0 < number < np.inf else None
+
+
+def finite(values: Any) -> FloatArray:
+    """Values as float64, with NaN for infinity."""
+    numbers = np.array(values, dtype=np.float64)
+    numbers[~np.isfinite(numbers)] = np.nan
+    return numbers
+
+
+def floats(values: Any, origin: Any = None) -> FloatArray:
+    """Numbers of a Series of pandas; times of day as seconds since `origin`, by default the earliest.
+
+    Nanoseconds since 1970 have no room in a float; their differences have.
+    """
+    if values.dtype.kind == "M":
+        values = values - (values.min() if origin is None else origin)
+    if values.dtype.kind == "m":
+        values = values.dt.total_seconds()
+    # A missing value of pandas' own types is no number for NumPy.
+    return finite(values.to_numpy(dtype=np.float64, na_value=np.nan))

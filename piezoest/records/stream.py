@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,14 +46,12 @@ class RecordStream:
     ----------
     path : str, Path or Source
         As for `read_record`, or what is open already.
-    columns, units : mapping of str to str, optional
-        As for `read_record`.
-    sample_rate : float, optional
-        [Hz], as for `read_record`.
-    rows : int
-        Rows of the file that are read at a time, at least 1; a block has at most about as many samples.
-    progress : callable, optional
+    columns, units, sample_rate, rows, progress
         As for `stream_record`.
+    wanted : tuple of str
+        Quantities beside time.
+    held : bool
+        Whether the columns are read once, and held in memory.
 
     Raises
     ------
@@ -64,7 +61,7 @@ class RecordStream:
         As `read_record`.
     """
 
-    __slots__ = ("_chosen", "_rows", "_source", "_timing", "notes", "sample_rate")
+    __slots__ = ("_chosen", "_held", "_positions", "_rows", "_source", "_timing", "notes", "sample_rate")
 
     #: [Hz].
     sample_rate: float
@@ -80,8 +77,10 @@ class RecordStream:
         sample_rate: float | None = None,
         rows: int = ROWS,
         progress: Progress | None = None,
+        wanted: tuple[str, ...] = ("voltage", "displacement"),
+        held: bool = False,
     ) -> None:
-        named, stated = dict(columns or {}), dict(units or {})
+        named = dict(columns or {})
         self._rows = integer("rows", rows, 1)
         self._source = source = path if isinstance(path, Source) else open_source(Path(path))
         notes = []
@@ -89,14 +88,15 @@ class RecordStream:
             sample_rate = source.sample_rate
             notes.append(f"sample rate of {sample_rate:g} Hz as the file states it")
         timed = ("time",) if sample_rate is None else ()
-        self._chosen = choose(source, (*timed, "voltage", "displacement"), named, stated)
-        source.check([column.position for column in self._chosen.values()])
-        self._timing = None
+        self._chosen = choose(source, (*timed, *wanted), named, dict(units or {}))
+        self._positions = [column.position for column in self._chosen.values()]
+        source.check(self._positions)
+        self._held = list(source.read(self._positions, ROWS)) if held else None
+        self._timing: Timing | None = None
         if sample_rate is None:
-            self._timing = _scan(source, self._chosen["time"], progress)
-            self.sample_rate = self._timing.sample_rate
-        else:
-            self.sample_rate = positive("sample_rate", sample_rate)
+            self._timing = scan(str(source.path), source.place, lambda: self._times(progress))
+            sample_rate = self._timing.sample_rate
+        self.sample_rate = positive("sample_rate", sample_rate)
         self.notes = (*notes, *_notes(source, self._chosen), *(self._timing.notes if self._timing else ()))
 
     def __repr__(self) -> str:
@@ -116,7 +116,9 @@ class RecordStream:
         """Return the number of samples; of text without a column of time, its lines are counted."""
         if self._timing is not None:
             return self._timing.samples
-        return self._source.count([column.position for column in self._chosen.values()])
+        if self._held is not None:
+            return sum(block.numbers.size for block in self._held)
+        return self._source.count(self._positions)
 
     def __iter__(self) -> Iterator[Block]:
         """Yield the log in blocks, from its start."""
@@ -148,27 +150,40 @@ class RecordStream:
         ...     pass
         100%
         """
-        first = usable = 0
-        for voltage, displacement in self._samples(progress):
-            voltage, displacement = sane(voltage), sane(displacement)
-            time = (
-                np.arange(first, first + voltage.size) / self.sample_rate
-                if self._timing is None
-                else self._timing.times(first, voltage.size)
-            )
-            first += voltage.size
-            usable += int(np.sum(np.isfinite(voltage) & np.isfinite(displacement)))
-            yield Block(time, voltage, displacement)
+        usable = 0
+        for time, voltage, displacement in self._samples(progress):
+            block = Block(time, sane(voltage), sane(displacement))
+            usable += int(np.sum(np.isfinite(block.voltage) & np.isfinite(block.displacement)))
+            yield block
         if usable < FEWEST_ROWS:
             raise ValueError(f"{self.path}: only {usable} usable rows, at least {FEWEST_ROWS} are needed")
 
-    def _samples(self, progress: Progress | None) -> Iterator[list[FloatArray]]:
-        columns = list(self._chosen.values())
-        blocks = _converted(self._source, columns, self._rows, progress)
-        if self._timing is None:
-            yield from (values for _, values in blocks)
-        else:
-            yield from placed(self._timing, ((values[0], values[1:]) for _, values in blocks))
+    def _samples(self, progress: Progress | None = None) -> Iterator[list[FloatArray]]:
+        """Yield blocks of time and the wanted columns, evenly sampled, NaN where a row is missing."""
+        blocks = (block.values for block in self._read(rows=self._rows, progress=progress))
+        first = 0
+        for values in blocks if self._timing is None else placed(self._timing, blocks):
+            count = values[0].size
+            even = np.arange(first, first + count) / self.sample_rate
+            yield [even if self._timing is None else self._timing.times(first, count), *values]
+            first += count
+
+    def _read(self, *quantities: str, rows: int = ROWS, progress: Progress | None = None) -> Iterator[Rows]:
+        """Yield blocks of the file's rows, in s, V and µm."""
+        columns = [self._chosen[quantity] for quantity in quantities or self._chosen]
+        positions = [column.position for column in columns]
+        places = [self._positions.index(position) for position in positions]
+        total = self._source.size or self._source.count(positions)
+        for block in self._source.read(positions, rows) if self._held is None else self._held:
+            kept = block.values if self._held is None else [block.values[k] for k in places]
+            yield block._replace(values=[c.factor * each for c, each in zip(columns, kept, strict=True)])
+            if progress is not None and block.done < total:
+                progress(block.done, total)
+        if progress is not None:
+            progress(total, total)
+
+    def _times(self, progress: Progress | None) -> Iterator[tuple[Any, FloatArray]]:
+        return ((block.numbers, block.values[0]) for block in self._read("time", progress=progress))
 
 
 def stream_record(
@@ -199,9 +214,10 @@ def stream_record(
     columns, units : mapping of str to str, optional
         As for `read_record`.
     sample_rate : float, optional
-        [Hz], as for `read_record`. Without it the column of time is read twice before the first block.
+        [Hz], as for `read_record`. Without it the column of time is read before the first block, twice where
+        it is uneven.
     rows : int
-        Rows of the file that are read at a time, at least 1.
+        Rows of the file that are read at a time, at least 1; a block has at most about as many samples.
     progress : callable, optional
         ``progress(done, total)`` is called while the column of time is read, as by `RecordStream.blocks`
         while the blocks are.
@@ -235,39 +251,15 @@ def stream_record(
     return stream
 
 
+def sane(values: FloatArray) -> FloatArray:
+    """Values with NaN for what no stage can have."""
+    return np.where(np.abs(values) < WILDEST, values, np.nan)
+
+
 def _states_its_rate(source: Source) -> bool:
     if source.sample_rate is None:
         return False
     return not has_column(source, "time") if source.titles else source.width == 2
-
-
-def _scan(source: Source, column: Column, progress: Progress | None) -> Timing:
-    passes = itertools.count()
-
-    def times() -> Iterator[tuple[object, FloatArray]]:
-        before = next(passes)
-
-        def both(done: int, total: int) -> None:
-            if progress is not None:
-                progress(before * total + done, 2 * total)
-
-        return ((rows.numbers, values[0]) for rows, values in _converted(source, [column], ROWS, both))
-
-    return scan(str(source.path), source.place, times)
-
-
-def _converted(
-    source: Source, columns: list[Column], rows: int, progress: Progress | None
-) -> Iterator[tuple[Rows, list[FloatArray]]]:
-    """Blocks of columns in s, V and µm."""
-    positions = [column.position for column in columns]
-    total = source.size or source.count(positions)
-    for block in source.read(positions, rows):
-        yield block, [column.factor * values for column, values in zip(columns, block.values, strict=True)]
-        if progress is not None and block.done < total:
-            progress(block.done, total)
-    if progress is not None:
-        progress(total, total)
 
 
 def _notes(source: Source, chosen: dict[str, Column]) -> list[str]:
@@ -279,6 +271,18 @@ def _notes(source: Source, chosen: dict[str, Column]) -> list[str]:
     return said
 
 
-def sane(values: FloatArray) -> FloatArray:
-    """Values with NaN for what no stage can have."""
-    return np.where(np.abs(values) < WILDEST, values, np.nan)
+def without_gaps(log: RecordStream) -> FloatArray:
+    """Return the one column of a log, evenly sampled; ValueError that names the line of a gap."""
+    where, count = f"{log.path}, {log._source.place}", 0
+    for block in log._read():
+        count += block.numbers.size
+        if not np.isfinite(block.values).all():
+            bad = block.numbers[~np.isfinite(block.values).all(axis=0)][0]
+            raise ValueError(
+                f"{where} {bad}: no number in the time or the reference; a reference must have no gaps"
+            )
+    if count < FEWEST_ROWS:
+        raise ValueError(f"{log.path}: only {count} rows, at least {FEWEST_ROWS} are needed")
+    if log._timing is not None and log._timing.samples > count:
+        raise ValueError(f"{where} {log._timing.jump}: time jumps here; a reference must have no gaps")
+    return np.concatenate([values for _, values in log._samples()])

@@ -1,194 +1,253 @@
-"""Columns of a text file, in blocks: by the readers of Arrow or NumPy where they can, else cell by cell."""
+"""Columns of a text file: how it is written is recognised here, and pandas reads it."""
 
 from __future__ import annotations
 
-import functools
-import importlib.util
+import csv
 import io
-import math
-from collections.abc import Iterable, Iterator, Sequence
+import itertools
+import warnings
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.records.columns import split_unit
-from piezoest.records.source import Rows, Source, shown
-from piezoest.records.text_cells import MISSING, number, seconds, stamp
-from piezoest.records.text_layout import Layout, layout_of, split
-from piezoest.records.text_lines import Lines, sample_lines
+from piezoest.records.cells import MISSING, Style, is_missing, is_number, is_stamp, number, style_of
+from piezoest.records.columns import titled
+from piezoest.records.lines import Lines, chunks, encoding_of, sample_lines
+from piezoest.records.source import LogError, Rows, Source, finite, floats, shown
 
-# Below this size [bytes], Arrow takes longer to load than it saves.
-WORTH_ARROW = 1 << 23
-# One block of Arrow's must hold a whole one of ours; bytes beside characters that take several.
-ARROW_ROOM = 1 << 20
-ARROW_MISSING = sorted(MISSING | {word.upper() for word in MISSING} | {"NaN", "None", "Null"})
+# Blank lines among the others: more are the way the file is written, fewer are samples that were lost.
+MOST_BLANK = 0.1
+# Lines by which the layout is recognised, and rows in which a time stamp is looked for.
+HEAD_LINES, STAMP_ROWS = 10_000, 100
 
 
-def open_text(path: Path) -> Source:
-    """Open a text file with one row per sample; ValueError if it is none."""
-    layout = layout_of(path)
+class Layout(NamedTuple):
+    """How a text file is written.
 
-    def lines(rows: int) -> Iterator[Lines]:
-        return sample_lines(path, layout.encoding, layout.begins, layout.skip_blank, rows)
+    Parameters
+    ----------
+    path : Path
+        The file.
+    encoding, delimiter : str
+        A blank stands for any number of them.
+    header : list of str
+        Names of columns; empty if there are none.
+    width : int
+        Number of columns.
+    begins : int
+        Number of the first line with a sample.
+    skip_blank : bool
+        Whether blank lines are the way it is written, and not samples that were lost.
+    style : Style
+        How numbers are written.
+    stamps : dict of int to Timestamp
+        The first time stamp of the columns that hold such.
+    """
 
-    def read(positions: Sequence[int], rows: int) -> Iterator[Rows]:
-        return read_lines(layout, lines(rows), positions, rows)
+    path: Path
+    encoding: str
+    delimiter: str
+    header: list[str]
+    width: int
+    begins: int
+    skip_blank: bool
+    style: Style
+    stamps: dict[int, Any]
 
-    def count(positions: Sequence[int]) -> int:
-        return sum(block.numbers.size for block in lines(1 << 20))
 
-    # Time stamps come out in seconds, whatever the header says.
-    titles = [
-        f"{split_unit(name)[0]} [s]" if i in layout.stamps else name for i, name in enumerate(layout.header)
+def layout_of(path: Path) -> Layout:
+    """Recognise the layout; ValueError if the file is no log, or its numbers can be read in two ways."""
+    encoding = encoding_of(path)
+    lines = itertools.chain.from_iterable(
+        enumerate(text.split("\n"), first) for first, text, _ in chunks(path, encoding, 1000)
+    )
+    head = [
+        (place, line)
+        for place, line in itertools.islice(lines, HEAD_LINES)
+        if not line.lstrip().startswith("#")
     ]
-    size = path.stat().st_size
-    return Source(path, layout.header, titles, layout.width, read, count, size, place="line")
+    filled = [(place, line) for place, line in head if line.strip()]
+    if not filled:
+        raise LogError(f"{path}: the file is empty")
+    between = sum(filled[0][0] < place < filled[-1][0] for place, line in head if not line.strip())
+    delimiter = next((mark for mark in ";\t,|" if mark in filled[0][1]), " ")
+    first = split(path, [filled[0][1]], delimiter)[0]
+    header = [] if all(map(is_number, first)) else [cell.strip() for cell in first]
+    if header and len(filled) == 1:
+        raise LogError(f"{path}: no rows below the header")
+    rows = filled[1:] if header else filled
+    texts = [line for _, line in rows]
+    stamps: dict[int, Any] = {}
+    if any(":" in line for line in texts[:STAMP_ROWS]):
+        for row in split(path, texts[:STAMP_ROWS], delimiter):
+            for i, cell in enumerate(row):
+                if i not in stamps and is_stamp(cell):
+                    stamps[i] = _stamps([cell])[0]
+    return Layout(
+        path, encoding, delimiter, header, len(first), rows[0][0], between > MOST_BLANK * len(filled),
+        _style(path, texts, delimiter), stamps,
+    )  # fmt: skip
 
 
-def read_lines(
-    layout: Layout, blocks: Iterable[Lines], positions: Sequence[int], rows: int
-) -> Iterator[Rows]:
-    """Columns at these positions, in blocks of at most so many rows."""
-    values_of = Reader(layout, positions).values
-    for block in blocks:
-        values = values_of(block)
-        for start in range(0, block.numbers.size, rows):
-            part = slice(start, start + rows)
-            yield Rows(block.numbers[part], [each[part] for each in values], block.done)
+def _style(path: Path, lines: list[str], delimiter: str) -> Style:
+    # Where commas stand between numbers, one with a comma has quotation marks.
+    mark = '"' if delimiter == "," else ","
+    if not any(mark in line for line in lines):
+        # Without any mark in the beginning, either may come later.
+        return Style("." if delimiter == "," or any("." in line for line in lines) else ".,")
+    try:
+        return style_of(cell for row in split(path, lines, delimiter) for cell in row)
+    except LogError:
+        raise
+    except ValueError as error:
+        raise LogError(f"{path}: {error}") from None
 
 
-class Reader:
-    """Reads columns of one file, block after block.
+def split(path: Path, lines: list[str], delimiter: str) -> list[list[str]]:
+    """Cells of lines; ValueError if they are no table."""
+    if delimiter == " ":
+        return [line.split() for line in lines]
+    try:
+        rows = list(csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=False))
+    except csv.Error as error:
+        raise LogError(f"{path}: cannot be read as a table: {error}") from None
+    if len(rows) != len(lines) or (len(lines) == 1 and lines[0].count('"') % 2):
+        raise LogError(f"{path}: a quotation mark is left open")
+    return rows
+
+
+class Text(Source):
+    """A text file with one row per sample.
 
     Parameters
     ----------
     layout : Layout
-        How the file is written.
-    positions : sequence of int
-        Columns that are wanted.
+        How it is written.
+    names, titles : list of str
+        As for `Source`.
     """
 
-    def __init__(self, layout: Layout, positions: Sequence[int]) -> None:
-        self._layout, self._positions = layout, positions
-        self._origins: dict[int, int] = {}
-        self._stamped = layout.stamps.intersection(positions)
-        arrow = importlib.util.find_spec("pyarrow") and layout.delimiter != " "
-        self._arrow = bool(arrow and layout.path.stat().st_size >= WORTH_ARROW)
+    place = "line"
 
-    def values(self, block: Lines) -> list[FloatArray]:
-        """Columns of a block; ValueError that names line and column if a cell holds something else."""
-        text = self._with_points(block.text)
-        if text is not None:
-            for reader in (self._by_arrow, self._by_numpy):
-                if (found := reader(text, block.numbers.size)) is not None:
-                    return found
-        lines = block.text.split("\n")
-        cells = split(self._layout.path, lines, self._layout.delimiter)
-        self._check_width(block.numbers, cells)
-        return [self._by_cells(block.numbers, cells, position) for position in self._positions]
+    def __init__(self, layout: Layout, names: list[str], titles: list[str]) -> None:
+        super().__init__(layout.path, names, titles, layout.width)
+        self.layout = layout
+        self.size = layout.path.stat().st_size
 
-    def _with_points(self, text: str) -> str | None:
-        """The text with decimal points; None if cells have to be looked at one by one."""
-        style, delimiter = self._layout.style, self._layout.delimiter
-        if style.thousands:
+    def lines(self, rows: int) -> Iterator[Lines]:
+        """Lines with samples."""
+        layout = self.layout
+        return sample_lines(layout.path, layout.encoding, layout.begins, layout.skip_blank, rows)
+
+    def count(self, positions: Sequence[int]) -> int:
+        """Number of rows, for which the file is read."""
+        return sum(block.numbers.size for block in self.lines(1 << 20))
+
+    def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:
+        """Yield blocks of at most so many rows."""
+        for block in self.lines(rows):
+            yield from self.cut(block, self.values(block, positions), rows)
+
+    def cut(self, block: Lines, values: list[FloatArray], rows: int) -> Iterator[Rows]:
+        """Yield what was read of lines in blocks of at most so many rows."""
+        for start in range(0, block.numbers.size, rows):
+            part = slice(start, start + rows)
+            yield Rows(block.numbers[part], [each[part] for each in values], block.done)
+
+    def values(self, block: Lines, positions: Sequence[int]) -> list[FloatArray]:
+        """Columns of lines; ValueError that names line and column if a cell holds something else."""
+        table = self._table(block)
+        if table is not None and all(
+            i in self.layout.stamps or table[i].dtype.kind in "fiu" for i in positions
+        ):
+            cells = {i: table[i] for i in positions}
+        else:
+            rows = self._rows(block)
+            cells = {i: [row[i].strip() if i < len(row) else "" for row in rows] for i in positions}
+        return [self._column(block, i, cells[i]) for i in positions]
+
+    def _table(self, block: Lines) -> Any:
+        """DataFrame of lines, with text in columns that hold something else; None if that cannot be."""
+        text, style, delimiter = block.text, self.layout.style, self.layout.delimiter
+        if style.thousands or ("." not in style.decimal and (delimiter == "," or "." in text)):
             return None
-        if delimiter == ",":
-            return text if "." in style.decimal else None
-        if style.decimal == ",":
-            return None if "." in text else text.replace(",", ".")
-        return text.replace(",", ".") if "," in style.decimal else text
+        if "," in style.decimal and delimiter != ",":
+            text = text.replace(",", ".")
+        import pandas as pd
 
-    def _by_arrow(self, text: str, count: int) -> list[FloatArray] | None:
-        if not self._arrow:
-            return None
-        import pyarrow
-        from pyarrow import csv
-
-        names = [str(i) for i in range(self._layout.width)]
-        wanted = [names[i] for i in self._positions]
-        for zone in (None, "UTC") if self._stamped else (None,):
-            times = pyarrow.timestamp("ns", zone)
-            kinds = [times if i in self._stamped else pyarrow.float64() for i in self._positions]
-            try:
-                table = csv.read_csv(
-                    io.BytesIO(text.encode()),
-                    csv.ReadOptions(column_names=names, use_threads=False, block_size=len(text) + ARROW_ROOM),
-                    csv.ParseOptions(delimiter=self._layout.delimiter, ignore_empty_lines=False),
-                    csv.ConvertOptions(
-                        include_columns=wanted,
-                        column_types=dict(zip(wanted, kinds, strict=True)),
-                        null_values=ARROW_MISSING,
-                    ),
-                )
-            except pyarrow.ArrowException:
-                continue
-            if table.num_rows == count:
-                return [self._of_arrow(table.column(str(i)).to_numpy(), i) for i in self._positions]
-        return None
-
-    def _of_arrow(self, values: Any, position: int) -> FloatArray:
-        if position in self._stamped:
-            return seconds(values, self._origins, position)
-        return _finite(values.astype(np.float64))
-
-    def _by_numpy(self, text: str, count: int) -> list[FloatArray] | None:
-        """As `_by_arrow`, where every field is there and holds a number."""
-        layout, blanks = self._layout, self._layout.delimiter == " "
-        complete = blanks or text.count(layout.delimiter) == (layout.width - 1) * count
-        if self._stamped or '"' in text or not complete:
-            return None
         try:
-            values = np.loadtxt(
-                text.split("\n"),
-                delimiter=None if blanks else layout.delimiter,
-                usecols=None if blanks else self._positions,
-                comments=None,
-                ndmin=2,
-            )
-        except ValueError:
-            return None
-        if len(values) != count or (blanks and values.shape[1] != layout.width):
-            return None
-        places = self._positions if blanks else range(len(self._positions))
-        return [_finite(values[:, place].copy()) for place in places]
-
-    def _check_width(self, numbers: np.ndarray[Any, Any], cells: list[list[str]]) -> None:
-        width = self._layout.width
-        for line, row in zip(numbers, cells, strict=True):
-            if len(row) > width and any(cell.strip() for cell in row[width:]):
-                raise ValueError(
-                    f"{self._layout.path}, line {line}: {len(row)} fields, where the first row has {width}"
+            with warnings.catch_warnings():
+                # It only warns of a first row that is too long.
+                warnings.simplefilter("error", pd.errors.ParserWarning)
+                table = pd.read_csv(
+                    io.StringIO(text),
+                    sep=r"\s+" if delimiter == " " else delimiter,
+                    header=None,
+                    names=list(range(self.layout.width + 1)),
+                    index_col=False,
+                    na_values=MISSING,
+                    keep_default_na=False,
+                    skip_blank_lines=False,
+                    skipinitialspace=True,
+                    low_memory=False,
                 )
+        except (ValueError, pd.errors.ParserWarning):
+            return None
+        whole = len(table) == block.numbers.size and table[self.layout.width].isna().all()
+        return table if whole else None
 
-    def _by_cells(self, numbers: np.ndarray[Any, Any], cells: list[list[str]], position: int) -> FloatArray:
-        layout, stamped = self._layout, position in self._stamped
-        values = np.full(len(cells), np.nan)
-        ticks = np.full(len(cells), np.datetime64("NaT"), "datetime64[ns]")
-        read = stamp if stamped else functools.partial(number, style=layout.style)
-        for k, row in enumerate(cells):
-            cell = row[position].strip() if position < len(row) else ""
-            try:
-                value = read(cell)
-            except ValueError:
-                if cell.lower() not in MISSING:
-                    title = layout.header[position] if layout.header else str(position + 1)
-                    what = "a time stamp such as 2026-11-22 10:00:00.005" if stamped else "a number"
-                    raise ValueError(
-                        f"{layout.path}, line {numbers[k]}, column {shown(title)!r}: {shown(cell)!r} is "
-                        f"not {what}"
-                    ) from None
-                continue
-            if value is None:
-                continue
-            if stamped:
-                ticks[k] = np.datetime64(int(value), "ns")
-            elif math.isfinite(value):
-                values[k] = value
-        return seconds(ticks, self._origins, position) if stamped else values
+    def _rows(self, block: Lines) -> list[list[str]]:
+        """Cells one by one, for numbers that are written in other ways, and to name the one that is none."""
+        rows = split(self.path, block.text.split("\n"), self.layout.delimiter)
+        width = self.layout.width
+        for line, row in zip(block.numbers, rows, strict=True):
+            if any(cell.strip() for cell in row[width:]):
+                raise LogError(
+                    f"{self.path}, line {line}: {len(row)} fields, where the first row has {width}"
+                )
+        return rows
+
+    def _column(self, block: Lines, position: int, cells: Any) -> FloatArray:
+        origin, bad, what = self.layout.stamps.get(position), -1, "a number"
+        if origin is not None:
+            values, what = floats(_stamps(cells), origin), "a time stamp such as 2026-11-22 10:00:00.005"
+            unknown = np.flatnonzero(np.isnan(values)).tolist()
+            bad = next((k for k in unknown if not is_missing(str(cells[k]))), -1)
+        elif isinstance(cells, list):
+            values = np.full(len(cells), np.nan)
+            for k, cell in enumerate(cells):
+                try:
+                    values[k] = number(cell, self.layout.style)
+                except ValueError:
+                    if not is_missing(cell):
+                        bad = k
+                        break
+        else:
+            values = cells.to_numpy()
+        if bad >= 0:
+            title = self.layout.header[position] if self.layout.header else str(position + 1)
+            cell = self._rows(block)[bad][position].strip()
+            raise LogError(
+                f"{self.path}, line {block.numbers[bad]}, column {shown(title)!r}: {shown(cell)!r} is "
+                f"not {what}"
+            )
+        return finite(values)
 
 
-def _finite(values: FloatArray) -> FloatArray:
-    values[~np.isfinite(values)] = np.nan
-    return values
+def _stamps(cells: Any) -> Any:
+    """Series of times, in UTC where a time zone is given."""
+    import pandas as pd
+
+    words = pd.Series(cells, dtype=str).str.strip().str.replace(",", ".")
+    return pd.to_datetime(words, format="ISO8601", utc=True, errors="coerce")
+
+
+def open_text(path: Path) -> Text:
+    """Open a text file with one row per sample; ValueError if it is none."""
+    layout = layout_of(path)
+    # Time stamps come out in seconds, whatever the header says.
+    titles = [titled(name, "s" if i in layout.stamps else "") for i, name in enumerate(layout.header)]
+    return Text(layout, layout.header, titles)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.records.source import LogError
 
 # A step of time may differ from whole samples by this part of a sample, and rows may be
 # missing for this part of the record; beyond, the timing is not known well enough.
@@ -15,8 +17,7 @@ LARGEST_JITTER = 0.25
 MOST_MISSING = 0.1
 MENTIONED_JITTER = 0.01
 
-Times = tuple[Any, FloatArray]  # numbers of rows in the file, times [s]
-Blocks = Callable[[], Iterable[Times]]
+Blocks = Callable[[], Iterable[tuple[Any, FloatArray]]]  # numbers of rows in the file, times [s]
 
 
 class Timing(NamedTuple):
@@ -24,21 +25,23 @@ class Timing(NamedTuple):
 
     Parameters
     ----------
-    rows, samples : int
-        Rows of the file; samples of the record, which are more where rows are missing.
+    samples : int
+        Samples of the record, more than rows of the file where some are missing.
     start, period : float
         Time of the first sample and from one to the next [s].
     usual : float or None
         Step by which rows are placed on samples [s]; None if each row is the next sample.
+    jump : int
+        Number of the row before which most samples are missing.
     notes : tuple of str
         What had to be assumed.
     """
 
-    rows: int
     samples: int
     start: float
     period: float
-    usual: float | None = None
+    usual: float | None
+    jump: int
     notes: tuple[str, ...] = ()
 
     def times(self, first: int, count: int) -> FloatArray:
@@ -52,6 +55,29 @@ class Timing(NamedTuple):
         return float((self.samples - 1) / (last - self.start))
 
 
+class _Known(NamedTuple):
+    """Rows with a time, behind the last one of the block before."""
+
+    rows: Any  # counted from 0
+    numbers: Any
+    times: FloatArray
+
+
+def _known(blocks: Iterable[tuple[Any, FloatArray]]) -> Iterator[tuple[int, _Known, int]]:
+    """Rows so far, those of a block that have a time, and how many of these are of the block before."""
+    start, last = 0, _Known(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
+    for numbers, time in blocks:
+        known = np.flatnonzero(np.isfinite(time))
+        found = _Known(
+            np.append(last.rows, known + start),
+            np.append(last.numbers, numbers[known]),
+            np.append(last.times, time[known]),
+        )
+        start += time.size
+        yield start, found, last.rows.size
+        last = _Known(found.rows[-1:], found.numbers[-1:], found.times[-1:])
+
+
 def scan(where: str, place: str, blocks: Blocks) -> Timing:
     """Find the timing; ValueError, with the place in the file, if time is not even enough.
 
@@ -60,138 +86,83 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
     where, place : str
         File and what it calls a row, for messages.
     blocks : callable
-        Returns an iterable of numbers of rows and their times; is called twice.
+        Returns an iterable of numbers of rows and their times; is called again where steps are uneven.
     """
-    line = _Line()
-    for numbers, time in blocks():
-        line.add(where, place, numbers, time)
-    if line.known < 2:
-        raise ValueError(f"{where}: only {line.known} rows with a time")
-    steps = _Steps(line.usual)
-    jitter, row = 0.0, 0
-    for numbers, time in blocks():
-        jitter = max(jitter, line.deviation(row, time))
-        steps.add(where, place, numbers, time)
-        row += time.size
-    by_step = jitter > LARGEST_JITTER
-    if by_step:
-        steps.check(line.rows)
-        jitter = steps.jitter
-    first, last = (steps.first, steps.last) if by_step else (line.first, line.last)
-    period = (line.last_time - line.first_time) / (last - first)
-    samples = int(last) + line.rows - line.last if by_step else line.rows
-    notes: tuple[str, ...] = ()
-    if jitter > MENTIONED_JITTER:
-        notes = (f"time is uneven by up to {100.0 * jitter:.0f} % of a sample; taken as even",)
-    return Timing(
-        line.rows, samples, line.first_time - first * period, period, line.usual if by_step else None, notes
-    )
+    rows, count, usual, jitter, absent = 0, 0, 0.0, 0.0, 0
+    largest, jump, moved, words, uneven = 0, 0, False, "", ""
+    sums, first, last = np.zeros(4), (0, 0.0), (0, 0.0)
+    for rows, known, old in _known(blocks()):  # noqa: B007
+        steps, apart = np.diff(known.times), np.diff(known.rows)
 
+        def at(k: int, numbers: Any = known.numbers) -> str:
+            return f"{where}, {place} {numbers[k + 1]}: time "
 
-class _Line:
-    """A straight line through times over rows, by least squares, as rows come."""
-
-    def __init__(self) -> None:
-        self.rows = self.known = 0
-        self.first = self.last = 0
-        self.first_time = self.last_time = 0.0
-        self.usual = 0.0
-        self._sums = np.zeros(4)
-
-    def add(self, where: str, place: str, numbers: Any, time: FloatArray) -> None:
-        known = np.flatnonzero(np.isfinite(time))
-        if known.size:
-            before = [self.last_time] if self.known else []
-            steps = np.diff(np.concatenate([before, time[known]]))
-            if np.any(steps <= 0.0):
-                k = int(np.argmax(steps <= 0.0)) + (0 if self.known else 1)
-                now = time[known[k]]
-                raise ValueError(
-                    f"{where}, {place} {numbers[known[k]]}: time does not increase: {now:.9g} s after "
-                    f"{now - steps[k - (0 if self.known else 1)]:.9g} s; if it has too few digits, give the "
-                    "sample rate instead"
-                )
-            if not self.known:
-                self.first, self.first_time = int(known[0]) + self.rows, float(time[known[0]])
-            if self.usual == 0.0 and known.size > 1:
-                # Of the first block only: the median of a whole column would need all of it.
-                self.usual = float(np.median(np.diff(time[known]) / np.diff(known)))
-            row, t = known + float(self.rows), time[known] - self.first_time
-            self._sums += row.sum(), t.sum(), (row * row).sum(), (row * t).sum()
-            self.known += known.size
-            self.last, self.last_time = int(known[-1]) + self.rows, float(time[known[-1]])
-        self.rows += time.size
-        if self.usual == 0.0 and self.known > 1:
-            self.usual = (self.last_time - self.first_time) / (self.last - self.first)
-
-    def deviation(self, row: int, time: FloatArray) -> float:
-        """How far times are off the line, in samples, the first of them being that of `row`."""
-        known = np.flatnonzero(np.isfinite(time))
-        if not known.size:
-            return 0.0
-        k, t, kk, kt = self._sums / self.known
-        period = (kt - k * t) / (kk - k * k)
-        on_the_line = self.first_time + t + period * (known + row - k)
-        return float(np.max(np.abs(time[known] - on_the_line)) / period)
-
-
-class _Steps:
-    """Whole steps from row to row, where rows are missing."""
-
-    def __init__(self, usual: float) -> None:
-        self.usual = usual
-        self.first = self.last = 0.0
-        self.jitter = 0.0
-        self._rows = 0
-        self._seen: tuple[int, float] | None = None
-        self._uneven = self._jump = ""
-        self._largest = -np.inf
-
-    def add(self, where: str, place: str, numbers: Any, time: FloatArray) -> None:
-        known = np.flatnonzero(np.isfinite(time))
-        if known.size:
-            rows, times = known + self._rows, time[known]
-            if self._seen is None:
-                self.first = self.last = float(rows[0])
-                self._seen = (int(rows[0]), float(times[0]))
-            rows = np.concatenate([[self._seen[0]], rows])
-            steps = np.diff(np.concatenate([[self._seen[1]], times]))
-            self._judge(steps, np.diff(rows), lambda k: f"{where}, {place} {numbers[known[k]]}: ")
-            self._seen = (int(rows[-1]), float(times[-1]))
-        self._rows += time.size
-
-    def _judge(self, steps: FloatArray, rows: Any, at: Callable[[int], str]) -> None:
-        samples, real = steps / self.usual, rows > 0
-        whole = np.rint(samples)
-        jitter = np.where(real, np.where(whole < 1.0, 1.0, np.abs(samples - whole)), 0.0)
-        if not self._uneven and jitter.max() > LARGEST_JITTER:
-            k = int(np.argmax(jitter > LARGEST_JITTER))
-            self._uneven = (
-                f"{at(k)}time is sampled unevenly, a step of {steps[k]:.6g} s where {self.usual:.6g} s is "
-                "usual: resample the log, or give the sample rate to take rows as even"
+        if not known.times.size:
+            continue
+        if np.any(steps <= 0.0):
+            k = int(np.argmax(steps <= 0.0))
+            raise LogError(
+                f"{at(k)}does not increase: {known.times[k + 1]:.9g} s after {known.times[k]:.9g} s; if it "
+                "has too few digits, give the sample rate instead"
             )
-        absent = whole - rows
-        if absent.max() > self._largest:
-            k = int(np.argmax(absent))
-            self._largest = float(absent[k])
-            self._jump = f"{at(k)}time jumps by {steps[k]:.6g} s where {self.usual:.6g} s is usual"
-        self.jitter = max(self.jitter, float(jitter.max()))
-        self.last += float(whole.sum())
+        if not count:
+            first = int(known.rows[0]), float(known.times[0])
+        count += known.times.size - old
+        last = int(known.rows[-1]), float(known.times[-1])
+        # Of a straight line through times over rows, by least squares.
+        row, t = known.rows[old:] - float(first[0]), known.times[old:] - first[1]
+        sums += row.sum(), t.sum(), (row * row).sum(), (row * t).sum()
+        if not steps.size:
+            continue
+        # Of the first steps only: the median of a whole column would need all of it.
+        usual = usual or float(np.median(steps / apart))
+        whole = np.rint(steps / usual)
+        off = np.where(whole < 1.0, 1.0, np.abs(steps / usual - whole))
+        gaps = whole - apart
+        if off.max() > LARGEST_JITTER and not uneven:
+            k = int(np.argmax(off > LARGEST_JITTER))
+            uneven = (
+                f"{at(k)}is sampled unevenly, a step of {steps[k]:.6g} s where {usual:.6g} s is usual: "
+                "resample the log, or give the sample rate to take rows as even"
+            )
+        k = int(np.argmax(gaps))
+        if not words or gaps[k] > largest:
+            largest, jump = gaps[k], int(known.numbers[k + 1])
+            words = f"{at(k)}jumps by {steps[k]:.6g} s where {usual:.6g} s is usual"
+        moved = moved or bool(np.any(gaps))
+        jitter, absent = max(jitter, float(off.max())), absent + int(gaps.sum())
+    if count < 2:
+        raise LogError(f"{where}: only {count} rows with a time")
+    if uneven:
+        # Steps may be so where times are not: of 3, 4 and 3 ms, where three decimals are too few for 10/3.
+        absent, moved, jitter = 0, False, _deviation(sums / count, first, blocks())
+        if jitter > LARGEST_JITTER:
+            raise LogError(uneven)
+    elif absent > MOST_MISSING * rows:
+        raise LogError(f"{words}, {absent} samples are missing in all: cut the log there")
+    period = float((last[1] - first[1]) / (last[0] + absent - first[0]))
+    notes = f"time is uneven by up to {100.0 * jitter:.0f} % of a sample; taken as even"
+    return Timing(
+        rows + absent, float(first[1] - first[0] * period), period, usual if moved else None, jump,
+        (notes,) if jitter > MENTIONED_JITTER else (),
+    )  # fmt: skip
 
-    def check(self, rows: int) -> None:
-        """Refuse what is uneven, or has too much missing."""
-        if self._uneven:
-            raise ValueError(self._uneven)
-        assert self._seen is not None
-        absent = int(self.last) - self._seen[0]
-        if absent > MOST_MISSING * rows:
-            raise ValueError(f"{self._jump}, {absent} samples are missing in all: cut the log there")
+
+def _deviation(
+    means: FloatArray, first: tuple[int, float], blocks: Iterable[tuple[Any, FloatArray]]
+) -> float:
+    """How far times are off a straight line, in samples, by its sums."""
+    k, t, kk, kt = means
+    period = (kt - k * t) / (kk - k * k)
+    off = 0.0
+    for _, known, _ in _known(blocks):
+        line = first[1] + t + period * (known.rows - first[0] - k)
+        off = max(off, float(np.max(np.abs(known.times - line), initial=0.0)) / period)
+    return off
 
 
-def placed(
-    timing: Timing, blocks: Iterable[tuple[FloatArray, list[FloatArray]]]
-) -> Iterator[list[FloatArray]]:
-    """Values on their samples, NaN where no row falls.
+def placed(timing: Timing, blocks: Iterable[list[FloatArray]]) -> Iterator[list[FloatArray]]:
+    """Columns on their samples, NaN where no row falls, by the first one, which is time.
 
     Parameters
     ----------
@@ -201,47 +172,24 @@ def placed(
         Times of rows, and values of any number of columns.
     """
     if timing.usual is None:
-        for _, values in blocks:
-            yield values
+        yield from (values for _, *values in blocks)
         return
     # Rows behind the last known time wait for the next one, between which they then lie.
-    row, position = 0, 0.0
-    began, waiting = False, (np.empty(0), [np.empty(0)])
-    pending: list[FloatArray] = []
-    emitted = 0
-    for time, values in blocks:
-        if not pending:
-            pending = [np.full(1, np.nan) for _ in values]
-            waiting = (np.empty(0), [np.empty(0) for _ in values])
-        time = np.concatenate([waiting[0], time])
-        values = [np.concatenate(pair) for pair in zip(waiting[1], values, strict=True)]
-        known = np.flatnonzero(np.isfinite(time))
-        if not known.size or (began and known.size == 1):
-            waiting = (time, values)
-            continue
-        steps = np.rint(np.diff(time[known]) / timing.usual)
-        if not began:
-            position, began = float(known[0]), True
-        marks = position + np.concatenate([[0.0], np.cumsum(steps)])
-        where = np.interp(np.arange(row, row + time.size), row + known, marks)
-        where[: known[0]] = marks[0] + np.arange(-known[0], 0)
-        where = np.rint(where[: known[-1]]).astype(np.int64)
-        end = int(marks[-1])
-        # The sample of the last known time may get another row, so it is not given out yet.
-        samples = [np.full(end + 1 - emitted, np.nan) for _ in values]
-        for sample, before, value in zip(samples, pending, values, strict=True):
-            sample[0] = before[0]
-            fits = np.isfinite(value[: known[-1]])
-            sample[where[fits] - emitted] = value[: known[-1]][fits]
-        pending = [sample[-1:].copy() for sample in samples]
-        if end > emitted:
-            yield [sample[:-1] for sample in samples]
-        row, position, emitted = row + int(known[-1]), marks[-1], end
-        waiting = (time[known[-1] :], [value[known[-1] :] for value in values])
-    samples = [np.full(waiting[0].size, np.nan) for _ in waiting[1]]
-    for sample, before, value in zip(samples, pending, waiting[1], strict=True):
-        sample[0] = before[0]
-        fits = np.isfinite(value)
-        sample[fits] = value[fits]
-    if waiting[0].size:
-        yield samples
+    waiting: Any = None
+    for block in itertools.chain(blocks, (None,)):
+        rows = np.array(block) if waiting is None else np.hstack([waiting, block or waiting[:, :0]])
+        known = np.flatnonzero(np.isfinite(rows[0]))
+        end = rows.shape[1] if block is None else known[-1] if known.size else 0
+        knots = np.unique(np.concatenate([[0], known, [end]]))
+        steps = np.rint(np.diff(np.append(rows[0], np.nan)[knots]) / timing.usual)
+        marks = np.append(0, np.cumsum(np.where(np.isnan(steps), np.diff(knots), steps)))
+        where = np.interp(np.arange(end), knots, marks)
+        samples = np.full((len(rows) - 1, int(marks[-1])), np.nan)
+        place = np.floor(where + 1e-6).astype(np.int64)
+        for sample, values in zip(samples, rows[1:, :end], strict=True):
+            # Of rows without a time, more than there is room for fall on the sample of another.
+            fits = np.isfinite(values)
+            sample[place[fits]] = values[fits]
+        waiting = rows[:, end:]
+        if end:
+            yield list(samples)

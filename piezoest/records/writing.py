@@ -12,8 +12,8 @@ import numpy as np
 from piezoest import _extras
 from piezoest._checks import FloatArray, array_1d
 from piezoest._files import replacing
-from piezoest.records.binary import EXTRA
 from piezoest.records.opening import TEXT_ENDINGS
+from piezoest.records.source import EXTRA
 
 Columns = Mapping[str, FloatArray]
 
@@ -72,37 +72,27 @@ def writer_for(path: str | Path) -> Callable[[Path, Columns], None]:
     ImportError
         If the format needs a package that is not installed.
     """
-    ending = Path(path).suffix.lower()
-    writers = {each: writer for endings, writer in WRITERS.items() for each in endings}
-    if not ending:  # such as /dev/stdout
-        return _write_text
-    if ending not in writers:
-        raise ValueError(
-            f"{path}: the ending of its name stands for no format that is written: use one of "
-            f"{', '.join(writers)}"
-        )
-    if writers[ending] is _write_parquet:
-        _extras.load("pyarrow.parquet", EXTRA, "writing Parquet")
-    if writers[ending] is _write_hdf5:
-        _extras.load("h5py", EXTRA, "writing HDF5")
-    return writers[ending]
+    ending = Path(path).suffix.lower() or ".csv"  # none: such as /dev/stdout
+    for endings, writer, package in WRITERS:
+        if ending in endings:
+            if package:
+                _extras.load(package, EXTRA, f"writing {ending}")
+            return writer
+    known = ", ".join(each for endings, *_ in WRITERS for each in endings)
+    raise ValueError(
+        f"{path}: the ending of its name stands for no format that is written: use one of {known}"
+    )
 
 
 def _write_text(path: Path, columns: Columns) -> None:
     delimiter = "\t" if path.suffix.lower() == ".tsv" else ","
+    digits = ["%.12g" if name.startswith("time") else "%.9g" for name in columns]
     with path.open("w", encoding="utf-8", newline="") as file:
-        np.savetxt(
-            file,
-            np.column_stack(list(columns.values())),
-            fmt=["%.12g" if name.startswith("time") else "%.9g" for name in columns],
-            delimiter=delimiter,
-            header=delimiter.join(columns),
-            comments="",
-        )
+        file.write(delimiter.join(columns) + "\n")
+        np.savetxt(file, np.column_stack(list(columns.values())), digits, delimiter)
 
 
 def _write_parquet(path: Path, columns: Columns) -> None:
-    import pyarrow
     import pyarrow.parquet
 
     pyarrow.parquet.write_table(pyarrow.table(dict(columns)), path)
@@ -127,12 +117,10 @@ def _write_mat(path: Path, columns: Columns) -> None:
 
 
 def _write_npy(path: Path, columns: Columns) -> None:
-    size = next((values.size for values in columns.values()), 0)
-    rows = np.zeros(size, [(name, np.float64) for name in columns])
-    for name, values in columns.items():
-        rows[name] = values
     with path.open("wb") as file:  # a name in capitals NumPy would lengthen
-        np.save(file, rows)
+        np.save(
+            file, np.rec.fromarrays(list(columns.values()), dtype=[(name, np.float64) for name in columns])
+        )
 
 
 def _write_npz(path: Path, columns: Columns) -> None:
@@ -141,11 +129,12 @@ def _write_npz(path: Path, columns: Columns) -> None:
         np.savez(file, **arrays)
 
 
-WRITERS: dict[tuple[str, ...], Callable[[Path, Columns], None]] = {
-    (".parquet", ".pq"): _write_parquet,
-    (".h5", ".hdf5", ".hdf", ".he5"): _write_hdf5,
-    (".mat",): _write_mat,
-    (".npy",): _write_npy,
-    (".npz",): _write_npz,
-    TEXT_ENDINGS: _write_text,
-}
+# Endings, the function, and the package of an extra that it needs.
+WRITERS: tuple[tuple[tuple[str, ...], Callable[[Path, Columns], None], str], ...] = (
+    ((".parquet", ".pq"), _write_parquet, "pyarrow.parquet"),
+    ((".h5", ".hdf5", ".hdf", ".he5"), _write_hdf5, "h5py"),
+    ((".mat",), _write_mat, ""),
+    ((".npy",), _write_npy, ""),
+    ((".npz",), _write_npz, ""),
+    (TEXT_ENDINGS, _write_text, ""),
+)

@@ -1,4 +1,4 @@
-"""Reports as one page of HTML with interactive plots, which needs no network and no server."""
+"""Reports as one page of HTML, which needs no network and no server."""
 
 from piezoest.report.identified import write_report
 from piezoest.report.page import Page

@@ -1,23 +1,17 @@
-"""One self-contained page: text, tables and plots, with the script that draws them inside."""
+"""One self-contained page: text, tables and pictures, which needs no network."""
 
 from __future__ import annotations
 
+import base64
 import html
+import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from piezoest import _extras
-from piezoest._checks import FloatArray
 from piezoest._files import write_text
 
-# A plot is some thousand dots wide: more points only make the page large and slow.
-MOST_POINTS = 4000
-MANY_SERIES = 5
-
-BLUE, ORANGE, GREEN, RED, GREY = "#1f5fa8", "#d9822b", "#2e8b57", "#b22234", "#8a8f98"
+DPI = 130  # of pictures
 
 STYLE = """
 :root { color-scheme: light; }
@@ -39,7 +33,7 @@ th:first-child, td:first-child { text-align: left; }
 ul.advice { background: #fff8ec; border-left: 4px solid #d9822b; margin: .5rem 0;
             padding: .6rem 1rem .6rem 2rem; }
 details { margin: .6rem 0; } summary { cursor: pointer; font-weight: 600; }
-.plot { width: 100%; margin: .4rem 0 1rem; }
+.picture { max-width: 100%; }
 footer { margin-top: 2.5rem; color: #5b616b; font-size: .85rem; border-top: 1px solid #e3e6ea;
          padding-top: .6rem; }
 """
@@ -56,14 +50,13 @@ class Page:
         The line below it.
     """
 
-    __slots__ = ("_parts", "_plots", "_title")
+    __slots__ = ("_parts", "_title")
 
     def __init__(self, title: str, subtitle: str = "") -> None:
         self._title = title
         self._parts = [f"<h1>{html.escape(title)}</h1>"]
         if subtitle:
             self._parts.append(f'<p class="sub">{html.escape(subtitle)}</p>')
-        self._plots = 0
 
     def heading(self, text: str) -> None:
         """Add a heading.
@@ -134,44 +127,21 @@ class Page:
         """
         self._parts.append(f'<div class="side">{"".join(_table(*table) for table in tables)}</div>')
 
-    def plot(self, figure: Any, height: int = 360) -> None:
-        """Add a plot.
+    def picture(self, figure: Any, alt: str) -> None:
+        """Add a picture.
 
         Parameters
         ----------
-        figure : plotly.graph_objects.Figure
-            What to draw.
-        height : int
-            In dots.
+        figure : matplotlib.figure.Figure
+            What to show.
+        alt : str
+            What it is, for those who do not see it.
         """
-        io = _extras.load("plotly.io", "report", "an HTML report")
-        figure.update_layout(
-            template="plotly_white",
-            height=height,
-            font={"size": 13, "color": "#1d2129"},
-            hovermode="closest",
-            # No margin grows by itself for the titles of subplots.
-            margin={"l": 60, "r": 20, "t": 64, "b": 48},
-        )
-        if len(figure.data) < MANY_SERIES:
-            # Above those titles, beside the buttons; more names than this would run into them.
-            figure.update_layout(
-                legend={"orientation": "h", "yref": "container", "yanchor": "top", "y": 1.0, "x": 0.0}
-            )
-        figure.update_xaxes(automargin=True)
-        figure.update_yaxes(automargin=True)
-        self._plots += 1
+        drawn = io.BytesIO()
+        figure.savefig(drawn, format="png", dpi=DPI)
+        data = base64.b64encode(drawn.getvalue()).decode()
         self._parts.append(
-            '<div class="plot">'
-            + io.to_html(
-                figure,
-                include_plotlyjs=False,
-                full_html=False,
-                config={"displaylogo": False, "displayModeBar": "hover", "responsive": True},
-                default_height=f"{height}px",
-                div_id=f"plot-{self._plots}",
-            )
-            + "</div>"
+            f'<img class="picture" alt="{html.escape(alt)}" src="data:image/png;base64,{data}">'
         )
 
     def footer(self, text: str) -> None:
@@ -186,14 +156,12 @@ class Page:
 
     def html(self) -> str:
         """Return the whole page."""
-        offline = _extras.load("plotly.offline", "report", "an HTML report")
         # Without an icon of its own, a browser asks for one.
         icon = '<link rel="icon" href="data:,">'
-        script = f"<script>{offline.get_plotlyjs()}</script>" if self._plots else ""
         return (
             '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f"{icon}<title>{html.escape(self._title)}</title><style>{STYLE}</style>{script}</head>\n<body>\n"
+            f"{icon}<title>{html.escape(self._title)}</title><style>{STYLE}</style></head>\n<body>\n"
             + "\n".join(self._parts)
             + "\n</body></html>\n"
         )
@@ -216,45 +184,3 @@ def _table(heading: Sequence[str], rows: Iterable[Sequence[str]], caption: str) 
     )
     title = f"<caption>{html.escape(caption)}</caption>" if caption else ""
     return f"<table>{title}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-
-
-def thin(*arrays: FloatArray, points: int = MOST_POINTS) -> list[FloatArray]:
-    """Arrays of one length with at most so many points, evenly taken.
-
-    Parameters
-    ----------
-    *arrays : ndarray, shape (N,)
-        Alike in length.
-    points : int
-        At most, or one more.
-    """
-    step = max(1, -(-arrays[0].size // points))
-    return [short(array[::step]) for array in arrays]
-
-
-def extremes(x: FloatArray, y: FloatArray, points: int = MOST_POINTS) -> tuple[FloatArray, FloatArray]:
-    """Least and largest of each stretch, in their order: no peak is lost.
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (N,)
-        Abscissa and values; NaN in the values counts as absent.
-    points : int
-        At most, or two more.
-    """
-    known = np.flatnonzero(np.isfinite(y))
-    if known.size <= points:
-        return short(x[known]), short(y[known])
-    edges = np.linspace(0, known.size, points // 2 + 1).astype(int)[:-1]
-    values = y[known]
-    step = np.diff([*edges, known.size])
-    stretch = np.repeat(np.arange(edges.size), step)
-    # The first of those that are least, and the first of those that are largest.
-    order = np.lexsort((values, stretch))
-    kept = np.unique(np.concatenate([order[edges], order[edges + step - 1]]))
-    return short(x[known[kept]]), short(values[kept])
-
-
-def short(values: FloatArray) -> Any:
-    """Values to single precision, in which a plot is drawn anyway."""
-    return np.asarray(values, dtype=np.float32)

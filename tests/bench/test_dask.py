@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from piezoest.bench import campaign, executors
-from piezoest.bench.runner import Settings
+from piezoest.bench import executors, table
+from piezoest.bench.store import carry_out
 
 pytest.importorskip("distributed")
 
-SMALL = Settings(2000.0, before=1, after=3, after_long=2, rest=0.2, drift=0.4, updates=20)
+SMALL = {"sample_rate": 2000.0, "before": 1, "after": 6, "rest": 0.2, "drift": 1.4, "updates": 20}
 
 # Says which process ran it; a cluster's workers have the environment they were started with.
 OWN = """
@@ -91,8 +91,10 @@ def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
     monkeypatch.syspath_prepend(home)
     monkeypatch.setenv("NOTES", str(home / "unused.txt"))
     (home / "own_estimators_on_dask.py").write_text(OWN, encoding="utf-8")
-    estimators = ["own_estimators_on_dask:Noted", "HysteresisRLS"]
-    tasks = campaign.plan(["cold-start", "two-tone"], estimators, range(8), SMALL)
+    estimators = ("own_estimators_on_dask:Noted", "HysteresisRLS")
+    scenarios = ("cold-start", "two-tone")
+    plan = table.Plan(estimators=estimators, scenarios=scenarios, stages=("paper",), seeds=8, given=SMALL)
+    tasks = plan.tasks()
     half = len(tasks) // 2
     said = []
     killed: list[subprocess.Popen[str]] = []
@@ -105,10 +107,10 @@ def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
             killed.extend(worker for worker in cluster.workers if worker.pid == last)
             killed[0].kill()
 
-    with campaign.store_in(home) as store:
-        execute = campaign.over_dask(cluster.address, estimators=estimators)
-        assert campaign.run(tasks, store, execute, kill_one_half_way) == len(tasks)
-        rows = list(store.rows(campaign.keys_of(tasks)))
+    with table.store_in(home) as store:
+        execute = table.over_dask(cluster.address, estimators=estimators)
+        carry_out(tasks, store, execute, kill_one_half_way)
+        rows = list(store.rows(task.key for task in tasks))
 
     assert said == [(k, len(tasks)) for k in range(len(tasks) + 1)]
     assert [row["key"] for row in rows] == [task.key for task in tasks]
@@ -123,20 +125,18 @@ def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
         worker.pid for worker in cluster.workers
     }
 
-    with campaign.store_in(tmp_path / "here") as store:
-        campaign.run(tasks, store, campaign.over_cores(1))
-        here = list(store.rows(campaign.keys_of(tasks)))
-    times = {"microseconds": None}
-    assert [{**row, **times} for row in rows] == [{**row, **times} for row in here]
+    with table.store_in(tmp_path / "here") as store:
+        carry_out(tasks, store, table.over_cores(1))
+        assert rows == list(store.rows(task.key for task in tasks))
 
 
 def test_a_worker_with_another_package_ends_the_campaign(
     cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(campaign, "fingerprint", lambda: "another")
-    tasks = campaign.plan(["cold-start"], [], range(1), SMALL)
-    with campaign.store_in(tmp_path) as store, pytest.raises(ValueError, match="install the same"):
-        campaign.run(tasks, store, campaign.over_dask(cluster.address))
+    monkeypatch.setattr(table, "fingerprint", lambda: "another")
+    plan = table.Plan(estimators=(), scenarios=("cold-start",), stages=("paper",), seeds=1, given=SMALL)
+    with table.store_in(tmp_path) as store, pytest.raises(ValueError, match="install the same"):
+        carry_out(plan.tasks(), store, table.over_dask(cluster.address))
 
 
 def test_local_by_default(tmp_path: Path) -> None:
@@ -145,7 +145,7 @@ def test_local_by_default(tmp_path: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "2 of 2 runs" in done.stderr
-    assert (tmp_path / "suite.json").exists()
+    assert (tmp_path / "table.json").exists()
 
 
 def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:

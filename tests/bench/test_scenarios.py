@@ -49,7 +49,7 @@ def test_the_same_seed_gives_the_same_case_and_the_same_stage(name: str) -> None
 
 
 @EVERY
-def test_a_case_is_fit_for_the_ring(name: str) -> None:
+def test_a_case_is_fit_for_the_loop(name: str) -> None:
     for seed in range(20):
         made = case(name, seed)
         assert made.start.is_admissible
@@ -128,7 +128,7 @@ def test_drift_is_one_per_cent_a_second_to_the_end() -> None:
     slope = np.diff(factor[made.change :]) * made.sample_rate
     np.testing.assert_allclose(slope, DRIFT)
     assert (len(made.reference) - made.change) / made.sample_rate == pytest.approx(2.0)
-    assert SCENARIOS["drift"].build(0, sample_rate=1000.0).reference.duration == pytest.approx(32.0)
+    assert SCENARIOS["drift"].build(0, sample_rate=1000.0).reference.duration == pytest.approx(5.8)
 
 
 def test_dwell_rests_and_goes_on() -> None:
@@ -168,6 +168,7 @@ def test_minor_loops_and_other_references() -> None:
         ({"noise": -1.0}, "noise"),
         ({"before": 0}, "before"),
         ({"updates": 0}, "updates"),
+        ({"stage": "best"}, "stage"),
     ],
 )
 def test_refuses_wrong_conditions(overrides: dict[str, Any], words: str) -> None:

@@ -10,8 +10,7 @@ from typing import Any
 
 import pytest
 
-from piezoest.bench.runner import Row
-from piezoest.bench.store import Store
+from piezoest.bench.store import Row, Store
 
 
 def test_store_keeps_each_key_once_and_goes_on_after_a_torn_line(tmp_path: Path) -> None:
@@ -64,6 +63,7 @@ def test_rows_that_moved_are_found_and_one_that_is_gone_is_said(tmp_path: Path) 
 APPEND = """
 import sys
 from pathlib import Path
+
 from piezoest.bench.store import Store
 
 path, name = Path(sys.argv[1]), sys.argv[2]

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from piezoest.bench.store import Store
-from piezoest.bench.tables import write_table
+from piezoest.bench.store import Store, carry_out
+from piezoest.bench.tables import table_of, write_table
 from piezoest.bench.zoo import columns, draw, play, settling, summary, tasks
 from piezoest.bench.zoo.contenders import CANDIDATES, CHANGED, DEFAULT, contender
 from piezoest.bench.zoo.controllers import Line, Parts
@@ -215,7 +215,7 @@ def test_the_map_counts_periods() -> None:
 def test_rows_go_into_a_table(tmp_path: Path) -> None:
     row = {**play(draw(2, **SHORT), Parts), "key": "k", "controller": "parts"}
     assert set(row) == set(columns.COLUMNS)
-    write_table([row], tmp_path / "runs.csv", columns.COLUMNS)
+    write_table(table_of([row], columns.COLUMNS), tmp_path / "runs.csv")
     heads, values = (tmp_path / "runs.csv").read_text(encoding="utf-8").splitlines()
     assert heads.split(",") == list(columns.COLUMNS)
     assert values.startswith("k,parts,2,backlash")
@@ -279,8 +279,8 @@ def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
     assert summary.summarise_cells(map(tasks.died, cell))["failures"] == 1
     with Store(tmp_path / "runs.jsonl") as store:
         assert all(store.append(tasks.died(task)) for task in (*planned, *cell))
-        assert tasks.carry_out_all(tasks.runs("parts", range(1), SHORT), store, 1) == 1
-        assert tasks.carry_out_all(tasks.runs("parts", range(1), SHORT), store, 1) == 0
+        carry_out(tasks.runs("parts", range(1), SHORT), store, tasks.over_cores(1))
+        assert len(store) == 4
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,7 @@ from piezoest.bench.zoo.contenders import DEFAULT, contender
 from piezoest.bench.zoo.faults import ANY, FAULTS
 from piezoest.bench.zoo.naming import named, recovery, settled
 from piezoest.bench.zoo.rig import Rig
-from piezoest.controller.shown import MEANINGS
-from piezoest.supervisor import Event
+from piezoest.controller.shown import MEANINGS, Event
 
 SHORT: dict[str, Any] = {
     "family": "coleman-hodgdon", "limits": "±100", "gain": 0.15, "width": 0.15, "sample_rate": 1000.0,

@@ -58,10 +58,7 @@ def settled(stage: Any, reference: pz.Signal, with_lead: bool) -> float:
     options: dict[str, Any] = {"mechanics": MECHANICS, "delay": 1.95} if with_lead else {"delay": 0.97}
     compensator: Any = lead(start, delay=1.95e-5) if with_lead else pz.InverseCompensator(start, LIMITS)
     estimator = pz.PrandtlIshlinskiiRLS(FS, **options)
-    # Without the guard: what the lead does is compared.
-    record = pz.track(
-        reference, stage=stage(FS), compensator=compensator, estimator=estimator, supervisor=False
-    )
+    record = pz.track(reference, stage=stage(FS), compensator=compensator, estimator=estimator)
     return record.max_error(2)
 
 

@@ -477,7 +477,6 @@ def test_track_wants_one_driver() -> None:
     others: dict[str, Any] = {
         "compensator": pz.LinearCompensator(pz.LinearGain(0.15)),
         "estimator": pz.HysteresisRLS(FS),
-        "supervisor": pz.Supervisor(FS),
     }
     for name, other in others.items():
         with pytest.raises(ValueError, match=f"does without {name}"):

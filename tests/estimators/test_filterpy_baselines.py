@@ -31,7 +31,7 @@ def record(samples: int, fs: float, frequency: float = 5.0) -> tuple[FloatArray,
     ],
 )
 def test_compiled_filter_equals_filterpy(options: dict[str, Any]) -> None:
-    """20 000 samples at 50 kHz, single and long gaps; 10 s are in benchmarks/filterpy_parity.py."""
+    """20 000 samples at 50 kHz, single and long gaps."""
     fs, samples = 50_000.0, 20_000 if not options else 4000
     u, x = record(samples, fs)
     gaps = np.random.default_rng(1).random(samples) < 0.01

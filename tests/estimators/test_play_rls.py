@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.bench.faults import FAULTS
 from piezoest.estimators import play_rls_kernel as kernel
 
 RATE = 10_000.0
@@ -161,30 +160,3 @@ def test_a_piezo_recorded(data_dir: Path) -> None:
     model: Any = estimator.model
     error = (x - model.simulate(late))[half:]
     assert np.sqrt(np.mean(error**2)) < 0.28
-
-
-LIMITS = pz.VoltageLimits(-100.0, 100.0)
-
-
-def faulty(name: str) -> tuple[pz.TrackingRecord, pz.PrandtlIshlinskiiRLS]:
-    fault = FAULTS[name]
-    estimator = pz.PrandtlIshlinskiiRLS(RATE)
-    record = pz.track(
-        fault.reference(pz.signals.triangle(5.0, 5.0, 15, RATE)),
-        stage=fault.build(lambda rate: pz.PaperStage(rate, seed=3), RATE, seed=3),
-        compensator=pz.InverseCompensator(START, LIMITS, transfer_samples=100),
-        estimator=estimator,
-        update_interval=20,
-    )
-    return record, estimator
-
-
-@pytest.mark.parametrize("name", FAULTS)
-def test_the_ring_stays_within_bounds_under_faults(name: str) -> None:
-    record, estimator = faulty(name)
-    assert np.all(np.isfinite(record.theta))
-    assert np.all(np.isfinite(estimator.P))
-    assert estimator.model.is_admissible
-    assert np.max(np.abs(record.voltage)) <= 100.0
-    if name in ("missing-1", "missing-50", "gap", "spikes", "wrong-rate"):
-        assert record.max_error(last_periods=3) < 0.012 * 5.0

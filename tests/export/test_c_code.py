@@ -201,7 +201,6 @@ def test_double_equals_the_library_over_every_scenario(kind: str) -> None:
             stage=case.new_stage(),
             compensator=compensator,
             estimator=estimator,
-            supervisor=False,
         )
         voltage = ours.run(r, np.concatenate([[np.nan], record.measured[:-1]]))
         np.testing.assert_array_equal(voltage, record.voltage, err_msg=name)
@@ -214,7 +213,7 @@ def test_controller_is_track(log: tuple[Any, Any]) -> None:
     estimator, compensator = PAIRS["rls"]()
     case = SCENARIOS["cold-start"].build(0)
     parts: dict[str, Any] = {"compensator": compensator, "estimator": estimator}
-    record = pz.track(r, stage=case.new_stage(), **parts, supervisor=False)
+    record = pz.track(r, stage=case.new_stage(), **parts)
     own = pz.track(
         r, stage=case.new_stage(), compensator=pz.export.Controller(*PAIRS["rls"]()), sample_rate=FS
     )
@@ -240,7 +239,6 @@ def test_float_settles_to_the_same_error(name: str) -> None:
         stage=case.new_stage(),
         compensator=compensator,
         estimator=estimator,
-        supervisor=False,
     )
     own = pz.track(case.reference, stage=case.new_stage(), compensator=single)
     # Rounding moves the samples at which a model is handed over.

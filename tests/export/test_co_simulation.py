@@ -83,7 +83,6 @@ def test_equals_the_library(unit: Path, tmp_path: Path) -> None:
         stage=pz.PaperStage(FS, seed=0),
         compensator=compensator,
         estimator=estimator,
-        supervisor=False,
     )
     running = start(unit, tmp_path)
     assert running.getReal([2]) == [0.0]

@@ -16,7 +16,6 @@ Cases = dict[str, Callable[[], Outcome]]
 COUNTS = ("samples", "updates", "missing", "held", "resets", "projected", "outliers")
 LAST = ("waiting", "updated", "missing", "held", "rejected")
 COMPENSATOR_COUNTS = ("samples", "saturated", "slewed", "missing", "projected")
-ACTIONS = ("kept", "fell back", "resumed")
 # Public attributes at the end of a record, where the estimator has them.
 ATTRIBUTES = ("theta", "y", "S", "K", "standard_errors", "excitation", "s", "thresholds", "decays")
 MATRICES = ("P", "state_covariance")
@@ -40,10 +39,6 @@ def status_numbers(status: Any) -> Array:
 
 def compensator_numbers(status: Any) -> Array:
     return flat([float(getattr(status, name)) for name in COMPENSATOR_COUNTS])
-
-
-def event_numbers(events: Any) -> Array:
-    return flat([(event.time, ACTIONS.index(event.action)) for event in events])
 
 
 def shown(estimator: Any, name: str) -> Any:

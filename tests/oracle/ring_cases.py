@@ -1,4 +1,4 @@
-"""Cases of the ring: estimator, supervisor and compensator and a stage, in Python and in exported C."""
+"""Cases of the ring: estimator, compensator and a stage, in Python and in exported C."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ import numpy as np
 import piezoest as pz
 from piezoest import policies as p
 from tests.oracle.compensator_cases import FEED_FORWARD, LIMITS, TIGHT
-from tests.oracle.filter_cases import PLAYS
 from tests.oracle.model_cases import NO_PLAYS
-from tests.oracle.outcome import Cases, Outcome, event_numbers, flat, model_numbers
-from tests.oracle.records import LINE, RATE, SCENARIOS, START, TRUE, rounded
+from tests.oracle.outcome import Cases, Outcome, flat, model_numbers
+from tests.oracle.records import LINE, RATE, SCENARIOS, START, rounded
 from tests.oracle.rls_cases import CORE
 
 FAST = 5000.0
@@ -52,77 +51,37 @@ class Faulty:
         return 12.0 if 2200 <= self.samples < 2400 or self.samples % 97 == 0 else x
 
 
-def ring(name: str, plant: str, guarded: bool, interval: int, compensator: Any) -> Outcome:
+def ring(name: str, plant: str, interval: int, compensator: Any) -> Outcome:
     if plant == "faulty":
         r = pz.signals.Signal(rounded(pz.signals.triangle(5.0, 10.0, 6, FAST).values), FAST, 500.0)
     else:
         r = pz.signals.Signal(
             rounded(pz.signals.multi_amplitude([3.0, 5.0], 10.0, 3, FAST).values), FAST, 500.0
         )
-    supervisor = pz.Supervisor(FAST) if guarded else None
     record = pz.track(
         r, stage=Faulty(1) if plant == "faulty" else pz.PaperStage(FAST, 2), compensator=compensator(),
-        estimator=ESTIMATORS[name](), update_interval=interval, supervisor=supervisor, sample_rate=FAST,
+        estimator=ESTIMATORS[name](), update_interval=interval, sample_rate=FAST,
     )  # fmt: skip
     outcome = {
         name: flat(getattr(record, name)) for name in ("voltage", "measured", "displacement", "parameters")
     }
     outcome["errors"] = flat(record.max_error(), record.rms_error(), record.periods)
-    if supervisor is not None:
-        outcome["events"] = flat(event_numbers(supervisor.events), supervisor.holding)
     return outcome
-
-
-def jumping() -> Outcome:
-    """Steps in the reference, which the slew rate makes ramps of; the guard is that of `track`."""
-    r = rounded(4.0 * np.sign(pz.signals.sine(1.0, 10.0, 4, FAST).values))
-    limits = pz.VoltageLimits(-60.0, 60.0, slew_rate=5e3, sample_rate=FAST)
-    compensator = pz.InverseCompensator(START, limits)
-    stage, estimator = pz.PaperStage(FAST, 4), pz.HysteresisRLS(FAST)
-    record = pz.track(r, stage=stage, compensator=compensator, estimator=estimator, allow_jumps=True)
-    return {"voltage": record.voltage, "measured": record.measured, "theta": flat(record.theta)}
-
-
-def reviewed(limit: float) -> Outcome:
-    """The supervisor alone: good, bad and odd models are proposed in turn."""
-    supervisor = pz.Supervisor(RATE, limit=limit)
-    u, _ = SCENARIOS["triangle"]()
-    x = TRUE.simulate(u)
-    r = rounded(x + 0.01)
-    x[900:960] = np.nan
-    sizes = (0.85, 0.94, 0.8, 1.0, 1.4, 0.0, 1.02)
-    proposals = [pz.ColemanHodgdon(TRUE.alpha, size * TRUE.beta, size * TRUE.gamma) for size in sizes]
-    present: Any = pz.LinearGain(0.14)
-    rows = []
-    for number, k in enumerate(range(0, u.size, 20)):
-        proposed: Any = PLAYS if number % 16 == 15 else proposals[number // 15]
-        piece = slice(k, k + 20)
-        present = supervisor.review(r[piece], u[piece], x[piece], present, proposed)
-        rows.append((present.theta[0], present.offset, float(len(present.theta)), float(supervisor.holding)))
-    return {"models": flat(rows), "events": event_numbers(supervisor.events)}
 
 
 def ring_cases() -> Cases:
     inverse = partial(pz.InverseCompensator, START, LIMITS)
     straight = partial(pz.LinearCompensator, LINE, LIMITS)
     creeping = partial(pz.InverseCompensator, START, LIMITS, sample_rate=FAST)
-    integrated: Any = lambda: pz.IntegralFeedback(inverse(), gain=20.0, sample_rate=FAST)  # noqa: E731
-    lead: Any = lambda: pz.LeadFilter(inverse(), pz.MassSpringDamper(780.0, 0.02), sample_rate=FAST)  # noqa: E731
     controller: Any = lambda: pz.export.Controller(ESTIMATORS["ekf"](), inverse())  # noqa: E731
     cases: Cases = {}
     for number, name in enumerate(ESTIMATORS):
         compensator: Any = {"rls-line": straight, "plays": creeping}.get(name, inverse)
         for plant in ("paper", "faulty"):
-            for guarded in (True, False):
-                interval = (5, 50, 23)[number % 3]
-                case = partial(ring, name, plant, guarded, interval, compensator)
-                cases[f"ring/{name}/{plant}-{'guarded' if guarded else 'free'}"] = case
-    for name, made in {"integral": integrated, "lead": lead}.items():
-        cases[f"ring/{name}"] = partial(ring, "rls", "paper", True, 5, made)
-        cases[f"ring/{name}-faulty"] = partial(ring, "rls", "faulty", True, 5, made)
-    cases["ring/jumps"] = jumping
-    cases["ring/controller"] = partial(ring, "none", "faulty", False, 5, controller)
-    return cases | {f"review/{limit:g}": partial(reviewed, limit) for limit in (0.3, 1.0, 3.0)}
+            interval = (5, 50, 23)[number % 3]
+            cases[f"ring/{name}/{plant}-free"] = partial(ring, name, plant, interval, compensator)
+    cases["ring/controller"] = partial(ring, "none", "faulty", 5, controller)
+    return cases
 
 
 # ---------------------------------------------------------------- exported C

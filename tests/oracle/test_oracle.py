@@ -45,16 +45,14 @@ def test_every_tolerance_has_a_case_and_a_reason() -> None:
 NO_EFFECT = {"rls/alone-normalisation", "rls/alone-norm-bound", "law/default", "law/no-policy"}
 
 
-@pytest.mark.parametrize(
-    "group", ["rls", "ekf", "output-error", "plays", "horizon", "batch", "law", "review"]
-)
+@pytest.mark.parametrize("group", ["rls", "ekf", "output-error", "plays", "horizon", "batch", "law"])
 def test_every_option_shows(group: str) -> None:
     """An option that is silently not carried out cannot hide: some case of it differs from all others."""
     same = Counter(_all_bits(name) for name in STORED)
     own: dict[str, bool] = {}
     for name in STORED:
         if name.startswith(f"{group}/"):
-            option = name if group in ("law", "review") else name.rpartition("/")[0]
+            option = name if group == "law" else name.rpartition("/")[0]
             own[option] = own.get(option, False) or same[_all_bits(name)] == 1
     assert {option for option, shows in own.items() if not shows} == {
         option for option in NO_EFFECT if option.startswith(f"{group}/")

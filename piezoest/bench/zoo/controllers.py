@@ -9,7 +9,6 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.compensators import InverseCompensator, VoltageLimits
 from piezoest.estimators.rls import HysteresisRLS
-from piezoest.supervisor import Event, Supervisor
 
 
 class Line:
@@ -25,7 +24,7 @@ class Line:
 
     def __init__(self, gain: float, centre: float, limits: VoltageLimits) -> None:
         self._gain, self._centre, self._limits = gain, centre, limits
-        self.events: tuple[Event, ...] = ()
+        self.events: tuple[()] = ()
         self.status: dict[str, Any] = {"model": "line"}
 
     def step(self, r: float) -> float:
@@ -42,7 +41,7 @@ class Line:
 
 
 class Parts:
-    """`InverseCompensator`, `HysteresisRLS` and `Supervisor` in a ring, with all their defaults.
+    """`InverseCompensator` and `HysteresisRLS` wired by hand, with all their defaults.
 
     Parameters
     ----------
@@ -57,30 +56,26 @@ class Parts:
     def __init__(self, sample_rate: float, limits: VoltageLimits, *, update_interval: int = 50) -> None:
         self._estimator = HysteresisRLS(sample_rate)
         self._compensator = InverseCompensator(self._estimator.model, limits)
-        self._guard = Supervisor(sample_rate)
         self._interval = update_interval
-        self._r: list[FloatArray] = []
         self._u: list[FloatArray] = []
         self._x: list[FloatArray] = []
 
     @property
-    def events(self) -> tuple[Event, ...]:
-        """What the supervisor did."""
-        return self._guard.events
+    def events(self) -> tuple[()]:
+        """None: there is nobody who watches."""
+        return ()
 
     @property
     def status(self) -> dict[str, Any]:
         """Model in use."""
-        return {"model": "line" if self._guard.holding else "coleman-hodgdon"}
+        return {"model": "coleman-hodgdon"}
 
     def step(self, r: float) -> float:
         """Voltage for a reference."""
-        self._r.append(np.array([r]))
         return float(self._compensator.step(r))
 
     def run(self, r: FloatArray) -> FloatArray:
         """Voltages for references, shape (N,)."""
-        self._r.append(r)
         return self._compensator.run(r)
 
     def learn(self, u: Any, x: Any) -> None:
@@ -89,10 +84,7 @@ class Parts:
         self._x.append(np.array(x, ndmin=1, dtype=float))
         if sum(part.size for part in self._u) < self._interval:
             return
-        r, u, x = (np.concatenate(parts) for parts in (self._r, self._u, self._x))
-        self._r, self._u, self._x = [], [], []
+        u, x = (np.concatenate(parts) for parts in (self._u, self._x))
+        self._u, self._x = [], []
         self._estimator.absorb(u, x)
-        present = self._compensator.model
-        model = self._guard.review(r, u, x, present, self._estimator.model)
-        if model is not present:
-            self._compensator.model = model
+        self._compensator.model = self._estimator.model

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from piezoest.bench.adaptation import json_safe
+from piezoest.bench.origin import json_safe
 from piezoest.bench.zoo.drawing import draw
 from piezoest.bench.zoo.families import FAMILIES
 from piezoest.bench.zoo.faults import NONE

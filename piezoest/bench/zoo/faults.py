@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.bench.faulty_stages import Factor, Gap, Missing, OffsetStep, Saturation, Spikes, Stuck
+from piezoest.bench.zoo.faulty_stages import Factor, Gap, Missing, OffsetStep, Saturation, Spikes, Stuck
 from piezoest.bench.zoo.references import Reference
 from piezoest.bench.zoo.wrong import FOREVER, Dead, Drift, ForATime, FrozenAmplifier, Hum, StuckStage
 

@@ -6,7 +6,7 @@ from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 
-from piezoest.bench.adaptation import json_safe
+from piezoest.bench.origin import json_safe
 from piezoest.bench.zoo.judging import Lines, judge
 from piezoest.bench.zoo.learnt_line import run_learnt_line
 from piezoest.bench.zoo.line import fit_line

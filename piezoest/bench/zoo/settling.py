@@ -17,7 +17,7 @@ import numpy as np
 
 from piezoest import signals
 from piezoest._checks import FloatArray
-from piezoest.bench.adaptation import json_safe
+from piezoest.bench.origin import json_safe
 from piezoest.bench.zoo.drawing import draw
 from piezoest.bench.zoo.faults import Fault
 from piezoest.bench.zoo.references import Reference

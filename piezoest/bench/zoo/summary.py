@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from piezoest.bench.adaptation import json_safe
+from piezoest.bench.origin import json_safe
 from piezoest.bench.zoo.playing import Row
 from piezoest.bench.zoo.settling import SEGMENTS
 

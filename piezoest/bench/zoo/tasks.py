@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
 
-from piezoest.bench.adaptation import json_safe
 from piezoest.bench.executors import in_processes
+from piezoest.bench.origin import json_safe
 from piezoest.bench.quiet import quiet
-from piezoest.bench.store import Store
 from piezoest.bench.zoo.contenders import code_of, contender
 from piezoest.bench.zoo.drawing import draw
 from piezoest.bench.zoo.dwelling import Dwell, play_dwell
@@ -135,31 +134,12 @@ def rests(controller: str, of: Sequence[Dwell]) -> list[Task]:
     return [Task(controller, dwell.seed, code, dwell=dwell) for dwell in of]
 
 
-def carry_out_all(
-    tasks: Sequence[Task],
-    store: Store,
-    workers: int | None = None,
-    progress: Callable[[int, int], None] = lambda done, of: None,
-) -> int:
-    """Run what the store does not hold yet; returns how many that were.
+def over_cores(workers: int | None = None) -> Callable[[Iterable[Task]], Iterator[Row]]:
+    """Run tasks in processes of this machine.
 
     Parameters
     ----------
-    tasks : sequence of Task
-        The whole campaign.
-    store : Store
-        Open; holds all of their rows afterwards.
     workers : int, optional
-        Processes; default one for each core.
-    progress : callable
-        Called with the number of finished runs and of all, at first and after each.
+        How many; default one for each core.
     """
-    execute: Any = partial(in_processes, carry_out, processes=workers, crashed=died)
-    todo = [task for task in tasks if task.key not in store]
-    done = len(tasks) - len(todo)
-    progress(done, len(tasks))
-    for row in execute(todo):
-        if store.append(row):
-            done += 1
-            progress(done, len(tasks))
-    return len(todo)
+    return partial(in_processes, carry_out, processes=workers, crashed=died)

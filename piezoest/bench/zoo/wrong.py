@@ -1,4 +1,4 @@
-"""Faulty stages beside those of `piezoest.bench.faulty_stages`: for a time, and of the stage itself."""
+"""Faulty stages beside those of `piezoest.bench.zoo.faulty_stages`: for a time, and of the stage itself."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray, finite, non_negative
-from piezoest.bench.faulty_stages import FaultyStage, Gap
+from piezoest.bench.zoo.faulty_stages import FaultyStage, Gap
 
 FOREVER = 1e9  # s
 

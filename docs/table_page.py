@@ -1,0 +1,132 @@
+"""Tables of the pages about estimators, from docs/data; no number is typed by hand.
+
+Runs at the start of every Sphinx build; by itself: python docs/table_page.py
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from paper_page import table, write_pieces
+
+from piezoest.bench import report
+from piezoest.bench.estimators import LINEAR
+from piezoest.bench.scenarios import UNREPEATED
+
+DOCS = Path(__file__).resolve().parent
+DATA = DOCS / "data"
+TARGET = DOCS / "generated" / "table"
+
+Document = dict[str, Any]
+
+
+def write(app: Any = None) -> None:
+    """Write what the pages include."""
+    runs, policies = read("table"), read("policies")
+    pieces = {
+        "numbers": substitutions("table", runs) + substitutions("policies", policies),
+        "overview": table("", *report.overview_table(runs)),
+        "needs": table("", *report.needs_table(runs)),
+        "settles": table("", *settles(runs)),
+        "scenarios": table("", ["scenario", "what happens"], list(map(list, runs["scenarios"].items()))),
+        "stages": table("", *stages(runs)),
+        "tuned": table("", *tuned(runs)),
+        "policies": table("", *settles(policies)),
+    }
+    write_pieces(TARGET, pieces)
+
+
+def read(name: str) -> Document:
+    return dict(json.loads((DATA / f"{name}.json").read_text(encoding="utf-8")))
+
+
+def names(document: Document) -> list[str]:
+    """Estimators, the one that adapts best first."""
+    known = [row for row in document["overview"] if row["typical"]]
+    return [row["estimator"] for row in sorted(known, key=lambda row: row["typical"][0])]
+
+
+def settles(document: Document) -> report.Table:
+    """Periods until each estimator settles, in each scenario on the first stage."""
+    scenarios, stage = list(document["scenarios"]), document["plan"]["stages"][0]
+    mine = [cell for cell in document["cells"] if cell["stage"] == stage]
+    cells = {(cell["scenario"], cell["estimator"]): cell for cell in mine}
+    body = []
+    for name in names(document):
+        row = [short(document["estimators"][name]["name"])]
+        for scenario in scenarios:
+            cell = cells.get((scenario, name))
+            row.append("" if cell is None else periods(cell["settles"]))
+        body.append(row)
+    return ["estimator", *scenarios], body
+
+
+def short(name: str) -> str:
+    """Arguments alone, where a name is a call of the estimator that all others are too."""
+    call = name.removeprefix("HysteresisRLS(")
+    return name if call == name else f"``{call.removesuffix(')')}``"
+
+
+def periods(quantiles: list[float | None]) -> str:
+    """Median, and in parentheses what 95 % of the runs keep."""
+    median, _, late = ("—" if value is None else f"{value:.0f}" for value in quantiles)
+    return median if median == late else f"{median} ({late})"
+
+
+def stages(document: Document) -> report.Table:
+    """Settled error of each estimator on each stage, over the scenarios that repeat."""
+    plan = document["plan"]
+    body = []
+    for name in names(document):
+        row = [document["estimators"][name]["name"]]
+        for stage in plan["stages"]:
+            mine = [
+                cell["settled"][0]
+                for cell in document["cells"]
+                if cell["stage"] == stage and cell["estimator"] == name and cell["scenario"] not in UNREPEATED
+            ]
+            row.append(report.percent(sorted(mine)[len(mine) // 2]) if mine else "")
+        body.append(row)
+    return ["estimator", *plan["stages"]], body
+
+
+def tuned(document: Document) -> report.Table:
+    """What tuning chose, and what it gained on other seeds."""
+    overview = {row["estimator"]: row for row in document["overview"]}
+    body = []
+    for each in document["tuned"]:
+        before, after = (overview[each[which]]["typical"] for which in ("default", "chosen"))
+        settings = each["chosen"] if each["chosen"] != each["default"] else "the default"
+        body.append(
+            [
+                document["estimators"][each["default"]]["name"], report.percent(before[0]),
+                report.percent(after[0]), f"``{settings}``",
+            ]
+        )  # fmt: skip
+    return ["estimator", "typical error, default", "tuned", "settings"], body
+
+
+def substitutions(prefix: str, document: Document) -> str:
+    """Numbers that stand in sentences."""
+    plan, conditions, machine = document["plan"], document["conditions"], document["machine"]
+    linear = next(row for row in document["overview"] if row["estimator"] == LINEAR)
+    values = {
+        "date": document["date"][:10],
+        "machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
+        "minutes": f"{document['seconds'] / 60.0:.0f} minutes",
+        "runs": document["runs"],
+        "seeds": plan["seeds"],
+        "slow": plan["slow_seeds"],
+        "rate": f"{conditions['sample_rate']:g} Hz",
+        "stages": ", ".join(plan["stages"][1:]),
+        "rest": f"{conditions['rest']:g} s",
+        "drift": f"{conditions['drift']:g} s",
+        "linear": f"{report.percent(linear['settled'][0])} %",
+    }
+    return "".join(f".. |{prefix} {name}| replace:: {value}\n" for name, value in values.items())
+
+
+if __name__ == "__main__":
+    write()

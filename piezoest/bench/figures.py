@@ -1,0 +1,251 @@
+"""Pictures of the table of runs: how fast each adapts, where each is weak, and error against cost."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from piezoest._files import save_figure
+from piezoest.bench.estimators import LINEAR
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+DPI = 130
+SETTLED = 0.012  # of the amplitude
+# Okabe and Ito's colours, told apart by all eyes, and black.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31", "#7A68A6")
+MARKERS = "osD^vPX*h"
+GREY = "0.55"
+FARTHEST = 50.0  # times the best one's error, where the colours end
+
+Document = dict[str, Any]
+
+
+def drawings(document: Document) -> dict[str, Figure]:
+    """Draw all pictures of a campaign, by name.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.table.describe`.
+    """
+    found = {"overview": overview(document), "settled": profile(document), "cost": cost(document)}
+    if any(cell["transient"] and cell["stage"] for cell in document["cells"]):
+        found["adaptation"] = adaptation(document)
+    return found
+
+
+def write_figures(document: Document, folder: Path) -> list[Path]:
+    """Draw a campaign as PNG.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.table.describe`.
+    folder : Path
+        To write to; made if it is not there.
+
+    Returns
+    -------
+    list of Path
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name, figure in drawings(document).items():
+        paths.append(folder / f"{name}.png")
+        # No date nor version within, so that the same numbers give the same file.
+        save_figure(figure, paths[-1], dpi=DPI, metadata={"Software": None})
+    return paths
+
+
+def _styles(document: Document) -> dict[str, dict[str, Any]]:
+    """Colour and marker of each estimator; linear feed-forward is grey."""
+    found: dict[str, dict[str, Any]] = {LINEAR: {"color": GREY, "marker": "_"}}
+    styles = zip(itertools.cycle(COLOURS), itertools.cycle(MARKERS), strict=True)
+    for name, (color, marker) in zip(
+        (n for n in document["estimators"] if n != LINEAR), styles, strict=False
+    ):
+        found[name] = {"color": color, "marker": marker}
+    return found
+
+
+def overview(document: Document) -> Figure:
+    """First and settled error of each estimator, with the interval that other seeds would lie in; narrow.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.table.describe`.
+    """
+    from matplotlib.figure import Figure
+
+    rows = [row for row in document["overview"] if row["typical"]]
+    rows.sort(key=lambda row: -row["typical"][0])
+    figure = Figure(figsize=(5.2, 0.4 * len(rows) + 1.5), layout="constrained")
+    axes = figure.subplots()
+    shown = {
+        "first": ("first period after a change", "#D55E00", "o"),
+        "settled": ("settled", "#0072B2", "s"),
+        "others": ("settled, stages of other families", "#009E73", "^"),
+    }
+    for quantity, (said, color, marker) in shown.items():
+        known = [(k, row[quantity]) for k, row in enumerate(rows) if row[quantity]]
+        if not known:
+            continue
+        middle, low, high = 100.0 * np.array([value for _, value in known]).T
+        axes.errorbar(
+            middle, [k for k, _ in known], xerr=[middle - low, high - middle], ls="", marker=marker,
+            color=color, label=said,
+        )  # fmt: skip
+    axes.axvline(100.0 * SETTLED, color="0.3", ls=":", lw=1)
+    axes.set_yticks(range(len(rows)), [document["estimators"][row["estimator"]]["name"] for row in rows])
+    axes.set(xscale="log", xlabel="largest error [% of the amplitude]")
+    _plain_numbers(axes.xaxis)
+    axes.grid(alpha=0.3)
+    _legend(figure, axes, 1)
+    return figure
+
+
+def cost(document: Document) -> Figure:
+    """Settled and first error against the cost of a step, with the interval that other seeds would lie in.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.table.describe`.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8, 4.6), layout="constrained")
+    style = _styles(document)
+    shown = {"first": "first period after a change", "settled": "once settled"}
+    for axes, (quantity, said) in zip(figure.subplots(1, 2, sharex=True), shown.items(), strict=True):
+        for row in document["overview"]:
+            about, value = document["estimators"][row["estimator"]], row[quantity]
+            if row["estimator"] == LINEAR and value:
+                axes.axhline(100.0 * value[0], color=GREY, ls="--", lw=1, label=LINEAR)
+            elif value and about.get("step_us"):
+                middle, low, high = (100.0 * each for each in value)
+                spread = [[middle - low], [high - middle]]
+                axes.errorbar(
+                    about["step_us"], middle, spread, ls="", ms=8, label=about["name"],
+                    **style[row["estimator"]],
+                )  # fmt: skip
+        axes.set(title=said, xlabel="one step [µs]", xscale="log", yscale="log")
+        _plain_numbers(axes.xaxis)
+        _plain_numbers(axes.yaxis)
+        axes.grid(alpha=0.3)
+    figure.axes[0].set_ylabel("largest error [% of the amplitude]")
+    _legend(figure, figure.axes[0], 2)
+    return figure
+
+
+def profile(document: Document) -> Figure:
+    """What each is weak at: its settled error in each scenario, relative to the best one's there.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.table.describe`.
+    """
+    from matplotlib.colors import LogNorm
+    from matplotlib.figure import Figure
+
+    names = sorted(
+        (row["estimator"] for row in document["overview"]),
+        key=lambda name: next(
+            row["typical"][0] if row["typical"] else math.inf
+            for row in document["overview"]
+            if row["estimator"] == name
+        ),
+    )
+    stage = document["plan"]["stages"][0]
+    columns = {(cell["stage"], cell["scenario"]): None for cell in document["cells"]}
+    scenarios = [scenario for where, scenario in columns if where in (stage, "")]
+    settled = {
+        (cell["scenario"], cell["estimator"]): cell["settled"][0]
+        for cell in document["cells"]
+        if cell["stage"] in (stage, "")
+    }
+    table = np.array(
+        [[settled.get((scenario, name), np.nan) for scenario in scenarios] for name in names], dtype=float
+    )
+    ratio = table / np.nanmin(table, axis=0)
+    figure = Figure(figsize=(8.5, 0.42 * len(names) + 2.0), layout="constrained")
+    axes = figure.subplots()
+    image = axes.imshow(
+        np.clip(ratio, 1.0, FARTHEST), norm=LogNorm(1.0, FARTHEST), cmap="YlOrRd", aspect="auto"
+    )
+    for (i, k), value in np.ndenumerate(ratio):
+        text = "—" if not np.isfinite(value) else f"{value:.0f}" if value >= 9.95 else f"{value:.1f}"
+        dark = value > FARTHEST**0.6
+        axes.text(k, i, text, ha="center", va="center", fontsize=9, color="white" if dark else "black")
+    axes.set_xticks(range(len(scenarios)), scenarios, rotation=35, ha="right")
+    axes.set_yticks(range(len(names)), [document["estimators"][name]["name"] for name in names])
+    bar = figure.colorbar(image, ax=axes, label="settled error / the best one's", pad=0.01)
+    _plain_numbers(bar.ax.yaxis, (1.0, 3.0))
+    return figure
+
+
+def adaptation(document: Document) -> Figure:
+    """Largest error of each period after the change, of every estimator: a panel for each scenario.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.table.describe`.
+    """
+    from matplotlib.figure import Figure
+
+    cells = [cell for cell in document["cells"] if cell["transient"] and cell["stage"]]
+    scenarios = list(dict.fromkeys(cell["scenario"] for cell in cells))
+    style = _styles(document)
+    columns = 2
+    rows = -(-len(scenarios) // columns)
+    figure = Figure(figsize=(8, 2.7 * rows + 1.2), layout="constrained")
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+    for axes, scenario in zip(panels, scenarios, strict=False):
+        mine = [cell for cell in cells if cell["scenario"] == scenario]
+        for cell in mine:
+            _transient(axes, cell, document["estimators"][cell["estimator"]]["name"], style)
+        axes.axhline(100.0 * SETTLED, color="0.3", ls=":", lw=1)
+        seconds = mine[0]["period"]
+        axes.set(title=scenario, xlabel=f"period after the change ({seconds:.3g} s each)", yscale="log")
+        _plain_numbers(axes.yaxis)
+        axes.grid(alpha=0.3)
+        axes.xaxis.get_major_locator().set_params(integer=True)
+    for axes in panels[len(scenarios) :]:
+        axes.remove()
+    for axes in panels[: len(scenarios) : columns]:
+        axes.set_ylabel("error [% of amplitude]")
+    _legend(figure, panels[0], 2)
+    return figure
+
+
+def _transient(axes: Axes, cell: Document, name: str, style: dict[str, dict[str, Any]]) -> None:
+    errors: list[Any] = [None if error is None else 100.0 * error for error in cell["transient"]]
+    looks: dict[str, Any] = {**style[cell["estimator"]], "lw": 1.4, "ms": 4}
+    if cell["estimator"] == LINEAR:
+        looks |= {"marker": None, "ls": "--", "zorder": 1}
+    axes.plot(range(1, len(errors) + 1), errors, label=name, **looks)
+
+
+def _legend(figure: Figure, axes: Axes, columns: int) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=9)
+
+
+def _plain_numbers(axis: Axis, digits: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
+    """Mark a logarithmic axis with 1, 2, 5, 10 and so on, written as such."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=digits))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

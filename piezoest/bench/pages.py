@@ -1,0 +1,81 @@
+"""Results of a benchmark as one page of HTML, from the document alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from piezoest.bench import figures, paper_report, report
+from piezoest.report import Page
+
+Document = dict[str, Any]
+
+HEADINGS = {
+    "overview": "Errors",
+    "adaptation": "Adaptation",
+    "settled": "Where each is weak",
+    "cost": "Cost",
+}
+
+
+def write_html(document: Document, path: str | Path) -> None:
+    """Write a result of `piezoest bench` as one page that needs no network.
+
+    Parameters
+    ----------
+    document : dict
+        What the command writes with ``--json``.
+    path : str or Path
+        File to write; an existing one is replaced.
+
+    Raises
+    ------
+    ValueError
+        If there is no page for such a document.
+    OSError
+        If the file cannot be written.
+    """
+    suite = document.get("suite")
+    if suite not in PAGES:
+        raise ValueError(
+            f"there is no page for the suite {suite!r}: pass what piezoest bench writes with --json"
+        )
+    machine = document.get("machine", {})
+    parts = [str(document.get("date", ""))[:10], str(machine.get("cpu", "")), str(machine.get("python", ""))]
+    page = Page(f"piezoest bench: {suite}", ", ".join(part for part in parts if part))
+    PAGES[suite](page, document)
+    page.footer(", ".join(f"{name} {version}" for name, version in document.get("versions", {}).items()))
+    page.write(path)
+
+
+def _table(page: Page, document: Document) -> None:
+    page.table(*report.overview_table(document))
+    page.text(report.KEY)
+    page.advice(f"Failed: {failure}" for failure in document["failures"])
+    if document["needs"]:
+        page.heading("Which estimator")
+        page.table(*report.needs_table(document))
+    for name, figure in figures.drawings(document).items():
+        page.heading(HEADINGS[name])
+        page.picture(figure, name)
+    for scenario, stage in dict.fromkeys((cell["scenario"], cell["stage"]) for cell in document["cells"]):
+        page.heading(f"{scenario}, {stage}" if stage else scenario)
+        page.text(document["scenarios"][scenario])
+        page.table(*report.scenario_table(document, scenario, stage))
+
+
+def _paper(page: Page, document: Document) -> None:
+    for sentence in paper_report.verdict(document["tables"]):
+        page.text(sentence)
+    for number, title in paper_report.TITLES.items():
+        page.heading(title)
+        page.table(*paper_report.table(document["tables"], number))
+    page.text(paper_report.KEY)
+    page.heading(paper_report.TRANSIENTS)
+    page.table(*paper_report.transients(document["adaptation"]))
+    if document["memory"]:
+        page.heading("Memory of the estimator")
+        page.table(*paper_report.memories(document["memory"]))
+
+
+PAGES = {"table": _table, "paper": _paper}

@@ -1,0 +1,227 @@
+"""The table of runs for the terminal and for pages: headings and cells, in 80 columns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+Document = dict[str, Any]
+Table = tuple[list[str], list[list[str]]]
+
+KEY = (
+    "Largest errors in % of the amplitude. settles: periods until every further error is below 1.2 %, the "
+    "median, and the share of runs that settle. first: in the first period after the change. settled: in the "
+    "last half of the periods; the same for references that do not repeat, and on stages of other families. "
+    "Geometric means over the scenarios of the medians over the seeds. step: one sample from Python."
+)
+SURE = 0.05
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Significant digits as a plain number; a dash for what is not known or infinite.
+
+    Parameters
+    ----------
+    value : float or None
+        To write.
+    digits : int
+        How many.
+    """
+    if value is None or not math.isfinite(value):
+        return "—"
+    if value == 0.0:
+        return "0"
+    places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    text = f"{value:.{places}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def percent(share: float | None, digits: int = 2) -> str:
+    """A share in per cent; a dash for what is not known or infinite.
+
+    Parameters
+    ----------
+    share : float or None
+        Of one.
+    digits : int
+        Significant ones.
+    """
+    return number(None if share is None else 100.0 * share, digits)
+
+
+def overview_table(document: Document) -> Table:
+    """Heading and a row for each estimator, the one that adapts best first.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.table.describe`.
+    """
+    heading = ["estimator", "settles", "first", "settled", "not\nrepeated", "other\nstages", "step\n[µs]"]
+    best = sorted(document["overview"], key=lambda row: row["typical"][0] if row["typical"] else math.inf)
+    body = []
+    for row in best:
+        about = document["estimators"][row["estimator"]]
+        errors = (row[name] for name in ("first", "settled", "unrepeated", "others"))
+        body.append(
+            [
+                about["name"],
+                settles(row["settles"], row["settled_runs"], row["first_runs"]),
+                *(percent(None if error is None else error[0]) for error in errors),
+                number(about.get("step_us"), 2),
+            ]
+        )
+    return heading, body
+
+
+def settles(quantiles: Sequence[float | None] | None, settled: int, runs: int) -> str:
+    """Periods until a run settles, and how many of a hundred runs do.
+
+    Parameters
+    ----------
+    quantiles : sequence of float, or None
+        Median and 5 and 95 % quantile.
+    settled, runs : int
+        How many settle, and of how many.
+    """
+    median = "—" if quantiles is None or quantiles[0] is None else f"{quantiles[0]:.0f}"
+    return f"{median} ({100 * settled // max(runs, 1)} %)"
+
+
+def scenario_table(document: Document, scenario: str, stage: str) -> Table:
+    """Heading and a row for each estimator in one scenario on one stage.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.table.describe`.
+    scenario, stage : str
+        Names.
+    """
+    heading = ["estimator", "settles", "first", "settled", "worst"]
+    cells = [cell for cell in document["cells"] if cell["scenario"] == scenario and cell["stage"] == stage]
+    cells.sort(key=lambda cell: cell["typical"][0])
+    body = [
+        [
+            document["estimators"][cell["estimator"]]["name"],
+            settles(cell["settles"], cell["settled_runs"], cell["runs"]),
+            *(percent(cell[name][0]) for name in ("first", "settled", "worst")),
+        ]
+        for cell in cells
+    ]
+    return heading, body
+
+
+def needs_table(document: Document) -> Table:
+    """Heading and a row for each need: what to take, and what cannot be told from it.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.table.describe`.
+    """
+    heading = ["you have or want", "take", "error\n[%]", "the next", "times\nas much"]
+    body = []
+    for need in document["needs"]:
+        names = {row["estimator"]: document["estimators"][row["estimator"]]["name"] for row in need["order"]}
+        best, *others = need["order"]
+        alike = [names[row["estimator"]] for row in others if row["p"] >= SURE]
+        worse = [row for row in others if row["p"] < SURE and row["ratio"][0] >= 1.0]
+        value = best["value"] or best["others"]
+        body.append(
+            [
+                need["words"],
+                " or ".join([names[best["estimator"]], *alike]),
+                percent(value[0]),
+                names[worse[0]["estimator"]] if worse else "—",
+                number(worse[0]["ratio"][0], 2) if worse else "—",
+            ]
+        )
+    return heading, body
+
+
+def print_table(document: Document, console: Any, *, scenarios: bool = False) -> None:
+    """Print a campaign.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.table.describe`.
+    console : rich.console.Console
+        To print on.
+    scenarios : bool
+        A table for each scenario and stage too.
+    """
+    if scenarios:
+        for scenario, stage in dict.fromkeys((cell["scenario"], cell["stage"]) for cell in document["cells"]):
+            where = f"{scenario}, {stage}" if stage else scenario
+            title = f"{where}: {document['scenarios'][scenario]}"
+            _print(console, title, *scenario_table(document, scenario, stage))
+    plan = document["plan"]
+    title = f"{len(document['scenarios'])} scenarios, {plan['seeds']} seeds, stage {plan['stages'][0]}"
+    _print(console, title, *overview_table(document))
+    machine = document["machine"]
+    lines = [
+        KEY,
+        f"{document['runs']} runs at {document['conditions']['sample_rate']:g} Hz; {machine['cpu']}, "
+        f"{machine['cores']} cores, {machine['python']}.",
+        *(f"{name}: {diverged} of {runs} runs diverge." for name, diverged, runs in _diverged(document)),
+    ]
+    for line in lines:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    for failure in [*document["failures"], *document["tracebacks"]]:
+        console.print(f"failed: {failure}", style="red", highlight=False, markup=False, soft_wrap=True)
+
+
+def _diverged(document: Document) -> list[tuple[str, int, int]]:
+    return [
+        (document["estimators"][row["estimator"]]["name"], row["diverged"], row["runs"])
+        for row in document["overview"]
+        if row["diverged"]
+    ]
+
+
+def _print(console: Any, title: str, heading: list[str], body: list[list[str]]) -> None:
+    from rich.box import SIMPLE_HEAD
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False)
+    table.add_column(heading[0])
+    for name in heading[1:]:
+        table.add_column(escape(name), justify="right", no_wrap=True)
+    for cells in body:
+        table.add_row(*cells)
+    console.print(table)
+
+
+def print_changes(document: Document, console: Any, *, everything: bool = False) -> None:
+    """Print what `piezoest bench compare` found.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.compare.compare`.
+    console : rich.console.Console
+        To print on.
+    everything : bool
+        What did not change too.
+    """
+    shown = [row for row in document["rows"] if everything or row["verdict"] in ("better", "worse")]
+    if shown:
+        heading = ["scenario, estimator", "number", "changed", "B/A", "q", "verdict"]
+        body = [
+            [
+                f"{row['scenario']}, {row['estimator']}", row["quantity"], f"{row['changed']}/{row['pairs']}",
+                number(row["ratio"]), number(row["q"], 2), row["verdict"],
+            ]
+            for row in shown
+        ]  # fmt: skip
+        _print(console, "B against A", heading, body)
+    counts = ", ".join(f"{count} {verdict}" for verdict, count in document["counts"].items())
+    for line in (
+        f"{document['pairs']} pairs of runs; of {len(document['rows'])} comparisons {counts or 'none'}.",
+        *document["notes"],
+    ):
+        console.print(line, highlight=False, markup=False, soft_wrap=True)

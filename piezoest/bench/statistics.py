@@ -1,0 +1,242 @@
+"""What runs say of estimators: means with their intervals, orders, and whether a difference is beyond chance.
+
+Runs are paired: the same scenario, stage and seed have the same start, noise and moment of change, so
+that what a seed brings with it cancels. What is compared is the logarithm of the ratio of two errors,
+averaged over scenarios and stages for each seed, for the seeds are what is independent. The test is
+Wilcoxon's signed ranks. That many comparisons are made at a time is allowed for: by Holm's correction where
+estimators are put in order, by the false discovery rate where two campaigns are compared.
+
+F. Wilcoxon, Biometrics Bulletin 1 (1945) 80-83; S. Holm, Scandinavian Journal of Statistics 6 (1979) 65-70;
+Y. Benjamini, Y. Hochberg, Journal of the Royal Statistical Society B 57 (1995) 289-300.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from piezoest._checks import FloatArray
+from piezoest.bench.estimators import LINEAR
+
+QUANTITIES = ("typical", "settled", "first", "worst")
+FAILED = 10.0  # error of a run that failed or left all bounds, relative to the amplitude
+RESAMPLED = 2000
+LEVEL = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Need:
+    """Something one may want of an estimator, and the number that tells.
+
+    Parameters
+    ----------
+    words : str
+        What is wanted.
+    quantity : str
+        Error that should be small.
+    scenarios : tuple of str
+        Where it is taken; empty for all.
+    """
+
+    words: str
+    quantity: str
+    scenarios: tuple[str, ...] = ()
+
+    def applies(self, scenarios: Sequence[str]) -> bool:
+        """Whether a campaign has the scenarios.
+
+        Parameters
+        ----------
+        scenarios : sequence of str
+            Of the campaign.
+        """
+        return set(self.scenarios) <= set(scenarios)
+
+
+CHANGES = ("amplitude-switch", "amplitude-drop", "gain-step")
+NEEDS = (
+    Need("Anything may come", "typical"),
+    Need("A start from wrong parameters", "typical", ("cold-start",)),
+    Need("Soon right again after a change of amplitude or gain", "typical", CHANGES),
+    Need("A small first error at such a change", "first", CHANGES),
+    Need("The least error once settled, one amplitude", "settled", ("cold-start",)),
+    Need("Minor loops and signals that do not repeat", "settled", ("prbs", "random-walk", "two-tone")),
+    Need("A gain that drifts", "settled", ("drift",)),
+    Need("Long rests", "first", ("dwell",)),
+    Need("A noisy gauge", "settled", ("noise",)),
+)
+
+
+def relative(runs: pd.DataFrame) -> pd.DataFrame:
+    """Runs with errors relative to the amplitude; what failed has large ones, and never settles.
+
+    Parameters
+    ----------
+    runs : pandas.DataFrame
+        Columns of `piezoest.bench.run.COLUMNS`.
+    """
+    frame = runs.copy()
+    amplitude = frame["amplitude"].astype(float)
+    for name in QUANTITIES:
+        errors = (frame[name].astype(float) / amplitude).to_numpy(float, na_value=np.inf)
+        frame[name] = np.clip(errors, 1e-12, FAILED)
+    frame["settles"] = frame["settles"].to_numpy(float, na_value=np.inf)
+    frame["period"] = frame["period"].to_numpy(float, na_value=np.nan)
+    frame["diverged"] = frame["diverged"].fillna(True).astype(bool)
+    return frame
+
+
+def logarithms(frame: pd.DataFrame, quantity: str) -> pd.DataFrame:
+    """Logarithm of an error: a row for each stage and scenario, a column for each seed.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Runs of one estimator, from `relative`.
+    quantity : str
+        In `QUANTITIES`.
+    """
+    return np.log(frame.pivot_table(index=["stage", "scenario"], columns="seed", values=quantity))
+
+
+def over_scenarios(frame: pd.DataFrame, quantity: str) -> float:
+    """Geometric mean over stages and scenarios of the median over the seeds.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Runs of one estimator, from `relative`.
+    quantity : str
+        In `QUANTITIES`.
+    """
+    return math.exp(float(logarithms(frame, quantity).median(axis=1).mean()))
+
+
+def interval(frame: pd.DataFrame, quantity: str) -> list[float]:
+    """The same, and the 95 % interval that other seeds would lie in, by the bootstrap over the seeds.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Runs of one estimator, from `relative`.
+    quantity : str
+        In `QUANTITIES`.
+
+    Returns
+    -------
+    list of float
+        Value, lower and upper end.
+    """
+    values = logarithms(frame, quantity).to_numpy()
+    found = math.exp(float(np.mean(np.nanmedian(values, axis=1))))
+    seeds = values.shape[1]
+    rng = np.random.default_rng(0)
+    drawn = values[:, rng.integers(0, seeds, (RESAMPLED, seeds))]
+    means = np.nanmean(np.nanmedian(drawn, axis=2), axis=0)
+    low, high = np.exp(np.quantile(means, (0.025, 0.975)))
+    return [found, float(low), float(high)]
+
+
+def order(frame: pd.DataFrame, need: Need, stages: Sequence[str]) -> list[dict[str, Any]]:
+    """Estimators in order of a need, the best first, each compared with the best by the runs they share.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Runs, from `relative`.
+    need : Need
+        What is wanted.
+    stages : sequence of str
+        Of the campaign; an estimator that ran on the first one only is ordered by that.
+
+    Returns
+    -------
+    list of dict
+        ``value`` with its interval on the first stage and ``others`` on the rest; ``ratio`` to the best with
+        its interval, and ``p``, allowed for the number of comparisons (Holm). The order is that of all
+        stages among estimators that ran on all, and of the first stage beside them.
+    """
+    there = frame[frame["scenario"].isin(need.scenarios)] if need.scenarios else frame
+    runs = {str(name): group for name, group in there.groupby("estimator", sort=False) if name != LINEAR}
+    everywhere = {name for name, group in runs.items() if set(group["stage"]) >= set(stages)}
+    ranked = sorted(runs, key=lambda name: over_scenarios(runs[name], need.quantity))
+    best = next((name for name in ranked if name in everywhere), ranked[0])
+    found: list[dict[str, Any]] = []
+    for name in ranked:
+        first = runs[name][runs[name]["stage"] == stages[0]]
+        others = runs[name][runs[name]["stage"].isin(stages[1:])]
+        d = _by_seed(runs[name], runs[best], need.quantity)
+        found.append(
+            {
+                "estimator": name,
+                "everywhere": name in everywhere,
+                "value": interval(first, need.quantity) if len(first) else None,
+                "others": interval(others, need.quantity) if len(others) else None,
+                "ratio": _ratio(d),
+                "p": 1.0 if name == best else signed_rank(d),
+            }
+        )
+    corrected = holm([row["p"] for row in found])
+    for row, p in zip(found, corrected, strict=True):
+        row["p"] = p
+    return sorted(found, key=lambda row: (row["ratio"][0], row["estimator"] != best))
+
+
+def _by_seed(ours: pd.DataFrame, theirs: pd.DataFrame, quantity: str) -> FloatArray:
+    """Mean logarithm of the ratio of two estimators' errors, for each seed that both have."""
+    difference = logarithms(ours, quantity) - logarithms(theirs, quantity)
+    values: FloatArray = difference.mean(axis=0).dropna().to_numpy()
+    return values
+
+
+def _ratio(d: FloatArray) -> list[float]:
+    """Median ratio and its 95 % interval, by the bootstrap."""
+    rng = np.random.default_rng(0)
+    drawn = np.median(d[rng.integers(0, d.size, (RESAMPLED, d.size))], axis=1)
+    low, high = np.quantile(drawn, (0.025, 0.975))
+    return [math.exp(float(np.median(d))), math.exp(float(low)), math.exp(float(high))]
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """Values of p that allow for the number of comparisons (Holm 1979).
+
+    Parameters
+    ----------
+    p : sequence of float
+        Of each comparison; 1 for what is compared with itself, which is none.
+    """
+    number = sum(value < 1.0 for value in p)
+    found, largest = list(p), 0.0
+    for rank, k in enumerate(sorted(range(len(p)), key=lambda k: p[k])):
+        largest = max(largest, min(1.0, p[k] * max(number - rank, 1)))
+        found[k] = largest
+    return found
+
+
+def signed_rank(d: FloatArray) -> float:
+    """Two-sided p of Wilcoxon's signed ranks; zeros are left out, and few pairs are tried in full.
+
+    Parameters
+    ----------
+    d : ndarray, shape (N,)
+        Differences, infinite ones larger than all others.
+
+    Returns
+    -------
+    float
+        1 if all but one are zero.
+    """
+    from scipy.stats import PermutationMethod, wilcoxon
+
+    d = d[d != 0.0]
+    if d.size < 2:
+        return 1.0
+    finite = np.abs(d[np.isfinite(d)])
+    d = np.clip(d, -1.0 - np.max(finite, initial=0.0), 1.0 + np.max(finite, initial=0.0))
+    exact = PermutationMethod(n_resamples=2**13) if d.size <= 13 else "auto"
+    return float(wilcoxon(d, method=exact).pvalue)

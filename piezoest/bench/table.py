@@ -1,0 +1,349 @@
+"""The table of runs: scenarios × stages × estimators × seeds, planned, and summed up in one document."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from piezoest.bench import cost, tables
+from piezoest.bench.cases import Conditions
+from piezoest.bench.estimators import KNOWN, LINEAR, PAPERS, candidate, is_slow, module_of, name_of
+from piezoest.bench.executors import in_processes, on_dask
+from piezoest.bench.machine import fingerprint
+from piezoest.bench.origin import json_safe
+from piezoest.bench.recorded import digest, file_of
+from piezoest.bench.run import COLUMNS, Row, Task, code_of, crashed, follow, play
+from piezoest.bench.scenarios import SCENARIOS, UNREPEATED
+from piezoest.bench.stages import PAPER, STAGES, STRANGERS
+from piezoest.bench.statistics import (
+    NEEDS,
+    QUANTITIES,
+    interval,
+    order,
+    relative,
+)
+from piezoest.bench.store import Store
+
+RUNS, PERIODS, DOCUMENT = "runs", "periods", "table.json"
+PERIOD_COLUMNS: dict[str, type] = {
+    "key": str, "stage": str, "scenario": str, "estimator": str, "seed": int, "period": int, "error": float,
+}  # fmt: skip
+# Under a minute with all estimators on two cores, compiled.
+QUICK: dict[str, Any] = {"sample_rate": 2000.0, "before": 2, "after": 6, "rest": 0.5, "drift": 1.5}
+DIGITS = 4  # significant, of the numbers of a document
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What is run.
+
+    Parameters
+    ----------
+    estimators : tuple of str
+        As `piezoest.bench.estimators.candidate` reads them; linear feed-forward is always beside them.
+    scenarios : tuple of str
+        Names in `SCENARIOS`, or of logs, see `piezoest.bench.recorded.logs_of`.
+    stages : tuple of str
+        Names in `piezoest.bench.stages.STAGES`.
+    seeds : int
+        Runs of each.
+    slow_seeds : int
+        Runs of each estimator that is slow; these run on the first stage only, and on no scenario of
+        `piezoest.bench.scenarios.UNREPEATED`, whose runs are long.
+    given : dict
+        Fields of `piezoest.bench.cases.Conditions`.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown or a value out of its range.
+    """
+
+    estimators: tuple[str, ...]
+    scenarios: tuple[str, ...] = tuple(SCENARIOS)
+    stages: tuple[str, ...] = (PAPER, *STRANGERS)
+    seeds: int = 30
+    slow_seeds: int = 10
+    given: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if unknown := [name for name in self.scenarios if name not in SCENARIOS and not file_of(name)]:
+            raise ValueError(f"scenario {', '.join(unknown)}: choose of {', '.join(SCENARIOS)}")
+        if unknown := [name for name in self.stages if name not in STAGES]:
+            raise ValueError(f"stage {', '.join(unknown)}: choose of {', '.join(STAGES)}")
+        for estimator in self.estimators:
+            candidate(estimator)
+        Conditions(**self.given)
+
+    def tasks(self) -> list[Task]:
+        """Every run; those with the same seed, stage and scenario one after the other."""
+        codes = {name: code_of(name) for name in (LINEAR, *dict.fromkeys(self.estimators))}
+        logs = {name: digest(file) for name in self.scenarios if (file := file_of(name)) is not None}
+        simulated = [name for name in dict.fromkeys(self.scenarios) if name not in logs]
+        found = [
+            Task(scenario, estimator, seed, {**self.given, "stage": stage}, code)
+            for seed in range(self.seeds)
+            for stage in self.stages
+            for scenario in simulated
+            for estimator, code in codes.items()
+            if not is_slow(estimator) or self._with_slow(scenario, stage, seed)
+        ]
+        # A log leaves nothing to chance: it is run once.
+        return found + [
+            Task(log, estimator, 0, {}, f"{code}-{content}")
+            for log, content in logs.items()
+            for estimator, code in codes.items()
+        ]
+
+    def _with_slow(self, scenario: str, stage: str, seed: int) -> bool:
+        return seed < self.slow_seeds and stage == self.stages[0] and scenario not in UNREPEATED
+
+
+def over_cores(processes: int | None = None) -> Any:
+    """Run tasks in processes of this machine.
+
+    Parameters
+    ----------
+    processes : int, optional
+        How many; default one for each core.
+    """
+    return partial(in_processes, play, processes=processes, crashed=crashed)
+
+
+def over_dask(
+    scheduler: str | None = None, processes: int | None = None, estimators: Iterable[str] = ()
+) -> Any:
+    """Run tasks on Dask.
+
+    Parameters
+    ----------
+    scheduler : str, optional
+        Address of a cluster's scheduler; default a cluster of this machine's cores.
+    processes : int, optional
+        Workers of the latter; default one for each core.
+    estimators : iterable of str
+        Those whose modules the workers need.
+    """
+    modules = sorted({path for name in estimators if (path := module_of(name)) is not None})
+    work = partial(_play_same, ours=fingerprint())
+    return partial(on_dask, work, scheduler=scheduler, processes=processes, crashed=crashed, modules=modules)
+
+
+def _play_same(task: Task, ours: str) -> Row:
+    """Run a task on a worker that has the same package."""
+    if fingerprint() != ours:
+        raise ValueError(
+            f"a worker has another piezoest ({fingerprint()}) than this process ({ours}): install the same"
+        )
+    return play(task)
+
+
+def label(text: str, tuned: Iterable[str] = ()) -> str:
+    """Name of an estimator in tables and figures.
+
+    Parameters
+    ----------
+    text : str
+        As `piezoest.bench.estimators.candidate` reads it, or "linear feed-forward".
+    tuned : iterable of str
+        Those that were found by tuning.
+    """
+    if text == PAPERS:
+        return "HysteresisRLS, the paper's law"
+    if text in set(tuned):
+        return f"{name_of(text)}, tuned"
+    return name_of(text) if text in KNOWN.values() else text
+
+
+def write(rows: Sequence[Row], folder: Path, format: str | None = None) -> pd.DataFrame:
+    """Write the tables `runs` and `periods`.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        From `piezoest.bench.run.play`.
+    folder : Path
+        To write to.
+    format : {"parquet", "csv"}, optional
+        Default Parquet where pyarrow is installed.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The runs.
+    """
+    format = tables.checked_format(format)
+    runs = tables.table_of(rows, COLUMNS)
+    tables.write_table(runs, folder / f"{RUNS}.{format}")
+    periods = ({**row, "period": k, "error": e} for row in rows for k, e in enumerate(row["errors"], 1))
+    tables.write_table(tables.table_of(periods, PERIOD_COLUMNS), folder / f"{PERIODS}.{format}")
+    return runs
+
+
+def costs(estimators: Iterable[str], given: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Times of each estimator per sample, one after the other, on a recorded cold start.
+
+    Parameters
+    ----------
+    estimators : iterable of str
+        As `piezoest.bench.estimators.candidate` reads them.
+    given : dict
+        Fields of `piezoest.bench.cases.Conditions`.
+
+    Returns
+    -------
+    dict
+        By estimator, from `piezoest.bench.cost.cost`; empty for one that fails.
+    """
+    case = SCENARIOS["cold-start"].build(0, **given)
+    record = follow(case, LINEAR)
+    found: dict[str, dict[str, Any]] = {}
+    for text in estimators:
+        try:
+            found[text] = cost.cost(partial(candidate(text), case.sample_rate, case.start), record)
+        except Exception:
+            found[text] = {}
+    return found
+
+
+def describe(
+    rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]], tuned: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Sum up a finished campaign.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        All of its runs.
+    plan : Plan
+        Of the campaign.
+    times : dict
+        From `costs`.
+    tuned : sequence of str
+        Estimators that were found by tuning; they are in no order of ``needs``.
+
+    Returns
+    -------
+    dict
+        JSON-safe; errors relative to the amplitude. ``cells``: of each estimator, stage and scenario the
+        median over the seeds and the 5 and 95 % quantiles; ``overview``: of each estimator the geometric mean
+        over the scenarios that repeat of the medians, on the first stage, with the 95 % interval that the
+        seeds leave, and the settled error on the other stages (``others``) and on scenarios that do not
+        repeat (``unrepeated``); ``needs``: the estimators in order for each need, compared pair by pair.
+    """
+    frame = relative(tables.table_of(rows, COLUMNS))
+    names = list(dict.fromkeys([LINEAR, *plan.estimators]))
+    errors: dict[tuple[str, str, str], list[list[float]]] = {}
+    for row in rows:
+        if row["failure"] is None and row["stage"] in ("", plan.stages[0]):
+            scaled = [math.inf if e is None else e / row["amplitude"] for e in row["errors"]]
+            errors.setdefault((row["stage"], row["scenario"], row["estimator"]), []).append(scaled)
+    cells = [
+        _cell(key, group, errors.get(key, []))
+        for key, group in frame.groupby(["stage", "scenario", "estimator"], sort=False)
+    ]
+    document = {
+        "suite": "table",
+        "code": fingerprint(),
+        "plan": asdict(plan),
+        "conditions": asdict(Conditions(**plan.given)),
+        "scenarios": {
+            name: SCENARIOS[name].description if name in SCENARIOS else f"Recorded log {file_of(name)}."
+            for name in plan.scenarios
+        },
+        "estimators": {
+            text: {"name": label(text, tuned), "slow": is_slow(text), **times.get(text, {})} for text in names
+        },
+        "runs": len(rows),
+        "overview": [_overview(frame, text, plan) for text in names],
+        "cells": cells,
+        "needs": [
+            {**asdict(need), "order": order(frame[~frame["estimator"].isin(tuned)], need, plan.stages)}
+            for need in NEEDS
+            if need.applies(plan.scenarios)
+        ],
+        "failures": [
+            f"{row['scenario']}, {row['stage']}, seed {row['seed']}, {row['estimator']}: {row['failure']}"
+            for row in rows
+            if row["failure"] is not None
+        ],
+        "tracebacks": list(dict.fromkeys(row["traceback"] for row in rows if row.get("traceback")))[:5],
+    }
+    return dict(json_safe(rounded(document)))
+
+
+def _cell(key: Any, group: pd.DataFrame, errors: Sequence[Sequence[float]]) -> Row:
+    stage, scenario, estimator = key
+    return {
+        "stage": stage,
+        "scenario": scenario,
+        "estimator": estimator,
+        "runs": len(group),
+        "failures": int(group["failure"].notna().sum()),
+        "diverged": int(group["diverged"].sum()),
+        "settled_runs": int(np.isfinite(group["settles"]).sum()),
+        "period": float(group["period"].median()),
+        **{name: _quantiles(group[name]) for name in (*QUANTITIES, "settles")},
+        "transient": np.median(errors, axis=0).tolist() if errors else [],
+    }
+
+
+def _quantiles(values: Any) -> list[float]:
+    """Median, 5 and 95 % quantile, each a value that occurred: no mean has an infinite neighbour."""
+    return [float(np.quantile(values, level, method="inverted_cdf")) for level in (0.5, 0.05, 0.95)]
+
+
+def _overview(frame: pd.DataFrame, estimator: str, plan: Plan) -> Row:
+    mine = frame[frame["estimator"] == estimator]
+    repeated = ~mine["scenario"].isin(UNREPEATED)
+    at_home = mine["stage"].isin(["", plan.stages[0]])
+    first, others = mine[repeated & at_home], mine[repeated & ~at_home]
+    unrepeated = mine[~repeated & at_home]
+    return {
+        "estimator": estimator,
+        "runs": len(mine),
+        "failures": int(mine["failure"].notna().sum()),
+        "diverged": int(mine["diverged"].sum()),
+        "first_runs": len(first),
+        "settled_runs": int(np.isfinite(first["settles"]).sum()),
+        "settles": _quantiles(first["settles"]) if len(first) else None,
+        **{name: interval(first, name) if len(first) else None for name in QUANTITIES},
+        "unrepeated": interval(unrepeated, "settled") if len(unrepeated) else None,
+        "others": interval(others, "settled") if len(others) else None,
+    }
+
+
+def rounded(value: Any) -> Any:
+    """The same with numbers of few digits, for a document that is kept.
+
+    Parameters
+    ----------
+    value : object
+        Of dictionaries, lists, tuples and plain values.
+    """
+    match value:
+        case dict():
+            return {key: rounded(item) for key, item in value.items()}
+        case list() | tuple():
+            return [rounded(item) for item in value]
+        case float() if math.isfinite(value):
+            return float(f"{value:.{DIGITS}g}")
+    return value
+
+
+def store_in(folder: Path) -> Store:
+    """Where the runs of a campaign with this folder are kept.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the campaign.
+    """
+    return Store(folder / "runs.jsonl")

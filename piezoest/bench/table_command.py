@@ -1,0 +1,296 @@
+"""`piezoest bench` itself, and `piezoest bench compare`."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from piezoest._files import read_json, write_text
+from piezoest._options import grouped
+from piezoest.bench.origin import origin
+from piezoest.bench.shared import (
+    Html,
+    Json,
+    check_html,
+    counting,
+    json_target,
+    json_text,
+    progress,
+    usage,
+    write_html,
+    write_json,
+)
+
+FOLDER, QUICK_FOLDER = Path("bench-results"), Path("bench-results-quick")
+SEEDS, SLOW_SEEDS = 30, 10
+WORSE = 1  # exit code of `compare --fail-if-worse`
+HEAD = ("date", "machine", "versions", "code", "runs")
+
+COMPARE_EPILOG = "Example: piezoest bench compare before after --json changes.json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Runs:
+    """What is run."""
+
+    estimator: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--estimator",
+            "-e",
+            metavar="NAME|MODULE:CLASS",
+            help='Beside the package\'s; may have arguments: "HysteresisRLS(memory=0.4)", and be repeated.',
+        ),
+    ] = None
+    only: Annotated[
+        list[str] | None,
+        typer.Option(help="Only this one in the place of the package's; may be repeated."),
+    ] = None
+    scenario: Annotated[
+        list[str] | None,
+        typer.Option("--scenario", "-s", help="Only this one; may be repeated. Default all."),
+    ] = None
+    stage: Annotated[
+        list[str] | None,
+        typer.Option(help="Only this one; may be repeated. Default paper and three of other families."),
+    ] = None
+    logs: Annotated[
+        str | None,
+        typer.Option(metavar="DIR|PATTERN", help="Recorded logs (CSV) in the place of the scenarios."),
+    ] = None
+    seeds: Annotated[
+        int | None,
+        typer.Option(min=1, help=f"Runs of each; default {SEEDS}, of slow estimators {SLOW_SEEDS}."),
+    ] = None
+    slow_seeds: Annotated[
+        int | None, typer.Option(min=1, help="Runs of each slow estimator, on the first stage only.")
+    ] = None
+    tune: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Each also tuned: the best of N settings, on other seeds."),
+    ] = None
+    sample_rate: Annotated[float | None, typer.Option(min=2000.0, help="Hz; default 5000.")] = None
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A look: short runs at 2 kHz, one seed, the paper's stage.")
+    ] = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """Where results go, and how they are shown."""
+
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help=f"Folder of the results; default {FOLDER}."),
+    ] = None
+    table: Annotated[
+        str | None, typer.Option(help="parquet or csv; default Parquet where pyarrow is installed.")
+    ] = None
+    scenarios: Annotated[bool, typer.Option("--by-scenario", help="Print each scenario's table.")] = False
+    figures: Annotated[
+        Path | None, typer.Option("--figures", metavar="DIR", help="Draw the figures, as PNG.")
+    ] = None
+    html: Html = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Where:
+    """On what the runs are made."""
+
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", min=1, help="Processes; default one for each core.")
+    ] = None
+    dask: Annotated[bool, typer.Option("--dask", help="Run on Dask, on this machine's cores.")] = False
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: tcp://10.0.0.1:8786."),
+    ] = None
+
+
+@grouped
+def table(context: typer.Context, runs: Runs, shown: Shown, where: Where, json_to: Json = None) -> None:
+    """Compare estimators: scenarios × stages × estimators × seeds, in parallel, beside linear feed-forward.
+
+    Finished runs are kept in the output folder: stopped and started again, it goes on where it was. There are
+    then the tables runs and periods (Parquet or CSV), and table.json with machine, versions and medians.
+
+    [bold]Examples[/bold]
+
+    A look:  [cyan]piezoest bench --quick[/cyan]
+
+    An estimator of your own beside the rest:  [cyan]piezoest bench -e my_module:MyEstimator[/cyan]
+
+    Settings of one:  [cyan]piezoest bench --only HysteresisRLS -e "HysteresisRLS(memory=0.2)"[/cyan]
+
+    Before and after a change:  [cyan]piezoest bench -o before[/cyan],  [cyan]piezoest bench -o after[/cyan],
+    then  [cyan]piezoest bench compare before after[/cyan]
+
+    A fleet of recorded stages:  [cyan]piezoest bench --logs fleet/ --dask[/cyan]
+    """
+    if context.invoked_subcommand is not None:
+        if given := _given(context):
+            raise typer.BadParameter(
+                f"{', '.join(given)} belong to the table of runs: write them after "
+                f"{context.invoked_subcommand}, if it has them, or leave it out"
+            )
+        return
+
+    target = json_target(json_to)
+    check_html(shown.html)
+    folder = shown.output or (QUICK_FOLDER if runs.quick else FOLDER)
+    began = time.perf_counter()
+    document = _run(runs, where, folder, shown.table, began)
+    write_text(folder / "table.json", json_text(document))
+    write_html(document, shown.html)
+    if shown.figures is not None:
+        from piezoest.bench.figures import write_figures
+
+        for path in write_figures(document, shown.figures):
+            typer.echo(f"Figure: {path}", err=json_to == "-")
+    if json_to == "-":
+        typer.echo(json_text(document), nl=False)
+        return
+    from piezoest.bench.report import print_table
+
+    print_table(document, Console(), scenarios=shown.scenarios)
+    typer.echo(f"Tables and table.json: {folder}")
+    write_json(document, target)
+
+
+def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: float) -> dict[str, Any]:
+    """Run what is missing, write the tables, and sum them up."""
+    with usage(folder):
+        with progress() as say:
+            say("loading (compiles once after the installation)")
+            from piezoest.bench import table, tables
+            from piezoest.bench.quiet import quiet
+            from piezoest.bench.store import carry_out
+            from piezoest.bench.tuning import tune
+
+            tables.checked_format(format)
+            plan = _plan(runs)
+        execute = (
+            table.over_dask(where.scheduler, where.jobs, plan.estimators)
+            if where.dask or where.scheduler is not None
+            else table.over_cores(where.jobs)
+        )
+        tuned: list[dict[str, Any]] = []
+        with table.store_in(folder) as store:
+            if runs.tune is not None:
+                with counting("runs to tune by") as count:
+                    tuned = tune(plan.estimators, runs.tune, plan.given, store, execute, count)
+                plan = _with_tuned(plan, tuned)
+            tasks = plan.tasks()
+            with counting("runs") as count:
+                carry_out(tasks, store, execute, count)
+            rows = list(store.rows(task.key for task in tasks))
+        table.write(rows, folder, format)
+        with progress() as say, quiet():
+            say("timing each estimator alone")
+            times = {} if runs.logs else table.costs(plan.estimators, plan.given)
+            say("summing up")
+            document = table.describe(rows, plan, times, _changed(tuned))
+    return {**document, **origin(began), "tuned": table.rounded(tuned)}
+
+
+def _plan(runs: Runs) -> Any:
+    from piezoest.bench import table
+    from piezoest.bench.estimators import KNOWN, defaults
+    from piezoest.bench.recorded import logs_of
+    from piezoest.bench.scenarios import SCENARIOS
+    from piezoest.bench.stages import PAPER, STRANGERS
+
+    given = dict(table.QUICK) if runs.quick else {}
+    if runs.sample_rate is not None:
+        given["sample_rate"] = runs.sample_rate
+    named = [KNOWN.get(name, name) for name in runs.only] if runs.only else defaults()
+    logs = logs_of(runs.logs) if runs.logs else []
+    seeds = runs.seeds or (1 if runs.quick else SEEDS)
+    return table.Plan(
+        estimators=tuple(dict.fromkeys([*named, *(runs.estimator or [])])),
+        scenarios=(*(runs.scenario or ([] if runs.logs else SCENARIOS)), *logs),
+        stages=tuple(runs.stage or ([PAPER] if runs.quick else [PAPER, *STRANGERS])),
+        seeds=seeds,
+        slow_seeds=runs.slow_seeds or min(seeds, SLOW_SEEDS),
+        given=given,
+    )
+
+
+def _with_tuned(plan: Any, tuned: list[dict[str, Any]]) -> Any:
+    """Plan with the estimators that tuning has chosen beside their defaults."""
+    from dataclasses import replace
+
+    return replace(plan, estimators=tuple(dict.fromkeys([*plan.estimators, *_changed(tuned)])))
+
+
+def _changed(tuned: list[dict[str, Any]]) -> list[str]:
+    """What tuning has chosen where that is not the default."""
+    return [each["chosen"] for each in tuned if each["chosen"] != each["default"]]
+
+
+def compare(
+    before: Annotated[Path, typer.Argument(metavar="A", help="Folder of a campaign.")],
+    after: Annotated[Path, typer.Argument(metavar="B", help="Folder of another.")],
+    level: Annotated[
+        float, typer.Option(min=0.0, max=1.0, help="Share of the changes found that may be none.")
+    ] = 0.05,
+    relevant: Annotated[float, typer.Option(min=0.0, help="Least relative change that counts.")] = 0.01,
+    everything: Annotated[bool, typer.Option("--all", help="Print what did not change too.")] = False,
+    fail_if_worse: Annotated[
+        bool, typer.Option("--fail-if-worse", help=f"Exit with {WORSE} if something became worse.")
+    ] = False,
+    json_to: Json = None,
+) -> None:
+    """What changed from campaign A to campaign B, and whether beyond the noise.
+
+    Runs are paired by scenario, stage, estimator and seed; each number is put to Wilcoxon's signed-rank test,
+    and the number of comparisons is allowed for by the false discovery rate.
+    """
+    target = json_target(json_to)
+    with usage():
+        from piezoest.bench import compare as comparison
+        from piezoest.bench import tables
+        from piezoest.bench.run import COLUMNS
+        from piezoest.bench.table import RUNS
+
+        documents = _read(before), _read(after)
+        comparison.check_conditions(*documents)
+        sides = [tables.read_table(folder, RUNS, COLUMNS) for folder in (before, after)]
+        found = comparison.compare(*sides, level=level, relevant=relevant)
+    heads = ({name: document[name] for name in HEAD} for document in documents)
+    document = {"suite": "changes", **dict(zip("AB", heads, strict=True)), **found}
+    if json_to == "-":
+        typer.echo(json_text(document), nl=False)
+    else:
+        from piezoest.bench.report import print_changes
+
+        print_changes(document, Console(), everything=everything)
+        write_json(document, target)
+    if fail_if_worse and document["counts"].get("worse"):
+        raise typer.Exit(WORSE)
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    """Document of a campaign's folder."""
+    path = folder / "table.json"
+    if not path.exists():
+        raise ValueError(f"{folder} holds no table.json: no campaign of piezoest bench was finished there")
+    match read_json(path):
+        case {"conditions": {}, **rest} as document if all(name in rest for name in HEAD):
+            return dict(document)
+    raise ValueError(f"{path} is not what piezoest bench writes")
+
+
+def _given(context: typer.Context) -> list[str]:
+    """Options of the table that were written before a command."""
+    found = []
+    for parameter in context.command.params:
+        source = context.get_parameter_source(str(parameter.name))
+        if source is not None and source.name == "COMMANDLINE":
+            found.append(parameter.opts[0])
+    return found

@@ -1,0 +1,119 @@
+"""What a cell of a text file holds: a number, as this file writes numbers, or a time stamp."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import NamedTuple
+
+WORDS = ("nan", "-", "--", "na", "n/a", "#n/a", "null", "none", "missing")
+MISSING = sorted({"", *WORDS, *map(str.upper, WORDS), *map(str.capitalize, WORDS), "NaN"})
+# Groups of three never begin with zero, so 0.005 holds none.
+GROUPS = r"[-+]?[1-9]\d{{0,2}}(?:{0}\d{{3}})+"
+# What may stand between such groups without being a decimal mark.
+SPACES = "[ '\N{NO-BREAK SPACE}\N{THIN SPACE}\N{NARROW NO-BREAK SPACE}\N{RIGHT SINGLE QUOTATION MARK}]"
+SPACED = re.compile(GROUPS.format(SPACES) + r"(?!\d)")
+EXPONENT = r"(?:[eE][-+]?\d+)?"
+PLAIN = re.compile(rf"[-+]?(\d*)([.,])(\d*){EXPONENT}")
+ONE_GROUP = re.compile(GROUPS.format("[.,]") + EXPONENT)
+OTHER = {",": ".", ".": ","}
+GROUPED = {
+    thousands: re.compile(rf"{GROUPS.format(re.escape(thousands))}(?:{re.escape(decimal)}\d*)?{EXPONENT}")
+    for thousands, decimal in OTHER.items()
+}
+STAMP = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(:\d{2})?([.,]\d+)?\s*(Z|z|[-+]\d{2}(:?\d{2})?)?")
+
+
+class Style(NamedTuple):
+    """How a file writes numbers.
+
+    Parameters
+    ----------
+    decimal : str
+        ``"."``, ``","``, or ``".,"`` where both stand for decimals.
+    thousands : str
+        ``","``, ``"."``, or empty if neither separates thousands.
+    """
+
+    decimal: str = "."
+    thousands: str = ""
+
+
+def style_of(cells: Iterable[str]) -> Style:
+    """How numbers are written, by what cannot be read in another way.
+
+    Raises
+    ------
+    ValueError
+        If the cells contradict each other; the message begins with one of them.
+    """
+    seen: dict[tuple[str, str], str] = {}  # what a mark is for, and a cell that shows it
+    for cell in cells:
+        text = _without_spaces(cell)
+        if mark := _separates_thousands(text):
+            seen.setdefault((mark, "thousands"), text)
+        elif (plain := PLAIN.fullmatch(text)) and (plain[1] or plain[3]):
+            seen.setdefault((plain[2], "unclear" if ONE_GROUP.fullmatch(text) else "decimal"), text)
+    for mark, other in OTHER.items():
+        if (sure := seen.get((mark, "thousands"))) is not None:
+            _agree(sure, seen.get((other, "thousands")) or seen.get((mark, "decimal")))
+            return Style(other, mark)
+    decimals = [mark for mark in OTHER if (mark, "decimal") in seen]
+    if len(decimals) == 1:
+        _agree(seen.get((OTHER[decimals[0]], "unclear")), seen[decimals[0], "decimal"])
+    decimals = decimals or [mark for mark in OTHER if (mark, "unclear") in seen]
+    return Style(decimals[0] if len(decimals) == 1 else ".,")
+
+
+def _agree(one: str | None, other: str | None) -> None:
+    if one is not None and other is not None:
+        raise ValueError(
+            f"{one!r} beside {other!r}: it is not clear which mark is for decimals and which for thousands: "
+            "write the log without a separator of thousands"
+        )
+
+
+def _separates_thousands(text: str) -> str:
+    """Mark that can only separate thousands in this number; empty if there is none."""
+    for mark, pattern in GROUPED.items():
+        if mark in text and (OTHER[mark] in text or text.count(mark) > 1) and pattern.fullmatch(text):
+            return mark
+    return ""
+
+
+def _without_spaces(cell: str) -> str:
+    text = cell.strip()
+    return re.sub(SPACES, "", text) if SPACED.match(text) else text
+
+
+def number(cell: str, style: Style) -> float:
+    """Value of a cell; ValueError if it holds no number."""
+    text = _without_spaces(cell)
+    mark = style.thousands or _separates_thousands(text)
+    if mark and mark not in style.decimal and GROUPED[mark].fullmatch(text):
+        text = text.replace(mark, "")
+    if any(mark in text and mark not in style.decimal for mark in ".,"):
+        raise ValueError("a mark that is not for decimals")
+    return float(text.replace(",", "."))
+
+
+def is_missing(cell: str) -> bool:
+    """Whether a cell says that there is no number."""
+    return cell.strip().lower() in ("", *WORDS)
+
+
+def is_stamp(cell: str) -> bool:
+    """Whether a cell holds a date with a time of day, as ISO 8601 has them."""
+    return STAMP.fullmatch(cell.strip()) is not None
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell may hold a number, a missing one or a time stamp, in whatever style."""
+    text = cell.strip()
+    if is_missing(text) or is_stamp(text) or any(each.fullmatch(text) for each in GROUPED.values()):
+        return True
+    try:
+        number(text, Style(".,"))
+    except ValueError:
+        return False
+    return True

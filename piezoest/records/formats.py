@@ -1,0 +1,167 @@
+"""NumPy, MATLAB, HDF5 and TDMS files: the arrays in them, by name."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import logging
+import zipfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from piezoest import _extras
+from piezoest.records.source import EXTRA, RATES, LogError, check_size, damaged, shown, stated_rate
+from piezoest.records.table import Named, Table
+
+ONE_FILE = "save all columns in one file, for no other is opened"
+TDMS_UNITS = ("unit_string", "NI_UnitDescription", "unit", "units")
+INCREMENT = "wf_increment"  # time from one sample of a waveform to the next [s]
+
+# ---------------------------------------------------------------- NumPy
+
+
+def open_npy(path: Path) -> Table:
+    """Open an array of shape (N, k) or (k, N), or one with named fields; it stays on disk."""
+    with damaged(path, "NumPy"):
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    return _held(path, "NumPy", {"array": array})
+
+
+def open_npz(path: Path) -> Table:
+    """Open an archive of arrays, which is read as a whole."""
+    with damaged(path, "NumPy"), zipfile.ZipFile(path) as packed:
+        parts = packed.infolist()
+    if any(not part.filename.endswith(".npy") for part in parts):
+        raise LogError(
+            f"{path}: this is no NumPy file but another archive, such as a spreadsheet: save the log as CSV"
+        )
+    check_size(path, sum(part.file_size for part in parts))
+    # NumPy leaves a file that it opened open where the archive is damaged.
+    with damaged(path, "NumPy"), path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        arrays = dict(archive)
+    return _held(path, "NumPy", arrays, "an archive is read as a whole: save the columns as one .npy array")
+
+
+def _held(path: Path, format_: str, arrays: Mapping[str, Any], whole: str = "") -> Table:
+    """Table of what is in memory already; structures have dotted names."""
+    return Table(
+        path, format_, contextlib.nullcontext, lambda _: _numeric(arrays), separator=".", whole=whole
+    )
+
+
+def _numeric(arrays: Mapping[str, Any], above: str = "") -> Iterator[Named]:
+    for name, value in arrays.items():
+        array = np.asarray(value)
+        if array.dtype.names:
+            alone = array.size == 1 and array.dtype.hasobject  # as MATLAB's structures are
+            fields = {field: array[field].flat[0] if alone else array[field] for field in array.dtype.names}
+            yield from _numeric(fields, f"{above}{name}." if alone else "")
+        elif array.dtype.kind in "fiu":
+            yield above + name, array, ""
+
+
+# ---------------------------------------------------------------- MATLAB before version 7.3
+
+
+def open_mat(path: Path) -> Table:
+    """Open a MATLAB file of version 4 to 7.2, which is read as a whole; structures have dotted names."""
+    from scipy.io import loadmat, whosmat
+
+    with damaged(path, "a MATLAB file"):
+        check_size(path, sum(8 * int(np.prod(shape, dtype=object)) for _, shape, _ in whosmat(path)))
+        variables = {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    return _held(
+        path, "MATLAB", variables, "MATLAB files before version 7.3 are read as a whole: save with '-v7.3'"
+    )
+
+
+# ---------------------------------------------------------------- HDF5, and MATLAB 7.3
+
+
+def open_hdf5(path: Path) -> Table:
+    """Open an HDF5 file: each array a column, or several, by its path; fields of compound types too."""
+    h5py = _extras.load("h5py", EXTRA, "reading HDF5 and MATLAB 7.3")
+    return Table(
+        path, "HDF5", lambda: h5py.File(path, "r"), lambda file: _in_hdf5(h5py, path, file), separator="/"
+    )
+
+
+def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
+    found: list[Named] = [
+        (name, np.asarray(value), "") for name, value in file.attrs.items()
+        if name.lower() in RATES and np.size(value) == 1
+    ]  # fmt: skip
+    # A link is followed by nobody here, but a column that is not found for it would be a riddle.
+    if outside := file.visititems_links(
+        lambda name, link: name if isinstance(link, h5py.ExternalLink) else None
+    ):
+        raise LogError(f"{path}: {shown(outside)} lies in another file: {ONE_FILE}")
+
+    def visit(name: str, item: Any) -> None:
+        # MATLAB keeps what cells and objects refer to in these; its text is an array of numbers.
+        # A group has no shape, and an array may have none either.
+        if name.startswith(("#refs#", "#subsystem#")) or getattr(item, "shape", None) is None:
+            return
+        others = [entry[0] for entry in item.external or ()]
+        if item.is_virtual:
+            others = [source.file_name for source in item.virtual_sources() if source.file_name != "."]
+        if others:
+            raise LogError(f"{path}: {shown(name)} lies in another file, {shown(others[0])}: {ONE_FILE}")
+        check_size(path, int(item.nbytes))
+        if item.dtype.names:
+            fields = [field for field in item.dtype.names if item.dtype[field].kind in "fiu"]
+            found.extend((f"{name}/{field}", item.fields(field), "") for field in fields)
+        elif item.dtype.kind in "fiu" and item.attrs.get("MATLAB_class") not in (b"char", "char"):
+            unit = next((item.attrs[key] for key in ("unit", "units") if key in item.attrs), "")
+            found.append(
+                (name, item, unit.decode(errors="replace") if isinstance(unit, bytes) else str(unit))
+            )
+
+    file.visititems(visit)
+    return found
+
+
+# ---------------------------------------------------------------- TDMS
+
+
+def open_tdms(path: Path) -> Table:
+    """Open a TDMS file: each channel a column, by ``group/channel``; waveforms state the sample rate."""
+    nptdms = _extras.load("nptdms", EXTRA, "reading TDMS")
+    return Table(path, "TDMS", lambda: _opened_tdms(nptdms, path), _in_tdms, separator="/")
+
+
+@contextlib.contextmanager
+def _opened_tdms(nptdms: Any, path: Path) -> Iterator[Any]:
+    """Open with a file of our own: the library leaves its own open where the contents are damaged."""
+    # What it logs about damage is said by the error, or is no loss: a file whose end was not written.
+    logs = importlib.import_module("nptdms.log").log_manager
+    level = logs.log_level
+    logs.set_level(logging.ERROR)
+    try:
+        with path.open("rb") as raw, nptdms.TdmsFile.open(raw) as file:
+            yield file
+    finally:
+        logs.set_level(level)
+
+
+def _in_tdms(file: Any) -> Iterator[Named]:
+    rates: set[float | None] = set()
+    for name, value in file.properties.items():
+        if name.lower() in RATES:
+            yield name, np.asarray(value), ""
+    for group in file.groups():
+        for channel in group.channels():
+            if channel.dtype.kind not in "fiuM" or not len(channel):
+                continue
+            stamped = channel.dtype.kind == "M"
+            unit = next(
+                (str(channel.properties[key]) for key in TDMS_UNITS if channel.properties.get(key)), ""
+            )
+            yield f"{group.name}/{channel.name}", channel, "s" if stamped else unit
+            if not stamped:
+                rates.add(stated_rate(channel.properties.get(INCREMENT)))
+    if len(rates) == 1 and (increment := rates.pop()):
+        yield "fs", np.asarray(1.0 / increment), ""

@@ -1,0 +1,134 @@
+"""Lines of a text file, packed or not, in chunks: encoding, comments and blank lines."""
+
+from __future__ import annotations
+
+import codecs
+import contextlib
+import gzip
+import io
+import re
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple, cast
+
+import numpy as np
+
+from piezoest.records.source import LogError, check_size
+
+# Bytes for recognising the encoding.
+HEAD_BYTES = 1 << 16
+# Characters of a line; more are no row of a log, and would fill the memory.
+LONGEST_LINE = 1 << 20
+# Bytes that are read at a time, at least and at most, and about those of a row.
+FEWEST_BYTES, MOST_BYTES, BYTES_OF_A_ROW = 1 << 14, 1 << 20, 32
+# Characters that no text has, unless as UTF-16.
+CONTROL = frozenset(range(32)) - frozenset(b"\t\n\v\f\r\x1a\x1b")
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+PACKED = b"\x1f\x8b"
+# A line that is blank or a comment, in a text that begins with the end of a line.
+SPECIAL = re.compile(r"\n[^\S\n]*(?:#|\n|\Z)")
+
+
+class Lines(NamedTuple):
+    """Consecutive lines with samples.
+
+    Parameters
+    ----------
+    numbers : ndarray of int64, shape (n,)
+        Of the lines, from 1.
+    text : str
+        The n lines; a blank one is a sample that was lost.
+    done : int
+        Bytes of the file that are read by then.
+    """
+
+    numbers: np.ndarray[Any, np.dtype[np.int64]]
+    text: str
+    done: int
+
+    @classmethod
+    def of(cls, kept: list[tuple[int, str]], done: int) -> Lines:
+        """Lines of their numbers and texts."""
+        return cls(np.array([number for number, _ in kept]), "\n".join(line for _, line in kept), done)
+
+    @classmethod
+    def all(cls, first: int, text: str, done: int) -> Lines:
+        """All lines of a text."""
+        return cls(np.arange(first, first + text.count("\n") + 1), text, done)
+
+
+@contextlib.contextmanager
+def unpacked(path: Path) -> Iterator[tuple[BinaryIO, BinaryIO]]:
+    """Open a file: as it is, whose position says how much is read, and what is in it if gzip packed it."""
+    with path.open("rb") as raw:
+        packed = raw.read(2) == PACKED
+        raw.seek(0)
+        try:
+            yield raw, cast(BinaryIO, gzip.GzipFile(fileobj=raw)) if packed else raw
+        except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+            raise LogError(f"{path}: cannot be unpacked, it may be truncated: {error}") from None
+
+
+def beginning(path: Path, size: int) -> bytes:
+    """First bytes of a file, or of what is packed in it."""
+    with unpacked(path) as (_, file):
+        return file.read(size)
+
+
+def encoding_of(path: Path) -> str:
+    """Encoding by which the file can be read; ValueError if it is not a text."""
+    raw = beginning(path, HEAD_BYTES)
+    if raw.startswith(UTF_16):
+        return "utf-16"
+    if CONTROL.intersection(raw[:4096]):
+        raise LogError(
+            f"{path}: this is not a text file: save the log as CSV, or name it by its format "
+            "(.mat, .h5, .parquet, .tdms, .xlsx, .npy, .npz)"
+        )
+    try:
+        # The last character may be cut in two.
+        codecs.getincrementaldecoder("utf-8")().decode(raw)
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8-sig"
+
+
+def chunks(path: Path, encoding: str, rows: int) -> Iterator[tuple[int, str, int]]:
+    """Whole lines, of about so many rows at most: number of the first, text, bytes read so far."""
+    size = min(max(BYTES_OF_A_ROW * rows, FEWEST_BYTES), MOST_BYTES)
+    decoder = io.IncrementalNewlineDecoder(codecs.getincrementaldecoder(encoding)(errors="replace"), True)
+    number, rest, held, data = 1, "", 0, b"first"
+    with unpacked(path) as (raw, file):
+        while data:
+            data = file.read(size)
+            held += len(data)
+            check_size(path, held)
+            text = rest + decoder.decode(data, final=not data)
+            cut = text.rfind("\n") + 1 if data else len(text)
+            whole, rest = text[:cut], text[cut:]
+            if whole:
+                yield number, whole.removesuffix("\n"), raw.tell()
+            number += whole.count("\n")
+            if len(rest) >= LONGEST_LINE:
+                raise LogError(f"{path}, line {number}: more than {LONGEST_LINE} characters: this is no log")
+
+
+def sample_lines(path: Path, encoding: str, begins: int, skip_blank: bool, rows: int) -> Iterator[Lines]:
+    """Lines with samples, from the line `begins` on; a blank one is a sample if another follows it."""
+    blank: list[tuple[int, str]] = []
+    for first, text, done in chunks(path, encoding, rows):
+        if first >= begins and not blank and not SPECIAL.search("\n" + text):
+            yield Lines.all(first, text, done)
+            continue
+        kept: list[tuple[int, str]] = []
+        for number, line in enumerate(text.split("\n"), first):
+            if number < begins or line.lstrip().startswith("#"):
+                continue
+            if line.strip():
+                kept += [*blank, (number, line)]
+                blank.clear()
+            elif not skip_blank:
+                blank.append((number, ""))
+        if kept:
+            yield Lines.of(kept, done)

@@ -1,0 +1,518 @@
+"""The table of runs: what a run is, how runs are kept, resumed and summed up. No time is asserted."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner, Result
+
+import piezoest as pz
+from piezoest.bench import cost, recorded, table, table_command, tables, tuning
+from piezoest.bench.estimators import KNOWN, LINEAR, PAPERS, candidate, defaults, found
+from piezoest.bench.executors import in_processes
+from piezoest.bench.machine import fingerprint
+from piezoest.bench.pages import write_html
+from piezoest.bench.run import COLUMNS, Row, Task, code_of, crashed, follow, play
+from piezoest.bench.scenarios import SCENARIOS
+from piezoest.bench.stages import STAGES, STRANGERS, make_stage
+from piezoest.bench.store import Store, carry_out
+from piezoest.cli import app
+from piezoest.records import Record
+
+SMALL: dict[str, Any] = {
+    "sample_rate": 2000.0, "before": 1, "after": 6, "rest": 0.2, "drift": 1.4, "updates": 20,
+}  # fmt: skip
+
+OWN = """
+import os
+
+class Still:
+    tuning_space = {"size": (0.1, 1.0)}
+
+    def __init__(self, sample_rate, initial_model, size=1.0):
+        self.model = initial_model
+
+    model = None
+
+    def step(self, u, x):
+        pass
+
+class Broken(Still):
+    def step(self, u, x):
+        raise RuntimeError("no idea")
+
+class Quits(Still):
+    def step(self, u, x):
+        raise SystemExit("enough")
+
+class Dies(Still):
+    def step(self, u, x):
+        os._exit(3)
+
+class Line:
+    model = None
+
+    def __init__(self, sample_rate, limits):
+        self.limits = limits
+
+    def step(self, r):
+        return r / 0.155
+
+    def run(self, r):
+        return r / 0.155
+
+    def learn(self, u, x):
+        pass
+"""
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    # Each test's own module: another one of the same name would stay loaded.
+    name = f"own_estimators_{tmp_path.name}"
+    (tmp_path / f"{name}.py").write_text(OWN, encoding="utf-8")
+    return name
+
+
+def task(estimator: str = "HysteresisRLS", scenario: str = "cold-start", **given: Any) -> Task:
+    return Task(scenario, estimator, 3, SMALL | given, code_of(estimator))
+
+
+def plan(*estimators: str, **given: Any) -> table.Plan:
+    asked = {"scenarios": ("cold-start", "noise"), "stages": ("paper",), "seeds": 2, "given": SMALL}
+    return table.Plan(estimators=estimators, **{**asked, **given})
+
+
+def bench(*arguments: object) -> Result:
+    return CliRunner().invoke(
+        app, ["bench", *(str(argument) for argument in arguments)], env={"COLUMNS": "80"}
+    )
+
+
+# ---------------------------------------------------------------- stages and estimators
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_a_stage_is_a_function_of_its_seed_and_has_a_loop(name: str) -> None:
+    u = pz.signals.triangle(90.0, 5.0, 3.0, 2000.0).values
+    first, again, other = (make_stage(name, 2000.0, seed=seed, noise=0.0).run(u) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    # The paper's differs by its noise alone.
+    assert np.any(first != other) == (name != "paper")
+    gain = np.polyfit(u[800:], first[800:], 1)
+    assert 0.05 < gain[0] < 0.5
+    assert np.max(np.abs(first[800:] - np.polyval(gain, u[800:]))) > 0.02 * np.ptp(first)
+    with pytest.raises(ValueError, match="stage must be one of paper"):
+        make_stage("best", 2000.0, seed=0)
+
+
+def test_all_estimators_are_compared_and_all_are_told_of_the_offset() -> None:
+    names = defaults()
+    assert {name.partition("(")[0] for name in names} == set(found())
+    assert "AdaptiveFeedforward" in names
+    assert PAPERS in names
+    for name in names:
+        made = candidate(name)(2000.0, pz.ColemanHodgdon(0.02, 0.12, 0.0036))
+        assert hasattr(made, "step")
+    assert all("offset=True" in text for text in (*KNOWN.values(), PAPERS))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("NoSuch", "choose of"),
+        ("no_such_module:Class", "No module named"),
+        ("json:NoSuch", "json has no class NoSuch"),
+        ("json:JSONDecoder", "has no step"),
+        ("HysteresisRLS(0.4)", "every argument needs its name"),
+        ("HysteresisRLS(memory=)", "invalid syntax"),
+        ("HysteresisRLS(wrong=1)", "takes no wrong"),
+        ("HysteresisRLS(memory=open)", "no number, string, tuple or policy"),
+        ("HysteresisRLS(policies=(Nothing(),))", "is no policy"),
+        ("HysteresisRLS(policies=(DeadZone(wrong=1),))", "unexpected keyword"),
+    ],
+)
+def test_what_is_no_estimator_is_refused(text: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        candidate(text)
+
+
+# ---------------------------------------------------------------- a run
+
+
+def test_a_run_is_a_function_of_its_task() -> None:
+    first, again = play(task()), play(task())
+    assert first == again
+    assert set(first) == {*COLUMNS, "errors"}
+    assert first["failure"] is None
+    assert first["key"] == task().key
+    assert first["period"] == pytest.approx(0.2)
+    assert first["typical"] == pytest.approx(math.prod(first["errors"]) ** (1.0 / 6.0))
+    assert first["worst"] >= max(first["errors"])
+    json.dumps(first, allow_nan=False)
+
+
+def test_keys_tell_runs_apart() -> None:
+    others = [
+        task(scenario="noise"),
+        task("HysteresisEKF"),
+        task(stage="duhem"),
+        dataclasses.replace(task(), seed=4),
+        dataclasses.replace(task(), code="another"),
+    ]
+    assert len({task().key, *(other.key for other in others)}) == 6
+
+
+def test_an_estimators_own_file_is_part_of_its_code(own: str) -> None:
+    before = code_of(f"{own}:Still")
+    assert code_of("HysteresisRLS") == fingerprint() != before
+    with Path(f"{own}.py").open("a", encoding="utf-8") as file:
+        file.write("\n# changed\n")
+    assert code_of(f"{own}:Still") != before
+
+
+def test_linear_feed_forward_is_measured_by_itself_and_a_controller_drives() -> None:
+    row = play(task(LINEAR))
+    assert row["settled"] == row["linear_settled"] == play(task())["linear_settled"]
+    controller = play(task("AdaptiveFeedforward", sample_rate=5000.0))
+    assert controller["failure"] is None
+    assert controller["settled"] < 0.5 * controller["linear_settled"]
+
+
+@pytest.mark.parametrize(
+    ("name", "failure"), [("Broken", "RuntimeError: no idea"), ("Quits", "SystemExit: enough")]
+)
+def test_what_an_estimator_raises_is_its_own_failure(own: str, name: str, failure: str) -> None:
+    row = play(task(f"{own}:{name}"))
+    assert row["failure"] == failure
+    assert row["settled"] is None
+    assert row["diverged"]
+    assert "in step" in row["traceback"]
+    assert row["errors"] == []
+
+
+def test_an_own_controller_is_played_too(own: str) -> None:
+    row = play(task(f"{own}:Line"))
+    assert row["failure"] is None
+    assert row["settled"] > 0.0
+
+
+def test_costs(own: str) -> None:
+    record = follow(SCENARIOS["cold-start"].build(0, **SMALL), LINEAR)
+    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    for name in ("HysteresisRLS", "AdaptiveFeedforward", f"{own}:Still"):
+        numbers = cost.cost(partial(candidate(name), 2000.0, start), record)
+        assert all(numbers[key] > 0.0 for key in ("step_us", "longest_us"))  # type: ignore[operator]
+        assert (numbers["run_us"] is not None) == (name == "HysteresisRLS")
+    assert table.costs([f"{own}:Broken"], SMALL) == {f"{own}:Broken": {}}
+
+
+# ---------------------------------------------------------------- tables
+
+
+@pytest.mark.parametrize("format", tables.FORMATS)
+def test_tables_are_tidy_and_read_back(tmp_path: Path, format: str) -> None:
+    if format == "parquet":
+        pytest.importorskip("pyarrow")
+    rows = [play(task()), crashed(task("HysteresisEKF"))]
+    written = table.write(rows, tmp_path, format)
+    read = tables.read_table(tmp_path, table.RUNS, COLUMNS)
+    pd.testing.assert_frame_equal(read, written)
+    assert read["failure"][1] == "the process died"
+    assert pd.isna(read["failure"][0])
+    periods = tables.read_table(tmp_path, table.PERIODS, table.PERIOD_COLUMNS)
+    assert periods["error"].to_list() == rows[0]["errors"]
+
+
+def test_tables_refuse_other_formats(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ValueError, match="parquet, csv"):
+        tables.checked_format("xlsx")
+    with pytest.raises(ValueError, match=r"holds no runs\.parquet"):
+        tables.read_table(tmp_path, table.RUNS, COLUMNS)
+    for text in ("a,b\n1,2\n", "key,seed\nx,y\n", "key\n1,2\n"):
+        (tmp_path / "runs.csv").write_text(text, encoding="utf-8")
+        with pytest.raises(ValueError, match=r"runs\.csv is damaged"):
+            tables.read_table(tmp_path, table.RUNS, COLUMNS)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    assert tables.checked_format(None) == "csv"
+    with pytest.raises(ValueError, match=r"pip install 'piezoest\[formats\]'"):
+        tables.checked_format("parquet")
+
+
+# ---------------------------------------------------------------- many runs
+
+
+def test_slow_estimators_run_on_fewer_seeds_and_the_first_stage() -> None:
+    asked = plan("HysteresisEKF", "FilterPyUKF", stages=("paper", *STRANGERS), seeds=3, slow_seeds=2)
+    tasks = asked.tasks()
+    assert len(tasks) == 2 * 3 * 4 * 2 + 2 * 2
+    slow = [each for each in tasks if each.estimator == "FilterPyUKF"]
+    assert {(each.given["stage"], each.seed) for each in slow} == {("paper", 0), ("paper", 1)}
+    for wrong, words in (({"scenarios": ("nowhere",)}, "nowhere"), ({"stages": ("best",)}, "best")):
+        with pytest.raises(ValueError, match=words):
+            plan("HysteresisEKF", **wrong)
+
+
+def test_processes_give_the_same_rows(tmp_path: Path) -> None:
+    tasks = plan("HysteresisEKF").tasks()
+    rows = []
+    for processes in (1, 2):
+        said: list[tuple[int, int]] = []
+        with Store(tmp_path / f"{processes}.jsonl") as store:
+            carry_out(tasks, store, table.over_cores(processes), lambda *done: said.append(done))  # noqa: B023
+            rows.append(list(store.rows(each.key for each in tasks)))
+        assert said == [(k, 8) for k in range(9)]
+    assert rows[0] == rows[1]
+
+
+def test_a_process_that_dies_is_a_failure_and_the_rest_goes_on(own: str, tmp_path: Path) -> None:
+    asked = plan(f"{own}:Still", f"{own}:Dies", f"{own}:Broken", seeds=1)
+    tasks = asked.tasks()
+    with table.store_in(tmp_path) as store:
+        carry_out(tasks, store, table.over_cores(2))
+        rows = list(store.rows(each.key for each in tasks))
+    assert [row["failure"] for row in rows] == 2 * [None, None, "the process died", "RuntimeError: no idea"]
+    document = table.describe(rows, asked, {})
+    cells = {(cell["scenario"], cell["estimator"]): cell for cell in document["cells"]}
+    assert cells["noise", f"{own}:Dies"]["failures"] == 1
+    assert cells["noise", f"{own}:Still"]["failures"] == 0
+    assert len(document["failures"]) == 4
+    assert len(document["tracebacks"]) == 1
+
+
+def die(item: int) -> int:
+    os._exit(item)
+
+
+def test_a_death_nobody_answers_for_is_an_error() -> None:
+    with pytest.raises(BrokenProcessPool, match="a process died"):
+        list(in_processes(die, [1, 2], 2))
+
+
+def test_a_document_sums_up(own: str, tmp_path: Path) -> None:
+    asked = plan("HysteresisEKF(offset=True)", f"{own}:Still", stages=("paper", "duhem"), seeds=3)
+    rows = [play(each) for each in asked.tasks()]
+    document = table.describe(rows, asked, {})
+    json.dumps(document, allow_nan=False)
+    assert document["runs"] == len(rows) == 36
+    assert document["estimators"]["HysteresisEKF(offset=True)"]["name"] == "HysteresisEKF"
+    cell = next(c for c in document["cells"] if c["estimator"].startswith("HysteresisEKF"))
+    mine = [
+        row["settled"] / row["amplitude"]
+        for row in rows
+        if (row["stage"], row["scenario"]) == ("paper", "cold-start")
+        and row["estimator"] == cell["estimator"]
+    ]
+    assert cell["settled"][0] == pytest.approx(np.median(mine), rel=1e-3)
+    assert len(cell["transient"]) == 6
+    over = {row["estimator"]: row for row in document["overview"]}
+    assert over["HysteresisEKF(offset=True)"]["settled"][0] < over[f"{own}:Still"]["settled"][0]
+    assert over["HysteresisEKF(offset=True)"]["others"] is not None
+    needs = {need["words"]: need for need in document["needs"]}
+    assert needs["Anything may come"]["order"][0]["estimator"] == "HysteresisEKF(offset=True)"
+    machine = {"date": "2026-01-01", "machine": {"cpu": "x", "python": "3"}, "versions": {"numpy": "2"}}
+    write_html({**document, **machine}, tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert page.count("<table>") == 2 + 4
+    assert page.count("data:image/png") == 4
+    with pytest.raises(ValueError, match="no page for the suite"):
+        write_html({"suite": "other"}, tmp_path / "page.html")
+
+
+def test_tuning_finds_settings_on_other_seeds(own: str, tmp_path: Path) -> None:
+    texts = ["HysteresisEKF(offset=True)", "HysteresisRLS(memory=0.4)", f"{own}:Still"]
+    with table.store_in(tmp_path) as store:
+        chosen = tuning.tune(texts, 2, SMALL, store, table.over_cores(1), lambda done, of: None)
+        assert len(store) == 2 * 4 * (3 + 3)
+    ekf, still = chosen
+    assert ekf["default"] == texts[0] == ekf["trials"][0]["estimator"]
+    assert all("offset=True" in trial["estimator"] for trial in ekf["trials"])
+    assert min(ekf["trials"], key=lambda trial: trial["score"])["estimator"] == ekf["chosen"]
+    assert {trial["score"] for trial in still["trials"]} == {still["trials"][0]["score"]}
+    with pytest.raises(ValueError, match="power of two"):
+        tuning.draws(tuning.tunable(texts[0]), 3, 0)
+
+
+# ---------------------------------------------------------------- recorded logs
+
+
+def write_log(path: Path, seed: int) -> None:
+    u = pz.signals.triangle(30.0, 5.0, 10.0, 2000.0).values
+    x = pz.PaperStage(2000.0, seed=seed).run(u)
+    x[100:110] = np.nan
+    Record.from_arrays(u, x, 2000.0).write(path)
+
+
+def test_recorded_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("fleet").mkdir()
+    for seed, name in enumerate("ab"):
+        write_log(Path(f"fleet/{name}.csv"), seed)
+    Path("fleet/c.csv").write_text("no numbers", encoding="utf-8")
+    logs = recorded.logs_of("fleet")
+    assert logs == [f"log:fleet/{name}.csv" for name in "abc"] == recorded.logs_of("fleet/*.csv")
+    asked = plan("HysteresisRLS", "PrandtlIshlinskiiRLS", scenarios=tuple(logs), seeds=3)
+    tasks = asked.tasks()
+    assert len({each.key for each in tasks}) == 9  # whatever the seeds
+    rows = [play(each) for each in tasks]
+    assert [row["failure"] is None for row in rows] == [True] * 6 + [False] * 3
+    for linear, derivative, plays in (rows[:3], rows[3:6]):
+        # Of a triangle on the stage the loop is a tenth of the range.
+        assert 0.0 < plays["settled"] < derivative["settled"] < 0.5 * linear["settled"]
+        assert derivative["linear_settled"] == linear["settled"]
+        assert len(derivative["errors"]) == recorded.SEGMENTS
+    document = table.describe(rows, asked, {})
+    assert {row["estimator"]: row["failures"] for row in document["overview"]}["HysteresisRLS"] == 1
+    assert "drives a stage" in play(Task(logs[0], "AdaptiveFeedforward", 0))["failure"]
+    write_log(Path("fleet/a.csv"), 7)
+    recorded.digest.cache_clear()
+    assert asked.tasks()[0].key != tasks[0].key
+    with pytest.raises(ValueError, match="no log is found at nowhere"):
+        recorded.logs_of("nowhere")
+
+
+# ---------------------------------------------------------------- the command
+
+SHORT = ("--scenario", "cold-start", "--scenario", "noise", "--quick", "--only", "HysteresisEKF", "--jobs", 1)
+
+
+def test_command_end_to_end(own: str, tmp_path: Path) -> None:
+    asked = (*SHORT, "-e", f"{own}:Broken", "--seeds", 2, "--table", "csv")
+    result = bench(*asked, "--by-scenario", "--json", "a.json", "--figures", "figures")
+    assert result.exit_code == 0, result.output
+    assert "12 of 12 runs" in result.stderr
+    assert all(
+        len(line) <= 80 for line in result.stdout.splitlines() if "─" in line or "HysteresisEKF" in line
+    )
+    assert "in step" in result.stdout  # the traceback of one's own estimator
+    assert {path.name for path in Path("figures").iterdir()} == {
+        "adaptation.png",
+        "cost.png",
+        "overview.png",
+        "settled.png",
+    }
+    folder = Path("bench-results-quick")
+    document = json.loads((folder / "table.json").read_text(encoding="utf-8"))
+    assert document == json.loads(Path("a.json").read_text(encoding="utf-8"))
+    assert document["runs"] == 12
+    assert document["conditions"]["sample_rate"] == 2000.0
+    assert document["versions"]["piezoest"] == pz.__version__
+    assert len(tables.read_table(folder, table.RUNS, COLUMNS)) == 12
+
+    lines = (folder / "runs.jsonl").read_bytes()
+    again = bench(*asked, "--json", "-")
+    assert again.exit_code == 0
+    assert (folder / "runs.jsonl").read_bytes() == lines  # nothing was run again
+    assert json.loads(again.stdout)["cells"] == document["cells"]
+
+
+def test_command_tunes(own: str) -> None:
+    result = bench(*SHORT, "--tune", 2, "--seeds", 1, "--json", "a.json")
+    assert result.exit_code == 0, result.output
+    document = json.loads(Path("a.json").read_text(encoding="utf-8"))
+    (tuned,) = document["tuned"]
+    if tuned["chosen"] != tuned["default"]:
+        assert document["estimators"][tuned["chosen"]]["name"] == "HysteresisEKF, tuned"
+
+
+def test_compare_with_itself_finds_no_change(own: str) -> None:
+    assert bench(*SHORT, "-o", "one").exit_code == 0
+    result = bench("compare", "one", "one", "--fail-if-worse", "--json", "c.json")
+    assert result.exit_code == 0, result.output
+    document = json.loads(Path("c.json").read_text(encoding="utf-8"))
+    assert set(document["counts"]) == {"same"}
+    assert document["pairs"] == 4
+    assert bench("compare", "one", "nowhere").exit_code == 2
+    assert bench(*SHORT, "-o", "other", "--sample-rate", 4000).exit_code == 0
+    assert bench("compare", "one", "other").exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("-e", "NoSuch"), "choose of"),
+        (("--scenario", "nowhere"), "choose of"),
+        (("--stage", "best"), "choose of"),
+        (("--table", "xlsx"), "parquet, csv"),
+        (("--json", "nowhere/a.json"), "no file that can be written"),
+        (("--html", "page.txt"), "must end in .html"),
+        (("--quick", "paper"), "--quick belong to the table"),
+    ],
+)
+def test_command_refuses_wrong_words(own: str, arguments: tuple[str, ...], words: str) -> None:
+    result = bench(*arguments)
+    assert result.exit_code == 2
+    assert words in " ".join(result.stderr.replace("│", " ").split())
+    assert not Path("bench-results").exists()
+
+
+def test_what_cannot_be_written_or_read_is_one_sentence(own: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(result: Result, *words: str) -> None:
+        assert result.exit_code == 1, result.output
+        assert "Traceback" not in result.stderr
+        assert all(word in result.stderr.splitlines()[-1] for word in ("error: ", *words))
+
+    Path("plain").touch()
+    refused(bench(*SHORT, "-o", "plain/folder"), "plain/folder", "Not a directory")
+
+    def full(store: Store, row: Row) -> bool:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "runs.jsonl")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Store, "append", full)
+        refused(bench(*SHORT, "-o", "one"), "runs.jsonl: No space left on device")
+    Path("two").mkdir()
+    for text in ("{", "[]", "{}", "[" * 100_000, '{"conditions": {}}'):
+        Path("two", "table.json").write_text(text, encoding="utf-8")
+        result = bench("compare", "two", "two")
+        assert result.exit_code == 2, text
+        assert "two/table.json is not" in " ".join(result.stderr.replace("│", " ").split())
+
+
+def test_a_killed_campaign_goes_on(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "piezoest", "bench", "--quick", "--only", "HysteresisRLS"]
+    command += ["--seeds", "2", "--jobs", "2", "--table", "csv", "-o", str(tmp_path)]
+    killed = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    assert killed.stderr is not None
+    for line in killed.stderr:
+        if " of 40 runs" in line and int(line.split()[0]) >= 10:
+            killed.send_signal(signal.SIGKILL)
+            break
+    killed.communicate()
+    assert killed.returncode == -signal.SIGKILL
+    kept = [line for line in (tmp_path / "runs.jsonl").read_bytes().split(b"\n") if line.endswith(b"}")]
+    assert 10 <= len(kept) < 40
+
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    # At least those that could be counted are not run again; a torn last line may be whole by now.
+    assert int(done.stderr.split(" of 40 runs")[0].split()[-1]) >= 10
+    rows = [
+        json.loads(line)
+        for line in (tmp_path / "runs.jsonl").read_bytes().splitlines()
+        if line.endswith(b"}")
+    ]
+    assert [json.dumps(row) for row in rows[: len(kept)]] == [json.dumps(json.loads(line)) for line in kept]
+    assert len(rows) == len({row["key"] for row in rows}) == 40
+    assert len(tables.read_table(tmp_path, table.RUNS, COLUMNS)) == 40
+
+
+def test_the_commands_defaults_are_many_seeds() -> None:
+    assert table_command.SEEDS >= 30
+    assert table_command.SLOW_SEEDS >= 10
