@@ -202,15 +202,14 @@ def track(
     estimator : object with ``step(u, x)`` and ``model``, optional
         Such as `HysteresisRLS`; without one the compensator's model stays.
     controller : object with ``step(r) -> u`` and ``learn(u, x)``, optional
-        Such as `AdaptiveFeedforward`, in the place of compensator and estimator: it goes round the
-        ring sample by sample, and the record has no parameters.
+        Such as `AdaptiveFeedforward`; it replaces compensator and estimator. The loop then runs sample by
+        sample, and the record has no parameters.
     update_interval : int
         Samples between two updates of the compensator's model (default 50: 1 ms at 50 kHz).
     sample_rate : float, optional
         [Hz]; needed if r is a plain array and the stage has no sample rate.
     allow_jumps : bool
-        Take a reference with unfiltered steps instead of refusing it; without a slew-rate limit
-        they reach the voltage.
+        Accept a reference with unfiltered steps. Without a slew-rate limit they reach the voltage.
 
     Returns
     -------

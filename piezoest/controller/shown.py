@@ -116,7 +116,7 @@ def _outside(state: Any, learnt_on: Any) -> dict[str, str]:
 
 
 def misses(state: Any) -> list[float | None]:
-    """Return what the line and each candidate has missed of late [µm]; None if nothing is known."""
+    """Return the recent error of the line and of each candidate [µm]; None if it is unknown."""
     unit, found = abs(float(state["unit"])), list[float | None]()
     for score in (state["score"], *(each["score"] for each in slots.every(state["candidates"]))):
         missed = unit * float(candidate.missed(Named(score)))
