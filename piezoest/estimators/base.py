@@ -160,16 +160,16 @@ class EstimatorBase(ABC):
     @property
     def status(self) -> Status:
         """How many samples were used, missing or left out; counts that an estimator does not have are 0."""
-        counted = ("samples", "updates", "missing", "held", "resets", "outliers")
-        places = [self._state, *(self._state[name] for name in ("law",) if name in self._state.dtype.names)]
-        known = {
-            name: int(each[name])
-            for each in places
-            for name in (*counted, "last")
-            if name in each.dtype.names
-        }
-        last = samples.NAMES[known.pop("last")]
-        return Status(**{**dict.fromkeys(counted, 0), **known}, projected=self._is_projected(), last=last)
+        state, fields, law = self._state, self._layout.by_name, self._layout.by_name.get("law")
+        own, kept = (law.by_name, state["law"]) if isinstance(law, Record) else ({}, state)
+        found = dict.fromkeys(("samples", "updates", "missing", "held", "resets", "outliers", "last"), 0)
+        for name in found:
+            if name in fields:
+                found[name] = int(state[name])
+            elif name in own:
+                found[name] = int(kept[name])
+        last = samples.NAMES[found.pop("last")]
+        return Status(**found, projected=self._is_projected(), last=last)
 
     def _is_projected(self) -> bool:
         """Whether `model` is not `theta` itself."""

@@ -155,18 +155,22 @@ class HysteresisEKF(CompiledEstimator):
         return bool(-GROWING * least["a"] <= a and abs(c) <= GREATEST * least["margin"])
 
     def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
-        return parameter_covariance(rows, history) if name == "P" else history
+        s = rows[:, len(self.parameter_names) :]
+        return parameter_covariance(s, history) if name == "P" else history
 
     @property
     def covariance_size(self) -> int:
         """Of the filter's state."""
         return int(self._state["filter"]["s"].size)
 
-    row_size = covariance_size
+    @property
+    def row_size(self) -> int:
+        """Parameters, and behind them the filter's state."""
+        return len(self.parameter_names) + self.covariance_size
 
     def theta_of(self, rows: FloatArray) -> FloatArray:
-        """Parameters (…, n) of states (…, row_size)."""
-        return parameters(rows)
+        """Parameters (…, n) of rows (…, row_size)."""
+        return rows[..., : len(self.parameter_names)]
 
     @property
     def s(self) -> FloatArray:
@@ -216,8 +220,10 @@ def parameters(s: FloatArray) -> FloatArray:
     """Parameters (…, n_theta) of states (…, n)."""
     if not is_hysteretic(s):
         return s.copy()
-    alpha, beta, gamma = equations.rate_parameters(s[..., 1], s[..., 2], s[..., 3])
-    return np.stack([alpha, beta, gamma, *np.moveaxis(s[..., 4:], -1, 0)], axis=-1)
+    theta = np.empty((*s.shape[:-1], s.shape[-1] - 1))
+    theta[..., 0], theta[..., 1], theta[..., 2] = equations.rate_parameters(s[..., 1], s[..., 2], s[..., 3])
+    theta[..., 3:] = s[..., 4:]
+    return theta
 
 
 def parameter_covariance(s: FloatArray, P: FloatArray) -> FloatArray:

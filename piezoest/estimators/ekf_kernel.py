@@ -298,10 +298,24 @@ def write_model(state: Any, settings: Any, model: Any) -> float:
 
 
 @inlined
+def _write_parameters(s: Any, least: Any, row: Any) -> None:
+    if least is None:
+        for i in range(len(s)):
+            row[i] = s[i]
+    else:
+        row[0], row[1], row[2] = equations.rate_parameters(s[1], s[2], s[3])
+        for i in range(4, len(s)):
+            row[i - 1] = s[i]
+
+
+@inlined
 def write_row(state: Any, settings: Any, row: Any) -> None:
-    """The filter's state."""
-    for i in range(len(state.filter.s)):
-        row[i] = state.filter.s[i]
+    """The parameters, and behind them the filter's state."""
+    s = state.filter.s
+    _write_parameters(s, settings.least, row)
+    first = len(row) - len(s)
+    for i in range(len(s)):
+        row[first + i] = s[i]
 
 
 @inlined

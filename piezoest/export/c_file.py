@@ -112,7 +112,9 @@ class File:
             name = self.unused(
                 short if short not in others else f"{self.prefix}_{'_'.join(names[1:])}", others
             )
+            self.types[layout] = name, ""  # taken, while those inside get theirs, which stand before it
             rows = [self._member(member, inner, path) for member, inner in members(layout).items()]
+            del self.types[layout]
             text = f"/* {path} */\ntypedef struct {{\n{''.join(rows)}}} {name};\n"
             self.types[layout] = name, text
         return self.types[layout][0]
