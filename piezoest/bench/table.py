@@ -57,6 +57,8 @@ class Plan:
     slow_seeds : int
         Runs of each estimator that is slow; these run on the first stage only, and on no scenario of
         `piezoest.bench.scenarios.UNREPEATED`, whose runs are long.
+    tuned : tuple of str
+        Estimators that were found by tuning, beside the others; these run on the first stage only.
     given : dict
         Fields of `piezoest.bench.cases.Conditions`.
 
@@ -71,6 +73,7 @@ class Plan:
     stages: tuple[str, ...] = (PAPER, *STRANGERS)
     seeds: int = 30
     slow_seeds: int = 10
+    tuned: tuple[str, ...] = ()
     given: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -84,7 +87,7 @@ class Plan:
 
     def tasks(self) -> list[Task]:
         """Every run; those with the same seed, stage and scenario one after the other."""
-        codes = {name: code_of(name) for name in (LINEAR, *dict.fromkeys(self.estimators))}
+        codes = {name: code_of(name) for name in self.everything}
         logs = {name: digest(file) for name in self.scenarios if (file := file_of(name)) is not None}
         simulated = [name for name in dict.fromkeys(self.scenarios) if name not in logs]
         found = [
@@ -93,7 +96,7 @@ class Plan:
             for stage in self.stages
             for scenario in simulated
             for estimator, code in codes.items()
-            if not is_slow(estimator) or self._with_slow(scenario, stage, seed)
+            if self._is_run(estimator, scenario, stage, seed)
         ]
         # A log leaves nothing to chance: it is run once.
         return found + [
@@ -102,8 +105,16 @@ class Plan:
             for estimator, code in codes.items()
         ]
 
-    def _with_slow(self, scenario: str, stage: str, seed: int) -> bool:
-        return seed < self.slow_seeds and stage == self.stages[0] and scenario not in UNREPEATED
+    @property
+    def everything(self) -> tuple[str, ...]:
+        """Linear feed-forward, the estimators and what was tuned, each once."""
+        return tuple(dict.fromkeys([LINEAR, *self.estimators, *self.tuned]))
+
+    def _is_run(self, estimator: str, scenario: str, stage: str, seed: int) -> bool:
+        """Whether a run is made: slow estimators and tuned ones have fewer."""
+        if is_slow(estimator):
+            return seed < self.slow_seeds and stage == self.stages[0] and scenario not in UNREPEATED
+        return estimator not in self.tuned or stage == self.stages[0]
 
 
 def over_cores(processes: int | None = None) -> Any:
@@ -213,9 +224,7 @@ def costs(estimators: Iterable[str], given: dict[str, Any]) -> dict[str, dict[st
     return found
 
 
-def describe(
-    rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]], tuned: Sequence[str] = ()
-) -> dict[str, Any]:
+def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """Sum up a finished campaign.
 
     Parameters
@@ -226,8 +235,6 @@ def describe(
         Of the campaign.
     times : dict
         From `costs`.
-    tuned : sequence of str
-        Estimators that were found by tuning; they are in no order of ``needs``.
 
     Returns
     -------
@@ -239,7 +246,7 @@ def describe(
         repeat (``unrepeated``); ``needs``: the estimators in order for each need, compared pair by pair.
     """
     frame = relative(tables.table_of(rows, COLUMNS))
-    names = list(dict.fromkeys([LINEAR, *plan.estimators]))
+    names = plan.everything
     errors: dict[tuple[str, str, str], list[list[float]]] = {}
     for row in rows:
         if row["failure"] is None and row["stage"] in ("", plan.stages[0]):
@@ -259,13 +266,14 @@ def describe(
             for name in plan.scenarios
         },
         "estimators": {
-            text: {"name": label(text, tuned), "slow": is_slow(text), **times.get(text, {})} for text in names
+            text: {"name": label(text, plan.tuned), "slow": is_slow(text), **times.get(text, {})}
+            for text in names
         },
         "runs": len(rows),
         "overview": [_overview(frame, text, plan) for text in names],
         "cells": cells,
         "needs": [
-            {**asdict(need), "order": order(frame[~frame["estimator"].isin(tuned)], need, plan.stages)}
+            {**asdict(need), "order": order(frame[~frame["estimator"].isin(plan.tuned)], need, plan.stages)}
             for need in NEEDS
             if need.applies(plan.scenarios)
         ],

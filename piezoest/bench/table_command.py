@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -192,9 +193,9 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
         table.write(rows, folder, format)
         with progress() as say, quiet():
             say("timing each estimator alone")
-            times = {} if runs.logs else table.costs(plan.estimators, plan.given)
+            times = {} if runs.logs else table.costs(plan.everything[1:], plan.given)
             say("summing up")
-            document = table.describe(rows, plan, times, _changed(tuned))
+            document = table.describe(rows, plan, times)
     return {**document, **origin(began), "tuned": table.rounded(tuned)}
 
 
@@ -222,15 +223,9 @@ def _plan(runs: Runs) -> Any:
 
 
 def _with_tuned(plan: Any, tuned: list[dict[str, Any]]) -> Any:
-    """Plan with the estimators that tuning has chosen beside their defaults."""
-    from dataclasses import replace
-
-    return replace(plan, estimators=tuple(dict.fromkeys([*plan.estimators, *_changed(tuned)])))
-
-
-def _changed(tuned: list[dict[str, Any]]) -> list[str]:
-    """What tuning has chosen where that is not the default."""
-    return [each["chosen"] for each in tuned if each["chosen"] != each["default"]]
+    """Plan with the estimators that tuning has chosen, where these are not the defaults."""
+    chosen = (each["chosen"] for each in tuned if each["chosen"] != each["default"])
+    return dataclasses.replace(plan, tuned=tuple(dict.fromkeys(chosen)))
 
 
 def compare(

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.identification.compared import Compared, Found, compared, label_of
 from piezoest.identification.data import prepare, turning_voltages
-from piezoest.identification.residual import autocorrelation
-from piezoest.identification.streamed import StreamedIdentification
+from piezoest.identification.residual import Misfit, autocorrelation
 from piezoest.records import Record
 
 if TYPE_CHECKING:
@@ -25,36 +23,35 @@ ABOVE: dict[str, Any] = {
 }  # fmt: skip
 
 
-class Drawn(NamedTuple):
-    """What is drawn of an identification: of a stream, every k-th sample.
+class Kind(NamedTuple):
+    """Errors of a kind of model [µm rms]: on blocks left out of the fit, and held out; NaN if unknown."""
 
-    Numbers of the samples that were left out at the start and of those that were fitted are of what is drawn.
+    label: str
+    chosen: bool
+    left_out: float
+    held_out: float
+
+
+class Drawn(NamedTuple):
+    """What is drawn of an identification: of a stream, samples at equal distances.
+
+    `errors` are those of the model and of a straight line, held out. `left_out` and `trained` count drawn
+    samples; `expected` are the bounds of readings about the prediction, if they are known.
     """
 
+    source: str
+    label: str
+    errors: tuple[Misfit, Misfit]
     record: Record
     prediction: FloatArray
     residual: FloatArray
     left_out: int
     trained: int
     expected: tuple[FloatArray, FloatArray] | None
+    kinds: tuple[Kind, ...]
 
 
-def drawn(found: Found) -> Drawn:
-    """Take what is drawn."""
-    if isinstance(found, StreamedIdentification):
-        record, prediction = found.thinned, found.prediction
-        share = len(record) / found.samples
-        residual = record.displacement - prediction
-        return Drawn(
-            record, prediction, residual, -(-found.left_out * len(record) // found.samples),
-            min(round(share * found.trained), len(record) - 1), None,
-        )  # fmt: skip
-    expected = found.predict()
-    band = expected.lower - expected.x, expected.upper - expected.x
-    return Drawn(found.record, found.prediction, found.residual, found.left_out, found.trained, band)
-
-
-def draw(found: Found) -> Figure:
+def draw(shown: Drawn) -> Figure:
     """Draw an identification: over time, the loop, the residual, and the kinds compared."""
     from matplotlib.figure import Figure
 
@@ -67,7 +64,6 @@ def draw(found: Found) -> Figure:
     rows = columns[1].subgridspec(3, 1, height_ratios=[1.5, 1.0, 0.9])
     loop, kinds, correlation = (figure.add_subplot(rows[k]) for k in range(3))
 
-    shown = drawn(found)
     record, thin = shown.record, slice(None, None, max(1, len(shown.record) // MOST_POINTS))
     voltage.plot(record.time[thin], record.voltage[thin], lw=0.8, color="C2")
     voltage.set_ylabel("voltage [V]")
@@ -87,11 +83,12 @@ def draw(found: Found) -> Figure:
     loop.set(xlabel="voltage [V]", ylabel="displacement [µm]", title="loop")
     loop.legend(loc="upper left", fontsize="small")
 
-    _draw_kinds(kinds, compared(found))
+    _draw_kinds(kinds, shown.kinds)
     _draw_autocorrelation(correlation, shown)
+    held_out, line = shown.errors
     figure.suptitle(
-        f"{Path(found.source).name}: {label_of(found)}; held out {found.held_out.rms:.3g} µm rms, "
-        f"largest {found.held_out.max:.3g} µm (straight line {found.line_held_out.rms:.3g} µm rms)"
+        f"{Path(shown.source).name}: {shown.label}; held out {held_out.rms:.3g} µm rms, "
+        f"largest {held_out.max:.3g} µm (straight line {line.rms:.3g} µm rms)"
     )
     return figure
 
@@ -111,7 +108,7 @@ def _draw_residual(axes: Any, shown: Drawn, thin: slice) -> None:
     axes.set(xlabel="time [s]", ylabel="measured − model [µm]", ylim=(-largest, largest))
 
 
-def _draw_kinds(axes: Any, kinds: list[Compared]) -> None:
+def _draw_kinds(axes: Any, kinds: tuple[Kind, ...]) -> None:
     """Errors of all kinds as dots: a straight line's may be a thousand times those of the others."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
@@ -119,8 +116,7 @@ def _draw_kinds(axes: Any, kinds: list[Compared]) -> None:
     chosen = next(k for k, kind in enumerate(kinds) if kind.chosen)
     axes.axhspan(chosen - 0.5, chosen + 0.5, color="C0", alpha=0.15, lw=0)
     axes.plot([kind.left_out for kind in kinds], places, "D", color="C0", label="blocks left out")
-    held_out = [np.nan if kind.held_out is None else kind.held_out.rms for kind in kinds]
-    axes.plot(held_out, places, "o", color="C1", label="held out")
+    axes.plot([kind.held_out for kind in kinds], places, "o", color="C1", label="held out")
     axes.set(xscale="log", yticks=places, ylim=(len(kinds) - 0.5, -0.5), xlabel="error [µm rms]")
     axes.set_yticklabels([kind.label for kind in kinds], fontsize="small")
     axes.grid(alpha=0.3)
@@ -155,12 +151,12 @@ def _draw_autocorrelation(axes: Any, shown: Drawn) -> None:
     axes.legend(loc="lower left", fontsize="small")
 
 
-def draw_excitation(found: Found) -> Figure:
+def draw_excitation(shown: Drawn) -> Figure:
     """Draw where the voltage turns, and its spectrum."""
     from matplotlib.figure import Figure
     from scipy.signal import welch
 
-    record = drawn(found).record
+    record = shown.record
     data = prepare(record.voltage, record.displacement)
     figure = Figure(figsize=(12, 3.4), layout="constrained")
     turns, spectrum = figure.subplots(1, 2)

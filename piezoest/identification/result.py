@@ -14,6 +14,7 @@ from piezoest.fitting import Fit, Prediction
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
 from piezoest.fitting.regression import Fitted
+from piezoest.identification.parameters import Row, parameter_rows
 from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.sense import Finding
 from piezoest.models import LearntOn, Model
@@ -22,24 +23,7 @@ from piezoest.records import Record
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Row = tuple[str, float, float, str]
-# More parameters than this are not listed one by one.
-MOST_ROWS = 12
-
-
-def parameter_rows(model: Any, delay: float, errors: dict[str, float]) -> list[Row]:
-    """Rows of parameter name, value, standard error (zero if it was not estimated) and unit.
-
-    Of many plays, gain and sum of the weights stand for all.
-    """
-    values = list(zip(model.parameter_names, model.theta.tolist(), model.parameter_units, strict=True))
-    if len(values) > MOST_ROWS:
-        values = [row for row in values if row[0] == "gain" or row[0].startswith("creep")]
-        weights = [(name, value) for name, value in zip(model.parameter_names, model.theta, strict=True)
-                   if name.startswith("weights")]  # fmt: skip
-        values.append((f"sum of {len(weights)} weights", float(sum(value for _, value in weights)), "µm/V"))
-    values += [("offset", model.offset, "µm"), ("delay", delay, "samples")]
-    return [(name, value, errors.get(name, 0.0), unit) for name, value, unit in values]
+    from piezoest.identification.drawing import Drawn
 
 
 def left_out_error(fitted: Fit | Fitted) -> float:
@@ -383,6 +367,22 @@ class Identification:
         ]
         return "\n".join([*lines, self.reason, *self.advice])
 
+    def drawn(self) -> Drawn:
+        """What figures show of it."""
+        from piezoest.identification.drawing import Drawn, Kind
+
+        expected = self.predict()
+        kinds = (
+            Kind(each.label, each is self.best, each.cross_validated, each.held_out.rms)
+            for each in self.candidates
+        )
+        return Drawn(
+            source=self.source, label=self.best.label, errors=(self.held_out, self.line_held_out),
+            record=self.record, prediction=self.prediction, residual=self.residual, left_out=self.left_out,
+            trained=self.trained, expected=(expected.lower - expected.x, expected.upper - expected.x),
+            kinds=tuple(kinds),
+        )  # fmt: skip
+
     def plot(self) -> Figure:
         """Draw displacement and model over time, the loop, the residual and its autocorrelation.
 
@@ -392,4 +392,4 @@ class Identification:
         """
         from piezoest.identification.drawing import draw
 
-        return draw(self)
+        return draw(self.drawn())

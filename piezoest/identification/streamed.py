@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from piezoest._checks import FloatArray, fraction
-from piezoest.fitting import Fitter
+from piezoest.fitting import FORMS, Fitter
 from piezoest.fitting.design import CHUNK, Design
 from piezoest.fitting.program import Sums
 from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression, add
@@ -19,10 +19,12 @@ from piezoest.fitting.search import BENDS, checked_delay, plays
 from piezoest.identification.advice import unsettled_sentence
 from piezoest.identification.choice import simplest
 from piezoest.identification.data import check_excitation, noise_of, prepare
+from piezoest.identification.drawing import Drawn, Kind
 from piezoest.identification.lag import tells_lag
+from piezoest.identification.parameters import Row, parameter_rows
 from piezoest.identification.parts import Part, Progress, parts, pieces
 from piezoest.identification.residual import Misfit
-from piezoest.identification.result import Row, left_out_error, parameter_rows
+from piezoest.identification.result import left_out_error
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record, RecordStream
 
@@ -93,6 +95,22 @@ class StreamedIdentification:
     def table(self) -> list[Row]:
         """Rows of parameter name, value, standard error (zero: not estimated) and unit."""
         return parameter_rows(self.model, self.delay, {})
+
+    def drawn(self) -> Drawn:
+        """What figures show of it: samples at equal distances."""
+        record, share = self.thinned, len(self.thinned) / self.samples
+        judged = {"line": self.line_held_out.rms, self.chosen: self.held_out.rms}
+        kinds = (
+            Kind(FORMS[name].label, name == self.chosen, left_out, judged.get(name, float("nan")))
+            for name, left_out in self.cross_validated.items()
+        )
+        return Drawn(
+            source=self.source, label=FORMS[self.chosen].label, errors=(self.held_out, self.line_held_out),
+            record=record, prediction=self.prediction, residual=record.displacement - self.prediction,
+            left_out=-int(-self.left_out * share // 1),
+            trained=min(round(share * self.trained), len(record) - 1),
+            expected=None, kinds=tuple(kinds),
+        )  # fmt: skip
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe dictionary; the model under ``"model"`` is that of the model's `to_dict`."""

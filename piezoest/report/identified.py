@@ -17,7 +17,7 @@ from piezoest.identification.compared import (
     validation_cells,
 )
 from piezoest.identification.data import prepare, turning_voltages
-from piezoest.identification.drawing import draw, draw_excitation, drawn
+from piezoest.identification.drawing import draw, draw_excitation
 from piezoest.identification.result import Identification
 from piezoest.identification.streamed import StreamedIdentification
 from piezoest.report.page import Page
@@ -106,16 +106,18 @@ def _add_figures(page: Page, found: Found) -> None:
         "only the voltage. "
         + (residual_sentence(found) or "Drawn are samples at equal distances, as the log was read in blocks.")
     )
-    page.picture(draw(found), "Voltage, displacement, residual, loop, errors of all kinds, autocorrelation")
+    page.picture(
+        draw(found.drawn()), "Voltage, displacement, residual, loop, errors of all kinds, autocorrelation"
+    )
 
 
 def _add_excitation(page: Page, found: Found) -> None:
     page.heading("Excitation")
-    record = drawn(found).record
+    record = found.drawn().record
     data = prepare(record.voltage, record.displacement)
     page.text(
         f"The voltage spans {data.extent:.4g} V about {data.middle:.4g} V and turns "
         f"{turning_voltages(data).size} times. Hysteresis shows only at turns, and the parameters belong to "
         "the amplitudes that occur."
     )
-    page.picture(draw_excitation(found), "Where the voltage turns, and its spectrum")
+    page.picture(draw_excitation(found.drawn()), "Where the voltage turns, and its spectrum")
