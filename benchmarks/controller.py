@@ -33,7 +33,8 @@ def build(name: str, samples: int) -> tuple[Any, Any]:
     before = max(1, periods // 2)
     switches = name in ("amplitude-switch", "amplitude-drop")
     case = SCENARIOS[name].build(
-        0, before=before, after=periods - before if switches else periods,
+        0, sample_rate=50_000.0, updates=200, before=before,
+        after=periods - before if switches else periods,
         rest=0.5 * seconds, drift=min(0.9 * seconds, 30.0),
     )  # fmt: skip
     r = case.reference

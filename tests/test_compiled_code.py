@@ -113,7 +113,7 @@ def test_sources_are_all_that_compiled_functions_are_made_of() -> None:
     assert not missing
     # ... and no more: files without any compiled function, but for constants.
     for elsewhere in (
-        "bench/runner.py",
+        "bench/run.py",
         "cli/__init__.py",
         "estimators/rls.py",
         "estimators/base.py",
@@ -138,7 +138,7 @@ EDITS = [
     ("compiled_records.py", "def _place", "# edited\ndef _place"),
 ]
 EDITS_OF_NO_SOURCE = [
-    ("bench/runner.py", "import", "# edited\nimport"),
+    ("bench/run.py", "import", "# edited\nimport"),
     ("estimators/rls.py", "PAPER_MEMORY = 0.4", "PAPER_MEMORY = 0.5"),
     ("policies/norm_bound.py", "limit: float = 100.0", "limit: float = 90.0"),
     ("cli/__init__.py", "import", "# edited\nimport"),

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import inspect
-import json
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -36,26 +34,20 @@ def test_readme_has_the_figures_of_the_data(monkeypatch: pytest.MonkeyPatch) -> 
     readme = program("readme", monkeypatch)
     _, inside, _ = readme.parts((ROOT / "README.md").read_text(encoding="utf-8"))
     assert inside == readme.figures(), "run python docs/readme.py"
-    # And that they are those of the data: read anew, without the program.
-    rows = json.loads((DOCS / "data" / "estimators.json").read_text(encoding="utf-8"))["rows"]
-    table = {
-        cells[0].strip("` "): cells[1].strip()
-        for cells in (line.strip("|").split("|") for line in inside.splitlines() if line.startswith("|"))
-    }
-    for row in rows:
-        if row["failure"] is None:
-            assert table[row["name"]] == f"{1e3 * row['settled_error']:.0f} nm"
 
 
-def test_readme_would_notice_other_data(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_readme_would_notice_other_data(monkeypatch: pytest.MonkeyPatch) -> None:
     readme = program("readme", monkeypatch)
-    before = readme.figures()
-    shutil.copytree(DOCS / "data", tmp_path / "data")
-    changed = (tmp_path / "data" / "estimators.json").read_text(encoding="utf-8")
-    document = json.loads(changed)
-    document["rows"][0]["settled_error"] *= 2.0
-    (tmp_path / "data" / "estimators.json").write_text(json.dumps(document), encoding="utf-8")
-    monkeypatch.setattr(readme, "DOCS", tmp_path)
+    before, read = readme.figures(), readme.read
+
+    def changed(name: str) -> Any:
+        document = read(name)
+        if name == "table":
+            for row in document["overview"]:
+                row["first"] = [2.0 * value for value in row["first"]]
+        return document
+
+    monkeypatch.setattr(readme, "read", changed)
     assert readme.figures() != before
 
 
@@ -66,24 +58,6 @@ def test_readme_shows_its_picture_and_two_commands() -> None:
     assert all((ROOT / picture).stat().st_size > 10_000 for picture in pictures)
     for target in re.findall(r"make ([a-z-]+)", text):
         assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M), target
-
-
-# ---------------------------------------------------------------- pages of adaptation
-
-
-def test_reasons_are_given_for_what_is_not_met_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    page = program("adaptation_page", monkeypatch)
-    document = page.read("adaptation")
-    rows = {(row["scenario"], row["estimator"]): row for row in document["summary"]}
-    for one in document["criteria"]:
-        one["met"] = True
-    assert page.reasons(document, rows) == []
-    for kind, words in (("linear", "another shape"), ("rest", "creep"), ("settling", "settle in time")):
-        for one in document["criteria"]:
-            one["met"] = one["kind"] != kind
-        sentences = page.reasons(document, rows)
-        assert sentences
-        assert words in sentences[-1]
 
 
 # ---------------------------------------------------------------- figures and data

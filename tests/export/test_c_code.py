@@ -43,6 +43,8 @@ def rls(**options: Any) -> Any:
     return pz.HysteresisRLS(FS, **{"initial_model": START, **options})
 
 
+AT: dict[str, Any] = {"sample_rate": FS, "updates": 200}
+
 PAIRS: dict[str, Any] = {
     "inverse": lambda: (None, inverse()),
     "plays": lambda: (None, pz.InverseCompensator(PLAYS, LIMITS)),
@@ -76,7 +78,7 @@ def code(name: str, precision: Any = "double") -> Any:
 @pytest.fixture(scope="module")
 def log() -> tuple[Any, Any]:
     """Reference, and measurement before each sample of it."""
-    case = SCENARIOS["cold-start"].build(0, after=2)
+    case = SCENARIOS["cold-start"].build(0, after=2, **AT)
     record = pz.track(
         case.reference, stage=case.new_stage(), compensator=pz.InverseCompensator(case.start, LIMITS)
     )
@@ -154,7 +156,7 @@ def test_double_equals_the_library(name: str, log: tuple[Any, Any]) -> None:
 def test_double_equals_the_library_over_every_scenario(kind: str) -> None:
     total = 0
     for name, scenario in SCENARIOS.items():
-        case = scenario.build(0, before=3, after=7, rest=0.5, drift=1.5)
+        case = scenario.build(0, before=3, after=7, rest=0.5, drift=1.5, **AT)
         r = case.reference.values[:100_000]
         estimator = getattr(pz, kind)(FS, initial_model=case.start)
         compensator = pz.InverseCompensator(case.start, LIMITS)
@@ -182,7 +184,7 @@ def test_float_follows_the_library_through_plays_and_bends(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["rls", "ekf"])
 def test_float_settles_to_the_same_error(name: str) -> None:
-    case = SCENARIOS["cold-start"].build(0, after=10)
+    case = SCENARIOS["cold-start"].build(0, after=10, **AT)
     estimator, compensator = PAIRS[name]()
     single = pz.export.CompiledController(code(name, "float"))
     library = pz.track(
@@ -201,8 +203,8 @@ def test_float_settles_to_the_same_error(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["rls", "ekf"])
 def test_freeze_holds_the_model_as_in_python(name: str) -> None:
-    r = SCENARIOS["cold-start"].build(0, after=2).reference.values
-    case = SCENARIOS["cold-start"].build(0)
+    r = SCENARIOS["cold-start"].build(0, after=2, **AT).reference.values
+    case = SCENARIOS["cold-start"].build(0, **AT)
     stages = case.new_stage(), case.new_stage()
     ours, theirs = pz.export.CompiledController(code(name)), pz.export.Controller(*PAIRS[name]())
     both: tuple[Any, Any] = ours, theirs
