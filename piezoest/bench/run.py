@@ -18,6 +18,7 @@ from piezoest.bench.estimators import LIMITS, LINEAR, candidate, module_of
 from piezoest.bench.machine import fingerprint
 from piezoest.bench.metrics import measure
 from piezoest.bench.origin import json_safe
+from piezoest.bench.quiet import quiet
 from piezoest.bench.scenarios import SCENARIOS
 from piezoest.compensators import InverseCompensator, LinearCompensator
 from piezoest.estimators.rls import HysteresisRLS
@@ -97,6 +98,7 @@ def code_of(estimator: str) -> str:
     return f"{fingerprint()}-{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}"
 
 
+@quiet()
 def play(task: Task) -> Row:
     """Run a task.
 
