@@ -16,7 +16,7 @@ from piezoest.fitting.runs import IntArray
 BLOCKS = 25
 # Of readings lie within the interval; wider by this factor, for a fit is to hold for longer than the blocks
 # tell.
-WITHIN, MARGIN = 0.95, 1.25
+WITHIN, MARGIN = 0.95, 1.15
 # Less and less is known of the level, as creep and drift go on: times ln(1 + time / length of the record),
 # and what is missed within it, or what drifts. Of 150 simulated logs (seeds 7200 to 7349 of
 # benchmarks/logs.py) as many readings lie inside in the first as in the second half behind what was fitted.
