@@ -129,7 +129,7 @@ def test_ekf_told_of_a_mismatch_is_cautious() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [pz.FilterPyEKF, pz.FilterPyUKF])
 def test_filterpy_baselines_are_consistent(kind: Any) -> None:
-    """Fewer samples and seeds, for filterpy is slow; `docs/consistency.py` takes all seeds."""
+    """Fewer samples and seeds, for filterpy is slow."""
     runs, rate = 40, 250.0
     found = outcome(lambda: kind(rate, noise=NOISE, drift=0.0, mismatch=0.0), runs, rate)
     assert found.within_three >= 0.95
