@@ -63,7 +63,7 @@ calibrate: $(VENV)/.installed  ## Fit the simulated stage to the paper's tables 
 # ---------------------------------------------------------------- checks
 
 test: $(VENV)/.installed-test  ## Run the tests (ARGS="-k name" passes options to pytest)
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
 
 test-slow: $(VENV)/.installed-test  ## Run the tests that take long: caches of many processes, random sweeps
 	$(BIN)/python -m pytest -m slow $(ARGS)
