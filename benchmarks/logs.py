@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 from log_judging import NEGLIGIBLE, PLAYS, TRAIN, clean_scores, judge
-from safety import short
 
 from piezoest._files import write_text
 from piezoest.bench.executors import in_processes
 from piezoest.bench.origin import json_safe, origin, put
 from piezoest.bench.shared import counting
+from piezoest.bench.table import DIGITS
 from piezoest.bench.zoo.logs import ADDED
 from piezoest.models import ColemanHodgdon
 
@@ -213,7 +213,7 @@ def main(given: Sequence[str] | None = None) -> int:
     if arguments.rows is not None:
         lines = (json.dumps(json_safe(ratios(row)), ensure_ascii=False) for row in rows)
         write_text(arguments.rows, "".join(f"{line}\n" for line in lines))
-    put(short(json.loads(json.dumps(json_safe(document)))), arguments.json)
+    put(json_safe(document, DIGITS), arguments.json)
     return 0
 
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import functools
-import json
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -25,8 +24,8 @@ import numpy as np
 from piezoest._files import save_figure
 from piezoest.bench.origin import json_safe, origin, put
 from piezoest.bench.shared import counting
-from piezoest.bench.store import carry_out
-from piezoest.bench.table import store_in
+from piezoest.bench.store import carry_out, store_in
+from piezoest.bench.table import DIGITS
 from piezoest.bench.zoo import contenders, dwelling, judging, naming, settling, summary
 from piezoest.bench.zoo.contest import contest, summarise_contest
 from piezoest.bench.zoo.summary import CRITERIA, summarise
@@ -183,15 +182,6 @@ def draw(document: Row, path: Path) -> None:
     save_figure(figure, path, dpi=110, metadata={"Software": None})
 
 
-def short(value: Any) -> Any:
-    """All numbers of a document with four digits: more would say nothing."""
-    if isinstance(value, dict):
-        return {name: short(each) for name, each in value.items()}
-    if isinstance(value, list):
-        return [short(each) for each in value]
-    return float(f"{value:.4g}") if isinstance(value, float) else value
-
-
 def main(given: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     for name, default, words in (
@@ -242,7 +232,7 @@ def main(given: Sequence[str] | None = None) -> int:
         "singles": summarise_contest(alone, DEFAULT) if alone else None,
         "dwell": dwelling.summarise_dwells(rested) if rested else None,
     }  # fmt: skip
-    document = short(json.loads(json.dumps(json_safe(document))))
+    document = json_safe(document, DIGITS)
     put(document, arguments.json)
     if arguments.figure is not None:
         draw(document, arguments.figure)

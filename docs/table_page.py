@@ -34,8 +34,7 @@ def write(app: Any = None) -> None:
 
 def names(document: Document) -> list[str]:
     """Estimators, the one that adapts best first."""
-    known = [row for row in document["overview"] if row["typical"]]
-    return [row["estimator"] for row in sorted(known, key=lambda row: row["typical"][0])]
+    return [row["estimator"] for row in report.best_first(document) if row["typical"]]
 
 
 def settles(document: Document) -> report.Table:

@@ -102,8 +102,6 @@ OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
 def test_a_full_disk_leaves_the_old_file(tmp_path: Path, name: str) -> None:
     if name.endswith((".parquet", ".h5")):
         pytest.importorskip("pyarrow" if name.endswith(".parquet") else "h5py")
-    if name.endswith(".html"):
-        pytest.importorskip("plotly")
     path = tmp_path / name
     OUTPUTS[name](path, 1)
     before = content(tmp_path)

@@ -12,14 +12,14 @@ import numpy as np
 
 from piezoest import signals
 from piezoest._checks import instance, integer, non_negative, positive
-from piezoest.bench.stages import PAPER, STAGES, make_stage
+from piezoest.bench.stages import GAIN, PAPER, STAGES, make_stage
 from piezoest.models import ColemanHodgdon, LinearGain
 from piezoest.signals import Signal
 from piezoest.stage import SimulatedStage
 
 # Table I, triangle of 5 µm at 5 Hz: what a start would be that is right.
 RIGHT_MODEL = ColemanHodgdon(alpha=2.10e-2, beta=1.47e-1, gamma=4.29e-3)
-RIGHT_GAIN = LinearGain(0.155)
+RIGHT_GAIN = LinearGain(GAIN)
 COLD, WARM = 0.5, 0.1  # a start parameter is off by up to this fraction of its value
 
 AMPLITUDE = 5.0  # µm, of the scenarios with one amplitude

@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from piezoest import policies
+from piezoest.bench.stages import REACH
 from piezoest.compensators import VoltageLimits
 from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
 from piezoest.estimators.base import EstimatorBase
 from piezoest.models import Model
 
 LINEAR = "linear feed-forward"
-LIMITS = VoltageLimits(-100.0, 100.0)  # V, of every stage of the bench
+LIMITS = VoltageLimits(REACH.low, REACH.high)  # of every stage of the bench
 
 # All are given the same to know: that readings may have an offset, which some learn only on request. The two
 # fits solve as often as each other; they forget slowly, for with an offset a window tells the rest less well.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,8 @@ import numpy as np
 
 from piezoest._files import save_figure
 from piezoest.bench.estimators import LINEAR
+from piezoest.bench.metrics import SETTLED
+from piezoest.bench.report import best_first
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI = 130
-SETTLED = 0.012  # of the amplitude
 # Okabe and Ito's colours, told apart by all eyes, and black.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31", "#7A68A6")
 MARKERS = "osD^vPX*h"
@@ -86,8 +86,7 @@ def overview(document: Document) -> Figure:
     """
     from matplotlib.figure import Figure
 
-    rows = [row for row in document["overview"] if row["typical"]]
-    rows.sort(key=lambda row: -row["typical"][0])
+    rows = [row for row in best_first(document) if row["typical"]][::-1]
     figure = Figure(figsize=(5.2, 0.4 * len(rows) + 1.5), layout="constrained")
     axes = figure.subplots()
     shown = {
@@ -158,14 +157,7 @@ def profile(document: Document) -> Figure:
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
-    names = sorted(
-        (row["estimator"] for row in document["overview"]),
-        key=lambda name: next(
-            row["typical"][0] if row["typical"] else math.inf
-            for row in document["overview"]
-            if row["estimator"] == name
-        ),
-    )
+    names = [row["estimator"] for row in best_first(document)]
     stage = document["plan"]["stages"][0]
     columns = {(cell["stage"], cell["scenario"]): None for cell in document["cells"]}
     scenarios = [scenario for where, scenario in columns if where in (stage, "")]

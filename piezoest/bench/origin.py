@@ -32,19 +32,23 @@ def put(document: dict[str, Any], path: Path | None) -> None:
         write_text(path, text + "\n")
 
 
-def json_safe(value: Any) -> Any:
+def json_safe(value: Any, digits: int | None = None) -> Any:
     """The same with plain lists, and None for what is not finite.
 
     Parameters
     ----------
     value : object
         Of dictionaries, lists, tuples and plain values.
+    digits : int, optional
+        Significant digits of numbers, for a document that is kept: more would say nothing. Default all.
     """
     match value:
         case dict():
-            return {key: json_safe(item) for key, item in value.items()}
+            return {key: json_safe(item, digits) for key, item in value.items()}
         case list() | tuple():
-            return [json_safe(item) for item in value]
+            return [json_safe(item, digits) for item in value]
         case float() if not math.isfinite(value):
             return None
+        case float() if digits is not None:
+            return float(f"{value:.{digits}g}")
     return value

@@ -50,6 +50,17 @@ def percent(share: float | None, digits: int = 2) -> str:
     return number(None if share is None else 100.0 * share, digits)
 
 
+def best_first(document: Document) -> list[Document]:
+    """Rows of the overview, the estimator that adapts best first, and last those that nothing is known of.
+
+    Parameters
+    ----------
+    document : dict
+        From `piezoest.bench.table.describe`.
+    """
+    return sorted(document["overview"], key=lambda row: row["typical"][0] if row["typical"] else math.inf)
+
+
 def overview_table(document: Document) -> Table:
     """Heading and a row for each estimator, the one that adapts best first.
 
@@ -59,9 +70,8 @@ def overview_table(document: Document) -> Table:
         From `piezoest.bench.table.describe`.
     """
     heading = ["estimator", "settles", "first", "settled", "not\nrepeated", "other\nstages", "step\n[µs]"]
-    best = sorted(document["overview"], key=lambda row: row["typical"][0] if row["typical"] else math.inf)
     body = []
-    for row in best:
+    for row in best_first(document):
         about = document["estimators"][row["estimator"]]
         errors = (row[name] for name in ("first", "settled", "unrepeated", "others"))
         body.append(

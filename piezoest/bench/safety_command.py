@@ -111,8 +111,7 @@ def safety(
         with progress() as say:
             say("loading (compiles once after the installation)")
             from piezoest.bench import tables
-            from piezoest.bench.store import carry_out
-            from piezoest.bench.table import store_in
+            from piezoest.bench.store import carry_out, store_in
             from piezoest.bench.zoo import contenders, tasks
 
             name = which.controller or contenders.DEFAULT

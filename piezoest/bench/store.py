@@ -152,6 +152,17 @@ def _read(line: bytes) -> dict[str, Any] | None:
     return None
 
 
+def store_in(folder: Path) -> Store:
+    """Where the runs of a campaign with this folder are kept.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the campaign.
+    """
+    return Store(folder / "runs.jsonl")
+
+
 def carry_out(
     tasks: Sequence[Task],
     store: Store,

@@ -29,7 +29,6 @@ from piezoest.bench.statistics import (
     order,
     relative,
 )
-from piezoest.bench.store import Store
 
 RUNS, PERIODS, DOCUMENT = "runs", "periods", "table.json"
 PERIOD_COLUMNS: dict[str, type] = {
@@ -284,7 +283,7 @@ def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) 
         ],
         "tracebacks": list(dict.fromkeys(row["traceback"] for row in rows if row.get("traceback")))[:5],
     }
-    return dict(json_safe(rounded(document)))
+    return dict(json_safe(document, DIGITS))
 
 
 def _cell(key: Any, group: pd.DataFrame, errors: Sequence[Sequence[float]]) -> Row:
@@ -326,32 +325,3 @@ def _overview(frame: pd.DataFrame, estimator: str, plan: Plan) -> Row:
         "unrepeated": interval(unrepeated, "settled") if len(unrepeated) else None,
         "others": interval(others, "settled") if len(others) else None,
     }
-
-
-def rounded(value: Any) -> Any:
-    """The same with numbers of few digits, for a document that is kept.
-
-    Parameters
-    ----------
-    value : object
-        Of dictionaries, lists, tuples and plain values.
-    """
-    match value:
-        case dict():
-            return {key: rounded(item) for key, item in value.items()}
-        case list() | tuple():
-            return [rounded(item) for item in value]
-        case float() if math.isfinite(value):
-            return float(f"{value:.{DIGITS}g}")
-    return value
-
-
-def store_in(folder: Path) -> Store:
-    """Where the runs of a campaign with this folder are kept.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the campaign.
-    """
-    return Store(folder / "runs.jsonl")

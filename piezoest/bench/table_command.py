@@ -13,7 +13,7 @@ from rich.console import Console
 
 from piezoest._files import read_json, write_text
 from piezoest._options import grouped
-from piezoest.bench.origin import origin
+from piezoest.bench.origin import json_safe, origin
 from piezoest.bench.shared import (
     Html,
     Json,
@@ -170,7 +170,7 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
             say("loading (compiles once after the installation)")
             from piezoest.bench import table, tables
             from piezoest.bench.quiet import quiet
-            from piezoest.bench.store import carry_out
+            from piezoest.bench.store import carry_out, store_in
             from piezoest.bench.tuning import tune
 
             tables.checked_format(format)
@@ -181,7 +181,7 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
             else table.over_cores(where.jobs)
         )
         tuned: list[dict[str, Any]] = []
-        with table.store_in(folder) as store:
+        with store_in(folder) as store:
             if runs.tune is not None:
                 with counting("runs to tune by") as count:
                     tuned = tune(plan.estimators, runs.tune, plan.given, store, execute, count)
@@ -196,7 +196,7 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
             times = {} if runs.logs else table.costs(plan.everything[1:], plan.given)
             say("summing up")
             document = table.describe(rows, plan, times)
-    return {**document, **origin(began), "tuned": table.rounded(tuned)}
+    return {**document, **origin(began), "tuned": json_safe(tuned, table.DIGITS)}
 
 
 def _plan(runs: Runs) -> Any:

@@ -93,9 +93,7 @@ class Output:
     plot: Annotated[
         Path | None, typer.Option("--plot", help="Figure to write; default <FILE>_identified.png here.")
     ] = None
-    html: Annotated[
-        Path | None, typer.Option("--html", help="Report to write: one page with interactive plots.")
-    ] = None
+    html: Annotated[Path | None, typer.Option("--html", help="Report to write: one page of HTML.")] = None
     no_plot: Annotated[bool, typer.Option("--no-plot", help="Write no figure.")] = False
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")] = False
 

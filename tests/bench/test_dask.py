@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from piezoest.bench import executors, table
-from piezoest.bench.store import carry_out
+from piezoest.bench.store import carry_out, store_in
 
 pytest.importorskip("distributed")
 
@@ -107,7 +107,7 @@ def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
             killed.extend(worker for worker in cluster.workers if worker.pid == last)
             killed[0].kill()
 
-    with table.store_in(home) as store:
+    with store_in(home) as store:
         execute = table.over_dask(cluster.address, estimators=estimators)
         carry_out(tasks, store, execute, kill_one_half_way)
         rows = list(store.rows(task.key for task in tasks))
@@ -125,7 +125,7 @@ def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
         worker.pid for worker in cluster.workers
     }
 
-    with table.store_in(tmp_path / "here") as store:
+    with store_in(tmp_path / "here") as store:
         carry_out(tasks, store, table.over_cores(1))
         assert rows == list(store.rows(task.key for task in tasks))
 
@@ -135,7 +135,7 @@ def test_a_worker_with_another_package_ends_the_campaign(
 ) -> None:
     monkeypatch.setattr(table, "fingerprint", lambda: "another")
     plan = table.Plan(estimators=(), scenarios=("cold-start",), stages=("paper",), seeds=1, given=SMALL)
-    with table.store_in(tmp_path) as store, pytest.raises(ValueError, match="install the same"):
+    with store_in(tmp_path) as store, pytest.raises(ValueError, match="install the same"):
         carry_out(plan.tasks(), store, table.over_dask(cluster.address))
 
 

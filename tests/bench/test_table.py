@@ -29,7 +29,7 @@ from piezoest.bench.pages import write_html
 from piezoest.bench.run import COLUMNS, Row, Task, code_of, crashed, follow, play
 from piezoest.bench.scenarios import SCENARIOS
 from piezoest.bench.stages import STAGES, STRANGERS, make_stage
-from piezoest.bench.store import Store, carry_out
+from piezoest.bench.store import Store, carry_out, store_in
 from piezoest.cli import app
 from piezoest.records import Record
 
@@ -285,7 +285,7 @@ def test_processes_give_the_same_rows(tmp_path: Path) -> None:
 def test_a_process_that_dies_is_a_failure_and_the_rest_goes_on(own: str, tmp_path: Path) -> None:
     asked = plan(f"{own}:Still", f"{own}:Dies", f"{own}:Broken", seeds=1)
     tasks = asked.tasks()
-    with table.store_in(tmp_path) as store:
+    with store_in(tmp_path) as store:
         carry_out(tasks, store, table.over_cores(2))
         rows = list(store.rows(each.key for each in tasks))
     assert [row["failure"] for row in rows] == 2 * [None, None, "the process died", "RuntimeError: no idea"]
@@ -338,7 +338,7 @@ def test_a_document_sums_up(own: str, tmp_path: Path) -> None:
 
 def test_tuning_finds_settings_on_other_seeds(own: str, tmp_path: Path) -> None:
     texts = ["HysteresisEKF(offset=True)", "HysteresisRLS(memory=0.4)", f"{own}:Still"]
-    with table.store_in(tmp_path) as store:
+    with store_in(tmp_path) as store:
         chosen = tuning.tune(texts, 2, SMALL, store, table.over_cores(1), lambda done, of: None)
         assert len(store) == 2 * 4 * (3 + 3)
     ekf, still = chosen
