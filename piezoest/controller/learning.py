@@ -21,8 +21,9 @@ HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 1.0
 # The way to the reference is over within this fraction of its length, or after so many times what a doubling
 # takes: a fast reference is never caught.
 NEAR, LONGEST = 0.05, 50.0
-# The gain on the way is that of readings whose mean has gone this fraction of it.
-LEAST_WAY = 0.4
+# The gain on the way is that of readings whose mean has gone this fraction of it, and at least this fraction of
+# the gain that the start has found: in the dead zone behind a turn there is hardly any answer.
+LEAST_WAY, LEAST_GAIN = 0.4, 0.5
 # The voltage may rest at a limit for this travel of the reference, in swings, before all begins anew; where
 # the stage stands beyond the reference there, the line follows sooner.
 RESTED, BEYOND = 4.0, 0.1
@@ -223,11 +224,14 @@ def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
     elif way >= state.confirmed and way > 0.0:
         # Only on new ground: on the way back hysteresis would pass for gain.
         state.confirmed = way
-        gone = recent.mean_u - start.origin
+        # Where the voltage came back, what the way there has left behind would pass for an answer.
+        back = (u - start.target) * (start.target - start.origin) < 0.0
+        gone = recent.mean_u - (start.target if back else start.origin)
         # Where the way has led through its beginning, the mean has hardly gone anywhere.
         if np.abs(gone) > LEAST_WAY * way:
-            gain = (recent.mean_x - start.zero) / gone
-            line.gain = gain if gain * line.gain > 0.0 else line.gain
+            gain = (recent.mean_x - (start.now if back else start.zero)) / gone
+            least = LEAST_GAIN * line.first_gain
+            line.gain = gain if gain / least > 1.0 else least
     if state.stage != SEEK:
         line.centre = recent.mean_x - line.gain * recent.mean_u
     return x

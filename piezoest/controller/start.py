@@ -28,9 +28,9 @@ START = record(
     voltage=MEASURED, origin=MEASURED, from_u=MEASURED, target=MEASURED, way=NUMBER, ways=COUNT,
     # Samples of the stage; where the reading stood at first and at the last rest, its noise.
     samples=COUNT, zero=MEASURED, from_x=MEASURED, noise=AMOUNT,
-    # Sums over a window of readings, scatter within, its mean and that of the last two; windows so far; the
-    # last two readings and the smallest change of one: the step of its converter.
-    sum=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT, mean=MEASURED, now=MEASURED, windows=COUNT,
+    # Sums over a window of readings, scatter around its trend, its mean and that of the last two; windows so
+    # far; the last two readings and the smallest change of one: the step of its converter.
+    sum=NUMBER, ramp=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT, mean=MEASURED, now=MEASURED, windows=COUNT,
     before=MEASURED, last=MEASURED, step=AMOUNT,
     # Sum of what an answer lacks of the user's gain; how late the stage answers [samples].
     total=NUMBER, lag=AMOUNT,
@@ -59,7 +59,8 @@ STUCK = 240.0
 # The way that checks an answer is so many times as long: what slews is later on it.
 CHECK = 2.0
 # At rest the means of two windows differ by less than this fraction of the answer; so many are enough.
-STILL, MOST_WINDOWS = 0.04, 30.0
+# ... and so many without an answer.
+STILL, MOST_WINDOWS, LATE = 0.04, 30.0, 5.0
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
 
@@ -136,26 +137,41 @@ def _move(start: Any, settings: Any) -> None:
     start.voltage = smooth(start.from_u, start.target, share)
     if share >= 1.0:
         start.stage, start.voltage = WAIT, start.target
-        start.sum = start.squares = start.summed = start.windows = 0.0
+        start.sum = start.ramp = start.squares = start.summed = start.windows = 0.0
 
 
 @register_jitable
 def _has_come_to_rest(start: Any, settings: Any, x: Any) -> bool:
     """Whether the stage has come to rest; `start.now` is then where it stands."""
+    off = x - start.from_x
     start.summed += 1.0
-    start.sum += x
-    start.squares += (x - start.from_x) ** 2
-    if start.summed < settings.window:
+    start.sum += off
+    start.ramp += start.summed * off
+    start.squares += off * off
+    count = start.summed
+    if count < settings.window:
         return False
-    before, start.mean = start.mean, start.sum / start.summed
+    mean = start.sum / count
+    # What still moves is no noise: only what is left around the trend is.
+    along = start.ramp / count - 0.5 * (count + 1.0) * mean
+    trend = along * along * 12.0 / (count * count - 1.0)
+    start.scatter = np.sqrt(max(0.0, start.squares / count - mean * mean - trend))
+    before, start.mean = start.mean, start.from_x + mean
     start.now = 0.5 * (before + start.mean)
-    start.scatter = np.sqrt(max(0.0, start.squares / start.summed - (start.mean - start.from_x) ** 2))
     start.windows += 1.0
-    start.sum = start.squares = start.summed = 0.0
+    start.sum = start.ramp = start.squares = start.summed = 0.0
     # What rings or is noise differs by chance.
     chance = 3.0 * start.scatter * np.sqrt(2.0 / settings.window) + 0.5 * start.noise
     still = np.abs(start.mean - before) < STILL * np.abs(start.now - start.from_x) + chance
-    return start.windows > 1.0 and (still or start.windows >= MOST_WINDOWS)
+    # Where nothing is seen yet, it may be late.
+    least = 1.0 if np.abs(start.now - start.from_x) > _clear(start) else LATE
+    return start.windows > least and (still or start.windows >= MOST_WINDOWS)
+
+
+@register_jitable
+def _clear(start: Any) -> float:
+    """What an answer must exceed to be one: noise, scatter and the step of the converter."""
+    return max(CLEAR * start.noise, STEPS * start.step, SCATTERS * start.scatter)
 
 
 @register_jitable
@@ -163,7 +179,7 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     """What the way has shown: done if two were answered alike, else another, twice as long."""
     answer = start.now - start.from_x
     start.gain_before, start.gain = start.gain, answer / (u - start.from_u) if u != start.from_u else 0.0
-    bound = max(CLEAR * start.noise, STEPS * start.step, SCATTERS * start.scatter)
+    bound = _clear(start)
     clear = u != start.from_u and np.abs(answer) > bound
     rests = start.windows <= AT_ONCE and np.abs(start.mean - start.now) < CLOSE * np.abs(answer)
     sure = rests and np.abs(answer) > SURE * bound and start.told == 0.0
