@@ -104,7 +104,7 @@ def _draw(line: Any, u: Any, x: Any, square: Any, square_x: Any, product: Any) -
     if product * product > EXPLAINED * square * square_x and product * line.gain > 0.0:
         gain = product / square
         line.gain *= min(max(gain / line.gain, 1.0 / most), most)
-        if line.legs < CERTAIN and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
+        if line.legs < 1.0 and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
             # What lags goes on while the voltage hardly moves.
             line.gain = CHANGE * line.first_gain
     elif line.clipped != 0.0 and square_x > FARTHER * FARTHER * line.gain * line.gain * square > 0.0:
