@@ -248,6 +248,8 @@ def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any) -> None:
     target = lines.voltage(line, r)
     there = np.abs(target - u) <= NEAR * np.abs(u - start.origin) or is_held(settings, u, target - u)
     longest = LONGEST * max(settings.doubling, start.lag)
+    if start.fastest > 0.0:
+        longest += 2.0 * np.abs(target - start.origin) / start.fastest
     if there or start.samples > longest:
         least = np.abs(start.target - start.from_u)
         state.stage = RUN

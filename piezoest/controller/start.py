@@ -28,10 +28,15 @@ START = record(
     voltage=MEASURED, origin=MEASURED, from_u=MEASURED, target=MEASURED, way=NUMBER, ways=COUNT,
     # Samples of the stage; where the reading stood at first and at the last rest, its noise.
     samples=COUNT, zero=MEASURED, from_x=MEASURED, noise=AMOUNT,
-    # Sums over a window of readings, scatter around its trend, its mean and that of the last two; windows so
-    # far; the last two readings and the smallest change of one: the step of its converter.
-    sum=NUMBER, ramp=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT, mean=MEASURED, now=MEASURED, windows=COUNT,
+    # Sums over a window of readings, scatter around its trend; its mean, the one before that and the one before
+    # both; mean of the last two; windows so far; the last two readings and the smallest change of one: the step
+    # of its converter.
+    sum=NUMBER, ramp=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT,
+    mean=MEASURED, mean_before=MEASURED, oldest_mean=MEASURED, now=MEASURED, windows=COUNT,
     before=MEASURED, last=MEASURED, step=AMOUNT,
+    # Largest change between two windows [µm], and of the voltage that the stage can follow [V], per sample; zero
+    # if that is not seen.
+    change=AMOUNT, fastest=AMOUNT,
     # Sum of what an answer lacks of the user's gain; how late the stage answers [samples].
     total=NUMBER, lag=AMOUNT,
     # Gain of the last way [µm/V], of the one before; ways for nothing; samples without the voltage.
@@ -59,8 +64,9 @@ STUCK = 240.0
 # The way that checks an answer is so many times as long: what slews is later on it.
 CHECK = 2.0
 # At rest the means of two windows differ by less than this fraction of the answer; so many are enough.
-# ... and so many without an answer.
-STILL, MOST_WINDOWS, LATE = 0.04, 30.0, 5.0
+# ... and so many without an answer. The stage is slow that changes by less than this fraction of the mean speed
+# of the voltage on a way, whose speed is half as large again in the middle.
+STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 5.0, 0.9
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
 
@@ -74,12 +80,20 @@ def begin(start: Any, u: Any) -> None:
 
 
 @register_jitable
+def _begin_windows(start: Any) -> None:
+    """Begin to look at the readings of a way."""
+    start.sum = start.ramp = start.squares = start.summed = start.change = 0.0
+    start.mean = start.mean_before = start.oldest_mean = start.from_x
+
+
+@register_jitable
 def begin_again(start: Any, settings: Any, u: Any) -> None:
     """Start again from a voltage where the stage may not be at rest yet, at the place nearest to 0 V."""
     rest = min(max(0.0, settings.lowest), settings.highest)
     begin(start, rest)
     start.stage, start.voltage, start.from_u, start.target = GO, u, u, rest
     start.tries = 0.5
+    _begin_windows(start)
 
 
 @register_jitable
@@ -87,6 +101,7 @@ def _go(start: Any, settings: Any, u: Any) -> None:
     """Begin the next way; back to where there is room if there is none ahead."""
     start.stage, start.samples = GO, 0.0
     start.from_u = u
+    _begin_windows(start)
     ahead = u + start.way
     if not settings.lowest <= ahead <= settings.highest:
         start.way = -start.way
@@ -136,13 +151,12 @@ def _move(start: Any, settings: Any) -> None:
     share = min(start.samples / (longer * settings.ramp), 1.0)
     start.voltage = smooth(start.from_u, start.target, share)
     if share >= 1.0:
-        start.stage, start.voltage = WAIT, start.target
-        start.sum = start.ramp = start.squares = start.summed = start.windows = 0.0
+        start.stage, start.voltage, start.windows = WAIT, start.target, 0.0
 
 
 @register_jitable
-def _has_come_to_rest(start: Any, settings: Any, x: Any) -> bool:
-    """Whether the stage has come to rest; `start.now` is then where it stands."""
+def _fills_window(start: Any, settings: Any, x: Any) -> bool:
+    """Whether a window is full; `start.now` is then where the stage stands."""
     off = x - start.from_x
     start.summed += 1.0
     start.sum += off
@@ -156,13 +170,21 @@ def _has_come_to_rest(start: Any, settings: Any, x: Any) -> bool:
     along = start.ramp / count - 0.5 * (count + 1.0) * mean
     trend = along * along * 12.0 / (count * count - 1.0)
     start.scatter = np.sqrt(max(0.0, start.squares / count - mean * mean - trend))
-    before, start.mean = start.mean, start.from_x + mean
-    start.now = 0.5 * (before + start.mean)
+    start.oldest_mean, start.mean_before, start.mean = start.mean_before, start.mean, start.from_x + mean
+    start.now = 0.5 * (start.mean_before + start.mean)
+    start.change = max(start.change, np.abs(start.mean - start.mean_before) / count)
     start.windows += 1.0
     start.sum = start.ramp = start.squares = start.summed = 0.0
+    return True
+
+
+@register_jitable
+def _rests(start: Any, settings: Any) -> bool:
+    """Whether the stage has come to rest."""
     # What rings or is noise differs by chance.
     chance = 3.0 * start.scatter * np.sqrt(2.0 / settings.window) + 0.5 * start.noise
-    still = np.abs(start.mean - before) < STILL * np.abs(start.now - start.from_x) + chance
+    most = STILL * np.abs(start.now - start.from_x) + chance
+    still = max(np.abs(start.mean - start.mean_before), np.abs(start.mean - start.oldest_mean)) < most
     # Where nothing is seen yet, it may be late.
     least = 1.0 if np.abs(start.now - start.from_x) > _clear(start) else LATE
     return start.windows > least and (still or start.windows >= MOST_WINDOWS)
@@ -172,6 +194,14 @@ def _has_come_to_rest(start: Any, settings: Any, x: Any) -> bool:
 def _clear(start: Any) -> float:
     """What an answer must exceed to be one: noise, scatter and the step of the converter."""
     return max(CLEAR * start.noise, STEPS * start.step, SCATTERS * start.scatter)
+
+
+@register_jitable
+def _see_slew(start: Any, settings: Any, u: Any) -> None:
+    """Whether the stage has come more slowly than the voltage went: a slow amplifier, or a lag."""
+    change = start.change / np.abs(start.gain)
+    asked = np.abs(u - start.from_u) / settings.ramp
+    start.fastest = change if change < SLOW * asked else 0.0
 
 
 @register_jitable
@@ -191,12 +221,14 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
         return
     if clear and (alike or longest):
         start.stage = DONE
+        _see_slew(start, settings, u)
         return
     if longest:
         # Back to where all began: nothing rests at a limit.
         start.stage, start.samples, start.ways = GO, 0.0, 0.0
         start.tries += 1.0
         start.from_u, start.target = u, start.origin
+        _begin_windows(start)
         return
     start.way *= CHECK if clear and start.ways == 0.0 else 2.0
     start.way = np.sign(start.way) * min(np.abs(start.way), settings.longest)
@@ -223,6 +255,8 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
             start.tries += 1.0
     if start.stage == GO:
         if start.stuck == 0.0:
+            if known:
+                _fills_window(start, settings, middle)
             _move(start, settings)
     elif start.stage == REST and start.ahead != 0.0:
         # Planned before the readings are there: the first way begins after as many samples as they take.
@@ -237,7 +271,7 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
         if start.samples >= FIRST:
             _settle_rest(start, settings, u)
     elif start.stage == WAIT and start.stuck == 0.0:
-        if _has_come_to_rest(start, settings, middle):
+        if _fills_window(start, settings, middle) and _rests(start, settings):
             _judge(start, settings, u)
     elif start.stage == SILENT:
         start.samples += 1.0

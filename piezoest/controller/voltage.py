@@ -22,6 +22,8 @@ RATE = 5.0
 # On the way to the reference the voltage goes no farther than so many times the way that was answered; a
 # doubling takes so many times as long as the stage takes to answer.
 AHEAD, LATE = 8.0, 3.0
+# Where the stage was slow, so many times its speed.
+FOLLOWED = 0.8
 # ... and where the readings have yet to confirm a user's gain, than so many times.
 FIRST_AHEAD = 2.0
 
@@ -70,6 +72,8 @@ def _nearer(state: Any, settings: Any, target: Any) -> float:
     if np.abs(target - start.origin) > np.abs(end - start.origin):
         left = end - state.u
     way = min(max(span, state.confirmed / AHEAD), np.abs(left)) / doubling
+    if start.fastest > 0.0:
+        way = min(way, FOLLOWED * start.fastest)
     return state.u + min(max(left, -way), way)
 
 
