@@ -56,7 +56,7 @@ SETTINGS = record(
 CLEAR, SCATTERS, STEPS, ALIKE = 6.0, 3.0, 10.0, 1.6
 # An answer so many times as clear is sure by itself, if it came to rest within so many windows, for hum rests
 # only for a moment, and the last two are this close to it, for a slow amplifier is still on its way.
-SURE, AT_ONCE, CLOSE = 3.0, 3.0, 0.02
+SURE, AT_ONCE, CLOSE = 3.0, 4.0, 0.02
 # The voltage written follows the one planned within this fraction of a way.
 FOLLOWS = 0.125
 # Without that, or without readings, the start is given up after so many windows.
@@ -66,7 +66,7 @@ CHECK = 2.0
 # At rest the means of two windows differ by less than this fraction of the answer; so many are enough.
 # ... and so many without an answer. The stage is slow that changes by less than this fraction of the mean speed
 # of the voltage on a way, whose speed is half as large again in the middle.
-STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 5.0, 0.9
+STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 4.0, 0.75
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
 
@@ -184,7 +184,7 @@ def _rests(start: Any, settings: Any) -> bool:
     # What rings or is noise differs by chance.
     chance = 3.0 * start.scatter * np.sqrt(2.0 / settings.window) + 0.5 * start.noise
     most = STILL * np.abs(start.now - start.from_x) + chance
-    still = max(np.abs(start.mean - start.mean_before), np.abs(start.mean - start.oldest_mean)) < most
+    still = max(np.abs(start.mean - start.mean_before), 0.5 * np.abs(start.mean - start.oldest_mean)) < most
     # Where nothing is seen yet, it may be late.
     least = 1.0 if np.abs(start.now - start.from_x) > _clear(start) else LATE
     return start.windows > least and (still or start.windows >= MOST_WINDOWS)
