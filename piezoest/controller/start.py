@@ -184,7 +184,7 @@ def _rests(start: Any, settings: Any) -> bool:
     # What rings or is noise differs by chance.
     chance = 3.0 * start.scatter * np.sqrt(2.0 / settings.window) + 0.5 * start.noise
     most = STILL * np.abs(start.now - start.from_x) + chance
-    still = max(np.abs(start.mean - start.mean_before), 0.5 * np.abs(start.mean - start.oldest_mean)) < most
+    still = max(np.abs(start.mean - start.mean_before), np.abs(start.mean - start.oldest_mean)) < most
     # Where nothing is seen yet, it may be late.
     least = 1.0 if np.abs(start.now - start.from_x) > _clear(start) else LATE
     return start.windows > least and (still or start.windows >= MOST_WINDOWS)
@@ -197,14 +197,6 @@ def _clear(start: Any) -> float:
 
 
 @register_jitable
-def _see_slew(start: Any, settings: Any, u: Any) -> None:
-    """Whether the stage has come more slowly than the voltage went: a slow amplifier, or a lag."""
-    change = start.change / np.abs(start.gain)
-    asked = np.abs(u - start.from_u) / settings.ramp
-    start.fastest = change if change < SLOW * asked else 0.0
-
-
-@register_jitable
 def _judge(start: Any, settings: Any, u: Any) -> None:
     """What the way has shown: done if two were answered alike, else another, twice as long."""
     answer = start.now - start.from_x
@@ -212,7 +204,10 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     bound = _clear(start)
     clear = u != start.from_u and np.abs(answer) > bound
     rests = start.windows <= AT_ONCE and np.abs(start.mean - start.now) < CLOSE * np.abs(answer)
-    sure = rests and np.abs(answer) > SURE * bound and start.told == 0.0
+    # A stage that comes more slowly than the voltage went may still be on its way: a slow amplifier, or a lag.
+    change = start.change / np.abs(start.gain) if start.gain != 0.0 else 0.0
+    start.fastest = change if change < SLOW * np.abs(u - start.from_u) / settings.ramp else 0.0
+    sure = rests and np.abs(answer) > SURE * bound and start.told == 0.0 and start.fastest == 0.0
     alike = sure or (start.ways > 0.0 and 1.0 / ALIKE < start.gain / start.gain_before < ALIKE)
     longest = np.abs(start.way) >= settings.longest
     start.from_x = start.now
@@ -221,7 +216,6 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
         return
     if clear and (alike or longest):
         start.stage = DONE
-        _see_slew(start, settings, u)
         return
     if longest:
         # Back to where all began: nothing rests at a limit.

@@ -115,7 +115,8 @@ def _rail(rig: Rig, run: Traces, lines: Lines) -> Any:
     low, high = rig.reach.low, rig.reach.high
     span = high - low
     zero = rig.coordinates[1]
-    needed = lines.line.voltage(run.reference - (zero - zero[0]))
+    # Where the gain has become smaller, less is within reach.
+    needed = lines.line.voltage((run.reference - (zero - zero[0])) / rig.gain_factor)
     # Half a loop beside the line is where an exact inverse may be.
     within = (WITHIN + 0.5 * rig.width) * span
     inside = (needed > low + within) & (needed < high - within)

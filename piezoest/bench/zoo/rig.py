@@ -150,6 +150,15 @@ class Rig:
         return coordinates(self.fault, self.plain.values.size)
 
     @property
+    def gain_factor(self) -> FloatArray:
+        """By what the fault has changed the gain, shape (N,)."""
+        n, schedule = self.plain.values.size, gain_schedule(self.fault, self.sample_rate)
+        if schedule is None:
+            return np.ones(n)
+        times, factors = zip(*schedule, strict=True)
+        return np.interp(np.arange(n) / self.sample_rate, times, factors)
+
+    @property
     def noise(self) -> float:
         """What nobody can foresee of a reading: noise, hum and steps, as a standard deviation [µm]."""
         own = self.around
