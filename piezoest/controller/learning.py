@@ -21,8 +21,8 @@ HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 1.0
 # The way to the reference is over within this fraction of its length, or after so many times what a doubling
 # takes: a fast reference is never caught.
 NEAR, LONGEST = 0.05, 50.0
-# The gain on the way is that of readings whose mean has gone this fraction of it, and at least this fraction of
-# the gain that the start has found: in the dead zone behind a turn there is hardly any answer.
+# The gain on the way is that of readings whose mean has gone this fraction of it, and at least this fraction
+# of the gain that the start has found: in the dead zone behind a turn there is hardly any answer.
 LEAST_WAY, LEAST_GAIN = 0.4, 0.5
 # The voltage may rest at a limit for this travel of the reference, in swings, before all begins anew; where
 # the stage stands beyond the reference there, the line follows sooner.

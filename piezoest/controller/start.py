@@ -28,14 +28,14 @@ START = record(
     voltage=MEASURED, origin=MEASURED, from_u=MEASURED, target=MEASURED, way=NUMBER, ways=COUNT,
     # Samples of the stage; where the reading stood at first and at the last rest, its noise.
     samples=COUNT, zero=MEASURED, from_x=MEASURED, noise=AMOUNT,
-    # Sums over a window of readings, scatter around its trend; its mean, the one before that and the one before
-    # both; mean of the last two; windows so far; the last two readings and the smallest change of one: the step
-    # of its converter.
+    # Sums over a window of readings, scatter around its trend; its mean, the one before that and the one
+    # before both; mean of the last two; windows so far; the last two readings and the smallest change of one:
+    # the step of its converter.
     sum=NUMBER, ramp=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT,
     mean=MEASURED, mean_before=MEASURED, oldest_mean=MEASURED, now=MEASURED, windows=COUNT,
     before=MEASURED, last=MEASURED, step=AMOUNT,
-    # Largest change between two windows [µm], and of the voltage that the stage can follow [V], per sample; zero
-    # if that is not seen.
+    # Largest change between two windows [µm]; fastest change of the voltage that a slow stage follows [V], zero
+    # for a fast one; both per sample.
     change=AMOUNT, fastest=AMOUNT,
     # Sum of what an answer lacks of the user's gain; how late the stage answers [samples].
     total=NUMBER, lag=AMOUNT,
@@ -63,9 +63,9 @@ FOLLOWS = 0.125
 STUCK = 240.0
 # The way that checks an answer is so many times as long: what slews is later on it.
 CHECK = 2.0
-# At rest the means of two windows differ by less than this fraction of the answer; so many are enough.
-# ... and so many without an answer. The stage is slow that changes by less than this fraction of the mean speed
-# of the voltage on a way, whose speed is half as large again in the middle.
+# At rest the means of three windows differ by less than this fraction of the answer; so many windows are enough
+# at any rate; at least so many are looked at where there is no answer. A stage is slow that changes by less
+# than this fraction of the mean speed of the voltage, which is half as fast again in the middle of a way.
 STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 4.0, 0.75
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
@@ -204,12 +204,14 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     bound = _clear(start)
     clear = u != start.from_u and np.abs(answer) > bound
     rests = start.windows <= AT_ONCE and np.abs(start.mean - start.now) < CLOSE * np.abs(answer)
-    # A stage that comes more slowly than the voltage went may still be on its way: a slow amplifier, or a lag.
+    # Who comes more slowly than the voltage went may still be on the way: a slow amplifier, or a lag.
     change = start.change / np.abs(start.gain) if start.gain != 0.0 else 0.0
     start.fastest = change if change < SLOW * np.abs(u - start.from_u) / settings.ramp else 0.0
     sure = rests and np.abs(answer) > SURE * bound and start.told == 0.0 and start.fastest == 0.0
     alike = sure or (start.ways > 0.0 and 1.0 / ALIKE < start.gain / start.gain_before < ALIKE)
-    longest = np.abs(start.way) >= settings.longest
+    # A sensor that has not changed by a bit on all ways is asked again by the shortest one alone.
+    dead = start.step == 0.0 and start.tries >= 1.0
+    longest = np.abs(start.way) >= settings.longest or dead
     start.from_x = start.now
     if start.target == start.origin and start.ways == 0.0 and start.tries > 0.0:
         start.stage, start.samples = SILENT, 0.0
