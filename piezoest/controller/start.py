@@ -34,8 +34,8 @@ START = record(
     sum=NUMBER, ramp=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT,
     mean=MEASURED, mean_before=MEASURED, oldest_mean=MEASURED, now=MEASURED, windows=COUNT,
     before=MEASURED, last=MEASURED, step=AMOUNT,
-    # Largest change between two windows [µm]; fastest change of the voltage that a slow stage follows [V], zero
-    # for a fast one; both per sample.
+    # Largest change between two windows [µm]; fastest change of the voltage that a slow stage follows [V],
+    # zero for a fast one; both per sample.
     change=AMOUNT, fastest=AMOUNT,
     # Sum of what an answer lacks of the user's gain; how late the stage answers [samples].
     total=NUMBER, lag=AMOUNT,
@@ -63,9 +63,9 @@ FOLLOWS = 0.125
 STUCK = 240.0
 # The way that checks an answer is so many times as long: what slews is later on it.
 CHECK = 2.0
-# At rest the means of three windows differ by less than this fraction of the answer; so many windows are enough
-# at any rate; at least so many are looked at where there is no answer. A stage is slow that changes by less
-# than this fraction of the mean speed of the voltage, which is half as fast again in the middle of a way.
+# At rest the means of three windows differ by less than this fraction of the answer; so many windows are
+# enough at any rate; at least so many are looked at where there is no answer. A stage is slow that changes by
+# less than this fraction of the mean speed of the voltage, which is half as fast again in the middle of a way.
 STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 4.0, 0.75
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
