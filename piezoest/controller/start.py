@@ -3,8 +3,9 @@
 At rest the first readings say where the stage stands; one wrong one among them does not count. Then the
 voltage goes two per cent of its range and rests until the reading has come to rest too. The gain is what lies
 between two rests, where neither delay nor lag counts. An answer that drowns in noise or in steps of the
-converter doubles the way; one that is clear, but not sure, is checked by a way twice as long: both must
-have been answered alike, else, as with backlash, the way is doubled. A gain that a user knows is not sought.
+converter doubles the way; one that is clear, but not sure, or came more slowly than the voltage went, is
+checked by a way twice as long: both must have been answered alike, else, as with backlash, the way is doubled.
+A gain that a user knows is not sought.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ STUCK = 240.0
 CHECK = 2.0
 # At rest the means of three windows differ by less than this fraction of the answer; so many windows are
 # enough at any rate; at least so many are looked at where there is no answer. A stage is slow that changes by
-# less than this fraction of the mean speed of the voltage, which is half as fast again in the middle of a way.
+# less than this fraction of the mean speed of the voltage, which is half as fast again midway.
 STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 4.0, 0.75
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0

@@ -9,6 +9,9 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
+from piezoest.bench import zoo
+from piezoest.bench.zoo.running import run_controller
+from piezoest.stage import Amplifier
 
 FS = 5000.0
 LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
@@ -61,6 +64,25 @@ def test_a_resonance_is_not_fed(frequency: float) -> None:
     late = slice(3000, None)
     assert line.status.stage == "running"
     assert np.abs(r - true)[late].max() < 1.5 * np.abs(r - by_line)[late].max()
+
+
+@pytest.mark.parametrize("slew_rate", [60.0, 250.0])
+def test_a_slow_amplifier_is_waited_for(slew_rate: float) -> None:
+    """What the voltage has not done yet would pass for a small gain, and small gains ask for large voltages."""
+    r = triangle(20, 0.5).repeat(4)
+    stage = pz.SimulatedStage(FS, LOOP, amplifier=Amplifier(-60.0, 60.0, slew_rate=slew_rate))
+    _, u, true = driven(r, stage, block=20)
+    assert np.abs(r - true).max() < 2.0
+    assert np.abs(u).max() < 15.0
+    assert np.abs(r - true)[-4000:].max() < 0.02
+
+
+@pytest.mark.parametrize("seed", [30230, 30468, 31415])
+def test_what_the_first_way_leaves_behind_is_no_small_gain(seed: int) -> None:
+    """Relays whose loop is wide: on the way back through the beginning they have hardly moved."""
+    rig = zoo.draw(seed)
+    traces, _ = run_controller(rig, pz.AdaptiveFeedforward(rig.sample_rate, limits=rig.limits))
+    assert np.abs(traces.displacement).max() < 6.0 * rig.plain.amplitude
 
 
 @pytest.mark.parametrize("wrong", ["reversed", "dead"])
