@@ -68,7 +68,7 @@ def test_a_resonance_is_not_fed(frequency: float) -> None:
 
 @pytest.mark.parametrize("slew_rate", [60.0, 250.0])
 def test_a_slow_amplifier_is_waited_for(slew_rate: float) -> None:
-    """What the voltage has not done yet would pass for a small gain, and small gains ask for large voltages."""
+    """What has not happened yet would pass for a small gain, which asks for large voltages."""
     r = triangle(20, 0.5).repeat(4)
     stage = pz.SimulatedStage(FS, LOOP, amplifier=Amplifier(-60.0, 60.0, slew_rate=slew_rate))
     _, u, true = driven(r, stage, block=20)
