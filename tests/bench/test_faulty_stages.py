@@ -89,17 +89,3 @@ def test_a_loop_stays_within_bounds_and_recovers(name: str, estimator: Any) -> N
     assert np.max(np.abs(record.voltage)) <= 100.0
     if recovers:
         assert record.max_error(last_periods=3) < 0.012 * 5.0
-
-
-@pytest.mark.parametrize(
-    ("kind", "arguments", "words"),
-    [
-        (faults.Missing, {"share": 1.5}, "share"),
-        (faults.Gap, {"start": -1.0}, "start"),
-        (faults.Saturation, {"limit": 0.0}, "limit"),
-        (faults.FaultyStage, {"seed": -1}, "seed"),
-    ],
-)
-def test_refuses_what_makes_no_sense(kind: Any, arguments: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        kind(sound(), **arguments)

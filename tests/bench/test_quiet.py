@@ -29,7 +29,7 @@ def flood(capfd: Any) -> str:
     return str(capfd.readouterr().err)
 
 
-@pytest.mark.parametrize("how", [("--workers", "2"), ("--workers", "1"), ("--show", "0")])
+@pytest.mark.parametrize("how", [("--workers", "2"), ("--show", "0")])
 def test_warnings_of_runs_are_not_on_the_screen(
     how: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any
 ) -> None:
