@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import TypingError
-from numba.core import config
 from numba.core.errors import LoweringError
 from numba.extending import register_jitable
 
@@ -159,16 +158,6 @@ def test_one_of_many_records(layout: Layout) -> None:
             for k in range(4):
                 step.of(layout, GAIN)(alone, given, x[k, c])
         assert many[c].tobytes() == alone.tobytes()
-
-
-def test_without_machine_code_the_function_itself_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    layout = layout_of(3)
-    machine, plain, given = new(layout), new(layout), new(GAIN, **GAINS)
-    step.of(layout, GAIN)(machine, given, 1.5)
-    monkeypatch.setattr(config, "DISABLE_JIT", True)
-    monkeypatch.setattr(step, "_entries", {})
-    step.of(layout, GAIN)(plain, given, 1.5)
-    assert plain.tobytes() == machine.tobytes()
 
 
 # ---------------------------------------------------------------- what does not compile

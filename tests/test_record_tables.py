@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -113,26 +114,6 @@ def test_frame_of_polars() -> None:
         Record.from_frame(frame.lazy())
 
 
-def test_missing_and_foreign_values_of_frames() -> None:
-    pd, pl = pytest.importorskip("pandas"), pytest.importorskip("polars")
-    holes: list[Any] = VOLTAGE.tolist()
-    holes[7] = None
-    for frame in (
-        pd.DataFrame({"t": TIME, "u": holes, "x": DISPLACEMENT}),
-        pd.DataFrame({"t": TIME, "u": pd.array(holes, "Float64"), "x": DISPLACEMENT}),
-        pl.DataFrame({"t": TIME, "u": holes, "x": DISPLACEMENT}),
-    ):
-        record = Record.from_frame(frame)
-        assert np.flatnonzero(~record.usable).tolist() == [7]
-        assert record.skipped == 1
-    for frame in (
-        pd.DataFrame({"t": TIME, "u": ["a"] * N, "x": TIME}),
-        pl.DataFrame({"t": TIME, "u": ["a"] * N, "x": TIME}),
-    ):
-        with pytest.raises(ValueError, match="frame, row 1, column 'u': 'a' is not a number"):
-            Record.from_frame(frame)
-
-
 # ---------------------------------------------------------------- whatever holds a log
 
 
@@ -148,3 +129,16 @@ def test_as_record_takes_what_holds_a_log(tmp_path: Path) -> None:
     check(as_record(pd.DataFrame({"u": VOLTAGE, "x": DISPLACEMENT}), sample_rate=RATE))
     check(as_record(VOLTAGE, DISPLACEMENT, sample_rate=RATE))
     check(as_record(VOLTAGE.tolist(), pd.Series(DISPLACEMENT), sample_rate=RATE))
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "package"),
+    [("a.xlsx", b"PK\x03\x04", "python_calamine"), ("a.tdms", b"TDSm", "nptdms")],
+)
+def test_missing_extra_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, start: bytes, package: str
+) -> None:
+    (tmp_path / name).write_bytes(start + bytes(200))
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ImportError, match=rf"needs {package}, .* pip install 'piezoest\[formats\]'"):
+        read_record(tmp_path / name)

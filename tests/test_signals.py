@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -361,3 +362,34 @@ def test_legitimate_signals_pass(name: str) -> None:
 def test_bad_arguments_are_named(call: Callable[[], object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_amplitude_modulated_envelope() -> None:
+    r = signals.amplitude_modulated(4.0, 50.0, 1.0, 1.0, 10_000.0, depth=0.75)
+    assert r.period == 10_000
+    assert np.max(np.abs(r.values[:200])) == pytest.approx(4.0, rel=0.01)
+    assert np.max(np.abs(r.values[4900:5100])) == pytest.approx(1.0, rel=0.01)
+
+
+@pytest.mark.parametrize("method", ["linear", "logarithmic"])
+def test_chirp_sweeps_from_start_to_stop(method: Any) -> None:
+    r = signals.chirp(1.0, 2.0, 32.0, 10.0, 10_000.0, method=method)
+    rises = np.flatnonzero((r.values[:-1] < 0.0) & (r.values[1:] >= 0.0)) / 10_000.0
+    frequency, middle = 1.0 / np.diff(rises), 0.5 * (rises[1:] + rises[:-1])
+    expected = 2.0 + 3.0 * middle if method == "linear" else 2.0 * 16.0 ** (middle / 10.0)
+    np.testing.assert_allclose(frequency, expected, rtol=0.03)
+
+
+def test_filtered_steps_reach_their_levels() -> None:
+    r = signals.filtered_steps([5.0, -5.0], [0.5, 1.0], FS, cutoff=10.0)
+    assert len(r) == 75_000
+    assert r.period is None
+    assert r.values[24_999] == pytest.approx(5.0, abs=1e-6)
+    assert r.values[-1] == pytest.approx(-5.0, abs=1e-6)
+    assert r.values.max() == pytest.approx(5.0 * 1.0432, rel=1e-3)
+    rest = signals.filtered_steps([2.0], 0.1, FS, start=2.0)
+    np.testing.assert_allclose(rest.values, 2.0, atol=1e-12)
+    wave = signals.filtered_steps([5.0, -5.0], 0.1, FS, periods=4)
+    assert wave.period == 10_000
+    assert len(wave) == 40_000
+    np.testing.assert_allclose(wave.values[:5000], -wave.values[5000:10_000], atol=1e-8)

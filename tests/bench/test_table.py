@@ -17,12 +17,12 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import piezoest as pz
-from piezoest.bench import recorded, table, tables
+from piezoest.bench import recorded, table, tables, tuning
 from piezoest.bench.estimators import KNOWN, PAPERS, candidate, defaults, found
 from piezoest.bench.machine import fingerprint
 from piezoest.bench.pages import write_html
 from piezoest.bench.run import COLUMNS, Task, code_of, crashed, play
-from piezoest.bench.stages import STAGES, make_stage
+from piezoest.bench.stages import STAGES, STRANGERS, make_stage
 from piezoest.bench.store import Store, carry_out, store_in
 from piezoest.cli import app
 from piezoest.records import Record
@@ -398,3 +398,28 @@ def test_a_killed_campaign_goes_on(tmp_path: Path) -> None:
     assert [json.dumps(row) for row in rows[: len(kept)]] == [json.dumps(json.loads(line)) for line in kept]
     assert len(rows) == len({row["key"] for row in rows}) == 40
     assert len(tables.read_table(tmp_path, table.RUNS, COLUMNS)) == 40
+
+
+def test_slow_estimators_run_on_fewer_seeds_and_the_first_stage() -> None:
+    asked = plan("HysteresisEKF", "FilterPyUKF", stages=("paper", *STRANGERS), seeds=3, slow_seeds=2)
+    tasks = asked.tasks()
+    assert len(tasks) == 2 * 3 * 4 * 2 + 2 * 2
+    slow = [each for each in tasks if each.estimator == "FilterPyUKF"]
+    assert {(each.given["stage"], each.seed) for each in slow} == {("paper", 0), ("paper", 1)}
+    for wrong, words in (({"scenarios": ("nowhere",)}, "nowhere"), ({"stages": ("best",)}, "best")):
+        with pytest.raises(ValueError, match=words):
+            plan("HysteresisEKF", **wrong)
+
+
+def test_tuning_finds_settings_on_other_seeds(own: str, tmp_path: Path) -> None:
+    texts = ["HysteresisEKF(offset=True)", "HysteresisRLS(memory=0.4)", f"{own}:Still"]
+    with store_in(tmp_path) as store:
+        chosen = tuning.tune(texts, 2, SMALL, store, table.over_cores(1), lambda done, of: None)
+        assert len(store) == 2 * 4 * (3 + 3)
+    ekf, still = chosen
+    assert ekf["default"] == texts[0] == ekf["trials"][0]["estimator"]
+    assert all("offset=True" in trial["estimator"] for trial in ekf["trials"])
+    assert min(ekf["trials"], key=lambda trial: trial["score"])["estimator"] == ekf["chosen"]
+    assert {trial["score"] for trial in still["trials"]} == {still["trials"][0]["score"]}
+    with pytest.raises(ValueError, match="power of two"):
+        tuning.draws(tuning.tunable(texts[0]), 3, 0)

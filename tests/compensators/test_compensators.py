@@ -185,3 +185,11 @@ def test_what_a_program_hands_over_for_a_reference(wrap: Any, model: Any) -> Non
         first = compensator.step(1.0)
         assert compensator.step(value) == first
         assert compensator.status.missing == 1
+
+
+def test_integral_feedback_removes_a_constant_error() -> None:
+    stage = pz.SimulatedStage(sample_rate=10_000.0, hysteresis=pz.LinearGain(0.12, offset=0.5))
+    loop = pz.IntegralFeedback(pz.LinearCompensator(pz.LinearGain(0.15)), gain=200.0, sample_rate=10_000.0)
+    record = pz.track(np.full(2000, 2.0), stage=stage, compensator=loop, allow_jumps=True)
+    assert abs(record.error[-1]) < 1e-6
+    assert abs(record.error[0]) > 0.09

@@ -62,10 +62,10 @@ def test_a_model_at_every_sample_does_not_run_away(amplitude: float, frequency: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [pz.HysteresisRLS, pz.OutputErrorRLS])
-@pytest.mark.parametrize("frequency", [5.0, 15.0, 22.0, 30.0])
+@pytest.mark.parametrize("frequency", [15.0, 30.0])
 @pytest.mark.parametrize("amplitude", [0.5, 5.0])
 def test_models_at_any_pace_do_not_run_away(make: Any, amplitude: float, frequency: float) -> None:
-    for seed, every in ((1, 1), (2, 7), (3, 500)):
+    for seed, every in ((1, 1), (2, 30)):
         follows_better_than_a_line(make, amplitude, frequency, seed, every)
 
 

@@ -80,9 +80,3 @@ def test_every_page_is_in_a_table_of_contents() -> None:
     text = "\n".join(page.read_text(encoding="utf-8") for page in DOCS.glob("*.rst"))
     listed = set(re.findall(r"^   ([\w/]+)$", text, re.M))
     assert pages <= listed
-
-
-# ---------------------------------------------------------------- reference
-
-
-# ---------------------------------------------------------------- links

@@ -74,3 +74,13 @@ def test_compiled_equals_plain() -> None:
     u = np.cumsum(np.random.default_rng(1).standard_normal(3000))
     found = compiled_with_decay.of(recent_path.PATH)(new(recent_path.PATH), u, 0.03)
     assert found == pytest.approx(with_decay(followed(u), 0.03), rel=1e-12)
+
+
+def test_model_in_use_goes_on_by_itself() -> None:
+    """However many turns are dropped, and taken up again it does not move."""
+    u = 20.0 + np.cumsum(np.random.default_rng(2).standard_normal(5000))
+    path = followed(u, a=0.002)
+    h = float(recent_path.hysteresis(path))
+    assert path.count > recent_path.MOST // 2
+    assert h == pytest.approx(simulated(u, 0.002), abs=0.2)
+    assert with_decay(path, 0.002) == pytest.approx(h, abs=1e-9)

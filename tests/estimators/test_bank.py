@@ -82,12 +82,3 @@ def test_a_channel_without_a_number_is_missing_and_stops_no_other() -> None:
     plain.run(u, np.where(gaps, np.nan, x))
     masked.run(u, np.ma.array(np.where(gaps, 1e3, x), mask=gaps))
     np.testing.assert_array_equal(masked.theta, plain.theta)
-
-
-def test_a_voltage_that_waits_is_a_sample_without_a_measurement() -> None:
-    estimator = pz.HysteresisRLS(5000.0)
-    estimator.predict(5.0)
-    bank = pz.EstimatorBank(estimator, 1)
-    estimator.step(1.0, 0.1)
-    bank.step([1.0], [0.1])
-    assert bank.channel(0).to_dict() == estimator.to_dict()

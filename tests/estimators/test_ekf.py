@@ -41,9 +41,6 @@ def test_jacobian_is_casadis_derivative(travel: float, sign: float) -> None:
             np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12 * abs(expected).max())
 
 
-# ---------------------------------------------------------------- parity
-
-
 # ---------------------------------------------------------------- reductions
 
 

@@ -225,3 +225,47 @@ def test_what_has_no_kernel_is_refused() -> None:
         pz.export.c(pz.PrandtlIshlinskiiRLS(FS), inverse())
     with pytest.raises(ValueError, match="no other model"):
         pz.export.c(rls(), pz.InverseCompensator(PLAYS))
+
+
+@pytest.mark.parametrize("name", ["rls", "ekf"])
+def test_float_settles_to_the_same_error(name: str) -> None:
+    case = SCENARIOS["cold-start"].build(0, after=10, **AT)
+    estimator, compensator = PAIRS[name]()
+    single = pz.export.CompiledController(code(name, "float"))
+    library = pz.track(
+        case.reference,
+        stage=case.new_stage(),
+        compensator=compensator,
+        estimator=estimator,
+    )
+    own = pz.track(case.reference, stage=case.new_stage(), compensator=single)
+    # Rounding moves the samples at which a model is handed over.
+    assert own.max_error(2) == pytest.approx(library.max_error(2), rel=0.03)
+
+
+def test_parameters_can_be_set(log: tuple[Any, Any]) -> None:
+    r, x = log
+    ours = pz.export.CompiledController(code("inverse"))
+    compensator = inverse()
+    ours.run(r[:500], x[:500])
+    compensator.run(r[:500])
+    ours.parameters = [0.021, 0.14, 0.0042, 0.1]
+    compensator.model = pz.ColemanHodgdon(0.021, 0.14, 0.0042, 0.1)
+    np.testing.assert_array_equal(ours.run(r[500:], x[500:]), compensator.run(r[500:]))
+    # An inadmissible model becomes its nearest admissible one; one that is no number is refused.
+    ours.parameters = [0.021, 0.14, 0.1, 0.0]
+    assert pz.ColemanHodgdon(*ours.parameters).is_admissible
+    for wrong in ([np.nan, 0.1, 0.1, 0.0], [0.02, np.inf, 0.1, 0.0]):
+        with pytest.raises(ValueError, match="parameters"):
+            ours.parameters = wrong
+
+
+def test_limits_are_kept_and_can_be_set(log: tuple[Any, Any]) -> None:
+    r, x = log
+    ours = pz.export.CompiledController(code("inverse"))
+    ours.set_limits(-5.0, 4.0)
+    u = ours.run(r, x)
+    assert u.min() == -5.0
+    assert u.max() == 4.0
+    with pytest.raises(ValueError, match="below"):
+        ours.set_limits(3.0, 3.0)

@@ -12,7 +12,6 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-import piezoest as pz
 from piezoest.models._base import REGISTERED
 
 GOOD = """
@@ -79,13 +78,3 @@ def test_says_what_is_wrong(make: Make, old: str, new: str, words: str) -> None:
     model = make(old, new)
     with pytest.raises(TypeError, match=words):
         model(0.15, 0.01).simulate(np.zeros(3))
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [("state[0] = u\n", "state[0] = u if u > u_0 else u_0\n"), ("state[0] = u\n", "a, b = constants\n")],
-)
-def test_a_fit_says_that_symbols_have_no_values(make: Make, old: str, new: str) -> None:
-    model = make(old, new)
-    with pytest.raises(TypeError, match="displacement does not work on a fit's symbols"):
-        pz.BatchFit(1000.0, initial_model=model(0.15, 0.01))

@@ -19,7 +19,7 @@ AT_HOME = storage.home() == MADE
 # What most users run; the rest of the options, each compiled for itself, are slow.
 QUICK = re.compile(
     r"(rls|ekf|output-error|plays|horizon|batch|identify)/default/|rls/paper/|ring/(rls|output-error)/"
-    r"|identify/|model|stage|compensator/(inverse|bent|line)-(free|tight)|hand-over/inverse-tight|lead/inverse"
+    r"|identify/|model|stage|compensator/(inverse|bent|line)-(free|tight)|hand-over/inverse-tight"
 )
 
 

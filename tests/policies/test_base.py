@@ -9,7 +9,6 @@ import itertools
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -173,18 +172,6 @@ def test_a_policy_defined_after_the_estimators_is_refused(policy_file: Maker) ->
 
 
 # ---------------------------------------------------------------- chains
-
-
-def test_all_policies_are_asked_for_their_permission(policy_file: Maker) -> None:
-    for name in ("Yes", "No", "Maybe"):
-        policy_file(name, hook("permits", f"state.asked.append({name!r}); return fixed"))
-    for answers in ((True, True, True), (True, False, True), (False, True, False)):
-        given = dict(zip(("yes", "no", "maybe"), answers, strict=True))
-        off = dict.fromkeys(base.REGISTERED)
-        state = SimpleNamespace(asked=[], policies=SimpleNamespace(**off))
-        settings = SimpleNamespace(policies=SimpleNamespace(**off | given))
-        assert base.chain("permits")(state, settings) is all(answers)
-        assert state.asked == ["Yes", "No", "Maybe"]
 
 
 def test_all_policies_are_saved_by_their_fields() -> None:
