@@ -79,7 +79,7 @@ def test_high_pass_removes_a_bias_of_the_sensor() -> None:
     assert worst(passed) < 1e-3 < 0.5 < worst(biased)
 
 
-@pytest.mark.parametrize("delay", [1.0, 3.0, 2.5])
+@pytest.mark.parametrize("delay", [0.5, 2.5, 3.0])
 def test_delay(delay: float) -> None:
     u, x = record(1.0)
     late = np.interp(np.arange(x.size) - delay, np.arange(x.size), x)
