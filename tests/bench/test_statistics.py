@@ -15,7 +15,7 @@ from piezoest.bench.run import COLUMNS
 from piezoest.bench.statistics import Need, holm, interval, order, over_scenarios, relative, signed_rank
 from piezoest.bench.tables import table_of
 
-SEEDS = 10
+SEEDS = 9
 
 
 @pytest.fixture(autouse=True)

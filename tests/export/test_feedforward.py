@@ -150,13 +150,14 @@ def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> N
     for gain in (1e-6, 0.15, 1e4):
         single.reset(0.0)
         r = 40.0 * gain * np.sin(np.arange(n) * 0.01)
-        odd = np.where(np.arange(n) > 1500, rng.random((3, n)) < 0.02, False)
+        odd = (rng.random((3, n)) < 0.02) & (np.arange(n) > 1500)
+        drawn = rng.choice(wild, (3, n))
         u = 0.0
         for k in range(n):
-            u = single.step(rng.choice(wild) if odd[0, k] else r[k])
+            u = single.step(drawn[0, k] if odd[0, k] else r[k])
             assert -100.0 <= u <= 100.0
             x = gain * (u + 0.01 * rng.normal())
-            single.learn(rng.choice(wild) if odd[1, k] else u, rng.choice(wild) if odd[2, k] else x)
+            single.learn(drawn[1, k] if odd[1, k] else u, drawn[2, k] if odd[2, k] else x)
             stages.add(single.status[0])
     assert stages == {0, 1, 2}
 
