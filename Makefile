@@ -65,8 +65,8 @@ calibrate: $(VENV)/.installed  ## Fit the simulated stage to the paper's tables 
 test: $(VENV)/.installed-test  ## Run the tests (ARGS="-k name" passes options to pytest)
 	$(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
 
-test-slow: $(VENV)/.installed-test  ## Run the tests that take long: caches of many processes, random sweeps
-	$(BIN)/python -m pytest -m slow $(ARGS)
+test-slow: $(VENV)/.installed-test  ## Run the tests that take long: every option, processes, random sweeps
+	$(BIN)/python -m pytest -m slow -n auto $(ARGS)
 
 lint: $(VENV)/.installed-lint  ## Check style, formatting and docstrings
 	$(BIN)/ruff check .

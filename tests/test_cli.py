@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -14,7 +12,6 @@ from typer.testing import CliRunner, Result
 
 from piezoest import signals
 from piezoest.cli import app
-from piezoest.cli.shared import Shown
 from piezoest.fitting import FORMS
 from piezoest.models import ColemanHodgdon, LearntModel, PrandtlIshlinskii
 from piezoest.records import Record, read_record, write_columns
@@ -130,37 +127,6 @@ def test_strict_refuses_a_doubtful_log(log: Path) -> None:
     assert run("identify", log, "--no-plot", "--strict").exit_code == 0
 
 
-def test_progress_shows_steps_and_how_much_of_each_is_done(
-    log: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    said: list[str] = []
-    done: list[tuple[int, int]] = []
-    monkeypatch.setattr(Shown, "__call__", lambda self, words: said.append(words))
-    monkeypatch.setattr(Shown, "done", lambda self, *much: done.append(much))
-    assert run("identify", log, "--stream").exit_code == 0
-    passes = [total for part, total in done if part == total]
-    # The column of time, and the prediction; the two passes between them end with the fitted part.
-    assert len(passes) >= 2
-    assert all(0 < part <= total for part, total in done)
-    assert [words for words in said if "predict" in words or "fitting" in words]
-    done.clear()
-    said.clear()
-    assert run("identify", log, "--no-plot").exit_code == 0
-    assert [words for words in said if words.startswith("fitting")] == [
-        f"fitting {form.label}" for form in FORMS.values()
-    ]
-    assert not done
-
-
-def test_identify_the_example(tmp_path: Path, log: Path) -> None:
-    found = json.loads(run("identify", "example", "--json", "--no-plot").stdout)
-    assert found["samples"] == 14_155
-    # A file of that name comes first.
-    Path("example").write_bytes(log.read_bytes())
-    found = json.loads(run("identify", "example", "--json", "--no-plot").stdout)
-    assert found["samples"] < 14_155
-
-
 def test_identify_real_recording(data_dir: Path, tmp_path: Path) -> None:
     file = data_dir / "discrete_backlash_operator" / "test_1hz.csv"
     result = run("identify", file, "--json", "--plot", tmp_path / "figure.png")
@@ -181,7 +147,7 @@ def test_identified_model_goes_into_compensate(log: Path, reference: Path) -> No
     np.testing.assert_allclose(x, u.displacement, atol=1e-6)
 
 
-@pytest.mark.parametrize("options", [("--model", "auto"), ("--model", "plays-creep"), ("--stream",)])
+@pytest.mark.parametrize("options", [("--model", "plays-creep"), ("--stream",)])
 def test_plays_go_into_compensate_with_their_ranges(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...]
 ) -> None:
@@ -202,15 +168,6 @@ def test_plays_go_into_compensate_with_their_ranges(
         np.testing.assert_allclose(x, u.displacement, atol=1e-3)
 
 
-@pytest.mark.parametrize("name", ["voltage.mat", "voltage.npy"])
-def test_compensate_writes_what_the_ending_says(reference: Path, name: str) -> None:
-    assert run("compensate", reference, *THETA, "-o", "voltage.csv").exit_code == 0
-    assert run("compensate", reference, *THETA, "-o", name).exit_code == 0
-    named = {"voltage": "voltage_V", "displacement": "reference_um"}
-    text, other = (read_record(file, columns=named).voltage for file in ("voltage.csv", name))
-    np.testing.assert_allclose(other, text, atol=1e-7)
-
-
 def test_compensate_keeps_within_limits_and_says_so(reference: Path) -> None:
     result = run("compensate", reference, *THETA, "--maximum", 10, "--minimum", -8, "-o", "voltage.csv")
     assert result.exit_code == 0
@@ -221,22 +178,6 @@ def test_compensate_keeps_within_limits_and_says_so(reference: Path) -> None:
 
 
 LEARNT_ON = {"voltage": [-16.0, 16.0], "displacement": [1.0, 5.0], "rate": 400.0, "frequency": [5.0, 5.0]}
-
-
-@pytest.mark.parametrize("offset", [3.0, 0.0])
-def test_compensate_says_what_the_model_was_not_learnt_on(reference: Path, offset: float) -> None:
-    r = signals.triangle(2.0, 5.0, 4, RATE)
-    write_columns(reference, {"time_s": r.time, "reference_um": r.values + offset})
-    moved = () if offset == TRUE.offset else ("--offset", offset)
-    for change, lines in (
-        ({}, 0),
-        ({"frequency": None}, 0),
-        ({"rate": 100.0, "displacement": [2.0, 4.0]}, 2),
-    ):
-        Path("model.json").write_text(json.dumps({"model": TRUE.to_dict(), "learnt_on": LEARNT_ON | change}))
-        result = run("compensate", reference, "-p", "model.json", "-o", "voltage.csv", *moved)
-        assert result.exit_code == 0
-        assert len(result.stderr.strip().splitlines()) == lines
 
 
 def test_mistakes_in_logs(log: Path) -> None:
@@ -296,34 +237,12 @@ def test_mistakes_in_compensate(reference: Path) -> None:
     assert not Path("voltage.csv").exists()
 
 
-def test_a_disk_that_is_full_and_a_record_that_is_too_long(
-    log: Path, reference: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if Path("/dev/full").exists():
-        refused(run("compensate", reference, *THETA, "-o", "/dev/full"), "/dev/full: No space left")
-
-    def too_long(*_: object, **__: object) -> None:
-        raise MemoryError("Unable to allocate 8 TiB")
-
-    monkeypatch.setattr("piezoest.records.read_record", too_long)
-    refused(run("identify", log, "--no-plot"), "not enough memory: Unable to allocate 8 TiB")
-
-
 def test_nothing_is_written_over_what_was_read(log: Path, reference: Path) -> None:
     refused(run("identify", log, "--no-plot", "--output", log), "log.csv", "named twice")
     refused(run("identify", log, "--plot", "a.png", "--output", "./a.png"), "named twice")
     refused(run("compensate", reference, *THETA, "-o", reference), "reference.csv", "named twice")
     assert log.read_text().startswith("time_s,voltage_V")
     assert reference.read_text().startswith("time_s,reference_um")
-
-
-def test_an_encoding_without_our_signs_is_no_mistake(log: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "piezoest", "identify", str(log), "--no-plot"],
-        capture_output=True, text=True, env={**os.environ, "PYTHONIOENCODING": "ascii"},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert "held out" in done.stdout
 
 
 def test_interrupt_is_quiet(monkeypatch: pytest.MonkeyPatch, log: Path) -> None:

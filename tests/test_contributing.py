@@ -58,11 +58,6 @@ FOUND_BY = {
 EXAMPLES = examples((ROOT / "CONTRIBUTING.md").read_text())
 
 
-def test_there_are_examples() -> None:
-    assert {"Adding a scenario", *FOUND_BY} == set(EXAMPLES)
-    assert all(len(blocks) >= 2 for blocks in EXAMPLES.values())
-
-
 def run(folder: Path, *arguments: str) -> None:
     """Run tests of the copy, without compiling."""
     environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": "1"}
@@ -78,6 +73,7 @@ def run(folder: Path, *arguments: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("title", EXAMPLES)
 def test_an_example_does_what_it_says(title: str, tmp_path: Path) -> None:
     without = shutil.ignore_patterns("__pycache__", "_build", "gallery", "generated", "figures", "data")
@@ -90,15 +86,3 @@ def test_an_example_does_what_it_says(title: str, tmp_path: Path) -> None:
     if title in FOUND_BY:
         name, *files = FOUND_BY[title]
         run(tmp_path, *files, "-k", name)
-
-
-def test_blocks_go_where_they_say(tmp_path: Path) -> None:
-    (tmp_path / "old.py").write_text("a = 1\nb = 2\n")
-    apply("# new file new.py\nc = 3\n", tmp_path)
-    apply("# added to old.py, below a = 1\nd = 4\n", tmp_path)
-    apply("# added to old.py\ne = 5\n", tmp_path)
-    assert (tmp_path / "new.py").read_text() == "c = 3\n"
-    assert (tmp_path / "old.py").read_text() == "a = 1\nd = 4\nb = 2\n\n\ne = 5\n"
-    for wrong in ("c = 3\n", "# new file old.py\n", "# added to none.py\n", "# added to old.py, below z\n"):
-        with pytest.raises(AssertionError):
-            apply(wrong, tmp_path)

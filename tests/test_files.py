@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import errno
-import json
-import os
 import re
 import signal
-import stat
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -134,102 +129,3 @@ def test_a_kill_in_the_middle_leaves_the_old_file(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
     assert done.returncode == -signal.SIGKILL
     assert path.read_text(encoding="utf-8") == "as it was"
-
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError, OSError(errno.ENOSPC, "full")])
-def test_nothing_is_left_beside_the_file(tmp_path: Path, error: Any) -> None:
-    from piezoest._files import replacing
-
-    path = tmp_path / "model.json"
-    path.write_text("as it was", encoding="utf-8")
-
-    def write() -> None:
-        with replacing(path) as temporary:
-            temporary.write_text("half", encoding="utf-8")
-            raise error
-
-    with pytest.raises(error if isinstance(error, type) else OSError) as failure:
-        write()
-    assert content(tmp_path) == {"model.json": b"as it was"}
-    if isinstance(failure.value, OSError):
-        assert failure.value.filename == str(path)
-
-
-def test_rights_and_links_stay(tmp_path: Path) -> None:
-    (tmp_path / "folder").mkdir()
-    kept, link, dangling = tmp_path / "folder" / "kept.csv", tmp_path / "link.csv", tmp_path / "dangling.csv"
-    write_columns(kept, {"a": [1.0]})
-    umask = os.umask(0)
-    os.umask(umask)
-    assert stat.S_IMODE(kept.stat().st_mode) == 0o666 & ~umask
-    kept.chmod(0o640)
-    link.symlink_to(Path("folder", "kept.csv"))
-    dangling.symlink_to(tmp_path / "folder" / "new.csv")
-    for path in (link, dangling):
-        write_columns(path, {"b": [2.0]})
-        assert path.is_symlink()
-        assert path.read_text(encoding="utf-8").split() == ["b", "2"]
-    assert stat.S_IMODE(kept.stat().st_mode) == 0o640
-
-
-def test_errors_name_the_file_that_was_asked_for(tmp_path: Path) -> None:
-    (tmp_path / "plain").touch()
-    for path in (tmp_path / "no" / "log.csv", tmp_path / "plain" / "log.csv", tmp_path):
-        with pytest.raises(OSError, match=r"log\.csv|Is a directory") as failure:
-            write_columns(path, {"a": [1.0]})
-        assert failure.value.filename == str(path)
-
-
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everything")
-def test_a_file_that_may_not_be_written_is_not_replaced(tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    path.touch(0o444)
-    with pytest.raises(PermissionError, match=r"log\.csv"):
-        write_columns(path, {"a": [1.0]})
-
-
-def test_pipes_are_written_to_as_they_are(tmp_path: Path) -> None:
-    pipe = tmp_path / "pipe.csv"
-    os.mkfifo(pipe)
-    read: list[str] = []
-    reader = threading.Thread(target=lambda: read.append(pipe.read_text(encoding="utf-8")))
-    reader.start()
-    write_columns(pipe, {"a": [1.0, 2.0]})
-    reader.join()
-    assert read == ["a\n1\n2\n"]
-    assert stat.S_ISFIFO(pipe.stat().st_mode)
-
-
-@pytest.mark.skipif(not Path("/dev/stdout").exists(), reason="no /dev/stdout here")
-def test_standard_output_is_written_to_as_it_is(tmp_path: Path) -> None:
-    program = "from piezoest.records import write_columns; write_columns('/dev/stdout', {'a': [1.0]})"
-    path = tmp_path / "out"
-    with path.open("wb") as file:
-        subprocess.run([sys.executable, "-c", program], stdout=file, check=True)
-        assert os.fstat(file.fileno()).st_ino == path.stat().st_ino
-    assert path.read_text(encoding="utf-8") == "a\n1\n"
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("{", "not JSON"),
-        ("[" * 100_000, "nested too deeply"),
-        ("\udcff", "not JSON"),
-        ("9" * 5000, "not JSON"),
-    ],
-)
-def test_json_that_cannot_be_read(tmp_path: Path, text: str, words: str) -> None:
-    path = tmp_path / "profile.json"
-    path.write_bytes(text.encode(errors="surrogateescape"))
-    with pytest.raises(ValueError, match=rf"profile\.json.*{words}"):
-        AmplitudeProfile.load(path)
-
-
-@pytest.mark.parametrize("theta", [{}, "x", [[1.0]], [[10**400, 1, 1]], None])
-def test_profiles_that_are_none(tmp_path: Path, theta: Any) -> None:
-    path = tmp_path / "profile.json"
-    data = {"profile": "AmplitudeProfile", "format": 1, "swings": [1.0], "theta": theta}
-    path.write_text(json.dumps(data), encoding="utf-8")
-    with pytest.raises(ValueError, match="theta must be"):
-        AmplitudeProfile.load(path)

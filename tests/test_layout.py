@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -20,7 +18,6 @@ from piezoest.layout import (
     Length,
     Named,
     Record,
-    by_name,
     leaves,
     new,
     numbers,
@@ -58,15 +55,6 @@ def test_unknown_names_are_refused() -> None:
         record(plays=COUNT, u=numbers(Length("plays", 3)))
 
 
-def test_saved_numbers_have_names_and_no_work_space() -> None:
-    state = new(lengthy(2), work=5.0, law={"updates": 3.0})
-    saved = by_name(lengthy(2), state)
-    assert saved == {
-        "law": {"updates": 3.0, "theta": [0.0] * 3, "P": [[0.0] * 3] * 3},
-        "memory": {"plays": 2.0, "last": 0.0, "u": [0.0] * 2, "thetas": [[0.0] * 2] * 2},
-    }
-
-
 def test_leaves_are_all_numbers_with_their_paths() -> None:
     layout = lengthy(2)
     first, second = new(layout, work=1.0), new(layout, work=2.0)
@@ -90,23 +78,6 @@ def test_layouts_are_values() -> None:
     assert len({layout, *others}) == 4
 
 
-def test_hashes_of_another_process_are_not_pickled() -> None:
-    layout = lengthy(4)
-    assert hash(layout)
-    program = (
-        "import pickle, sys\n"
-        "from piezoest.layout import Record\n"
-        "layout = pickle.loads(sys.stdin.buffer.read())\n"
-        "assert hash(layout) == hash(Record(layout.fields, layout.functions))\n"
-    )
-    for seed in ("1", "2"):
-        done = subprocess.run(
-            [sys.executable, "-c", program], input=pickle.dumps(layout), check=False, capture_output=True,
-            env={"PYTHONPATH": ":".join(sys.path), "PYTHONHASHSEED": seed},
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-
-
 def test_named_reads_and_writes_the_array() -> None:
     layout = lengthy(2)
     state = new(layout, work=5.0)
@@ -121,8 +92,3 @@ def test_named_reads_and_writes_the_array() -> None:
     for misspelt in (lambda: named.law.thetta, lambda: setattr(named.law, "thetta", 1.0)):
         with pytest.raises((ValueError, KeyError, AttributeError), match="thetta"):
             misspelt()
-
-
-def test_a_length_has_one_count() -> None:
-    with pytest.raises(ValueError, match="two counts"):
-        record(a=numbers(Length("n", 3)), b=numbers(Length("n", 4)))

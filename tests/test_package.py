@@ -18,7 +18,6 @@ import piezoest
 from docs.check_docstrings import public_objects
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGE = ROOT / "piezoest"
 
 # Each takes longer to load than all of `import piezoest` may.
 HEAVY = ("casadi", "filterpy", "matplotlib", "numba", "pandas", "pyarrow", "scipy.signal")
@@ -45,20 +44,6 @@ def test_import_loads_nothing_heavy() -> None:
 
 
 # ---------------------------------------------------------------- names
-
-
-def test_names_are_served_and_listed() -> None:
-    assert set(piezoest.__all__) <= set(dir(piezoest))
-    assert all(getattr(piezoest, name) is not None for name in piezoest.__all__)
-
-
-def test_unknown_name_is_refused() -> None:
-    with pytest.raises(AttributeError, match="no_such_name"):
-        _ = piezoest.no_such_name  # type: ignore[attr-defined]
-
-
-def test_types_are_shipped() -> None:
-    assert (PACKAGE / "py.typed").is_file()
 
 
 def test_version_is_one_and_the_same() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from piezoest.records import Record, read_record, read_reference, stream_record
+from piezoest.records import Record, read_record, stream_record
 
 N = 60
 RATE = 100.0
@@ -126,24 +125,6 @@ def test_unknown_column_lists_those_that_exist(log: Path) -> None:
             assert name in str(caught.value)
 
 
-def test_units_that_are_refused(log: Path) -> None:
-    for text in ("furlong", "V", "0 nm", "1e999 nm", "nm 3", ""):
-        with pytest.raises(ValueError, match=r"units has .* for displacement"):
-            read_record(log, units={"displacement": text})
-    with pytest.raises(ValueError, match=r"known are um, micron, .*nm"):
-        read_record(log, units={"displacement": "furlong"})
-    with pytest.raises(ValueError, match=r"units has .*'speed'"):
-        read_record(log, units={"speed": "m"})
-
-
-def test_time_that_does_not_increase_names_the_row(log: Path) -> None:
-    time = TIME.copy()
-    time[20] = time[19]
-    WRITERS[log.name](log, {**NAMES, "time_s": time})
-    with pytest.raises(ValueError, match="row 21: time does not increase"):
-        read_record(log)
-
-
 def test_truncated_file(log: Path) -> None:
     raw = log.read_bytes()
     for part in (0.3, 0.6, 0.95):
@@ -175,14 +156,6 @@ def test_file_without_numbers_or_with_too_few(log: Path) -> None:
         read_record(log)
 
 
-# Rows of a matrix, and of a table, are of one length.
-@pytest.mark.parametrize("name", [name for name in WRITERS if name not in ("log.npy", "log.parquet")])
-def test_columns_of_different_lengths(tmp_path: Path, name: str) -> None:
-    WRITERS[name](tmp_path / name, {**NAMES, "voltage_V": VOLTAGE[:-1]})
-    with pytest.raises(ValueError, match=r"differ in length: .*voltage_V has 59"):
-        read_record(tmp_path / name)
-
-
 @pytest.mark.parametrize("key", ["fs", "Fs", "sample_rate"])
 @pytest.mark.parametrize("name", ["log.h5", "log.mat", "log73.mat", "log.npz"])
 def test_sample_rate_in_the_file(tmp_path: Path, name: str, key: str) -> None:
@@ -195,13 +168,6 @@ def test_sample_rate_in_the_file(tmp_path: Path, name: str, key: str) -> None:
     assert read_record(tmp_path / name, sample_rate=50.0).sample_rate == 50.0
     WRITERS[name](tmp_path / name, {**columns, "t": 2.0 * TIME})
     assert read_record(tmp_path / name).sample_rate == pytest.approx(50.0)
-
-
-def test_sample_rate_in_metadata(tmp_path: Path) -> None:
-    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
-    table = pa.table({"u": VOLTAGE, "x": DISPLACEMENT}).replace_schema_metadata({"sample_rate": "100"})
-    pq.write_table(table, tmp_path / "log.parquet")
-    check(read_record(tmp_path / "log.parquet"))
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -226,26 +192,6 @@ def test_matrix_without_names(tmp_path: Path, turned: bool) -> None:
         read_record(tmp_path / "two.npy")
 
 
-def test_structures_groups_and_compound_types(tmp_path: Path) -> None:
-    named = {"time": "log.t", "voltage": "log.in.u", "displacement": "log.x"}
-    write_mat(tmp_path / "log.mat", {"log": {"t": TIME, "x": DISPLACEMENT, "in": {"u": VOLTAGE}}})
-    check(read_record(tmp_path / "log.mat"))
-    check(read_record(tmp_path / "log.mat", columns=named))
-    write_hdf5(tmp_path / "log.h5", {"log/t": TIME, "log/x": DISPLACEMENT, "log/in/u": VOLTAGE})
-    check(read_record(tmp_path / "log.h5"))
-    check(read_record(tmp_path / "log.h5", columns={k: v.replace(".", "/") for k, v in named.items()}))
-    rows = np.zeros(N, [("t", "f8"), ("u", "f4"), ("x", "f8")])
-    rows["t"], rows["u"], rows["x"] = TIME, VOLTAGE, DISPLACEMENT
-    write_hdf5(tmp_path / "rows.h5", {"rows": rows})
-    record = read_record(tmp_path / "rows.h5")
-    np.testing.assert_array_equal(record.voltage, VOLTAGE.astype(np.float32))
-    # The same names in two groups cannot be guessed.
-    write_hdf5(tmp_path / "two.h5", {f"{run}/{k}": v for run in "ab" for k, v in NAMES.items()})
-    with pytest.raises(ValueError, match="the columns a/time_s, b/time_s could all be the time"):
-        read_record(tmp_path / "two.h5")
-    check(read_record(tmp_path / "two.h5", columns={k.split("_")[0]: f"b/{k}" for k in NAMES}))
-
-
 def test_units_that_the_file_states(tmp_path: Path) -> None:
     columns = {"t": 1e3 * TIME, "u": VOLTAGE, "x": 1e3 * DISPLACEMENT}
     write_parquet(tmp_path / "log.parquet", columns, {"t": "ms", "u": "V", "x": "nm"})
@@ -267,30 +213,6 @@ def test_times_of_day(tmp_path: Path) -> None:
     write_parquet(tmp_path / "log.parquet", {**NAMES, "time_s": stamps.astype("datetime64[ns]")})
     # Nanoseconds since 1970 have no room in a float64.
     np.testing.assert_allclose(read_record(tmp_path / "log.parquet").time, TIME, atol=1e-12)
-
-
-def test_integers_and_single_precision(tmp_path: Path) -> None:
-    counts = np.round(100.0 * VOLTAGE).astype(np.int16)
-    columns = {"t": TIME.astype(np.float32), "u": counts, "x": DISPLACEMENT.astype(np.float32)}
-    for name in ("log.parquet", "log.mat", "log.h5", "log.npz"):
-        WRITERS[name](tmp_path / name, columns)
-        record = read_record(tmp_path / name, units={"voltage": "0.01 V"})
-        np.testing.assert_allclose(record.voltage, 0.01 * counts, atol=1e-12)
-        assert record.voltage.dtype == np.float64
-
-
-def test_reference_from_any_format(log: Path) -> None:
-    WRITERS[log.name](log, {"time_s": TIME, "reference_um": VOLTAGE})
-    signal = read_reference(log)
-    np.testing.assert_array_equal(signal.values, VOLTAGE)
-    assert signal.sample_rate == pytest.approx(RATE)
-
-
-@pytest.mark.parametrize("name", ["log.mat", "log.npz"])
-def test_what_cannot_be_streamed_says_what_can(tmp_path: Path, name: str) -> None:
-    WRITERS[name](tmp_path / name, NAMES)
-    with pytest.raises(ValueError, match=r"cannot be streamed: .*(-v7\.3|\.npy)"):
-        stream_record(tmp_path / name)
 
 
 @pytest.mark.parametrize("name", STREAMED)
@@ -322,22 +244,6 @@ def test_written_and_read_again_to_the_bit(tmp_path: Path, name: str) -> None:
     assert again.skipped == 1
 
 
-@pytest.mark.parametrize("name", ["a.csv", "a.txt", "a.tsv", "a.dat", "a"])
-def test_written_as_text_and_read_again(tmp_path: Path, name: str) -> None:
-    Record.from_arrays(VOLTAGE, DISPLACEMENT, RATE).write(tmp_path / name)
-    again = read_record(tmp_path / name)
-    np.testing.assert_allclose(again.voltage, VOLTAGE, rtol=1e-8)
-    np.testing.assert_allclose(again.displacement, DISPLACEMENT, rtol=1e-8)
-    assert ("\t" in (tmp_path / name).read_text()) == (name == "a.tsv")
-
-
-@pytest.mark.parametrize("name", ["a.xlsx", "a.csv.gz"])
-def test_an_ending_that_stands_for_no_format(tmp_path: Path, name: str) -> None:
-    with pytest.raises(ValueError, match=rf"{name}: the ending .* \.parquet, .*\.csv"):
-        Record.from_arrays(VOLTAGE, DISPLACEMENT, RATE).write(tmp_path / name)
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize(("file", "package"), [("log.parquet", "pyarrow"), ("log.h5", "h5py")])
 def test_missing_extra_of_writing_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str, package: str
@@ -346,17 +252,3 @@ def test_missing_extra_of_writing_is_named(
     with pytest.raises(ImportError, match=rf"needs {package}, .* pip install 'piezoest\[formats\]'"):
         Record.from_arrays(VOLTAGE, DISPLACEMENT, RATE).write(tmp_path / file)
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(("file", "package"), [("log.parquet", "pyarrow"), ("log.h5", "h5py")])
-def test_missing_extra_is_named(tmp_path: Path, file: str, package: str) -> None:
-    WRITERS[file](tmp_path / file, NAMES)
-    code = (
-        f"import sys; sys.modules[{package!r}] = None\n"
-        f"sys.argv = ['piezoest', 'identify', {str(tmp_path / file)!r}]\n"
-        "from piezoest.cli import main; main()"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert f"needs {package}, which is not installed: pip install 'piezoest[formats]'" in done.stderr
-    assert "Traceback" not in done.stderr

@@ -82,11 +82,10 @@ def check(record: Record) -> None:
 @pytest.mark.parametrize("decimal", [".", ","])
 @pytest.mark.parametrize("separator", ["\t", ";"])
 @pytest.mark.parametrize("x_columns", ["One", "No", "Multi"])
-@pytest.mark.parametrize("ending", ["lvm", "txt"])
-def test_lvm(tmp_path: Path, decimal: str, separator: str, x_columns: str, ending: str) -> None:
+def test_lvm(tmp_path: Path, decimal: str, separator: str, x_columns: str) -> None:
     names = "X_Value\tDrive\tX_Value\tPosition\tComment" if x_columns == "Multi" else None
     more = {} if names is None else {"names": names}
-    file = lvm(tmp_path / f"log.{ending}", decimal=decimal, separator=separator, x_columns=x_columns, **more)  # type: ignore[arg-type]
+    file = lvm(tmp_path / "log.lvm", decimal=decimal, separator=separator, x_columns=x_columns, **more)  # type: ignore[arg-type]
     record = read_record(file)
     check(record)
     assert record.notes == ()
@@ -119,44 +118,6 @@ def test_lvm_of_several_segments(
     assert stream_record(file, sample_rate=RATE).count() == N
 
 
-def test_a_gap_between_segments_stays(tmp_path: Path) -> None:
-    file = lvm(tmp_path / "log.lvm", ((PARTS[0], 0.0, 0.0), (slice(22, N), 0.0, 0.022)))
-    record = read_record(file)
-    assert np.flatnonzero(~record.usable).tolist() == [20, 21]
-    np.testing.assert_array_equal(record.voltage[22:], VOLTAGE[22:])
-
-
-def test_lvm_that_is_refused(tmp_path: Path) -> None:
-    anew = tuple((part, 0.0, 0.0) for part in PARTS)
-    file = lvm(tmp_path / "log.lvm", anew, dated=False)
-    with pytest.raises(ValueError, match=r"line \d+: time begins anew with this segment"):
-        read_record(file)
-    assert len(read_record(file, sample_rate=RATE)) == N
-    with pytest.raises(ValueError, match="sampled at different rates"):
-        read_record(lvm(file, second_step="0.002"))
-    content = lvm(file, anew[:2]).read_text()
-    at = content.rindex("Position")
-    file.write_text(content[:at] + "Force" + content[at + len("Position") :])
-    with pytest.raises(ValueError, match="other columns than the first"):
-        read_record(file)
-    file.write_text(content[: content.index("X_Value")])
-    with pytest.raises(ValueError, match=r"log\.lvm: no rows below the header"):
-        read_record(file)
-    lvm(file, names="X_Value\tUntitled\tUntitled 1\tComment")
-    # Both are named by nothing but their units, which is enough.
-    check(read_record(file))
-    file.write_text(file.read_text().replace("Y_Unit_Label\tVolts\tum", "Y_Unit_Label\tVolts\tVolts"))
-    with pytest.raises(
-        ValueError, match=r"no column for displacement .* X_Value, Untitled, Untitled 1:|could all"
-    ):
-        read_record(file)
-    named = {"voltage": "Untitled", "displacement": "Untitled 1"}
-    check(read_record(file, columns=named, units={"displacement": "1 um"}))
-    file.write_text(file.read_text().replace("-", "minus ", 1))
-    with pytest.raises(ValueError, match=r"line \d+, column 'Untitled.*': 'minus .* is not a number"):
-        read_record(file, columns=named, units={"displacement": "1 um"})
-
-
 # ---------------------------------------------------------------- TDMS
 
 
@@ -187,29 +148,3 @@ def test_tdms(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="no column for time"):
         read_record(tdms(file, wf_increment=0.5))
     assert read_record(file, sample_rate=50.0).sample_rate == 50.0
-
-
-def test_tdms_of_times_of_day_and_single_precision(tmp_path: Path) -> None:
-    nptdms = pytest.importorskip("nptdms")
-    stamps = np.datetime64("2026-11-22T10:00:00", "us") + (1e6 * TIME).round().astype("timedelta64[us]")
-    with nptdms.TdmsWriter(str(tmp_path / "log.tdms")) as writer:
-        columns = {"time": stamps, "u": VOLTAGE.astype(np.float32), "x": np.arange(N, dtype=np.int16)}
-        writer.write_segment([nptdms.ChannelObject("run", name, values) for name, values in columns.items()])
-    record = read_record(tmp_path / "log.tdms")
-    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
-    np.testing.assert_array_equal(record.voltage, VOLTAGE.astype(np.float32))
-    np.testing.assert_array_equal(record.displacement, np.arange(N))
-    stream = stream_record(tmp_path / "log.tdms", rows=7)
-    assert [block.time.size for block in stream] == [7] * 8 + [4]
-
-
-def test_tdms_without_numbers_or_under_a_wrong_name(tmp_path: Path) -> None:
-    nptdms = pytest.importorskip("nptdms")
-    file = tmp_path / "log.tdms"
-    with nptdms.TdmsWriter(str(file)) as writer:
-        writer.write_segment([nptdms.ChannelObject("notes", "words", ["a", "b"])])
-    with pytest.raises(ValueError, match="no arrays of numbers"):
-        read_record(file)
-    file.write_text("t,u,x\n" * 20)
-    with pytest.raises(ValueError, match="this is no TDMS file"):
-        read_record(file)

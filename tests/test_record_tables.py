@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import piezoest as pz
-from piezoest.records import Record, as_record, example_log, read_record, stream_record
+from piezoest.records import Record, as_record, read_record, stream_record
 
 N = 60
 RATE = 200.0
@@ -76,36 +75,6 @@ def test_cells_without_numbers(tmp_path: Path) -> None:
         read_record(sheets(tmp_path / "log.xlsx", log=table))
 
 
-def test_spreadsheets_that_hold_no_log(tmp_path: Path) -> None:
-    file = tmp_path / "log.xlsx"
-    words: list[list[Any]] = [["t", "u", "x"], ["a", "b", "c"]]
-    for table in ([], words):
-        with pytest.raises(ValueError, match="no sheet has a table of numbers"):
-            read_record(sheets(file, log=table))
-    with pytest.raises(ValueError, match="no column 'nope' for voltage; there are the columns t, drive_V"):
-        read_record(sheets(file, log=rows(TIME.tolist())), columns={"voltage": "nope"})
-    doubled = sheets(file, log=rows(TIME.tolist(), ("t", "x", "x")))
-    with pytest.raises(ValueError, match="2 columns are called 'x': name the one for voltage by its number"):
-        read_record(doubled, columns={"voltage": "x"})
-    check(read_record(doubled, columns={"voltage": "2", "displacement": "3"}, units={"displacement": "nm"}))
-    file.write_text("t,u,x\n" * 20)
-    with pytest.raises(ValueError, match="this is no spreadsheet file, although its name ends"):
-        read_record(file)
-
-
-@pytest.mark.parametrize(
-    ("name", "start", "package"),
-    [("a.xlsx", b"PK\x03\x04", "python_calamine"), ("a.tdms", b"TDSm", "nptdms")],
-)
-def test_missing_extra_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, start: bytes, package: str
-) -> None:
-    (tmp_path / name).write_bytes(start + bytes(200))
-    monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(ImportError, match=rf"needs {package}, .* pip install 'piezoest\[formats\]'"):
-        read_record(tmp_path / name)
-
-
 # ---------------------------------------------------------------- DataFrames
 
 
@@ -145,53 +114,6 @@ def test_frame_of_polars() -> None:
         Record.from_frame(frame.lazy())
 
 
-def test_missing_and_foreign_values_of_frames() -> None:
-    pd, pl = pytest.importorskip("pandas"), pytest.importorskip("polars")
-    holes: list[Any] = VOLTAGE.tolist()
-    holes[7] = None
-    for frame in (
-        pd.DataFrame({"t": TIME, "u": holes, "x": DISPLACEMENT}),
-        pd.DataFrame({"t": TIME, "u": pd.array(holes, "Float64"), "x": DISPLACEMENT}),
-        pl.DataFrame({"t": TIME, "u": holes, "x": DISPLACEMENT}),
-    ):
-        record = Record.from_frame(frame)
-        assert np.flatnonzero(~record.usable).tolist() == [7]
-        assert record.skipped == 1
-    for frame in (
-        pd.DataFrame({"t": TIME, "u": ["a"] * N, "x": TIME}),
-        pl.DataFrame({"t": TIME, "u": ["a"] * N, "x": TIME}),
-    ):
-        with pytest.raises(ValueError, match="frame, row 1, column 'u': 'a' is not a number"):
-            Record.from_frame(frame)
-
-
-def test_frames_with_odd_columns() -> None:
-    pd = pytest.importorskip("pandas")
-    matrix = np.column_stack([TIME, VOLTAGE, DISPLACEMENT])
-    check(Record.from_frame(pd.DataFrame(matrix)))
-    check(
-        Record.from_frame(
-            pd.DataFrame(
-                matrix, columns=pd.MultiIndex.from_tuples([("log", "t"), ("log", "u"), ("log", "x")])
-            ),
-            columns={"time": "log/t", "voltage": "log/u", "displacement": "log/x"},
-        )
-    )
-    doubled = pd.DataFrame(matrix, columns=["t", "u", "u"])
-    with pytest.raises(ValueError, match="could all be the voltage"):
-        Record.from_frame(doubled)
-    check(Record.from_frame(doubled, columns={"voltage": "2", "displacement": "3"}))
-    for empty, words in (
-        (pd.DataFrame(), "no columns"),
-        (pd.DataFrame({"t": [], "u": [], "x": []}), "no rows"),
-    ):
-        with pytest.raises(ValueError, match=words):
-            Record.from_frame(empty)
-    for none in (matrix, None, pd.Series(TIME), {"t": TIME}):
-        with pytest.raises(ValueError, match="frame must be a DataFrame of pandas or Polars, got"):
-            Record.from_frame(none)
-
-
 # ---------------------------------------------------------------- whatever holds a log
 
 
@@ -210,31 +132,13 @@ def test_as_record_takes_what_holds_a_log(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("data", "given", "words"),
-    [
-        ((VOLTAGE,), {"sample_rate": RATE}, r"one array of shape \(60,\) and no displacement"),
-        ((5,), {}, "got int"),
-        (({"u": VOLTAGE},), {}, "got dict"),
-        ((VOLTAGE, DISPLACEMENT), {}, "sample_rate must be given"),
-        ((VOLTAGE, DISPLACEMENT[:-1]), {"sample_rate": RATE}, r"displacement must have shape \(60,\)"),
-        ((VOLTAGE[:, None], DISPLACEMENT), {"sample_rate": RATE}, "voltage must have shape"),
-        ((VOLTAGE, DISPLACEMENT), {"sample_rate": RATE, "units": {}}, "units does not go with this"),
-        (("log.csv", DISPLACEMENT), {}, "displacement does not go with this: a file has its own"),
-        ((Record.from_arrays(VOLTAGE, DISPLACEMENT, RATE),), {"sample_rate": 1.0}, "a Record has its own"),
-    ],
+    ("name", "start", "package"),
+    [("a.xlsx", b"PK\x03\x04", "python_calamine"), ("a.tdms", b"TDSm", "nptdms")],
 )
-def test_as_record_refuses(data: tuple[Any, ...], given: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        as_record(*data, **given)
-
-
-def test_the_example_comes_with_licence_and_origin() -> None:
-    path = pz.records.example_log()
-    assert path.stat().st_size < 1_000_000
-    assert "MIT License" in (path.parent / "LICENSE").read_text(encoding="utf-8")
-    assert "yan9a/DiscreteBacklashOperator" in (path.parent / "README.md").read_text(encoding="utf-8")
-    record = as_record(example_log())
-    assert len(record) == 14_155
-    assert record.sample_rate == pytest.approx(200.0)
-    assert record.notes == ()
-    assert stream_record(path, rows=1000).count() == 14_155
+def test_missing_extra_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, start: bytes, package: str
+) -> None:
+    (tmp_path / name).write_bytes(start + bytes(200))
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ImportError, match=rf"needs {package}, .* pip install 'piezoest\[formats\]'"):
+        read_record(tmp_path / name)

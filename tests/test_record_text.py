@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from piezoest.records import read_record, read_reference, stream_record
-from piezoest.records.cells import Style, number, style_of
 
 N = 80
 RATE = 200.0
@@ -64,36 +63,6 @@ def test_separators_of_thousands(
     check(write(tmp_path / "log.csv", separator, rows_of(write_number), header))
 
 
-@pytest.mark.parametrize(
-    ("cells", "style"),
-    [
-        (["1.5", "22"], Style(".")),
-        (["1,5", "-0,001"], Style(",")),
-        (["0.005", "1,5"], Style(".,")),
-        (["1,234.5", "1,234"], Style(".", ",")),
-        (["1.234,5", "0,5"], Style(",", ".")),
-        (["1,234,567"], Style(".", ",")),
-        (["1 234", "text", "1e5"], Style(".,")),
-        (["1 234,5"], Style(",")),
-        # Three decimals throughout are no thousands.
-        (["1,234", "5,678"], Style(",")),
-        (["1.234", "5.678"], Style(".")),
-        (["1,234,5", "2026-11-22 10:00"], Style(".,")),
-    ],
-)
-def test_what_marks_stand_for(cells: list[str], style: Style) -> None:
-    assert style_of(cells) == style
-
-
-@pytest.mark.parametrize(
-    "cells", [["1,234", "0.5"], ["1.234", "0,5"], ["1,234.5", "1.234,5"], ["1,234.5", "1,5"]]
-)
-def test_marks_that_could_be_either_are_refused(tmp_path: Path, cells: list[str]) -> None:
-    rows = [(f"{k}", cells[k % len(cells)], "1") for k in range(20)]
-    with pytest.raises(ValueError, match=r"log\.csv: .* not clear which mark is for decimals"):
-        read_record(write(tmp_path / "log.csv", ";", rows))
-
-
 def test_a_mark_that_appears_late_is_no_number(tmp_path: Path) -> None:
     # 1,234 would be 1234 or 1.234, and the rows before say nothing of it.
     rows = [(f"{k / 10:.1f}", "1.5", "1") for k in range(10_100)]
@@ -102,14 +71,6 @@ def test_a_mark_that_appears_late_is_no_number(tmp_path: Path) -> None:
     rows[10_050] = ("1005.0", "1,234", "1")
     with pytest.raises(ValueError, match="line 10052, column 'u': '1,234' is not a number"):
         read_record(write(tmp_path / "log.csv", ";", rows))
-
-
-def test_numbers_in_a_style() -> None:
-    assert number("-1,234,567.25e-3", Style(".", ",")) == -1234.56725
-    assert number("+1.234", Style(",", ".")) == 1234.0
-    for text_, style in (("12,34.5", Style(".", ",")), ("1 2", Style(".")), ("0,123", Style("."))):
-        with pytest.raises(ValueError, match=r"."):
-            number(text_, style)
 
 
 @pytest.mark.parametrize(
@@ -138,20 +99,6 @@ def test_time_stamps(
     assert not any("'t" in note for note in read_record(file).notes)
 
 
-def test_time_stamps_of_several_zones_and_missing_ones(tmp_path: Path) -> None:
-    rows = [(t[:-6] + "+02:00", "1.5", f"{k}") for k, t in enumerate(STAMPS)]
-    rows[40:] = [
-        (str(np.datetime64(t) - np.timedelta64(1, "h"))[:-6] + "+01:00", u, x)
-        for t, (_, u, x) in zip(STAMPS[40:], rows[40:], strict=True)
-    ]
-    rows[7] = ("", "1.5", "7")
-    record = read_record(write(tmp_path / "log.csv", ",", rows))
-    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
-    rows[50] = ("yesterday", "1.5", "50")
-    with pytest.raises(ValueError, match=r"line 52, column 't': 'yesterday' is not a time stamp"):
-        read_record(write(tmp_path / "log.csv", ",", rows))
-
-
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
 def test_encodings_and_packed_text(tmp_path: Path, encoding: str) -> None:
     lines = ["t_s;u_V;Weg [µm]", *(";".join(row) for row in rows_of(lambda value: f"{value:.3f}"))]
@@ -166,21 +113,6 @@ def test_encodings_and_packed_text(tmp_path: Path, encoding: str) -> None:
     packed.write_bytes(packed.read_bytes()[:-30])
     with pytest.raises(ValueError, match=r"log\.csv\.gz: cannot be unpacked"):
         read_record(packed)
-
-
-def test_packed_files_that_are_no_text_or_grow_without_end(tmp_path: Path) -> None:
-    np.save(tmp_path / "log.npy", np.column_stack([TIME, VOLTAGE, DISPLACEMENT]))
-    file = tmp_path / "log.npy.gz"
-    file.write_bytes(gzip.compress((tmp_path / "log.npy").read_bytes()))
-    with pytest.raises(ValueError, match=r"log\.npy\.gz: .*unpack it first"):
-        read_record(file)
-    file = tmp_path / "log.csv.gz"
-    with gzip.open(file, "wb") as packed:
-        packed.write(b"t,u,x\n")
-        for _ in range(300):
-            packed.write(b"1,1,1\n" * (1 << 18))
-    with pytest.raises(ValueError, match=r"declares .* of numbers"):
-        read_record(file, sample_rate=1.0)
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
@@ -209,34 +141,3 @@ def test_every_bit_of_a_number_and_what_stands_between(tmp_path: Path, separator
     rows[2500] = (rows[2500][0], "text", "1")
     with pytest.raises(ValueError, match="line 2502, column 'u': 'text' is not a number"):
         read_record(write(file, separator, rows))  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("name", ["log.csv", "log.csv.gz", "log.npy", "log.lvm"])
-@pytest.mark.parametrize("timed", [False, True])
-def test_progress_and_count(tmp_path: Path, name: str, timed: bool) -> None:
-    file = tmp_path / name
-    lines = ["t;u;x", *(f"{k};{k % 7};{k}" for k in range(5000)), "", "# end"]
-    content = "\n".join(lines).encode()
-    if name == "log.npy":
-        np.save(file, np.column_stack([np.arange(5000.0), np.arange(5000) % 7, np.arange(5000)]))
-    else:
-        file.write_bytes(gzip.compress(content) if name.endswith(".gz") else content)
-    opening: list[tuple[int, int]] = []
-    stream = stream_record(
-        file,
-        rows=600,
-        sample_rate=None if timed else 1.0,
-        progress=lambda done, total: opening.append((done, total)),
-    )
-    assert bool(opening) == timed
-    reading: list[tuple[int, int]] = []
-    sizes = [block.time.size for block in stream.blocks(progress=lambda *said: reading.append(said))]
-    assert sum(sizes) == stream.count() == 5000
-    assert max(sizes) <= 600
-    for said in (opening, reading) if timed else (reading,):
-        done = [each[0] for each in said]
-        assert done == sorted(done)
-        assert said[-1][0] == said[-1][1]
-        assert {total for _, total in said} == {said[0][1]}
-    assert len(reading) > 3
-    assert reading[-1][1] == (5000 if name == "log.npy" else file.stat().st_size)

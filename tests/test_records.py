@@ -59,11 +59,6 @@ def test_headers_that_are_recognised(tmp_path: Path, header: str) -> None:
     check(read_record(log(tmp_path, header)))
 
 
-def test_assumed_units_are_said(tmp_path: Path) -> None:
-    notes = read_record(log(tmp_path, "t,u_V,x_um")).notes
-    assert notes == ("column 't': unit taken as s",)
-
-
 @pytest.mark.parametrize("separator", [";", "\t", "|", "  "])
 def test_other_delimiters_with_decimal_comma(tmp_path: Path, separator: str) -> None:
     file = log(tmp_path)
@@ -98,30 +93,6 @@ def test_rows_without_numbers_are_kept_as_nan_and_counted(tmp_path: Path, line: 
     assert np.flatnonzero(~record.usable).tolist() == [8]
     assert any("1 sample is without usable numbers" in note for note in record.notes)
     np.testing.assert_allclose(record.time, TIME, atol=1e-9)
-
-
-def test_rows_that_are_absent_leave_the_timing(tmp_path: Path) -> None:
-    file = log(tmp_path)
-    lines = file.read_text().splitlines()
-    file.write_text("\n".join(lines[:20] + lines[22:]))
-    record = read_record(file)
-    assert record.skipped == 2
-    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
-    np.testing.assert_allclose(record.voltage[21:], VOLTAGE[21:], atol=1e-6)
-
-
-def test_every_second_line_blank_is_only_formatting(tmp_path: Path) -> None:
-    file = log(tmp_path)
-    file.write_text(file.read_text().replace("\n", "\n\n"))
-    record = read_record(file)
-    check(record)
-    assert record.skipped == 0
-
-
-def test_jitter_is_said(tmp_path: Path) -> None:
-    record = read_record(log(tmp_path, line20=f"{TIME[18] + 0.001:.4f},{VOLTAGE[18]},{DISPLACEMENT[18]}"))
-    check(record)
-    assert any("uneven by up to 10 %" in note for note in record.notes)
 
 
 @pytest.mark.parametrize(
@@ -160,18 +131,6 @@ def test_empty_files(tmp_path: Path) -> None:
         read_record(tmp_path / "none.csv")
 
 
-def test_wrong_column_arguments(tmp_path: Path) -> None:
-    file = log(tmp_path)
-    with pytest.raises(ValueError, match="no column 'foo' for voltage; there are the columns time_s"):
-        read_record(file, columns={"voltage": "foo"})
-    with pytest.raises(ValueError, match="would be"):
-        read_record(log(tmp_path, "t,u,x"), columns={"voltage": "x"})
-    with pytest.raises(ValueError, match="columns has"):
-        read_record(file, columns={"volts": "u"})
-    with pytest.raises(ValueError, match="sample_rate"):
-        read_record(file, sample_rate=-1.0)
-
-
 def test_round_trip_and_split(tmp_path: Path) -> None:
     voltage = VOLTAGE.copy()
     voltage[3] = np.nan
@@ -202,15 +161,3 @@ def test_reference(tmp_path: Path) -> None:
     file.write_text("r_um\n" + "\n".join(["1"] * 20 + ["nan"] + ["1"] * 20))
     with pytest.raises(ValueError, match="line 22: no number"):
         read_reference(file, sample_rate=10.0)
-
-
-def test_columns_of_different_lengths_are_not_written(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="one length"):
-        write_columns(tmp_path / "out.csv", {"a": [1.0], "b": [1.0, 2.0]})
-
-
-def test_numbers_that_no_stage_can_have_are_missing(tmp_path: Path) -> None:
-    record = read_record(log(tmp_path, line5="0.030,1e300,1.0", line9="0.070,1.0,-1e12"))
-    assert record.skipped == 2
-    assert any("2 samples are without usable numbers" in note for note in record.notes)
-    assert np.flatnonzero(~record.usable).tolist() == [3, 7]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -22,67 +21,6 @@ def ring(periods: int = 12, **options: Any) -> Any:
         estimator=pz.HysteresisRLS(FS, memory=0.4),
         **options,
     )
-
-
-def test_intervals_are_a_loop_of_steps() -> None:
-    """Objects with nothing but `step`, as on hardware, give the same bits."""
-
-    class Bare:
-        def __init__(self, inner: Any) -> None:
-            self._inner = inner
-
-        def step(self, *arguments: Any) -> Any:
-            return self._inner.step(*arguments)
-
-        model = property(
-            lambda self: self._inner.model, lambda self, model: setattr(self._inner, "model", model)
-        )
-        displacement = property(lambda self: self._inner.displacement)
-        hand_over_due = property(lambda self: self._inner.hand_over_due)
-
-    r = pz.signals.triangle(5.0, 5.0, 1, FS)
-    whole = ring(1)
-    bare = pz.track(
-        r,
-        stage=Bare(pz.PaperStage(sample_rate=FS, seed=0)),
-        compensator=Bare(pz.InverseCompensator(START)),
-        estimator=Bare(pz.HysteresisRLS(FS, memory=0.4)),
-    )
-    for name in ("voltage", "measured", "displacement", "theta"):
-        assert np.array_equal(getattr(whole, name), getattr(bare, name)), name
-
-
-def test_an_estimator_of_ones_own_needs_no_registration() -> None:
-    class Constant:
-        model = pz.ColemanHodgdon(0.018, 0.148, 0.0039)
-
-        def step(self, u: float, x: float | None) -> None:
-            pass
-
-    record = pz.track(
-        pz.signals.triangle(5.0, 5.0, 3, FS),
-        stage=pz.PaperStage(sample_rate=FS),
-        compensator=pz.InverseCompensator(START),
-        estimator=Constant(),
-    )
-    np.testing.assert_array_equal(record.theta[-1], Constant.model.theta)
-
-
-def test_table_and_plot() -> None:
-    record = ring(2)
-    lines = record.table().splitlines()
-    assert len(lines) == 3
-    assert "alpha" in lines[0]
-    wide = dataclasses.replace(
-        record, parameters=np.zeros((record.parameters.shape[0], 66)), parameter_names=("weight",) * 66
-    )
-    assert "weight" not in wide.table() + repr(wide)
-    assert max(map(len, (*lines, *wide.table().splitlines()))) <= 80
-    figure = record.plot(last_periods=1)
-    series, loop, error = figure.axes
-    assert series.get_ylabel() == "displacement [µm]"
-    assert loop.get_xlabel() == "reference [µm]"
-    assert error.get_ylabel() == "error [µm]"
 
 
 def test_plain_arrays_need_a_rate() -> None:
@@ -116,9 +54,6 @@ def test_wrong_references() -> None:
         follow(np.repeat([0.0, 1.0, 0.0], 100))
     with pytest.raises(ValueError, match="last_periods is 5, the record has 2 periods"):
         ring(2).max_error(last_periods=5)
-
-
-LINE = pz.LinearGain(0.14, 0.2)
 
 
 class Driver:

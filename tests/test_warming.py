@@ -43,10 +43,3 @@ def test_a_compensator_is_compiled_and_left_as_it_is(monkeypatch: pytest.MonkeyP
     assert compensator.status.samples == 0
     assert compensator.layouts in inverse_kernel.step._entries
     assert compensator.layouts in inverse_kernel.run._entries
-
-
-def test_another_class_is_refused_before_anything_compiles() -> None:
-    with pytest.raises(
-        ValueError, match=r"used must be estimators of piezoest, .* or a controller, got type"
-    ):
-        pz.warmup(pz.AdaptiveFeedforward, pz.PaperStage)

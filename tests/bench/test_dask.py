@@ -81,6 +81,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
     cluster.close()
 
 
+@pytest.mark.slow
 def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
     cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -130,15 +131,7 @@ def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
         assert rows == list(store.rows(task.key for task in tasks))
 
 
-def test_a_worker_with_another_package_ends_the_campaign(
-    cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(table, "fingerprint", lambda: "another")
-    plan = table.Plan(estimators=(), scenarios=("cold-start",), stages=("paper",), seeds=1, given=SMALL)
-    with store_in(tmp_path) as store, pytest.raises(ValueError, match="install the same"):
-        carry_out(plan.tasks(), store, table.over_dask(cluster.address))
-
-
+@pytest.mark.slow
 def test_local_by_default(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "piezoest", "bench", "--quick", "--only", "HysteresisRLS"]
     command += ["-s", "noise", "--dask", "--jobs", "1", "--table", "csv", "-o", str(tmp_path)]
@@ -146,12 +139,6 @@ def test_local_by_default(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "2 of 2 runs" in done.stderr
     assert (tmp_path / "table.json").exists()
-
-
-def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(executors, "PATIENCE", 0.2)
-    with pytest.raises(ValueError, match=r"scheduler tcp://127.0.0.1:9 does not answer"):
-        list(executors.on_dask(abs, [1], "tcp://127.0.0.1:9"))
 
 
 def test_without_dask(monkeypatch: pytest.MonkeyPatch) -> None:

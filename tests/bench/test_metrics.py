@@ -9,7 +9,7 @@ import pytest
 
 import piezoest as pz
 from piezoest.bench.cases import RIGHT_GAIN, RIGHT_MODEL, Case
-from piezoest.bench.metrics import Metrics, measure, period_edges, settles
+from piezoest.bench.metrics import Metrics, measure, settles
 
 PERIOD = 10
 AMPLITUDE = 5.0  # settled below 0.06
@@ -82,7 +82,3 @@ def test_what_comes_before_the_change_counts_for_divergence_alone() -> None:
 )
 def test_divergence(errors: list[float], linear: list[float], diverged: bool) -> None:
     assert numbers(errors, linear).diverged is diverged
-
-
-def test_edges_of_periods_that_are_no_whole_number_of_samples() -> None:
-    assert period_edges(5, 2.5, 13).tolist() == [5, 8, 10, 12]

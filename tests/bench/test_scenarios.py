@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from piezoest.bench.cases import RIGHT_GAIN, RIGHT_MODEL, Case
-from piezoest.bench.scenarios import DRIFT, GAIN_RAMP, NOISE, SCENARIOS, Scenario, scenario
+from piezoest.bench.scenarios import DRIFT, GAIN_RAMP, SCENARIOS
 from piezoest.signals import check_continuity
 
 NAMES = [
@@ -78,24 +78,6 @@ def test_amplitude_frequency_and_sample_rate_scale(name: str) -> None:
     np.testing.assert_array_equal(finer.start.theta, base.start.theta)
 
 
-def test_a_name_is_entered_once() -> None:
-    with pytest.raises(ValueError, match="there is a scenario noise already"):
-        scenario("noise", "Another.")
-    assert SCENARIOS["noise"].description != "Another."
-
-
-def test_a_reference_without_a_sample_rate_is_refused() -> None:
-    mine = Scenario("mine", "An array.", lambda draft: draft.case(np.zeros(9)))  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="reference must be a Signal, got ndarray"):
-        mine.build(0)
-
-
-def test_starts_fill_their_range() -> None:
-    starts = np.array([case("cold-start", seed).start.theta for seed in range(200)]) / RIGHT_MODEL.theta
-    assert np.all(starts.min(axis=0) < 0.65)
-    assert np.all(starts.max(axis=0) > 1.35)
-
-
 @pytest.mark.parametrize(
     ("name", "before", "after"), [("amplitude-switch", 2.5, 7.5), ("amplitude-drop", 7.5, 2.5)]
 )
@@ -139,40 +121,3 @@ def test_dwell_rests_and_goes_on() -> None:
     assert np.all(made.reference.values[first:end] == 0.0)
     assert (end - first) / made.sample_rate == 0.5
     np.testing.assert_array_equal(made.reference.values[end : end + 800], made.reference.values[:800])
-
-
-def test_noise_is_drawn_evenly_in_its_logarithm() -> None:
-    noise = np.array([case("noise", seed).noise for seed in range(200)], dtype=float)
-    assert NOISE[0] <= noise.min() < 2.0 * NOISE[0]
-    assert 0.5 * NOISE[1] < noise.max() <= NOISE[1]
-    assert np.median(noise) == pytest.approx(np.sqrt(NOISE[0] * NOISE[1]), rel=0.5)
-    assert case("noise", noise=0.002).noise == 0.002
-    assert case("cold-start", noise=0.002).new_stage().gauge.noise == 0.002
-    assert case("cold-start").new_stage().gauge.noise == 0.0012
-
-
-def test_minor_loops_and_other_references() -> None:
-    turns = {name: int(np.sum(np.diff(np.sign(np.diff(case(name).reference.values))) != 0)) for name in NAMES}
-    # A triangle turns twice a period; the fast tone of the two makes it turn seven times in five.
-    assert turns["cold-start"] == 8
-    assert turns["two-tone"] == 4 * 14
-    assert turns["random-walk"] > 8
-    assert np.any(case("random-walk", 1).reference.values != case("random-walk", 2).reference.values)
-
-
-@pytest.mark.parametrize(
-    ("overrides", "words"),
-    [
-        ({"sample_rate": 0.0}, "sample_rate"),
-        ({"amplitude": -1.0}, "amplitude"),
-        ({"noise": -1.0}, "noise"),
-        ({"before": 0}, "before"),
-        ({"updates": 0}, "updates"),
-        ({"stage": "best"}, "stage"),
-    ],
-)
-def test_refuses_wrong_conditions(overrides: dict[str, Any], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        case("cold-start", **overrides)
-    with pytest.raises(TypeError):
-        case("cold-start", amplitud=1.0)

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import errno
 import json
 import math
-import os
 import signal
 import subprocess
 import sys
-from concurrent.futures.process import BrokenProcessPool
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +17,11 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import piezoest as pz
-from piezoest.bench import cost, recorded, table, table_command, tables, tuning
-from piezoest.bench.estimators import KNOWN, LINEAR, PAPERS, candidate, defaults, found
-from piezoest.bench.executors import in_processes
+from piezoest.bench import recorded, table, tables, tuning
+from piezoest.bench.estimators import KNOWN, PAPERS, candidate, defaults, found
 from piezoest.bench.machine import fingerprint
 from piezoest.bench.pages import write_html
-from piezoest.bench.run import COLUMNS, Row, Task, code_of, crashed, follow, play
-from piezoest.bench.scenarios import SCENARIOS
+from piezoest.bench.run import COLUMNS, Task, code_of, crashed, play
 from piezoest.bench.stages import STAGES, STRANGERS, make_stage
 from piezoest.bench.store import Store, carry_out, store_in
 from piezoest.cli import app
@@ -187,14 +181,6 @@ def test_an_estimators_own_file_is_part_of_its_code(own: str) -> None:
     assert code_of(f"{own}:Still") != before
 
 
-def test_linear_feed_forward_is_measured_by_itself_and_a_controller_drives() -> None:
-    row = play(task(LINEAR))
-    assert row["settled"] == row["linear_settled"] == play(task())["linear_settled"]
-    controller = play(task("AdaptiveFeedforward", sample_rate=5000.0))
-    assert controller["failure"] is None
-    assert controller["settled"] < 0.5 * controller["linear_settled"]
-
-
 @pytest.mark.parametrize(
     ("name", "failure"), [("Broken", "RuntimeError: no idea"), ("Quits", "SystemExit: enough")]
 )
@@ -205,22 +191,6 @@ def test_what_an_estimator_raises_is_its_own_failure(own: str, name: str, failur
     assert row["diverged"]
     assert "in step" in row["traceback"]
     assert row["errors"] == []
-
-
-def test_an_own_controller_is_played_too(own: str) -> None:
-    row = play(task(f"{own}:Line"))
-    assert row["failure"] is None
-    assert row["settled"] > 0.0
-
-
-def test_costs(own: str) -> None:
-    record = follow(SCENARIOS["cold-start"].build(0, **SMALL), LINEAR)
-    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
-    for name in ("HysteresisRLS", "AdaptiveFeedforward", f"{own}:Still"):
-        numbers = cost.cost(partial(candidate(name), 2000.0, start), record)
-        assert all(numbers[key] > 0.0 for key in ("step_us", "longest_us"))  # type: ignore[operator]
-        assert (numbers["run_us"] is not None) == (name == "HysteresisRLS")
-    assert table.costs([f"{own}:Broken"], SMALL) == {f"{own}:Broken": {}}
 
 
 # ---------------------------------------------------------------- tables
@@ -240,34 +210,7 @@ def test_tables_are_tidy_and_read_back(tmp_path: Path, format: str) -> None:
     assert periods["error"].to_list() == rows[0]["errors"]
 
 
-def test_tables_refuse_other_formats(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ValueError, match="parquet, csv"):
-        tables.checked_format("xlsx")
-    with pytest.raises(ValueError, match=r"holds no runs\.parquet"):
-        tables.read_table(tmp_path, table.RUNS, COLUMNS)
-    for text in ("a,b\n1,2\n", "key,seed\nx,y\n", "key\n1,2\n"):
-        (tmp_path / "runs.csv").write_text(text, encoding="utf-8")
-        with pytest.raises(ValueError, match=r"runs\.csv is damaged"):
-            tables.read_table(tmp_path, table.RUNS, COLUMNS)
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    assert tables.checked_format(None) == "csv"
-    with pytest.raises(ValueError, match=r"pip install 'piezoest\[formats\]'"):
-        tables.checked_format("parquet")
-
-
 # ---------------------------------------------------------------- many runs
-
-
-def test_slow_estimators_run_on_fewer_seeds_and_the_first_stage() -> None:
-    asked = plan("HysteresisEKF", "FilterPyUKF", stages=("paper", *STRANGERS), seeds=3, slow_seeds=2)
-    tasks = asked.tasks()
-    assert len(tasks) == 2 * 3 * 4 * 2 + 2 * 2
-    slow = [each for each in tasks if each.estimator == "FilterPyUKF"]
-    assert {(each.given["stage"], each.seed) for each in slow} == {("paper", 0), ("paper", 1)}
-    for wrong, words in (({"scenarios": ("nowhere",)}, "nowhere"), ({"stages": ("best",)}, "best")):
-        with pytest.raises(ValueError, match=words):
-            plan("HysteresisEKF", **wrong)
 
 
 def test_processes_give_the_same_rows(tmp_path: Path) -> None:
@@ -282,6 +225,7 @@ def test_processes_give_the_same_rows(tmp_path: Path) -> None:
     assert rows[0] == rows[1]
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_is_a_failure_and_the_rest_goes_on(own: str, tmp_path: Path) -> None:
     asked = plan(f"{own}:Still", f"{own}:Dies", f"{own}:Broken", seeds=1)
     tasks = asked.tasks()
@@ -295,15 +239,6 @@ def test_a_process_that_dies_is_a_failure_and_the_rest_goes_on(own: str, tmp_pat
     assert cells["noise", f"{own}:Still"]["failures"] == 0
     assert len(document["failures"]) == 4
     assert len(document["tracebacks"]) == 1
-
-
-def die(item: int) -> int:
-    os._exit(item)
-
-
-def test_a_death_nobody_answers_for_is_an_error() -> None:
-    with pytest.raises(BrokenProcessPool, match="a process died"):
-        list(in_processes(die, [1, 2], 2))
 
 
 def test_a_document_sums_up(own: str, tmp_path: Path) -> None:
@@ -334,20 +269,6 @@ def test_a_document_sums_up(own: str, tmp_path: Path) -> None:
     assert page.count("data:image/png") == 4
     with pytest.raises(ValueError, match="no page for the suite"):
         write_html({"suite": "other"}, tmp_path / "page.html")
-
-
-def test_tuning_finds_settings_on_other_seeds(own: str, tmp_path: Path) -> None:
-    texts = ["HysteresisEKF(offset=True)", "HysteresisRLS(memory=0.4)", f"{own}:Still"]
-    with store_in(tmp_path) as store:
-        chosen = tuning.tune(texts, 2, SMALL, store, table.over_cores(1), lambda done, of: None)
-        assert len(store) == 2 * 4 * (3 + 3)
-    ekf, still = chosen
-    assert ekf["default"] == texts[0] == ekf["trials"][0]["estimator"]
-    assert all("offset=True" in trial["estimator"] for trial in ekf["trials"])
-    assert min(ekf["trials"], key=lambda trial: trial["score"])["estimator"] == ekf["chosen"]
-    assert {trial["score"] for trial in still["trials"]} == {still["trials"][0]["score"]}
-    with pytest.raises(ValueError, match="power of two"):
-        tuning.draws(tuning.tunable(texts[0]), 3, 0)
 
 
 # ---------------------------------------------------------------- recorded logs
@@ -423,15 +344,6 @@ def test_command_end_to_end(own: str, tmp_path: Path) -> None:
     assert json.loads(again.stdout)["cells"] == document["cells"]
 
 
-def test_command_tunes(own: str) -> None:
-    result = bench(*SHORT, "--tune", 2, "--seeds", 1, "--json", "a.json")
-    assert result.exit_code == 0, result.output
-    document = json.loads(Path("a.json").read_text(encoding="utf-8"))
-    (tuned,) = document["tuned"]
-    if tuned["chosen"] != tuned["default"]:
-        assert document["estimators"][tuned["chosen"]]["name"] == "HysteresisEKF, tuned"
-
-
 def test_compare_with_itself_finds_no_change(own: str) -> None:
     assert bench(*SHORT, "-o", "one").exit_code == 0
     result = bench("compare", "one", "one", "--fail-if-worse", "--json", "c.json")
@@ -448,11 +360,8 @@ def test_compare_with_itself_finds_no_change(own: str) -> None:
     ("arguments", "words"),
     [
         (("-e", "NoSuch"), "choose of"),
-        (("--scenario", "nowhere"), "choose of"),
         (("--stage", "best"), "choose of"),
-        (("--table", "xlsx"), "parquet, csv"),
         (("--json", "nowhere/a.json"), "no file that can be written"),
-        (("--html", "page.txt"), "must end in .html"),
         (("--quick", "paper"), "--quick belong to the table"),
     ],
 )
@@ -463,29 +372,7 @@ def test_command_refuses_wrong_words(own: str, arguments: tuple[str, ...], words
     assert not Path("bench-results").exists()
 
 
-def test_what_cannot_be_written_or_read_is_one_sentence(own: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(result: Result, *words: str) -> None:
-        assert result.exit_code == 1, result.output
-        assert "Traceback" not in result.stderr
-        assert all(word in result.stderr.splitlines()[-1] for word in ("error: ", *words))
-
-    Path("plain").touch()
-    refused(bench(*SHORT, "-o", "plain/folder"), "plain/folder", "Not a directory")
-
-    def full(store: Store, row: Row) -> bool:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "runs.jsonl")
-
-    with monkeypatch.context() as patched:
-        patched.setattr(Store, "append", full)
-        refused(bench(*SHORT, "-o", "one"), "runs.jsonl: No space left on device")
-    Path("two").mkdir()
-    for text in ("{", "[]", "{}", "[" * 100_000, '{"conditions": {}}'):
-        Path("two", "table.json").write_text(text, encoding="utf-8")
-        result = bench("compare", "two", "two")
-        assert result.exit_code == 2, text
-        assert "two/table.json is not" in " ".join(result.stderr.replace("│", " ").split())
-
-
+@pytest.mark.slow
 def test_a_killed_campaign_goes_on(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "piezoest", "bench", "--quick", "--only", "HysteresisRLS"]
     command += ["--seeds", "2", "--jobs", "2", "--table", "csv", "-o", str(tmp_path)]
@@ -513,6 +400,26 @@ def test_a_killed_campaign_goes_on(tmp_path: Path) -> None:
     assert len(tables.read_table(tmp_path, table.RUNS, COLUMNS)) == 40
 
 
-def test_the_commands_defaults_are_many_seeds() -> None:
-    assert table_command.SEEDS >= 30
-    assert table_command.SLOW_SEEDS >= 10
+def test_slow_estimators_run_on_fewer_seeds_and_the_first_stage() -> None:
+    asked = plan("HysteresisEKF", "FilterPyUKF", stages=("paper", *STRANGERS), seeds=3, slow_seeds=2)
+    tasks = asked.tasks()
+    assert len(tasks) == 2 * 3 * 4 * 2 + 2 * 2
+    slow = [each for each in tasks if each.estimator == "FilterPyUKF"]
+    assert {(each.given["stage"], each.seed) for each in slow} == {("paper", 0), ("paper", 1)}
+    for wrong, words in (({"scenarios": ("nowhere",)}, "nowhere"), ({"stages": ("best",)}, "best")):
+        with pytest.raises(ValueError, match=words):
+            plan("HysteresisEKF", **wrong)
+
+
+def test_tuning_finds_settings_on_other_seeds(own: str, tmp_path: Path) -> None:
+    texts = ["HysteresisEKF(offset=True)", "HysteresisRLS(memory=0.4)", f"{own}:Still"]
+    with store_in(tmp_path) as store:
+        chosen = tuning.tune(texts, 2, SMALL, store, table.over_cores(1), lambda done, of: None)
+        assert len(store) == 2 * 4 * (3 + 3)
+    ekf, still = chosen
+    assert ekf["default"] == texts[0] == ekf["trials"][0]["estimator"]
+    assert all("offset=True" in trial["estimator"] for trial in ekf["trials"])
+    assert min(ekf["trials"], key=lambda trial: trial["score"])["estimator"] == ekf["chosen"]
+    assert {trial["score"] for trial in still["trials"]} == {still["trials"][0]["score"]}
+    with pytest.raises(ValueError, match="power of two"):
+        tuning.draws(tuning.tunable(texts[0]), 3, 0)

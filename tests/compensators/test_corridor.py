@@ -62,21 +62,11 @@ def test_a_model_at_every_sample_does_not_run_away(amplitude: float, frequency: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [pz.HysteresisRLS, pz.OutputErrorRLS])
-@pytest.mark.parametrize("frequency", [5.0, 15.0, 22.0, 30.0])
+@pytest.mark.parametrize("frequency", [15.0, 30.0])
 @pytest.mark.parametrize("amplitude", [0.5, 5.0])
 def test_models_at_any_pace_do_not_run_away(make: Any, amplitude: float, frequency: float) -> None:
-    for seed, every in ((1, 1), (2, 7), (3, 500)):
+    for seed, every in ((1, 1), (2, 30)):
         follows_better_than_a_line(make, amplitude, frequency, seed, every)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("frequency", [15.0, 30.0])
-def test_a_filter_that_would_run_away_is_held_by_the_corridor(frequency: float) -> None:
-    """It is not better than a line at this pace, handed over at every sample, but never far from it."""
-    r = np.asarray(pz.signals.triangle(5.0, frequency, 8, FS))
-    compensator = pz.InverseCompensator(START, LIMITS)
-    errors, _ = hand_wired(r, pz.PaperStage(FS, seed=1), pz.HysteresisEKF(FS), compensator)
-    assert per_period(errors, 8)[2:].max() < 0.3 * 5.0
 
 
 def unipolar(seed: int) -> pz.SimulatedStage:
@@ -143,36 +133,6 @@ def test_models_take_effect_by_travel() -> None:
     compensator.model = first
     compensator.reset()
     assert compensator.model == first
-
-
-@pytest.mark.parametrize(
-    "model", [pz.LinearGain(0.13), START, pz.PrandtlIshlinskii(0.1, [1.0, 5.0], [0.02, 0.02])]
-)
-def test_a_run_takes_up_what_waits_where_steps_would(model: Any) -> None:
-    r = 2.0 * np.sin(np.arange(3000.0) / 200.0)
-    found = []
-    for by_step in (False, True):
-        compensator = pz.InverseCompensator(START, LIMITS)
-        compensator.run(r[:100])
-        compensator.model = pz.LinearGain(0.2)
-        compensator.model = model
-        if by_step:
-            found.append([compensator.step(r_k) for r_k in r[100:].tolist()])
-        else:
-            found.append(compensator.run(r[100:]).tolist())
-        assert compensator.model == model
-    assert found[0] == found[1]
-
-
-def test_a_single_hand_over_sets_the_line_within_two_turns() -> None:
-    """A model that nobody learnt in the loop is believed, however far it is from the first."""
-    r = 5.0 * np.sin(2.0 * np.pi * np.arange(40_000) / 10_000.0)
-    stiff = pz.LinearGain(2.0)
-    compensator = pz.InverseCompensator(pz.LinearGain(0.15), transfer_samples=100)
-    compensator.run(r[:1000])
-    compensator.model = stiff
-    u = compensator.run(r[1000:])
-    np.testing.assert_allclose(u[20_000:], r[21_000:] / 2.0, atol=1e-9)
 
 
 extreme = st.floats(width=64, allow_nan=False, allow_infinity=False)

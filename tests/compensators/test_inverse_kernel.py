@@ -47,16 +47,6 @@ def test_a_model_handed_over_in_compiled_code_is_as_one_that_is_set(model: Any) 
     np.testing.assert_array_equal(numbers[: model.theta.size], compensator.model.theta)
 
 
-@pytest.mark.parametrize("numbers", [[0.0, 0.0, 0.0, 0.0], [np.nan, 0.1, 0.1, 0.0], [0.2, 0.0, 0.0, 1e10]])
-def test_what_has_no_inverse_is_not_used(numbers: list[float]) -> None:
-    compensator = pz.InverseCompensator(START)
-    before = compensator.settings.copy()
-    assert not set_model.of(*compensator.layouts)(
-        compensator.state, compensator.settings, np.array(numbers), False
-    )
-    assert compensator.settings == before
-
-
 # A model with its inverse, in one file: x = gain (u + drift of the voltage's last change).
 
 

@@ -62,10 +62,3 @@ def test_change_of_model_is_bumpless(models: tuple[pz.models.Model, pz.models.Mo
     # Plays were set from the voltage's turning points: what was owed is paid back, and then it fits.
     if models[1] is OTHER:
         np.testing.assert_allclose(OTHER.simulate(u)[-100:], r[-100:], atol=1e-3)
-
-
-def test_inadmissible_model_is_not_taken() -> None:
-    compensator = pz.InverseCompensator(OTHER)
-    compensator.model = pz.PrandtlIshlinskii(0.1, [1.0], [-0.2])
-    assert compensator.model == OTHER
-    assert compensator.status.projected

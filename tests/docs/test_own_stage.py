@@ -20,6 +20,14 @@ def program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
     assert specification.loader is not None
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
+    now = [0.0]
+
+    def clock() -> float:
+        now[0] += 1e-5
+        return now[0]
+
+    monkeypatch.setattr(module.time, "perf_counter", clock)
+    monkeypatch.setattr(module.time, "sleep", lambda left: now.__setitem__(0, now[0] + left))
     return module
 
 

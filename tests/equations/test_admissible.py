@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from piezoest import ColemanHodgdon
 from piezoest.equations.admissible import is_admissible, project_admissible
 
 THETA = np.array([0.021, 0.147, 0.0043])
@@ -54,20 +53,3 @@ def test_projection_is_the_nearest_point(seed: int) -> None:
         options={"ftol": 1e-14, "maxiter": 500},
     )
     assert distance(projected / THETA) <= best.fun * 1.02 + 1e-6
-
-
-def test_further_parameters_move_as_their_correlation_says() -> None:
-    theta = np.array([0.02, 0.15, 0.0075, 1.0])
-    P = np.diag([0.02, 0.15, 0.004, 1.0]) ** 2
-    P[2, 3] = P[3, 2] = 0.5 * 0.004
-    project_admissible(theta, P, 1e-4, 1e-3, 1e-3)
-    assert theta[3] < 1.0
-
-
-def test_admissible_model_is_its_own_nearest() -> None:
-    model = ColemanHodgdon(0.02, 0.12, 0.0036)
-    assert model.is_admissible
-    assert model.nearest_admissible() is model
-    assert not ColemanHodgdon(0.02, 0.12, 0.0056).is_admissible
-    assert ColemanHodgdon(0.02, 0.12, 0.0056).nearest_admissible().is_admissible
-    assert ColemanHodgdon(-0.02, 0.12, 0.0056).nearest_admissible().is_admissible

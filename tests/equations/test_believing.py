@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.equations import believing
-from piezoest.layout import Named, new
 
 FS = 20_000.0
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.0043)
@@ -34,16 +32,3 @@ def test_a_coarse_converter_still_teaches(bits: int) -> None:
     assert isinstance(model, pz.ColemanHodgdon)
     apart = (model.simulate(U) - X)[-4000:]
     assert np.max(np.abs(apart)) < 0.005 + 0.5 * code
-
-
-def test_stands_still_counts_travel_not_time() -> None:
-    memory = Named(new(believing.BELIEF), believing.BELIEF)
-    assert not believing.stands_still(memory, 0.0, 0.0, 60.0)
-    assert not believing.stands_still(memory, 0.0, 0.1, 60.0)
-    assert believing.believable(memory, 0.0, 0.15, 0.1, 100.0)
-    assert not believing.stands_still(memory, 0.0, 0.1, 60.0)
-    assert believing.stands_still(memory, 0.0, 0.3, 60.0)
-    # A reading that moves again is a reading again.
-    assert not believing.stands_still(memory, 1e-6, 10.0, 60.0)
-    assert believing.believable(memory, 1e-6, 0.15, 0.1, 100.0)
-    assert not believing.stands_still(memory, 0.0, 0.25, 60.0)

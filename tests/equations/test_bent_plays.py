@@ -6,7 +6,6 @@ import itertools
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -52,17 +51,6 @@ def test_segments_add_up_to_the_play() -> None:
     np.testing.assert_allclose(sum(parts), p, atol=1e-15)
 
 
-def test_creep_needs_a_sample_rate() -> None:
-    model = pz.PrandtlIshlinskii(0.1, [1.0], [0.02], creep=pz.Creep([0.04], [0.1]))
-    with pytest.raises(ValueError, match="sample_rate"):
-        model.simulate(np.zeros(3))
-    with pytest.raises(ValueError, match=r"creep=model\.creep"):
-        pz.SimulatedStage(RATE, model)
-    stage = pz.SimulatedStage(RATE, pz.PrandtlIshlinskii(0.1, [1.0], [0.02]), creep=pz.Creep([0.04], [0.1]))
-    u = 10.0 * np.sin(np.arange(500) / 30.0)
-    np.testing.assert_allclose(model.simulate(u, sample_rate=RATE), stage.run(u), atol=1e-12)
-
-
 @given(seed=st.integers(0, 10_000), scale=st.floats(0.1, 10.0))
 def test_turning_points_hold_all_the_memory_of_plays(seed: int, scale: float) -> None:
     u = np.round(scale * np.cumsum(np.random.default_rng(seed).standard_normal(150)), 1)
@@ -94,15 +82,3 @@ def test_preisach_wipes_out_and_is_congruent() -> None:
     up = PREISACH.simulate(line(0.0, 10.0, 20.0, 10.0, 20.0))[-201:]
     down = PREISACH.simulate(line(0.0, 60.0, 10.0, 20.0, 10.0, 20.0))[-201:]
     np.testing.assert_allclose(np.diff(up - down), 0.0, atol=1e-12)
-
-
-def test_preisach_loops_differ_with_their_place_and_direction() -> None:
-    assert isinstance(PREISACH, pz.Preisach)
-    low = np.ptp(PREISACH.simulate(line(0.0, -60.0, -50.0, -60.0, -50.0))[-201:])
-    high = np.ptp(PREISACH.simulate(line(0.0, 20.0, 30.0, 20.0, 30.0))[-201:])
-    assert high > 1.05 * low
-    u = line(0.0, 40.0, -40.0, 40.0)
-    asymmetry = PREISACH.simulate(u) + PREISACH.simulate(-u)
-    assert np.abs(asymmetry[-100:]).max() > 0.05
-    with pytest.raises(ValueError, match="weights"):
-        pz.Preisach(0.1, [1.0], [-0.1], 0.0, 10.0)

@@ -12,9 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from piezoest import ColemanHodgdon, signals
+from piezoest import ColemanHodgdon
 from piezoest.equations import coleman_hodgdon as ch
-from piezoest.equations.integrators import bogacki_shampine
 
 TABLE_I = [
     (3.26e-2, 0.136, 5.96e-3),
@@ -72,31 +71,6 @@ def test_two_forms_agree(loop: tuple[float, float, float], turning_points: list[
     assert w == pytest.approx(expected, abs=1e-9 * (1.0 + abs(expected)))
 
 
-def test_slip_in_b1() -> None:
-    """(B1) of the paper subtracts its second term; with u' < 0 it must be added to equal (1)."""
-    alpha, beta, gamma = TABLE_I[2]
-    w, u, u_dot = 1.3, 20.0, -7.0
-    plus, minus = max(u_dot, 0.0), min(u_dot, 0.0)
-    added = (beta - alpha * w + gamma * u) * plus + (beta + alpha * w - gamma * u) * minus
-    printed = (beta - alpha * w + gamma * u) * plus - (beta + alpha * w - gamma * u) * minus
-    assert ch.rate(w, u, u_dot, alpha, beta, gamma) == pytest.approx(added)
-    assert ch.rate(w, u, u_dot, alpha, beta, gamma) != pytest.approx(printed)
-
-
-@pytest.mark.parametrize("theta", TABLE_I)
-def test_hysteresis_rate_is_the_derivative_of_the_step(theta: tuple[float, float, float]) -> None:
-    a, b, _ = ch.loop_parameters(*theta)
-    for u_dot in (3.0, -3.0):
-        h = 1e-5
-        slope = (ch.hysteresis_step(0.4, u_dot * h, a, b) - 0.4) / h
-        assert slope == pytest.approx(ch.hysteresis_rate(0.4, u_dot, a, b), rel=1e-5)
-
-
-def test_small_alpha_needs_no_special_case() -> None:
-    assert ch.hysteresis_step(0.2, 3.0, 0.0, 0.05) == pytest.approx(0.2 - 0.05 * 3.0)
-    assert ch.relative_decay(0.0) == 1.0
-
-
 @given(
     loops(),
     st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=8),
@@ -142,30 +116,3 @@ def test_no_branch_error_at_extreme_arguments() -> None:
             assert np.sign(du) == sign
     assert ch.inverse_increment(0.1, 0.0, 0.02, 0.06, 0.2) == 0.0
     assert ch.inverse_increment(3.0, 0.0, 0.02, 0.06, 0.12) == 0.0
-
-
-def test_runge_kutta_has_order_three() -> None:
-    a, b, c = ch.loop_parameters(*TABLE_I[2])
-    r = np.array([0.0, 4.0, -4.0, 3.0])
-    errors = []
-    for steps in (8, 16, 32, 64):
-        exact = approximate = 0.0
-        for k in range(1, r.size):
-            exact += (r[k] - r[k - 1]) - c * ch.inverse_increment(exact, r[k] - r[k - 1], a, b, c)
-            for _ in range(steps):
-                dr = (r[k] - r[k - 1]) / steps
-                approximate = bogacki_shampine(ch.inverse_rate, approximate, 1.0, (dr, a, b, c))
-        errors.append(abs(approximate - exact))
-    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
-    assert orders[-1] >= 2.9
-    assert errors[-1] < 1e-6
-
-
-def test_jumps_are_answered_with_what_to_do() -> None:
-    square = np.repeat([0.0, 10.0, 0.0, 10.0], 100)
-    model = ColemanHodgdon(*TABLE_I[2])
-    with pytest.raises(ValueError, match=r"u jumps by .*signals\.filtered_steps"):
-        model.simulate(square)
-    with pytest.raises(ValueError, match=r"r jumps by .*signals\.filtered_steps"):
-        model.invert(square)
-    model.simulate(signals.filtered_steps([0.0, 10.0], [0.1, 0.1], 1e4).values)

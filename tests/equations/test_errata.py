@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
-from piezoest import ColemanHodgdon
 from piezoest.equations import coleman_hodgdon as ch
-from piezoest.equations import least_squares as ls
-from piezoest.layout import Named, new, numbers, record
 
 TABLE_I = [
     (3.26e-2, 0.136, 5.96e-3),
@@ -19,17 +14,6 @@ TABLE_I = [
     (1.59e-2, 0.155, 3.55e-3),
     (3.32e-2, 0.136, 6.15e-3),
 ]
-
-
-@pytest.mark.parametrize("theta", TABLE_I)
-def test_units_of_table_i(theta: tuple[float, float, float]) -> None:
-    """Printed without units: as 1/V, µm/V, µm/V² they are admissible, and scale as a change to mV demands."""
-    alpha, beta, gamma = theta
-    model = ColemanHodgdon(alpha, beta, gamma)
-    assert model.is_admissible
-    u = 35.0 * np.sin(np.linspace(0.0, 12.0, 400))
-    in_millivolts = ColemanHodgdon(alpha / 1e3, beta / 1e3, gamma / 1e6)
-    np.testing.assert_allclose(in_millivolts.simulate(1e3 * u), model.simulate(u), rtol=1e-9, atol=1e-12)
 
 
 def slope_of_the_voltage(place: float, s: float, a: float, b: float, c: float) -> float:
@@ -47,33 +31,3 @@ def test_switching_by_the_reference_needs_the_admissible_set(
     places = np.linspace(-1.0, 1.0, 41)
     assert all(slope_of_the_voltage(place, s, a, b, c) > 0.0 for place in places)
     assert slope_of_the_voltage(0.99 * s, s, a, b, 1.9 * b) < 0.0
-
-
-def test_a6_to_the_letter_freezes_for_good() -> None:
-    """Once ||P|| > R0, (A6) sets its derivative to zero, and nothing brings it back."""
-    bound, memory, h = 2.0, 1.0, 0.01
-    P: Any = np.diag([1.0, 0.9])
-    quiet, loud = np.array([1e-3, 0.0]), np.array([1.0, -1.0])
-
-    def letter(P: Any, phi: Any) -> Any:
-        if np.trace(P) > bound:
-            return P
-        return P + h * (P / memory - P @ np.outer(phi, phi) @ P / (1.0 + phi @ P @ phi))
-
-    for _ in range(100):
-        P = letter(P, quiet)
-    frozen = P.copy()
-    assert np.trace(frozen) > bound
-    for _ in range(1000):
-        P = letter(P, loud)
-    np.testing.assert_array_equal(P, frozen)
-
-    theta, P = np.zeros(2), np.diag([1.0, 0.9])
-    layout = record(theta=numbers(2), P=numbers(2, 2))
-    rates = Named(new(layout), layout)
-    for phi in [quiet] * 100 + [loud] * 1000:
-        ls.continuous_step(theta, P, phi, 0.0, h, 1.0 / memory, 1.0, rates)
-        ls.continuous_correction(theta, P, h, bound, rates)
-    assert ls.trace(P) <= bound
-    # What the regressor tells, it keeps telling.
-    assert loud @ P @ loud < loud @ frozen @ loud

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from piezoest.compile import Record, compiled
-from piezoest.equations import coleman_hodgdon as hysteresis
 from piezoest.equations import kalman
-from piezoest.layout import NUMBER, new, numbers, record
+from piezoest.layout import NUMBER, numbers, record
 from tests.equations.three_ways import three_ways
 from tests.reference import kalman as reference
 
@@ -65,67 +64,6 @@ def test_projection_is_the_nearest_point(n: int) -> None:
         np.testing.assert_allclose(moved, reference.project(s, P, g, least), rtol=1e-9)
         assert said == float(g @ s < least)
         assert g @ moved >= least - 1e-12
-
-
-def test_projection_without_any_variance_stays() -> None:
-    s = state(4)
-    g = np.array([0.0, 1.0, 0.0, 0.0])
-    moved = s.copy()
-    assert kalman.project(moved, np.zeros((4, 4)), g, 1.0) == 1.0
-    np.testing.assert_array_equal(moved, s)
-
-
-def test_variance_of_the_product_is_that_of_gaussians() -> None:
-    """A product of zero-mean Gaussians has the variance P_aa P_ww + P_aw²: sampled."""
-    P = np.eye(4)
-    P[:2, :2] = [[0.09, 0.002], [0.002, 1e-4]]
-    draws = np.random.default_rng(0).multivariate_normal([0.0, 0.0], P[:2, :2], size=400_000)
-    sampled = np.var(draws[:, 0] * draws[:, 1])
-    travel = 3.0
-    got = kalman.bilinear_variance(P, -travel, 0.02) / (travel / 0.02)
-    assert got == pytest.approx(sampled, rel=0.02)
-    assert kalman.bilinear_variance(P, 0.0, 0.02) == 0.0
-    assert np.isfinite(kalman.bilinear_variance(P, 1.0, 0.0))
-
-
-FILTER = record(
-    R=NUMBER, least=NUMBER, s=numbers(4), P=numbers(4, 4), q=numbers(4), row=numbers(4), h=numbers(4),
-    gain=numbers(4),
-)  # fmt: skip
-
-
-@compiled
-def filtered(case: Record, samples: int) -> None:
-    """Run P through so many samples of a sine; the least variance on the way goes into `least`."""
-    u_last = 0.0
-    s, P, row = case.s, case.P, case.row
-    for k in range(samples):
-        u = 33.0 * np.sin(6e-4 * k)
-        du = u - u_last
-        u_last = u
-        row[0], row[1], row[2] = hysteresis.hysteresis_jacobian(s[0], du, s[1], s[2])
-        s[0] = hysteresis.hysteresis_step(s[0], du, s[1], s[2])
-        kalman.predict_covariance(P, row, 4, case.q)
-        case.h[0], case.h[3] = 1.0, u
-        kalman.update(s, P, case.h, 0.0, case.R, case.gain)
-        for i in range(4):
-            case.least = min(case.least, P[i, i])
-
-
-@pytest.mark.parametrize("noise", [1.5e-3, 1e-6])
-@pytest.mark.parametrize("walk", [0.0, 0.3])
-def test_stays_symmetric_positive_definite_over_a_million_samples(noise: float, walk: float) -> None:
-    q = (walk * np.array([1.0, 0.021, 0.057, 0.204])) ** 2 / 50_000.0
-    s, P = np.array([0.0, 0.021, 0.057, 0.204]), np.diag([1.0, 1e-4, 1e-3, 1e-2])
-    case = new(FILTER, R=noise**2, least=np.inf, s=s, P=P, q=q)
-    filtered.of(FILTER)(case, 1_000_000)
-    assert case["least"] > 0.0
-    P = case["P"]
-    assert np.array_equal(P, P.T)
-    scale = np.sqrt(np.diag(P))
-    # Without process noise w_h becomes a function of a and b, and P truly singular: but for
-    # rounding its least eigenvalue is then zero.
-    assert np.linalg.eigvalsh(P / np.outer(scale, scale))[0] > (0.0 if walk else -1e-12)
 
 
 # ---------------------------------------------------------------- one source, three ways

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 from scipy.signal import cont2discrete
 
-from piezoest.equations.mechanics import mechanics_coefficients, mechanics_step
+from piezoest.equations.mechanics import mechanics_coefficients
 
 
 def continuous(frequency: float, damping: float) -> tuple[Any, Any]:
@@ -30,23 +28,3 @@ def test_coefficients_are_the_held_discretisation(frequency: float, damping: flo
         np.array([[a11, a12], [a21, a22]]) * scale / scale[:, None], a_d * scale / scale[:, None], atol=1e-11
     )
     np.testing.assert_allclose(np.array([b1, b2]) / scale, b_d[:, 0] / scale, atol=1e-11)
-
-
-@pytest.mark.parametrize("damping", [0.0, 0.02, 1.0, 1.0 + 1e-9, 2.5])
-def test_solves_the_differential_equation(damping: float) -> None:
-    dt, frequency = 2e-4, 780.0
-    a, b = continuous(frequency, damping)
-    coefficients = mechanics_coefficients(frequency, damping, dt)
-    state, expected = np.zeros(2), np.zeros(2)
-    for f in (1.0, 1.0, -2.0, 0.5, 0.5, 3.0):
-        x = mechanics_step(state, f, coefficients)
-        solution = solve_ivp(
-            lambda t, y, f=f: a @ y + b[:, 0] * f,
-            (0.0, dt),
-            expected,
-            method="DOP853",
-            rtol=1e-12,
-            atol=1e-12,
-        )
-        expected = solution.y[:, -1]
-        assert x == pytest.approx(expected[0], abs=1e-9)

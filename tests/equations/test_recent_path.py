@@ -61,34 +61,6 @@ def test_steady_loop_is_known_however_long_it_went_on(amplitude: float, a: float
     assert h == pytest.approx(simulated(u, a), abs=0.01 * amplitude)
 
 
-@pytest.mark.parametrize("part", [0.5, 1.0, 2.0])
-@pytest.mark.parametrize("a", [0.005, 0.02, 0.1])
-def test_turns_out_of_many_small_loops_within_a_large_one(a: float, part: float) -> None:
-    """Minor loops on a slow wave: the oldest point kept stands far from the middle."""
-    t = np.linspace(0.0, 40.0, 4001)
-    u = 30.0 * np.sin(2.0 * np.pi * 0.1 * t) + 5.0 * np.sin(2.0 * np.pi * 2.0 * t)
-    assert with_decay(followed(u, a=part * a), a) == pytest.approx(simulated(u, a), abs=1.0)
-
-
-def test_model_in_use_goes_on_by_itself() -> None:
-    """However many turns are dropped, and taken up again it does not move."""
-    u = 20.0 + np.cumsum(np.random.default_rng(2).standard_normal(5000))
-    path = followed(u, a=0.002)
-    h = float(recent_path.hysteresis(path))
-    assert path.count > recent_path.MOST // 2
-    assert h == pytest.approx(simulated(u, 0.002), abs=0.2)
-    assert with_decay(path, 0.002) == pytest.approx(h, abs=1e-9)
-
-
-def test_jitter_does_not_wash_the_memory_out() -> None:
-    swings = triangle([30.0, -30.0] * 30 + [20.0])
-    jitter = 20.0 + 0.05 * np.random.default_rng(0).standard_normal(2000)
-    u = np.concatenate([swings, jitter])
-    path = followed(u)
-    before = followed(swings)
-    assert np.count_nonzero(path.points != before.points) <= 2
-
-
 @compiled
 def compiled_with_decay(path: Record, u: Vector, a: float) -> float:
     recent_path.begin(path, 0.0, 0.02)
@@ -104,8 +76,11 @@ def test_compiled_equals_plain() -> None:
     assert found == pytest.approx(with_decay(followed(u), 0.03), rel=1e-12)
 
 
-def test_long_steady_loop_is_known_to_rounding() -> None:
-    """What the walk back leaves out is that of a steady loop, too."""
-    u = triangle([30.0, -30.0] * 200 + [12.0])
-    assert with_decay(followed(u, a=0.02), 0.02) == pytest.approx(simulated(u, 0.02), abs=1e-9)
-    assert with_decay(followed(u, a=0.02), 0.024) == pytest.approx(simulated(u, 0.024), abs=0.003)
+def test_model_in_use_goes_on_by_itself() -> None:
+    """However many turns are dropped, and taken up again it does not move."""
+    u = 20.0 + np.cumsum(np.random.default_rng(2).standard_normal(5000))
+    path = followed(u, a=0.002)
+    h = float(recent_path.hysteresis(path))
+    assert path.count > recent_path.MOST // 2
+    assert h == pytest.approx(simulated(u, 0.002), abs=0.2)
+    assert with_decay(path, 0.002) == pytest.approx(h, abs=1e-9)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import gc
-import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -85,58 +82,3 @@ def test_a_channel_without_a_number_is_missing_and_stops_no_other() -> None:
     plain.run(u, np.where(gaps, np.nan, x))
     masked.run(u, np.ma.array(np.where(gaps, 1e3, x), mask=gaps))
     np.testing.assert_array_equal(masked.theta, plain.theta)
-
-
-def test_copies_are_independent() -> None:
-    u, x = records(200, 2)
-    bank = pz.EstimatorBank(pz.HysteresisRLS(SAMPLE_RATE), 2)
-    bank.run(u[:100], x[:100])
-    before = bank.theta
-    other = copy.copy(bank)
-    other.run(u[100:], x[100:])
-    np.testing.assert_array_equal(bank.theta, before)
-    bank.run(u[100:], x[100:])
-    np.testing.assert_array_equal(bank.theta, other.theta)
-
-
-@pytest.mark.parametrize("make", [pz.HysteresisRLS, pz.HysteresisEKF])
-def test_streaming_keeps_nothing_and_needs_no_collector(make: Any) -> None:
-    u, x = (values[:, 0].tolist() for values in records(3000, 4))
-    estimator, other = make(SAMPLE_RATE), make(SAMPLE_RATE)
-    for u_k, x_k in zip(u, x, strict=True):
-        estimator.step(u_k, x_k)
-    tracemalloc.start()
-    gc.collect()
-    before, _ = tracemalloc.get_traced_memory()
-    estimator.reset()
-    gc.disable()
-    try:
-        for u_k, x_k in zip(u, x, strict=True):
-            estimator.step(u_k, x_k)
-    finally:
-        gc.enable()
-    after, _ = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert after - before < 5000
-    for u_k, x_k in zip(u, x, strict=True):
-        other.step(u_k, x_k)
-    np.testing.assert_array_equal(estimator.theta, other.theta)
-
-
-def test_what_is_read_of_a_channel_stays_that_channels() -> None:
-    bank = pz.EstimatorBank(pz.HysteresisRLS(5000.0), 2)
-    bank.step([0.0, 1.0], [0.0, 0.2])
-    bank.step([1.0, 3.0], [0.1, 0.5])
-    first, second = bank.channel(0), bank.channel(1)
-    assert first.state["u_last"] == 1.0
-    assert second.state["u_last"] == 2.0  # from its first voltage on
-    assert bank.channel(0).to_dict() == first.to_dict()
-
-
-def test_a_voltage_that_waits_is_a_sample_without_a_measurement() -> None:
-    estimator = pz.HysteresisRLS(5000.0)
-    estimator.predict(5.0)
-    bank = pz.EstimatorBank(estimator, 1)
-    estimator.step(1.0, 0.1)
-    bank.step([1.0], [0.1])
-    assert bank.channel(0).to_dict() == estimator.to_dict()

@@ -73,13 +73,6 @@ def test_filter_is_filterpys_own(kind: Any, base: type) -> None:
     np.testing.assert_array_equal(covariances[-1], estimator.state_covariance)
 
 
-def test_what_filterpy_is_told_reaches_the_estimator() -> None:
-    estimator = pz.FilterPyEKF(1000.0)
-    estimator.filter.x = np.array([0.1, 0.03, 0.05, 0.2])
-    np.testing.assert_allclose(estimator.theta, [0.03, 0.15, 0.006])
-    np.testing.assert_array_equal(estimator.s, estimator.filter.x)
-
-
 def test_unscented_of_a_linear_gain_is_the_kalman_filter() -> None:
     u, x = record(400, 2000.0)
     options: dict[str, Any] = {"initial_model": pz.LinearGain(0.1), "mismatch": 0.0}

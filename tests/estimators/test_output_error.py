@@ -7,7 +7,6 @@ import pytest
 from numpy.typing import NDArray
 
 import piezoest as pz
-from piezoest.equations import output_error
 from tests.reference.output_error import OutputErrorFilter
 
 FloatArray = NDArray[np.float64]
@@ -23,18 +22,6 @@ def voltage(periods: float = 8.0) -> FloatArray:
 def loop_error(model: pz.ColemanHodgdon, u: FloatArray, offset: float = 0.0) -> float:
     """Largest difference over the last period [µm]."""
     return float(np.abs(model.simulate(u) - TRUE.simulate(u) - offset)[-400:].max())
-
-
-def test_recentre_describes_the_same_decay() -> None:
-    rng = np.random.default_rng(0)
-    root = rng.standard_normal((5, 5))
-    s, P = np.array([0.3, 1.0, 0.06, 0.1, 0.2]), root @ root.T
-    T = np.eye(5)
-    T[2, 0] = -0.15
-    expected_s, expected_P = T @ s, T @ P @ T.T
-    output_error.recentre(s, P, 0.15)
-    np.testing.assert_allclose(s, expected_s, rtol=1e-14)
-    np.testing.assert_allclose(P, expected_P, rtol=1e-12, atol=1e-14)
 
 
 # ---------------------------------------------------------------- what it learns
@@ -91,14 +78,6 @@ def test_noise_makes_no_wrong_loop(noise: float) -> None:
     assert loop_error(estimator.model, u) < 5e-3 + 2.0 * noise
 
 
-def test_a_decay_outside_the_bank_is_taken_for_its_end() -> None:
-    u = voltage(10.0)
-    estimator = pz.OutputErrorRLS(RATE, initial_model=pz.ColemanHodgdon(0.2, 0.147, 0.0429), span=2.0)
-    estimator.run(u, TRUE.simulate(u))
-    assert estimator.theta[0] >= estimator.decays[0] * 0.7
-    assert estimator.model.is_admissible
-
-
 # ---------------------------------------------------------------- what must not move it
 
 
@@ -114,19 +93,6 @@ def test_rest_moves_nothing() -> None:
     np.testing.assert_array_equal(estimator.theta, before)
     assert estimator.status.held == held + creep.size
     assert estimator.status.last == "held"
-
-
-def test_frozen_holds_the_parameters_and_keeps_up_with_the_voltage() -> None:
-    u = voltage(6.0)
-    x = TRUE.simulate(u)
-    held, free = pz.OutputErrorRLS(RATE), pz.OutputErrorRLS(RATE)
-    held.frozen = True
-    held.run(u, x)
-    np.testing.assert_array_equal(held.theta[:3], pz.OutputErrorRLS(RATE).theta[:3])
-    held.frozen = False
-    held.run(u, x)
-    free.run(np.tile(u, 2), np.tile(x, 2))
-    assert loop_error(held.model, u) < 0.02
 
 
 def test_holes_and_spikes_are_left_out() -> None:

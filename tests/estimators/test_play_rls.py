@@ -90,30 +90,6 @@ def test_grid_follows_the_voltage() -> None:
     assert estimator.model.is_admissible
 
 
-@pytest.mark.parametrize(
-    ("record", "name", "value", "words"),
-    [
-        ("plays", "half_width", 2.0, "the grid must be as"),
-        ("plays", "slopes", 3.0, "slopes must be as the arguments make it"),
-        ("law", "used", -1.0, "must be zero or more"),
-        ("law", "P", -1.0, "symmetric and positive"),
-        ("line", "position", 9.0, "position must be a whole number"),
-        ("resonance", "coefficients", 0.5, "coefficients must be as"),
-    ],
-)
-def test_saved_numbers_that_cannot_be_are_refused(record: str, name: str, value: float, words: str) -> None:
-    damper = pz.models.MassSpringDamper(700.0, 0.02)
-    data = pz.PrandtlIshlinskiiRLS(RATE, thresholds=4, bends=1, delay=2.5, mechanics=damper).to_dict()
-    pz.PrandtlIshlinskiiRLS.from_dict(data)
-    place: Any = data["state"][record]
-    key: Any = name
-    while isinstance(place[key], list):
-        place, key = place[key], 0
-    place[key] = value
-    with pytest.raises(ValueError, match=words):
-        pz.PrandtlIshlinskiiRLS.from_dict(data)
-
-
 def test_a_piezo_recorded(data_dir: Path) -> None:
     record = pz.read_record(data_dir / "discrete_backlash_operator" / "test_1hz.csv")
     u, x, rate = record.voltage, record.displacement, record.sample_rate

@@ -44,10 +44,6 @@ def made(*policies: Any, **options: Any) -> Any:
     return pz.HysteresisRLS(FS, policies=(*policies, *BASE), **options)
 
 
-def profile_of(swings: Any, theta: Any) -> Any:
-    return pz.AmplitudeProfile(swings, theta)
-
-
 def start() -> tuple[Any, Any, Any]:
     rng = np.random.default_rng(3)
     A = rng.normal(size=(3, 3))
@@ -104,18 +100,6 @@ def test_directional_forgetting_is_the_textbook() -> None:
     np.testing.assert_allclose(np.linalg.inv(P), information, rtol=1e-7)
 
 
-def test_directional_forgetting_keeps_what_is_not_excited() -> None:
-    """One direction for long: exponential forgetting loses the others, this does not."""
-    estimators = []
-    for policy in (p.Forgetting(20.0), p.DirectionalForgetting(20.0, "second")):
-        estimator = pz.RecursiveLeastSquares(2, P=1.0, policies=(policy,))
-        for k in range(2000):
-            estimator.update(1.0, [1.0, 0.0 if k else 1.0])
-        estimators.append(np.linalg.eigvalsh(estimator.P)[-1])
-    assert estimators[0] > 1e9
-    assert estimators[1] < 1.5
-
-
 def test_variable_forgetting_is_the_textbook() -> None:
     theta, P, rng = start()
     estimator = pz.RecursiveLeastSquares(
@@ -156,21 +140,6 @@ def test_a_step_of_the_gain_is_detected_once(forgetting: Any) -> None:
     expected = TRUE.theta * [1.0, 0.8, 0.8]
     errors = [np.abs(e.theta[:3] / expected - 1.0).max() for e in (with_it, without)]
     assert errors[0] < errors[1]
-
-
-def test_gate_shuts_where_nothing_excites() -> None:
-    u, x = record(6.0)
-    gated = made(p.RandomWalk(), p.ExcitationGate(0.2))
-    gated.run(u, x)
-    assert gated.excitation < 0.2
-    assert gated.status.updates < 64 * 3
-    assert gated.status.last == "held"
-    P = gated.P
-    gated.run(u, x)
-    np.testing.assert_array_equal(gated.P, P)
-    opened = made(p.RandomWalk(), p.ExcitationGate())
-    opened.run(u, x)
-    assert opened.status.updates > 0.9 * u.size
 
 
 def test_projection_keeps_theta_admissible() -> None:
@@ -224,13 +193,3 @@ def test_amplitudes_are_remembered(tmp_path: Path) -> None:
         errors.append(np.abs(e.theta[:3] / small.theta - 1.0).max())
     assert known.status.resets > resets
     assert errors[0] < errors[1]
-
-
-def test_commands_take_a_profile(tmp_path: Path) -> None:
-    from piezoest.cli.compensate_command import Stated, _model
-    from piezoest.export.commands import _read
-
-    path = tmp_path / "profile.json"
-    profile_of([30.0, 90.0], [[0.024, 0.14, 0.0046], TRUE.theta]).save(path)
-    assert _model(Stated(parameters=path)).model == TRUE
-    assert _read(path)[0] == TRUE

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from typing import Any
 
 import numpy as np
@@ -48,7 +47,7 @@ def test_continuous_law_is_the_papers(normalised: bool) -> None:
 def test_zero_regressor_for_good() -> None:
     for policies in ((pz.policies.NormBound(10.0),), (pz.policies.DeadZone(),)):
         law = pz.RecursiveLeastSquares(2, P=1.0, policies=(pz.policies.Forgetting(5.0), *policies))
-        for _ in range(20_000):
+        for _ in range(2000):
             law.update(0.3, [0.0, 0.0])
         assert np.all(np.isfinite(law.P))
         assert np.trace(law.P) <= 20.0
@@ -61,16 +60,6 @@ def test_covariance_resetting_below_the_floor_and_on_call() -> None:
     assert law.resets == pytest.approx(10, abs=2)
     law.reset_covariance()
     np.testing.assert_array_equal(law.P, [[1.0]])
-
-
-def test_wild_samples_are_skipped() -> None:
-    law = pz.RecursiveLeastSquares(2)
-    for z, phi in ((np.nan, [1.0, 1.0]), (1.0, [np.inf, 1.0]), (1e200, [1.0, 1.0])):
-        law.update(z, phi)
-    np.testing.assert_array_equal(law.theta, [0.0, 0.0])
-    law.update(1.0, [1.0, 0.0])
-    assert law.y == 1.0
-    assert pytest.approx(1e6 + 1.0) == law.S
 
 
 def law(n: int = 2, **options: Any) -> Any:
@@ -93,17 +82,3 @@ def law(n: int = 2, **options: Any) -> Any:
 def test_wrong_arguments(make: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make()
-
-
-def test_odd_outputs_are_numbers_or_missing_and_a_copy_is_independent() -> None:
-    law = pz.RecursiveLeastSquares(2)
-    law.update(np.array([2.0]), [1.0, 0.5])  # type: ignore[arg-type]
-    known = law.theta
-    assert np.any(known != 0.0)
-    for z in ("2", 10**400, None, 2j, [1.0, 2.0]):
-        law.update(z, [1.0, 0.5])  # type: ignore[arg-type]
-        assert np.array_equal(law.theta, known)
-    other = copy.copy(law)
-    other.update(5.0, [1.0, 0.0])
-    assert np.array_equal(law.theta, known)
-    assert not np.array_equal(other.theta, known)

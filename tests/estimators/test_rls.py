@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
@@ -80,7 +79,7 @@ def test_high_pass_removes_a_bias_of_the_sensor() -> None:
     assert worst(passed) < 1e-3 < 0.5 < worst(biased)
 
 
-@pytest.mark.parametrize("delay", [1.0, 3.0, 2.5])
+@pytest.mark.parametrize("delay", [0.5, 2.5, 3.0])
 def test_delay(delay: float) -> None:
     u, x = record(1.0)
     late = np.interp(np.arange(x.size) - delay, np.arange(x.size), x)
@@ -103,32 +102,6 @@ def test_long_gap_starts_anew() -> None:
     estimator = pz.HysteresisRLS(FS, memory=0.4)
     estimator.run(u, x)
     np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=1e-3)
-
-
-def test_continuous_law_in_seconds_adapts_over_seconds() -> None:
-    """The paper's normalised law is bounded per unit of time: in seconds it is the slower one."""
-    u, x = record(1.0)
-    errors = []
-    bases: tuple[Any, ...] = ("discrete", "continuous")
-    for base in bases:
-        estimator = pz.HysteresisRLS(FS, memory=0.4, time_base=base)
-        estimator.run(u, x)
-        errors.append(np.abs(estimator.theta / TRUE.theta - 1.0).max())
-    assert errors[0] < 1e-3 < errors[1]
-
-
-@pytest.mark.parametrize("options", [{}, {"memory": 0.4}], ids=["default", "the paper's"])
-def test_without_errors_nothing_else_changes(options: dict[str, Any]) -> None:
-    u, x = record(0.5, 1e-3)
-    estimator = pz.HysteresisRLS(FS, **options)
-    lean = pz.HysteresisRLS(FS, errors=False, **options)
-    assert np.array_equal(lean.run(u, x).theta, estimator.run(u, x).theta)
-    assert estimator.excitation > 0.0
-    assert np.isnan(lean.excitation)
-    assert np.array_equal(lean.standard_errors, np.sqrt(np.diag(lean.P)))
-    assert not np.allclose(lean.standard_errors, estimator.standard_errors, rtol=0.01)
-    again = pz.HysteresisRLS.from_dict(json.loads(json.dumps(lean.to_dict())))
-    assert np.array_equal(again.standard_errors, lean.standard_errors)
 
 
 @pytest.mark.parametrize(

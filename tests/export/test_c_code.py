@@ -95,16 +95,7 @@ def tool(name: str) -> str:
 # ---------------------------------------------------------------- the text
 
 
-@pytest.mark.parametrize("name", PAIRS)
-def test_same_input_gives_the_same_text(name: str) -> None:
-    first, second = code(name), code.__wrapped__(name)
-    assert (first.header, first.source) == (second.header, second.source)
-    for word in ("malloc", "calloc", "goto"):
-        assert word not in first.source
-
-
-@pytest.mark.parametrize("cc", ["gcc", "clang"])
-@pytest.mark.parametrize("precision", ["double", "float"])
+@pytest.mark.parametrize(("cc", "precision"), [("gcc", "float"), ("clang", "double")])
 def test_compiles_without_a_warning(cc: str, precision: str, tmp_path: Path) -> None:
     cc = tool(cc)
     for name in PAIRS:
@@ -114,24 +105,6 @@ def test_compiles_without_a_warning(cc: str, precision: str, tmp_path: Path) -> 
             cwd=tmp_path, capture_output=True, text=True, check=False,
         )  # fmt: skip
         assert done.returncode == 0, f"{name}: {done.stderr}"
-
-
-@pytest.mark.parametrize("precision", ["double", "float"])
-def test_cppcheck_is_silent(precision: str, tmp_path: Path) -> None:
-    cppcheck = tool("cppcheck")
-    for name in PAIRS:
-        code(name, precision).write(tmp_path)
-        # The public functions are called from elsewhere, math.h is not looked into.
-        options = [
-            "--enable=all",
-            "--std=c99",
-            "--suppress=missingIncludeSystem",
-            "--suppress=unusedFunction",
-        ]
-        command = [cppcheck, *options, "--quiet", "--error-exitcode=1", "controller.c"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, f"{name}: {done.stderr}"
-        assert done.stdout + done.stderr == ""
 
 
 # ---------------------------------------------------------------- parity
@@ -173,31 +146,6 @@ def test_double_equals_the_library_over_every_scenario(kind: str) -> None:
     assert total >= 500_000
 
 
-@pytest.mark.parametrize("name", ["plays", "plays-bent", "plays-none"])
-def test_float_follows_the_library_through_plays_and_bends(name: str) -> None:
-    n = 100_000
-    r = np.concatenate([np.zeros(1), np.linspace(0.5, 4.0, n) * np.sin(np.arange(n) * 1e-3)])
-    theirs = PAIRS[name]()[1].run(r)
-    ours = pz.export.CompiledController(code(name, "float")).run(r, r)
-    assert np.max(np.abs(ours - theirs)) < 2e-3
-
-
-@pytest.mark.parametrize("name", ["rls", "ekf"])
-def test_float_settles_to_the_same_error(name: str) -> None:
-    case = SCENARIOS["cold-start"].build(0, after=10, **AT)
-    estimator, compensator = PAIRS[name]()
-    single = pz.export.CompiledController(code(name, "float"))
-    library = pz.track(
-        case.reference,
-        stage=case.new_stage(),
-        compensator=compensator,
-        estimator=estimator,
-    )
-    own = pz.track(case.reference, stage=case.new_stage(), compensator=single)
-    # Rounding moves the samples at which a model is handed over.
-    assert own.max_error(2) == pytest.approx(library.max_error(2), rel=0.03)
-
-
 # ---------------------------------------------------------------- handling
 
 
@@ -222,34 +170,6 @@ def test_freeze_holds_the_model_as_in_python(name: str) -> None:
             voltages.append(u)
         assert np.array_equal(before, ours.parameters) == frozen
         np.testing.assert_array_equal(voltages[0], voltages[1])
-
-
-def test_parameters_can_be_set(log: tuple[Any, Any]) -> None:
-    r, x = log
-    ours = pz.export.CompiledController(code("inverse"))
-    compensator = inverse()
-    ours.run(r[:500], x[:500])
-    compensator.run(r[:500])
-    ours.parameters = [0.021, 0.14, 0.0042, 0.1]
-    compensator.model = pz.ColemanHodgdon(0.021, 0.14, 0.0042, 0.1)
-    np.testing.assert_array_equal(ours.run(r[500:], x[500:]), compensator.run(r[500:]))
-    # An inadmissible model becomes its nearest admissible one; one that is no number is refused.
-    ours.parameters = [0.021, 0.14, 0.1, 0.0]
-    assert pz.ColemanHodgdon(*ours.parameters).is_admissible
-    for wrong in ([np.nan, 0.1, 0.1, 0.0], [0.02, np.inf, 0.1, 0.0]):
-        with pytest.raises(ValueError, match="parameters"):
-            ours.parameters = wrong
-
-
-def test_limits_are_kept_and_can_be_set(log: tuple[Any, Any]) -> None:
-    r, x = log
-    ours = pz.export.CompiledController(code("inverse"))
-    ours.set_limits(-5.0, 4.0)
-    u = ours.run(r, x)
-    assert u.min() == -5.0
-    assert u.max() == 4.0
-    with pytest.raises(ValueError, match="below"):
-        ours.set_limits(3.0, 3.0)
 
 
 DRIVER = """#include "controller.h"
@@ -292,20 +212,6 @@ def test_sanitizers_are_silent(name: str, tmp_path: Path, log: tuple[Any, Any]) 
 # ---------------------------------------------------------------- refusals
 
 
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        ({"name": "9lives"}, "name"),
-        ({"name": "double-u"}, "name"),
-        ({"precision": "half"}, "precision"),
-        ({"update_interval": 0}, "update_interval"),
-    ],
-)
-def test_wrong_arguments_are_refused(arguments: dict[str, Any], word: str) -> None:
-    with pytest.raises(ValueError, match=word):
-        pz.export.c(*PAIRS["rls"](), **arguments)
-
-
 def test_what_has_no_kernel_is_refused() -> None:
     with pytest.raises(ValueError, match="FilterPyEKF"):
         pz.export.c(pz.FilterPyEKF(FS), inverse())
@@ -321,9 +227,45 @@ def test_what_has_no_kernel_is_refused() -> None:
         pz.export.c(rls(), pz.InverseCompensator(PLAYS))
 
 
-def test_plays_keep_their_model() -> None:
-    ours = pz.export.CompiledController(code("plays-bent"))
-    np.testing.assert_array_equal(ours.parameters, [BENT.gain, 0.0, 0.0, BENT.offset])
-    with pytest.raises(ValueError, match="no model"):
-        ours.parameters = [0.02, 0.12, 0.0036, 0.0]
-    assert "model of this controller is fixed" in ours.code.header
+@pytest.mark.parametrize("name", ["rls", "ekf"])
+def test_float_settles_to_the_same_error(name: str) -> None:
+    case = SCENARIOS["cold-start"].build(0, after=10, **AT)
+    estimator, compensator = PAIRS[name]()
+    single = pz.export.CompiledController(code(name, "float"))
+    library = pz.track(
+        case.reference,
+        stage=case.new_stage(),
+        compensator=compensator,
+        estimator=estimator,
+    )
+    own = pz.track(case.reference, stage=case.new_stage(), compensator=single)
+    # Rounding moves the samples at which a model is handed over.
+    assert own.max_error(2) == pytest.approx(library.max_error(2), rel=0.03)
+
+
+def test_parameters_can_be_set(log: tuple[Any, Any]) -> None:
+    r, x = log
+    ours = pz.export.CompiledController(code("inverse"))
+    compensator = inverse()
+    ours.run(r[:500], x[:500])
+    compensator.run(r[:500])
+    ours.parameters = [0.021, 0.14, 0.0042, 0.1]
+    compensator.model = pz.ColemanHodgdon(0.021, 0.14, 0.0042, 0.1)
+    np.testing.assert_array_equal(ours.run(r[500:], x[500:]), compensator.run(r[500:]))
+    # An inadmissible model becomes its nearest admissible one; one that is no number is refused.
+    ours.parameters = [0.021, 0.14, 0.1, 0.0]
+    assert pz.ColemanHodgdon(*ours.parameters).is_admissible
+    for wrong in ([np.nan, 0.1, 0.1, 0.0], [0.02, np.inf, 0.1, 0.0]):
+        with pytest.raises(ValueError, match="parameters"):
+            ours.parameters = wrong
+
+
+def test_limits_are_kept_and_can_be_set(log: tuple[Any, Any]) -> None:
+    r, x = log
+    ours = pz.export.CompiledController(code("inverse"))
+    ours.set_limits(-5.0, 4.0)
+    u = ours.run(r, x)
+    assert u.min() == -5.0
+    assert u.max() == 4.0
+    with pytest.raises(ValueError, match="below"):
+        ours.set_limits(3.0, 3.0)

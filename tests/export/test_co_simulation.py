@@ -47,13 +47,6 @@ def test_is_valid(kind: str, precision: Any, tmp_path: Path) -> None:
     assert validation.validate_fmu(str(path)) == []
 
 
-def test_holds_sources_and_a_binary(unit: Path) -> None:
-    names = zipfile.ZipFile(unit).namelist()
-    assert "sources/piezoest_controller.c" in names
-    assert "sources/fmi2.c" in names
-    assert any(name.startswith("binaries/") for name in names)
-
-
 def start(unit: Path, folder: Path) -> Any:
     description = fmpy.read_model_description(str(unit))
     fmpy.extract(str(unit), unzipdir=str(folder))

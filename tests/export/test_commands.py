@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 from typer.testing import CliRunner, Result
@@ -90,11 +89,6 @@ def test_profile_is_the_same_as_the_objects(model: Path) -> None:
     assert Path("out/stage.c").read_text() == code.source
 
 
-def test_estimator_alone_is_a_profile(model: Path) -> None:
-    model.write_text(json.dumps(pz.HysteresisEKF(20_000.0).to_dict()))
-    assert run("c", model, "-o", "out").exit_code == 0
-
-
 def test_tables_are_written(model: Path) -> None:
     r = pz.signals.triangle(2.0, 5.0, 1, 1000.0)
     write_columns("r.csv", {"time_s": r.time, "reference_um": r.values})
@@ -108,43 +102,10 @@ def test_tables_are_written(model: Path) -> None:
     ("arguments", "word"),
     [
         (("c", "model.json", "-o", "out", "--estimator", "rls"), "--sample-rate"),
-        (("c", "model.json", "-o", "out", "--estimator", "kalman"), "kalman"),
         (("c", "model.json", "-o", "out", "--precision", "half"), "precision"),
-        (("c", "absent.json", "-o", "out"), "absent.json"),
         (("c", "model.json", "-o", "out", "--minimum", 5, "--maximum", 1), "minimum"),
-        (("fmu", "model.json", "-o", "out.zip", "--sample-rate", 1e4), ".fmu"),
         (("fmu", "model.json", "-o", "out.fmu"), "sample_rate"),
     ],
 )
 def test_mistakes_are_one_sentence(model: Path, arguments: tuple[object, ...], word: str) -> None:
     refused(run(*arguments), word)
-
-
-SAVED = pz.HysteresisRLS(50_000.0).to_dict()
-LACKING = {
-    name: {key: value for key, value in SAVED.items() if key != name} for name in ("arguments", "state")
-}
-
-
-@pytest.mark.parametrize(
-    ("content", "word"),
-    [
-        ("no json", "model.json"),
-        ([], "no model"),
-        ({"model": "Unknown"}, "Unknown"),
-        ({"estimator": "Unknown"}, "Unknown"),
-        (SAVED | {"arguments": None}, "model.json: its estimator is not what to_dict"),
-        (SAVED | {"arguments": {"no": 1}}, "not what to_dict"),
-        (SAVED | {"arguments": {"sample_rate": 10**400}}, "not what to_dict"),
-        (SAVED | {"state": {}}, "not what to_dict"),
-        (LACKING["arguments"], "has no 'arguments'"),
-        (LACKING["state"], "has no 'state'"),
-        *(
-            ({"model": MODEL, "limits": wrong}, "")
-            for wrong in ([1], "x", 5, {"maximum": 10**400}, {"no": 1})
-        ),
-    ],
-)
-def test_files_that_hold_no_controller_are_refused(model: Path, content: Any, word: str) -> None:
-    model.write_text(content if isinstance(content, str) else json.dumps(content))
-    refused(run("c", model, "-o", "out"), word)

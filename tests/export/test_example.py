@@ -18,6 +18,7 @@ def run(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["double", "float"])
 def test_loop_of_the_example_equals_the_library(precision: str, tmp_path: Path) -> None:
     if not (shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")):
@@ -28,6 +29,7 @@ def test_loop_of_the_example_equals_the_library(precision: str, tmp_path: Path) 
     assert (tmp_path / "piezoest_controller.c").exists()
 
 
+@pytest.mark.slow
 def test_target_gives_the_voltages_of_the_host(tmp_path: Path) -> None:
     absent = [
         name for name in ("arm-none-eabi-gcc", "arm-none-eabi-objdump", "qemu-system-arm")

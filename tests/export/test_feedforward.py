@@ -32,7 +32,10 @@ def controller(estimators: str, limits: pz.VoltageLimits = LIMITS) -> Any:
     return pz.AdaptiveFeedforward(FS, limits=limits, estimators=ESTIMATORS[estimators])
 
 
-@pytest.fixture(scope="module", params=ESTIMATORS)
+@pytest.fixture(
+    scope="module",
+    params=["default", *(pytest.param(name, marks=pytest.mark.slow) for name in ("ekf", "line"))],
+)
 def pair(request: pytest.FixtureRequest) -> tuple[Any, Any]:
     """A controller, and what is exported of it."""
     library = controller(request.param)
@@ -97,18 +100,6 @@ def test_voltages_are_the_librarys_over_all_stages_and_faults(pair: tuple[Any, A
     assert len(faults) >= 4
 
 
-def test_it_begins_anew_at_another_voltage(pair: tuple[Any, Any]) -> None:
-    library, board = pair
-    library.reset(-40.0)
-    board.reset(-40.0)
-    drive(library, board, rig("duhem"), count=2000)
-    for outside in (-101.0, 100.5, np.nan):
-        with pytest.raises(ValueError, match="limits"):
-            board.reset(outside)
-    r = [1.0, 2.0, 1.0]
-    np.testing.assert_array_equal([board.step(each) for each in r], [library.step(each) for each in r])
-
-
 def test_it_goes_on_from_where_it_was_exported() -> None:
     library = controller("line", pz.VoltageLimits(-100.0, 100.0, 2e4, FS))
     stage = rig("duhem").stage()
@@ -135,14 +126,6 @@ def test_a_gain_that_is_known_need_not_be_right(gain: float) -> None:
     assert any(event.reason.startswith("gain") for event in library.events) == (gain < 0.0)
 
 
-def test_what_the_model_was_learnt_on_changes_no_voltage() -> None:
-    known = pz.models.LearntOn((-20.0, 20.0), (-4.0, 4.0), 1e3, (20.0, 20.0))
-    learnt = pz.models.LearntModel(pz.LinearGain(0.2), known)
-    library = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), model=learnt)
-    drive(library, pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem"))
-    assert [event.reason.split(":")[0] for event in library.events] == ["outside"]
-
-
 @pytest.mark.parametrize("begin", [0, 2500])
 def test_it_homes(begin: int) -> None:
     library = pz.AdaptiveFeedforward(FS, limits=pz.VoltageLimits(-100.0, 100.0, 2e4, FS), estimators=())
@@ -157,48 +140,24 @@ def test_it_homes(begin: int) -> None:
             board.home(*wrong)
 
 
-def test_writes_that_may_be_lost_are_told() -> None:
-    library = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(pz.HysteresisEKF,))
-    board, own = pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem")
-    stage = own.stage()
-    for k, r in enumerate(own.reference.tolist()):
-        u = library.step(r)
-        assert board.step(r) == u
-        x = float(stage.step(u))
-        for each in (library, board):
-            each.learn(None if 4000 < k < 4030 else u, x)
-    assert [event.reason.split(":")[0] for event in library.events].count("unknown voltage") == 1
-
-
 # ---------------------------------------------------------------- float
-
-
-def test_float_follows_as_well(single: Any) -> None:
-    r = pz.signals.triangle(5.0, 20.0, 20, FS)
-    errors = []
-    for driver in (controller("default"), single):
-        stage = pz.PaperStage(FS, seed=0)
-        driver.reset(0.0)
-        errors.append(pz.track(r, stage=stage, controller=driver).max_error(4))
-    assert single.status[0] == 2
-    assert single.status[1] > 0
-    assert errors[1] == pytest.approx(errors[0], rel=0.3)
 
 
 def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> None:
     rng = np.random.default_rng(1)
     wild = np.array([np.nan, np.inf, -np.inf, 1e308, -1e308, 1e30, -1e30, 9e8, -9e8, 1e5, 0.0, 1e-45])
-    n, stages = 6000, set()
+    n, stages = 4000, set()
     for gain in (1e-6, 0.15, 1e4):
         single.reset(0.0)
         r = 40.0 * gain * np.sin(np.arange(n) * 0.01)
-        odd = np.where(np.arange(n) > 2000, rng.random((3, n)) < 0.02, False)
+        odd = (rng.random((3, n)) < 0.02) & (np.arange(n) > 1500)
+        drawn = rng.choice(wild, (3, n))
         u = 0.0
         for k in range(n):
-            u = single.step(rng.choice(wild) if odd[0, k] else r[k])
+            u = single.step(drawn[0, k] if odd[0, k] else r[k])
             assert -100.0 <= u <= 100.0
             x = gain * (u + 0.01 * rng.normal())
-            single.learn(rng.choice(wild) if odd[1, k] else u, rng.choice(wild) if odd[2, k] else x)
+            single.learn(drawn[1, k] if odd[1, k] else u, drawn[2, k] if odd[2, k] else x)
             stages.add(single.status[0])
     assert stages == {0, 1, 2}
 
@@ -209,10 +168,9 @@ def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> N
 @pytest.mark.parametrize(
     ("estimators", "precision", "cc"),
     [
-        ("default", "float", "gcc"),
-        ("default", "double", "clang"),
-        ("ekf", "float", "gcc"),
         ("line", "double", "gcc"),
+        pytest.param("default", "double", "clang", marks=pytest.mark.slow),
+        pytest.param("ekf", "float", "gcc", marks=pytest.mark.slow),
     ],
 )
 def test_compiles_without_a_warning(estimators: str, precision: Any, cc: str, tmp_path: Path) -> None:
@@ -258,6 +216,7 @@ int main(void)
 """
 
 
+@pytest.mark.slow
 def test_sanitizers_are_silent(tmp_path: Path) -> None:
     library, stage = controller("default"), rig("bouc-wen").stage()
     pairs = np.zeros((rig("bouc-wen").reference.size, 2))

@@ -45,24 +45,12 @@ def test_branches_run_between_turning_points() -> None:
     assert falling[middle, 1] < rising[middle, 1] - 1.0
 
 
-def test_two_tones_have_a_branch_for_each_way() -> None:
-    t = np.arange(5000) / 5000.0
-    made = pz.export.table(
-        MODELS["plays"], 3.0 * np.sin(2.0 * np.pi * t) + 1.5 * np.sin(6.0 * np.pi * t), sample_rate=5000.0
-    )
-    assert len(made.branches) == 6
-
-
 def test_files_can_be_read_back(tmp_path: Path) -> None:
     made = pz.export.table(MODELS["coleman-hodgdon"], pz.signals.triangle(4.0, 5.0, 1, 5000.0))
     waveform, branches = made.write(tmp_path / "new")
     record = read_record(waveform, columns={"displacement": "reference_um"})
     np.testing.assert_allclose(record.voltage, made.voltage, rtol=1e-8)
     assert branches.read_text().splitlines()[0] == "branch,displacement_um,voltage_V"
-
-
-def test_a_constant_has_no_branches() -> None:
-    assert pz.export.table(MODELS["line"], np.zeros(10), sample_rate=10.0).branches == ()
 
 
 def test_wrong_references_are_refused() -> None:

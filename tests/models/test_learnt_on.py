@@ -74,55 +74,6 @@ def test_steps_spikes_rests_and_converters_are_no_rate() -> None:
     assert LearntOn.of(rest, rest, FS) == LearntOn((0.0, 0.0), (0.0, 0.0), 0.0)
 
 
-def test_noise_is_no_swing() -> None:
-    ramp = np.linspace(0.0, 10.0, 1000)
-    assert LearntOn.of(ramp, ramp, FS).frequency is None
-    noise = 0.3 * np.random.default_rng(0).normal(size=wave().size)
-    found = LearntOn.of(wave() + noise, 0.1 * wave() + noise, FS)
-    assert found.frequency == pytest.approx((5.0, 5.0), rel=0.04)
-    assert found.rate == pytest.approx(800.0, rel=0.5)
-
-
-@pytest.mark.parametrize(
-    ("u", "x", "fs", "message"),
-    [
-        ([1.0, 2.0], [1.0], FS, "same length"),
-        ([np.nan], [1.0], FS, "u holds no number"),
-        ([1.0], [np.inf], FS, "x holds no number"),
-        ([1.0], [1.0], 0.0, "sample_rate must"),
-        ([[1.0]], [1.0], FS, "u must have shape"),
-    ],
-)
-def test_what_is_no_log_is_refused(u: Any, x: Any, fs: float, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        LearntOn.of(u, x, fs)
-
-
-@pytest.mark.parametrize(
-    ("field", "value", "message"),
-    [
-        ("voltage", [1.0], "voltage must be a pair"),
-        ("voltage", "ab", "voltage must be a pair"),
-        ("voltage", [2.0, 1.0], "voltage must be the lowest and the highest"),
-        ("displacement", [0.0, np.nan], "displacement must be finite"),
-        ("displacement", None, "displacement must be a pair"),
-        ("rate", -1.0, "rate must be zero or more"),
-        ("rate", None, "rate must be one number"),
-        ("frequency", [-1.0, 1.0], "frequency must be zero or more"),
-        ("colour", 1.0, "unknown fields"),
-    ],
-)
-def test_what_is_no_range_is_refused(field: str, value: Any, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        LearntOn.from_dict(KNOWN.to_dict() | {field: value})
-
-
-@pytest.mark.parametrize("known", [KNOWN, LearntOn((0.0, 1.0), (0.0, 1.0), 1.0)])
-def test_ranges_survive_json(known: LearntOn) -> None:
-    assert LearntOn.from_dict(json.loads(json.dumps(known.to_dict()))) == known
-    assert hash(known) == hash(LearntOn.from_dict(known.to_dict()))
-
-
 def test_blocks_of_a_log_have_the_ranges_of_the_log() -> None:
     u = np.concatenate((wave(20.0, 2.0), wave(40.0, 10.0)))
     parts = [LearntOn.of(part, 0.1 * part, FS) for part in np.split(u, 4)]
@@ -193,37 +144,3 @@ def test_a_model_comes_in_many_forms(tmp_path: Path) -> None:
     line = LearntModel(pz.LinearGain(0.1), KNOWN)
     assert LearntModel.from_dict(line.to_dict()) == line
     assert model_from_dict(both.to_dict()["model"]) == LOOP
-
-
-def test_an_offset_takes_the_displacement_with_it() -> None:
-    moved = LearntModel(LOOP, KNOWN).with_offset(1.0)
-    assert moved.model.offset == 1.0
-    assert moved.learnt_on is not None
-    assert moved.learnt_on.displacement == (-8.0, 4.0)
-    assert moved.learnt_on.voltage == KNOWN.voltage
-    assert LearntModel(LOOP).with_offset(1.0).model.offset == 1.0
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("[1]", "model.json holds no model"),
-        ('{"model": 3}', "model.json holds no model"),
-        ('{"model": {"alpha": 1}}', "model.json: ColemanHodgdon has no 'beta'"),
-        (json.dumps(LearntModel(LOOP).to_dict() | {"learnt_on": 3}), "model.json: learnt_on must be"),
-        (json.dumps(LearntModel(LOOP).to_dict() | {"learnt_on": {}}), "learnt_on has no 'voltage'"),
-    ],
-)
-def test_a_file_without_a_model_is_refused(tmp_path: Path, text: str, message: str) -> None:
-    file = tmp_path / "model.json"
-    file.write_text(text)
-    with pytest.raises(ValueError, match=message):
-        LearntModel.read(file)
-
-
-def test_what_is_no_model_is_refused() -> None:
-    for wrong in (3.0, None, SimpleNamespace(model=3.0)):
-        with pytest.raises(ValueError, match="model must be a model, as LinearGain"):
-            LearntModel.of(wrong)
-    with pytest.raises(ValueError, match="learnt_on must be"):
-        LearntModel(LOOP, {})  # type: ignore[arg-type]

@@ -66,36 +66,22 @@ def plays(*arguments: Any, **fields: Any) -> Any:
     ("call", "message"),
     [
         (plays(0.1, [1.0, 2.0], [0.1]), "weights must have one value per threshold"),
-        (plays(0.1, [0.0, 2.0], [0.1, 0.1]), "thresholds must be above zero.*add the weight"),
         (plays(0.1, [2.0, 1.0], [0.1, 0.1]), "thresholds must rise"),
-        (plays(0.1, [1.0, 1.0], [0.1, 0.1]), "thresholds must rise"),
         (plays(np.nan, [1.0], [0.1]), "gain must be finite"),
-        (plays(0.1, [[1.0]], [0.1]), "thresholds must have shape"),
         (plays(bends=[1.0]), "bend_weights"),
-        (plays(bends=[2.0, 1.0], bend_weights=np.zeros((2, 2))), "bends"),
         (plays(creep=3.0), "creep"),
-        (plays(sample_rate=0.0), "sample_rate"),
         (lambda: PrandtlIshlinskii.from_theta([0.1, 1.0]), "1 \\+ 2n values"),
-        (lambda: PrandtlIshlinskii(0.1, [1.0, 2.0], [-0.2, 0.3]).invert(ONES), r"lowest slope is -0\.1"),
         (
             lambda: MODEL.simulate(ONES, initial_state=np.array([0.0, 50.0])),
             "cannot be reached by any voltage",
         ),
-        (lambda: MODEL.simulate(ONES, initial_state=np.zeros(3)), "must hold 2 play states, got 3"),
         (lambda: Creep([0.1], [0.0]), "time_constants must be above zero"),
-        (lambda: Creep([0.1, 0.2], [1.0]), "one value per gain"),
         (lambda: Creep.logarithmic(0.01, shortest=1.0, longest=0.1), "longest must be above"),
-        (lambda: Creep.from_dict({"gains": [1.0]}), "creep has no 'time_constants'"),
         (
             lambda: CREEP.simulate(ONES, sample_rate=1e3, initial_state=np.zeros(3)),
             "initial_state must hold 4",
         ),
-        (lambda: MassSpringDamper(0.0, 0.02), "natural_frequency must be above zero"),
         (lambda: MassSpringDamper.from_dict({}), "mechanics has no 'natural_frequency'"),
-        (
-            lambda: MECHANICS.simulate(ONES, sample_rate=1e4, initial_state=np.zeros(1)),
-            "displacement and velocity",
-        ),
     ],
 )
 def test_refusals(call: Any, message: str) -> None:
@@ -117,13 +103,6 @@ def test_creep() -> None:
     ]
     np.testing.assert_array_equal(halves[0], x[:5])
     assert halves[1][0] == pytest.approx(np.sum(creep.gains * creep.decays(1000.0)))
-
-
-def test_many_plays_are_counted_not_listed() -> None:
-    model = PrandtlIshlinskii(0.1, np.arange(1.0, 41.0), np.full(40, 0.002), offset=1.5)
-    assert (
-        repr(model) == "PrandtlIshlinskii(gain=0.1, 40 plays up to 40 V, 0 bends, 0 creep terms, offset=1.5)"
-    )
 
 
 def test_mechanics() -> None:

@@ -12,7 +12,6 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-import piezoest as pz
 from piezoest.models._base import REGISTERED
 
 GOOD = """
@@ -79,28 +78,3 @@ def test_says_what_is_wrong(make: Make, old: str, new: str, words: str) -> None:
     model = make(old, new)
     with pytest.raises(TypeError, match=words):
         model(0.15, 0.01).simulate(np.zeros(3))
-
-
-def test_functions_in_no_file_are_refused(make: Make) -> None:
-    model = make()
-    Path(importlib.import_module(model.__module__).__file__ or "").unlink()
-    with pytest.raises(TypeError, match="must stand in a file"):
-        model(0.15, 0.01).simulate(np.zeros(3))
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [("state[0] = u\n", "state[0] = u if u > u_0 else u_0\n"), ("state[0] = u\n", "a, b = constants\n")],
-)
-def test_a_fit_says_that_symbols_have_no_values(make: Make, old: str, new: str) -> None:
-    model = make(old, new)
-    with pytest.raises(TypeError, match="displacement does not work on a fit's symbols"):
-        pz.BatchFit(1000.0, initial_model=model(0.15, 0.01))
-
-
-def test_a_parameter_that_starts_below_zero_is_free_in_a_fit(make: Make) -> None:
-    model = make()
-    u = pz.signals.triangle(33.0, 5.0, periods=2, sample_rate=1000.0).values
-    fit = pz.BatchFit(1000.0, initial_model=model(0.1, -0.03))
-    fit.run(u, model(0.15, 0.02).simulate(u))
-    np.testing.assert_allclose(fit.model.theta, [0.15, 0.02], rtol=1e-3)

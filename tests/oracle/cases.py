@@ -23,12 +23,8 @@ SCALE = "scale of a robust loss, which is sought to 2 %, from another start"
 # ("jump"), with the file's code by 5e-4 and 2.3e-3, and the parameters by 0.001 standard errors.
 SINGULAR = "rounding, in the inverse of an almost singular covariance"
 
-# Theta is projected after updates alone, in the file again at samples that a dead zone held.
-PROJECTED = "rounding, of a projection of what is projected already"
-
 # Numbers that may differ from the file's: prefix of case/array -> relative tolerance, reason.
 TOLERATED: dict[str, tuple[float, str]] = {
-    "c/rls-policies": (1e-11, PROJECTED),
     "batch": (1e-6, "solver's tolerance"),
     "batch/creep": (1e-5, "solver's tolerance, on a gain that is zero within its error"),
     "batch/huber": (3e-5, SCALE),

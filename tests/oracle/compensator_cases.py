@@ -1,4 +1,4 @@
-"""Cases of compensators: limits, faults in the reference, hand-over of models, feedback and lead."""
+"""Cases of compensators: limits, faults in the reference, hand-over of models."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 import piezoest as pz
 from tests.oracle.filter_cases import BENT, PLAYS
 from tests.oracle.model_cases import CREEPING, MODELS, VOLTAGES
-from tests.oracle.outcome import Cases, Outcome, compensator_numbers, flat, model_numbers
-from tests.oracle.records import LINE, RATE, START, TRUE, Array, rounded
+from tests.oracle.outcome import Cases, Outcome, compensator_numbers, flat
+from tests.oracle.records import LINE, RATE, START, Array, rounded
 
 LIMITS = pz.VoltageLimits(-60.0, 60.0)
 TIGHT = pz.VoltageLimits(-20.0, 25.0, slew_rate=1200.0, sample_rate=RATE)
@@ -67,24 +67,6 @@ def handed_over(name: str, limits: Any, models: tuple[str, ...]) -> Outcome:
     }
 
 
-def integral(name: str, gain: float, limits: Any) -> Outcome:
-    feedback = pz.IntegralFeedback(FEED_FORWARD[name](limits), gain=gain, sample_rate=RATE)
-    plant, x = pz.SimulatedStage(RATE, TRUE, gauge=pz.Gauge(1e-3), seed=2), None
-    rows = []
-    for k, r in enumerate(faulty("sine").tolist()):
-        u = feedback.step(None if np.isnan(r) else r, None if k % 17 == 3 else x)
-        x = plant.step(u)
-        rows.append((u, x, feedback.integral))
-    return {"ring": flat(rows), "model": model_numbers(feedback.model)}
-
-
-def lead(name: str, options: dict[str, float]) -> Outcome:
-    mechanics = pz.MassSpringDamper(80.0, 0.1)
-    return feed_forward(
-        pz.LeadFilter(FEED_FORWARD[name](TIGHT), mechanics, sample_rate=RATE, **options), faulty("sine")
-    )
-
-
 # Models that are handed over on the way, by compensator.
 ORDERS: dict[str, str] = {
     "inverse": "coleman-hodgdon line coleman-hodgdon-offset plays wrong creeping start bent line",
@@ -95,7 +77,6 @@ ORDERS: dict[str, str] = {
     "inverse-abrupt": "coleman-hodgdon plays line bent start",
     "inverse-integrated": "coleman-hodgdon start line coleman-hodgdon-offset",
 }
-LEADS: tuple[dict[str, float], ...] = ({}, {"delay": 2e-3}, {"smoothing": 5e-3, "delay": 5e-4})
 RANGES: dict[str, Any] = {"free": None, "limited": LIMITS, "tight": TIGHT}
 
 
@@ -110,9 +91,4 @@ def cases() -> Cases:
         for limited, limits in {"limited": within, "tight": TIGHT}.items():
             case = partial(handed_over, name, limits, tuple(models.split()))
             made[f"hand-over/{name}-{limited}"] = case
-    for name in ("inverse", "line", "plays"):
-        for gain, limits in ((5.0, LIMITS), (60.0, TIGHT)):
-            made[f"integral/{name}-{gain:g}"] = partial(integral, name, gain, limits)
-        for number, options in enumerate(LEADS):
-            made[f"lead/{name}-{number}"] = partial(lead, name, options)
     return made

@@ -10,9 +10,11 @@ import numpy as np
 import piezoest as pz
 from tests.oracle.filter_cases import BENT, OTHER, PLAYS
 from tests.oracle.outcome import Cases, Outcome, flat
-from tests.oracle.records import LINE, RATE, TRUE, Array, dwelling, sine, triangle, walk
-from tests.oracle.rls_cases import PROFILE
+from tests.oracle.records import LINE, RATE, START, TRUE, Array, dwelling, sine, triangle, walk
 
+PROFILE = pz.AmplitudeProfile(
+    np.array([20.0, 40.0, 66.0]), np.array([TRUE.theta, START.theta, 1.1 * TRUE.theta])
+)
 PREISACH = pz.Preisach(0.08, np.linspace(3.0, 30.0, 5), np.full(5, 0.02), 15.0, 40.0, 0.2)
 NO_PLAYS = pz.PrandtlIshlinskii(0.15, [], [], 0.3)
 CREEPING = pz.PrandtlIshlinskii(
@@ -64,13 +66,6 @@ def model_methods() -> Outcome:
         "mechanics": mechanics.simulate(u, sample_rate=RATE),
         "coefficients": flat(creep.decays(RATE), mechanics.coefficients(RATE)),
     }
-
-
-def table(name: str) -> Outcome:
-    """Settled voltage of a periodic reference, for controllers that take no code."""
-    reference = pz.signals.from_array(0.1 * (sine(33.0, length=200) + sine(20.0, 15.0, 200)), RATE, 200.0)
-    made = pz.export.table(MODELS[name], reference, points=33)
-    return {"voltage": made.voltage, "reference": made.reference, "branches": flat(*made.branches)}
 
 
 # ---------------------------------------------------------------- stages
@@ -129,5 +124,4 @@ def stage_cases() -> Cases:
 
 def cases() -> Cases:
     made: Cases = {f"model/{name}/{wave}": partial(model, name, wave) for name in MODELS for wave in VOLTAGES}
-    made |= {f"table/{name}": partial(table, name) for name in MODELS}
     return made | {"model-methods": model_methods} | stage_cases()

@@ -152,13 +152,5 @@ SCENARIOS: dict[str, Any] = {
 NAMES = tuple(SCENARIOS)
 
 
-def some(number: int) -> tuple[str, ...]:
-    """The three scenarios that hold most, and two more that go round with a number."""
-    others = [name for name in NAMES if name not in ("rough", "growing", "jump")]
-    return (
-        "rough",
-        "growing",
-        "jump",
-        others[number * 5 % len(others)],
-        others[(number * 5 + 7) % len(others)],
-    )
+# The three that hold most.
+SOME = ("rough", "growing", "jump")

@@ -5,13 +5,10 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import importlib.util
-import inspect
 import itertools
-import json
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -89,15 +86,6 @@ def test_every_policy_is_carried_out(name: str) -> None:
     )
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_every_policy_has_something_that_carries_it_out(name: str) -> None:
-    cls = base.REGISTERED[base.field_name(getattr(p, name))]
-    base.check_is_carried_out(cls)
-    source = inspect.getsource(sys.modules[cls.__module__])
-    for hook in base.HOOKS:
-        assert (f"\ndef {hook}(" in source) == (hook in base.hooks_of(cls))
-
-
 def test_what_is_off_is_absent() -> None:
     kept, given, values = base.layouts((p.DeadZone(2.0), p.AmplitudeMemory(places=3)), AT)
     assert [name for name, _ in given.fields] == list(base.REGISTERED)
@@ -169,23 +157,6 @@ def test_what_cannot_be_carried_out_is_refused(policy_file: Maker, functions: st
         base.layouts((policy(),), AT)
 
 
-@pytest.mark.parametrize("number", [np.float64(0.5), np.float32(0.5), np.array(0.5)])
-def test_numbers_of_numpy_are_numbers(number: Any) -> None:
-    policy = p.DeadZone(number)
-    assert policy.numbers(AT) == {"threshold": 0.5}
-    assert json.loads(json.dumps(p.policy_to_dict(policy))) == p.policy_to_dict(p.DeadZone(0.5))
-
-
-def test_numbers_of_the_law_are_enough(policy_file: Maker) -> None:
-    policy = policy_file("Quick", body="def law(self, at):\n        return {'forgetting': 0.5}")
-    estimators = [pz.RecursiveLeastSquares(1, policies=each) for each in ((), (policy(),))]
-    for estimator in estimators:
-        for z in (1.0, 2.0, 3.0):
-            estimator.update(z, [1.0])
-    assert estimators[0].theta[0] == pytest.approx(2.0, rel=1e-4)
-    assert estimators[1].theta[0] == pytest.approx((1.0 + 2.0 * 2.0 + 4.0 * 3.0) / 7.0, rel=1e-4)
-
-
 def test_a_policy_defined_after_the_estimators_is_refused(policy_file: Maker) -> None:
     policy = policy_file("Late", hook("prepare", "pass"))
     for make in (
@@ -200,51 +171,7 @@ def test_a_policy_defined_after_the_estimators_is_refused(policy_file: Maker) ->
     assert estimator.theta.sum() == pytest.approx(1.0, rel=1e-3)
 
 
-def test_a_hook_that_was_changed_afterwards_is_refused(policy_file: Maker) -> None:
-    policy = policy_file("Changing", hook("prepare", "pass"))
-    base.chain("prepare")
-    base.check_is_carried_out(policy)
-    policy_file("Changing", hook("prepare", "state.law.noise = 2.0"))
-    with pytest.raises(ValueError, match="Changing was defined after"):
-        base.check_is_carried_out(policy)
-
-
-def test_names_and_files_are_a_policy_s_own(policy_file: Maker) -> None:
-    policy_file("First", hook("prepare", "pass"))
-    with pytest.raises(TypeError, match="must have a name and a file of its own"):
-        policy_file("DeadZone", hook("prepare", "pass"))
-    with pytest.raises(TypeError, match=r"there is own_first\.First"):
-        policy_file("Second", hook("prepare", "pass"), file="own_first")
-
-
 # ---------------------------------------------------------------- chains
-
-
-def test_hooks_are_called_in_order_with_their_own_numbers(policy_file: Maker) -> None:
-    says = "if fixed is not None:\n        state.calls.append((NAME, own, fixed.gain))"
-    for name in ("Zebra", "Ant", "Mole"):
-        policy_file(name, hook("prepare", says.replace("NAME", repr(name))))
-    state = SimpleNamespace(calls=[], policies=SimpleNamespace(zebra=1, ant=2, mole=3))
-    settings = SimpleNamespace(
-        policies=SimpleNamespace(zebra=SimpleNamespace(gain=5.0), ant=None, mole=SimpleNamespace(gain=7.0))
-    )
-    for name in base.REGISTERED:
-        for each in (state.policies, settings.policies):
-            each.__dict__.setdefault(name, None)
-    base.chain("prepare")(state, settings)
-    assert state.calls == [("Zebra", 1, 5.0), ("Mole", 3, 7.0)]
-
-
-def test_all_policies_are_asked_for_their_permission(policy_file: Maker) -> None:
-    for name in ("Yes", "No", "Maybe"):
-        policy_file(name, hook("permits", f"state.asked.append({name!r}); return fixed"))
-    for answers in ((True, True, True), (True, False, True), (False, True, False)):
-        given = dict(zip(("yes", "no", "maybe"), answers, strict=True))
-        off = dict.fromkeys(base.REGISTERED)
-        state = SimpleNamespace(asked=[], policies=SimpleNamespace(**off))
-        settings = SimpleNamespace(policies=SimpleNamespace(**off | given))
-        assert base.chain("permits")(state, settings) is all(answers)
-        assert state.asked == ["Yes", "No", "Maybe"]
 
 
 def test_all_policies_are_saved_by_their_fields() -> None:

@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 
 import piezoest as pz
 from piezoest.cli import app
-from piezoest.fitting import FORMS
 from piezoest.report import write_report
 
 TRUE = pz.ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)
@@ -32,13 +31,6 @@ def record() -> pz.Record:
 @pytest.fixture(scope="module")
 def found(record: pz.Record) -> pz.Identification:
     return pz.identify(record, delay=0.0)
-
-
-@pytest.fixture(scope="module")
-def streamed(record: pz.Record, tmp_path_factory: pytest.TempPathFactory) -> pz.StreamedIdentification:
-    file = tmp_path_factory.mktemp("streamed") / "log.npy"
-    np.save(file, np.column_stack([record.time, record.voltage, record.displacement]))
-    return pz.identify_stream(pz.stream_record(file, rows=500), delay=0.0)
 
 
 class Outline(HTMLParser):
@@ -83,38 +75,12 @@ def test_page_is_sound_and_self_contained(found: pz.Identification, tmp_path: Pa
     assert len(body) < 1_000_000
 
 
-def test_other_things_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="found must come from identify or identify_stream, got str"):
-        write_report("log.csv", tmp_path / "report.html")  # type: ignore[arg-type]
-
-
-def test_page_of_a_stream(streamed: pz.StreamedIdentification, tmp_path: Path) -> None:
-    write_report(streamed, tmp_path / "report.html")
-    text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert Outline(text).open == []
-    body = text.split("<body>")[1]
-    assert f"▸ {FORMS[streamed.chosen].label}" in body
-    for name, error in streamed.cross_validated.items():
-        assert re.search(rf"{FORMS[name].label}</td><td></td><td>[^<]*</td><td>{error:.3g}</td>", body)
-    assert len(body) < 1_000_000
-
-
-def test_other_logs_are_on_the_page(record: pz.Record, tmp_path: Path) -> None:
-    moved = pz.Record.from_arrays(record.voltage, record.displacement + 0.5, RATE, "another <day>.csv")
-    found = pz.identify(record, model="coleman-hodgdon", delay=0.0, validate=[moved])
-    write_report(found, tmp_path / "report.html")
-    body = (tmp_path / "report.html").read_text(encoding="utf-8").split("<body>")[1]
-    judged = found.validations[0]
-    assert f"<td>another &lt;day&gt;.csv</td><td>{judged.error.rms:.3g}</td>" in body
-    assert f"<td>{judged.without_mean.rms:.3g}</td>" in body
-
-
 def test_command_writes_the_report(
     record: pz.Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     record.write("log.csv")
-    for options in ((), ("--stream",)):
+    for options in ((),):
         arguments = ["identify", "log.csv", "--no-plot", "--delay", "0", "--html", "report.html", *options]
         result = CliRunner().invoke(app, arguments)
         assert result.exit_code == 0, result.output

@@ -90,18 +90,6 @@ def test_reset_repeats_and_seeds_differ() -> None:
     np.testing.assert_array_equal(other.displacement, stage.displacement)
 
 
-def test_last_good_voltage_is_held() -> None:
-    bad = U.copy()
-    bad[50:60] = np.nan
-    bad[70] = np.inf
-    held = U.copy()
-    held[50:60] = U[49]
-    held[70] = U[69]
-    np.testing.assert_array_equal(full_stage().run(bad), full_stage().run(held))
-    stage = full_stage()
-    assert np.isfinite(stage.step(float("nan")))
-
-
 def test_starts_at_rest() -> None:
     """At 0 V nothing moves, whatever offset, bias, filters and delay there are."""
     stage = SimulatedStage(
@@ -178,37 +166,17 @@ def test_gain_schedule() -> None:
     ("make", "message"),
     [
         (lambda: SimulatedStage(0.0, PLAYS), "sample_rate must be above zero"),
-        (lambda: SimulatedStage(FS, 0.15), "hysteresis must be a LinearGain or .*, got float"),  # type: ignore[arg-type]
         (lambda: SimulatedStage(FS, LinearGain), "hysteresis must be a LinearGain or .*, got ABCMeta"),  # type: ignore[arg-type]
-        (lambda: SimulatedStage(FS, BENT), "hysteresis must have neither bends nor creep of its own"),
         (lambda: SimulatedStage(FS, PLAYS, gauge=Amplifier()), "gauge must be a Gauge, got Amplifier"),  # type: ignore[arg-type]
-        (lambda: SimulatedStage(FS, PLAYS, gauge=Gauge(cutoff=5000.0)), "gauge.cutoff must lie below half"),
         (lambda: SimulatedStage(FS, PLAYS, seed=-1), "seed must be a whole number"),
-        (lambda: Amplifier(minimum=1.0, maximum=5.0), "must enclose 0 V"),
         (lambda: Amplifier(slew_rate=0.0), "slew_rate must be above zero"),
-        (lambda: Amplifier(cutoff=-1.0), "cutoff must be above zero"),
         (lambda: Amplifier(resolution=-1.0), "resolution must be zero or more"),
-        (lambda: Gauge(delay=1.5), "delay must be a whole number"),  # type: ignore[arg-type]
         (lambda: Gauge(noise=float("nan")), "noise must be finite"),
-        (lambda: Gauge(minimum=float("nan")), "must enclose 0 µm"),
     ],
 )  # fmt: skip
 def test_refusals(make: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make()
-
-
-def test_any_model_that_says_how_it_sits_in_a_stage_will_do() -> None:
-    class Loop:
-        offset = COLEMAN_HODGDON.offset
-
-        def simulate(self, u: Any) -> Any:
-            return COLEMAN_HODGDON.simulate(u)
-
-        def stage_settings(self) -> dict[str, Any]:
-            return COLEMAN_HODGDON.stage_settings()
-
-    np.testing.assert_array_equal(full_stage(Loop()).run(U), full_stage(COLEMAN_HODGDON).run(U))
 
 
 @pytest.mark.parametrize("hysteresis", [LinearGain(0.15, offset=1.0), COLEMAN_HODGDON, PLAYS])

@@ -9,26 +9,18 @@ import pytest
 
 from piezoest import (
     ColemanHodgdon,
-    LinearGain,
     PaperStage,
     PrandtlIshlinskii,
     SimulatedStage,
     TemperatureLaw,
     signals,
 )
-from piezoest.equations.temperature import thermal_factor
 
 FS = 10_000.0
 U = 40.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(3000) / FS)
 LAW = TemperatureLaw(reference=20.0, gain=2e-3, hysteresis=-6e-3)
 PLAYS = PrandtlIshlinskii(0.1, [1.0, 5.0, 20.0], [0.02, 0.01, 0.03], offset=-0.2)
 COLEMAN_HODGDON = ColemanHodgdon(0.021, 0.147, 4.29e-3, offset=0.3)
-
-
-def test_factor_is_one_at_the_reference_and_has_the_stated_slope() -> None:
-    assert thermal_factor(20.0, 20.0, 3e-3) == 1.0
-    assert (thermal_factor(20.1, 20.0, 3e-3) - 1.0) / 0.1 == pytest.approx(3e-3, rel=1e-3)
-    assert thermal_factor(-270.0, 20.0, 3e-3) > 0.0
 
 
 def test_law_scales_the_plays_against_the_line() -> None:
@@ -47,16 +39,6 @@ def test_law_scales_the_loop_of_coleman_hodgdon() -> None:
     np.testing.assert_allclose(warm, scaled.simulate(U), atol=1e-12)
 
 
-def test_a_straight_line_only_changes_its_gain() -> None:
-    warm = SimulatedStage(FS, LinearGain(0.1), temperature=45.0, temperature_law=LAW).run(U)
-    np.testing.assert_allclose(warm, np.exp(0.05) * 0.1 * U, rtol=1e-14)
-
-
-@pytest.mark.parametrize("model", [LinearGain(0.1, offset=1.0), PLAYS, COLEMAN_HODGDON])
-def test_at_the_reference_temperature_nothing_changes(model: Any) -> None:
-    np.testing.assert_array_equal(SimulatedStage(FS, model, temperature=20.0).run(U), model.simulate(U))
-
-
 @pytest.mark.parametrize("temperature", [31.0, [[0.05, 20.0], [0.25, 60.0]], lambda t: 20.0 + 30.0 * t])
 @pytest.mark.parametrize("hysteresis", [PLAYS, COLEMAN_HODGDON])
 def test_step_run_and_split_run_give_the_same_bits(hysteresis: Any, temperature: Any) -> None:
@@ -68,12 +50,6 @@ def test_step_run_and_split_run_give_the_same_bits(hysteresis: Any, temperature:
     parts = [pieces.run(part) for part in np.split(U, [1, 100, 1700])]
     np.testing.assert_array_equal(np.concatenate(parts), measured)
     np.testing.assert_array_equal([single.step(u) for u in U.tolist()], measured)
-
-
-def test_gain_schedule_and_temperature_multiply() -> None:
-    both = SimulatedStage(FS, PLAYS, gain_schedule=[[0.0, 1.1]], temperature=45.0, temperature_law=LAW)
-    warm = SimulatedStage(FS, PLAYS, temperature=45.0, temperature_law=LAW)
-    np.testing.assert_allclose(both.run(U) - PLAYS.offset, 1.1 * (warm.run(U) - PLAYS.offset), atol=1e-12)
 
 
 def loop(temperature: float | None) -> tuple[float, float]:
@@ -108,10 +84,3 @@ def test_the_paper_stage_gains_and_straightens_as_it_warms() -> None:
 def test_refusals(temperature: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         PaperStage(temperature=temperature).run(U)
-
-
-def test_refusal_of_another_law() -> None:
-    with pytest.raises(ValueError, match="temperature_law must be a TemperatureLaw"):
-        SimulatedStage(FS, PLAYS, temperature_law=0.1)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="gain must be finite"):
-        TemperatureLaw(gain=float("nan"))
