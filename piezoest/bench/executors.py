@@ -36,22 +36,9 @@ def in_processes(
 ) -> Iterator[Result]:
     """Work on items over the cores.
 
-    Parameters
-    ----------
-    work : callable
-        What is done with each; a module's function, as for `pickle`.
-    items : iterable
-        Each may be pickled.
-    processes : int, optional
-        How many; default one for each core, 1 works in this process.
-    crashed : callable, optional
-        Result of an item whose process died over it. The items that were under way when a process
-        died are tried again, each alone. Without it the death is an error.
-
-    Yields
-    ------
-    object
-        Result of each as it is done.
+    `work`: what is done with each; a module's function, as for `pickle`. `processes`: how many; default one
+    for each core, 1 works in this process. `crashed`: result of an item whose process died over it. The items
+    that were under way when a process died are tried again, each alone. Without it the death is an error.
     """
     processes = integer("processes", os.cpu_count() or 1 if processes is None else processes, 1)
     if processes == 1:
@@ -164,31 +151,11 @@ def on_dask(
 ) -> Iterator[Result]:
     """Work on items with Dask: the work of a worker that is lost is done again by another.
 
-    Parameters
-    ----------
-    work : callable
-        What is done with each; a function of a module that the workers have.
-    items : iterable
-        Each may be pickled.
-    scheduler : str, optional
-        Address of a cluster's scheduler, as in ``tcp://10.0.0.1:8786``; default a cluster of this
-        machine's cores, for the time of the work.
-    processes : int, optional
-        Workers of the latter; default one for each core.
-    crashed : callable, optional
-        Result of an item over which worker after worker died. Without it that is an error.
-    modules : sequence of Path
-        Files that the workers need to import, sent to them first.
-
-    Yields
-    ------
-    object
-        Result of each as it is done.
-
-    Raises
-    ------
-    ValueError
-        If Dask is not installed, or the scheduler does not answer.
+    `work`: what is done with each; a function of a module that the workers have. `scheduler`: address of a
+    cluster's scheduler, as in ``tcp://10.0.0.1:8786``; default a cluster of this machine's cores, for the
+    time of the work. `processes`: workers of the latter; default one for each core. `crashed`: result of an
+    item over which worker after worker died. Without it that is an error. `modules`: files that the workers
+    need to import, sent to them first.
     """
     try:
         import distributed

@@ -35,12 +35,8 @@ def put(document: dict[str, Any], path: Path | None) -> None:
 def json_safe(value: Any, digits: int | None = None) -> Any:
     """The same with plain lists, and None for what is not finite.
 
-    Parameters
-    ----------
-    value : object
-        Of dictionaries, lists, tuples and plain values.
-    digits : int, optional
-        Significant digits of numbers, for a document that is kept: more would say nothing. Default all.
+    `value`: of dictionaries, lists, tuples and plain values. `digits`: significant digits of numbers, for a
+    document that is kept: more would say nothing. Default all.
     """
     match value:
         case dict():

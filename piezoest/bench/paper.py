@@ -35,18 +35,10 @@ MEMORIES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # s; its period is 0.2 s
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A number of the paper beside ours.
+    """A number of the paper beside ours."""
 
-    Parameters
-    ----------
-    paper : Published
-        The paper's.
-    ours : float
-        The simulated stage's, in the same unit.
-    """
-
-    paper: Published
-    ours: float
+    paper: Published  # the paper's
+    ours: float  # the simulated stage's, in the same unit
 
     @property
     def ratio(self) -> float:
@@ -62,28 +54,15 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class PaperResult:
-    """The paper's experiment, run again.
+    """The paper's experiment, run again."""
 
-    Parameters
-    ----------
-    memory : float
-        Of the estimator [s].
-    seed : int
-        Start of the random numbers of the stage's noise.
-    linear, inverse : dict of str to Run
-        Both compensations by the row's name, parameters estimated while running.
-    crossed : dict of str to Run
-        Rows of Table III.
-    sweep : dict of float to Run
-        Inverse compensation of one reference by memory [s].
-    """
-
-    memory: float
-    seed: int
+    memory: float  # of the estimator [s]
+    seed: int  # start of the random numbers of the stage's noise
+    # Both compensations by the row's name, parameters estimated while running.
     linear: dict[str, Run] = field(repr=False)
     inverse: dict[str, Run] = field(repr=False)
-    crossed: dict[str, Run] = field(repr=False)
-    sweep: dict[float, Run] = field(repr=False)
+    crossed: dict[str, Run] = field(repr=False)  # rows of Table III
+    sweep: dict[float, Run] = field(repr=False)  # inverse compensation of one reference by memory [s]
 
     def compare(self) -> list[Comparison]:
         """Every number of the tables beside ours."""
@@ -141,28 +120,11 @@ def run_paper(
 ) -> PaperResult:
     """Run the paper's experiment on the simulated stage.
 
-    Parameters
-    ----------
-    memory : float
-        Time constant of the estimator's forgetting [s]; the paper names none.
-    memories : iterable of float
-        Further ones, for the error of one row against memory.
-    seed : int
-        Start of the random numbers of the stage's noise.
-    workers : int, optional
-        Processes to run in; default one for each processor, 0 for this one. A script that
-        calls this with others needs ``if __name__ == "__main__":``.
-    progress : callable, optional
-        Called with a sentence after each run.
-
-    Returns
-    -------
-    PaperResult
-
-    Raises
-    ------
-    ValueError
-        If memory or seed is out of its range.
+    `memory`: time constant of the estimator's forgetting [s]; the paper names none. `memories`: further ones,
+    for the error of one row against memory. `seed`: start of the random numbers of the stage's noise.
+    `workers`: processes to run in; default one for each processor, 0 for this one. A script that calls this
+    with others needs ``if __name__ == "__main__":``. `progress`: called with a sentence after each run.
+    ValueError if memory or seed is out of its range.
     """
     memory, seed = positive("memory", memory), integer("seed", seed)
     workers = integer("workers", os.cpu_count() or 1 if workers is None else workers)

@@ -37,12 +37,7 @@ def use_of(entry: Entry) -> str:
 def table(entries: Iterable[Entry], number: str) -> tuple[Cells, list[Cells]]:
     """Heading and body of Table I, II or III: for each row a line of the paper, of ours, of the ratios.
 
-    Parameters
-    ----------
-    entries : iterable of dict
-        "tables" of the JSON.
-    number : str
-        ``"I"``, ``"II"`` or ``"III"``.
+    `number`: ``"I"``, ``"II"`` or ``"III"``.
     """
     mine = [entry for entry in entries if entry["table"] == number]
     quantities = list(dict.fromkeys(entry["quantity"] for entry in mine))
@@ -110,12 +105,7 @@ def _settling(run: dict[str, Any]) -> str:
 def print_report(document: dict[str, Any], console: Any) -> None:
     """Print the tables, the transients, the sweep and the verdict.
 
-    Parameters
-    ----------
-    document : dict
-        What `piezoest bench paper --json` writes.
-    console : rich.console.Console
-        To print on.
+    `document`: what `piezoest bench paper --json` writes.
     """
     for number, title in TITLES.items():
         heading, body = table(document["tables"], number)

@@ -38,30 +38,14 @@ IN_POINTS = "error_reduction"
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """One number of the paper.
+    """One number of the paper."""
 
-    Parameters
-    ----------
-    table : str
-        ``"I"``, ``"II"`` or ``"III"``.
-    row : str
-        Reference signal, as `triangle_row` and `PRBS_ROW` name it.
-    quantity : str
-        Column: alpha, beta, gamma, K, linear_max_error and so on.
-    value : float
-        As printed.
-    unit : str
-        Of the value.
-    held_out : bool
-        Whether the calibration of the stage never saw it.
-    """
-
-    table: str
-    row: str
-    quantity: str
-    value: float
-    unit: str
-    held_out: bool
+    table: str  # ``"I"``, ``"II"`` or ``"III"``
+    row: str  # reference signal, as `triangle_row` and `PRBS_ROW` name it
+    quantity: str  # column: alpha, beta, gamma, K, linear_max_error and so on
+    value: float  # as printed
+    unit: str  # of the value
+    held_out: bool  # whether the calibration of the stage never saw it
 
     @property
     def bound(self) -> float | None:
@@ -75,10 +59,7 @@ class Published:
     def deviation(self, ours: float) -> float:
         """Deviation of `ours`, relative to the value or in points of per cent.
 
-        Parameters
-        ----------
-        ours : float
-            The same number from the simulated stage.
+        `ours`: the same number from the simulated stage.
         """
         difference = ours - self.value
         return difference if self.quantity == IN_POINTS else difference / self.value

@@ -32,10 +32,7 @@ Task = TypeVar("Task", bound=Keyed)
 class Store:
     """Rows in a file, to be used in a ``with`` statement.
 
-    Parameters
-    ----------
-    path : Path
-        Made if it is not there; with its folder.
+    `path`: made if it is not there; with its folder.
     """
 
     def __init__(self, path: Path) -> None:
@@ -80,15 +77,7 @@ class Store:
     def append(self, row: Row) -> bool:
         """Keep a row, at once; False if its key is known already, and then the first one stands.
 
-        Parameters
-        ----------
-        row : dict
-            JSON-safe, with a ``"key"``.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written whole; what of it was written counts for nothing.
+        `row`: JSON-safe, with a ``"key"``.
         """
         if row["key"] in self._places:
             return False
@@ -110,18 +99,7 @@ class Store:
         return self._file.read(1) not in (b"", b"\n")
 
     def rows(self, keys: Iterable[str]) -> Iterator[Row]:
-        """Rows of these keys, in their order; a key without one is left out.
-
-        Parameters
-        ----------
-        keys : iterable of str
-            Of the tasks.
-
-        Raises
-        ------
-        ValueError
-            If a row that was there is no longer.
-        """
+        """Rows of these keys, in their order; a key without one is left out."""
         for key in keys:
             if key not in self._places:
                 continue
@@ -153,13 +131,7 @@ def _read(line: bytes) -> dict[str, Any] | None:
 
 
 def store_in(folder: Path) -> Store:
-    """Where the runs of a campaign with this folder are kept.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the campaign.
-    """
+    """Where the runs of a campaign with this folder are kept."""
     return Store(folder / "runs.jsonl")
 
 
@@ -171,16 +143,9 @@ def carry_out(
 ) -> None:
     """Run what the store does not hold yet.
 
-    Parameters
-    ----------
-    tasks : sequence of Task
-        The whole campaign.
-    store : Store
-        Open; holds all of their rows afterwards.
-    execute : callable
-        Gives the row of each task it is given, in any order: see `piezoest.bench.executors`.
-    progress : callable
-        Called with the number of finished runs and of all, at first and after each.
+    `store`: open; holds all of their rows afterwards. `execute`: gives the row of each task it is given, in
+    any order: see `piezoest.bench.executors`. `progress`: called with the number of finished runs and of all,
+    at first and after each.
     """
     todo = [task for task in tasks if task.key not in store]
     done = len(tasks) - len(todo)

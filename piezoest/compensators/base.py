@@ -42,10 +42,7 @@ class CompensatorStatus:
 
 
 class Compensator:
-    """Feed-forward through the inverse of a model.
-
-    See `LinearCompensator` and `InverseCompensator`.
-    """
+    """Feed-forward through the inverse of a model. See `LinearCompensator` and `InverseCompensator`."""
 
     __slots__ = (
         "_layouts", "_limits", "_loops", "_model", "_options", "_projected", "_sample_rate", "_settings",

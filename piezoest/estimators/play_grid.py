@@ -363,8 +363,8 @@ def wanted_half_width(plays: Any) -> Any:
 def move(plays: Any, settings: Any, theta: Any, half_width: Any) -> None:
     """Lay a grid about the middle of the range seen, and move the slopes in `theta` to it.
 
-    Slopes are densities: over the thresholds, continued evenly beyond the old grid, and over the voltage.
-    The new plays are where the voltage's turning points have left them.
+    Slopes are densities: over the thresholds, continued evenly beyond the old grid, and over the voltage. The
+    new plays are where the voltage's turning points have left them.
     """
     relative, bends, y = settings.relative_thresholds, settings.relative_bends, plays.y
     columns, centre = len(bends) + 1, 0.5 * (plays.high + plays.low)

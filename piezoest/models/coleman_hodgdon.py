@@ -194,8 +194,8 @@ class ColemanHodgdon(FreeRunning):
     def coordinates(cls, held: Collection[str], within_reach: bool) -> tuple[str, ...]:
         """Put gamma/(alpha beta) in place of the last of alpha, beta, gamma that is not held.
 
-        Admissible is then a box: a > 0, b > 0 and c >= 2b are bounds. Within reach are start states of
-        at most b/a: ``place``, the part of it, is then varied.
+        Admissible is then a box: a > 0, b > 0 and c >= 2b are bounds. Within reach are start states of at
+        most b/a: ``place``, the part of it, is then varied.
         """
         names = super(ColemanHodgdon, cls).coordinates(held, within_reach)
         replaced = [name for name in cls.parameter_names if name in names][-1:]

@@ -93,9 +93,9 @@ def _square_step(state: Any, settings: Any, walk: Any, i: int) -> Any:
 def prepare(own: Any, fixed: Any, state: Any, settings: Any) -> None:
     """Let P grow, and set the noise variance of a sample that gives the memory wanted.
 
-    Everything is counted in swings of the voltage. With P growing by q a swing, the best
-    excited direction forgets within sqrt(rho/(q phi²)) swings, where phi is the regressor and rho
-    the noise variance of a whole swing: rho follows from the memory wanted and the mean of phi².
+    Everything is counted in swings of the voltage. With P growing by q a swing, the best excited direction
+    forgets within sqrt(rho/(q phi²)) swings, where phi is the regressor and rho the noise variance of a whole
+    swing: rho follows from the memory wanted and the mean of phi².
     """
     if fixed is None:
         return

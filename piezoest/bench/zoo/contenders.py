@@ -28,18 +28,10 @@ DEFAULT = "AdaptiveFeedforward" if hasattr(piezoest, "AdaptiveFeedforward") else
 def contender(name: str) -> Factory:
     """Maker of a controller.
 
-    Parameters
-    ----------
-    name : str
-        "parts", a class of the package, or a class or function of one's own as ``module:name``. It is called
-        as ``name(sample_rate, limits=limits)``. Or the default controller, changed: "line" has no candidate
-        beside the line, "no-corridor" leaves the voltage all its room, and the name of an estimator has that
-        one alone.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or a class has no ``step``, ``run`` and ``learn``.
+    `name`: "parts", a class of the package, or a class or function of one's own as ``module:name``. It is
+    called as ``name(sample_rate, limits=limits)``. Or the default controller, changed: "line" has no
+    candidate beside the line, "no-corridor" leaves the voltage all its room, and the name of an estimator has
+    that one alone.
     """
     found = _found(name)
     if inspect.isclass(found) and (missing := [each for each in NEEDED if not hasattr(found, each)]):
@@ -78,13 +70,7 @@ def _change(name: str) -> dict[str, Any]:
 
 
 def code_of(name: str) -> str:
-    """Fingerprint of this package and, for a controller of one's own, of its file.
-
-    Parameters
-    ----------
-    name : str
-        As `contender` reads it.
-    """
+    """Fingerprint of this package and, for a controller of one's own, of its file."""
     source = inspect.getsourcefile(_found(name)) if ":" in name else None
     if source is None:
         return fingerprint()

@@ -19,25 +19,13 @@ SETPOINT_NOISE = 1e-4  # µm, of a reference that rests
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A fault of a run.
+    """A fault of a run."""
 
-    Parameters
-    ----------
-    kind : str
-        Name in `FAULTS`, or "none".
-    start, stop : int
-        First sample with it, and the first one without; `stop` is the run's length if it stays.
-    size : float
-        What it is about: a factor, or µm.
-    lasting : bool
-        Whether it stays.
-    """
-
-    kind: str = NONE
-    start: int = 0
-    stop: int = 0
-    size: float = 0.0
-    lasting: bool = False
+    kind: str = NONE  # name in `FAULTS`, or "none"
+    start: int = 0  # first sample with it
+    stop: int = 0  # first one without; the run's length if it stays
+    size: float = 0.0  # what it is about: a factor, or µm
+    lasting: bool = False  # whether it stays
 
     @property
     def mode(self) -> str:
@@ -73,55 +61,29 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Around:
-    """What a fault has to know of its rig.
+    """What a fault has to know of its rig."""
 
-    Parameters
-    ----------
-    sample_rate : float
-        [Hz].
-    reference : Reference
-        As it would be without the fault.
-    noise : float
-        Standard deviation of the gauge's noise [µm].
-    stroke : float
-        Of the stage over the whole reach [µm].
-    seed : int
-        Start of the random numbers.
-    """
-
-    sample_rate: float
-    reference: Reference
-    noise: float
-    stroke: float
-    seed: int
+    sample_rate: float  # [Hz]
+    reference: Reference  # as it would be without the fault
+    noise: float  # standard deviation of the gauge's noise [µm]
+    stroke: float  # of the stage over the whole reach [µm]
+    seed: int  # start of the random numbers
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of fault.
+    """A kind of fault."""
 
-    Parameters
-    ----------
-    modes : tuple of str
-        Of "from-start" (and it stays), "transient" and "permanent" (from a moment on).
-    size : callable, optional
-        Draws the size from (random numbers, `Around`).
-    stage : callable, optional
-        Makes the faulty stage of (stage, `Fault`, `Around`).
-    hides : bool
-        Whether nothing can be learnt meanwhile: readings say nothing or lie, or the stage stands still.
-    partly : bool
-        Whether some readings are wrong and the others right.
-    names : tuple of str
-        What a controller may call it; empty if it need not be noticed.
-    """
-
+    # Of "from-start" (and it stays), "transient" and "permanent" (from a moment on).
     modes: tuple[str, ...] = (TRANSIENT, PERMANENT)
+    # Draws the size from (random numbers, `Around`).
     size: Callable[[Any, Around], float] = lambda rng, around: 0.0
+    # Makes the faulty stage of (stage, `Fault`, `Around`).
     stage: Callable[[Any, Fault, Around], Any] = lambda stage, fault, around: stage
+    # Whether nothing can be learnt meanwhile: readings say nothing or lie, or the stage stands still.
     hides: bool = False
-    partly: bool = False
-    names: tuple[str, ...] = ()
+    partly: bool = False  # whether some readings are wrong and the others right
+    names: tuple[str, ...] = ()  # what a controller may call it; empty if it need not be noticed
 
 
 def _times(fault: Fault, around: Around) -> tuple[float, float]:
@@ -238,21 +200,7 @@ def _usual(size: float, around: Around) -> float:
 def draw_fault(kind: str, mode: str | None, rng: Any, around: Around) -> Fault:
     """Draw when a fault is there and how large it is.
 
-    Parameters
-    ----------
-    kind : str
-        Name in `FAULTS`, or "none".
-    mode : str, optional
-        One of its modes; drawn if not given.
-    rng : numpy.random.Generator
-        Where it comes from.
-    around : Around
-        The rig.
-
-    Raises
-    ------
-    ValueError
-        If the kind is unknown or has no such mode.
+    `kind`: name in `FAULTS`, or "none". `mode`: one of its modes; drawn if not given.
     """
     if kind == NONE:
         return Fault()
@@ -280,15 +228,7 @@ def draw_fault(kind: str, mode: str | None, rng: Any, around: Around) -> Fault:
 
 
 def changed_reference(fault: Fault, around: Around) -> FloatArray:
-    """Reference of the run with its fault, shape (N,) [µm].
-
-    Parameters
-    ----------
-    fault : Fault
-        From `draw_fault`.
-    around : Around
-        The rig.
-    """
+    """Reference of the run with its fault, shape (N,) [µm]."""
     reference = around.reference
     r, within = reference.values, fault.within(reference.values.size)
     if fault.kind == "zero-off-shifted":
@@ -309,15 +249,7 @@ def changed_reference(fault: Fault, around: Around) -> FloatArray:
 
 
 def gain_schedule(fault: Fault, sample_rate: float) -> list[list[float]] | None:
-    """Factor of the gain over time, for a `SimulatedStage`; None without.
-
-    Parameters
-    ----------
-    fault : Fault
-        From `draw_fault`.
-    sample_rate : float
-        [Hz].
-    """
+    """Factor of the gain over time, for a `SimulatedStage`; None without."""
     if fault.kind != "gain-step":
         return None
     rows = [[0.0, 1.0], [(fault.start - 1) / sample_rate, 1.0], [fault.start / sample_rate, fault.size]]
@@ -332,12 +264,7 @@ def coordinates(fault: Fault, n: int) -> tuple[float, FloatArray]:
     A reference is in the coordinates of the gauge. A gauge that has been wrong from the start, or whose zero
     has moved for good, is right by definition; one that was right and goes wrong is not.
 
-    Parameters
-    ----------
-    fault : Fault
-        From `draw_fault`.
-    n : int
-        Samples of the run.
+    `fault`: from `draw_fault`.
     """
     zero = np.zeros(n)
     if fault.kind == "zero-off-shifted" or (fault.kind == "zero-off" and fault.right):
@@ -348,18 +275,8 @@ def coordinates(fault: Fault, n: int) -> tuple[float, FloatArray]:
 def truthful(fault: Fault, first: int, x: FloatArray, seen: FloatArray, tolerance: float) -> Any:
     """Which readings say something true of how the stage answers; an oracle knows it.
 
-    Parameters
-    ----------
-    fault : Fault
-        From `draw_fault`.
-    first : int
-        Sample of the first reading.
-    x : ndarray, shape (M,)
-        Readings [µm].
-    seen : ndarray, shape (M,)
-        What a sound gauge without noise would have read [µm].
-    tolerance : float
-        By which a reading may miss that [µm].
+    `x` (M,): readings [µm]. `seen` (M,): what a sound gauge without noise would have read [µm]. `tolerance`:
+    by which a reading may miss that [µm].
     """
     told = np.isfinite(x)
     kind = FAULTS.get(fault.kind, Kind())

@@ -15,17 +15,8 @@ from piezoest._checks import FloatArray, array_1d, finite, fraction, integer, no
 class FaultyStage:
     """A stage with something between it and the rest of the ring; by itself, nothing.
 
-    Parameters
-    ----------
-    stage : object with ``step``, ``run``, ``displacement``, ``reset`` and ``sample_rate``
-        Such as `PaperStage`.
-    seed : int
-        Start of the random numbers of the fault.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
+    `stage`: such as `PaperStage`. `seed`: start of the random numbers of the fault. ValueError if a value is
+    out of its range.
     """
 
     def __init__(self, stage: Any, *, seed: int = 0) -> None:
@@ -61,33 +52,14 @@ class FaultyStage:
         return self._stage.displacement
 
     def step(self, u: float) -> float:
-        """Apply a voltage for one sample.
-
-        Parameters
-        ----------
-        u : float
-            Voltage [V].
-
-        Returns
-        -------
-        float
-            Reading [µm]; NaN where there is none.
-        """
+        """Apply a voltage for one sample. `u`: voltage [V]. Returns reading [µm]; NaN where there is none."""
         x = self._stage.step(float(self._voltage(np.array([float(u)]))[0]))
         return float(self._read(np.array([x]))[0])
 
     def run(self, u: Any) -> FloatArray:
         """Apply a voltage record; the same as a loop of `step`.
 
-        Parameters
-        ----------
-        u : array_like, shape (N,)
-            Voltage [V].
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Readings [µm]; NaN where there is none.
+        `u` (N,): voltage [V]. Returns (N,): readings [µm]; NaN where there is none.
         """
         return self._read(self._stage.run(self._voltage(array_1d("u", u, allow_nan=True))))
 
@@ -105,14 +77,7 @@ class FaultyStage:
 class Missing(FaultyStage):
     """Single samples without a reading, at random.
 
-    Parameters
-    ----------
-    stage : object
-        See `FaultyStage`.
-    share : float
-        Of the samples that are missing, within [0, 1].
-    seed : int
-        Start of the random numbers.
+    `share`: of the samples that are missing, within [0, 1].
     """
 
     def __init__(self, stage: Any, share: float, *, seed: int = 0) -> None:
@@ -124,17 +89,7 @@ class Missing(FaultyStage):
 
 
 class Gap(FaultyStage):
-    """No reading for a while.
-
-    Parameters
-    ----------
-    stage : object
-        See `FaultyStage`.
-    start, duration : float
-        [s].
-    seed : int
-        Not used: the fault is certain.
-    """
+    """No reading for a while. `start`, `duration`: [s]."""
 
     def __init__(self, stage: Any, start: float, duration: float = 1.0, *, seed: int = 0) -> None:
         self._interval = non_negative("start", start), positive("duration", duration)
@@ -145,19 +100,7 @@ class Gap(FaultyStage):
 
 
 class Spikes(FaultyStage):
-    """Single readings that are off by `size`, up or down at random.
-
-    Parameters
-    ----------
-    stage : object
-        See `FaultyStage`.
-    rate : float
-        Mean number a second.
-    size : float
-        [µm].
-    seed : int
-        Start of the random numbers.
-    """
+    """Single readings that are off by `size`, up or down at random. `size`: [µm]."""
 
     def __init__(self, stage: Any, rate: float = 5.0, size: float = 10.0, *, seed: int = 0) -> None:
         self._rate, self._size = non_negative("rate", rate), finite("size", size)
@@ -171,17 +114,7 @@ class Spikes(FaultyStage):
 
 
 class Stuck(Gap):
-    """The reading stands still for a while.
-
-    Parameters
-    ----------
-    stage : object
-        See `FaultyStage`.
-    start, duration : float
-        [s].
-    seed : int
-        Not used: the fault is certain.
-    """
+    """The reading stands still for a while. `start`, `duration`: [s]."""
 
     def _begin(self) -> None:
         super()._begin()
@@ -201,16 +134,7 @@ class Stuck(Gap):
 class Saturation(FaultyStage):
     """A converter whose range the displacement leaves.
 
-    Parameters
-    ----------
-    stage : object
-        See `FaultyStage`.
-    limit : float
-        Largest reading to either side of the centre [µm].
-    centre : float
-        Middle of its range [µm].
-    seed : int
-        Not used: the fault is certain.
+    `limit`: largest reading to either side of the centre [µm]. `centre`: middle of its range [µm].
     """
 
     def __init__(self, stage: Any, limit: float, centre: float = 0.0, *, seed: int = 0) -> None:
@@ -222,17 +146,7 @@ class Saturation(FaultyStage):
 
 
 class Factor(FaultyStage):
-    """Readings times a factor: -1 for a gauge wired the wrong way round, 1000 for nm taken for µm.
-
-    Parameters
-    ----------
-    stage : object
-        See `FaultyStage`.
-    factor : float
-        Of the readings.
-    seed : int
-        Not used: the fault is certain.
-    """
+    """Readings times a factor: -1 for a gauge wired the wrong way round, 1000 for nm taken for µm."""
 
     def __init__(self, stage: Any, factor: float, *, seed: int = 0) -> None:
         self._factor = finite("factor", factor)
@@ -245,16 +159,7 @@ class Factor(FaultyStage):
 class OffsetStep(FaultyStage):
     """The gauge's zero moves: from a time on, readings are off by a constant.
 
-    Parameters
-    ----------
-    stage : object
-        See `FaultyStage`.
-    start : float
-        [s].
-    offset : float
-        [µm].
-    seed : int
-        Not used: the fault is certain.
+    `start`: [s]. `offset`: [µm].
     """
 
     def __init__(self, stage: Any, start: float, offset: float = 0.5, *, seed: int = 0) -> None:

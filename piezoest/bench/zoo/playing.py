@@ -36,21 +36,9 @@ def play(rig: Rig, factory: Factory, *, traces: Literal[True]) -> tuple[Row, Bot
 def play(rig: Rig, factory: Factory, *, traces: bool = False) -> Row | tuple[Row, Both]:
     """Let a controller drive a rig, and judge it beside straight lines.
 
-    Parameters
-    ----------
-    rig : Rig
-        From `piezoest.bench.zoo.draw`.
-    factory : callable
-        ``factory(sample_rate, limits)`` makes a controller, with ``step(r)``, ``run(r)`` and ``learn(u, x)``.
-    traces : bool
-        Whether to give the traces, too.
-
-    Returns
-    -------
-    dict
-        What was drawn and what came of it, flat and JSON-safe; what the controller raised is its ``failure``.
-    Both
-        With `traces` only.
+    `factory`: ``factory(sample_rate, limits)`` makes a controller, with ``step(r)``, ``run(r)`` and
+    ``learn(u, x)``. Returns what was drawn and what came of it, flat and JSON-safe; what the controller
+    raised is its ``failure``; with `traces` only.
     """
     line = fit_line(rig)
     lines = Lines(line, run_line(rig, line), *run_learnt_line(rig, line))

@@ -20,15 +20,7 @@ KEY = (
 
 
 def print_summary(summary: dict[str, Any], console: Any) -> None:
-    """Print what runs say together.
-
-    Parameters
-    ----------
-    summary : dict
-        From `piezoest.bench.zoo.summary.summarise`.
-    console : rich.console.Console
-        To print on.
-    """
+    """Print what runs say together. `summary`: from `piezoest.bench.zoo.summary.summarise`."""
     _table(
         console, "Violations",
         ("criterion", f"of {summary['runs']}", f"of {summary['healthy_runs']} healthy"),
@@ -88,12 +80,7 @@ def _crossed(console: Any, groups: list[dict[str, Any]]) -> None:
 def print_map(summary: dict[str, Any], console: Any) -> None:
     """Print shares of runs that settled within two periods, of those that are asked for.
 
-    Parameters
-    ----------
-    summary : dict
-        From `piezoest.bench.zoo.summary.summarise_cells`.
-    console : rich.console.Console
-        To print on.
+    `summary`: from `piezoest.bench.zoo.summary.summarise_cells`.
     """
     changes = [name for name, _, _ in SEGMENTS]
     cells = summary["cells"]
@@ -120,12 +107,7 @@ def print_map(summary: dict[str, Any], console: Any) -> None:
 def print_contest(summary: dict[str, Any], console: Any) -> None:
     """Print settled errors relative to those of the best single estimator.
 
-    Parameters
-    ----------
-    summary : dict
-        From `piezoest.bench.zoo.contest.summarise_contest`.
-    console : rich.console.Console
-        To print on.
+    `summary`: from `piezoest.bench.zoo.contest.summarise_contest`.
     """
     _table(
         console,
@@ -148,12 +130,7 @@ def print_contest(summary: dict[str, Any], console: Any) -> None:
 def print_dwells(summary: dict[str, Any], console: Any) -> None:
     """Print how a controller goes on after a long rest.
 
-    Parameters
-    ----------
-    summary : dict
-        From `piezoest.bench.zoo.dwelling.summarise_dwells`.
-    console : rich.console.Console
-        To print on.
+    `summary`: from `piezoest.bench.zoo.dwelling.summarise_dwells`.
     """
     numbers = ("first", "second", "third", "largest", "excursion", "farthest")
     heads = ("runs", "kept", "first", "second", "third", "largest", "way", "longest")

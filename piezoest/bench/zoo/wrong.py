@@ -15,14 +15,7 @@ FOREVER = 1e9  # s
 class ForATime(Gap):
     """A fault between two moments only.
 
-    Parameters
-    ----------
-    fault : FaultyStage
-        With the stage; by itself it holds for ever.
-    start, duration : float
-        [s].
-    seed : int
-        Not used: the fault has its own.
+    `fault`: with the stage; by itself it holds for ever. `start`, `duration`: [s].
     """
 
     def __init__(self, fault: FaultyStage, start: float, duration: float = FOREVER, *, seed: int = 0) -> None:
@@ -68,16 +61,7 @@ class FrozenAmplifier(Gap):
 class StuckStage(Gap):
     """The stage itself stands still for a while, and its gauge shows it with some noise.
 
-    Parameters
-    ----------
-    stage : object
-        See `FaultyStage`.
-    start, duration : float
-        [s].
-    noise : float
-        Standard deviation of the reading meanwhile [µm].
-    seed : int
-        Start of the random numbers.
+    `start`, `duration`: [s]. `noise`: standard deviation of the reading meanwhile [µm].
     """
 
     def __init__(
@@ -113,16 +97,7 @@ class StuckStage(Gap):
 class Dead(Gap):
     """The gauge shows a level of its own, with noise, whatever the stage does.
 
-    Parameters
-    ----------
-    stage : object
-        See `FaultyStage`.
-    start, duration : float
-        [s].
-    level, noise : float
-        What it shows and the standard deviation of its noise [µm].
-    seed : int
-        Start of the random numbers.
+    `start`, `duration`: [s]. `level`, `noise`: what it shows and the standard deviation of its noise [µm].
     """
 
     def __init__(
@@ -146,16 +121,7 @@ class Dead(Gap):
 class Hum(FaultyStage):
     """A sine on the reading, from the mains.
 
-    Parameters
-    ----------
-    stage : object
-        See `FaultyStage`.
-    size : float
-        Its amplitude [µm].
-    frequency : float
-        [Hz].
-    seed : int
-        Start of the random numbers: its phase.
+    `size`: its amplitude [µm]. `frequency`: [Hz]. `seed`: start of the random numbers: its phase.
     """
 
     def __init__(self, stage: Any, size: float, frequency: float = 50.0, *, seed: int = 0) -> None:
@@ -174,16 +140,7 @@ class Hum(FaultyStage):
 class Drift(FaultyStage):
     """The stage itself moves, slowly and steadily, as its mount warms up; the gauge sees it.
 
-    Parameters
-    ----------
-    stage : object
-        See `FaultyStage`.
-    rate : float
-        [µm/s].
-    start, duration : float
-        When it moves [s]; it stays where it came to.
-    seed : int
-        Not used: the fault is certain.
+    `rate`: [µm/s]. `start`, `duration`: when it moves [s]; it stays where it came to.
     """
 
     def __init__(
