@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 Document = dict[str, Any]  # from `piezoest.bench.table.describe`
@@ -110,10 +110,10 @@ def print_table(document: Document, console: Any, *, scenarios: bool = False) ->
         for scenario, stage in dict.fromkeys((cell["scenario"], cell["stage"]) for cell in document["cells"]):
             where = f"{scenario}, {stage}" if stage else scenario
             title = f"{where}: {document['scenarios'][scenario]}"
-            _print(console, title, *scenario_table(document, scenario, stage))
+            print_cells(console, title, *scenario_table(document, scenario, stage))
     plan = document["plan"]
     title = f"{len(document['scenarios'])} scenarios, {plan['seeds']} seeds, stage {plan['stages'][0]}"
-    _print(console, title, *overview_table(document))
+    print_cells(console, title, *overview_table(document))
     machine = document["machine"]
     lines = [
         KEY,
@@ -135,7 +135,8 @@ def _diverged(document: Document) -> list[tuple[str, int, int]]:
     ]
 
 
-def _print(console: Any, title: str, heading: list[str], body: list[list[str]]) -> None:
+def print_cells(console: Any, title: str, heading: Sequence[str], body: Iterable[Sequence[Any]]) -> None:
+    """Print a table: the first column is text, the others are numbers."""
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
     from rich.table import Table
@@ -145,7 +146,7 @@ def _print(console: Any, title: str, heading: list[str], body: list[list[str]]) 
     for name in heading[1:]:
         table.add_column(escape(name), justify="right", no_wrap=True)
     for cells in body:
-        table.add_row(*cells)
+        table.add_row(*(escape(str(cell)) for cell in cells))
     console.print(table)
 
 
@@ -161,7 +162,7 @@ def print_changes(document: Document, console: Any, *, everything: bool = False)
             ]
             for row in shown
         ]  # fmt: skip
-        _print(console, "B against A", heading, body)
+        print_cells(console, "B against A", heading, body)
     counts = ", ".join(f"{count} {verdict}" for verdict, count in document["counts"].items())
     for line in (
         f"{document['pairs']} pairs of runs; of {len(document['rows'])} comparisons {counts or 'none'}.",

@@ -185,22 +185,8 @@ class FilterPyEKF(_FilterPyBaseline):
 
     Parameters
     ----------
-    sample_rate : float
-        [Hz].
-    initial_model : ColemanHodgdon or LinearGain, optional
-        Model to start from; its kind is the kind that is estimated.
-    uncertainty : float
-        Standard deviation of each initial parameter, relative to its value.
-    noise : float
-        Standard deviation of the displacement's noise [µm].
-    drift : float
-        Random walk of each parameter, relative to its initial value per root second.
-    mismatch : float
-        Random walk of w_h [µm per root second].
-    offset : bool
-        Estimate a constant offset of the displacement too.
-    delay : float
-        Samples by which the measured displacement lags the voltage.
+    sample_rate, initial_model, uncertainty, noise, drift, mismatch, offset, delay
+        As in `HysteresisEKF`.
 
     Raises
     ------
@@ -244,22 +230,8 @@ class FilterPyUKF(_FilterPyBaseline):
 
     Parameters
     ----------
-    sample_rate : float
-        [Hz].
-    initial_model : ColemanHodgdon or LinearGain, optional
-        Model to start from; its kind is the kind that is estimated.
-    uncertainty : float
-        Standard deviation of each initial parameter, relative to its value.
-    noise : float
-        Standard deviation of the displacement's noise [µm].
-    drift : float
-        Random walk of each parameter, relative to its initial value per root second.
-    mismatch : float
-        Random walk of w_h [µm per root second].
-    offset : bool
-        Estimate a constant offset of the displacement too.
-    delay : float
-        Samples by which the measured displacement lags the voltage.
+    sample_rate, initial_model, uncertainty, noise, drift, mismatch, offset, delay
+        As in `HysteresisEKF`.
 
     Raises
     ------

@@ -316,10 +316,8 @@ class ColemanHodgdon(FreeRunning):
         ----------
         r : array_like, shape (N,)
             Reference displacement [µm].
-        initial_state : float
-            w_h [µm] at the first sample.
-        allow_jumps : bool
-            Take jumps between samples as fast monotone changes instead of refusing them.
+        initial_state, allow_jumps
+            As in `simulate`.
 
         Returns
         -------

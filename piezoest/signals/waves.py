@@ -109,16 +109,8 @@ def sine(
 
     Parameters
     ----------
-    amplitude : float
-        µm.
-    frequency : float
-        Hz, below half the sample rate.
-    periods : float
-        Number of periods; the number of samples is rounded.
-    sample_rate : float
-        Hz.
-    phase : float
-        Start, in periods. 0: at zero, rising.
+    amplitude, frequency, periods, sample_rate, phase
+        As in `triangle`.
 
     Returns
     -------

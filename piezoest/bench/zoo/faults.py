@@ -9,9 +9,23 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.bench.zoo.faulty_stages import Factor, Gap, Missing, OffsetStep, Saturation, Spikes, Stuck
+from piezoest.bench.zoo.faulty_stages import (
+    FOREVER,
+    Dead,
+    Drift,
+    Factor,
+    ForATime,
+    FrozenAmplifier,
+    Gap,
+    Hum,
+    Missing,
+    OffsetStep,
+    Saturation,
+    Spikes,
+    Stuck,
+    StuckStage,
+)
 from piezoest.bench.zoo.references import Reference
-from piezoest.bench.zoo.wrong import FOREVER, Dead, Drift, ForATime, FrozenAmplifier, Hum, StuckStage
 
 NONE, START, TRANSIENT, PERMANENT = "none", "from-start", "transient", "permanent"
 SETPOINT_NOISE = 1e-4  # µm, of a reference that rests

@@ -18,8 +18,8 @@ from piezoest.bench.zoo.faults import (
     coordinates,
     gain_schedule,
 )
+from piezoest.bench.zoo.faulty_stages import Drift, Hum
 from piezoest.bench.zoo.references import Reference
-from piezoest.bench.zoo.wrong import Drift, Hum
 from piezoest.compensators import VoltageLimits
 from piezoest.models import Creep, MassSpringDamper
 from piezoest.stage import Amplifier, Gauge, SimulatedStage
