@@ -1,9 +1,8 @@
 """One run of the paper's experiment: a reference, a compensation, the ring until it is stationary.
 
-The procedure is the paper's. Reference, compensator, stage and estimator form the ring at
-50 kHz, with noise and converters; the parameters are estimated while the ring runs, and the
-error is max |r - x| of the true displacement over the stationary part. Nothing is fitted to
-a record afterwards.
+The procedure is the paper's. Reference, compensator, stage and estimator form the ring at 50 kHz, with noise
+and converters; the parameters are estimated while the ring runs, and the error is max |r - x| of the true
+displacement over the stationary part. Nothing is fitted to a record afterwards.
 
 What the paper does not say is chosen here: the memory of the estimator, the start, and how
 often the compensator takes over new parameters.

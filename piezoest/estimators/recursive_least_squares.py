@@ -31,13 +31,11 @@ class RecursiveLeastSquares:
     P : array_like, shape (n, n) or (n,), or float, optional
         Initial covariance Q0^-1: matrix, diagonal, or one variance for all (default 1e6).
     noise_variance : float
-        Variance R of the noise in z, in its unit squared (discrete law only; the paper's
-        law has 1).
+        Variance R of the noise in z, in its unit squared (discrete law only; the paper's law has 1).
     time_base : {"discrete", "continuous"}
-        ``"discrete"``: time in samples; one exact update a sample, the ordinary recursive
-        least squares. ``"continuous"``: the differential equations (A5)-(A7) integrated by
-        Bogacki-Shampine with `step`; with the step in seconds its normalised gain works
-        per second, as in the paper.
+        ``"discrete"``: time in samples; one exact update a sample, the ordinary recursive least squares.
+        ``"continuous"``: the differential equations (A5)-(A7) integrated by Bogacki-Shampine with `step`;
+        with the step in seconds its normalised gain works per second, as in the paper.
     step : float
         Time between samples, in the unit of `Forgetting.memory`: 1 for samples (default),
         ``1 / sample_rate`` for seconds.
@@ -49,8 +47,7 @@ class RecursiveLeastSquares:
     Raises
     ------
     ValueError
-        If a shape, a value or a combination of policies is wrong, or P is not symmetric
-        positive definite.
+        If a shape, a value or a combination of policies is wrong, or P is not symmetric positive definite.
 
     Notes
     -----

@@ -44,8 +44,7 @@ class ColemanHodgdon(FreeRunning):
     gamma : float
         alpha times the slope of the asymptote [µm/V²].
     offset : float
-        Displacement at zero voltage and w_h = 0 [µm]: a sensor bias, or the
-        centre of a unipolar loop.
+        Displacement at zero voltage and w_h = 0 [µm]: a sensor bias, or the centre of a unipolar loop.
 
     Raises
     ------
@@ -299,8 +298,7 @@ class ColemanHodgdon(FreeRunning):
         Raises
         ------
         ValueError
-            If u is not a finite 1-D array, or jumps: the model is defined for connected
-            inputs only.
+            If u is not a finite 1-D array, or jumps: the model is defined for connected inputs only.
         """
         u = array_1d("u", u)
         if not allow_jumps:
