@@ -118,43 +118,37 @@ def run_demo(periods: int = 15, seed: int = 0, progress: Callable[[str], None] |
     # A moment of each way first, so that what Numba compiles once does not count as time of the runs.
     say("compiling, once after the installation")
     moment = signals.triangle(AMPLITUDE, FREQUENCY, 0.01, SAMPLE_RATE)
-    for way in (_linear, _fixed, _adaptive, _controlled):
+    for way in (*WAYS.values(), _controlled):
         way(moment, seed)
     reference = signals.triangle(AMPLITUDE, FREQUENCY, periods, SAMPLE_RATE)
     began = time.perf_counter()
-    say("linear feed-forward, gain estimated while running")
-    linear = _linear(reference, seed)
-    say("inverse of the wrong start model, fixed")
-    fixed = _fixed(reference, seed)
-    say("inverse compensation, model estimated while running")
-    adaptive = _adaptive(reference, seed)
+    records = []
+    for label, way in WAYS.items():
+        say(label)
+        records.append(way(reference, seed))
     say("AdaptiveFeedforward, from nothing")
     controlled, learnt = _controlled(reference, seed)
-    return Demo(linear, fixed, adaptive, controlled, learnt, time.perf_counter() - began)
+    return Demo(*records, controlled, learnt, time.perf_counter() - began)
 
 
-def _linear(reference: signals.Signal, seed: int) -> TrackingRecord:
-    return track(
-        reference,
-        stage=PaperStage(SAMPLE_RATE, seed=seed),
-        compensator=LinearCompensator(WRONG_GAIN),
-        estimator=HysteresisRLS(SAMPLE_RATE, initial_model=WRONG_GAIN),
-    )
+def _followed(reference: signals.Signal, seed: int, compensator: Any, start: Any = None) -> TrackingRecord:
+    """The ring with a compensator, and with an estimator if there is a model for it to start from."""
+    estimator = None if start is None else HysteresisRLS(SAMPLE_RATE, initial_model=start)
+    stage = PaperStage(SAMPLE_RATE, seed=seed)
+    return track(reference, stage=stage, compensator=compensator, estimator=estimator)
 
 
-def _fixed(reference: signals.Signal, seed: int) -> TrackingRecord:
-    return track(
-        reference, stage=PaperStage(SAMPLE_RATE, seed=seed), compensator=InverseCompensator(WRONG_MODEL)
-    )
-
-
-def _adaptive(reference: signals.Signal, seed: int) -> TrackingRecord:
-    return track(
-        reference,
-        stage=PaperStage(SAMPLE_RATE, seed=seed),
-        compensator=InverseCompensator(WRONG_MODEL),
-        estimator=HysteresisRLS(SAMPLE_RATE, initial_model=WRONG_MODEL),
-    )
+WAYS: dict[str, Callable[[signals.Signal, int], TrackingRecord]] = {
+    "linear feed-forward, gain estimated while running": lambda reference, seed: _followed(
+        reference, seed, LinearCompensator(WRONG_GAIN), WRONG_GAIN
+    ),
+    "inverse of the wrong start model, fixed": lambda reference, seed: _followed(
+        reference, seed, InverseCompensator(WRONG_MODEL)
+    ),
+    "inverse compensation, model estimated while running": lambda reference, seed: _followed(
+        reference, seed, InverseCompensator(WRONG_MODEL), WRONG_MODEL
+    ),
+}
 
 
 def _controlled(reference: signals.Signal, seed: int) -> tuple[TrackingRecord, dict[str, float]]:

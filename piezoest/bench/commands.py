@@ -53,7 +53,7 @@ def paper(
     seed: Annotated[int, typer.Option(min=0, help="Start of the random numbers of the stage.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Without the sweep over the memory.")] = False,
     workers: Annotated[
-        int | None, typer.Option(min=0, help="Processes; default one for each processor, 0 for none.")
+        int | None, typer.Option(min=1, help="Processes; default one for each processor.")
     ] = None,
     html: Html = None,
 ) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from piezoest.bench.paper import SWEPT, _executor
+from piezoest.bench.paper import SWEPT
 from piezoest.bench.paper_experiment import MEMORY, START, Experiment
 from piezoest.bench.paper_report import print_report
 from piezoest.bench.paper_tables import PRBS_ROW, Published, published
@@ -185,11 +184,6 @@ def test_figure_of_the_memory(tmp_path: Path) -> None:
     run = Experiment(SWEPT, START, None, 0).run()
     result = PaperResult(0.4, 0, {}, {}, {}, {0.2: run, 0.4: run})
     error_against_memory(result).savefig(tmp_path / "memory.png")
-
-
-def test_without_workers_the_runs_are_made_here() -> None:
-    with _executor(0) as executor:
-        assert executor.submit(os.getpid).result() == os.getpid()
 
 
 def test_wrong_usage(tmp_path: Path) -> None:

@@ -48,18 +48,6 @@ def test_rows_of_two_stores_are_kept_apart(tmp_path: Path, monkeypatch: pytest.M
         assert [row["value"] for row in other.rows(["other"])] == [1]
 
 
-def test_rows_that_moved_are_found_and_one_that_is_gone_is_said(tmp_path: Path) -> None:
-    path = tmp_path / "runs.jsonl"
-    with Store(path) as store:
-        for key in "abc":
-            store.append({"key": key})
-        lines = path.read_bytes().splitlines(keepends=True)
-        path.write_bytes(b"".join([lines[2], lines[0]]))
-        assert [row["key"] for row in store.rows("ac")] == ["a", "c"]
-        with pytest.raises(ValueError, match=r"runs\.jsonl: the run b is gone"):
-            list(store.rows("cb"))
-
-
 APPEND = """
 import sys
 from pathlib import Path
