@@ -128,7 +128,8 @@ def run_demo(periods: int = 15, seed: int = 0, progress: Callable[[str], None] |
         records.append(way(reference, seed))
     say("AdaptiveFeedforward, from nothing")
     controlled, learnt = _controlled(reference, seed)
-    return Demo(*records, controlled, learnt, time.perf_counter() - began)
+    linear, fixed, adaptive = records
+    return Demo(linear, fixed, adaptive, controlled, learnt, time.perf_counter() - began)
 
 
 def _followed(reference: signals.Signal, seed: int, compensator: Any, start: Any = None) -> TrackingRecord:

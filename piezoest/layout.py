@@ -20,11 +20,12 @@ function ``wanted`` of that module, which is how one loop serves models that kno
 
 from __future__ import annotations
 
+import copy
 import functools
 import importlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -269,3 +270,16 @@ class Named:
 
     def __getitem__(self, i: int) -> Named:
         return Named(self._array[i], self._layout)
+
+
+class Copied:
+    """What has a state of its own, which its copies do not share."""
+
+    __slots__ = ()
+
+    def copy(self) -> Self:
+        """Return an independent one in the same state."""
+        return copy.deepcopy(self)
+
+    def __copy__(self) -> Self:
+        return self.copy()

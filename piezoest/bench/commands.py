@@ -25,9 +25,7 @@ from piezoest.bench.shared import (
 )
 
 app = typer.Typer(
-    cls=Group,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
+    cls=Group, rich_markup_mode="rich", context_settings={"help_option_names": ["-h", "--help"]}
 )
 
 app.callback(invoke_without_command=True)(table_command.table)

@@ -10,12 +10,7 @@ from piezoest.report import Page
 
 Document = dict[str, Any]  # from `piezoest.bench.table.describe`
 
-HEADINGS = {
-    "overview": "Errors",
-    "adaptation": "Adaptation",
-    "settled": "Where each is weak",
-    "cost": "Cost",
-}
+HEADINGS = {"overview": "Errors", "adaptation": "Adaptation", "settled": "Where each is weak", "cost": "Cost"}
 
 
 def write_html(document: Document, path: str | Path) -> None:

@@ -22,13 +22,7 @@ from piezoest.bench.recorded import digest, file_of
 from piezoest.bench.run import COLUMNS, Row, Task, code_of, crashed, follow, play
 from piezoest.bench.scenarios import SCENARIOS, UNREPEATED
 from piezoest.bench.stages import PAPER, STAGES, STRANGERS
-from piezoest.bench.statistics import (
-    NEEDS,
-    QUANTITIES,
-    interval,
-    order,
-    relative,
-)
+from piezoest.bench.statistics import NEEDS, QUANTITIES, interval, order, relative
 
 RUNS, PERIODS, DOCUMENT = "runs", "periods", "table.json"
 PERIOD_COLUMNS: dict[str, type] = {

@@ -49,8 +49,7 @@ class Runs:
         ),
     ] = None
     only: Annotated[
-        list[str] | None,
-        typer.Option(help="Only this one in the place of the package's; may be repeated."),
+        list[str] | None, typer.Option(help="Only this one in the place of the package's; may be repeated.")
     ] = None
     scenario: Annotated[
         list[str] | None,
@@ -108,8 +107,7 @@ class Where:
     ] = None
     dask: Annotated[bool, typer.Option("--dask", help="Run on Dask, on this machine's cores.")] = False
     scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: tcp://10.0.0.1:8786."),
+        str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: tcp://10.0.0.1:8786.")
     ] = None
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass
-from typing import Any, Literal, Self, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, instance, integer, number_or_nan, positive
 from piezoest.compensators import inverse_kernel as kernel
 from piezoest.compensators.limits import VoltageLimits
-from piezoest.layout import Named, Record, new
+from piezoest.layout import Copied, Named, Record, new
 from piezoest.models import Model
 
 Method = Literal["closed-form", "bogacki-shampine"]
@@ -41,7 +40,7 @@ class CompensatorStatus:
     projected: bool
 
 
-class Compensator:
+class Compensator(Copied):
     """Feed-forward through the inverse of a model. See `LinearCompensator` and `InverseCompensator`."""
 
     __slots__ = (
@@ -282,15 +281,8 @@ class Compensator:
         self._compiled()[1](self._state, self._settings, r[start:], u[start:])
         return u
 
-    def copy(self) -> Self:
-        """Return an independent compensator in the same state."""
-        return copy.deepcopy(self)
 
-    def __copy__(self) -> Self:
-        return self.copy()
-
-
-class AroundCompensator:
+class AroundCompensator(Copied):
     """What is put around a feed-forward compensator, and shows its model, limits and status."""
 
     __slots__ = ("_compensator",)
@@ -322,10 +314,3 @@ class AroundCompensator:
     def status(self) -> CompensatorStatus:
         """What happened to the samples so far."""
         return self._compensator.status
-
-    def copy(self) -> Self:
-        """Return an independent one in the same state."""
-        return copy.deepcopy(self)
-
-    def __copy__(self) -> Self:
-        return self.copy()

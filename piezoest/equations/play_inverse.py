@@ -11,11 +11,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.equations.bent_plays import (
-    bent_plays_output,
-    bent_plays_step,
-    prandtl_ishlinskii_voltage,
-)
+from piezoest.equations.bent_plays import bent_plays_output, bent_plays_step, prandtl_ishlinskii_voltage
 from piezoest.equations.creep import creep_to_come, unit_creep_step
 from piezoest.equations.turning_points import recall
 from piezoest.layout import FIXED, MEASURED, Length, Record, numbers, record

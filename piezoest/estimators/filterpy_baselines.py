@@ -258,7 +258,7 @@ class FilterPyUKF(_FilterPyBaseline):
         "model_is_admissible_after_anything": (
             "The UKF of filterpy subtracts K S K' from P, which loses definiteness on absurd measurements "
             "(1e8 µm); as a baseline it is used unaltered."
-        ),
+        )
     }
 
     def _make_filter(self, n: int) -> Any:

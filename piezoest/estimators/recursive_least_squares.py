@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import copy
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, finite, integer, moderate, number_or_nan
 from piezoest.estimators import recursive_least_squares_kernel as kernel
-from piezoest.layout import new, record
+from piezoest.layout import Copied, new, record
 from piezoest.policies import Normalisation, Policy, check_policies
 from piezoest.policies.base import Conditions, layouts
 
@@ -19,7 +18,7 @@ TimeBase = Literal["discrete", "continuous"]
 LARGEST_START = 1e50
 
 
-class RecursiveLeastSquares:
+class RecursiveLeastSquares(Copied):
     """Recursive least squares with forgetting for any regression z = theta . phi (App. A).
 
     Parameters
@@ -125,9 +124,6 @@ class RecursiveLeastSquares:
         law = self._state["law"]
         law["P"] = self._settings["law"]["P_0"]
         law["resets"] += 1.0
-
-    def __copy__(self) -> Self:
-        return copy.deepcopy(self)
 
     @property
     def theta(self) -> FloatArray:

@@ -204,11 +204,7 @@ class PrandtlIshlinskii(Model, EqualByContent):
         return {"gain": self.gain, "thresholds": self.thresholds, "weights": self.weights}
 
     def simulate(
-        self,
-        u: FloatArray,
-        *,
-        initial_state: FloatArray | None = None,
-        sample_rate: float | None = None,
+        self, u: FloatArray, *, initial_state: FloatArray | None = None, sample_rate: float | None = None
     ) -> FloatArray:
         """Displacement for a voltage record; exact for a voltage held over each sample.
 
@@ -238,11 +234,7 @@ class PrandtlIshlinskii(Model, EqualByContent):
         return x
 
     def invert(
-        self,
-        r: FloatArray,
-        *,
-        initial_state: FloatArray | None = None,
-        sample_rate: float | None = None,
+        self, r: FloatArray, *, initial_state: FloatArray | None = None, sample_rate: float | None = None
     ) -> FloatArray:
         """Voltage under which the model follows a reference exactly.
 

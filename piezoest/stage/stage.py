@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 from collections.abc import Callable
-from typing import Any, Protocol, Self, cast
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, finite, integer, number_or_nan, positive
-from piezoest.layout import new
+from piezoest.layout import Copied, new
 from piezoest.models.creep import Creep
 from piezoest.models.mechanics import MassSpringDamper
 from piezoest.stage import kernel
@@ -39,7 +38,7 @@ _ONE = np.ones(1)
 _NO_MECHANICS = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
 
 
-class SimulatedStage:
+class SimulatedStage(Copied):
     """A simulated stage: from a voltage to the measured and the true displacement.
 
     Each sample passes amplifier → hysteresis → creep → mechanics → gauge. The voltage of `step` is
@@ -278,9 +277,6 @@ class SimulatedStage:
         self._generator = np.random.default_rng(self._seed)
         self._count = 0
         self._displacement = self._hysteresis.offset
-
-    def __copy__(self) -> Self:
-        return copy.deepcopy(self)
 
     def _factors(self, n: int) -> tuple[FloatArray, FloatArray]:
         """Factors of the hysteresis and of its shape for the next n samples: shape (n,), or (1,) for 1."""
