@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import ast
-import importlib
 import inspect
-import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from piezoest import policies
+from piezoest.bench.machine import imported
 from piezoest.bench.stages import REACH
 from piezoest.compensators import VoltageLimits
 from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
@@ -114,15 +112,9 @@ def _load(path: str) -> type:
     module_name, separator, class_name = path.partition(":")
     if not (module_name and separator and class_name):
         raise ValueError(f"an estimator of one's own must read like module:Class, got {path!r}")
-    if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
-    try:
-        module = importlib.import_module(module_name)
-    except ImportError as error:
-        raise ValueError(f"{path}: {error}") from None
-    cls = getattr(module, class_name, None)
+    cls = imported(path)
     if not inspect.isclass(cls):
-        raise ValueError(f"{path}: {module_name} has no class {class_name}")
+        raise ValueError(f"{path}: {class_name} is no class")
     needed = ("step", "learn") if hasattr(cls, "learn") else ("step", "model")
     if missing := [name for name in needed if not hasattr(cls, name)]:
         raise ValueError(f"{path}: {class_name} has no {' and no '.join(missing)}: see piezoest.Estimator")

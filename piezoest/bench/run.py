@@ -12,10 +12,9 @@ import traceback
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from piezoest.bench import recorded
+from piezoest.bench import machine, recorded
 from piezoest.bench.cases import Case
 from piezoest.bench.estimators import LIMITS, LINEAR, candidate, module_of
-from piezoest.bench.machine import fingerprint
 from piezoest.bench.metrics import measure
 from piezoest.bench.origin import json_safe
 from piezoest.bench.quiet import quiet
@@ -33,24 +32,10 @@ LINEAR_MEMORY = 2.0  # periods
 
 # Numbers of a run in the order of the table's columns; with each its type there.
 COLUMNS: dict[str, type] = {
-    "key": str,
-    "stage": str,
-    "scenario": str,
-    "estimator": str,
-    "seed": int,
-    "failure": str,
-    "amplitude": float,
-    "period": float,
-    "settles": int,
-    "first": float,
-    "worst": float,
-    "typical": float,
-    "settled": float,
-    "settled_rms": float,
-    "linear_settled": float,
-    "linear_worst": float,
-    "diverged": bool,
-}
+    "key": str, "stage": str, "scenario": str, "estimator": str, "seed": int, "failure": str,
+    "amplitude": float, "period": float, "settles": int, "first": float, "worst": float, "typical": float,
+    "settled": float, "settled_rms": float, "linear_settled": float, "linear_worst": float, "diverged": bool,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,10 +61,7 @@ def code_of(estimator: str) -> str:
 
     `estimator`: as `piezoest.bench.estimators.candidate` reads it, or "linear feed-forward".
     """
-    path = module_of(estimator)
-    if path is None:
-        return fingerprint()
-    return f"{fingerprint()}-{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}"
+    return machine.code_of(module_of(estimator))
 
 
 @quiet()
