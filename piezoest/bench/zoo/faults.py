@@ -9,22 +9,7 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.bench.zoo.faulty_stages import (
-    FOREVER,
-    Dead,
-    Drift,
-    Factor,
-    ForATime,
-    FrozenAmplifier,
-    Gap,
-    Hum,
-    Missing,
-    OffsetStep,
-    Saturation,
-    Spikes,
-    Stuck,
-    StuckStage,
-)
+from piezoest.bench.zoo import faulty_stages as faulty
 from piezoest.bench.zoo.references import Reference
 
 NONE, START, TRANSIENT, PERMANENT = "none", "from-start", "transient", "permanent"
@@ -104,13 +89,13 @@ def _times(fault: Fault, around: Around) -> tuple[float, float]:
     """Start and duration [s], half a sample early: whatever rounding does, the sample is the one meant."""
     start = max(fault.start - 0.5, 0.0) / around.sample_rate
     if fault.lasting:
-        return start, FOREVER
+        return start, faulty.FOREVER
     return start, (fault.stop - max(fault.start, 0.5)) / around.sample_rate
 
 
 def _for_a_time(make: Callable[[Any, Fault, Around], Any]) -> Callable[[Any, Fault, Around], Any]:
     """Let a fault that has no moments of its own hold while it should."""
-    return lambda stage, fault, around: ForATime(make(stage, fault, around), *_times(fault, around))
+    return lambda stage, fault, around: faulty.ForATime(make(stage, fault, around), *_times(fault, around))
 
 
 def _swing(around: Around) -> float:
@@ -132,21 +117,22 @@ ANY = (*STILL, *FACTORS, "zero moved")
 
 FAULTS: dict[str, Kind] = {
     "amplifier-frozen": Kind(
-        ALL, stage=lambda stage, fault, around: FrozenAmplifier(stage, *_times(fault, around)), hides=True,
-        names=STILL,
+        ALL, stage=lambda stage, fault, around: faulty.FrozenAmplifier(stage, *_times(fault, around)),
+        hides=True, names=STILL,
     ),
     "stage-stuck": Kind(
-        ALL, stage=lambda stage, fault, around: StuckStage(
+        ALL, stage=lambda stage, fault, around: faulty.StuckStage(
             stage, *_times(fault, around), around.noise, seed=around.seed
         ),
         hides=True, names=STILL,
     ),
     "sensor-constant": Kind(
-        ALL, stage=lambda stage, fault, around: Stuck(stage, *_times(fault, around)), hides=True, names=STILL
+        ALL, stage=lambda stage, fault, around: faulty.Stuck(stage, *_times(fault, around)),
+        hides=True, names=STILL,
     ),
     "sensor-noise": Kind(
         ALL, size=lambda rng, around: around.reference.centre + rng.uniform(-1.0, 1.0) * around.stroke,
-        stage=lambda stage, fault, around: Dead(
+        stage=lambda stage, fault, around: faulty.Dead(
             stage, *_times(fault, around), fault.size, 0.002 * _swing(around), seed=around.seed
         ),
         hides=True, names=ANY,
@@ -154,28 +140,28 @@ FAULTS: dict[str, Kind] = {
     "sensor-saturated": Kind(
         ALL, size=lambda rng, around: 0.6 * around.reference.amplitude,
         stage=_for_a_time(
-            lambda stage, fault, around: Saturation(stage, fault.size, around.reference.centre)
+            lambda stage, fault, around: faulty.Saturation(stage, fault.size, around.reference.centre)
         ),
         partly=True, names=("saturated",),
     ),
     "sensor-factor": Kind(
         ALL, size=lambda rng, around: float(rng.choice([-1.0, 1e-3, 1e3])),
-        stage=_for_a_time(lambda stage, fault, around: Factor(stage, fault.size)), hides=True,
+        stage=_for_a_time(lambda stage, fault, around: faulty.Factor(stage, fault.size)), hides=True,
         names=FACTORS,
     ),
     "zero-off": Kind(
         ALL, size=_zero,
-        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)), hides=True,
+        stage=_for_a_time(lambda stage, fault, around: faulty.OffsetStep(stage, 0.0, fault.size)), hides=True,
         names=("zero moved",),
     ),
     "zero-off-shifted": Kind(
         ALL, size=_zero,
-        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)),
+        stage=_for_a_time(lambda stage, fault, around: faulty.OffsetStep(stage, 0.0, fault.size)),
     ),
     "spikes": Kind(
         ALL, size=lambda rng, around: _swing(around) * rng.choice([0.3, 1.0, 5.0]),
         stage=_for_a_time(
-            lambda stage, fault, around: Spikes(
+            lambda stage, fault, around: faulty.Spikes(
                 stage, 0.01 * around.sample_rate, fault.size, seed=around.seed
             )
         ),
@@ -183,16 +169,18 @@ FAULTS: dict[str, Kind] = {
     ),
     "dropouts": Kind(
         ALL, size=lambda rng, around: float(rng.choice([0.01, 0.2, 0.5])),
-        stage=_for_a_time(lambda stage, fault, around: Missing(stage, fault.size, seed=around.seed)),
+        stage=_for_a_time(lambda stage, fault, around: faulty.Missing(stage, fault.size, seed=around.seed)),
     ),
-    "gap": Kind(ALL, stage=lambda stage, fault, around: Gap(stage, *_times(fault, around)), hides=True),
+    "gap": Kind(
+        ALL, stage=lambda stage, fault, around: faulty.Gap(stage, *_times(fault, around)), hides=True
+    ),
     "hum": Kind(
         ALL, size=lambda rng, around: _usual(0.2, around) if rng.random() < 0.5 else 0.05 * _swing(around),
-        stage=_for_a_time(lambda stage, fault, around: Hum(stage, fault.size, seed=around.seed)),
+        stage=_for_a_time(lambda stage, fault, around: faulty.Hum(stage, fault.size, seed=around.seed)),
     ),
     "drift": Kind(
         ALL, size=lambda rng, around: _swing(around) * rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.3),
-        stage=lambda stage, fault, around: Drift(
+        stage=lambda stage, fault, around: faulty.Drift(
             stage, fault.size * around.sample_rate / max(fault.stop - fault.start, 1), *_times(fault, around)
         ),
     ),
@@ -200,7 +188,7 @@ FAULTS: dict[str, Kind] = {
     "amplitude-drop": Kind((TRANSIENT, PERMANENT), size=lambda rng, around: rng.uniform(0.1, 0.4)),
     "glitch": Kind(
         (TRANSIENT,), size=lambda rng, around: _usual(rng.choice([1.0, 2.0, 10.0]), around),
-        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)), hides=True,
+        stage=_for_a_time(lambda stage, fault, around: faulty.OffsetStep(stage, 0.0, fault.size)), hides=True,
     ),
     "dwell": Kind((TRANSIENT,)),
 }  # fmt: skip
