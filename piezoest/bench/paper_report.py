@@ -15,16 +15,11 @@ TITLES = {
 }
 TRANSIENTS = "Adaptation: largest error [µm] of each period, and periods until it is settled"
 HEADINGS = {
-    "alpha": "α\n[1/V]",
-    "beta": "β\n[µm/V]",
-    "gamma": "γ\n[µm/V²]",
-    "K": "K\n[µm/V]",
-    "linear_max_error": "linear\n[µm]",
-    "linear_relative_error": "linear\n[%]",
-    "compensated_max_error": "comp.\n[µm]",
-    "compensated_relative_error": "comp.\n[%]",
+    "alpha": "α\n[1/V]", "beta": "β\n[µm/V]", "gamma": "γ\n[µm/V²]", "K": "K\n[µm/V]",
+    "linear_max_error": "linear\n[µm]", "linear_relative_error": "linear\n[%]",
+    "compensated_max_error": "comp.\n[µm]", "compensated_relative_error": "comp.\n[%]",
     "error_reduction": "reduction\n[%]",
-}
+}  # fmt: skip
 CALIBRATION, HELD_OUT = "calibration", "held out"
 KEY = "✓ within its bound, ✗ outside; numbers without a mark have none."
 

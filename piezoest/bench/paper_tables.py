@@ -14,23 +14,13 @@ SOURCE = "Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012)"
 # reference, printed with two digits.
 Bounds = dict[str, float]
 CALIBRATION_BOUNDS: Bounds = {
-    "alpha": 0.15,
-    "beta": 0.02,
-    "gamma": 0.15,
-    "K": 0.02,
-    "linear_max_error": 0.05,
-    "compensated_max_error": 0.25,
-    "error_reduction": 2.0,
-}
+    "alpha": 0.15, "beta": 0.02, "gamma": 0.15, "K": 0.02, "linear_max_error": 0.05,
+    "compensated_max_error": 0.25, "error_reduction": 2.0,
+}  # fmt: skip
 PRBS_BOUNDS: Bounds = {
-    "alpha": 0.15,
-    "beta": 0.03,
-    "gamma": 0.15,
-    "K": 0.03,
-    "linear_max_error": 0.10,
-    "compensated_max_error": 0.20,
-    "error_reduction": 6.0,
-}
+    "alpha": 0.15, "beta": 0.03, "gamma": 0.15, "K": 0.03, "linear_max_error": 0.10,
+    "compensated_max_error": 0.20, "error_reduction": 6.0,
+}  # fmt: skip
 TABLE_III_BOUNDS: Bounds = {"compensated_max_error": 0.20}
 
 IN_POINTS = "error_reduction"

@@ -25,15 +25,11 @@ def layouts(settings: dict[str, Any]) -> tuple[Record, Record]:
     changes = Length("bend_weight_count", settings["bend_weights"].size)
     state = record(__name__, y=numbers(plays, kind=MEASURED), z=numbers(terms, kind=MEASURED))
     return state, record(
-        gain=FIXED,
-        offset=FIXED,
-        thresholds=numbers(plays, kind=FIXED),
-        weights=numbers(plays, kind=FIXED),
-        creep_gains=numbers(terms, kind=FIXED),
-        decays=numbers(terms, kind=FIXED),
-        bends=numbers(bends, kind=FIXED),
-        bend_weights=numbers(changes, kind=FIXED),
-    )
+        gain=FIXED, offset=FIXED,
+        thresholds=numbers(plays, kind=FIXED), weights=numbers(plays, kind=FIXED),
+        creep_gains=numbers(terms, kind=FIXED), decays=numbers(terms, kind=FIXED),
+        bends=numbers(bends, kind=FIXED), bend_weights=numbers(changes, kind=FIXED),
+    )  # fmt: skip
 
 
 @register_jitable

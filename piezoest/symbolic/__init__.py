@@ -8,14 +8,6 @@ from piezoest.symbolic.solving import Evaluation, Minimum, ipopt, quadratic_prog
 from piezoest.symbolic.tracing import Pass, Simulation, jacobian, simulation, trace
 
 __all__ = [
-    "Evaluation",
-    "Minimum",
-    "Pass",
-    "Simulation",
-    "ipopt",
-    "jacobian",
-    "quadratic_program",
-    "quadratic_solver",
-    "simulation",
-    "trace",
-]
+    "Evaluation", "Minimum", "Pass", "Simulation", "ipopt", "jacobian", "quadratic_program",
+    "quadratic_solver", "simulation", "trace",
+]  # fmt: skip

@@ -139,14 +139,9 @@ def _ratio(gain: float, share: float, a: float) -> ColemanHodgdon:
 # `preisach` is a sum of plays under a bell: of the play estimators' own family, and no independent witness;
 # so are `paper` and `coleman-hodgdon` of theirs. The others are nobody's.
 FAMILIES: dict[str, Callable[[Any, Reach], Make]] = {
-    "bouc-wen": _bouc_wen,
-    "duhem": _duhem,
-    "backlash": _backlash,
-    "relays": _relays,
-    "paper": _paper,
-    "preisach": _preisach,
-    "coleman-hodgdon": _coleman_hodgdon,
-}
+    "bouc-wen": _bouc_wen, "duhem": _duhem, "backlash": _backlash, "relays": _relays, "paper": _paper,
+    "preisach": _preisach, "coleman-hodgdon": _coleman_hodgdon,
+}  # fmt: skip
 
 
 def draw_family(family: str, rng: np.random.Generator, reach: Reach, *, width: float, gain: float) -> Any:

@@ -89,15 +89,9 @@ def _steps(n: int, f: float, fs: float, rng: Any) -> FloatArray:
 
 
 SHAPES: dict[str, Callable[[int, float, float, Any], FloatArray]] = {
-    "triangle": _triangle,
-    "sine": _sine,
-    "raster": _raster,
-    "chirp": _chirp,
-    "sum-of-sines": _sum_of_sines,
-    "walk": _walk,
-    "steps": _steps,
-    "beyond": _triangle,
-}
+    "triangle": _triangle, "sine": _sine, "raster": _raster, "chirp": _chirp, "sum-of-sines": _sum_of_sines,
+    "walk": _walk, "steps": _steps, "beyond": _triangle,
+}  # fmt: skip
 REPEATING = ("triangle", "sine", "raster", "walk", "steps", "beyond")
 CYCLES = {"walk": float(WALK_SWINGS), "steps": 0.5 * LEVELS}
 

@@ -13,14 +13,8 @@ from piezoest.bench.zoo.settling import SEGMENTS
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
 RATIOS = (
-    "ratio",
-    "ratio_rms",
-    "cycle_ratio",
-    "last_ratio",
-    "last_ratio_rms",
-    "after_ratio",
-    "after_ratio_rms",
-)
+    "ratio", "ratio_rms", "cycle_ratio", "last_ratio", "last_ratio_rms", "after_ratio", "after_ratio_rms",
+)  # fmt: skip
 ENOUGH = 0.95  # of the runs of a cell
 SOON, BACK = 2, 3  # periods until it has settled, and until a fault is forgotten
 

@@ -109,15 +109,9 @@ def _chirp(n: int, waves: float, rng: Any) -> FloatArray:
 
 
 SHAPES: dict[str, Callable[[int, float, Any], FloatArray]] = {
-    "triangle": _triangle,
-    "sine": _sine,
-    "growing": _growing,
-    "decaying": _decaying,
-    "sum-of-sines": _sines,
-    "walk": _walk,
-    "staircase": _staircase,
-    "chirp": _chirp,
-}
+    "triangle": _triangle, "sine": _sine, "growing": _growing, "decaying": _decaying, "sum-of-sines": _sines,
+    "walk": _walk, "staircase": _staircase, "chirp": _chirp,
+}  # fmt: skip
 
 
 def draw_voltage(kind: str, n: int, waves: float, rng: np.random.Generator) -> FloatArray:
