@@ -82,8 +82,6 @@ class HysteresisEKF(CompiledEstimator):
 
     kernel: ClassVar[Any] = ekf_kernel
 
-    conformance_exceptions: ClassVar[dict[str, str]] = {}
-
     def __init__(
         self,
         sample_rate: float,

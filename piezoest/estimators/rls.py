@@ -124,8 +124,6 @@ class HysteresisRLS(Freezable):
     kernel: ClassVar[Any] = rls_kernel
     unneeded: ClassVar[tuple[Any, ...]] = (rls_kernel.propagate_error,)
 
-    conformance_exceptions: ClassVar[dict[str, str]] = {}
-
     def __init__(
         self,
         sample_rate: float,
