@@ -245,7 +245,7 @@ def robust(
             break
         fitted, solution = loss, solve(problem, q, loss, scale)
         q, evaluations = solution.q, evaluations + solution.evaluations
-    return solution._replace(evaluations=evaluations), scale
+    return Solution(q, solution.success, solution.message, evaluations), scale
 
 
 # ---------------------------------------------------------------- how far to trust it

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -160,34 +160,13 @@ class Rig:
 
     def to_dict(self) -> dict[str, Any]:
         """All that was drawn, flat: columns of a row."""
-        own, plain, fault = self.around, self.plain, self.fault
+        plain, fault, around = self.plain, self.fault, asdict(self.around)
+        around["sensor_noise"] = around.pop("noise")
         return {
-            "seed": self.seed,
-            "family": self.family,
-            "gain": self.gain,
-            "width": self.width,
-            "low": self.reach.low,
-            "high": self.reach.high,
-            "sample_rate": self.sample_rate,
-            "mechanics": own.mechanics,
-            "lag": own.lag,
-            "delay": own.delay,
-            "sensor_noise": own.noise,
-            "resolution": own.resolution,
-            "volts": own.volts,
-            "slew_rate": own.slew_rate,
-            "creep": own.creep,
-            "hum": own.hum,
-            "drift": own.drift,
-            "reference": plain.kind,
-            "amplitude": plain.amplitude,
-            "centre": plain.centre,
-            "frequency": plain.frequency,
-            "samples": plain.values.size,
-            "block": self.block,
-            "fault": fault.kind,
-            "mode": fault.mode,
-            "fault_size": fault.size,
-            "fault_start": fault.start / self.sample_rate,
-            "fault_stop": fault.stop / self.sample_rate,
-        }
+            "seed": self.seed, "family": self.family, "gain": self.gain, "width": self.width,
+            "low": self.reach.low, "high": self.reach.high, "sample_rate": self.sample_rate, **around,
+            "reference": plain.kind, "amplitude": plain.amplitude, "centre": plain.centre,
+            "frequency": plain.frequency, "samples": plain.values.size, "block": self.block,
+            "fault": fault.kind, "mode": fault.mode, "fault_size": fault.size,
+            "fault_start": fault.start / self.sample_rate, "fault_stop": fault.stop / self.sample_rate,
+        }  # fmt: skip
