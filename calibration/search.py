@@ -9,20 +9,23 @@ import numpy as np
 import surrogate
 from scipy.optimize import least_squares
 
+from piezoest.bench.paper_tables import CALIBRATION_BOUNDS, published, triangle_row
+
 COLUMNS = ("alpha", "beta", "gamma", "K", "linear_max_error", "compensated_max_error", "error_reduction")
 ROWS = ((2.5, 5.0), (5.0, 2.5), (5.0, 5.0), (7.5, 5.0))  # µm, Hz
 SLOW, FAST = 1, 2  # the rows of one amplitude and two frequencies
-PAPER = np.array(
-    [
-        [3.26e-2, 1.36e-1, 5.96e-3, 0.141, 0.20, 0.016],
-        [1.91e-2, 1.49e-1, 4.05e-3, 0.156, 0.54, 0.055],
-        [2.10e-2, 1.47e-1, 4.29e-3, 0.155, 0.54, 0.045],
-        [1.59e-2, 1.55e-1, 3.55e-3, 0.165, 0.93, 0.053],
-    ]
-)
-REDUCTIONS = np.array([92.0, 90.0, 92.0, 94.0])  # %
-RELATIVE_TOLERANCES = np.array([0.15, 0.02, 0.15, 0.02, 0.05, 0.25])
-REDUCTION_TOLERANCE = 2.0  # points
+_PUBLISHED = {(number.row, number.quantity): number.value for number in published() if number.table != "III"}
+
+
+def of_paper(row: str) -> Any:
+    """What the paper has for a row, in the order of `COLUMNS`."""
+    return np.array([_PUBLISHED[row, column] for column in COLUMNS])
+
+
+PAPER, REDUCTIONS = np.split(np.array([of_paper(triangle_row(*row)) for row in ROWS]), [-1], axis=1)
+REDUCTIONS = REDUCTIONS.ravel()  # %
+*_relative, REDUCTION_TOLERANCE = (CALIBRATION_BOUNDS[column] for column in COLUMNS)  # the last in points
+RELATIVE_TOLERANCES = np.array(_relative)
 LEAST_DIFFERENCE = 0.1  # of the paper's between 2.5 Hz and 5 Hz
 _DIFFERING = [0, 1, 2, 3, 5]  # the linear errors are equal
 STEEPNESS, FAILED = 30.0, 50.0

@@ -5,18 +5,10 @@ Runs at the start of every Sphinx build; by itself: python docs/logs_page.py
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
-from page_parts import percent, replacements, short, table, write_pieces
-
-DOCS = Path(__file__).resolve().parent
-SOURCE = DOCS / "data" / "logs.json"
-TARGET = DOCS / "generated" / "logs"
-
-Document = dict[str, Any]
+from page_parts import DOCS, Document, made, percent, read, replacements, short, table, write_pieces
 
 ADDED = {
     "noise": "noise",
@@ -47,7 +39,7 @@ HEADING = [
 
 def write(app: Any = None) -> None:
     """Write what the page includes."""
-    write_pieces(TARGET, pieces(json.loads(SOURCE.read_text(encoding="utf-8"))))
+    write_pieces(DOCS / "generated" / "logs", pieces(read("logs")))
 
 
 def pieces(document: Document) -> dict[str, str]:
@@ -70,13 +62,12 @@ def pieces(document: Document) -> dict[str, str]:
 
 def numbers(document: Document) -> str:
     """Numbers that stand in sentences."""
-    machine, criteria, first = document["machine"], document["criteria"], document["seed"]
+    criteria, first = document["criteria"], document["seed"]
     return replacements(
         {
+            **made("logs", document),
             "logs count": document["logs"],
             "logs seeds": f"{first} to {first + document['logs'] - 1}",
-            "logs date": document["date"][:10],
-            "logs machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
             "logs near": f"{criteria['near']:g}",
             "logs plays": criteria["plays"],
             "logs negligible": percent(criteria["negligible"]),

@@ -5,18 +5,14 @@ Runs at the start of every Sphinx build; by itself: python docs/performance_page
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
-from page_parts import DOCS, table, write_pieces
-
-Document = dict[str, Any]
+from page_parts import DOCS, Document, made, read, replacements, table, write_pieces
 
 
 def write(app: Any = None) -> None:
     """Write what the page includes."""
-    document = json.loads((DOCS / "data" / "speed.json").read_text(encoding="utf-8"))
-    write_pieces(DOCS / "generated" / "performance", pieces(document))
+    write_pieces(DOCS / "generated" / "performance", pieces(read("speed")))
 
 
 def pieces(document: Document) -> dict[str, str]:
@@ -70,11 +66,9 @@ def against(rows: list[Document], *, faster: bool) -> tuple[list[str], list[list
 
 def numbers(document: Document) -> str:
     """Substitutions for numbers that stand in sentences."""
-    machine, once = document["machine"], document["once"]
+    once = document["once"]
     rows = document["against_c"] + document["against_python"]
     values = {
-        "date": document["date"][:10],
-        "machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
         "numba": f"Numba {document['versions']['numba']}",
         "compiler": f"``{document['compiler']}``",
         "load": f"{document['load']:.1f}",
@@ -87,7 +81,7 @@ def numbers(document: Document) -> str:
         "warmup": f"{once['warmup']:.1f} s",
         "track": f"{1.0 / once['one second of track()']:.0f}",
     }
-    return "".join(f".. |speed {name}| replace:: {value}\n" for name, value in values.items())
+    return replacements(made("speed", document) | {f"speed {name}": value for name, value in values.items()})
 
 
 if __name__ == "__main__":

@@ -7,15 +7,15 @@ python docs/readme.py --figure   # and draws docs/figures/effect.png, in some se
 from __future__ import annotations
 
 import argparse
-import json
 import textwrap
 from pathlib import Path
 from typing import Any
 
+from page_parts import DOCS, read
+
 from piezoest._files import save_figure, write_text
 from piezoest.bench import report
 
-DOCS = Path(__file__).resolve().parent
 README = DOCS.parent / "README.md"
 FIGURE = DOCS / "figures" / "effect.png"
 BEGIN, END = "<!-- figures: made by docs/readme.py -->\n", "<!-- end of figures -->\n"
@@ -31,10 +31,6 @@ its procedure gives {linear_ours:.2g} µm and {ours:.2g} µm here. On a recordin
 {travel:.0f} µm of travel, the identified model misses {missed:.2f} µm rms on the half it has not seen,
 a straight line {line:.2f} µm.
 """
-
-
-def read(name: str) -> dict[str, Any]:
-    return dict(json.loads((DOCS / "data" / f"{name}.json").read_text(encoding="utf-8")))
 
 
 def figures() -> str:

@@ -20,13 +20,7 @@ MODERATE = 1e20
 
 
 def finite(name: str, value: Any) -> float:
-    """Return `value` as a finite float.
-
-    Raises
-    ------
-    ValueError
-        If it is not one real, finite number.
-    """
+    """Return `value` as a finite float."""
     if type(value) is float and math.isfinite(value):
         return value  # a live loop makes a model now and then
     try:
@@ -101,8 +95,8 @@ def integer(name: str, value: Any, minimum: int = 0, maximum: int | None = None)
 def number_or_nan(value: Any) -> float:
     """Return what a driver gave as a float: NaN where it is not one real number.
 
-    Numbers of any kind, and arrays, lists and tuples of one of them, are numbers. Text, masked
-    values, complex numbers, other shapes and other objects are missing; nothing is raised.
+    Numbers of any kind, and arrays, lists and tuples of one of them, are numbers. Text, masked values,
+    complex numbers, other shapes and other objects are missing; nothing is raised.
     """
     if isinstance(value, float):
         return float(value)
@@ -155,13 +149,7 @@ def dictionary(value: Any) -> dict[str, Any]:
 
 
 def class_named(data: Any, key: str, classes: Iterable[Any]) -> Any:
-    """Return the class whose name a dictionary has under `key`.
-
-    Raises
-    ------
-    ValueError
-        If the name is none of theirs.
-    """
+    """Return the class whose name a dictionary has under `key`."""
     known = {cls.__name__: cls for cls in classes}
     name = data.get(key) if hasattr(data, "get") else data
     if str(name) not in known:
@@ -187,14 +175,7 @@ def fields(name: str, data: Any, needed: Iterable[str], optional: Iterable[str] 
 
 
 def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: int = 0) -> FloatArray:
-    """Return `value` as a contiguous float64 array of shape (N,).
-
-    Raises
-    ------
-    ValueError
-        If it has another number of dimensions, is not numeric, is shorter than
-        `minimum_length`, or holds NaN or infinity while `allow_nan` is false.
-    """
+    """Return `value` as a contiguous float64 array of shape (N,)."""
     if (
         allow_nan
         and type(value) is np.ndarray

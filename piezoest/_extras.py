@@ -11,13 +11,7 @@ class MissingExtraError(ImportError):
 
 
 def load(module: str, extra: str, purpose: str) -> Any:
-    """Import a module of an optional extra.
-
-    Raises
-    ------
-    MissingExtraError
-        If it is not installed; the message says what for, and how to install it.
-    """
+    """Import a module of an optional extra."""
     package = module.partition(".")[0]
     try:
         importlib.import_module(package)

@@ -18,11 +18,6 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
     Whatever happens before, even a kill or a full disk, leaves the file that was there as it was. Devices,
     pipes and what the process has open (``/dev/stdout``) have no place to take: their own name comes back.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written; names `path`.
     """
     target = _regular(Path(path))
     # The ending says the format to those who write; glob passes over the point.
@@ -60,15 +55,7 @@ def save_figure(figure: Any, path: str | Path, **options: Any) -> None:
 
 
 def read_json(path: str | Path) -> Any:
-    """What a JSON file holds.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    ValueError
-        If it is not JSON, or nested too deeply; names the file.
-    """
+    """What a JSON file holds. OSError if it cannot be read."""
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except ValueError as error:
@@ -78,15 +65,7 @@ def read_json(path: str | Path) -> Any:
 
 
 def read_object(path: str | Path, what: str) -> dict[str, Any]:
-    """The dictionary that a JSON file holds.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    ValueError
-        As `read_json`, or if the file holds something else; says that it holds no `what`.
-    """
+    """The dictionary that a JSON file holds. OSError if it cannot be read."""
     data = read_json(path)
     if not isinstance(data, dict):
         raise ValueError(f"{path} holds no {what}")

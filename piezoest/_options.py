@@ -12,10 +12,7 @@ from typing import Any, get_type_hints
 def grouped(command: Callable[..., None]) -> Callable[..., None]:
     """The command as typer reads it, with the fields of its dataclasses as options of its own.
 
-    Parameters
-    ----------
-    command : callable
-        Arguments annotated with a dataclass are made of the options that its fields describe.
+    `command`: arguments annotated with a dataclass are made of the options that its fields describe.
     """
     signature = inspect.signature(command, eval_str=True)
     groups: dict[str, Any] = {

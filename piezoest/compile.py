@@ -112,10 +112,7 @@ class Compiled:
     def of(self, *layouts: named.Record) -> Callable[..., Any]:
         """Return the machine code for records of these layouts, in the order of the arguments.
 
-        Raises
-        ------
-        TypeError
-            If there are not as many layouts as records.
+        TypeError if there are not as many layouts as records.
         """
         entry = self._entries.get(layouts)
         if entry is None:

@@ -36,30 +36,18 @@ SETTLED_PERIODS = 2
 
 @dataclass(frozen=True, slots=True)
 class Demo:
-    """Four ways to follow the same reference on the same simulated stage.
+    """Four ways to follow the same reference on the same simulated stage."""
 
-    Parameters
-    ----------
-    linear : TrackingRecord
-        Linear feed-forward whose gain is estimated while the stage runs (11), (12).
-    fixed : TrackingRecord
-        Inverse of the wrong start model, without estimation.
-    adaptive : TrackingRecord
-        Inverse of the model that is estimated while the stage runs, from the wrong start (14)-(20).
-    controller : TrackingRecord
-        `AdaptiveFeedforward`, which is told the limits of the voltage and nothing else.
-    learnt : dict
-        Parameters of the model that drives the controller in the end, by name.
-    seconds : float
-        What the four runs took together, compilation left out.
-    """
-
+    # Linear feed-forward whose gain is estimated while the stage runs (11), (12).
     linear: TrackingRecord = field(repr=False)
-    fixed: TrackingRecord = field(repr=False)
+    fixed: TrackingRecord = field(repr=False)  # inverse of the wrong start model, without estimation
+    # Inverse of the model that is estimated while the stage runs, from the wrong start (14)-(20).
     adaptive: TrackingRecord = field(repr=False)
+    # `AdaptiveFeedforward`, which is told the limits of the voltage and nothing else.
     controller: TrackingRecord = field(repr=False)
+    # Parameters of the model that drives the controller in the end, by name.
     learnt: dict[str, float] = field(repr=False)
-    seconds: float
+    seconds: float  # what the four runs took together, compilation left out
 
     @property
     def reduction(self) -> float:
@@ -75,12 +63,7 @@ class Demo:
         return 1.0 - record.max_error(SETTLED_PERIODS) / self.linear.max_error(SETTLED_PERIODS)
 
     def plot(self) -> Figure:
-        """Draw time series and maps of the settled runs, as Fig. 4 of the paper, and the adaptation.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Draw time series and maps of the settled runs, as Fig. 4 of the paper, and the adaptation."""
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(16, 11), layout="constrained")
@@ -126,66 +109,47 @@ class Demo:
 def run_demo(periods: int = 15, seed: int = 0, progress: Callable[[str], None] | None = None) -> Demo:
     """Run the demonstration on `PaperStage`, with noise and quantisation.
 
-    Parameters
-    ----------
-    periods : int
-        Periods of the smoothed triangle, 0.2 s each; at least 2.
-    seed : int
-        Start of the random numbers of the stage's noise.
-    progress : callable, optional
-        Called with a sentence before each part.
-
-    Returns
-    -------
-    Demo
-
-    Raises
-    ------
-    ValueError
-        If `periods` is below 2.
+    `periods`: periods of the smoothed triangle, 0.2 s each; at least 2. `seed`: start of the random numbers
+    of the stage's noise. `progress`: called with a sentence before each part. ValueError if `periods` is
+    below 2.
     """
     periods = integer("periods", periods, SETTLED_PERIODS)
     say = progress or (lambda _: None)
     # A moment of each way first, so that what Numba compiles once does not count as time of the runs.
     say("compiling, once after the installation")
     moment = signals.triangle(AMPLITUDE, FREQUENCY, 0.01, SAMPLE_RATE)
-    for way in (_linear, _fixed, _adaptive, _controlled):
+    for way in (*WAYS.values(), _controlled):
         way(moment, seed)
     reference = signals.triangle(AMPLITUDE, FREQUENCY, periods, SAMPLE_RATE)
     began = time.perf_counter()
-    say("linear feed-forward, gain estimated while running")
-    linear = _linear(reference, seed)
-    say("inverse of the wrong start model, fixed")
-    fixed = _fixed(reference, seed)
-    say("inverse compensation, model estimated while running")
-    adaptive = _adaptive(reference, seed)
+    records = []
+    for label, way in WAYS.items():
+        say(label)
+        records.append(way(reference, seed))
     say("AdaptiveFeedforward, from nothing")
     controlled, learnt = _controlled(reference, seed)
+    linear, fixed, adaptive = records
     return Demo(linear, fixed, adaptive, controlled, learnt, time.perf_counter() - began)
 
 
-def _linear(reference: signals.Signal, seed: int) -> TrackingRecord:
-    return track(
-        reference,
-        stage=PaperStage(SAMPLE_RATE, seed=seed),
-        compensator=LinearCompensator(WRONG_GAIN),
-        estimator=HysteresisRLS(SAMPLE_RATE, initial_model=WRONG_GAIN),
-    )
+def _followed(reference: signals.Signal, seed: int, compensator: Any, start: Any = None) -> TrackingRecord:
+    """The ring with a compensator, and with an estimator if there is a model for it to start from."""
+    estimator = None if start is None else HysteresisRLS(SAMPLE_RATE, initial_model=start)
+    stage = PaperStage(SAMPLE_RATE, seed=seed)
+    return track(reference, stage=stage, compensator=compensator, estimator=estimator)
 
 
-def _fixed(reference: signals.Signal, seed: int) -> TrackingRecord:
-    return track(
-        reference, stage=PaperStage(SAMPLE_RATE, seed=seed), compensator=InverseCompensator(WRONG_MODEL)
-    )
-
-
-def _adaptive(reference: signals.Signal, seed: int) -> TrackingRecord:
-    return track(
-        reference,
-        stage=PaperStage(SAMPLE_RATE, seed=seed),
-        compensator=InverseCompensator(WRONG_MODEL),
-        estimator=HysteresisRLS(SAMPLE_RATE, initial_model=WRONG_MODEL),
-    )
+WAYS: dict[str, Callable[[signals.Signal, int], TrackingRecord]] = {
+    "linear feed-forward, gain estimated while running": lambda reference, seed: _followed(
+        reference, seed, LinearCompensator(WRONG_GAIN), WRONG_GAIN
+    ),
+    "inverse of the wrong start model, fixed": lambda reference, seed: _followed(
+        reference, seed, InverseCompensator(WRONG_MODEL)
+    ),
+    "inverse compensation, model estimated while running": lambda reference, seed: _followed(
+        reference, seed, InverseCompensator(WRONG_MODEL), WRONG_MODEL
+    ),
+}
 
 
 def _controlled(reference: signals.Signal, seed: int) -> tuple[TrackingRecord, dict[str, float]]:

@@ -20,11 +20,12 @@ function ``wanted`` of that module, which is how one loop serves models that kno
 
 from __future__ import annotations
 
+import copy
 import functools
 import importlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -36,31 +37,15 @@ LARGEST, MOST = 1e60, 2.0**50
 
 
 class Kind(NamedTuple):
-    """What numbers can be.
+    """What numbers can be."""
 
-    Parameters
-    ----------
-    low, high : float
-        Least and largest value.
-    whole : bool
-        Whole numbers only.
-    square : bool
-        A symmetric matrix without a variance below zero.
-    definite : bool
-        No direction with a variance below zero either, but for rounding.
-    fixed : bool
-        As construction leaves them.
-    idle : bool
-        Work space: written before it is read, and neither saved nor loaded.
-    """
-
-    low: float = -LARGEST
-    high: float = LARGEST
-    whole: bool = False
-    square: bool = False
-    definite: bool = False
-    fixed: bool = False
-    idle: bool = False
+    low: float = -LARGEST  # least value
+    high: float = LARGEST  # largest value
+    whole: bool = False  # whole numbers only
+    square: bool = False  # a symmetric matrix without a variance below zero
+    definite: bool = False  # no direction with a variance below zero either, but for rounding
+    fixed: bool = False  # as construction leaves them
+    idle: bool = False  # work space: written before it is read, and neither saved nor loaded
 
 
 def whole(low: float, high: float) -> Kind:
@@ -174,10 +159,7 @@ def record(functions: str = "", /, **fields: Field) -> Record:
     The lengths of its arrays become fields of their own, at its beginning. `functions` is the name of the
     module that its functions are in, if it has any.
 
-    Raises
-    ------
-    ValueError
-        If a length has the name of a field.
+    ValueError if a length has the name of a field.
     """
     return _record(functions, tuple(fields.items()))
 
@@ -288,3 +270,16 @@ class Named:
 
     def __getitem__(self, i: int) -> Named:
         return Named(self._array[i], self._layout)
+
+
+class Copied:
+    """What has a state of its own, which its copies do not share."""
+
+    __slots__ = ()
+
+    def copy(self) -> Self:
+        """Return an independent one in the same state."""
+        return copy.deepcopy(self)
+
+    def __copy__(self) -> Self:
+        return self.copy()

@@ -28,10 +28,9 @@ class TrackingRecord:
     reference, voltage, measured, displacement : ndarray, shape (N,)
         r [µm], u [V], measured x [µm], true x [µm] (the measured one if the true one is unknown).
     parameters : ndarray, shape (M, n)
-        Parameters of the compensator's model, one row for each `update_interval` samples; n = 0
-        without an estimator, or with a controller. If the number of parameters changes, as after a start
-        with another kind of model, the parameters of the next model are shown. `theta` has one row per
-        sample.
+        Parameters of the compensator's model, one row for each `update_interval` samples; n = 0 without an
+        estimator, or with a controller. If the number of parameters changes, as after a start with another
+        kind of model, the parameters of the next model are shown. `theta` has one row per sample.
     parameter_names : tuple of str
         Names of the columns of `theta`.
     sample_rate : float

@@ -27,51 +27,25 @@ AMPLITUDE = 5.0  # µm, of the scenarios with one amplitude
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """What a scenario leaves open.
+    """What a scenario leaves open."""
 
-    Parameters
-    ----------
-    sample_rate : float
-        [Hz]. The default is a tenth of the paper's, for filterpy's filters take half a millisecond a sample;
-        what settles where hardly depends on it. At 20 kHz and below the stage leaves its filters out, whose
-        delay costs an estimator accuracy.
-    amplitude : float, optional
-        Largest nominal amplitude of the reference [µm]; default 5, and 7.5 where there are two.
-    frequency : float
-        Of the reference [Hz]; signals that are no wave are stretched in time with it.
-    noise : float, optional
-        Standard deviation of the gauge's noise [µm]; default the stage's own.
-    before, after : int
-        Periods before the change, where there is one, and after it.
-    rest : float
-        Length of the dwell [s].
-    drift : float
-        Length of the drift [s].
-    updates : int
-        Updates of the compensator's model in a period of the wave; the default is one in
-        eight milliseconds at 5 Hz.
-    creep : bool
-        Whether the stage creeps.
-    stage : str
-        Name in `piezoest.bench.stages.STAGES`.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
-    """
-
+    # [Hz]. The default is a tenth of the paper's, for filterpy's filters take half a millisecond a sample;
+    # what settles where hardly depends on it. At 20 kHz and below the stage leaves its filters out, whose
+    # delay costs an estimator accuracy.
     sample_rate: float = 5000.0
+    # Largest nominal amplitude of the reference [µm]; default 5, and 7.5 where there are two.
     amplitude: float | None = None
-    frequency: float = 5.0
-    noise: float | None = None
-    before: int = 4
-    after: int = 10
-    rest: float = 5.0
-    drift: float = 5.0
+    frequency: float = 5.0  # of the reference [Hz]; signals that are no wave are stretched in time with it
+    noise: float | None = None  # standard deviation of the gauge's noise [µm]; default the stage's own
+    before: int = 4  # periods before the change, where there is one
+    after: int = 10  # periods after it
+    rest: float = 5.0  # length of the dwell [s]
+    drift: float = 5.0  # length of the drift [s]
+    # Updates of the compensator's model in a period of the wave; the default is one in eight milliseconds at
+    # 5 Hz.
     updates: int = 25
-    creep: bool = True
-    stage: str = PAPER
+    creep: bool = True  # whether the stage creeps
+    stage: str = PAPER  # name in `piezoest.bench.stages.STAGES`
 
     def __post_init__(self) -> None:
         for name in ("sample_rate", "frequency", "rest", "drift"):
@@ -94,54 +68,23 @@ class Conditions:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One run: everything but the estimator.
+    """One run: everything but the estimator."""
 
-    Parameters
-    ----------
-    scenario : str
-        Name of the scenario.
-    seed : int
-        Start of the random numbers, the stage's noise among them.
-    reference : Signal
-        What the stage has to follow [µm].
-    period : float
-        Samples over which an error is taken.
-    change : int
-        Sample at which something changes; 0 if it is the start itself.
-    amplitude : float
-        Nominal amplitude after the change [µm].
-    start : ColemanHodgdon
-        Model to start from.
-    linear_start : LinearGain
-        The same for linear feed-forward.
-    update_interval : int
-        Samples between two updates of the compensator's model.
-    rest : tuple of int, optional
-        First sample of a dwell and the first after it.
-    noise : float, optional
-        Standard deviation of the gauge's noise [µm]; None for the stage's own.
-    gain_schedule : tuple, optional
-        Time [s] and factor of the stage's hysteresis, see `PaperStage`.
-    creep : bool
-        Whether the stage creeps.
-    stage : str
-        Name in `piezoest.bench.stages.STAGES`.
-    """
-
-    scenario: str
-    seed: int
-    reference: Signal
-    period: float
-    change: int
-    amplitude: float
-    start: ColemanHodgdon
-    linear_start: LinearGain
-    update_interval: int
-    rest: tuple[int, int] | None = None
-    noise: float | None = None
+    scenario: str  # name of the scenario
+    seed: int  # start of the random numbers, the stage's noise among them
+    reference: Signal  # what the stage has to follow [µm]
+    period: float  # samples over which an error is taken
+    change: int  # sample at which something changes; 0 if it is the start itself
+    amplitude: float  # nominal amplitude after the change [µm]
+    start: ColemanHodgdon  # model to start from
+    linear_start: LinearGain  # the same for linear feed-forward
+    update_interval: int  # samples between two updates of the compensator's model
+    rest: tuple[int, int] | None = None  # first sample of a dwell and the first after it
+    noise: float | None = None  # standard deviation of the gauge's noise [µm]; None for the stage's own
+    # Time [s] and factor of the stage's hysteresis, see `PaperStage`.
     gain_schedule: tuple[tuple[float, float], ...] | None = None
-    creep: bool = True
-    stage: str = PAPER
+    creep: bool = True  # whether the stage creeps
+    stage: str = PAPER  # name in `piezoest.bench.stages.STAGES`
 
     @property
     def sample_rate(self) -> float:
@@ -162,24 +105,12 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """What a scenario makes its case of.
+    """What a scenario makes its case of."""
 
-    Parameters
-    ----------
-    scenario : str
-        Name of the scenario.
-    seed : int
-        Start of the random numbers.
-    rng : numpy.random.Generator
-        Random numbers of this scenario and seed.
-    conditions : Conditions
-        What the scenario leaves open.
-    """
-
-    scenario: str
-    seed: int
-    rng: np.random.Generator
-    conditions: Conditions
+    scenario: str  # name of the scenario
+    seed: int  # start of the random numbers
+    rng: np.random.Generator  # random numbers of this scenario and seed
+    conditions: Conditions  # what the scenario leaves open
 
     @property
     def amplitude(self) -> float:
@@ -187,13 +118,7 @@ class Draft:
         return self.conditions.amplitude or AMPLITUDE
 
     def triangle(self, periods: float) -> Signal:
-        """Smoothed triangle of `amplitude`.
-
-        Parameters
-        ----------
-        periods : float
-            How many.
-        """
+        """Smoothed triangle of `amplitude`."""
         given = self.conditions
         return signals.triangle(self.amplitude, given.frequency, periods, given.sample_rate)
 
@@ -202,21 +127,9 @@ class Draft:
     ) -> Case:
         """Make the case: a start is drawn, and the stage is as the conditions say.
 
-        Parameters
-        ----------
-        reference : Signal
-            What the stage has to follow [µm].
-        spread : float
-            A start parameter is off by up to this fraction: `COLD` or `WARM`.
-        period : float, optional
-            Samples over which an error is taken; default a period of the wave.
-        **rest
-            Other fields of `Case`.
-
-        Raises
-        ------
-        ValueError
-            If the reference is not a signal.
+        `reference`: what the stage has to follow [µm]. `spread`: a start parameter is off by up to this
+        fraction: `COLD` or `WARM`. `period`: samples over which an error is taken; default a period of the
+        wave. `**rest`: other fields of `Case`. ValueError if the reference is not a signal.
         """
         instance("reference", reference, Signal, "a Signal: make one of values, sample rate and period")
         given = self.conditions
@@ -243,12 +156,7 @@ class Draft:
 def drawn_start(rng: np.random.Generator, spread: float) -> ColemanHodgdon:
     """Start model with each parameter off by up to `spread`; drawn again until it is admissible.
 
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Random numbers.
-    spread : float
-        Fraction of each parameter's value.
+    `spread`: fraction of each parameter's value.
     """
     while True:
         model = ColemanHodgdon.from_theta(RIGHT_MODEL.theta * (1.0 + rng.uniform(-spread, spread, 3)))

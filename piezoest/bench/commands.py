@@ -10,24 +10,11 @@ import typer
 from rich.console import Console
 
 from piezoest._errors import Group
-from piezoest.bench import safety_command, table_command
+from piezoest.bench import safety_command, shared, table_command
 from piezoest.bench.origin import origin
-from piezoest.bench.shared import (
-    Html,
-    Json,
-    check_html,
-    json_target,
-    json_text,
-    progress,
-    usage,
-    write_html,
-    write_json,
-)
 
 app = typer.Typer(
-    cls=Group,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
+    cls=Group, rich_markup_mode="rich", context_settings={"help_option_names": ["-h", "--help"]}
 )
 
 app.callback(invoke_without_command=True)(table_command.table)
@@ -40,7 +27,7 @@ app.command(epilog=safety_command.EPILOG)(safety_command.safety)
     "piezoest bench paper --memory 0.4 --quick"
 )
 def paper(
-    json_to: Json = None,
+    json_to: shared.Json = None,
     figures: Annotated[
         Path | None, typer.Option("--figures", metavar="DIR", help="Write Figs. 3 to 5 and two more as PNG.")
     ] = None,
@@ -53,21 +40,21 @@ def paper(
     seed: Annotated[int, typer.Option(min=0, help="Start of the random numbers of the stage.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Without the sweep over the memory.")] = False,
     workers: Annotated[
-        int | None, typer.Option(min=0, help="Processes; default one for each processor, 0 for none.")
+        int | None, typer.Option(min=1, help="Processes; default one for each processor.")
     ] = None,
-    html: Html = None,
+    html: shared.Html = None,
 ) -> None:
     """Tables I, II and III of the paper beside those of the simulated stage.
 
     The paper's procedure at 50 kHz: each row adapts while it runs, until it is stationary. The stage was
     calibrated to the rows marked calibration; it has never seen those marked held out.
     """
-    target = json_target(json_to)
-    check_html(html)
+    target = shared.json_target(json_to)
+    shared.check_html(html)
     if figures is not None and (figures.exists() and not figures.is_dir()):
         raise typer.BadParameter(f"{figures} is not a folder", param_hint="--figures")
     began = time.perf_counter()
-    with usage(), progress() as say:
+    with shared.usage(), shared.progress() as say:
         say("loading (compiles once after the installation)")
         from piezoest.bench.paper import MEMORIES, run_paper
         from piezoest.bench.paper_experiment import MEMORY
@@ -80,16 +67,16 @@ def paper(
             progress=say,
         )
     document = {"suite": "paper", **origin(began), **result.to_dict()}
-    write_html(document, html)
+    shared.write_html(document, html)
     if figures is not None:
         from piezoest.bench.paper_figures import write_figures
 
         for path in write_figures(result, figures):
             typer.echo(f"Figure: {path}", err=json_to == "-")
     if json_to == "-":
-        typer.echo(json_text(document), nl=False)
+        typer.echo(shared.json_text(document), nl=False)
         return
     from piezoest.bench.paper_report import print_report
 
     print_report(document, Console())
-    write_json(document, target)
+    shared.write_json(document, target)

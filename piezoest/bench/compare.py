@@ -25,23 +25,12 @@ def compare(
 ) -> dict[str, Any]:
     """Compare the runs of two campaigns with the same settings, pair by pair.
 
-    Parameters
-    ----------
-    first, second : pandas.DataFrame
-        Tables of runs, before and after.
-    level : float
-        False discovery rate: the share of the changes found that may be none.
-    relevant : float
-        Least relative change of the median that counts.
-
-    Returns
-    -------
-    dict
-        ``rows``: for each estimator and number, over all scenarios and for each, the number of pairs and of
-        those that changed, the median ratio of the latter, p, q (p with the other comparisons allowed for)
-        and the verdict; ``pairs``, ``counts`` and ``notes``. A verdict is "same" (to the last bit), "within
-        noise", "negligible", "better", "worse", or "too few seeds": not even a change of all pairs in one
-        direction would be told from noise.
+    `level`: false discovery rate: the share of the changes found that may be none. `relevant`: least relative
+    change of the median that counts. Returns ``rows``: for each estimator and number, over all scenarios and
+    for each, the number of pairs and of those that changed, the median ratio of the latter, p, q (p with the
+    other comparisons allowed for) and the verdict; ``pairs``, ``counts`` and ``notes``. A verdict is "same"
+    (to the last bit), "within noise", "negligible", "better", "worse", or "too few seeds": not even a change
+    of all pairs in one direction would be told from noise.
     """
     both = first.merge(second, on=RUN, suffixes=("", "_after"))
     rows = [
@@ -65,15 +54,7 @@ def compare(
 def check_conditions(first: Mapping[str, Any], second: Mapping[str, Any]) -> None:
     """Refuse to compare campaigns whose runs differ in more than the code.
 
-    Parameters
-    ----------
-    first, second : mapping
-        Documents of `piezoest.bench.table.describe`.
-
-    Raises
-    ------
-    ValueError
-        If their conditions differ; names them.
+    `first`, `second`: documents of `piezoest.bench.table.describe`.
     """
     one, other = first["conditions"], second["conditions"]
     differing = [

@@ -20,19 +20,9 @@ PASS_SECONDS, PASSES, LEAST_SAMPLES = 0.4, 3, 200
 def cost(new: Callable[[], Any], record: TrackingRecord) -> dict[str, float | None]:
     """Take the times of an estimator or controller, one after the other in this process.
 
-    Parameters
-    ----------
-    new : callable
-        Makes a new one.
-    record : TrackingRecord
-        What is given to it, sample by sample.
-
-    Returns
-    -------
-    dict
-        ``step_us``: one sample by `step` from Python; ``run_us``: the same of a whole record at once, None
-        without `run`; medians of three passes. ``longest_us``: the longest `step`. ``bytes``: pickled, after
-        the record.
+    `record`: what is given to it, sample by sample. Returns ``step_us``: one sample by `step` from Python;
+    ``run_us``: the same of a whole record at once, None without `run`; medians of three passes.
+    ``longest_us``: the longest `step`. ``bytes``: pickled, after the record.
     """
     rows = list(zip(*(values.tolist() for values in _given(new(), record)), strict=True))
     trial = rows[: max(LEAST_SAMPLES, len(rows) // 10)]

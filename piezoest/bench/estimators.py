@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import ast
-import importlib
 import inspect
-import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from piezoest import policies
+from piezoest.bench.machine import imported
 from piezoest.bench.stages import REACH
 from piezoest.compensators import VoltageLimits
 from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
@@ -57,47 +55,22 @@ def found() -> dict[str, type]:
 
 
 def name_of(text: str) -> str:
-    """Class of a description, without its arguments.
-
-    Parameters
-    ----------
-    text : str
-        As `candidate` reads it.
-    """
+    """Class of a description, without its arguments."""
     return text.partition("(")[0].strip()
 
 
 def is_slow(text: str) -> bool:
-    """Whether an estimator takes so long that it is run on fewer seeds and stages.
-
-    Parameters
-    ----------
-    text : str
-        As `candidate` reads it.
-    """
+    """Whether an estimator takes so long that it is run on fewer seeds and stages."""
     return name_of(text) in SLOW
 
 
 def candidate(text: str) -> Callable[..., Any]:
     """Maker of new estimators from their description.
 
-    Parameters
-    ----------
-    text : str
-        ``HysteresisRLS``, ``my_module:MyEstimator``, or either with keyword arguments as in
-        ``HysteresisRLS(memory=0.4, policies=(NormBound(), DeadZone()))``: numbers, strings, tuples, and the
-        policies of `piezoest.policies`.
-
-    Returns
-    -------
-    callable
-        ``make(sample_rate, initial_model)``, a new estimator or controller; what its class does not take is
-        left out.
-
-    Raises
-    ------
-    ValueError
-        If there is no such class, or the arguments cannot be read.
+    `text`: ``HysteresisRLS``, ``my_module:MyEstimator``, or either with keyword arguments as in
+    ``HysteresisRLS(memory=0.4, policies=(NormBound(), DeadZone()))``: numbers, strings, tuples, and the
+    policies of `piezoest.policies`. Returns ``make(sample_rate, initial_model)``, a new estimator or
+    controller; what its class does not take is left out.
     """
     name = name_of(text)
     cls = class_of(name)
@@ -114,18 +87,7 @@ def candidate(text: str) -> Callable[..., Any]:
 
 
 def class_of(name: str) -> type:
-    """Class of the package, or of one's own as ``module:Class``.
-
-    Parameters
-    ----------
-    name : str
-        Without arguments.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
+    """Class of the package, or of one's own as ``module:Class``."""
     if ":" in name:
         return _load(name)
     known = found()
@@ -137,10 +99,7 @@ def class_of(name: str) -> type:
 def module_of(text: str) -> Path | None:
     """File of an estimator of one's own; None for one of the package.
 
-    Parameters
-    ----------
-    text : str
-        As `candidate` reads it, or `LINEAR`.
+    `text`: as `candidate` reads it, or `LINEAR`.
     """
     if ":" not in name_of(text):
         return None
@@ -153,15 +112,9 @@ def _load(path: str) -> type:
     module_name, separator, class_name = path.partition(":")
     if not (module_name and separator and class_name):
         raise ValueError(f"an estimator of one's own must read like module:Class, got {path!r}")
-    if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
-    try:
-        module = importlib.import_module(module_name)
-    except ImportError as error:
-        raise ValueError(f"{path}: {error}") from None
-    cls = getattr(module, class_name, None)
+    cls = imported(path)
     if not inspect.isclass(cls):
-        raise ValueError(f"{path}: {module_name} has no class {class_name}")
+        raise ValueError(f"{path}: {class_name} is no class")
     needed = ("step", "learn") if hasattr(cls, "learn") else ("step", "model")
     if missing := [name for name in needed if not hasattr(cls, name)]:
         raise ValueError(f"{path}: {class_name} has no {' and no '.join(missing)}: see piezoest.Estimator")

@@ -6,11 +6,11 @@ All three give each item's result once, in no particular order, and survive what
 from __future__ import annotations
 
 import contextlib
-import itertools
 import multiprocessing
 import os
 import signal
 import threading
+from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -36,92 +36,51 @@ def in_processes(
 ) -> Iterator[Result]:
     """Work on items over the cores.
 
-    Parameters
-    ----------
-    work : callable
-        What is done with each; a module's function, as for `pickle`.
-    items : iterable
-        Each may be pickled.
-    processes : int, optional
-        How many; default one for each core, 1 works in this process.
-    crashed : callable, optional
-        Result of an item whose process died over it. The items that were under way when a process
-        died are tried again, each alone. Without it the death is an error.
-
-    Yields
-    ------
-    object
-        Result of each as it is done.
+    `work`: what is done with each; a module's function, as for `pickle`. `processes`: how many; default one
+    for each core, 1 works in this process. `crashed`: result of an item whose process died over it. The items
+    that were under way when a process died are tried again, each alone. Without it the death is an error.
     """
     processes = integer("processes", os.cpu_count() or 1 if processes is None else processes, 1)
     if processes == 1:
         yield from map(work, items)
         return
-    queue = _Queue(items)
-    while not queue.empty:
+    queue = deque(items)
+    while queue:
         suspects = yield from _until_death(work, queue, processes, 2 * processes)
         if suspects and crashed is None:
             raise BrokenProcessPool("a process died at its work")
-        alone = _Queue(suspects)
-        while crashed is not None and not alone.empty:
+        alone = deque(suspects)
+        while crashed is not None and alone:
             guilty = yield from _until_death(work, alone, 1, 1)
             yield from map(crashed, guilty)
 
 
-class _Queue(Iterator[Item]):
-    """Items, of which the last one may be put back."""
-
-    def __init__(self, items: Iterable[Item]) -> None:
-        self._items = iter(items)
-
-    def __next__(self) -> Item:
-        return next(self._items)
-
-    def put_back(self, item: Item) -> None:
-        self._items = itertools.chain([item], self._items)
-
-    @property
-    def empty(self) -> bool:
-        for item in self:
-            self.put_back(item)
-            return False
-        return True
-
-
 def _until_death(
-    work: Callable[[Item], Result], queue: _Queue[Item], processes: int, at_a_time: int
+    work: Callable[[Item], Result], queue: deque[Item], processes: int, at_a_time: int
 ) -> Generator[Result, None, list[Item]]:
     """Work on the queue in new processes; returns what was under way when one of them died."""
     under_way: dict[Future[Result], Item] = {}
     dead: list[Item] = []
     with _pool(processes) as pool:
-        while not dead:
-            for item in itertools.islice(queue, at_a_time - len(under_way)):
+        while True:
+            while queue and not dead and len(under_way) < at_a_time:
+                item = queue.popleft()
                 try:
                     under_way[pool.submit(work, item)] = item
                 except BrokenProcessPool:
                     # Another one's death, seen before it could be known.
-                    queue.put_back(item)
+                    queue.appendleft(item)
                     break
             if not under_way:
-                break
+                return dead
             for future in wait(under_way, return_when=FIRST_COMPLETED).done:
                 item = under_way.pop(future)
                 try:
                     result = future.result()
                 except BrokenProcessPool:
                     dead.append(item)
-                    continue
-                yield result
-        # The pool is broken: what had been done in it is whole, the rest goes with it.
-        for future, item in under_way.items():
-            try:
-                result = future.result()
-            except BrokenProcessPool:
-                dead.append(item)
-                continue
-            yield result
-    return dead
+                else:
+                    yield result
 
 
 @contextlib.contextmanager
@@ -164,31 +123,11 @@ def on_dask(
 ) -> Iterator[Result]:
     """Work on items with Dask: the work of a worker that is lost is done again by another.
 
-    Parameters
-    ----------
-    work : callable
-        What is done with each; a function of a module that the workers have.
-    items : iterable
-        Each may be pickled.
-    scheduler : str, optional
-        Address of a cluster's scheduler, as in ``tcp://10.0.0.1:8786``; default a cluster of this
-        machine's cores, for the time of the work.
-    processes : int, optional
-        Workers of the latter; default one for each core.
-    crashed : callable, optional
-        Result of an item over which worker after worker died. Without it that is an error.
-    modules : sequence of Path
-        Files that the workers need to import, sent to them first.
-
-    Yields
-    ------
-    object
-        Result of each as it is done.
-
-    Raises
-    ------
-    ValueError
-        If Dask is not installed, or the scheduler does not answer.
+    `work`: what is done with each; a function of a module that the workers have. `scheduler`: address of a
+    cluster's scheduler, as in ``tcp://10.0.0.1:8786``; default a cluster of this machine's cores, for the
+    time of the work. `processes`: workers of the latter; default one for each core. `crashed`: result of an
+    item over which worker after worker died. Without it that is an error. `modules`: files that the workers
+    need to import, sent to them first.
     """
     try:
         import distributed

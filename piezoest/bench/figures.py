@@ -25,17 +25,11 @@ MARKERS = "osD^vPX*h"
 GREY = "0.55"
 FARTHEST = 50.0  # times the best one's error, where the colours end
 
-Document = dict[str, Any]
+Document = dict[str, Any]  # from `piezoest.bench.table.describe`
 
 
 def drawings(document: Document) -> dict[str, Figure]:
-    """Draw all pictures of a campaign, by name.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.table.describe`.
-    """
+    """Draw all pictures of a campaign, by name."""
     found = {"overview": overview(document), "settled": profile(document), "cost": cost(document)}
     if any(cell["transient"] and cell["stage"] for cell in document["cells"]):
         found["adaptation"] = adaptation(document)
@@ -43,19 +37,7 @@ def drawings(document: Document) -> dict[str, Figure]:
 
 
 def write_figures(document: Document, folder: Path) -> list[Path]:
-    """Draw a campaign as PNG.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.table.describe`.
-    folder : Path
-        To write to; made if it is not there.
-
-    Returns
-    -------
-    list of Path
-    """
+    """Draw a campaign as PNG. `folder`: to write to; made if it is not there."""
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for name, figure in drawings(document).items():
@@ -77,13 +59,7 @@ def _styles(document: Document) -> dict[str, dict[str, Any]]:
 
 
 def overview(document: Document) -> Figure:
-    """First and settled error of each estimator, with the interval that other seeds would lie in; narrow.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.table.describe`.
-    """
+    """First and settled error of each estimator, with the interval that other seeds would lie in; narrow."""
     from matplotlib.figure import Figure
 
     rows = [row for row in best_first(document) if row["typical"]][::-1]
@@ -113,13 +89,7 @@ def overview(document: Document) -> Figure:
 
 
 def cost(document: Document) -> Figure:
-    """Settled and first error against the cost of a step, with the interval that other seeds would lie in.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.table.describe`.
-    """
+    """Settled and first error against the cost of a step, with the interval that other seeds would lie in."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8, 4.6), layout="constrained")
@@ -147,13 +117,7 @@ def cost(document: Document) -> Figure:
 
 
 def profile(document: Document) -> Figure:
-    """What each is weak at: its settled error in each scenario, relative to the best one's there.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.table.describe`.
-    """
+    """What each is weak at: its settled error in each scenario, relative to the best one's there."""
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
@@ -187,13 +151,7 @@ def profile(document: Document) -> Figure:
 
 
 def adaptation(document: Document) -> Figure:
-    """Largest error of each period after the change, of every estimator: a panel for each scenario.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.table.describe`.
-    """
+    """Largest error of each period after the change, of every estimator: a panel for each scenario."""
     from matplotlib.figure import Figure
 
     cells = [cell for cell in document["cells"] if cell["transient"] and cell["stage"]]

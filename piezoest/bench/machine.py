@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import importlib
 import importlib.metadata
 import os
 import platform
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -47,3 +49,21 @@ def fingerprint() -> str:
         found.update(path.relative_to(root).as_posix().encode())
         found.update(path.read_bytes())
     return found.hexdigest()[:16]
+
+
+def code_of(source: str | Path | None) -> str:
+    """Fingerprint of this package and, if there is one, of the file of a class of one's own."""
+    if source is None:
+        return fingerprint()
+    return f"{fingerprint()}-{hashlib.sha256(Path(source).read_bytes()).hexdigest()[:16]}"
+
+
+def imported(path: str) -> Any:
+    """What ``module:name`` stands for; the module may lie in the working directory."""
+    module, _, name = path.partition(":")
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    try:
+        return getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"{path}: {error}") from None

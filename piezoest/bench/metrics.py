@@ -19,67 +19,30 @@ IntArray = np.ndarray[tuple[int], np.dtype[np.int64]]
 
 @dataclass(frozen=True, slots=True)
 class Metrics:
-    """Numbers of one run; errors in µm.
+    """Numbers of one run; errors in µm."""
 
-    Parameters
-    ----------
-    settles : int or None
-        Periods after the change until the largest error of every further one is below 1.2 % of the
-        amplitude: 0 if the first one is, None if the last one is not.
-    first : float
-        Largest error of the first period after the change.
-    worst : float
-        Largest error after the change.
-    typical : float
-        Geometric mean of the largest errors of all periods after the change: it counts how soon an estimator
-        adapts and where it ends alike.
-    settled : float
-        Largest error of the last half of the periods, of at least five.
-    settled_rms : float
-        Root mean square error of the same.
-    linear_settled : float
-        `settled` of linear feed-forward in the same run.
-    linear_worst : float
-        `worst` of linear feed-forward in the same run.
-    diverged : bool
-        Whether the largest error after the run's first period exceeds one and a half times that of linear
-        feed-forward.
-    errors : tuple of float
-        Largest error of each period after the change.
-    """
-
+    # Periods after the change until the largest error of every further one is below 1.2 % of the amplitude: 0
+    # if the first one is, None if the last one is not.
     settles: int | None
-    first: float
-    worst: float
+    first: float  # largest error of the first period after the change
+    worst: float  # largest error after the change
+    # Geometric mean of the largest errors of all periods after the change: it counts how soon an estimator
+    # adapts and where it ends alike.
     typical: float
-    settled: float
-    settled_rms: float
-    linear_settled: float
-    linear_worst: float
+    settled: float  # largest error of the last half of the periods, of at least five
+    settled_rms: float  # root mean square error of the same
+    linear_settled: float  # `settled` of linear feed-forward in the same run
+    linear_worst: float  # `worst` of linear feed-forward in the same run
+    # Whether the largest error after the run's first period exceeds one and a half times that of linear
+    # feed-forward.
     diverged: bool
-    errors: tuple[float, ...] = field(repr=False)
+    errors: tuple[float, ...] = field(repr=False)  # largest error of each period after the change
 
 
 def measure(record: TrackingRecord, linear: TrackingRecord, case: Case) -> Metrics:
     """Take the numbers of a run.
 
-    Parameters
-    ----------
-    record : TrackingRecord
-        Of the estimator.
-    linear : TrackingRecord
-        Of linear feed-forward with an estimated gain, on an identical stage.
-    case : Case
-        What both were.
-
-    Returns
-    -------
-    Metrics
-
-    Raises
-    ------
-    ValueError
-        If the record does not hold more than five whole periods after the change.
+    `linear`: of linear feed-forward with an estimated gain, on an identical stage.
     """
     error, linear_error = np.abs(record.error), np.abs(linear.error)
     edges = period_edges(case.change, case.period, error.size)
@@ -113,12 +76,7 @@ def measure(record: TrackingRecord, linear: TrackingRecord, case: Case) -> Metri
 def settles(errors: FloatArray, level: float) -> int | None:
     """Periods until every further error is below a level; None if the last one is not.
 
-    Parameters
-    ----------
-    errors : ndarray, shape (M,)
-        Largest error of each period.
-    level : float
-        In the same unit.
+    `errors` (M,): largest error of each period.
     """
     above = np.flatnonzero(~(errors < level))
     if above.size == 0:
@@ -130,14 +88,7 @@ def settles(errors: FloatArray, level: float) -> int | None:
 def period_edges(change: int, period: float, size: int) -> IntArray:
     """First samples of the whole periods from the change on, and the end of the last.
 
-    Parameters
-    ----------
-    change : int
-        First sample of the first period.
-    period : float
-        In samples, not necessarily whole.
-    size : int
-        Samples of the record.
+    `period`: in samples, not necessarily whole.
     """
     edges = np.rint(change + period * np.arange(int((size - change) / period) + 2)).astype(np.int64)
     return edges[edges <= size]
@@ -146,15 +97,6 @@ def period_edges(change: int, period: float, size: int) -> IntArray:
 def largest(error: FloatArray, edges: IntArray) -> FloatArray:
     """Largest value between each two edges.
 
-    Parameters
-    ----------
-    error : ndarray, shape (N,)
-        Of either sign left out.
-    edges : ndarray of int, shape (M + 1,)
-        Rising.
-
-    Returns
-    -------
-    ndarray, shape (M,)
+    `error` (N,): of either sign left out. `edges` (M + 1,): rising. Returns shape (M,).
     """
     return np.maximum.reduceat(error[: edges[-1]], edges[:-1])

@@ -23,24 +23,24 @@ def origin(began: float | None = None) -> dict[str, Any]:
     return head if began is None else {**head, "seconds": round(time.perf_counter() - began, 1)}
 
 
+def json_text(document: dict[str, Any]) -> str:
+    """Text of a document."""
+    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
 def put(document: dict[str, Any], path: Path | None) -> None:
     """Write results to a file, or print them where there is none."""
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     if path is None:
-        print(text)
+        print(json_text(document), end="")
     else:
-        write_text(path, text + "\n")
+        write_text(path, json_text(document))
 
 
 def json_safe(value: Any, digits: int | None = None) -> Any:
     """The same with plain lists, and None for what is not finite.
 
-    Parameters
-    ----------
-    value : object
-        Of dictionaries, lists, tuples and plain values.
-    digits : int, optional
-        Significant digits of numbers, for a document that is kept: more would say nothing. Default all.
+    `value`: of dictionaries, lists, tuples and plain values. `digits`: significant digits of numbers, for a
+    document that is kept: more would say nothing. Default all.
     """
     match value:
         case dict():

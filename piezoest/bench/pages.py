@@ -8,32 +8,16 @@ from typing import Any
 from piezoest.bench import figures, paper_report, report
 from piezoest.report import Page
 
-Document = dict[str, Any]
+Document = dict[str, Any]  # from `piezoest.bench.table.describe`
 
-HEADINGS = {
-    "overview": "Errors",
-    "adaptation": "Adaptation",
-    "settled": "Where each is weak",
-    "cost": "Cost",
-}
+HEADINGS = {"overview": "Errors", "adaptation": "Adaptation", "settled": "Where each is weak", "cost": "Cost"}
 
 
 def write_html(document: Document, path: str | Path) -> None:
     """Write a result of `piezoest bench` as one page that needs no network.
 
-    Parameters
-    ----------
-    document : dict
-        What the command writes with ``--json``.
-    path : str or Path
-        File to write; an existing one is replaced.
-
-    Raises
-    ------
-    ValueError
-        If there is no page for such a document.
-    OSError
-        If the file cannot be written.
+    `document`: what the command writes with ``--json``. `path`: file to write; an existing one is replaced.
+    OSError if the file cannot be written.
     """
     suite = document.get("suite")
     if suite not in PAGES:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import multiprocessing
-import os
-from collections.abc import Callable, Iterable
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from piezoest._checks import integer, positive
+from piezoest.bench.executors import in_processes
 from piezoest.bench.paper_experiment import (
     MEMORY,
     PRBS,
@@ -35,18 +33,10 @@ MEMORIES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # s; its period is 0.2 s
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A number of the paper beside ours.
+    """A number of the paper beside ours."""
 
-    Parameters
-    ----------
-    paper : Published
-        The paper's.
-    ours : float
-        The simulated stage's, in the same unit.
-    """
-
-    paper: Published
-    ours: float
+    paper: Published  # the paper's
+    ours: float  # the simulated stage's, in the same unit
 
     @property
     def ratio(self) -> float:
@@ -62,28 +52,15 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class PaperResult:
-    """The paper's experiment, run again.
+    """The paper's experiment, run again."""
 
-    Parameters
-    ----------
-    memory : float
-        Of the estimator [s].
-    seed : int
-        Start of the random numbers of the stage's noise.
-    linear, inverse : dict of str to Run
-        Both compensations by the row's name, parameters estimated while running.
-    crossed : dict of str to Run
-        Rows of Table III.
-    sweep : dict of float to Run
-        Inverse compensation of one reference by memory [s].
-    """
-
-    memory: float
-    seed: int
+    memory: float  # of the estimator [s]
+    seed: int  # start of the random numbers of the stage's noise
+    # Both compensations by the row's name, parameters estimated while running.
     linear: dict[str, Run] = field(repr=False)
     inverse: dict[str, Run] = field(repr=False)
-    crossed: dict[str, Run] = field(repr=False)
-    sweep: dict[float, Run] = field(repr=False)
+    crossed: dict[str, Run] = field(repr=False)  # rows of Table III
+    sweep: dict[float, Run] = field(repr=False)  # inverse compensation of one reference by memory [s]
 
     def compare(self) -> list[Comparison]:
         """Every number of the tables beside ours."""
@@ -141,31 +118,13 @@ def run_paper(
 ) -> PaperResult:
     """Run the paper's experiment on the simulated stage.
 
-    Parameters
-    ----------
-    memory : float
-        Time constant of the estimator's forgetting [s]; the paper names none.
-    memories : iterable of float
-        Further ones, for the error of one row against memory.
-    seed : int
-        Start of the random numbers of the stage's noise.
-    workers : int, optional
-        Processes to run in; default one for each processor, 0 for this one. A script that
-        calls this with others needs ``if __name__ == "__main__":``.
-    progress : callable, optional
-        Called with a sentence after each run.
-
-    Returns
-    -------
-    PaperResult
-
-    Raises
-    ------
-    ValueError
-        If memory or seed is out of its range.
+    `memory`: time constant of the estimator's forgetting [s]; the paper names none. `memories`: further ones,
+    for the error of one row against memory. `seed`: start of the random numbers of the stage's noise.
+    `workers`: processes to run in; default one for each processor, 1 for this one. A script that calls this
+    with others needs ``if __name__ == "__main__":``. `progress`: called with a sentence after each run.
+    ValueError if memory or seed is out of its range.
     """
     memory, seed = positive("memory", memory), integer("seed", seed)
-    workers = integer("workers", os.cpu_count() or 1 if workers is None else workers)
     sweep = sorted({positive("memories", value) for value in memories} - {memory})
 
     inverse = {r: Experiment(r, START, memory, seed) for r in REFERENCES}
@@ -173,15 +132,22 @@ def run_paper(
     swept = {value: Experiment(SWEPT, START, value, seed) for value in sweep}
     # The longest first, so that no process waits for the last one.
     first = sorted([*inverse.values(), *linear.values(), *swept.values()], key=lambda e: -e.seconds)
-    with _executor(workers) as executor:
-        runs = _run_all(executor, first, len(first) + len(CROSSED), progress)
-        crossed = {
-            crossed_row(applied.amplitude, applied.frequency, found_for.amplitude): Experiment(
-                applied, _model(runs[inverse[found_for]]), None, seed
-            )
-            for applied, found_for in CROSSED
-        }
-        runs |= _run_all(executor, list(crossed.values()), len(first) + len(CROSSED), progress, len(first))
+    runs: dict[Experiment, Run] = {}
+
+    def make(experiments: Sequence[Experiment]) -> None:
+        for run in in_processes(Experiment.run, experiments, workers):
+            runs[run.experiment] = run
+            if progress is not None:
+                progress(f"{len(runs)} of {len(first) + len(CROSSED)}: {run.experiment.name}")
+
+    make(first)
+    crossed = {
+        crossed_row(applied.amplitude, applied.frequency, found_for.amplitude): Experiment(
+            applied, _model(runs[inverse[found_for]]), None, seed
+        )
+        for applied, found_for in CROSSED
+    }
+    make(list(crossed.values()))
     by_memory = {value: runs[experiment] for value, experiment in swept.items()}
     if by_memory:
         by_memory[memory] = runs[inverse[SWEPT]]
@@ -193,41 +159,6 @@ def run_paper(
         crossed={row: runs[experiment] for row, experiment in crossed.items()},
         sweep=dict(sorted(by_memory.items())),
     )
-
-
-class _ThisProcess(Executor):
-    """An executor that runs what it is given at once."""
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        future.set_result(fn(*args, **kwargs))
-        return future
-
-
-def _executor(workers: int) -> Executor:
-    if workers == 0:
-        return _ThisProcess()
-    return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
-
-
-def _run_all(
-    executor: Executor,
-    experiments: list[Experiment],
-    total: int,
-    progress: Callable[[str], None] | None,
-    done: int = 0,
-) -> dict[Experiment, Run]:
-    futures = {executor.submit(experiment.run): experiment for experiment in experiments}
-    runs = {}
-    try:
-        for future in as_completed(futures):
-            runs[futures[future]] = future.result()
-            if progress is not None:
-                progress(f"{done + len(runs)} of {total}: {futures[future].name}")
-    except BaseException:
-        executor.shutdown(wait=False, cancel_futures=True)
-        raise
-    return runs
 
 
 def _model(run: Run) -> ColemanHodgdon:

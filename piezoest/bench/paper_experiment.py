@@ -1,9 +1,8 @@
 """One run of the paper's experiment: a reference, a compensation, the ring until it is stationary.
 
-The procedure is the paper's. Reference, compensator, stage and estimator form the ring at
-50 kHz, with noise and converters; the parameters are estimated while the ring runs, and the
-error is max |r - x| of the true displacement over the stationary part. Nothing is fitted to
-a record afterwards.
+The procedure is the paper's. Reference, compensator, stage and estimator form the ring at 50 kHz, with noise
+and converters; the parameters are estimated while the ring runs, and the error is max |r - x| of the true
+displacement over the stationary part. Nothing is fitted to a record afterwards.
 
 What the paper does not say is chosen here: the memory of the estimator, the start, and how
 often the compensator takes over new parameters.
@@ -44,21 +43,11 @@ SETTLED = 1.1  # times the stationary error: below it a period counts as settled
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A reference signal of the paper.
+    """A reference signal of the paper."""
 
-    Parameters
-    ----------
-    shape : {"triangle", "prbs"}
-        Smoothed triangle, or filtered pseudo-random binary signal.
-    amplitude : float
-        Nominal [µm].
-    frequency : float, optional
-        Of the triangle [Hz].
-    """
-
-    shape: Literal["triangle", "prbs"]
-    amplitude: float
-    frequency: float = 0.0
+    shape: Literal["triangle", "prbs"]  # smoothed triangle, or filtered pseudo-random binary signal
+    amplitude: float  # nominal [µm]
+    frequency: float = 0.0  # of the triangle [Hz]
 
     @property
     def name(self) -> str:
@@ -66,13 +55,7 @@ class Reference:
         return PRBS_ROW if self.shape == "prbs" else triangle_row(self.amplitude, self.frequency)
 
     def signal(self, seconds: float) -> signals.Signal:
-        """Whole periods that take at least `seconds`, from rest at zero.
-
-        Parameters
-        ----------
-        seconds : float
-            [s].
-        """
+        """Whole periods that take at least `seconds`, from rest at zero. `seconds`: [s]."""
         if self.shape == "prbs":
             period = signals.prbs(self.amplitude, sample_rate=SAMPLE_RATE, start="zero")
             return period.repeat(math.ceil(seconds / period.duration - 1e-9))
@@ -86,25 +69,14 @@ TRIANGLES = tuple(Reference("triangle", *row) for row in ((2.5, 5.0), (5.0, 2.5)
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """One way round the ring.
+    """One way round the ring."""
 
-    Parameters
-    ----------
-    reference : Reference
-        What the stage has to follow.
-    model : LinearGain or ColemanHodgdon
-        For linear feed-forward (11), or for the inverse of the hysteresis (14)-(17): to start
-        from, or to stay with.
-    memory : float, optional
-        Time constant of the estimator's forgetting [s]; None: no estimator.
-    seed : int
-        Start of the random numbers of the stage's noise.
-    """
-
-    reference: Reference
+    reference: Reference  # what the stage has to follow
+    # For linear feed-forward (11), or for the inverse of the hysteresis (14)-(17): to start from, or to stay
+    # with.
     model: LinearGain | ColemanHodgdon
-    memory: float | None
-    seed: int
+    memory: float | None  # time constant of the estimator's forgetting [s]; None: no estimator
+    seed: int  # start of the random numbers of the stage's noise
 
     @property
     def compensation(self) -> Compensation:
@@ -154,24 +126,12 @@ class Experiment:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What an experiment gave.
+    """What an experiment gave."""
 
-    Parameters
-    ----------
-    experiment : Experiment
-        What was run.
-    parameters : tuple of float
-        Mean over the last period of the parameters in use.
-    errors : tuple of float
-        Largest |r - x| of each period [µm].
-    stationary : TrackingRecord
-        The last periods.
-    """
-
-    experiment: Experiment
-    parameters: tuple[float, ...]
-    errors: tuple[float, ...]
-    stationary: TrackingRecord = field(repr=False)
+    experiment: Experiment  # what was run
+    parameters: tuple[float, ...]  # mean over the last period of the parameters in use
+    errors: tuple[float, ...]  # largest |r - x| of each period [µm]
+    stationary: TrackingRecord = field(repr=False)  # the last periods
 
     @property
     def max_error(self) -> float:
@@ -192,8 +152,8 @@ class Run:
     def settling_periods(self) -> int | None:
         """Periods until the largest error of every period stays below 1.1 times `max_error`.
 
-        None if that is not within the first half of the run: what calms down only at its end
-        may not stay calm.
+        None if that is not within the first half of the run: what calms down only at its end may not stay
+        calm.
         """
         late = np.flatnonzero(np.asarray(self.errors) > SETTLED * self.max_error)
         settled = int(late[-1]) + 1 if late.size else 0
@@ -221,15 +181,7 @@ class Run:
 
 
 def last_periods(record: TrackingRecord, periods: int) -> TrackingRecord:
-    """The end of a record, its time from zero.
-
-    Parameters
-    ----------
-    record : TrackingRecord
-        Of a periodic reference.
-    periods : int
-        How many to keep.
-    """
+    """The end of a record, its time from zero."""
     n = periods * (record.period or 1)
 
     def last(values: FloatArray) -> FloatArray:

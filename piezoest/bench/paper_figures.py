@@ -22,20 +22,7 @@ WAYS = {"linear": "linear feed-forward", "inverse": "hysteresis compensation"}
 
 
 def write_figures(result: PaperResult, folder: Path) -> list[Path]:
-    """Write all figures as PNG.
-
-    Parameters
-    ----------
-    result : PaperResult
-        To draw.
-    folder : Path
-        To write to; made if it is not there.
-
-    Returns
-    -------
-    list of Path
-        The files.
-    """
+    """Write all figures as PNG. `folder`: to write to; made if it is not there."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, figure in _figures(result):
@@ -58,10 +45,7 @@ def _figures(result: PaperResult) -> Iterator[tuple[str, Figure]]:
 def input_output_map(run: Run) -> Figure:
     """Fig. 3: displacement over voltage, the stage's and that of the identified model.
 
-    Parameters
-    ----------
-    run : Run
-        Hysteresis compensation of a triangle.
+    `run`: hysteresis compensation of a triangle.
     """
     record = last_periods(run.stationary, 1)
     voltage, displacement = record.voltage, record.displacement
@@ -82,10 +66,7 @@ def input_output_map(run: Run) -> Figure:
 def triangle_tracking(linear: Run, inverse: Run) -> Figure:
     """Fig. 4: time series (a), (b) and reference-to-displacement maps (c), (d).
 
-    Parameters
-    ----------
-    linear, inverse : Run
-        Both compensations of the same triangle.
+    `linear`, `inverse`: both compensations of the same triangle.
     """
     figure = _figure(10.0, 7.4)
     series, maps = figure.subplots(2, 2, height_ratios=[1.0, 1.3])
@@ -100,10 +81,7 @@ def triangle_tracking(linear: Run, inverse: Run) -> Figure:
 def prbs_tracking(linear: Run, inverse: Run) -> Figure:
     """Fig. 5: time series (a), (b) of the filtered PRBS.
 
-    Parameters
-    ----------
-    linear, inverse : Run
-        Both compensations of the same signal.
+    `linear`, `inverse`: both compensations of the same signal.
     """
     figure = _figure(10.0, 3.8)
     for axes, letter, run in zip(figure.subplots(1, 2), "ab", (linear, inverse), strict=True):
@@ -114,13 +92,7 @@ def prbs_tracking(linear: Run, inverse: Run) -> Figure:
 
 
 def adaptation(result: PaperResult) -> Figure:
-    """Largest error of each period after the start, for every row of Table II.
-
-    Parameters
-    ----------
-    result : PaperResult
-        To draw.
-    """
+    """Largest error of each period after the start, for every row of Table II."""
     figure = _figure(10.0, 4.2)
     axes = figure.subplots(1, 2, sharey=True)
     for ax, way, runs in ((axes[0], "linear", result.linear), (axes[1], "inverse", result.inverse)):
@@ -141,13 +113,7 @@ def adaptation(result: PaperResult) -> Figure:
 
 
 def error_against_memory(result: PaperResult) -> Figure:
-    """Stationary error and time to settle over the memory of the estimator.
-
-    Parameters
-    ----------
-    result : PaperResult
-        To draw, with a sweep.
-    """
+    """Stationary error and time to settle over the memory of the estimator."""
     memory = np.array(list(result.sweep))
     runs = list(result.sweep.values())
     figure = _figure(10.0, 3.9)

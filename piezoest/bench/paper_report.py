@@ -15,16 +15,11 @@ TITLES = {
 }
 TRANSIENTS = "Adaptation: largest error [µm] of each period, and periods until it is settled"
 HEADINGS = {
-    "alpha": "α\n[1/V]",
-    "beta": "β\n[µm/V]",
-    "gamma": "γ\n[µm/V²]",
-    "K": "K\n[µm/V]",
-    "linear_max_error": "linear\n[µm]",
-    "linear_relative_error": "linear\n[%]",
-    "compensated_max_error": "comp.\n[µm]",
-    "compensated_relative_error": "comp.\n[%]",
+    "alpha": "α\n[1/V]", "beta": "β\n[µm/V]", "gamma": "γ\n[µm/V²]", "K": "K\n[µm/V]",
+    "linear_max_error": "linear\n[µm]", "linear_relative_error": "linear\n[%]",
+    "compensated_max_error": "comp.\n[µm]", "compensated_relative_error": "comp.\n[%]",
     "error_reduction": "reduction\n[%]",
-}
+}  # fmt: skip
 CALIBRATION, HELD_OUT = "calibration", "held out"
 KEY = "✓ within its bound, ✗ outside; numbers without a mark have none."
 
@@ -37,12 +32,7 @@ def use_of(entry: Entry) -> str:
 def table(entries: Iterable[Entry], number: str) -> tuple[Cells, list[Cells]]:
     """Heading and body of Table I, II or III: for each row a line of the paper, of ours, of the ratios.
 
-    Parameters
-    ----------
-    entries : iterable of dict
-        "tables" of the JSON.
-    number : str
-        ``"I"``, ``"II"`` or ``"III"``.
+    `number`: ``"I"``, ``"II"`` or ``"III"``.
     """
     mine = [entry for entry in entries if entry["table"] == number]
     quantities = list(dict.fromkeys(entry["quantity"] for entry in mine))
@@ -110,12 +100,7 @@ def _settling(run: dict[str, Any]) -> str:
 def print_report(document: dict[str, Any], console: Any) -> None:
     """Print the tables, the transients, the sweep and the verdict.
 
-    Parameters
-    ----------
-    document : dict
-        What `piezoest bench paper --json` writes.
-    console : rich.console.Console
-        To print on.
+    `document`: what `piezoest bench paper --json` writes.
     """
     for number, title in TITLES.items():
         heading, body = table(document["tables"], number)

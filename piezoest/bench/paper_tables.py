@@ -14,23 +14,13 @@ SOURCE = "Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012)"
 # reference, printed with two digits.
 Bounds = dict[str, float]
 CALIBRATION_BOUNDS: Bounds = {
-    "alpha": 0.15,
-    "beta": 0.02,
-    "gamma": 0.15,
-    "K": 0.02,
-    "linear_max_error": 0.05,
-    "compensated_max_error": 0.25,
-    "error_reduction": 2.0,
-}
+    "alpha": 0.15, "beta": 0.02, "gamma": 0.15, "K": 0.02, "linear_max_error": 0.05,
+    "compensated_max_error": 0.25, "error_reduction": 2.0,
+}  # fmt: skip
 PRBS_BOUNDS: Bounds = {
-    "alpha": 0.15,
-    "beta": 0.03,
-    "gamma": 0.15,
-    "K": 0.03,
-    "linear_max_error": 0.10,
-    "compensated_max_error": 0.20,
-    "error_reduction": 6.0,
-}
+    "alpha": 0.15, "beta": 0.03, "gamma": 0.15, "K": 0.03, "linear_max_error": 0.10,
+    "compensated_max_error": 0.20, "error_reduction": 6.0,
+}  # fmt: skip
 TABLE_III_BOUNDS: Bounds = {"compensated_max_error": 0.20}
 
 IN_POINTS = "error_reduction"
@@ -38,30 +28,14 @@ IN_POINTS = "error_reduction"
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """One number of the paper.
+    """One number of the paper."""
 
-    Parameters
-    ----------
-    table : str
-        ``"I"``, ``"II"`` or ``"III"``.
-    row : str
-        Reference signal, as `triangle_row` and `PRBS_ROW` name it.
-    quantity : str
-        Column: alpha, beta, gamma, K, linear_max_error and so on.
-    value : float
-        As printed.
-    unit : str
-        Of the value.
-    held_out : bool
-        Whether the calibration of the stage never saw it.
-    """
-
-    table: str
-    row: str
-    quantity: str
-    value: float
-    unit: str
-    held_out: bool
+    table: str  # ``"I"``, ``"II"`` or ``"III"``
+    row: str  # reference signal, as `triangle_row` and `PRBS_ROW` name it
+    quantity: str  # column: alpha, beta, gamma, K, linear_max_error and so on
+    value: float  # as printed
+    unit: str  # of the value
+    held_out: bool  # whether the calibration of the stage never saw it
 
     @property
     def bound(self) -> float | None:
@@ -75,10 +49,7 @@ class Published:
     def deviation(self, ours: float) -> float:
         """Deviation of `ours`, relative to the value or in points of per cent.
 
-        Parameters
-        ----------
-        ours : float
-            The same number from the simulated stage.
+        `ours`: the same number from the simulated stage.
         """
         difference = ours - self.value
         return difference if self.quantity == IN_POINTS else difference / self.value

@@ -32,20 +32,7 @@ SEGMENTS = 10  # of the rest, the largest error of each of which is taken
 def logs_of(pattern: str) -> list[str]:
     """Names that stand for recorded logs in the place of scenarios.
 
-    Parameters
-    ----------
-    pattern : str
-        A file, a folder of CSV files, or a pattern such as ``fleet/*.csv``.
-
-    Returns
-    -------
-    list of str
-        Sorted.
-
-    Raises
-    ------
-    ValueError
-        If no file is found.
+    `pattern`: a file, a folder of CSV files, or a pattern such as ``fleet/*.csv``.
     """
     files = sorted(glob(f"{pattern}/*.csv" if Path(pattern).is_dir() else pattern, recursive=True))
     if not files:
@@ -56,45 +43,23 @@ def logs_of(pattern: str) -> list[str]:
 def file_of(scenario: str) -> Path | None:
     """File of a scenario that is a recorded log; None of any other.
 
-    Parameters
-    ----------
-    scenario : str
-        Name in the place of a scenario's.
+    `scenario`: name in the place of a scenario's.
     """
     return Path(scenario.removeprefix(LOG)) if scenario.startswith(LOG) else None
 
 
 @functools.lru_cache(maxsize=4096)
 def digest(path: Path) -> str:
-    """Fingerprint of a log's content.
-
-    Parameters
-    ----------
-    path : Path
-        Of the log.
-    """
+    """Fingerprint of a log's content."""
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
 def numbers(path: Path, estimator: str | None) -> dict[str, Any]:
     """Take the numbers of one estimator on one log.
 
-    Parameters
-    ----------
-    path : Path
-        Of the log, as `piezoest.records.read_record` reads it.
-    estimator : str or None
-        As `piezoest.bench.estimators.candidate` reads it; None for the straight line.
-
-    Returns
-    -------
-    dict
-        Columns of `piezoest.bench.run.COLUMNS` that a log has: there is no change to settle after.
-
-    Raises
-    ------
-    ValueError
-        If the log cannot be read or used.
+    `path`: of the log, as `piezoest.records.read_record` reads it. `estimator`: as
+    `piezoest.bench.estimators.candidate` reads it; None for the straight line. Returns columns of
+    `piezoest.bench.run.COLUMNS` that a log has: there is no change to settle after.
     """
     data, sample_rate = _read(path)
     learnt = round(LEARNT * data.u.size)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-Document = dict[str, Any]
+Document = dict[str, Any]  # from `piezoest.bench.table.describe`
 Table = tuple[list[str], list[list[str]]]
 
 KEY = (
@@ -19,15 +19,7 @@ SURE = 0.05
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Significant digits as a plain number; a dash for what is not known or infinite.
-
-    Parameters
-    ----------
-    value : float or None
-        To write.
-    digits : int
-        How many.
-    """
+    """Significant digits as a plain number; a dash for what is not known or infinite."""
     if value is None or not math.isfinite(value):
         return "—"
     if value == 0.0:
@@ -38,37 +30,17 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def percent(share: float | None, digits: int = 2) -> str:
-    """A share in per cent; a dash for what is not known or infinite.
-
-    Parameters
-    ----------
-    share : float or None
-        Of one.
-    digits : int
-        Significant ones.
-    """
+    """A share in per cent; a dash for what is not known or infinite."""
     return number(None if share is None else 100.0 * share, digits)
 
 
 def best_first(document: Document) -> list[Document]:
-    """Rows of the overview, the estimator that adapts best first, and last those that nothing is known of.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.table.describe`.
-    """
+    """Rows of the overview, the estimator that adapts best first, and last those that nothing is known of."""
     return sorted(document["overview"], key=lambda row: row["typical"][0] if row["typical"] else math.inf)
 
 
 def overview_table(document: Document) -> Table:
-    """Heading and a row for each estimator, the one that adapts best first.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.table.describe`.
-    """
+    """Heading and a row for each estimator, the one that adapts best first."""
     heading = ["estimator", "settles", "first", "settled", "not\nrepeated", "other\nstages", "step\n[µs]"]
     body = []
     for row in best_first(document):
@@ -88,27 +60,14 @@ def overview_table(document: Document) -> Table:
 def settles(quantiles: Sequence[float | None] | None, settled: int, runs: int) -> str:
     """Periods until a run settles, and how many of a hundred runs do.
 
-    Parameters
-    ----------
-    quantiles : sequence of float, or None
-        Median and 5 and 95 % quantile.
-    settled, runs : int
-        How many settle, and of how many.
+    `quantiles`: median and 5 and 95 % quantile.
     """
     median = "—" if quantiles is None or quantiles[0] is None else f"{quantiles[0]:.0f}"
     return f"{median} ({100 * settled // max(runs, 1)} %)"
 
 
 def scenario_table(document: Document, scenario: str, stage: str) -> Table:
-    """Heading and a row for each estimator in one scenario on one stage.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.table.describe`.
-    scenario, stage : str
-        Names.
-    """
+    """Heading and a row for each estimator in one scenario on one stage."""
     heading = ["estimator", "settles", "first", "settled", "worst"]
     cells = [cell for cell in document["cells"] if cell["scenario"] == scenario and cell["stage"] == stage]
     cells.sort(key=lambda cell: cell["typical"][0])
@@ -124,13 +83,7 @@ def scenario_table(document: Document, scenario: str, stage: str) -> Table:
 
 
 def needs_table(document: Document) -> Table:
-    """Heading and a row for each need: what to take, and what cannot be told from it.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.table.describe`.
-    """
+    """Heading and a row for each need: what to take, and what cannot be told from it."""
     heading = ["you have or want", "take", "error\n[%]", "the next", "times\nas much"]
     body = []
     for need in document["needs"]:
@@ -152,25 +105,15 @@ def needs_table(document: Document) -> Table:
 
 
 def print_table(document: Document, console: Any, *, scenarios: bool = False) -> None:
-    """Print a campaign.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.table.describe`.
-    console : rich.console.Console
-        To print on.
-    scenarios : bool
-        A table for each scenario and stage too.
-    """
+    """Print a campaign. `scenarios`: a table for each scenario and stage too."""
     if scenarios:
         for scenario, stage in dict.fromkeys((cell["scenario"], cell["stage"]) for cell in document["cells"]):
             where = f"{scenario}, {stage}" if stage else scenario
             title = f"{where}: {document['scenarios'][scenario]}"
-            _print(console, title, *scenario_table(document, scenario, stage))
+            print_cells(console, title, *scenario_table(document, scenario, stage))
     plan = document["plan"]
     title = f"{len(document['scenarios'])} scenarios, {plan['seeds']} seeds, stage {plan['stages'][0]}"
-    _print(console, title, *overview_table(document))
+    print_cells(console, title, *overview_table(document))
     machine = document["machine"]
     lines = [
         KEY,
@@ -192,7 +135,8 @@ def _diverged(document: Document) -> list[tuple[str, int, int]]:
     ]
 
 
-def _print(console: Any, title: str, heading: list[str], body: list[list[str]]) -> None:
+def print_cells(console: Any, title: str, heading: Sequence[str], body: Iterable[Sequence[Any]]) -> None:
+    """Print a table: the first column is text, the others are numbers."""
     from rich.box import SIMPLE_HEAD
     from rich.markup import escape
     from rich.table import Table
@@ -202,22 +146,12 @@ def _print(console: Any, title: str, heading: list[str], body: list[list[str]]) 
     for name in heading[1:]:
         table.add_column(escape(name), justify="right", no_wrap=True)
     for cells in body:
-        table.add_row(*cells)
+        table.add_row(*(escape(str(cell)) for cell in cells))
     console.print(table)
 
 
 def print_changes(document: Document, console: Any, *, everything: bool = False) -> None:
-    """Print what `piezoest bench compare` found.
-
-    Parameters
-    ----------
-    document : dict
-        From `piezoest.bench.compare.compare`.
-    console : rich.console.Console
-        To print on.
-    everything : bool
-        What did not change too.
-    """
+    """Print what `piezoest bench compare` found. `document`: from `piezoest.bench.compare.compare`."""
     shown = [row for row in document["rows"] if everything or row["verdict"] in ("better", "worse")]
     if shown:
         heading = ["scenario, estimator", "number", "changed", "B/A", "q", "verdict"]
@@ -228,7 +162,7 @@ def print_changes(document: Document, console: Any, *, everything: bool = False)
             ]
             for row in shown
         ]  # fmt: skip
-        _print(console, "B against A", heading, body)
+        print_cells(console, "B against A", heading, body)
     counts = ", ".join(f"{count} {verdict}" for verdict, count in document["counts"].items())
     for line in (
         f"{document['pairs']} pairs of runs; of {len(document['rows'])} comparisons {counts or 'none'}.",

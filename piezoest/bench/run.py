@@ -12,10 +12,9 @@ import traceback
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from piezoest.bench import recorded
+from piezoest.bench import machine, recorded
 from piezoest.bench.cases import Case
 from piezoest.bench.estimators import LIMITS, LINEAR, candidate, module_of
-from piezoest.bench.machine import fingerprint
 from piezoest.bench.metrics import measure
 from piezoest.bench.origin import json_safe
 from piezoest.bench.quiet import quiet
@@ -33,49 +32,22 @@ LINEAR_MEMORY = 2.0  # periods
 
 # Numbers of a run in the order of the table's columns; with each its type there.
 COLUMNS: dict[str, type] = {
-    "key": str,
-    "stage": str,
-    "scenario": str,
-    "estimator": str,
-    "seed": int,
-    "failure": str,
-    "amplitude": float,
-    "period": float,
-    "settles": int,
-    "first": float,
-    "worst": float,
-    "typical": float,
-    "settled": float,
-    "settled_rms": float,
-    "linear_settled": float,
-    "linear_worst": float,
-    "diverged": bool,
-}
+    "key": str, "stage": str, "scenario": str, "estimator": str, "seed": int, "failure": str,
+    "amplitude": float, "period": float, "settles": int, "first": float, "worst": float, "typical": float,
+    "settled": float, "settled_rms": float, "linear_settled": float, "linear_worst": float, "diverged": bool,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One run.
+    """One run."""
 
-    Parameters
-    ----------
-    scenario : str
-        Name in `SCENARIOS`, or "log:" and the name of a file.
-    estimator : str
-        As `piezoest.bench.estimators.candidate` reads it, or "linear feed-forward".
-    seed : int
-        Start of the random numbers.
-    given : dict
-        Fields of `piezoest.bench.cases.Conditions`, the stage among them.
-    code : str
-        Fingerprint of what is run, see `code_of`: a row of other code is another run's.
-    """
-
-    scenario: str
-    estimator: str
-    seed: int
+    scenario: str  # name in `SCENARIOS`, or "log:" and the name of a file
+    estimator: str  # as `piezoest.bench.estimators.candidate` reads it, or "linear feed-forward"
+    seed: int  # start of the random numbers
+    # Fields of `piezoest.bench.cases.Conditions`, the stage among them.
     given: dict[str, Any] = field(default_factory=dict, hash=False)
-    code: str = ""
+    code: str = ""  # fingerprint of what is run, see `code_of`: a row of other code is another run's
 
     @property
     def key(self) -> str:
@@ -87,31 +59,17 @@ class Task:
 def code_of(estimator: str) -> str:
     """Fingerprint of this package and, for an estimator of one's own, of its module.
 
-    Parameters
-    ----------
-    estimator : str
-        As `piezoest.bench.estimators.candidate` reads it, or "linear feed-forward".
+    `estimator`: as `piezoest.bench.estimators.candidate` reads it, or "linear feed-forward".
     """
-    path = module_of(estimator)
-    if path is None:
-        return fingerprint()
-    return f"{fingerprint()}-{hashlib.sha256(path.read_bytes()).hexdigest()[:16]}"
+    return machine.code_of(module_of(estimator))
 
 
 @quiet()
 def play(task: Task) -> Row:
     """Run a task.
 
-    Parameters
-    ----------
-    task : Task
-        What to run.
-
-    Returns
-    -------
-    dict
-        `COLUMNS` and ``errors``; what the estimator raised is its ``failure``, its traceback stands under
-        ``traceback``, and then what is not known is None, as is what is not finite.
+    Returns `COLUMNS` and ``errors``; what the estimator raised is its ``failure``, its traceback stands under
+    ``traceback``, and then what is not known is None, as is what is not finite.
     """
     row = _empty(task)
     try:
@@ -130,13 +88,7 @@ def play(task: Task) -> Row:
 
 
 def crashed(task: Task) -> Row:
-    """Row of a task whose process died over it.
-
-    Parameters
-    ----------
-    task : Task
-        What was to be run.
-    """
+    """Row of a task whose process died over it."""
     return {**_empty(task), "failure": "the process died"}
 
 
@@ -162,21 +114,8 @@ def _linear(scenario: str, seed: int, given: tuple[tuple[str, Any], ...]) -> tup
 def follow(case: Case, estimator: str) -> TrackingRecord:
     """Let a stage follow the reference of a case.
 
-    Parameters
-    ----------
-    case : Case
-        Reference, stage and start.
-    estimator : str
-        As `piezoest.bench.estimators.candidate` reads it, a controller among them, or "linear feed-forward".
-
-    Returns
-    -------
-    TrackingRecord
-
-    Raises
-    ------
-    ValueError
-        If the estimator is unknown.
+    `estimator`: as `piezoest.bench.estimators.candidate` reads it, a controller among them, or "linear
+    feed-forward". ValueError if the estimator is unknown.
     """
     rate = case.sample_rate
     transfer = max(1, round(TRANSFER * rate))

@@ -53,8 +53,7 @@ class Which:
         bool, typer.Option("--map", help="How soon it settles, over amplitude, frequency and family.")
     ] = False
     singles: Annotated[
-        bool,
-        typer.Option("--singles", help="Each family and reference, beside each estimator of it alone."),
+        bool, typer.Option("--singles", help="Each family and reference, beside each estimator of it alone.")
     ] = False
     dwell: Annotated[
         int | None,
@@ -82,8 +81,7 @@ class Written:
     """Where results go."""
 
     output: Annotated[
-        Path,
-        typer.Option("--out", "-o", metavar="DIR", help="Folder of the results, and of finished runs."),
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the results, and of finished runs.")
     ] = FOLDER
     table: Annotated[
         str | None, typer.Option(help="parquet or csv; default Parquet where pyarrow is installed.")
@@ -197,14 +195,14 @@ def _write(
 def _show(controller: str, seed: int, given: dict[str, Any], folder: Path) -> None:
     """Run one seed again, print its row and draw it."""
     from piezoest.bench.quiet import quiet
-    from piezoest.bench.zoo import draw, play
+    from piezoest.bench.zoo import draw, traced
     from piezoest.bench.zoo.contenders import contender
     from piezoest.bench.zoo.figure import write_figure
     from piezoest.bench.zoo.report import number
 
     rig = draw(seed, **given)
     with quiet():  # its events are printed
-        row, both = play(rig, contender(controller), traces=True)
+        row, both = traced(rig, contender(controller))
     for name, value in row.items():
         typer.echo(f"{name:>16} {number(value)}")
     for event in both.events:

@@ -27,40 +27,16 @@ NOISE = (1e-4, 3e-2)  # µm
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A named situation.
+    """A named situation."""
 
-    Parameters
-    ----------
-    name : str
-        Stays what it is.
-    description : str
-        One line.
-    make : callable
-        Case from a `Draft`.
-    """
-
-    name: str
-    description: str
-    make: Callable[[Draft], Case] = field(repr=False)
+    name: str  # stays what it is
+    description: str  # one line
+    make: Callable[[Draft], Case] = field(repr=False)  # case from a `Draft`
 
     def build(self, seed: int, **overrides: Any) -> Case:
         """Make the run of one seed.
 
-        Parameters
-        ----------
-        seed : int
-            Start of the random numbers.
-        **overrides
-            Fields of `Conditions`.
-
-        Returns
-        -------
-        Case
-
-        Raises
-        ------
-        ValueError
-            If a value is out of its range.
+        `**overrides`: fields of `Conditions`. ValueError if a value is out of its range.
         """
         seed = integer("seed", seed)
         rng = np.random.default_rng([seed, *self.name.encode()])
@@ -74,15 +50,7 @@ UNREPEATED = ("prbs", "random-walk", "two-tone")  # minor loops, or no period wi
 def scenario(name: str, description: str) -> Callable[[Callable[[Draft], Case]], Callable[[Draft], Case]]:
     """Decorator that enters a function from `Draft` to `Case` into `SCENARIOS`.
 
-    Parameters
-    ----------
-    name, description
-        As in `Scenario`.
-
-    Raises
-    ------
-    ValueError
-        If there is one of that name.
+    `name`, `description`: as in `Scenario`.
     """
     if name in SCENARIOS:
         raise ValueError(f"there is a scenario {name} already: choose another name")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ from rich.console import Console
 
 from piezoest._errors import INTERRUPTED
 from piezoest._files import write_text
+from piezoest.bench.origin import json_text as json_text
 
 Html = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="Write a page of HTML.")]
 Json = Annotated[
@@ -99,11 +99,6 @@ def usage(folder: Path | None = None) -> Iterator[None]:
         if folder is not None:
             print(f"stopped: the same command goes on from {folder}", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None
-
-
-def json_text(document: dict[str, Any]) -> str:
-    """Text of a document."""
-    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def write_json(document: dict[str, Any], target: Path | None) -> None:

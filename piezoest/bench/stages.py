@@ -31,25 +31,9 @@ def make_stage(
 ) -> SimulatedStage:
     """Make a stage at rest; the same arguments give the same stage, its noise included.
 
-    Parameters
-    ----------
-    name : str
-        In `STAGES`.
-    sample_rate : float
-        [Hz].
-    seed : int
-        Of the shape of the loop and of the noise.
-    noise : float, optional
-        Standard deviation of the gauge's noise [µm]; default that of the paper's.
-    gain_schedule : tuple, optional
-        Time [s] and factor of the hysteresis, see `PaperStage`.
-    creep : bool
-        Whether it creeps.
-
-    Raises
-    ------
-    ValueError
-        If there is no stage of that name.
+    `name`: in `STAGES`. `sample_rate`: [Hz]. `seed`: of the shape of the loop and of the noise. `noise`:
+    standard deviation of the gauge's noise [µm]; default that of the paper's. `gain_schedule`: time [s] and
+    factor of the hysteresis, see `PaperStage`.
     """
     if name not in STAGES:
         raise ValueError(f"stage must be one of {', '.join(STAGES)}, got {name!r}")

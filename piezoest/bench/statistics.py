@@ -31,30 +31,14 @@ LEVEL = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Need:
-    """Something one may want of an estimator, and the number that tells.
+    """Something one may want of an estimator, and the number that tells."""
 
-    Parameters
-    ----------
-    words : str
-        What is wanted.
-    quantity : str
-        Error that should be small.
-    scenarios : tuple of str
-        Where it is taken; empty for all.
-    """
-
-    words: str
-    quantity: str
-    scenarios: tuple[str, ...] = ()
+    words: str  # what is wanted
+    quantity: str  # error that should be small
+    scenarios: tuple[str, ...] = ()  # where it is taken; empty for all
 
     def applies(self, scenarios: Sequence[str]) -> bool:
-        """Whether a campaign has the scenarios.
-
-        Parameters
-        ----------
-        scenarios : sequence of str
-            Of the campaign.
-        """
+        """Whether a campaign has the scenarios."""
         return set(self.scenarios) <= set(scenarios)
 
 
@@ -75,10 +59,7 @@ NEEDS = (
 def relative(runs: pd.DataFrame) -> pd.DataFrame:
     """Runs with errors relative to the amplitude; what failed has large ones, and never settles.
 
-    Parameters
-    ----------
-    runs : pandas.DataFrame
-        Columns of `piezoest.bench.run.COLUMNS`.
+    `runs`: columns of `piezoest.bench.run.COLUMNS`.
     """
     frame = runs.copy()
     amplitude = frame["amplitude"].astype(float)
@@ -94,12 +75,7 @@ def relative(runs: pd.DataFrame) -> pd.DataFrame:
 def logarithms(frame: pd.DataFrame, quantity: str) -> pd.DataFrame:
     """Logarithm of an error: a row for each stage and scenario, a column for each seed.
 
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        Runs of one estimator, from `relative`.
-    quantity : str
-        In `QUANTITIES`.
+    `frame`: runs of one estimator, from `relative`. `quantity`: in `QUANTITIES`.
     """
     return np.log(frame.pivot_table(index=["stage", "scenario"], columns="seed", values=quantity))
 
@@ -107,12 +83,7 @@ def logarithms(frame: pd.DataFrame, quantity: str) -> pd.DataFrame:
 def over_scenarios(frame: pd.DataFrame, quantity: str) -> float:
     """Geometric mean over stages and scenarios of the median over the seeds.
 
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        Runs of one estimator, from `relative`.
-    quantity : str
-        In `QUANTITIES`.
+    `frame`: runs of one estimator, from `relative`. `quantity`: in `QUANTITIES`.
     """
     return math.exp(float(logarithms(frame, quantity).median(axis=1).mean()))
 
@@ -120,17 +91,7 @@ def over_scenarios(frame: pd.DataFrame, quantity: str) -> float:
 def interval(frame: pd.DataFrame, quantity: str) -> list[float]:
     """The same, and the 95 % interval that other seeds would lie in, by the bootstrap over the seeds.
 
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        Runs of one estimator, from `relative`.
-    quantity : str
-        In `QUANTITIES`.
-
-    Returns
-    -------
-    list of float
-        Value, lower and upper end.
+    `frame`: runs of one estimator, from `relative`. `quantity`: in `QUANTITIES`.
     """
     values = logarithms(frame, quantity).to_numpy()
     found = math.exp(float(np.mean(np.nanmedian(values, axis=1))))
@@ -145,21 +106,10 @@ def interval(frame: pd.DataFrame, quantity: str) -> list[float]:
 def order(frame: pd.DataFrame, need: Need, stages: Sequence[str]) -> list[dict[str, Any]]:
     """Estimators in order of a need, the best first, each compared with the best by the runs they share.
 
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        Runs, from `relative`.
-    need : Need
-        What is wanted.
-    stages : sequence of str
-        Of the campaign; an estimator that ran on the first one only is ordered by that.
-
-    Returns
-    -------
-    list of dict
-        ``value`` with its interval on the first stage and ``others`` on the rest; ``ratio`` to the best with
-        its interval, and ``p``, allowed for the number of comparisons (Holm). The order is that of all
-        stages among estimators that ran on all, and of the first stage beside them.
+    `frame`: runs, from `relative`. `stages`: of the campaign; an estimator that ran on the first one only is
+    ordered by that. Returns ``value`` with its interval on the first stage and ``others`` on the rest;
+    ``ratio`` to the best with its interval, and ``p``, allowed for the number of comparisons (Holm). The
+    order is that of all stages among estimators that ran on all, and of the first stage beside them.
     """
     there = frame[frame["scenario"].isin(need.scenarios)] if need.scenarios else frame
     runs = {str(name): group for name, group in there.groupby("estimator", sort=False) if name != LINEAR}
@@ -205,10 +155,7 @@ def _ratio(d: FloatArray) -> list[float]:
 def holm(p: Sequence[float]) -> list[float]:
     """Values of p that allow for the number of comparisons (Holm 1979).
 
-    Parameters
-    ----------
-    p : sequence of float
-        Of each comparison; 1 for what is compared with itself, which is none.
+    `p`: of each comparison; 1 for what is compared with itself, which is none.
     """
     number = sum(value < 1.0 for value in p)
     found, largest = list(p), 0.0
@@ -221,15 +168,7 @@ def holm(p: Sequence[float]) -> list[float]:
 def signed_rank(d: FloatArray) -> float:
     """Two-sided p of Wilcoxon's signed ranks; zeros are left out, and few pairs are tried in full.
 
-    Parameters
-    ----------
-    d : ndarray, shape (N,)
-        Differences, infinite ones larger than all others.
-
-    Returns
-    -------
-    float
-        1 if all but one are zero.
+    `d` (N,): differences, infinite ones larger than all others. Returns 1 if all but one are zero.
     """
     from scipy.stats import PermutationMethod, wilcoxon
 

@@ -11,8 +11,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, BinaryIO, Protocol, Self, TypeVar
+from typing import Any, Protocol, Self, TypeVar
 
 Row = dict[str, Any]
 
@@ -32,75 +31,46 @@ Task = TypeVar("Task", bound=Keyed)
 class Store:
     """Rows in a file, to be used in a ``with`` statement.
 
-    Parameters
-    ----------
-    path : Path
-        Made if it is not there; with its folder.
+    `path`: made if it is not there; with its folder.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._places: dict[str, int] = {}
+        self._rows: dict[str, Row] = {}
 
     def __enter__(self) -> Self:
         self._path.parent.mkdir(parents=True, exist_ok=True)
         # Unbuffered: what is written comes to the end of the file in one piece, whoever else appends to it.
-        self._end = self._path.open("ab", buffering=0)
-        self._file: BinaryIO = self._path.open("rb")
-        self._look()
+        self._file = self._path.open("ab+", buffering=0)
+        with self._path.open("rb") as lines:
+            for row in filter(None, map(_read, lines)):
+                self._rows.setdefault(row["key"], row)
         return self
 
-    def _look(self) -> None:
-        """Find the places of all rows that are there."""
-        places: dict[str, int] = {}
-        self._file.seek(0, os.SEEK_END)  # drops what was read before
-        self._file.seek(0)
-        place = 0
-        for line in self._file:
-            if (row := _read(line)) is not None:
-                places.setdefault(row["key"], place)
-            place += len(line)
-        self._places |= places
-
-    def __exit__(
-        self,
-        error_type: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self._file.close()
-        self._end.close()
 
     def __contains__(self, key: str) -> bool:
-        return key in self._places
+        return key in self._rows
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len(self._rows)
 
     def append(self, row: Row) -> bool:
         """Keep a row, at once; False if its key is known already, and then the first one stands.
 
-        Parameters
-        ----------
-        row : dict
-            JSON-safe, with a ``"key"``.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written whole; what of it was written counts for nothing.
+        `row`: JSON-safe, with a ``"key"``.
         """
-        if row["key"] in self._places:
+        if row["key"] in self._rows:
             return False
         line = json.dumps(row, allow_nan=False, ensure_ascii=False).encode() + b"\n"
         whole = b"\n" + line if self._torn() else line
         try:
-            if self._end.write(whole) < len(whole):
+            if self._file.write(whole) < len(whole):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
             raise OSError(error.errno, error.strerror, str(self._path)) from None
-        # Where the writing ended, not where the file ended before: another process may have appended then.
-        self._places[row["key"]] = self._end.tell() - len(line)
+        self._rows[row["key"]] = row
         return True
 
     def _torn(self) -> bool:
@@ -110,34 +80,8 @@ class Store:
         return self._file.read(1) not in (b"", b"\n")
 
     def rows(self, keys: Iterable[str]) -> Iterator[Row]:
-        """Rows of these keys, in their order; a key without one is left out.
-
-        Parameters
-        ----------
-        keys : iterable of str
-            Of the tasks.
-
-        Raises
-        ------
-        ValueError
-            If a row that was there is no longer.
-        """
-        for key in keys:
-            if key not in self._places:
-                continue
-            if (row := self._at(key)) is None:
-                # Lines have moved, as by an editor.
-                self._look()
-                row = self._at(key)
-            if row is None:
-                raise ValueError(f"{self._path}: the run {key} is gone from it: start the command again")
-            yield row
-
-    def _at(self, key: str) -> Row | None:
-        """Row at the place of a key, if it is the key's."""
-        self._file.seek(self._places[key])
-        row = _read(self._file.readline())
-        return row if row is not None and row["key"] == key else None
+        """Rows of these keys, in their order; a key without one is left out."""
+        return (self._rows[key] for key in keys if key in self._rows)
 
 
 def _read(line: bytes) -> dict[str, Any] | None:
@@ -153,13 +97,7 @@ def _read(line: bytes) -> dict[str, Any] | None:
 
 
 def store_in(folder: Path) -> Store:
-    """Where the runs of a campaign with this folder are kept.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the campaign.
-    """
+    """Where the runs of a campaign with this folder are kept."""
     return Store(folder / "runs.jsonl")
 
 
@@ -171,16 +109,9 @@ def carry_out(
 ) -> None:
     """Run what the store does not hold yet.
 
-    Parameters
-    ----------
-    tasks : sequence of Task
-        The whole campaign.
-    store : Store
-        Open; holds all of their rows afterwards.
-    execute : callable
-        Gives the row of each task it is given, in any order: see `piezoest.bench.executors`.
-    progress : callable
-        Called with the number of finished runs and of all, at first and after each.
+    `store`: open; holds all of their rows afterwards. `execute`: gives the row of each task it is given, in
+    any order: see `piezoest.bench.executors`. `progress`: called with the number of finished runs and of all,
+    at first and after each.
     """
     todo = [task for task in tasks if task.key not in store]
     done = len(tasks) - len(todo)

@@ -22,13 +22,7 @@ from piezoest.bench.recorded import digest, file_of
 from piezoest.bench.run import COLUMNS, Row, Task, code_of, crashed, follow, play
 from piezoest.bench.scenarios import SCENARIOS, UNREPEATED
 from piezoest.bench.stages import PAPER, STAGES, STRANGERS
-from piezoest.bench.statistics import (
-    NEEDS,
-    QUANTITIES,
-    interval,
-    order,
-    relative,
-)
+from piezoest.bench.statistics import NEEDS, QUANTITIES, interval, order, relative
 
 RUNS, PERIODS, DOCUMENT = "runs", "periods", "table.json"
 PERIOD_COLUMNS: dict[str, type] = {
@@ -41,39 +35,20 @@ DIGITS = 4  # significant, of the numbers of a document
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """What is run.
+    """What is run."""
 
-    Parameters
-    ----------
-    estimators : tuple of str
-        As `piezoest.bench.estimators.candidate` reads them; linear feed-forward is always beside them.
-    scenarios : tuple of str
-        Names in `SCENARIOS`, or of logs, see `piezoest.bench.recorded.logs_of`.
-    stages : tuple of str
-        Names in `piezoest.bench.stages.STAGES`.
-    seeds : int
-        Runs of each.
-    slow_seeds : int
-        Runs of each estimator that is slow; these run on the first stage only, and on no scenario of
-        `piezoest.bench.scenarios.UNREPEATED`, whose runs are long.
-    tuned : tuple of str
-        Estimators that were found by tuning, beside the others; these run on the first stage only.
-    given : dict
-        Fields of `piezoest.bench.cases.Conditions`.
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown or a value out of its range.
-    """
-
+    # As `piezoest.bench.estimators.candidate` reads them; linear feed-forward is always beside them.
     estimators: tuple[str, ...]
+    # Names in `SCENARIOS`, or of logs, see `piezoest.bench.recorded.logs_of`.
     scenarios: tuple[str, ...] = tuple(SCENARIOS)
-    stages: tuple[str, ...] = (PAPER, *STRANGERS)
-    seeds: int = 30
+    stages: tuple[str, ...] = (PAPER, *STRANGERS)  # names in `piezoest.bench.stages.STAGES`
+    seeds: int = 30  # runs of each
+    # Runs of each estimator that is slow; these run on the first stage only, and on no scenario of
+    # `piezoest.bench.scenarios.UNREPEATED`, whose runs are long.
     slow_seeds: int = 10
+    # Estimators that were found by tuning, beside the others; these run on the first stage only.
     tuned: tuple[str, ...] = ()
-    given: dict[str, Any] = field(default_factory=dict)
+    given: dict[str, Any] = field(default_factory=dict)  # fields of `piezoest.bench.cases.Conditions`
 
     def __post_init__(self) -> None:
         if unknown := [name for name in self.scenarios if name not in SCENARIOS and not file_of(name)]:
@@ -117,13 +92,7 @@ class Plan:
 
 
 def over_cores(processes: int | None = None) -> Any:
-    """Run tasks in processes of this machine.
-
-    Parameters
-    ----------
-    processes : int, optional
-        How many; default one for each core.
-    """
+    """Run tasks in processes of this machine. `processes`: how many; default one for each core."""
     return partial(in_processes, play, processes=processes, crashed=crashed)
 
 
@@ -132,14 +101,8 @@ def over_dask(
 ) -> Any:
     """Run tasks on Dask.
 
-    Parameters
-    ----------
-    scheduler : str, optional
-        Address of a cluster's scheduler; default a cluster of this machine's cores.
-    processes : int, optional
-        Workers of the latter; default one for each core.
-    estimators : iterable of str
-        Those whose modules the workers need.
+    `scheduler`: address of a cluster's scheduler; default a cluster of this machine's cores. `processes`:
+    workers of the latter; default one for each core. `estimators`: those whose modules the workers need.
     """
     modules = sorted({path for name in estimators if (path := module_of(name)) is not None})
     work = partial(_play_same, ours=fingerprint())
@@ -158,12 +121,7 @@ def _play_same(task: Task, ours: str) -> Row:
 def label(text: str, tuned: Iterable[str] = ()) -> str:
     """Name of an estimator in tables and figures.
 
-    Parameters
-    ----------
-    text : str
-        As `piezoest.bench.estimators.candidate` reads it, or "linear feed-forward".
-    tuned : iterable of str
-        Those that were found by tuning.
+    `text`: as `piezoest.bench.estimators.candidate` reads it, or "linear feed-forward".
     """
     if text == PAPERS:
         return "HysteresisRLS, the paper's law"
@@ -175,19 +133,7 @@ def label(text: str, tuned: Iterable[str] = ()) -> str:
 def write(rows: Sequence[Row], folder: Path, format: str | None = None) -> pd.DataFrame:
     """Write the tables `runs` and `periods`.
 
-    Parameters
-    ----------
-    rows : sequence of dict
-        From `piezoest.bench.run.play`.
-    folder : Path
-        To write to.
-    format : {"parquet", "csv"}, optional
-        Default Parquet where pyarrow is installed.
-
-    Returns
-    -------
-    pandas.DataFrame
-        The runs.
+    `rows`: from `piezoest.bench.run.play`. `format`: default Parquet where pyarrow is installed.
     """
     format = tables.checked_format(format)
     runs = tables.table_of(rows, COLUMNS)
@@ -200,17 +146,9 @@ def write(rows: Sequence[Row], folder: Path, format: str | None = None) -> pd.Da
 def costs(estimators: Iterable[str], given: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Times of each estimator per sample, one after the other, on a recorded cold start.
 
-    Parameters
-    ----------
-    estimators : iterable of str
-        As `piezoest.bench.estimators.candidate` reads them.
-    given : dict
-        Fields of `piezoest.bench.cases.Conditions`.
-
-    Returns
-    -------
-    dict
-        By estimator, from `piezoest.bench.cost.cost`; empty for one that fails.
+    `estimators`: as `piezoest.bench.estimators.candidate` reads them. `given`: fields of
+    `piezoest.bench.cases.Conditions`. Returns by estimator, from `piezoest.bench.cost.cost`; empty for one
+    that fails.
     """
     case = SCENARIOS["cold-start"].build(0, **given)
     record = follow(case, LINEAR)
@@ -226,23 +164,12 @@ def costs(estimators: Iterable[str], given: dict[str, Any]) -> dict[str, dict[st
 def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """Sum up a finished campaign.
 
-    Parameters
-    ----------
-    rows : sequence of dict
-        All of its runs.
-    plan : Plan
-        Of the campaign.
-    times : dict
-        From `costs`.
-
-    Returns
-    -------
-    dict
-        JSON-safe; errors relative to the amplitude. ``cells``: of each estimator, stage and scenario the
-        median over the seeds and the 5 and 95 % quantiles; ``overview``: of each estimator the geometric mean
-        over the scenarios that repeat of the medians, on the first stage, with the 95 % interval that the
-        seeds leave, and the settled error on the other stages (``others``) and on scenarios that do not
-        repeat (``unrepeated``); ``needs``: the estimators in order for each need, compared pair by pair.
+    `times`: from `costs`. Returns JSON-safe; errors relative to the amplitude. ``cells``: of each estimator,
+    stage and scenario the median over the seeds and the 5 and 95 % quantiles; ``overview``: of each estimator
+    the geometric mean over the scenarios that repeat of the medians, on the first stage, with the 95 %
+    interval that the seeds leave, and the settled error on the other stages (``others``) and on scenarios
+    that do not repeat (``unrepeated``); ``needs``: the estimators in order for each need, compared pair by
+    pair.
     """
     frame = relative(tables.table_of(rows, COLUMNS))
     names = plan.everything

@@ -13,19 +13,8 @@ from rich.console import Console
 
 from piezoest._files import read_json, write_text
 from piezoest._options import grouped
+from piezoest.bench import shared
 from piezoest.bench.origin import json_safe, origin
-from piezoest.bench.shared import (
-    Html,
-    Json,
-    check_html,
-    counting,
-    json_target,
-    json_text,
-    progress,
-    usage,
-    write_html,
-    write_json,
-)
 
 FOLDER, QUICK_FOLDER = Path("bench-results"), Path("bench-results-quick")
 SEEDS, SLOW_SEEDS = 30, 10
@@ -49,8 +38,7 @@ class Runs:
         ),
     ] = None
     only: Annotated[
-        list[str] | None,
-        typer.Option(help="Only this one in the place of the package's; may be repeated."),
+        list[str] | None, typer.Option(help="Only this one in the place of the package's; may be repeated.")
     ] = None
     scenario: Annotated[
         list[str] | None,
@@ -96,7 +84,7 @@ class Shown:
     figures: Annotated[
         Path | None, typer.Option("--figures", metavar="DIR", help="Draw the figures, as PNG.")
     ] = None
-    html: Html = None
+    html: shared.Html = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,13 +96,14 @@ class Where:
     ] = None
     dask: Annotated[bool, typer.Option("--dask", help="Run on Dask, on this machine's cores.")] = False
     scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: tcp://10.0.0.1:8786."),
+        str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: tcp://10.0.0.1:8786.")
     ] = None
 
 
 @grouped
-def table(context: typer.Context, runs: Runs, shown: Shown, where: Where, json_to: Json = None) -> None:
+def table(
+    context: typer.Context, runs: Runs, shown: Shown, where: Where, json_to: shared.Json = None
+) -> None:
     """Compare estimators: scenarios × stages × estimators × seeds, in parallel, beside linear feed-forward.
 
     Finished runs are kept in the output folder: stopped and started again, it goes on where it was. There are
@@ -141,32 +130,32 @@ def table(context: typer.Context, runs: Runs, shown: Shown, where: Where, json_t
             )
         return
 
-    target = json_target(json_to)
-    check_html(shown.html)
+    target = shared.json_target(json_to)
+    shared.check_html(shown.html)
     folder = shown.output or (QUICK_FOLDER if runs.quick else FOLDER)
     began = time.perf_counter()
     document = _run(runs, where, folder, shown.table, began)
-    write_text(folder / "table.json", json_text(document))
-    write_html(document, shown.html)
+    write_text(folder / "table.json", shared.json_text(document))
+    shared.write_html(document, shown.html)
     if shown.figures is not None:
         from piezoest.bench.figures import write_figures
 
         for path in write_figures(document, shown.figures):
             typer.echo(f"Figure: {path}", err=json_to == "-")
     if json_to == "-":
-        typer.echo(json_text(document), nl=False)
+        typer.echo(shared.json_text(document), nl=False)
         return
     from piezoest.bench.report import print_table
 
     print_table(document, Console(), scenarios=shown.scenarios)
     typer.echo(f"Tables and table.json: {folder}")
-    write_json(document, target)
+    shared.write_json(document, target)
 
 
 def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: float) -> dict[str, Any]:
     """Run what is missing, write the tables, and sum them up."""
-    with usage(folder):
-        with progress() as say:
+    with shared.usage(folder):
+        with shared.progress() as say:
             say("loading (compiles once after the installation)")
             from piezoest.bench import table, tables
             from piezoest.bench.quiet import quiet
@@ -183,15 +172,15 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
         tuned: list[dict[str, Any]] = []
         with store_in(folder) as store:
             if runs.tune is not None:
-                with counting("runs to tune by") as count:
+                with shared.counting("runs to tune by") as count:
                     tuned = tune(plan.estimators, runs.tune, plan.given, store, execute, count)
                 plan = _with_tuned(plan, tuned)
             tasks = plan.tasks()
-            with counting("runs") as count:
+            with shared.counting("runs") as count:
                 carry_out(tasks, store, execute, count)
             rows = list(store.rows(task.key for task in tasks))
         table.write(rows, folder, format)
-        with progress() as say, quiet():
+        with shared.progress() as say, quiet():
             say("timing each estimator alone")
             times = {} if runs.logs else table.costs(plan.everything[1:], plan.given)
             say("summing up")
@@ -239,15 +228,15 @@ def compare(
     fail_if_worse: Annotated[
         bool, typer.Option("--fail-if-worse", help=f"Exit with {WORSE} if something became worse.")
     ] = False,
-    json_to: Json = None,
+    json_to: shared.Json = None,
 ) -> None:
     """What changed from campaign A to campaign B, and whether beyond the noise.
 
     Runs are paired by scenario, stage, estimator and seed; each number is put to Wilcoxon's signed-rank test,
     and the number of comparisons is allowed for by the false discovery rate.
     """
-    target = json_target(json_to)
-    with usage():
+    target = shared.json_target(json_to)
+    with shared.usage():
         from piezoest.bench import compare as comparison
         from piezoest.bench import tables
         from piezoest.bench.run import COLUMNS
@@ -260,12 +249,12 @@ def compare(
     heads = ({name: document[name] for name in HEAD} for document in documents)
     document = {"suite": "changes", **dict(zip("AB", heads, strict=True)), **found}
     if json_to == "-":
-        typer.echo(json_text(document), nl=False)
+        typer.echo(shared.json_text(document), nl=False)
     else:
         from piezoest.bench.report import print_changes
 
         print_changes(document, Console(), everything=everything)
-        write_json(document, target)
+        shared.write_json(document, target)
     if fail_if_worse and document["counts"].get("worse"):
         raise typer.Exit(WORSE)
 

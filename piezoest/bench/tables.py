@@ -25,18 +25,7 @@ def default_format() -> str:
 
 
 def checked_format(format: str | None) -> str:
-    """Format that can be written here.
-
-    Parameters
-    ----------
-    format : {"parquet", "csv"} or None
-        Default Parquet where pyarrow is installed.
-
-    Raises
-    ------
-    ValueError
-        If the format is another, or pyarrow is not installed for Parquet.
-    """
+    """Format that can be written here. `format`: default Parquet where pyarrow is installed."""
     format = default_format() if format is None else format
     if format not in FORMATS:
         raise ValueError(f"table format must be one of {', '.join(FORMATS)}, got {format!r}")
@@ -48,16 +37,8 @@ def checked_format(format: str | None) -> str:
 def table_of(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, type]) -> pd.DataFrame:
     """Table of rows.
 
-    Parameters
-    ----------
-    rows : iterable of mapping
-        What they have beside the columns is left out.
-    columns : mapping of str to type
-        Names in their order: str, int, float or bool.
-
-    Returns
-    -------
-    pandas.DataFrame
+    `rows`: what they have beside the columns is left out. `columns`: names in their order: str, int, float or
+    bool.
     """
     cells = [[row.get(name) for name in columns] for row in rows]
     return pd.DataFrame(cells, columns=list(columns)).astype(_types(columns))
@@ -66,17 +47,8 @@ def table_of(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, type]) -> 
 def write_table(table: pd.DataFrame, path: Path) -> None:
     """Write a table, whole or not at all.
 
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        From `table_of`.
-    path : Path
-        Ends in .parquet or .csv.
-
-    Raises
-    ------
-    ValueError
-        If the name ends in something else, or pyarrow is not installed for Parquet.
+    `table`: from `table_of`. ValueError if the name ends in something else, or pyarrow is not installed for
+    Parquet.
     """
     write = table.to_parquet if checked_format(path.suffix[1:]) == "parquet" else table.to_csv
     with replacing(path) as temporary:
@@ -84,22 +56,7 @@ def write_table(table: pd.DataFrame, path: Path) -> None:
 
 
 def read_table(folder: Path, name: str, columns: Mapping[str, type]) -> pd.DataFrame:
-    """Read a table of a folder; of two formats the newer one.
-
-    Parameters
-    ----------
-    folder : Path
-        What `write_table` wrote to.
-    name : str
-        Of the file, without its ending.
-    columns : mapping of str to type
-        That it must have.
-
-    Raises
-    ------
-    ValueError
-        If there is none, it is damaged, or it lacks a column.
-    """
+    """Read a table of a folder; of two formats the newer one. `folder`: what `write_table` wrote to."""
     found = [path for format in FORMATS if (path := folder / f"{name}.{format}").exists()]
     if not found:
         raise ValueError(

@@ -31,37 +31,18 @@ SHIFT = 2026  # seed of the shift of the settings that are tried
 
 @dataclass(frozen=True, slots=True)
 class Between:
-    """Any value from low to high, evenly in its logarithm.
-
-    Parameters
-    ----------
-    low, high : float
-        Above zero.
-    whole : bool
-        Whole numbers only.
-
-    Raises
-    ------
-    ValueError
-        If the bounds are not above zero and in this order.
-    """
+    """Any value from low to high, evenly in its logarithm."""
 
     low: float
     high: float
-    whole: bool = False
+    whole: bool = False  # whole numbers only
 
     def __post_init__(self) -> None:
         if positive("high", self.high) <= positive("low", self.low):
             raise ValueError(f"high must be above low, got {self.low} and {self.high}")
 
     def at(self, position: float) -> float | int:
-        """Value at a position along the way, within [0, 1).
-
-        Parameters
-        ----------
-        position : float
-            0 for low.
-        """
+        """Value at a position along the way, within [0, 1). `position`: 0 for low."""
         if self.whole:
             first, last = math.log(self.low), math.log(self.high + 1.0)
             return min(int(math.exp(first + position * (last - first))), int(self.high))
@@ -71,24 +52,12 @@ class Between:
 
 @dataclass(frozen=True, slots=True)
 class OneOf:
-    """One of some values.
+    """One of some values."""
 
-    Parameters
-    ----------
-    values : tuple
-        Literals.
-    """
-
-    values: tuple[Any, ...]
+    values: tuple[Any, ...]  # literals
 
     def at(self, position: float) -> Any:
-        """Value at a position along the way, within [0, 1).
-
-        Parameters
-        ----------
-        position : float
-            0 for the first.
-        """
+        """Value at a position along the way, within [0, 1). `position`: 0 for the first."""
         return self.values[min(int(position * len(self.values)), len(self.values) - 1)]
 
 
@@ -97,29 +66,16 @@ Space = Mapping[str, Between | OneOf]
 
 @dataclass(frozen=True, slots=True)
 class Tunable:
-    """An estimator and what may be tuned of it.
+    """An estimator and what may be tuned of it."""
 
-    Parameters
-    ----------
-    default : str
-        As `piezoest.bench.estimators.candidate` reads it.
-    template : str
-        The same with ``{…}`` for each value.
-    space : mapping
-        From the names in the template.
-    """
-
-    default: str
-    template: str = ""
-    space: Space = field(default_factory=dict)
+    default: str  # as `piezoest.bench.estimators.candidate` reads it
+    template: str = ""  # the same with ``{…}`` for each value
+    space: Space = field(default_factory=dict)  # from the names in the template
 
     def text(self, point: Sequence[float]) -> str:
         """Description of the estimator at a point of its space.
 
-        Parameters
-        ----------
-        point : sequence of float
-            Within [0, 1), one for each value.
+        `point`: within [0, 1), one for each value.
         """
         values = {
             name: repr(self.space[name].at(position))
@@ -173,16 +129,8 @@ SPACES: dict[str, tuple[str, Space]] = {
 def tunable(text: str) -> Tunable:
     """What may be tuned of an estimator.
 
-    Parameters
-    ----------
-    text : str
-        As `piezoest.bench.estimators.candidate` reads it. What is written with arguments is taken as it
-        stands, but for those that all of a class are given (`piezoest.bench.estimators.KNOWN`).
-
-    Raises
-    ------
-    ValueError
-        If the class declares something that is no space.
+    `text`: as `piezoest.bench.estimators.candidate` reads it. What is written with arguments is taken as it
+    stands, but for those that all of a class are given (`piezoest.bench.estimators.KNOWN`).
     """
     name = name_of(text)
     if "(" in text and text != KNOWN.get(name):
@@ -211,24 +159,8 @@ def _call(name: str, space: Space, given: str = "") -> str:
 def draws(tunable: Tunable, number: int, seed: int) -> list[str]:
     """Descriptions of the estimator all over its space: a Sobol sequence, shifted at random.
 
-    Parameters
-    ----------
-    tunable : Tunable
-        With its space.
-    number : int
-        A power of two, for the sequence to be balanced.
-    seed : int
-        Of the shift.
-
-    Returns
-    -------
-    list of str
-        The default comes first, whatever the number; without a space it is alone.
-
-    Raises
-    ------
-    ValueError
-        If the number is no power of two.
+    `number`: a power of two, for the sequence to be balanced. Returns the default comes first, whatever the
+    number; without a space it is alone.
     """
     from scipy.stats import qmc
 
@@ -252,26 +184,11 @@ def tune(
 ) -> list[dict[str, Any]]:
     """Find the best settings of each estimator, by the same budget, on seeds that nothing is judged on.
 
-    Parameters
-    ----------
-    estimators : sequence of str
-        As `piezoest.bench.estimators.candidate` reads them.
-    number : int
-        Settings of each that are tried beside the default; a power of two.
-    given : dict
-        Fields of `piezoest.bench.cases.Conditions`.
-    store : Store
-        Where runs are kept.
-    execute : callable
-        Such as `piezoest.bench.table.over_cores`.
-    progress : callable
-        As `piezoest.bench.store.carry_out` calls it.
-
-    Returns
-    -------
-    list of dict
-        Of each estimator that has a space and is not slow: its ``default``, its trials with their scores, and
-        the ``chosen`` one. A score is the geometric mean of the typical errors, relative to the amplitude.
+    `estimators`: as `piezoest.bench.estimators.candidate` reads them. `number`: settings of each that are
+    tried beside the default; a power of two. `given`: fields of `piezoest.bench.cases.Conditions`. `execute`:
+    such as `piezoest.bench.table.over_cores`. `progress`: as `piezoest.bench.store.carry_out` calls it.
+    Returns of each estimator that has a space and is not slow: its ``default``, its trials with their scores,
+    and the ``chosen`` one. A score is the geometric mean of the typical errors, relative to the amplitude.
     """
     spaces = [each for text in estimators if not is_slow(text) and (each := tunable(text)).space]
     # The same points for all: two with the same space get the same settings.

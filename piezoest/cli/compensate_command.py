@@ -69,8 +69,8 @@ def compensate(
 ) -> None:
     """Turn a reference into the voltage that makes the stage follow it.
 
-    The voltage starts from 0 V without hysteresis, or from the limit nearest to it.
-    It learns nothing on the way: on a stage with a sensor, piezoest.AdaptiveFeedforward does, in a script.
+    The voltage starts from 0 V without hysteresis, or from the limit nearest to it. It learns nothing on the
+    way: on a stage with a sensor, piezoest.AdaptiveFeedforward does, in a script.
     """
     with errors(debug):
         check_writable(

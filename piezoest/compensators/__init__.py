@@ -8,11 +8,6 @@ from piezoest.compensators.limits import VoltageLimits
 from piezoest.compensators.linear import LinearCompensator
 
 __all__ = [
-    "Compensator",
-    "CompensatorStatus",
-    "IntegralFeedback",
-    "InverseCompensator",
-    "LeadFilter",
-    "LinearCompensator",
-    "VoltageLimits",
-]
+    "Compensator", "CompensatorStatus", "IntegralFeedback", "InverseCompensator", "LeadFilter",
+    "LinearCompensator", "VoltageLimits",
+]  # fmt: skip

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass
-from typing import Any, Literal, Self, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, integer, number_or_nan, positive
+from piezoest._checks import FloatArray, array_1d, instance, integer, number_or_nan, positive
 from piezoest.compensators import inverse_kernel as kernel
 from piezoest.compensators.limits import VoltageLimits
-from piezoest.layout import Named, Record, new
+from piezoest.layout import Copied, Named, Record, new
 from piezoest.models import Model
 
 Method = Literal["closed-form", "bogacki-shampine"]
@@ -41,11 +40,8 @@ class CompensatorStatus:
     projected: bool
 
 
-class Compensator:
-    """Feed-forward through the inverse of a model.
-
-    See `LinearCompensator` and `InverseCompensator`.
-    """
+class Compensator(Copied):
+    """Feed-forward through the inverse of a model. See `LinearCompensator` and `InverseCompensator`."""
 
     __slots__ = (
         "_layouts", "_limits", "_loops", "_model", "_options", "_projected", "_sample_rate", "_settings",
@@ -285,9 +281,36 @@ class Compensator:
         self._compiled()[1](self._state, self._settings, r[start:], u[start:])
         return u
 
-    def copy(self) -> Self:
-        """Return an independent compensator in the same state."""
-        return copy.deepcopy(self)
 
-    def __copy__(self) -> Self:
-        return self.copy()
+class AroundCompensator(Copied):
+    """What is put around a feed-forward compensator, and shows its model, limits and status."""
+
+    __slots__ = ("_compensator",)
+
+    def __init__(self, compensator: Compensator) -> None:
+        expected = "a LinearCompensator or an InverseCompensator"
+        self._compensator = instance("compensator", compensator, Compensator, expected)
+
+    @property
+    def model(self) -> Model:
+        """Model of the feed-forward; settable, bumpless."""
+        return self._compensator.model
+
+    @model.setter
+    def model(self, model: Model) -> None:
+        self._compensator.model = model
+
+    @property
+    def compensator(self) -> Compensator:
+        """The feed-forward inside."""
+        return self._compensator
+
+    @property
+    def limits(self) -> VoltageLimits:
+        """Limits that the voltage never leaves."""
+        return self._compensator.limits
+
+    @property
+    def status(self) -> CompensatorStatus:
+        """What happened to the samples so far."""
+        return self._compensator.status

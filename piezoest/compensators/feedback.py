@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import copy
 import math
-from typing import Self
 
-from piezoest._checks import instance, number_or_nan, positive
-from piezoest.compensators.base import Compensator
-from piezoest.models import Model
+from piezoest._checks import number_or_nan, positive
+from piezoest.compensators.base import AroundCompensator, Compensator
 
 
-class IntegralFeedback:
+class IntegralFeedback(AroundCompensator):
     """Integral action on the tracking error around a feed-forward compensator.
 
     The reference handed to the compensator is r + i, with di/dt = gain (r - x).
@@ -45,36 +42,20 @@ class IntegralFeedback:
     >>> u = feedback.step(1.5, None)  # reference and last reading [µm]; None: no reading yet
     """
 
-    __slots__ = ("_compensator", "_gain", "_integral", "_step_gain")
+    __slots__ = ("_integral", "_step_gain")
 
     #: The loop must hand each measurement back: `piezoest.track` steps sample by sample.
     needs_measurement = True
 
     def __init__(self, compensator: Compensator, *, gain: float, sample_rate: float) -> None:
-        expected = "a LinearCompensator or an InverseCompensator"
-        self._compensator = instance("compensator", compensator, Compensator, expected)
-        self._gain = positive("gain", gain)
-        self._step_gain = self._gain / positive("sample_rate", sample_rate)
+        super().__init__(compensator)
+        self._step_gain = positive("gain", gain) / positive("sample_rate", sample_rate)
         self._integral = 0.0
-
-    @property
-    def model(self) -> Model:
-        """Model of the feed-forward; settable, bumpless."""
-        return self._compensator.model
-
-    @model.setter
-    def model(self, model: Model) -> None:
-        self._compensator.model = model
 
     @property
     def integral(self) -> float:
         """Correction of the reference [µm]."""
         return self._integral
-
-    @property
-    def compensator(self) -> Compensator:
-        """The feed-forward inside."""
-        return self._compensator
 
     def step(self, r: float | None, x: float | None) -> float:
         """Voltage for the next sample.
@@ -104,6 +85,3 @@ class IntegralFeedback:
         """Return to the state after construction."""
         self._integral = 0.0
         self._compensator.reset()
-
-    def __copy__(self) -> Self:
-        return copy.deepcopy(self)

@@ -37,31 +37,19 @@ def layouts(own_state: Any, own_settings: Any) -> tuple[Any, Any]:
     """Layouts of state and settings around those of a model's inverse."""
     state = record(
         voltage=MEASURED,
-        # What the last change of model still owes [µm].
-        owed=NUMBER,
-        samples=COUNT,
-        saturated=COUNT,
-        slewed=COUNT,
-        missing=COUNT,
-        # Sign of what the limits withhold now.
-        limited=SIGN,
+        owed=NUMBER,  # what the last change of model still owes [µm]
+        samples=COUNT, saturated=COUNT, slewed=COUNT, missing=COUNT,
+        limited=SIGN,  # of what the limits withhold now
         # The voltage's recent path, and its turning points that are not wiped out.
-        path=recent_path.PATH,
-        memory=TURNING_POINTS,
-        corridor=corridor.CORRIDOR,
-        inverse=own_state,
-    )
+        path=recent_path.PATH, memory=TURNING_POINTS,
+        corridor=corridor.CORRIDOR, inverse=own_state,
+    )  # fmt: skip
     settings = record(
-        minimum=NUMBER,
-        maximum=NUMBER,
-        largest_step=NUMBER,
-        # Of what is owed, from sample to sample.
-        decay=FIXED,
+        minimum=NUMBER, maximum=NUMBER, largest_step=NUMBER,
+        decay=FIXED,  # of what is owed, from sample to sample
         # Of a hysteresis: whether (17) is integrated, whether a new model is placed by the voltage's path.
-        integrated=FIXED,
-        by_path=FIXED,
-        inverse=own_settings,
-    )
+        integrated=FIXED, by_path=FIXED, inverse=own_settings,
+    )  # fmt: skip
     return state, settings
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import copy
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
-from piezoest._checks import WILDEST, FloatArray, array_1d, finite, number_or_nan, positive
-from piezoest.compensators.base import Compensator, CompensatorStatus
-from piezoest.compensators.limits import VoltageLimits
+from piezoest._checks import WILDEST, FloatArray, array_1d, finite, instance, number_or_nan, positive
+from piezoest.compensators.base import AroundCompensator, Compensator
 from piezoest.compile import Record, Vector, compiled, inlined
 from piezoest.equations.lead import SETTINGS, STATE, lead_coefficients, lead_step
 from piezoest.layout import new
-from piezoest.models import MassSpringDamper, Model
+from piezoest.models import MassSpringDamper
 
 
 @inlined
@@ -40,7 +38,7 @@ def _run(state: Record, settings: Record, r: Vector) -> None:
         r[k] = _lead(state, settings, r[k])
 
 
-class LeadFilter:
+class LeadFilter(AroundCompensator):
     """A second-order lead filter before a feed-forward, for references that are close to the resonance.
 
     The compensator gets r + c1 r' + c2 r''. The stage's mechanics and delay turn this into r again. Use it
@@ -82,7 +80,7 @@ class LeadFilter:
     >>> u = lead.step(0.0)
     """
 
-    __slots__ = ("_compensator", "_settings", "_state")
+    __slots__ = ("_settings", "_state")
 
     def __init__(
         self,
@@ -93,14 +91,9 @@ class LeadFilter:
         delay: float = 0.0,
         smoothing: float | None = None,
     ) -> None:
-        if not isinstance(compensator, Compensator):
-            raise ValueError(
-                f"compensator must be a LinearCompensator or an InverseCompensator, got {compensator!r}"
-            )
-        if not isinstance(mechanics, MassSpringDamper):
-            raise ValueError(f"mechanics must be a MassSpringDamper, got {mechanics!r}")
+        super().__init__(compensator)
+        instance("mechanics", mechanics, MassSpringDamper, "a MassSpringDamper")
         omega = 2.0 * np.pi * mechanics.natural_frequency
-        self._compensator = compensator
         coefficients = lead_coefficients(
             mechanics.natural_frequency,
             mechanics.damping_ratio,
@@ -109,30 +102,6 @@ class LeadFilter:
             1.0 / positive("sample_rate", sample_rate),
         )
         self._settings, self._state = new(SETTINGS, **coefficients), new(STATE)
-
-    @property
-    def model(self) -> Model:
-        """Model of the feed-forward; settable, bumpless."""
-        return self._compensator.model
-
-    @model.setter
-    def model(self, model: Model) -> None:
-        self._compensator.model = model
-
-    @property
-    def compensator(self) -> Compensator:
-        """The feed-forward inside."""
-        return self._compensator
-
-    @property
-    def limits(self) -> VoltageLimits:
-        """Limits that the voltage never leaves."""
-        return self._compensator.limits
-
-    @property
-    def status(self) -> CompensatorStatus:
-        """What happened to the samples so far."""
-        return self._compensator.status
 
     def step(self, r: float | None) -> float:
         """Voltage for the next sample of the reference.
@@ -178,10 +147,3 @@ class LeadFilter:
         """Return to the state after construction."""
         self._state = new(STATE)
         self._compensator.reset()
-
-    def copy(self) -> Self:
-        """Return an independent one in the same state."""
-        return copy.deepcopy(self)
-
-    def __copy__(self) -> Self:
-        return self.copy()

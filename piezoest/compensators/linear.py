@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from piezoest._checks import instance
 from piezoest.compensators.base import Compensator
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.models import LinearGain, Model
@@ -41,9 +42,6 @@ class LinearCompensator(Compensator):
         super().__init__(model, limits, "closed-form", transfer_samples)
 
     def _accepts(self, model: Model) -> Model:
-        if not isinstance(model, LinearGain):
-            raise ValueError(
-                f"model must be a LinearGain, got {type(model).__name__}: "
-                "use InverseCompensator for a model with hysteresis"
-            )
+        hint = "a LinearGain: use InverseCompensator for a model with hysteresis"
+        instance("model", model, LinearGain, hint)
         return model

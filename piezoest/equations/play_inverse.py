@@ -11,11 +11,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.equations.bent_plays import (
-    bent_plays_output,
-    bent_plays_step,
-    prandtl_ishlinskii_voltage,
-)
+from piezoest.equations.bent_plays import bent_plays_output, bent_plays_step, prandtl_ishlinskii_voltage
 from piezoest.equations.creep import creep_to_come, unit_creep_step
 from piezoest.equations.turning_points import recall
 from piezoest.layout import FIXED, MEASURED, Length, Record, numbers, record
@@ -29,15 +25,11 @@ def layouts(settings: dict[str, Any]) -> tuple[Record, Record]:
     changes = Length("bend_weight_count", settings["bend_weights"].size)
     state = record(__name__, y=numbers(plays, kind=MEASURED), z=numbers(terms, kind=MEASURED))
     return state, record(
-        gain=FIXED,
-        offset=FIXED,
-        thresholds=numbers(plays, kind=FIXED),
-        weights=numbers(plays, kind=FIXED),
-        creep_gains=numbers(terms, kind=FIXED),
-        decays=numbers(terms, kind=FIXED),
-        bends=numbers(bends, kind=FIXED),
-        bend_weights=numbers(changes, kind=FIXED),
-    )
+        gain=FIXED, offset=FIXED,
+        thresholds=numbers(plays, kind=FIXED), weights=numbers(plays, kind=FIXED),
+        creep_gains=numbers(terms, kind=FIXED), decays=numbers(terms, kind=FIXED),
+        bends=numbers(bends, kind=FIXED), bend_weights=numbers(changes, kind=FIXED),
+    )  # fmt: skip
 
 
 @register_jitable

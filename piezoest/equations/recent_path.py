@@ -19,17 +19,10 @@ MOST = 33  # sixteen periods and the turn before; odd
 # at the oldest and at the last turning point [V]; largest swing of late; how many turning points there are,
 # the place of the last one, and the places, used in turns.
 PATH = record(
-    direction=SIGN,
-    furthest=MEASURED,
-    present=MEASURED,
-    decay=NUMBER,
-    at_oldest=NUMBER,
-    at_last=NUMBER,
-    largest=DISTANCE,
-    count=whole(0.0, MOST),
-    newest=whole(0.0, MOST - 1.0),
-    points=numbers(MOST, kind=MEASURED),
-)
+    direction=SIGN, furthest=MEASURED, present=MEASURED,
+    decay=NUMBER, at_oldest=NUMBER, at_last=NUMBER, largest=DISTANCE,
+    count=whole(0.0, MOST), newest=whole(0.0, MOST - 1.0), points=numbers(MOST, kind=MEASURED),
+)  # fmt: skip
 
 # What is left of a swing this long ago no longer counts.
 FORGOTTEN = 1e-3

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import copy
 import itertools
 import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from piezoest._checks import FloatArray, as_floats, integer, number_or_nan
 from piezoest.estimators import loops
 from piezoest.estimators.base import Status
 from piezoest.estimators.compiled import CompiledEstimator
-from piezoest.layout import write
+from piezoest.layout import Copied, write
 from piezoest.models import Model
 
 # Samples (of all channels) below which a second core costs more than it brings.
@@ -24,7 +23,7 @@ SAMPLES_PER_CORE = 4096
 MOST_CHANNELS = 1_000_000
 
 
-class EstimatorBank:
+class EstimatorBank(Copied):
     """Many copies of an estimator, one for each channel, stepped together.
 
     Each channel is an estimator of its own and gives what a single one gives, to the last
@@ -70,9 +69,6 @@ class EstimatorBank:
             self._reader.update(None)
         self._start = self._reader.state.copy()
         self._states = np.repeat(self._start[np.newaxis], channels)
-
-    def __copy__(self) -> Self:
-        return copy.deepcopy(self)
 
     def __len__(self) -> int:
         """Return the number of channels."""

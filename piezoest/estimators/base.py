@@ -14,7 +14,7 @@ from piezoest.estimators import samples, saved_state
 from piezoest.estimators.outcome import Estimator as Estimator
 from piezoest.estimators.outcome import Status as Status
 from piezoest.estimators.outcome import Trace as Trace
-from piezoest.layout import Record, by_name, from_bytes, new, write
+from piezoest.layout import Copied, Record, by_name, from_bytes, new, write
 from piezoest.models import ColemanHodgdon, Model, model_from_dict
 from piezoest.policies import policy_from_dict
 
@@ -23,7 +23,7 @@ _FORMAT = 1
 DEFAULT_MODEL = ColemanHodgdon(0.02, 0.12, 0.0036)
 
 
-class EstimatorBase(ABC):
+class EstimatorBase(Copied, ABC):
     """Base class of all estimators.
 
     A subclass keeps everything that changes in ``self._state`` (a structured array, see `piezoest.layout`),
@@ -293,13 +293,6 @@ class EstimatorBase(ABC):
         """Return to the state after construction."""
         self._load(self._start)
         self._pending = None
-
-    def copy(self) -> Self:
-        """Return an independent estimator in the same state."""
-        return copy.deepcopy(self)
-
-    def __copy__(self) -> Self:
-        return self.copy()
 
     def __getstate__(self) -> Any:
         # Pickled are numbers without their names, which the layouts have.

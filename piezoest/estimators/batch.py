@@ -98,7 +98,7 @@ class BatchFit(Hopping):
         "run_in_parts_is_one_run": (
             "Each run ends with one fit of all samples so far, which its last row shows; the rows before "
             "show the fit that was held until then. With hop they are the same."
-        ),
+        )
     }
 
     def __init__(

@@ -16,23 +16,9 @@ from piezoest.symbolic import jacobian, simulation, trace
 class Coordinates:
     """Coordinates q of a fit, the parameters they stand for, and the derivative of the one by the other.
 
-    Parameters
-    ----------
-    model : type of FreeRunning
-        Says what is varied.
-    held : tuple of str
-        Names out of `parameters` whose values are given.
-    creep_terms : int
-        Number of creep terms.
-    delayed : bool
-        Whether the displacement lags the voltage, and the start state is one that a voltage brings about.
-
-    Attributes
-    ----------
-    parameters : tuple of str
-        The model's, offset, its start states, creep_gains[0], …, and delay [samples].
-    free : tuple of str
-        Names of the coordinates q.
+    `held`: names out of `parameters` whose values are given. `delayed`: whether the displacement lags the
+    voltage, and the start state is one that a voltage brings about. `parameters`: the model's, offset, its
+    start states, creep_gains[0], …, and delay [samples].
     """
 
     def __init__(

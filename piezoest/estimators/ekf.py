@@ -43,9 +43,8 @@ class HysteresisEKF(CompiledEstimator):
         Random walk of each parameter, relative to its initial value, per root second. It sets the
         memory of the filter; 0 for constant parameters.
     mismatch : float
-        Random walk of w_h [µm per root second]: how far the stage deviates from the model within
-        a second; 0 for an exact model. For a `LinearGain`, which has no w_h: its error averaged
-        over a second [µm].
+        Random walk of w_h [µm per root second]: how far the stage deviates from the model within a second; 0
+        for an exact model. For a `LinearGain`, which has no w_h: its error averaged over a second [µm].
     offset : bool
         Also estimate an offset of the displacement, with the random walk `mismatch`. A larger loop
         leaves such an offset after a change of amplitude.
@@ -82,8 +81,6 @@ class HysteresisEKF(CompiledEstimator):
     __slots__ = ()
 
     kernel: ClassVar[Any] = ekf_kernel
-
-    conformance_exceptions: ClassVar[dict[str, str]] = {}
 
     def __init__(
         self,

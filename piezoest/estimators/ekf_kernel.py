@@ -47,33 +47,20 @@ def state_layout(n: int, line: Field, *, offset: bool, project: bool) -> Layout:
     """Layout of the state of a filter of n states; `line` is the storage of the delay."""
     return record(
         __name__,
-        samples=COUNT,
-        missing=COUNT,
-        updates=COUNT,
-        held=COUNT,
-        resets=COUNT,
-        last=OUTCOME,
-        primed=FLAG,
-        u_last=MEASURED,
-        y=NUMBER,
-        S=AMOUNT,
-        centre=CENTRE if offset else ABSENT,
-        projection=PROJECTION if project else ABSENT,
+        samples=COUNT, missing=COUNT, updates=COUNT, held=COUNT, resets=COUNT, last=OUTCOME,
+        primed=FLAG, u_last=MEASURED, y=NUMBER, S=AMOUNT,
+        centre=CENTRE if offset else ABSENT, projection=PROJECTION if project else ABSENT,
         filter=record(s=numbers(n, kind=PARAMETER), P=numbers(n, n, kind=COVARIANCE), K=numbers(n)),
         line=line,
-    )
+    )  # fmt: skip
 
 
 def settings_layout(n: int, *, hysteretic: bool) -> Layout:
     """Layout of the settings: noise and random walk (variances), and of the start offset and variances."""
     return record(
-        noise=AMOUNT,
-        offset=NUMBER,
-        gain=ABSENT if hysteretic else NUMBER,
-        least=BOUNDS if hysteretic else ABSENT,
-        walk=numbers(n),
-        variances=numbers(n),
-    )
+        noise=AMOUNT, offset=NUMBER, gain=ABSENT if hysteretic else NUMBER,
+        least=BOUNDS if hysteretic else ABSENT, walk=numbers(n), variances=numbers(n),
+    )  # fmt: skip
 
 
 # ---------------------------------------------------------------- one sample

@@ -185,22 +185,8 @@ class FilterPyEKF(_FilterPyBaseline):
 
     Parameters
     ----------
-    sample_rate : float
-        [Hz].
-    initial_model : ColemanHodgdon or LinearGain, optional
-        Model to start from; its kind is the kind that is estimated.
-    uncertainty : float
-        Standard deviation of each initial parameter, relative to its value.
-    noise : float
-        Standard deviation of the displacement's noise [µm].
-    drift : float
-        Random walk of each parameter, relative to its initial value per root second.
-    mismatch : float
-        Random walk of w_h [µm per root second].
-    offset : bool
-        Estimate a constant offset of the displacement too.
-    delay : float
-        Samples by which the measured displacement lags the voltage.
+    sample_rate, initial_model, uncertainty, noise, drift, mismatch, offset, delay
+        As in `HysteresisEKF`.
 
     Raises
     ------
@@ -244,22 +230,8 @@ class FilterPyUKF(_FilterPyBaseline):
 
     Parameters
     ----------
-    sample_rate : float
-        [Hz].
-    initial_model : ColemanHodgdon or LinearGain, optional
-        Model to start from; its kind is the kind that is estimated.
-    uncertainty : float
-        Standard deviation of each initial parameter, relative to its value.
-    noise : float
-        Standard deviation of the displacement's noise [µm].
-    drift : float
-        Random walk of each parameter, relative to its initial value per root second.
-    mismatch : float
-        Random walk of w_h [µm per root second].
-    offset : bool
-        Estimate a constant offset of the displacement too.
-    delay : float
-        Samples by which the measured displacement lags the voltage.
+    sample_rate, initial_model, uncertainty, noise, drift, mismatch, offset, delay
+        As in `HysteresisEKF`.
 
     Raises
     ------
@@ -286,7 +258,7 @@ class FilterPyUKF(_FilterPyBaseline):
         "model_is_admissible_after_anything": (
             "The UKF of filterpy subtracts K S K' from P, which loses definiteness on absurd measurements "
             "(1e8 µm); as a baseline it is used unaltered."
-        ),
+        )
     }
 
     def _make_filter(self, n: int) -> Any:

@@ -60,24 +60,10 @@ class Solution(NamedTuple):
 class Problem:
     """A record and what of the model is to be fitted to it.
 
-    Parameters
-    ----------
-    u : ndarray, shape (N,)
-        Voltage [V], without gaps.
-    x : ndarray, shape (N,)
-        Measured displacement [µm], NaN where it is missing.
-    coordinates : Coordinates
-        What is varied.
-    held : ndarray
-        Values of the coordinates' held parameters.
-    decays : ndarray, optional
-        Factors exp(-dt/tau_i) of the creep terms.
-    root_weight : ndarray, shape (N,), optional
-        Each sample's reciprocal standard deviation, up to a common factor.
-    prior : Prior, optional
-        Knowledge of the coordinates beside the record.
-    limits : mapping, optional
-        Narrower bounds of coordinates by name.
+    `u` (N,): voltage [V], without gaps. `x` (N,): measured displacement [µm], NaN where it is missing.
+    `held`: values of the coordinates' held parameters. `decays`: factors exp(-dt/tau_i) of the creep terms.
+    `root_weight` (N,): each sample's reciprocal standard deviation, up to a common factor. `prior`: knowledge
+    of the coordinates beside the record. `limits`: narrower bounds of coordinates by name.
     """
 
     def __init__(
@@ -170,8 +156,8 @@ def best_start(
 ) -> FloatArray:
     """Coordinates to start from: the better of the derivative form's fit and of a first model.
 
-    That is the given one, or one of the record's size, or the default where the record shows none;
-    creep gains and delay start from `others`, by name. The options are for `HysteresisRLS`.
+    That is the given one, or one of the record's size, or the default where the record shows none; creep
+    gains and delay start from `others`, by name. The options are for `HysteresisRLS`.
     """
     x = np.where(problem.measured, problem.x, np.nan)
     model = problem.coordinates.model
@@ -259,7 +245,7 @@ def robust(
             break
         fitted, solution = loss, solve(problem, q, loss, scale)
         q, evaluations = solution.q, evaluations + solution.evaluations
-    return solution._replace(evaluations=evaluations), scale
+    return Solution(q, solution.success, solution.message, evaluations), scale
 
 
 # ---------------------------------------------------------------- how far to trust it
@@ -270,9 +256,9 @@ class Outcome:
     """What a solution says of the parameters.
 
     Their names; theta (n,) and P (n, n) of all parameters, zero in P where one was held or ended at a bound;
-    coordinates at a bound by name; noise's standard deviation [µm]; residual (N,), measured less
-    simulated [µm], NaN where nothing was measured; and with j the derivative of the last measured output by
-    the coordinates, theta's covariance with that output (n,) and the output's variance.
+    coordinates at a bound by name; noise's standard deviation [µm]; residual (N,), measured less simulated
+    [µm], NaN where nothing was measured; and with j the derivative of the last measured output by the
+    coordinates, theta's covariance with that output (n,) and the output's variance.
     """
 
     parameter_names: tuple[str, ...]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -91,8 +91,6 @@ class MovingHorizon(Hopping):
     """
 
     __slots__ = ("_hop", "_message", "_seconds", "_window")
-
-    conformance_exceptions: ClassVar[dict[str, str]] = {}
 
     def __init__(
         self,

@@ -1,8 +1,7 @@
 """Where the loop is centred, from levels: the mean of x less the model's over whole periods.
 
-The derivative form sees the offset through |du| only, which takes a good sensor; a level needs no
-derivative. Over a whole period (two swings of the voltage) what the model misses of the loop's
-shape cancels.
+The derivative form sees the offset through |du| only, which takes a good sensor; a level needs no derivative.
+Over a whole period (two swings of the voltage) what the model misses of the loop's shape cancels.
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@ class OutputErrorRLS(Freezable):
     kernel: ClassVar[Any] = kernel
 
     conformance_exceptions: ClassVar[dict[str, str]] = {
-        "learns_a_linear_gain": "A linear gain has no loop, and nothing that an output-error form would add.",
+        "learns_a_linear_gain": "A linear gain has no loop, and nothing that an output-error form would add."
     }
 
     def __init__(

@@ -120,8 +120,8 @@ def _excite(state: Any, fraction: Any) -> None:
 def _walk(state: Any, settings: Any, fraction: Any, pace: Any) -> Any:
     """Let P grow, and return the variance of a sample's own noise.
 
-    As in `HysteresisRLS` everything is counted in swings, and the noise of a whole swing
-    follows from the memory wanted and the excitation. Here it is how far the disturbance walks.
+    As in `HysteresisRLS` everything is counted in swings, and the noise of a whole swing follows from the
+    memory wanted and the excitation. Here it is how far the disturbance walks.
     """
     s, P, policy = state.law.s, state.law.P, settings.policies.random_walk
     Q = local_rows(3, 3)

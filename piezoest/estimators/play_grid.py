@@ -183,25 +183,15 @@ def layout(plan: Plan) -> Record:
     slopes, terms = Length("slopes", plan.slopes.size), Length("terms", plan.times.size)
     middle, half_width = MEASURED, Kind(LEAST_RANGE, DISTANCE.high)
     return record(
-        u=MEASURED,
-        travel=AMOUNT,
-        centre=FIXED if plan.fixed else middle,
-        half_width=FIXED if plan.fixed else half_width,
-        low=MEASURED,
-        high=MEASURED,
-        turns=whole(0.0, LOOKED_AT),
-        memory=TURNING_POINTS,
+        u=MEASURED, travel=AMOUNT,
+        centre=FIXED if plan.fixed else middle, half_width=FIXED if plan.fixed else half_width,
+        low=MEASURED, high=MEASURED, turns=whole(0.0, LOOKED_AT), memory=TURNING_POINTS,
         phi=numbers(Length("size", plan.slopes.size + plan.times.size + 1)),
-        y=numbers(slopes, kind=MEASURED),
-        reach=numbers(slopes, kind=AMOUNT),
-        segments=numbers(slopes, kind=MEASURED),
-        way=numbers(slopes, kind=AMOUNT),
-        lower=numbers(slopes),
-        upper=numbers(slopes),
-        zero=numbers(slopes),
-        creep=numbers(terms),
-        work=numbers(slopes, kind=WORK),
-    )
+        y=numbers(slopes, kind=MEASURED), reach=numbers(slopes, kind=AMOUNT),
+        segments=numbers(slopes, kind=MEASURED), way=numbers(slopes, kind=AMOUNT),
+        lower=numbers(slopes), upper=numbers(slopes), zero=numbers(slopes),
+        creep=numbers(terms), work=numbers(slopes, kind=WORK),
+    )  # fmt: skip
 
 
 def window_layout(plan: Plan) -> Record:
@@ -363,8 +353,8 @@ def wanted_half_width(plays: Any) -> Any:
 def move(plays: Any, settings: Any, theta: Any, half_width: Any) -> None:
     """Lay a grid about the middle of the range seen, and move the slopes in `theta` to it.
 
-    Slopes are densities: over the thresholds, continued evenly beyond the old grid, and over the voltage.
-    The new plays are where the voltage's turning points have left them.
+    Slopes are densities: over the thresholds, continued evenly beyond the old grid, and over the voltage. The
+    new plays are where the voltage's turning points have left them.
     """
     relative, bends, y = settings.relative_thresholds, settings.relative_bends, plays.y
     columns, centre = len(bends) + 1, 0.5 * (plays.high + plays.low)

@@ -16,14 +16,7 @@ from piezoest.estimators.compiled import Freezable
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.saved_state import Rule, no_more_than
 from piezoest.layout import ABSENT, Named
-from piezoest.models import (
-    ColemanHodgdon,
-    Creep,
-    LinearGain,
-    MassSpringDamper,
-    Model,
-    PrandtlIshlinskii,
-)
+from piezoest.models import ColemanHodgdon, Creep, LinearGain, MassSpringDamper, Model, PrandtlIshlinskii
 
 FIRST_HALF_PERIOD = 0.1  # s, before the voltage has turned
 LONGEST_GAP = 2e-3  # s, after which an outlier is a new level

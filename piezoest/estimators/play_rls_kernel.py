@@ -121,9 +121,9 @@ def _walk(law: Any, plays: Any, window: Any, settings: Any, half_period: Any) ->
 def _constrain(law: Any, columns: int) -> None:
     """Parameters to use: the estimate's nearest in the metric of P with nothing below its least.
 
-    The estimate and its covariance are left alone: what is said against a constraint stays
-    known. C. Hildreth, Naval Research Logistics Quarterly 4 (1957) 79-85: each force lifts one
-    parameter to its bound, and they are kept from update to update.
+    The estimate and its covariance are left alone: what is said against a constraint stays known. C.
+    Hildreth, Naval Research Logistics Quarterly 4 (1957) 79-85: each force lifts one parameter to its bound,
+    and they are kept from update to update.
     """
     theta, P, used, force = law.theta, law.P, law.used, law.force
     level = len(theta) - 1
@@ -154,9 +154,9 @@ def _constrain(law: Any, columns: int) -> None:
 def _update(law: Any, plays: Any, window: Any, settings: Any, half_period: Any, first: int) -> Any:
     """One step of the law, on the means over the window that ends here: the innovation and its variance.
 
-    Parameters before `first` are left alone, but what is unknown of them counts (S. F. Schmidt's
-    consider filter): at a dwell the slopes say nothing. A variance of zero says that there was no step:
-    the covariance was spoilt, and is the start's.
+    Parameters before `first` are left alone, but what is unknown of them counts (S. F. Schmidt's consider
+    filter): at a dwell the slopes say nothing. A variance of zero says that there was no step: the covariance
+    was spoilt, and is the start's.
     """
     theta, P, mean, work = law.theta, law.P, window.phi, law.work
     size, count = len(theta), window.count

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import copy
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, finite, integer, moderate, number_or_nan
 from piezoest.estimators import recursive_least_squares_kernel as kernel
-from piezoest.layout import new, record
+from piezoest.layout import Copied, new, record
 from piezoest.policies import Normalisation, Policy, check_policies
 from piezoest.policies.base import Conditions, layouts
 
@@ -19,7 +18,7 @@ TimeBase = Literal["discrete", "continuous"]
 LARGEST_START = 1e50
 
 
-class RecursiveLeastSquares:
+class RecursiveLeastSquares(Copied):
     """Recursive least squares with forgetting for any regression z = theta . phi (App. A).
 
     Parameters
@@ -31,13 +30,11 @@ class RecursiveLeastSquares:
     P : array_like, shape (n, n) or (n,), or float, optional
         Initial covariance Q0^-1: matrix, diagonal, or one variance for all (default 1e6).
     noise_variance : float
-        Variance R of the noise in z, in its unit squared (discrete law only; the paper's
-        law has 1).
+        Variance R of the noise in z, in its unit squared (discrete law only; the paper's law has 1).
     time_base : {"discrete", "continuous"}
-        ``"discrete"``: time in samples; one exact update a sample, the ordinary recursive
-        least squares. ``"continuous"``: the differential equations (A5)-(A7) integrated by
-        Bogacki-Shampine with `step`; with the step in seconds its normalised gain works
-        per second, as in the paper.
+        ``"discrete"``: time in samples; one exact update a sample, the ordinary recursive least squares.
+        ``"continuous"``: the differential equations (A5)-(A7) integrated by Bogacki-Shampine with `step`;
+        with the step in seconds its normalised gain works per second, as in the paper.
     step : float
         Time between samples, in the unit of `Forgetting.memory`: 1 for samples (default),
         ``1 / sample_rate`` for seconds.
@@ -49,8 +46,7 @@ class RecursiveLeastSquares:
     Raises
     ------
     ValueError
-        If a shape, a value or a combination of policies is wrong, or P is not symmetric
-        positive definite.
+        If a shape, a value or a combination of policies is wrong, or P is not symmetric positive definite.
 
     Notes
     -----
@@ -128,9 +124,6 @@ class RecursiveLeastSquares:
         law = self._state["law"]
         law["P"] = self._settings["law"]["P_0"]
         law["resets"] += 1.0
-
-    def __copy__(self) -> Self:
-        return copy.deepcopy(self)
 
     @property
     def theta(self) -> FloatArray:

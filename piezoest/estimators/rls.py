@@ -73,10 +73,9 @@ class HysteresisRLS(Freezable):
     cutoff : float
         Cut-off frequency of W_p [Hz], at least 1e-9 of the sample rate.
     high_pass : float, optional
-        Cut-off frequency of a first-order high-pass filter on both sides [Hz], for a biased
-        sensor (last remark of App. A); below the reference's lowest frequency. It removes
-        constants only. A bias enters as |du/dt|, so `offset` is better unless the reference is
-        a sharp triangle.
+        Cut-off frequency of a first-order high-pass filter on both sides [Hz], for a biased sensor (last
+        remark of App. A); below the reference's lowest frequency. It removes constants only. A bias enters as
+        |du/dt|, so `offset` is better unless the reference is a sharp triangle.
     offset : bool, optional
         Also estimate the centre of the loop, with |du/dt| as an additional regressor. A biased
         sensor or a unipolar voltage then needs no high-pass, and the offset that a larger loop has left is
@@ -84,8 +83,7 @@ class HysteresisRLS(Freezable):
     delay : float
         Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     time_base : {"discrete", "continuous"}
-        Time base of the law, see `RecursiveLeastSquares`; ``"continuous"`` is the paper's,
-        in seconds.
+        Time base of the law, see `RecursiveLeastSquares`; ``"continuous"`` is the paper's, in seconds.
     errors : bool
         Compute the covariance of the estimate's error, for `standard_errors`, and the mean square of the
         regressor, for `excitation`. This costs about as much as the law itself: :doc:`/performance`.
@@ -105,8 +103,7 @@ class HysteresisRLS(Freezable):
     noise, so that the covariance is well scaled. The regressor is integrated over each
     sample, which keeps the form exact to third order in the change of voltage.
 
-    Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), sec. III B
-    and App. A.
+    Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), sec. III B and App. A.
 
     Examples
     --------
@@ -126,8 +123,6 @@ class HysteresisRLS(Freezable):
 
     kernel: ClassVar[Any] = rls_kernel
     unneeded: ClassVar[tuple[Any, ...]] = (rls_kernel.propagate_error,)
-
-    conformance_exceptions: ClassVar[dict[str, str]] = {}
 
     def __init__(
         self,
@@ -290,9 +285,8 @@ class HysteresisRLS(Freezable):
     def excitation(self) -> float:
         """Smallest eigenvalue of the regressor's mean square over a swing, relative to the mean eigenvalue.
 
-        This is alpha_0 of (A8) for the scaled regressor, normalised: 1 if all directions are
-        equally excited, 0 if one is not excited. NaN with ``errors=False``, unless
-        `policies.ExcitationGate` is on.
+        This is alpha_0 of (A8) for the scaled regressor, normalised: 1 if all directions are equally excited,
+        0 if one is not excited. NaN with ``errors=False``, unless `policies.ExcitationGate` is on.
         """
         if "products" not in self._followed:
             return np.nan

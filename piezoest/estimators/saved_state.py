@@ -30,21 +30,8 @@ Rule = tuple[str, Any]
 def check(saved: Any, layout: Record, start: Any, rules: Callable[[Any], Iterable[Rule]]) -> Any:
     """Return a saved state as a structured array, if it is one of a layout.
 
-    Parameters
-    ----------
-    saved : dict
-        Numbers by name, as `layout.by_name` gives them.
-    layout : Record
-        What they must be.
-    start : ndarray
-        The state after construction.
-    rules : callable
-        ``rules(state)``: what must hold between the numbers, in words, and whether it does.
-
-    Raises
-    ------
-    ValueError
-        Naming what it cannot be.
+    `saved`: numbers by name, as `layout.by_name` gives them. `rules`: ``rules(state)``: what must hold
+    between the numbers, in words, and whether it does.
     """
     state = start.copy()
     _read(saved, layout, state, "state")

@@ -21,16 +21,10 @@ def thinned(
     first sample's number in the stream: the points stay where they are as it slides. `decimation` samples
     make a point; the sample `also` has to be one too.
 
-    Returns
-    -------
-    points : ndarray of int, shape (M,)
-        Samples that are points: the middle of each block, turning points, first and last.
-    shift : ndarray, shape (M,)
-        Mean voltage of the samples averaged less that of the point.
-    x : ndarray, shape (M,)
-        Mean displacement of the samples averaged.
-    root_weight : ndarray, shape (M,)
-        Square root of the number of samples averaged; 0 where there is no measurement.
+    Returns `points` (M,): samples that are points: the middle of each block, turning points, first and last;
+    `shift` (M,): mean voltage of the samples averaged less that of the point; `x` (M,): mean displacement of
+    the samples averaged; `root_weight` (M,): square root of the number of samples averaged; 0 where there is
+    no measurement.
     """
     N, reach = u.size, (decimation - 1) // 2
     direction = np.sign(np.diff(u))

@@ -70,23 +70,12 @@ class Function:
 
 @dataclass(eq=False)
 class File:
-    """Everything that one C file is made of.
+    """Everything that one C file is made of."""
 
-    Parameters
-    ----------
-    prefix : str
-        What the names of its types begin with.
-    real : str
-        Name of the type of real numbers in C, ``"double"`` or ``"float"``.
-    unneeded : tuple of callable
-        Functions whose calls, as statements, are left out.
-    coarser : dict
-        Constants, by module and name, that have another value here.
-    """
-
-    prefix: str
-    real: str
-    unneeded: tuple[Any, ...] = ()
+    prefix: str  # what the names of its types begin with
+    real: str  # name of the type of real numbers in C, ``"double"`` or ``"float"``
+    unneeded: tuple[Any, ...] = ()  # functions whose calls, as statements, are left out
+    # Constants, by module and name, that have another value here.
     coarser: dict[tuple[str, str], float] = field(default_factory=dict)
     functions: dict[Any, Function] = field(default_factory=dict)
     in_work: list[Any] = field(default_factory=list)

@@ -94,8 +94,7 @@ class Ring:
         Parameters
         ----------
         r, x : array_like, shape (N,)
-            Reference, and the displacement measured before each sample of it [µm]; NaN where
-            there is none.
+            Reference, and the displacement measured before each sample of it [µm]; NaN where there is none.
 
         Returns
         -------

@@ -21,6 +21,48 @@ def _is_needed(field: Any) -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
+def _field_kinds(cls: Any) -> tuple[list[str], list[str]]:
+    """Names of the fields that a dataclass must be given, and of those that it may be."""
+    every = dataclasses.fields(cls)
+    needed = [field.name for field in every if _is_needed(field)]
+    return needed, [field.name for field in every if field.name not in needed]
+
+
+def _plain(value: Any) -> Any:
+    """As JSON has it."""
+    return value.tolist() if isinstance(value, np.ndarray) else list(value) if type(value) is tuple else value
+
+
+class AsFields:
+    """A dataclass that is saved as its fields."""
+
+    __slots__ = ()
+
+    #: What messages call its dictionary.
+    called: ClassVar[str]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a JSON-safe dictionary of the fields."""
+        kind: Any = type(self)
+        return {name: _plain(getattr(self, name)) for name in _field_names(kind)}
+
+    @classmethod
+    def from_dict(cls, data: Any) -> Self:
+        """Make it from what `to_dict` gave.
+
+        Parameters
+        ----------
+        data : dict
+            The dictionary.
+
+        Raises
+        ------
+        ValueError
+            If a field is missing, unknown or refused.
+        """
+        return cls(**fields(cls.called, data, *_field_kinds(cls)))
+
+
 def finite_voltage(model: Model, u: FloatArray) -> FloatArray:
     """Return the voltage that a model's inverse gave."""
     bad = np.flatnonzero(~np.isfinite(u))
@@ -176,10 +218,7 @@ class Model(ABC):
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe dictionary with the class name under ``"model"``."""
-        values = {name: getattr(self, name) for name in _field_names(type(self))}
-        plain = {
-            name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()
-        }
+        plain = {name: _plain(getattr(self, name)) for name in _field_names(type(self))}
         return {"model": type(self).__name__, **plain}
 
     @classmethod
@@ -196,10 +235,8 @@ class Model(ABC):
         ValueError
             If a field is missing or unknown, or the dictionary is of another model.
         """
-        every = dataclasses.fields(cls)  # type: ignore[arg-type]
-        needed = [field.name for field in every if _is_needed(field)]
-        optional = ["model", *(field.name for field in every if not _is_needed(field))]
-        values = dict(fields(cls.__name__, data, needed, optional))
+        needed, optional = _field_kinds(cls)
+        values = dict(fields(cls.__name__, data, needed, ["model", *optional]))
         if (name := values.pop("model", cls.__name__)) != cls.__name__:
             raise ValueError(f"data is of a {name}, not of a {cls.__name__}")
         return cls(**cls._read(values))

@@ -44,8 +44,7 @@ class ColemanHodgdon(FreeRunning):
     gamma : float
         alpha times the slope of the asymptote [µm/V²].
     offset : float
-        Displacement at zero voltage and w_h = 0 [µm]: a sensor bias, or the
-        centre of a unipolar loop.
+        Displacement at zero voltage and w_h = 0 [µm]: a sensor bias, or the centre of a unipolar loop.
 
     Raises
     ------
@@ -194,8 +193,8 @@ class ColemanHodgdon(FreeRunning):
     def coordinates(cls, held: Collection[str], within_reach: bool) -> tuple[str, ...]:
         """Put gamma/(alpha beta) in place of the last of alpha, beta, gamma that is not held.
 
-        Admissible is then a box: a > 0, b > 0 and c >= 2b are bounds. Within reach are start states of
-        at most b/a: ``place``, the part of it, is then varied.
+        Admissible is then a box: a > 0, b > 0 and c >= 2b are bounds. Within reach are start states of at
+        most b/a: ``place``, the part of it, is then varied.
         """
         names = super(ColemanHodgdon, cls).coordinates(held, within_reach)
         replaced = [name for name in cls.parameter_names if name in names][-1:]
@@ -299,8 +298,7 @@ class ColemanHodgdon(FreeRunning):
         Raises
         ------
         ValueError
-            If u is not a finite 1-D array, or jumps: the model is defined for connected
-            inputs only.
+            If u is not a finite 1-D array, or jumps: the model is defined for connected inputs only.
         """
         u = array_1d("u", u)
         if not allow_jumps:
@@ -316,10 +314,8 @@ class ColemanHodgdon(FreeRunning):
         ----------
         r : array_like, shape (N,)
             Reference displacement [µm].
-        initial_state : float
-            w_h [µm] at the first sample.
-        allow_jumps : bool
-            Take jumps between samples as fast monotone changes instead of refusing them.
+        initial_state, allow_jumps
+            As in `simulate`.
 
         Returns
         -------

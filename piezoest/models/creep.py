@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, fields, finite, integer, positive
+from piezoest._checks import FloatArray, array_1d, finite, integer, positive
 from piezoest.compile import Vector, compiled
 from piezoest.equations.creep import creep_step
-from piezoest.models._base import EqualByContent
+from piezoest.models._base import AsFields, EqualByContent
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
-class Creep(EqualByContent):
+class Creep(AsFields, EqualByContent):
     """Logarithmic creep as first-order terms: x_creep = sum_i z_i, tau_i z_i' = gains[i] w - z_i.
 
     Parameters
@@ -43,6 +43,8 @@ class Creep(EqualByContent):
     >>> creep.simulate(np.ones(4), sample_rate=10.0).round(4)
     array([0.0073, 0.0105, 0.0121, 0.0131])
     """
+
+    called = "creep"
 
     gains: FloatArray
     time_constants: FloatArray
@@ -87,26 +89,6 @@ class Creep(EqualByContent):
         count = max(2, round(decades * per_decade) + 1)
         gain = finite("gain_per_decade", gain_per_decade) * decades / (count - 1)
         return cls(np.full(count, gain), np.geomspace(shortest, longest, count))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary of the two fields."""
-        return {"gains": self.gains.tolist(), "time_constants": self.time_constants.tolist()}
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Make the creep from what `to_dict` gave.
-
-        Parameters
-        ----------
-        data : dict
-            Fields ``gains`` and ``time_constants``.
-
-        Raises
-        ------
-        ValueError
-            If a field is missing or unknown.
-        """
-        return cls(**fields("creep", data, ("gains", "time_constants")))
 
     def decays(self, sample_rate: float) -> FloatArray:
         """Factors exp(-dt/tau_i) of one sample, shape (n,).

@@ -7,7 +7,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, fields, finite, non_negative, positive
+from piezoest._checks import FloatArray, array_1d, finite, non_negative, positive
+from piezoest.models._base import AsFields
 from piezoest.signals.turns import TURN, turns
 
 Range = tuple[float, float]
@@ -25,7 +26,7 @@ WILD = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class LearntOn:
+class LearntOn(AsFields):
     """Ranges of the log that a model was learnt on.
 
     Parameters
@@ -58,6 +59,8 @@ class LearntOn:
     >>> learnt_on.voltage, learnt_on.frequency
     ((-40.0, 40.0), (5.0, 5.0))
     """
+
+    called = "learnt_on"
 
     voltage: Range
     displacement: Range
@@ -158,31 +161,6 @@ class LearntOn:
                     f"{ends(self.frequency, 'Hz')}"
                 )
         return tuple(said)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary."""
-        return {
-            "voltage": list(self.voltage),
-            "displacement": list(self.displacement),
-            "rate": self.rate,
-            "frequency": None if self.frequency is None else list(self.frequency),
-        }
-
-    @classmethod
-    def from_dict(cls, data: Any) -> Self:
-        """Make the ranges from what `to_dict` gave.
-
-        Parameters
-        ----------
-        data : dict
-            The dictionary.
-
-        Raises
-        ------
-        ValueError
-            If a field is missing, unknown or refused.
-        """
-        return cls(**fields("learnt_on", data, ("voltage", "displacement", "rate"), ("frequency",)))
 
 
 def allowed(known: Range) -> Range:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, Self
+from dataclasses import dataclass
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, fields, non_negative, positive
+from piezoest._checks import FloatArray, array_1d, non_negative, positive
 from piezoest.compile import Vector, compiled
 from piezoest.equations.mechanics import mechanics_coefficients, mechanics_step
+from piezoest.models._base import AsFields
 
 
 @dataclass(frozen=True, slots=True)
-class MassSpringDamper:
+class MassSpringDamper(AsFields):
     """Second-order mechanics of unit static gain: x'' + 2 zeta omega x' + omega² x = omega² f (5).
 
     Parameters
@@ -37,32 +37,14 @@ class MassSpringDamper:
     array([0.117, 0.437, 0.883])
     """
 
+    called = "mechanics"
+
     natural_frequency: float
     damping_ratio: float
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "natural_frequency", positive("natural_frequency", self.natural_frequency))
         object.__setattr__(self, "damping_ratio", non_negative("damping_ratio", self.damping_ratio))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary of the two fields."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Make the mechanics from what `to_dict` gave.
-
-        Parameters
-        ----------
-        data : dict
-            Fields ``natural_frequency`` and ``damping_ratio``.
-
-        Raises
-        ------
-        ValueError
-            If a field is missing or unknown.
-        """
-        return cls(**fields("mechanics", data, ("natural_frequency", "damping_ratio")))
 
     def coefficients(self, sample_rate: float) -> FloatArray:
         """Exact step of one sample with the input held, shape (6,): see `mechanics_coefficients`.

@@ -155,17 +155,8 @@ class PrandtlIshlinskii(Model, EqualByContent):
     def from_theta(cls, theta: Any, offset: float = 0.0) -> Self:
         """Make the model without creep and bends from its parameter vector.
 
-        Parameters
-        ----------
-        theta : array_like, shape (1 + 2n,)
-            Gain, n thresholds, n weights.
-        offset : float
-            Displacement at zero voltage and plays at zero [µm].
-
-        Raises
-        ------
-        ValueError
-            If the length is even, or a parameter is refused.
+        `theta` (1 + 2n,): gain, n thresholds, n weights. `offset`: displacement at zero voltage and plays at
+        zero [µm].
         """
         values = array_1d("theta", theta, minimum_length=1)
         n, odd = divmod(values.size - 1, 2)
@@ -213,11 +204,7 @@ class PrandtlIshlinskii(Model, EqualByContent):
         return {"gain": self.gain, "thresholds": self.thresholds, "weights": self.weights}
 
     def simulate(
-        self,
-        u: FloatArray,
-        *,
-        initial_state: FloatArray | None = None,
-        sample_rate: float | None = None,
+        self, u: FloatArray, *, initial_state: FloatArray | None = None, sample_rate: float | None = None
     ) -> FloatArray:
         """Displacement for a voltage record; exact for a voltage held over each sample.
 
@@ -247,11 +234,7 @@ class PrandtlIshlinskii(Model, EqualByContent):
         return x
 
     def invert(
-        self,
-        r: FloatArray,
-        *,
-        initial_state: FloatArray | None = None,
-        sample_rate: float | None = None,
+        self, r: FloatArray, *, initial_state: FloatArray | None = None, sample_rate: float | None = None
     ) -> FloatArray:
         """Voltage under which the model follows a reference exactly.
 

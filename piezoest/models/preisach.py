@@ -18,10 +18,9 @@ from piezoest.models._base import EqualByContent, Model, rising_pair
 class Preisach(Model, EqualByContent):
     """Preisach hysteresis: x = gain u + sum_i weights[i] relays(play_i[u]) + offset.
 
-    The relays of half-width thresholds[i] are spread over the voltage with the density
-    sech²((s - centre)/width): their share of the slope is weights[i] at the centre and falls
-    off on both sides of it, which makes the loop asymmetric, and minor loops differ with
-    their place.
+    The relays of half-width thresholds[i] are spread over the voltage with the density sech²((s -
+    centre)/width): their share of the slope is weights[i] at the centre and falls off on both sides of it,
+    which makes the loop asymmetric, and minor loops differ with their place.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest._checks import FloatArray, fraction, integer, moderate, positive
+from piezoest._checks import FloatArray, fraction, instance, integer, moderate, positive
 from piezoest.compile import inlined
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, Field, Length, Named, Record, numbers, record
 from piezoest.models import AmplitudeProfile
@@ -214,8 +214,7 @@ def profile_of(own: Any, scale: FloatArray) -> AmplitudeProfile:
 def store_profile(own: Any, scale: FloatArray, profile: AmplitudeProfile) -> None:
     """Remember a profile, and nothing else."""
     _check_is_on(own)
-    if not isinstance(profile, AmplitudeProfile):
-        raise ValueError(f"profile must be an AmplitudeProfile, got {profile!r}")
+    instance("profile", profile, AmplitudeProfile, "an AmplitudeProfile")
     count, places = profile.swings.size, own["sizes"].size
     if count > places:
         raise ValueError(f"profile holds {count} swings, AmplitudeMemory has {places} places")

@@ -55,30 +55,14 @@ _chained: dict[str, dict[str, Any]] = {}
 
 @dataclass(frozen=True)
 class Conditions:
-    """What the numbers of a policy may depend on.
+    """What the numbers of a policy may depend on."""
 
-    Parameters
-    ----------
-    step : float
-        Time between samples [s], or in the unit of a memory.
-    P_0 : ndarray, shape (n, n)
-        Initial covariance.
-    discrete : bool
-        Whether the law is the discrete one.
-    by_period : bool
-        Whether memory is counted in periods of the reference.
-    has_swings : bool
-        Whether the estimator follows a voltage.
-    has_loop : bool
-        Whether its model has hysteresis.
-    """
-
-    step: float
-    P_0: FloatArray
-    discrete: bool = True
-    by_period: bool = False
-    has_swings: bool = False
-    has_loop: bool = False
+    step: float  # time between samples [s], or in the unit of a memory
+    P_0: FloatArray  # (n, n): initial covariance
+    discrete: bool = True  # whether the law is the discrete one
+    by_period: bool = False  # whether memory is counted in periods of the reference
+    has_swings: bool = False  # whether the estimator follows a voltage
+    has_loop: bool = False  # whether its model has hysteresis
 
 
 class Policy:
@@ -181,14 +165,7 @@ def _arguments_of(function: Any) -> list[str]:
 
 
 def hooks_of(policy: type[Policy]) -> dict[str, Any]:
-    """Functions that a policy's file has for compiled code, by their hooks.
-
-    Raises
-    ------
-    ValueError
-        If a function has the arguments of a hook and another name, or the name and other arguments, or what
-        has the name of a hook is no function that Numba can put into its caller.
-    """
+    """Functions that a policy's file has for compiled code, by their hooks."""
     here = vars(sys.modules[policy.__module__])
     if odd := sorted(name for name in HOOKS if name in here and not inspect.isfunction(here[name])):
         raise ValueError(f"{policy.__name__}: {', '.join(odd)} must be a plain function, marked @inlined")

@@ -47,8 +47,7 @@ class DirectionalForgetting(InUnits, Policy):
     memory : float
         Time constant along the regressor, in units of `unit`.
     unit : {"period", "second"}
-        Of memory: the reference's own period, or seconds (the unit of `step` in
-        `RecursiveLeastSquares`).
+        Of memory: the reference's own period, or seconds (the unit of `step` in `RecursiveLeastSquares`).
 
     Raises
     ------

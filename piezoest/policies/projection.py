@@ -22,9 +22,8 @@ class Projection(Policy):
 
     Without it theta is not restricted, and only `model` is projected.
 
-    P. Ioannou, J. Sun, Robust Adaptive Control (1996), sec. 4.4; G. Goodwin, K. Sin, Adaptive
-    Filtering, Prediction and Control (1984), sec. 3.7; D. Simon, IET Control Theory Appl. 4 (2010)
-    1303-1318.
+    P. Ioannou, J. Sun, Robust Adaptive Control (1996), sec. 4.4; G. Goodwin, K. Sin, Adaptive Filtering,
+    Prediction and Control (1984), sec. 3.7; D. Simon, IET Control Theory Appl. 4 (2010) 1303-1318.
 
     Parameters
     ----------

@@ -26,11 +26,10 @@ OFF_CENTRE, LEAST_STEP, CEILING = 0.3, 1e-6, 1e4
 class RandomWalk(Policy):
     """Forgetting by a random walk of the parameters: P grows by a constant and not by a factor.
 
-    A direction without excitation is forgotten linearly and not exponentially, and each
-    direction is forgotten as fast as new data arrive for it. Everything depends on the travel of
-    the voltage and not on time, as hysteresis does. So nothing is forgotten at rest, and one setting
-    works for every amplitude, frequency and unit. A swing, from one turning point of the voltage
-    to the next, is half a period.
+    A direction without excitation is forgotten linearly and not exponentially, and each direction is
+    forgotten as fast as new data arrive for it. Everything depends on the travel of the voltage and not on
+    time, as hysteresis does. So nothing is forgotten at rest, and one setting works for every amplitude,
+    frequency and unit. A swing, from one turning point of the voltage to the next, is half a period.
 
     L. Ljung, System Identification, 2nd ed. (1999), sec. 11.2; L. Guo, L. Ljung, IEEE Trans.
     Autom. Control 40 (1995) 1353-1385.
@@ -93,9 +92,9 @@ def _square_step(state: Any, settings: Any, walk: Any, i: int) -> Any:
 def prepare(own: Any, fixed: Any, state: Any, settings: Any) -> None:
     """Let P grow, and set the noise variance of a sample that gives the memory wanted.
 
-    Everything is counted in swings of the voltage. With P growing by q a swing, the best
-    excited direction forgets within sqrt(rho/(q phi²)) swings, where phi is the regressor and rho
-    the noise variance of a whole swing: rho follows from the memory wanted and the mean of phi².
+    Everything is counted in swings of the voltage. With P growing by q a swing, the best excited direction
+    forgets within sqrt(rho/(q phi²)) swings, where phi is the regressor and rho the noise variance of a whole
+    swing: rho follows from the memory wanted and the mean of phi².
     """
     if fixed is None:
         return

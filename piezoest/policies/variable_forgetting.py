@@ -31,8 +31,7 @@ class VariableForgetting(InUnits, Policy):
     shortest : float
         Shortest time constant, relative to memory.
     unit : {"period", "second"}
-        Of memory: the reference's own period, or seconds (the unit of `step` in
-        `RecursiveLeastSquares`).
+        Of memory: the reference's own period, or seconds (the unit of `step` in `RecursiveLeastSquares`).
 
     Raises
     ------

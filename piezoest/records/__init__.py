@@ -7,14 +7,6 @@ from piezoest.records.stream import Block, RecordStream, stream_record
 from piezoest.records.writing import write_columns, writer_for
 
 __all__ = [
-    "Block",
-    "Record",
-    "RecordStream",
-    "as_record",
-    "example_log",
-    "read_record",
-    "read_reference",
-    "stream_record",
-    "write_columns",
-    "writer_for",
-]
+    "Block", "Record", "RecordStream", "as_record", "example_log", "read_record", "read_reference",
+    "stream_record", "write_columns", "writer_for",
+]  # fmt: skip

@@ -25,27 +25,16 @@ STAMP = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(:\d{2})?([.,]\d+)?\s
 
 
 class Style(NamedTuple):
-    """How a file writes numbers.
+    """How a file writes numbers."""
 
-    Parameters
-    ----------
-    decimal : str
-        ``"."``, ``","``, or ``".,"`` where both stand for decimals.
-    thousands : str
-        ``","``, ``"."``, or empty if neither separates thousands.
-    """
-
-    decimal: str = "."
-    thousands: str = ""
+    decimal: str = "."  # ``"."``, ``","``, or ``".,"`` where both stand for decimals
+    thousands: str = ""  # ``","``, ``"."``, or empty if neither separates thousands
 
 
 def style_of(cells: Iterable[str]) -> Style:
     """How numbers are written, by what cannot be read in another way.
 
-    Raises
-    ------
-    ValueError
-        If the cells contradict each other; the message begins with one of them.
+    ValueError if the cells contradict each other; the message begins with one of them.
     """
     seen: dict[tuple[str, str], str] = {}  # what a mark is for, and a cell that shows it
     for cell in cells:

@@ -42,13 +42,7 @@ class Column(NamedTuple):
 def choose(
     source: Source, wanted: tuple[str, ...], named: Mapping[str, str], units: Mapping[str, str]
 ) -> dict[str, Column]:
-    """Columns of the wanted quantities, as given, else by name, else by unit.
-
-    Raises
-    ------
-    ValueError
-        If that cannot be decided; the message lists the columns that there are.
-    """
+    """Columns of the wanted quantities, as given, else by name, else by unit."""
     for argument, given in (("columns", named), ("units", units)):
         if unknown := sorted(set(given) - set(NAMES)):
             raise LogError(f"{argument} has {unknown}: known are time, voltage and displacement")

@@ -23,18 +23,8 @@ TIMES = datetime.date | datetime.time | datetime.timedelta
 class Frame(Source):
     """A DataFrame of pandas, whose columns may have any names.
 
-    Parameters
-    ----------
-    path : Path
-        What to call it.
-    series : list of Series
-        The columns.
-    names, titles : list of str
-        As for `Source`; of columns with times the title need not say the unit.
-    first : int
-        Number of the first row.
-    whole : str
-        As for `Source`.
+    `names`, `titles`: as for `Source`; of columns with times the title need not say the unit. `whole`: as for
+    `Source`.
     """
 
     def __init__(

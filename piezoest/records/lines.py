@@ -31,21 +31,11 @@ SPECIAL = re.compile(r"\n[^\S\n]*(?:#|\n|\Z)")
 
 
 class Lines(NamedTuple):
-    """Consecutive lines with samples.
+    """Consecutive lines with samples."""
 
-    Parameters
-    ----------
-    numbers : ndarray of int64, shape (n,)
-        Of the lines, from 1.
-    text : str
-        The n lines; a blank one is a sample that was lost.
-    done : int
-        Bytes of the file that are read by then.
-    """
-
-    numbers: np.ndarray[Any, np.dtype[np.int64]]
-    text: str
-    done: int
+    numbers: np.ndarray[Any, np.dtype[np.int64]]  # (n,): of the lines, from 1
+    text: str  # the n lines; a blank one is a sample that was lost
+    done: int  # bytes of the file that are read by then
 
     @classmethod
     def of(cls, kept: list[tuple[int, str]], done: int) -> Lines:

@@ -31,14 +31,7 @@ OF_SPREADSHEETS = {"xl/workbook.xml", "xl/workbook.bin", "content.xml"}
 def open_source(path: Path) -> Source:
     """Open a log by what it begins with, or else by the ending of its name.
 
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    ValueError
-        If it is empty, or not of the format that its name promises.
-    MissingExtraError
-        If its format needs a package that is not installed.
+    OSError if it cannot be read. MissingExtraError if its format needs a package that is not installed.
     """
     start, ending = beginning(path, 128), path.suffix.lower()
     if not start.strip():

@@ -28,54 +28,26 @@ class LogError(ValueError):
 
 
 class Rows(NamedTuple):
-    """Some rows of the columns that were asked for.
+    """Some rows of the columns that were asked for."""
 
-    Parameters
-    ----------
-    numbers : ndarray of int64, shape (n,)
-        Number of each row in its file, the first being 1.
-    values : list of ndarray, shape (n,)
-        The columns, NaN where there is no number.
-    done : int
-        Bytes or rows of the file that are read by then, see `Source`.
-    """
-
-    numbers: np.ndarray[Any, np.dtype[np.int64]]
-    values: list[FloatArray]
-    done: int
+    numbers: np.ndarray[Any, np.dtype[np.int64]]  # (n,): number of each row in its file, the first being 1
+    values: list[FloatArray]  # (n,): the columns, NaN where there is no number
+    done: int  # bytes or rows of the file that are read by then, see `Source`
 
 
 class Source(abc.ABC):
     """A file with columns.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    names : list of str
-        What to list in messages and to choose by: full paths in files that have folders.
-    titles : list of str
-        The same for guessing: the last part of the name, with the unit that the file states. Empty where
-        columns have no names.
-    width : int
-        Number of columns.
-
-    Attributes
-    ----------
-    place : str
-        What the file calls a row: ``"line"`` or ``"row"``.
-    size : int
-        Bytes of a file whose `Rows.done` counts bytes; 0 where it counts rows.
-    whole : str
-        Why the file cannot be read in parts; empty if it can.
-    sample_rate : float or None
-        [Hz], if the file states it beside the columns.
+    `names`: what to list in messages and to choose by: full paths in files that have folders. `titles`: the
+    same for guessing: the last part of the name, with the unit that the file states. Empty where columns have
+    no names. `size`: bytes of a file whose `Rows.done` counts bytes; 0 where it counts rows. `whole`: why the
+    file cannot be read in parts; empty if it can.
     """
 
-    place: ClassVar[str] = "row"
+    place: ClassVar[str] = "row"  # what the file calls a row: ``"line"`` or ``"row"``
     size = 0
     whole = ""
-    sample_rate: float | None = None
+    sample_rate: float | None = None  # [Hz], if the file states it beside the columns
 
     def __init__(self, path: Path, names: list[str], titles: list[str], width: int) -> None:
         self.path, self.names, self.titles, self.width = path, names, titles, width

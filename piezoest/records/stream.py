@@ -176,7 +176,8 @@ class RecordStream:
         total = self._source.size or self._source.count(positions)
         for block in self._source.read(positions, rows) if self._held is None else self._held:
             kept = block.values if self._held is None else [block.values[k] for k in places]
-            yield block._replace(values=[c.factor * each for c, each in zip(columns, kept, strict=True)])
+            values = [c.factor * each for c, each in zip(columns, kept, strict=True)]
+            yield Rows(block.numbers, values, block.done)
             if progress is not None and block.done < total:
                 progress(block.done, total)
         if progress is not None:

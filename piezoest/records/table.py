@@ -29,21 +29,10 @@ Named = tuple[str, Any, str]
 class Table(Source):
     """Columns of a file that is opened once for their names, and again for their numbers.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    format_ : str
-        What to call it.
-    opened : callable
-        Returns a context manager of what `arrays` takes.
-    arrays : callable
-        Yields name, array and unit: a vector is one column, a matrix several, a number called fs the
-        sample rate.
-    separator : str
-        What stands between a name and the folder or structure that it is in; empty if there are none.
-    whole : str
-        As for `Source`.
+    `opened`: returns a context manager of what `arrays` takes. `arrays`: yields name, array and unit: a
+    vector is one column, a matrix several, a number called fs the sample rate. `separator`: what stands
+    between a name and the folder or structure that it is in; empty if there are none. `whole`: as for
+    `Source`.
     """
 
     def __init__(

@@ -25,37 +25,17 @@ HEAD_LINES, STAMP_ROWS = 10_000, 100
 
 
 class Layout(NamedTuple):
-    """How a text file is written.
+    """How a text file is written."""
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    encoding, delimiter : str
-        A blank stands for any number of them.
-    header : list of str
-        Names of columns; empty if there are none.
-    width : int
-        Number of columns.
-    begins : int
-        Number of the first line with a sample.
-    skip_blank : bool
-        Whether blank lines are the way it is written, and not samples that were lost.
-    style : Style
-        How numbers are written.
-    stamps : dict of int to Timestamp
-        The first time stamp of the columns that hold such.
-    """
-
-    path: Path
+    path: Path  # the file
     encoding: str
-    delimiter: str
-    header: list[str]
-    width: int
-    begins: int
-    skip_blank: bool
-    style: Style
-    stamps: dict[int, Any]
+    delimiter: str  # a blank stands for any number of them
+    header: list[str]  # names of columns; empty if there are none
+    width: int  # number of columns
+    begins: int  # number of the first line with a sample
+    skip_blank: bool  # whether blank lines are the way it is written, and not samples that were lost
+    style: Style  # how numbers are written
+    stamps: dict[int, Any]  # the first time stamp of the columns that hold such
 
 
 def layout_of(path: Path) -> Layout:
@@ -120,15 +100,7 @@ def split(path: Path, lines: list[str], delimiter: str) -> list[list[str]]:
 
 
 class Text(Source):
-    """A text file with one row per sample.
-
-    Parameters
-    ----------
-    layout : Layout
-        How it is written.
-    names, titles : list of str
-        As for `Source`.
-    """
+    """A text file with one row per sample. `names`, `titles`: as for `Source`."""
 
     place = "line"
 

@@ -21,28 +21,14 @@ Blocks = Callable[[], Iterable[tuple[Any, FloatArray]]]  # numbers of rows in th
 
 
 class Timing(NamedTuple):
-    """Where the samples of a log lie in time.
+    """Where the samples of a log lie in time."""
 
-    Parameters
-    ----------
-    samples : int
-        Samples of the record, more than rows of the file where some are missing.
-    start, period : float
-        Time of the first sample and from one to the next [s].
-    usual : float or None
-        Step by which rows are placed on samples [s]; None if each row is the next sample.
-    jump : int
-        Number of the row before which most samples are missing.
-    notes : tuple of str
-        What had to be assumed.
-    """
-
-    samples: int
-    start: float
-    period: float
-    usual: float | None
-    jump: int
-    notes: tuple[str, ...] = ()
+    samples: int  # samples of the record, more than rows of the file where some are missing
+    start: float  # time of the first sample [s]
+    period: float  # from one to the next [s]
+    usual: float | None  # step by which rows are placed on samples [s]; None if each row is the next sample
+    jump: int  # number of the row before which most samples are missing
+    notes: tuple[str, ...] = ()  # what had to be assumed
 
     def times(self, first: int, count: int) -> FloatArray:
         """Times of samples [s]."""
@@ -81,12 +67,8 @@ def _known(blocks: Iterable[tuple[Any, FloatArray]]) -> Iterator[tuple[int, _Kno
 def scan(where: str, place: str, blocks: Blocks) -> Timing:
     """Find the timing; ValueError, with the place in the file, if time is not even enough.
 
-    Parameters
-    ----------
-    where, place : str
-        File and what it calls a row, for messages.
-    blocks : callable
-        Returns an iterable of numbers of rows and their times; is called again where steps are uneven.
+    `where`, `place`: file and what it calls a row, for messages. `blocks`: returns an iterable of numbers of
+    rows and their times; is called again where steps are uneven.
     """
     rows, count, usual, jitter, absent = 0, 0, 0.0, 0.0, 0
     largest, jump, moved, words, uneven = 0, 0, False, "", ""
@@ -164,12 +146,7 @@ def _deviation(
 def placed(timing: Timing, blocks: Iterable[list[FloatArray]]) -> Iterator[list[FloatArray]]:
     """Columns on their samples, NaN where no row falls, by the first one, which is time.
 
-    Parameters
-    ----------
-    timing : Timing
-        From `scan`.
-    blocks : iterable
-        Times of rows, and values of any number of columns.
+    `timing`: from `scan`. `blocks`: times of rows, and values of any number of columns.
     """
     if timing.usual is None:
         yield from (values for _, *values in blocks)

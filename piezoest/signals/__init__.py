@@ -17,18 +17,6 @@ from piezoest.signals.signal import Signal, check_continuity
 from piezoest.signals.waves import amplitude_modulated, chirp, multi_amplitude, sine, triangle, two_tone
 
 __all__ = [
-    "Signal",
-    "amplitude_modulated",
-    "check_continuity",
-    "chirp",
-    "dwell",
-    "filtered_steps",
-    "from_array",
-    "maximal_length_sequence",
-    "multi_amplitude",
-    "prbs",
-    "random_walk",
-    "sine",
-    "triangle",
-    "two_tone",
-]
+    "Signal", "amplitude_modulated", "check_continuity", "chirp", "dwell", "filtered_steps", "from_array",
+    "maximal_length_sequence", "multi_amplitude", "prbs", "random_walk", "sine", "triangle", "two_tone",
+]  # fmt: skip

@@ -190,9 +190,8 @@ def prbs(
 
     Notes
     -----
-    Eielsen, Gravdahl and Pettersen (2012), Sec. IV: "a length of 38 750 samples, a bandwidth of 40 Hz, a
-    ±5 µm range, and was filtered by a second-order low-pass Butterworth filter with a 10 Hz cut-off
-    frequency".
+    Eielsen, Gravdahl and Pettersen (2012), Sec. IV: "a length of 38 750 samples, a bandwidth of 40 Hz, a ±5
+    µm range, and was filtered by a second-order low-pass Butterworth filter with a 10 Hz cut-off frequency".
     """
     amplitude = non_negative("amplitude", amplitude)
     periods = integer("periods", periods, 1)

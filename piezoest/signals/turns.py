@@ -17,22 +17,9 @@ TURN = 0.05
 def turns(values: Any, threshold: float) -> NDArray[np.intp]:
     """Places at which a signal turns and then runs back by more than a threshold.
 
-    Parameters
-    ----------
-    values : array_like, shape (N,)
-        Without gaps.
-    threshold : float
-        Ways back of this size or less are noise, in the unit of the values.
-
-    Returns
-    -------
-    ndarray of int, shape (n,)
-        Rising indices of the first sample of each extreme. The first and the last sample are no turns.
-
-    Raises
-    ------
-    ValueError
-        If the values are not 1-D and finite, or the threshold is below zero.
+    `values` (N,): without gaps. `threshold`: ways back of this size or less are noise, in the unit of the
+    values. Returns (n,): rising indices of the first sample of each extreme. The first and the last sample
+    are no turns. ValueError if the values are not 1-D and finite, or the threshold is below zero.
 
     Notes
     -----

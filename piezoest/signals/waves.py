@@ -36,10 +36,9 @@ def triangle(
 
     The ideal triangle of the nominal amplitude keeps its slopes, ±4·amplitude·frequency, and its straight
     lines up to (1 − smoothing)·amplitude. Around each of the two extrema of a period, `smoothing`/2 of the
-    period is replaced by the even polynomial of lowest degree that joins the straight lines with
-    `continuity` continuous derivatives. For order k it has degree 2k. With s = −1…1 across the corner its
-    curvature is proportional to (1 − s²)^(k−1), and the wave at a maximum is
-    amplitude·(1 − smoothing·φ(s)):
+    period is replaced by the even polynomial of lowest degree that joins the straight lines with `continuity`
+    continuous derivatives. For order k it has degree 2k. With s = −1…1 across the corner its curvature is
+    proportional to (1 − s²)^(k−1), and the wave at a maximum is amplitude·(1 − smoothing·φ(s)):
 
     - k = 1: φ = (1 + s²)/2, a parabola;
     - k = 2: φ = (3 + 6s² − s⁴)/8;
@@ -109,16 +108,8 @@ def sine(
 
     Parameters
     ----------
-    amplitude : float
-        µm.
-    frequency : float
-        Hz, below half the sample rate.
-    periods : float
-        Number of periods; the number of samples is rounded.
-    sample_rate : float
-        Hz.
-    phase : float
-        Start, in periods. 0: at zero, rising.
+    amplitude, frequency, periods, sample_rate, phase
+        As in `triangle`.
 
     Returns
     -------

@@ -63,8 +63,8 @@ def next_place(place: Any, length: Any) -> Any:
 def amplifier_step(state: Any, settings: Any, u: Any) -> Any:
     """Voltage at the stage for the commanded `u`.
 
-    The order is that of the hardware: converter (range, steps), reconstruction filter,
-    amplifier (range, slew rate).
+    The order is that of the hardware: converter (range, steps), reconstruction filter, amplifier (range, slew
+    rate).
     """
     low, high = settings.minimum, settings.maximum
     u = finite_or_held(u, state.command)

@@ -34,19 +34,16 @@ class PaperStage(SimulatedStage):
     Parameters
     ----------
     sample_rate : float
-        [Hz]; 50 kHz as in the paper. The filters are left out if it is at most twice their
-        cut-off.
+        [Hz]; 50 kHz as in the paper. The filters are left out if it is at most twice their cut-off.
     seed : int
         Start of the random numbers of the gauge's noise.
     gain_schedule : callable or array_like, shape (M, 2), optional
         Factor of the hysteresis over time, for ageing: see `SimulatedStage`.
     temperature : float, callable or array_like, shape (M, 2), optional
-        Temperature [°C] over time: see `SimulatedStage`. Gain and shape change by
-        `TemperatureLaw`, an assumption; at 20 °C, and without it, the stage is that of the
-        tables.
+        Temperature [°C] over time: see `SimulatedStage`. Gain and shape change by `TemperatureLaw`, an
+        assumption; at 20 °C, and without it, the stage is that of the tables.
     noise : float, optional
-        Standard deviation of the gauge's white noise [µm]; the data file's if not given, 0
-        for none.
+        Standard deviation of the gauge's white noise [µm]; the data file's if not given, 0 for none.
     quantisation : bool
         Whether the converters quantise.
     filters : bool
@@ -63,8 +60,7 @@ class PaperStage(SimulatedStage):
 
     Notes
     -----
-    Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), Sec. IV,
-    Tables I and II.
+    Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), Sec. IV, Tables I and II.
 
     Examples
     --------

@@ -51,9 +51,8 @@ class PreisachStage(SimulatedStage):
 
     Notes
     -----
-    An assumption throughout, chosen to be like a soft piezo ceramic and to be no model's own
-    kind. Source of the operator: M. Brokate, J. Sprekels, Hysteresis and Phase Transitions,
-    Springer 1996.
+    An assumption throughout, chosen to be like a soft piezo ceramic and to be no model's own kind. Source of
+    the operator: M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, Springer 1996.
 
     Examples
     --------

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 from collections.abc import Callable
-from typing import Any, Protocol, Self, cast
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from piezoest._checks import FloatArray, array_1d, finite, integer, number_or_nan, positive
-from piezoest.layout import new
+from piezoest._checks import FloatArray, array_1d, finite, instance, integer, number_or_nan, positive
+from piezoest.layout import Copied, new
 from piezoest.models.creep import Creep
 from piezoest.models.mechanics import MassSpringDamper
 from piezoest.stage import kernel
@@ -39,7 +38,7 @@ _ONE = np.ones(1)
 _NO_MECHANICS = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
 
 
-class SimulatedStage:
+class SimulatedStage(Copied):
     """A simulated stage: from a voltage to the measured and the true displacement.
 
     Each sample passes amplifier → hysteresis → creep → mechanics → gauge. The voltage of `step` is
@@ -88,27 +87,10 @@ class SimulatedStage:
     """
 
     __slots__ = (
-        "_amplifier",
-        "_count",
-        "_creep",
-        "_displacement",
-        "_gauge",
-        "_generator",
-        "_hysteresis",
-        "_layouts",
-        "_mechanics",
-        "_noisy",
-        "_rest",
-        "_run_loop",
-        "_sample_rate",
-        "_schedule",
-        "_seed",
-        "_settings",
-        "_state",
-        "_step_loop",
-        "_temperature",
-        "_temperature_law",
-    )
+        "_amplifier", "_count", "_creep", "_displacement", "_gauge", "_generator", "_hysteresis", "_layouts",
+        "_mechanics", "_noisy", "_rest", "_run_loop", "_sample_rate", "_schedule", "_seed", "_settings",
+        "_state", "_step_loop", "_temperature", "_temperature_law",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -130,14 +112,17 @@ class SimulatedStage:
                 f"got {type(hysteresis).__name__}"
             )
         self._hysteresis = hysteresis
-        self._creep: Creep | None = _of_class("creep", creep, Creep)
-        self._mechanics: MassSpringDamper | None = _of_class("mechanics", mechanics, MassSpringDamper)
-        self._amplifier: Amplifier = _of_class("amplifier", amplifier, Amplifier) or Amplifier()
-        self._gauge: Gauge = _of_class("gauge", gauge, Gauge) or Gauge()
+        self._creep: Creep | None = instance("creep", creep, Creep | None, "a Creep")
+        self._mechanics: MassSpringDamper | None = instance(
+            "mechanics", mechanics, MassSpringDamper | None, "a MassSpringDamper"
+        )
+        given = instance("amplifier", amplifier, Amplifier | None, "an Amplifier")
+        self._amplifier: Amplifier = given or Amplifier()
+        self._gauge: Gauge = instance("gauge", gauge, Gauge | None, "a Gauge") or Gauge()
         self._schedule = _schedule("gain_schedule", "factor", gain_schedule)
         self._temperature = _schedule("temperature", "temperature", _for_all_times(temperature))
-        law: TemperatureLaw | None = _of_class("temperature_law", temperature_law, TemperatureLaw)
-        self._temperature_law = law or TemperatureLaw()
+        law = instance("temperature_law", temperature_law, TemperatureLaw | None, "a TemperatureLaw")
+        self._temperature_law: TemperatureLaw = law or TemperatureLaw()
         self._seed = integer("seed", seed)
         self._noisy = self._gauge.noise > 0.0
         self._displacement: float | FloatArray
@@ -279,9 +264,6 @@ class SimulatedStage:
         self._count = 0
         self._displacement = self._hysteresis.offset
 
-    def __copy__(self) -> Self:
-        return copy.deepcopy(self)
-
     def _factors(self, n: int) -> tuple[FloatArray, FloatArray]:
         """Factors of the hysteresis and of its shape for the next n samples: shape (n,), or (1,) for 1."""
         if self._schedule is None and self._temperature is None:
@@ -295,13 +277,6 @@ class SimulatedStage:
             factor = factor * self._temperature_law.gain_factor(temperature)
             shape = self._temperature_law.hysteresis_factor(temperature)
         return factor, shape
-
-
-def _of_class(name: str, value: Any, cls: type) -> Any:
-    """Return a part of the stage, or None, as it came."""
-    if value is not None and not isinstance(value, cls):
-        raise ValueError(f"{name} must be a {cls.__name__}, got {type(value).__name__}")
-    return value
 
 
 def _schedule(name: str, quantity: str, schedule: Any) -> Schedule | None:

@@ -38,12 +38,11 @@ class TemperatureLaw:
 
     Notes
     -----
-    The defaults are assumptions, chosen for their signs and order of magnitude. The stroke of
-    stack actuators rises steadily with temperature (Smart Mater. Struct. 17, 015049 (2008):
-    -30 to 125 °C). The coercive field falls, domain walls move more easily, and less of the
-    response lags. With 0.25 %/K and -0.5 %/K the stage of the paper gains about 0.1 % a
-    kelvin at 5 µm, where plays make a quarter to a third of the displacement, and its loop
-    becomes thinner.
+    The defaults are assumptions, chosen for their signs and order of magnitude. The stroke of stack actuators
+    rises steadily with temperature (Smart Mater. Struct. 17, 015049 (2008): -30 to 125 °C). The coercive
+    field falls, domain walls move more easily, and less of the response lags. With 0.25 %/K and -0.5 %/K the
+    stage of the paper gains about 0.1 % a kelvin at 5 µm, where plays make a quarter to a third of the
+    displacement, and its loop becomes thinner.
     """
 
     reference: float = 20.0

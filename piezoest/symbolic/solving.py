@@ -15,8 +15,8 @@ from piezoest._checks import FloatArray
 class Evaluation(NamedTuple):
     """A nonlinear programme at one point.
 
-    objective; gradient (n,); constraints (m,); constraint_jacobian (m, n); hessian (n, n), of the
-    objective or what stands for it.
+    objective; gradient (n,); constraints (m,); constraint_jacobian (m, n); hessian (n, n), of the objective
+    or what stands for it.
     """
 
     objective: float
@@ -46,18 +46,8 @@ def ipopt(
 ) -> Minimum:
     """Minimise subject to bounds and constraints = 0, by IPOPT.
 
-    Parameters
-    ----------
-    evaluate : callable
-        Gives an `Evaluation` at z (n,); called once a point.
-    start, lower, upper : ndarray, shape (n,)
-        Start and bounds.
-    constraints : int
-        Number of equality constraints.
-    max_iterations : int
-        IPOPT's ``max_iter``.
-    tolerance : float
-        IPOPT's ``tol``.
+    `evaluate`: gives an `Evaluation` at z (n,); called once a point. `start`, `lower`, `upper` (n,): start
+    and bounds. `max_iterations`: IPOPT's ``max_iter``. `tolerance`: IPOPT's ``tol``.
     """
     point = _Point(evaluate)
     n, m = start.size, constraints
@@ -179,12 +169,7 @@ def _conic(size: int) -> Any:
 def quadratic_program(H: FloatArray, g: FloatArray, lower: FloatArray) -> FloatArray:
     """Minimum of w' H w / 2 - g' w over w >= lower.
 
-    Parameters
-    ----------
-    H : ndarray, shape (n, n)
-        Symmetric, positive definite.
-    g, lower : ndarray, shape (n,)
-        `lower` is -inf where there is no bound.
+    `H` (n, n): symmetric, positive definite. `g`, `lower` (n,): `lower` is -inf where there is no bound.
     """
     found = _conic(g.size)(h=casadi.DM(H), g=-g, lbx=lower, ubx=np.inf)
     return np.fmax(found["x"].full()[:, 0], lower)

@@ -23,17 +23,8 @@ UNROLLED, CHAINED = 50, 20
 def trace(function: Callable[..., Any], *sizes: int) -> Any:
     """CasADi Function of an equation.
 
-    Parameters
-    ----------
-    function : callable
-        Of numbers and flat arrays, returning a number or a tuple of numbers.
-    *sizes : int
-        Length of each argument; 0 for a number.
-
-    Returns
-    -------
-    casadi.Function
-        Of the same arguments; one output, the results in one column.
+    `function`: of numbers and flat arrays, returning a number or a tuple of numbers. `*sizes`: length of each
+    argument; 0 for a number. Returns of the same arguments; one output, the results in one column.
     """
     arguments = [casadi.SX.sym(f"v{i}", max(size, 1)) for i, size in enumerate(sizes)]
     # An equation may write into its arrays, and knows their length: they are lists.
@@ -47,15 +38,8 @@ def trace(function: Callable[..., Any], *sizes: int) -> Any:
 def jacobian(function: Callable[..., Any], *sizes: int) -> Callable[..., FloatArray]:
     """Exact derivative of an equation with respect to all of its arguments.
 
-    Parameters
-    ----------
-    function, *sizes
-        As in `trace`.
-
-    Returns
-    -------
-    callable
-        Of the same arguments; gives an ndarray of shape (results, arguments).
+    `function`, `*sizes`: as in `trace`. Returns of the same arguments; gives an ndarray of shape (results,
+    arguments).
     """
     traced = trace(function, *sizes)
     symbols = traced.sx_in()
@@ -67,8 +51,8 @@ def jacobian(function: Callable[..., Any], *sizes: int) -> Callable[..., FloatAr
 class Pass(NamedTuple):
     """One simulation of a record, with its derivatives by (parameters, start state).
 
-    x (N,) [µm]; jacobian (N, n_p + n_s); end (n_s,), the state after the last sample;
-    end_jacobian (n_s, n_p + n_s). Without sensitivities the Jacobians have no columns.
+    x (N,) [µm]; jacobian (N, n_p + n_s); end (n_s,), the state after the last sample; end_jacobian (n_s, n_p
+    + n_s). Without sensitivities the Jacobians have no columns.
     """
 
     x: FloatArray
@@ -84,17 +68,9 @@ class Simulation:
     p = (the model's constants..., offset, gains..., delay), state s = (the model's..., z...). The
     forward sensitivities ds/dp and ds/ds(0) are carried along as further states.
 
-    Parameters
-    ----------
-    model : type of FreeRunning
-        Gives the equation.
-    constants : int
-        Number of constants that its equation has.
-    creep_terms : int
-        Number of creep terms.
-    delayed : bool
-        Whether the derivative by a delay of the voltage is wanted too: the last of the parameters then, whose
-        value is 0, for the voltage comes delayed.
+    `constants`: number of constants that its equation has. `delayed`: whether the derivative by a delay of
+    the voltage is wanted too: the last of the parameters then, whose value is 0, for the voltage comes
+    delayed.
     """
 
     __slots__ = ("_carried", "_delayed", "_model", "_plain", "_sensitive", "_sizes", "n_p", "n_s")
@@ -160,22 +136,10 @@ class Simulation:
     ) -> Pass:
         """Simulate a record.
 
-        Parameters
-        ----------
-        u : ndarray, shape (N,)
-            Voltage [V].
-        p : ndarray, shape (n_p,)
-            (constants..., offset, gains..., delay).
-        s : ndarray, shape (n_s,)
-            State before the first sample.
-        decays : ndarray, shape (creep terms,)
-            exp(-dt/tau_i).
-        slope : ndarray, shape (N,), optional
-            Derivative of the voltage by the delay, where that is a parameter [V].
-        before : float, optional
-            Voltage before the first sample [V]; default u[0].
-        sensitive : bool
-            Whether to carry the sensitivities along.
+        `u` (N,): voltage [V]. `p` (n_p,): (constants..., offset, gains..., delay). `s` (n_s,): state before
+        the first sample. `decays` (creep terms,): exp(-dt/tau_i). `slope` (N,): derivative of the voltage by
+        the delay, where that is a parameter [V]. `before`: voltage before the first sample [V]; default u[0].
+        `sensitive`: whether to carry the sensitivities along.
         """
         N, n_p, n_s = u.size, self.n_p, self.n_s
         columns = [np.append(u[:1] if before is None else before, u[:-1]), u]

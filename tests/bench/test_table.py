@@ -132,7 +132,7 @@ def test_all_estimators_are_compared_and_all_are_told_of_the_offset() -> None:
     [
         ("NoSuch", "choose of"),
         ("no_such_module:Class", "No module named"),
-        ("json:NoSuch", "json has no class NoSuch"),
+        ("json:NoSuch", "has no attribute .NoSuch."),
         ("json:JSONDecoder", "has no step"),
         ("HysteresisRLS(0.4)", "every argument needs its name"),
         ("HysteresisRLS(memory=)", "invalid syntax"),

@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 from piezoest.bench.store import Store, carry_out
 from piezoest.bench.tables import table_of, write_table
-from piezoest.bench.zoo import columns, draw, play, settling, summary, tasks
+from piezoest.bench.zoo import columns, draw, play, settling, summary, tasks, traced
 from piezoest.bench.zoo.contenders import CANDIDATES, CHANGED, DEFAULT, contender
 from piezoest.bench.zoo.controllers import Line, Parts
 from piezoest.bench.zoo.families import FAMILIES
@@ -151,7 +151,7 @@ def test_what_is_not_finite_or_outside_the_limits_is_seen() -> None:
 
 def test_a_rest_at_a_limit_is_seen() -> None:
     rig = draw(1, **SHORT)
-    row, traces = play(rig, lambda fs, limits: Line(0.01, 0.0, limits), traces=True)
+    row, traces = traced(rig, lambda fs, limits: Line(0.01, 0.0, limits))
     assert row["rests_at_rail"]
     assert row["rail"] > 2.0
     assert row["ratio"] > 1.0
@@ -163,20 +163,20 @@ def test_a_rest_at_a_limit_is_seen() -> None:
 def test_beyond_the_stroke_a_limit_is_where_to_be() -> None:
     rig = draw(1, **{**{k: v for k, v in SHORT.items() if k != "amplitude"}, "reference": "beyond"})
     assert rig.plain.amplitude > 15.0
-    row, traces = play(rig, best_line(rig), traces=True)
+    row, traces = traced(rig, best_line(rig))
     assert not row["rests_at_rail"]
     assert row["line_worst"] >= np.max(np.abs(traces.lines.fitted.error[rig.judged_from :])) > 1.0
 
 
 def test_after_a_transient_fault_two_swings_pass() -> None:
     rig = draw(1, **{**SHORT, "fault": "gap", "mode": "transient"})
-    row, traces = play(rig, best_line(rig), traces=True)
+    row, traces = traced(rig, best_line(rig))
     assert traces.run is not None
     first = rig.fault.stop + rig.learning
     assert rig.learning == rig.plain.two_swings + rig.block
     assert row["after_worst"] == np.max(np.abs(traces.run.error[first:]))
     rig = draw(1, **{**SHORT, "fault": "gain-step", "mode": "permanent"})
-    row, traces = play(rig, best_line(rig), traces=True)
+    row, traces = traced(rig, best_line(rig))
     assert traces.run is not None
     first = rig.fault.start + rig.learning
     assert row["after_worst"] == np.max(np.abs(traces.run.error[first:]))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from piezoest._checks import FloatArray
-from piezoest.bench.zoo import draw, play
+from piezoest.bench.zoo import draw, play, traced
 from piezoest.bench.zoo.controllers import Line
 from piezoest.bench.zoo.faults import truthful
 from piezoest.bench.zoo.learnt_line import run_learnt_line
@@ -117,7 +117,7 @@ def test_it_never_stays_where_it_does_not_belong() -> None:
 
 def test_the_worse_line_of_both_counts() -> None:
     rig = rig_with("gain-step", "permanent")
-    row, traces = play(rig, lambda fs, limits: Line(0.15, 0.0, limits), traces=True)
+    row, traces = traced(rig, lambda fs, limits: Line(0.15, 0.0, limits))
     for name, part in (("", slice(rig.judged_from, None)), ("last_", slice(-rig.plain.cycle, None))):
         fitted, own = (float(np.abs(each.error[part]).max()) for each in traces.lines[1:3])
         assert row[f"{name}line_worst"] == max(fitted, own)

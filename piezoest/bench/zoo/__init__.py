@@ -1,11 +1,11 @@
 """A zoo of rigs: stages that no estimator of the library was made for, and what goes wrong on somebody's rig.
 
->>> from piezoest.bench.zoo import draw, play
+>>> from piezoest.bench.zoo import draw, traced
 >>> rig = draw(7)
->>> row, traces = play(rig, factory, traces=True)  # doctest: +SKIP
+>>> row, traces = traced(rig, factory)  # doctest: +SKIP
 """
 
 from piezoest.bench.zoo.drawing import draw
-from piezoest.bench.zoo.playing import play
+from piezoest.bench.zoo.playing import play, traced
 
-__all__ = ["draw", "play"]
+__all__ = ["draw", "play", "traced"]

@@ -19,21 +19,11 @@ from piezoest.layout import FIXED, MEASURED, Record, record
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Backlash(Loop):
-    """A play and a dead zone behind it.
+    """A play and a dead zone behind it."""
 
-    Parameters
-    ----------
-    width : float
-        Half of the play [V].
-    dead : float
-        Half of the dead zone [V].
-    place : float
-        Its middle [V].
-    """
-
-    width: float
-    dead: float = 0.0
-    place: float = 0.0
+    width: float  # half of the play [V]
+    dead: float = 0.0  # half of the dead zone [V]
+    place: float = 0.0  # its middle [V]
 
     wipes_out = True
 

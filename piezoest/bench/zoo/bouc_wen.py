@@ -22,21 +22,11 @@ LONGEST = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoucWen(Loop):
-    """Bouc-Wen loop, with beta = (1 + fullness)/2 and gamma = (1 - fullness)/2.
+    """Bouc-Wen loop, with beta = (1 + fullness)/2 and gamma = (1 - fullness)/2."""
 
-    Parameters
-    ----------
-    width : float
-        Where h saturates [V].
-    power : float
-        How sharp the knee is, 1 or more.
-    fullness : float
-        How round the loop is, within [-1, 1].
-    """
-
-    width: float
-    power: float = 1.0
-    fullness: float = 0.5
+    width: float  # where h saturates [V]
+    power: float = 1.0  # how sharp the knee is, 1 or more
+    fullness: float = 0.5  # how round the loop is, within [-1, 1]
 
     def stage_settings(self) -> dict[str, Any]:
         """Numbers by name; a loop that lags is subtracted from the line."""

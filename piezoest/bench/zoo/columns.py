@@ -36,13 +36,7 @@ DWELL_COLUMNS: dict[str, type] = {
 
 
 def tidy_cells(rows: Iterable[Row]) -> Iterator[Row]:
-    """A row for each change of each run of the map.
-
-    Parameters
-    ----------
-    rows : iterable of dict
-        From `piezoest.bench.zoo.settling.settle`.
-    """
+    """A row for each change of each run of the map. `rows`: from `piezoest.bench.zoo.settling.settle`."""
     for row in rows:
         for segment in row["segments"] or [{}]:
             yield {**row, **segment}

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import functools
-import hashlib
-import importlib
 import inspect
-import os
-import sys
-from pathlib import Path
 from typing import Any
 
 import piezoest
-from piezoest.bench.machine import fingerprint
+from piezoest.bench import machine
+from piezoest.bench.machine import imported
 from piezoest.bench.zoo.controllers import Parts
 from piezoest.bench.zoo.running import Factory
 
@@ -28,18 +24,10 @@ DEFAULT = "AdaptiveFeedforward" if hasattr(piezoest, "AdaptiveFeedforward") else
 def contender(name: str) -> Factory:
     """Maker of a controller.
 
-    Parameters
-    ----------
-    name : str
-        "parts", a class of the package, or a class or function of one's own as ``module:name``. It is called
-        as ``name(sample_rate, limits=limits)``. Or the default controller, changed: "line" has no candidate
-        beside the line, "no-corridor" leaves the voltage all its room, and the name of an estimator has that
-        one alone.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or a class has no ``step``, ``run`` and ``learn``.
+    `name`: "parts", a class of the package, or a class or function of one's own as ``module:name``. It is
+    called as ``name(sample_rate, limits=limits)``. Or the default controller, changed: "line" has no
+    candidate beside the line, "no-corridor" leaves the voltage all its room, and the name of an estimator has
+    that one alone.
     """
     found = _found(name)
     if inspect.isclass(found) and (missing := [each for each in NEEDED if not hasattr(found, each)]):
@@ -56,18 +44,12 @@ def _found(name: str) -> Any:
         return Parts
     if name in CHANGED:
         return functools.partial(piezoest.AdaptiveFeedforward, **_change(name))
-    module, separator, attribute = name.partition(":")
-    if not separator:
-        if not hasattr(piezoest, name):
-            known = ", ".join((PARTS, *CHANGED))
-            raise ValueError(f"controller {name}: choose {known}, a class of piezoest, or module:name")
-        return getattr(piezoest, name)
-    if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
-    try:
-        return getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
-        raise ValueError(f"controller {name}: {error}") from None
+    if ":" in name:
+        return imported(name)
+    if not hasattr(piezoest, name):
+        known = ", ".join((PARTS, *CHANGED))
+        raise ValueError(f"controller {name}: choose {known}, a class of piezoest, or module:name")
+    return getattr(piezoest, name)
 
 
 def _change(name: str) -> dict[str, Any]:
@@ -78,14 +60,5 @@ def _change(name: str) -> dict[str, Any]:
 
 
 def code_of(name: str) -> str:
-    """Fingerprint of this package and, for a controller of one's own, of its file.
-
-    Parameters
-    ----------
-    name : str
-        As `contender` reads it.
-    """
-    source = inspect.getsourcefile(_found(name)) if ":" in name else None
-    if source is None:
-        return fingerprint()
-    return f"{fingerprint()}-{hashlib.sha256(Path(source).read_bytes()).hexdigest()[:16]}"
+    """Fingerprint of this package and, for a controller of one's own, of its file."""
+    return machine.code_of(inspect.getsourcefile(_found(name)) if ":" in name else None)

@@ -34,14 +34,8 @@ def contest(
 ) -> list[Task]:
     """All runs of a controller, and of the default one with each estimator alone.
 
-    Parameters
-    ----------
-    controller : str
-        As `piezoest.bench.zoo.contenders.contender` reads it.
-    seeds : range
-        For each family and reference.
-    families, references : sequence of str
-        Names in `FAMILIES` and `SHAPES`.
+    `controller`: as `piezoest.bench.zoo.contenders.contender` reads it. `families`, `references`: names in
+    `FAMILIES` and `SHAPES`.
     """
     return [
         task
@@ -55,18 +49,9 @@ def contest(
 def summarise_contest(rows: Iterable[Row], controller: str) -> dict[str, Any]:
     """Compare settled errors in each cell.
 
-    Parameters
-    ----------
-    rows : iterable of dict
-        Of the runs that `contest` planned.
-    controller : str
-        The one that is compared with the others.
-
-    Returns
-    -------
-    dict
-        ``cells``: for each family and reference the median of the settled errors over the amplitude, that of
-        the best single estimator and its name, and their ratio. ``kept``: in how many cells that is allowed.
+    `rows`: of the runs that `contest` planned. `controller`: the one that is compared with the others.
+    Returns ``cells``: for each family and reference the median of the settled errors over the amplitude, that
+    of the best single estimator and its name, and their ratio. ``kept``: in how many cells that is allowed.
     """
     rows = list(rows)
     errors: dict[tuple[str, str], dict[str, list[float]]] = {}

@@ -12,15 +12,7 @@ from piezoest.estimators.rls import HysteresisRLS
 
 
 class Line:
-    """u = (r - centre)/gain within the limits; learns nothing.
-
-    Parameters
-    ----------
-    gain, centre : float
-        [µm/V] and [µm].
-    limits : VoltageLimits
-        Of the voltage.
-    """
+    """u = (r - centre)/gain within the limits; learns nothing. `gain`, `centre`: [µm/V] and [µm]."""
 
     def __init__(self, gain: float, centre: float, limits: VoltageLimits) -> None:
         self._gain, self._centre, self._limits = gain, centre, limits
@@ -41,17 +33,7 @@ class Line:
 
 
 class Parts:
-    """`InverseCompensator` and `HysteresisRLS` wired by hand, with all their defaults.
-
-    Parameters
-    ----------
-    sample_rate : float
-        [Hz].
-    limits : VoltageLimits
-        Of the voltage.
-    update_interval : int
-        Samples between two models.
-    """
+    """`InverseCompensator` and `HysteresisRLS` wired by hand, with all their defaults."""
 
     def __init__(self, sample_rate: float, limits: VoltageLimits, *, update_interval: int = 50) -> None:
         self._estimator = HysteresisRLS(sample_rate)

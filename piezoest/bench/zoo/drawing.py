@@ -58,24 +58,11 @@ class _Draw:
 def draw(seed: int, **given: Any) -> Rig:
     """Draw a rig and what it is to do.
 
-    Parameters
-    ----------
-    seed : int
-        The rig is a function of it alone, and of what is given.
-    **given
-        In the place of what would be drawn, by its column: family, limits ("±100", "0..150", "0..10",
-        "-20..120"), gain, width, sample_rate, reference, amplitude, frequency, waves, mechanics, delay,
-        noise, resolution, volts, slew, creep, hum, drift, fault, mode, block. `slew` is relative to the
-        fastest change that the reference needs.
-
-    Returns
-    -------
-    Rig
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown, or a value impossible.
+    `seed`: the rig is a function of it alone, and of what is given. `**given`: in the place of what would be
+    drawn, by its column: family, limits ("±100", "0..150", "0..10", "-20..120"), gain, width, sample_rate,
+    reference, amplitude, frequency, waves, mechanics, delay, noise, resolution, volts, slew, creep, hum,
+    drift, fault, mode, block. `slew` is relative to the fastest change that the reference needs. ValueError
+    if a name is unknown, or a value impossible.
     """
     pick = _Draw(integer("seed", seed), given)
     rng = pick.rng

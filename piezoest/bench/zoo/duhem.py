@@ -20,30 +20,16 @@ from piezoest.layout import FIXED, MEASURED, NUMBER, Record, record
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Duhem(Loop):
-    """Duhem loop with slopes of its own up and down.
+    """Duhem loop with slopes of its own up and down."""
 
-    Parameters
-    ----------
-    scale, centre : float
-        Half of the voltage's range, and its middle [V].
-    rate_up, rate_down : float
-        How fast h tends to its branch [1/V].
-    top, bottom : float
-        Size of the two branches [V].
-    tilt : float
-        How much the branches grow over the range.
-    bend : float
-        Change of the line's slope from the middle of the range to its end, relative.
-    """
-
-    scale: float
-    centre: float
-    rate_up: float
-    rate_down: float
-    top: float
+    scale: float  # half of the voltage's range [V]
+    centre: float  # its middle [V]
+    rate_up: float  # how fast h tends to its branch up [1/V]
+    rate_down: float  # and down
+    top: float  # size of the two branches [V]
     bottom: float
-    tilt: float = 0.0
-    bend: float = 0.0
+    tilt: float = 0.0  # how much the branches grow over the range
+    bend: float = 0.0  # change of the line's slope from the middle of the range to its end, relative
 
     def stage_settings(self) -> dict[str, Any]:
         """Numbers by name; a loop that lags is subtracted from the line."""

@@ -37,50 +37,22 @@ WAYS = ("creep", "feedback", "noise")
 
 @dataclass(frozen=True, slots=True)
 class Dwell:
-    """A rest on some rig.
+    """A rest on some rig."""
 
-    Parameters
-    ----------
-    seed : int
-        Of all that is drawn.
-    feedback : bool
-        Whether the controller is given ``feedback=``.
-    duration : float
-        Of the rest [s].
-    """
-
-    seed: int
-    feedback: bool
-    duration: float = DURATION
+    seed: int  # of all that is drawn
+    feedback: bool  # whether the controller is given ``feedback=``
+    duration: float = DURATION  # of the rest [s]
 
 
 def dwells(seeds: Sequence[int], duration: float = DURATION) -> list[Dwell]:
-    """All rests on the rigs of these seeds, without feedback and with it.
-
-    Parameters
-    ----------
-    seeds : sequence of int
-        One for each rig.
-    duration : float
-        [s].
-    """
+    """All rests on the rigs of these seeds, without feedback and with it. `duration`: [s]."""
     return [Dwell(seed, feedback, duration) for seed in seeds for feedback in (False, True)]
 
 
 def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
     """Rig of a dwell, the samples in which its reference rests, and what is drawn beside.
 
-    Parameters
-    ----------
-    dwell : Dwell
-        From `dwells`.
-
-    Returns
-    -------
-    Rig
-    slice
-    dict
-        ``setpoint_noise`` [µm], zero for none, and ``feedback`` [1/s], zero for none.
+    Returns ``setpoint_noise`` [µm], zero for none, and ``feedback`` [1/s], zero for none.
     """
     rng = np.random.default_rng([dwell.seed, 25])
     sample_rate = float(rng.choice(SAMPLE_RATES))
@@ -103,21 +75,11 @@ def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
 def play_dwell(dwell: Dwell, factory: Factory) -> dict[str, Any]:
     """Let a controller rest, and go on.
 
-    Parameters
-    ----------
-    dwell : Dwell
-        From `dwells`.
-    factory : callable
-        ``factory(sample_rate, limits)`` makes a controller, ``factory(sample_rate, limits, feedback=...)``
-        one with feedback.
-
-    Returns
-    -------
-    dict
-        ``settled``: median of the largest errors of the last three periods before; ``allowed``: 1.2 times
-        the largest of it, three times the noise and 0.2 % of the swing; ``first``, ``second``, ``third``:
-        largest errors of the periods after, all [µm]; ``kept``: whether the first is allowed;
-        ``excursion``: how far the voltage went in the rest, as a fraction of its swing before.
+    `factory`: ``factory(sample_rate, limits)`` makes a controller, ``factory(sample_rate, limits,
+    feedback=...)`` one with feedback. Returns ``settled``: median of the largest errors of the last three
+    periods before; ``allowed``: 1.2 times the largest of it, three times the noise and 0.2 % of the swing;
+    ``first``, ``second``, ``third``: largest errors of the periods after, all [µm]; ``kept``: whether the
+    first is allowed; ``excursion``: how far the voltage went in the rest, as a fraction of its swing before.
     """
     rig, rest, drawn = dwell_rig(dwell)
     row: dict[str, Any] = {**rig.to_dict(), **drawn, "duration": dwell.duration, "failure": None}
@@ -146,18 +108,9 @@ def play_dwell(dwell: Dwell, factory: Factory) -> dict[str, Any]:
 def summarise_dwells(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
     """Sum up rests.
 
-    Parameters
-    ----------
-    rows : iterable of dict
-        From `play_dwell`.
-
-    Returns
-    -------
-    dict
-        ``groups``, with and without creep, feedback and noise in the reference, and ``by_family``: runs,
-        how many are ``kept``, medians and the largest of the errors over what is allowed, and of the
-        excursion.
-        ``worst``: the seeds that are not kept, the worst ones first.
+    `rows`: from `play_dwell`. Returns ``groups``, with and without creep, feedback and noise in the
+    reference, and ``by_family``: runs, how many are ``kept``, medians and the largest of the errors over what
+    is allowed, and of the excursion. ``worst``: the seeds that are not kept, the worst ones first.
     """
     rows = list(rows)
     judged = [row for row in rows if row["failure"] is None]
@@ -212,12 +165,6 @@ def _summed(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def died(dwell: Dwell) -> dict[str, Any]:
-    """Row of a run whose process died over it.
-
-    Parameters
-    ----------
-    dwell : Dwell
-        From `dwells`.
-    """
+    """Row of a run whose process died over it."""
     rig, _, drawn = dwell_rig(dwell)
     return {**rig.to_dict(), **drawn, "duration": dwell.duration}

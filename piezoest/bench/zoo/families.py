@@ -29,16 +29,10 @@ PLAYS = 24
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """Limits of the voltage [V].
+    """Limits of the voltage [V]."""
 
-    Parameters
-    ----------
-    low, high : float
-        [V].
-    """
-
-    low: float
-    high: float
+    low: float  # [V]
+    high: float  # [V]
 
     @property
     def middle(self) -> float:
@@ -145,36 +139,16 @@ def _ratio(gain: float, share: float, a: float) -> ColemanHodgdon:
 # `preisach` is a sum of plays under a bell: of the play estimators' own family, and no independent witness;
 # so are `paper` and `coleman-hodgdon` of theirs. The others are nobody's.
 FAMILIES: dict[str, Callable[[Any, Reach], Make]] = {
-    "bouc-wen": _bouc_wen,
-    "duhem": _duhem,
-    "backlash": _backlash,
-    "relays": _relays,
-    "paper": _paper,
-    "preisach": _preisach,
-    "coleman-hodgdon": _coleman_hodgdon,
-}
+    "bouc-wen": _bouc_wen, "duhem": _duhem, "backlash": _backlash, "relays": _relays, "paper": _paper,
+    "preisach": _preisach, "coleman-hodgdon": _coleman_hodgdon,
+}  # fmt: skip
 
 
 def draw_family(family: str, rng: np.random.Generator, reach: Reach, *, width: float, gain: float) -> Any:
     """Draw a model of a family.
 
-    Parameters
-    ----------
-    family : str
-        Name in `FAMILIES`.
-    rng : numpy.random.Generator
-        Where its shape comes from.
-    reach : Reach
-        Limits of the voltage.
-    width : float
-        Of the loop over the reach, relative to its stroke.
-    gain : float
-        Mean slope over the reach [µm/V].
-
-    Raises
-    ------
-    ValueError
-        If the family is unknown, or no shape that was tried gives a loop of that width.
+    `family`: name in `FAMILIES`. `rng`: where its shape comes from. `width`: of the loop over the reach,
+    relative to its stroke. `gain`: mean slope over the reach [µm/V].
     """
     if family not in FAMILIES:
         raise ValueError(f"family must be one of {', '.join(FAMILIES)}, got {family!r}")
@@ -207,14 +181,6 @@ def _slopes(u: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def width_of(model: Any, reach: Reach) -> float:
-    """Width of a model's loop over the reach, relative to its stroke.
-
-    Parameters
-    ----------
-    model : object with ``simulate(u)``
-        From `draw_family`.
-    reach : Reach
-        Limits of the voltage.
-    """
+    """Width of a model's loop over the reach, relative to its stroke. `model`: from `draw_family`."""
     x = model.simulate(reach.cycle())
     return _opening(x) / float(np.ptp(x[-POINTS:]))

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.bench.zoo.faulty_stages import Factor, Gap, Missing, OffsetStep, Saturation, Spikes, Stuck
+from piezoest.bench.zoo import faulty_stages as faulty
 from piezoest.bench.zoo.references import Reference
-from piezoest.bench.zoo.wrong import FOREVER, Dead, Drift, ForATime, FrozenAmplifier, Hum, StuckStage
 
 NONE, START, TRANSIENT, PERMANENT = "none", "from-start", "transient", "permanent"
 SETPOINT_NOISE = 1e-4  # µm, of a reference that rests
@@ -19,25 +18,13 @@ SETPOINT_NOISE = 1e-4  # µm, of a reference that rests
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A fault of a run.
+    """A fault of a run."""
 
-    Parameters
-    ----------
-    kind : str
-        Name in `FAULTS`, or "none".
-    start, stop : int
-        First sample with it, and the first one without; `stop` is the run's length if it stays.
-    size : float
-        What it is about: a factor, or µm.
-    lasting : bool
-        Whether it stays.
-    """
-
-    kind: str = NONE
-    start: int = 0
-    stop: int = 0
-    size: float = 0.0
-    lasting: bool = False
+    kind: str = NONE  # name in `FAULTS`, or "none"
+    start: int = 0  # first sample with it
+    stop: int = 0  # first one without; the run's length if it stays
+    size: float = 0.0  # what it is about: a factor, or µm
+    lasting: bool = False  # whether it stays
 
     @property
     def mode(self) -> str:
@@ -73,68 +60,42 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Around:
-    """What a fault has to know of its rig.
+    """What a fault has to know of its rig."""
 
-    Parameters
-    ----------
-    sample_rate : float
-        [Hz].
-    reference : Reference
-        As it would be without the fault.
-    noise : float
-        Standard deviation of the gauge's noise [µm].
-    stroke : float
-        Of the stage over the whole reach [µm].
-    seed : int
-        Start of the random numbers.
-    """
-
-    sample_rate: float
-    reference: Reference
-    noise: float
-    stroke: float
-    seed: int
+    sample_rate: float  # [Hz]
+    reference: Reference  # as it would be without the fault
+    noise: float  # standard deviation of the gauge's noise [µm]
+    stroke: float  # of the stage over the whole reach [µm]
+    seed: int  # start of the random numbers
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of fault.
+    """A kind of fault."""
 
-    Parameters
-    ----------
-    modes : tuple of str
-        Of "from-start" (and it stays), "transient" and "permanent" (from a moment on).
-    size : callable, optional
-        Draws the size from (random numbers, `Around`).
-    stage : callable, optional
-        Makes the faulty stage of (stage, `Fault`, `Around`).
-    hides : bool
-        Whether nothing can be learnt meanwhile: readings say nothing or lie, or the stage stands still.
-    partly : bool
-        Whether some readings are wrong and the others right.
-    names : tuple of str
-        What a controller may call it; empty if it need not be noticed.
-    """
-
+    # Of "from-start" (and it stays), "transient" and "permanent" (from a moment on).
     modes: tuple[str, ...] = (TRANSIENT, PERMANENT)
+    # Draws the size from (random numbers, `Around`).
     size: Callable[[Any, Around], float] = lambda rng, around: 0.0
+    # Makes the faulty stage of (stage, `Fault`, `Around`).
     stage: Callable[[Any, Fault, Around], Any] = lambda stage, fault, around: stage
+    # Whether nothing can be learnt meanwhile: readings say nothing or lie, or the stage stands still.
     hides: bool = False
-    partly: bool = False
-    names: tuple[str, ...] = ()
+    partly: bool = False  # whether some readings are wrong and the others right
+    names: tuple[str, ...] = ()  # what a controller may call it; empty if it need not be noticed
 
 
 def _times(fault: Fault, around: Around) -> tuple[float, float]:
     """Start and duration [s], half a sample early: whatever rounding does, the sample is the one meant."""
     start = max(fault.start - 0.5, 0.0) / around.sample_rate
     if fault.lasting:
-        return start, FOREVER
+        return start, faulty.FOREVER
     return start, (fault.stop - max(fault.start, 0.5)) / around.sample_rate
 
 
 def _for_a_time(make: Callable[[Any, Fault, Around], Any]) -> Callable[[Any, Fault, Around], Any]:
     """Let a fault that has no moments of its own hold while it should."""
-    return lambda stage, fault, around: ForATime(make(stage, fault, around), *_times(fault, around))
+    return lambda stage, fault, around: faulty.ForATime(make(stage, fault, around), *_times(fault, around))
 
 
 def _swing(around: Around) -> float:
@@ -156,21 +117,22 @@ ANY = (*STILL, *FACTORS, "zero moved")
 
 FAULTS: dict[str, Kind] = {
     "amplifier-frozen": Kind(
-        ALL, stage=lambda stage, fault, around: FrozenAmplifier(stage, *_times(fault, around)), hides=True,
-        names=STILL,
+        ALL, stage=lambda stage, fault, around: faulty.FrozenAmplifier(stage, *_times(fault, around)),
+        hides=True, names=STILL,
     ),
     "stage-stuck": Kind(
-        ALL, stage=lambda stage, fault, around: StuckStage(
+        ALL, stage=lambda stage, fault, around: faulty.StuckStage(
             stage, *_times(fault, around), around.noise, seed=around.seed
         ),
         hides=True, names=STILL,
     ),
     "sensor-constant": Kind(
-        ALL, stage=lambda stage, fault, around: Stuck(stage, *_times(fault, around)), hides=True, names=STILL
+        ALL, stage=lambda stage, fault, around: faulty.Stuck(stage, *_times(fault, around)),
+        hides=True, names=STILL,
     ),
     "sensor-noise": Kind(
         ALL, size=lambda rng, around: around.reference.centre + rng.uniform(-1.0, 1.0) * around.stroke,
-        stage=lambda stage, fault, around: Dead(
+        stage=lambda stage, fault, around: faulty.Dead(
             stage, *_times(fault, around), fault.size, 0.002 * _swing(around), seed=around.seed
         ),
         hides=True, names=ANY,
@@ -178,28 +140,28 @@ FAULTS: dict[str, Kind] = {
     "sensor-saturated": Kind(
         ALL, size=lambda rng, around: 0.6 * around.reference.amplitude,
         stage=_for_a_time(
-            lambda stage, fault, around: Saturation(stage, fault.size, around.reference.centre)
+            lambda stage, fault, around: faulty.Saturation(stage, fault.size, around.reference.centre)
         ),
         partly=True, names=("saturated",),
     ),
     "sensor-factor": Kind(
         ALL, size=lambda rng, around: float(rng.choice([-1.0, 1e-3, 1e3])),
-        stage=_for_a_time(lambda stage, fault, around: Factor(stage, fault.size)), hides=True,
+        stage=_for_a_time(lambda stage, fault, around: faulty.Factor(stage, fault.size)), hides=True,
         names=FACTORS,
     ),
     "zero-off": Kind(
         ALL, size=_zero,
-        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)), hides=True,
+        stage=_for_a_time(lambda stage, fault, around: faulty.OffsetStep(stage, 0.0, fault.size)), hides=True,
         names=("zero moved",),
     ),
     "zero-off-shifted": Kind(
         ALL, size=_zero,
-        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)),
+        stage=_for_a_time(lambda stage, fault, around: faulty.OffsetStep(stage, 0.0, fault.size)),
     ),
     "spikes": Kind(
         ALL, size=lambda rng, around: _swing(around) * rng.choice([0.3, 1.0, 5.0]),
         stage=_for_a_time(
-            lambda stage, fault, around: Spikes(
+            lambda stage, fault, around: faulty.Spikes(
                 stage, 0.01 * around.sample_rate, fault.size, seed=around.seed
             )
         ),
@@ -207,16 +169,18 @@ FAULTS: dict[str, Kind] = {
     ),
     "dropouts": Kind(
         ALL, size=lambda rng, around: float(rng.choice([0.01, 0.2, 0.5])),
-        stage=_for_a_time(lambda stage, fault, around: Missing(stage, fault.size, seed=around.seed)),
+        stage=_for_a_time(lambda stage, fault, around: faulty.Missing(stage, fault.size, seed=around.seed)),
     ),
-    "gap": Kind(ALL, stage=lambda stage, fault, around: Gap(stage, *_times(fault, around)), hides=True),
+    "gap": Kind(
+        ALL, stage=lambda stage, fault, around: faulty.Gap(stage, *_times(fault, around)), hides=True
+    ),
     "hum": Kind(
         ALL, size=lambda rng, around: _usual(0.2, around) if rng.random() < 0.5 else 0.05 * _swing(around),
-        stage=_for_a_time(lambda stage, fault, around: Hum(stage, fault.size, seed=around.seed)),
+        stage=_for_a_time(lambda stage, fault, around: faulty.Hum(stage, fault.size, seed=around.seed)),
     ),
     "drift": Kind(
         ALL, size=lambda rng, around: _swing(around) * rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.3),
-        stage=lambda stage, fault, around: Drift(
+        stage=lambda stage, fault, around: faulty.Drift(
             stage, fault.size * around.sample_rate / max(fault.stop - fault.start, 1), *_times(fault, around)
         ),
     ),
@@ -224,7 +188,7 @@ FAULTS: dict[str, Kind] = {
     "amplitude-drop": Kind((TRANSIENT, PERMANENT), size=lambda rng, around: rng.uniform(0.1, 0.4)),
     "glitch": Kind(
         (TRANSIENT,), size=lambda rng, around: _usual(rng.choice([1.0, 2.0, 10.0]), around),
-        stage=_for_a_time(lambda stage, fault, around: OffsetStep(stage, 0.0, fault.size)), hides=True,
+        stage=_for_a_time(lambda stage, fault, around: faulty.OffsetStep(stage, 0.0, fault.size)), hides=True,
     ),
     "dwell": Kind((TRANSIENT,)),
 }  # fmt: skip
@@ -238,21 +202,7 @@ def _usual(size: float, around: Around) -> float:
 def draw_fault(kind: str, mode: str | None, rng: Any, around: Around) -> Fault:
     """Draw when a fault is there and how large it is.
 
-    Parameters
-    ----------
-    kind : str
-        Name in `FAULTS`, or "none".
-    mode : str, optional
-        One of its modes; drawn if not given.
-    rng : numpy.random.Generator
-        Where it comes from.
-    around : Around
-        The rig.
-
-    Raises
-    ------
-    ValueError
-        If the kind is unknown or has no such mode.
+    `kind`: name in `FAULTS`, or "none". `mode`: one of its modes; drawn if not given.
     """
     if kind == NONE:
         return Fault()
@@ -280,15 +230,7 @@ def draw_fault(kind: str, mode: str | None, rng: Any, around: Around) -> Fault:
 
 
 def changed_reference(fault: Fault, around: Around) -> FloatArray:
-    """Reference of the run with its fault, shape (N,) [µm].
-
-    Parameters
-    ----------
-    fault : Fault
-        From `draw_fault`.
-    around : Around
-        The rig.
-    """
+    """Reference of the run with its fault, shape (N,) [µm]."""
     reference = around.reference
     r, within = reference.values, fault.within(reference.values.size)
     if fault.kind == "zero-off-shifted":
@@ -309,15 +251,7 @@ def changed_reference(fault: Fault, around: Around) -> FloatArray:
 
 
 def gain_schedule(fault: Fault, sample_rate: float) -> list[list[float]] | None:
-    """Factor of the gain over time, for a `SimulatedStage`; None without.
-
-    Parameters
-    ----------
-    fault : Fault
-        From `draw_fault`.
-    sample_rate : float
-        [Hz].
-    """
+    """Factor of the gain over time, for a `SimulatedStage`; None without."""
     if fault.kind != "gain-step":
         return None
     rows = [[0.0, 1.0], [(fault.start - 1) / sample_rate, 1.0], [fault.start / sample_rate, fault.size]]
@@ -332,12 +266,7 @@ def coordinates(fault: Fault, n: int) -> tuple[float, FloatArray]:
     A reference is in the coordinates of the gauge. A gauge that has been wrong from the start, or whose zero
     has moved for good, is right by definition; one that was right and goes wrong is not.
 
-    Parameters
-    ----------
-    fault : Fault
-        From `draw_fault`.
-    n : int
-        Samples of the run.
+    `fault`: from `draw_fault`.
     """
     zero = np.zeros(n)
     if fault.kind == "zero-off-shifted" or (fault.kind == "zero-off" and fault.right):
@@ -348,18 +277,8 @@ def coordinates(fault: Fault, n: int) -> tuple[float, FloatArray]:
 def truthful(fault: Fault, first: int, x: FloatArray, seen: FloatArray, tolerance: float) -> Any:
     """Which readings say something true of how the stage answers; an oracle knows it.
 
-    Parameters
-    ----------
-    fault : Fault
-        From `draw_fault`.
-    first : int
-        Sample of the first reading.
-    x : ndarray, shape (M,)
-        Readings [µm].
-    seen : ndarray, shape (M,)
-        What a sound gauge without noise would have read [µm].
-    tolerance : float
-        By which a reading may miss that [µm].
+    `x` (M,): readings [µm]. `seen` (M,): what a sound gauge without noise would have read [µm]. `tolerance`:
+    by which a reading may miss that [µm].
     """
     told = np.isfinite(x)
     kind = FAULTS.get(fault.kind, Kind())

@@ -16,19 +16,7 @@ LINE, LEARNT, RUN = "#0072B2", "#009E73", "#D55E00"
 
 
 def write_figure(rig: Rig, row: Row, both: Both, path: Path) -> None:
-    """Draw a run as PNG.
-
-    Parameters
-    ----------
-    rig : Rig
-        What was run.
-    row : dict
-        Its row.
-    both : Both
-        Traces of the controller and of the lines.
-    path : Path
-        To write to.
-    """
+    """Draw a run as PNG. `both`: traces of the controller and of the lines."""
     from matplotlib.figure import Figure
 
     fitted, learnt = both.lines.fitted, both.lines.learnt

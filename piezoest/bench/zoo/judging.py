@@ -33,14 +33,7 @@ def judge(rig: Rig, run: Traces, lines: Lines) -> dict[str, Any]:
 
     The lines' error is the larger one of both, in each part of the run.
 
-    Parameters
-    ----------
-    rig : Rig
-        From `piezoest.bench.zoo.draw`.
-    run : Traces
-        Of the controller.
-    lines : Lines
-        What it is compared with.
+    `rig`: from `piezoest.bench.zoo.draw`.
     """
     n, first, cycle = run.reference.size, rig.judged_from, rig.plain.cycle
     swing = 2.0 * rig.plain.amplitude

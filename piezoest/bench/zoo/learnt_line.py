@@ -27,18 +27,8 @@ NOISES = 6.0  # by which a reading may miss what is true
 def run_learnt_line(rig: Rig, hindsight: FittedLine) -> tuple[Traces, int]:
     """Let a line that learns leg by leg drive a rig.
 
-    Parameters
-    ----------
-    rig : Rig
-        From `piezoest.bench.zoo.draw`.
-    hindsight : FittedLine
-        From `piezoest.bench.zoo.line.fit_line`: from its slope and from the mean slope none is far.
-
-    Returns
-    -------
-    Traces
-    int
-        First sample that the line drives; before, nothing was known of the stage.
+    `hindsight`: from `piezoest.bench.zoo.line.fit_line`: from its slope and from the mean slope none is far.
+    Returns first sample that the line drives; before, nothing was known of the stage.
     """
     r, stage, n = rig.reference, rig.stage(), rig.plain.values.size
     u, x, true = np.full(n, rig.limits.rest), np.empty(n), np.empty(n)

@@ -23,16 +23,10 @@ SLOWEST, FASTEST = 0.2, 3.0  # slope of the means, relative to that over the rea
 
 @dataclass(frozen=True, slots=True)
 class FittedLine:
-    """displacement = gain u + centre.
+    """displacement = gain u + centre."""
 
-    Parameters
-    ----------
-    gain, centre : float
-        [µm/V] and [µm].
-    """
-
-    gain: float
-    centre: float
+    gain: float  # [µm/V]
+    centre: float  # [µm]
 
     def voltage(self, r: FloatArray) -> FloatArray:
         """Voltage for a reference, without limits, shape (N,) [V]."""
@@ -40,13 +34,7 @@ class FittedLine:
 
 
 def fit_line(rig: Rig) -> FittedLine:
-    """Line of a rig's healthy twin.
-
-    Parameters
-    ----------
-    rig : Rig
-        From `piezoest.bench.zoo.draw`.
-    """
+    """Line of a rig's healthy twin."""
     plain, (factor, zero) = rig.plain, rig.coordinates
     # What is wrong from the start is what the controller knows as well; the rest comes later.
     zero_0 = float(zero[0])
@@ -61,13 +49,7 @@ def fit_line(rig: Rig) -> FittedLine:
 
 
 def slope_of(u: FloatArray, x: FloatArray) -> float:
-    """Slope of the least-squares line through points.
-
-    Parameters
-    ----------
-    u, x : ndarray, shape (N,)
-        [V] and [µm].
-    """
+    """Slope of the least-squares line through points. `u`, `x` (N,): [V] and [µm]."""
     du = u - u.mean()
     # Sums, for products of long arrays start threads, which wait for one another where all cores are at work.
     return float(np.sum(du * x) / np.sum(du * du))

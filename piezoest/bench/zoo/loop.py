@@ -16,21 +16,11 @@ from piezoest.stage import SimulatedStage
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loop:
-    """Base of the families; to be simulated only, none has an inverse.
+    """Base of the families; to be simulated only, none has an inverse."""
 
-    Parameters
-    ----------
-    gain : float
-        Slope of the line [µm/V].
-    share : float
-        Of the loop, relative to the line.
-    offset : float
-        Displacement where both are zero [µm].
-    """
-
-    gain: float = 1.0
-    share: float = 1.0
-    offset: float = 0.0
+    gain: float = 1.0  # slope of the line [µm/V]
+    share: float = 1.0  # of the loop, relative to the line
+    offset: float = 0.0  # displacement where both are zero [µm]
 
     wipes_out: ClassVar[bool] = False  # whether a larger swing deletes what smaller ones left behind
 

@@ -18,18 +18,9 @@ BACK = 1.2  # of the settled error
 def named(rig: Rig, controller: Any) -> dict[str, Any]:
     """What a controller said: names of faults, how soon after the fault, and what drove at last.
 
-    Parameters
-    ----------
-    rig : Rig
-        From `piezoest.bench.zoo.draw`.
-    controller : object
-        With ``events`` and ``status``, if it has them.
-
-    Returns
-    -------
-    dict
-        ``named_right``: whether one of the fault's names was said after its beginning; None if it need not
-        be. ``named_periods``: how many periods after the beginning that was. Other columns are as they say.
+    `controller`: with ``events`` and ``status``, if it has them. Returns ``named_right``: whether one of the
+    fault's names was said after its beginning; None if it need not be. ``named_periods``: how many periods
+    after the beginning that was. Other columns are as they say.
     """
     events = list(getattr(controller, "events", ()))
     status = getattr(controller, "status", {})
@@ -55,12 +46,7 @@ def named(rig: Rig, controller: Any) -> dict[str, Any]:
 def settled(error: FloatArray, cycle: int) -> float | None:
     """Median of the largest errors in the last cycles, None if there is none.
 
-    Parameters
-    ----------
-    error : ndarray, shape (N,)
-        Absolute errors [µm].
-    cycle : int
-        Samples of a cycle.
+    `error` (N,): absolute errors [µm].
     """
     ends = [error[max(0, error.size - (k + 1) * cycle) : error.size - k * cycle] for k in range(LAST)]
     worst = [float(part.max()) for part in ends if part.size]
@@ -70,22 +56,11 @@ def settled(error: FloatArray, cycle: int) -> float | None:
 def recovery(rig: Rig, error: FloatArray, floor: float) -> dict[str, Any]:
     """How soon after a transient fault the error is as small as before.
 
-    Parameters
-    ----------
-    rig : Rig
-        From `piezoest.bench.zoo.draw`.
-    error : ndarray, shape (N,)
-        Absolute errors of the run [µm].
-    floor : float
-        Error that is small anyway [µm].
-
-    Returns
-    -------
-    dict
-        ``recovery``: whether it is judged: after a transient fault, where the reference repeats itself and
-        goes on for three cycles. ``recovered``: the cycle, from the fault's end on, in which the largest
-        error is below 1.2 times the settled one before the fault; None if none is. Without a settled error
-        before, for the fault was there at the start, it is the one at the end.
+    `error` (N,): absolute errors of the run [µm]. `floor`: error that is small anyway [µm]. Returns
+    ``recovery``: whether it is judged: after a transient fault, where the reference repeats itself and goes
+    on for three cycles. ``recovered``: the cycle, from the fault's end on, in which the largest error is
+    below 1.2 times the settled one before the fault; None if none is. Without a settled error before, for the
+    fault was there at the start, it is the one at the end.
     """
     fault, cycle, first = rig.fault, rig.plain.cycle, rig.judged_from
     after = [error[begin : begin + cycle].max() for begin in range(fault.stop, error.size - cycle + 1, cycle)]

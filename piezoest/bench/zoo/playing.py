@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple, overload
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,32 +25,17 @@ class Both(NamedTuple):
     events: tuple[Any, ...] = ()
 
 
-@overload
-def play(rig: Rig, factory: Factory, *, traces: Literal[False] = False) -> Row: ...
+def play(rig: Rig, factory: Factory) -> Row:
+    """Let a controller drive a rig, and judge it; see `traced`."""
+    return traced(rig, factory)[0]
 
 
-@overload
-def play(rig: Rig, factory: Factory, *, traces: Literal[True]) -> tuple[Row, Both]: ...
-
-
-def play(rig: Rig, factory: Factory, *, traces: bool = False) -> Row | tuple[Row, Both]:
+def traced(rig: Rig, factory: Factory) -> tuple[Row, Both]:
     """Let a controller drive a rig, and judge it beside straight lines.
 
-    Parameters
-    ----------
-    rig : Rig
-        From `piezoest.bench.zoo.draw`.
-    factory : callable
-        ``factory(sample_rate, limits)`` makes a controller, with ``step(r)``, ``run(r)`` and ``learn(u, x)``.
-    traces : bool
-        Whether to give the traces, too.
-
-    Returns
-    -------
-    dict
-        What was drawn and what came of it, flat and JSON-safe; what the controller raised is its ``failure``.
-    Both
-        With `traces` only.
+    `factory`: ``factory(sample_rate, limits)`` makes a controller, with ``step(r)``, ``run(r)`` and
+    ``learn(u, x)``. Returns what was drawn and what came of it, flat and JSON-safe; what the controller
+    raised is its ``failure``; and the traces.
     """
     line = fit_line(rig)
     lines = Lines(line, run_line(rig, line), *run_learnt_line(rig, line))
@@ -67,4 +52,4 @@ def play(rig: Rig, factory: Factory, *, traces: bool = False) -> Row | tuple[Row
     except Exception as error:
         row["failure"] = f"{type(error).__name__}: {error}"
     row = dict(json_safe(row))
-    return (row, Both(run, lines, tuple(getattr(controller, "events", ())))) if traces else row
+    return row, Both(run, lines, tuple(getattr(controller, "events", ())))

@@ -17,34 +17,16 @@ ROUNDED = 40  # part of a period over which a raster's corners are rounded, as i
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """A reference that a rig is to follow.
+    """A reference that a rig is to follow."""
 
-    Parameters
-    ----------
-    kind : str
-        Name in `SHAPES`.
-    values : ndarray, shape (N,)
-        [µm].
-    amplitude, centre : float
-        Half of its range, and its middle [µm].
-    frequency : float
-        [Hz]; of what is no wave, that of about as fast a one.
-    wave : float
-        Samples in a wave.
-    cycle : int
-        Samples after which it repeats itself, or the longest wave.
-    begins : int
-        Samples of the way from rest to its beginning.
-    """
-
-    kind: str
-    values: FloatArray
-    amplitude: float
-    centre: float
-    frequency: float
-    wave: float
-    cycle: int
-    begins: int
+    kind: str  # name in `SHAPES`
+    values: FloatArray  # (N,): [µm]
+    amplitude: float  # half of its range [µm]
+    centre: float  # its middle [µm]
+    frequency: float  # [Hz]; of what is no wave, that of about as fast a one
+    wave: float  # samples in a wave
+    cycle: int  # samples after which it repeats itself, or the longest wave
+    begins: int  # samples of the way from rest to its beginning
 
     @property
     def two_swings(self) -> int:
@@ -107,27 +89,15 @@ def _steps(n: int, f: float, fs: float, rng: Any) -> FloatArray:
 
 
 SHAPES: dict[str, Callable[[int, float, float, Any], FloatArray]] = {
-    "triangle": _triangle,
-    "sine": _sine,
-    "raster": _raster,
-    "chirp": _chirp,
-    "sum-of-sines": _sum_of_sines,
-    "walk": _walk,
-    "steps": _steps,
-    "beyond": _triangle,
-}
+    "triangle": _triangle, "sine": _sine, "raster": _raster, "chirp": _chirp, "sum-of-sines": _sum_of_sines,
+    "walk": _walk, "steps": _steps, "beyond": _triangle,
+}  # fmt: skip
 REPEATING = ("triangle", "sine", "raster", "walk", "steps", "beyond")
 CYCLES = {"walk": float(WALK_SWINGS), "steps": 0.5 * LEVELS}
 
 
 def cycle_of(kind: str) -> float:
-    """Waves in a cycle.
-
-    Parameters
-    ----------
-    kind : str
-        Name in `SHAPES`.
-    """
+    """Waves in a cycle. `kind`: name in `SHAPES`."""
     return CYCLES.get(kind, 1.0)
 
 
@@ -143,18 +113,7 @@ def build(
 ) -> Reference:
     """Make a reference that begins at rest at 0 µm, goes to its first value and then its way.
 
-    Parameters
-    ----------
-    kind : str
-        Name in `SHAPES`.
-    amplitude, centre : float
-        [µm].
-    frequency, sample_rate : float
-        [Hz].
-    waves : float
-        How many.
-    rng : numpy.random.Generator
-        Of what is drawn.
+    `kind`: name in `SHAPES`. `amplitude`, `centre`: [µm]. `frequency`, `sample_rate`: [Hz].
     """
     n = round(waves * sample_rate / frequency)
     shape = SHAPES[kind](n, frequency, sample_rate, rng)

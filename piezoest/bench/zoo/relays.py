@@ -21,27 +21,15 @@ from piezoest.layout import COUNT, FIXED, NUMBER, Length, Record, numbers, recor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Relays(Loop):
-    """Relays with a Gaussian density over half-width and place.
+    """Relays with a Gaussian density over half-width and place."""
 
-    Parameters
-    ----------
-    low, high : float
-        Lowest and highest level [V].
-    half_width, half_width_spread : float
-        Mean and spread of the relays' half-widths [V].
-    place, place_spread : float
-        Mean and spread of the middles of the relays [V].
-    levels : int
-        Grid lines.
-    """
-
-    low: float
-    high: float
-    half_width: float
-    half_width_spread: float
-    place: float
-    place_spread: float
-    levels: int = 500
+    low: float  # lowest level [V]
+    high: float  # highest level [V]
+    half_width: float  # mean of the relays' half-widths [V]
+    half_width_spread: float  # [V]
+    place: float  # mean of the middles of the relays [V]
+    place_spread: float  # [V]
+    levels: int = 500  # grid lines
     weights: FloatArray = field(init=False, repr=False, compare=False)
 
     wipes_out = True

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
+from piezoest.bench.report import print_cells
 from piezoest.bench.zoo.dwelling import WAYS
 from piezoest.bench.zoo.settling import SEGMENTS
 from piezoest.bench.zoo.summary import ENOUGH, SOON
@@ -20,28 +20,20 @@ KEY = (
 
 
 def print_summary(summary: dict[str, Any], console: Any) -> None:
-    """Print what runs say together.
-
-    Parameters
-    ----------
-    summary : dict
-        From `piezoest.bench.zoo.summary.summarise`.
-    console : rich.console.Console
-        To print on.
-    """
-    _table(
+    """Print what runs say together. `summary`: from `piezoest.bench.zoo.summary.summarise`."""
+    print_cells(
         console, "Violations",
         ("criterion", f"of {summary['runs']}", f"of {summary['healthy_runs']} healthy"),
         [(name, count, summary["healthy"][name]) for name, count in summary["violations"].items()],
     )  # fmt: skip
     quantiles = summary["quantiles"]
-    _table(
+    print_cells(
         console, "Ratios", ("", *next(iter(quantiles.values()))),
         [(name, *map(number, each.values())) for name, each in quantiles.items()],
     )  # fmt: skip
     _crossed(console, summary["by_family"])
     columns = ("runs", "over", "over_rms", "over_last", "over_after", "at_limit")
-    _table(
+    print_cells(
         console,
         "By fault: runs with a ratio above 1, or at a limit; faults named, in how many periods; as good as "
         "before within three cycles",
@@ -79,7 +71,7 @@ def _crossed(console: Any, groups: list[dict[str, Any]]) -> None:
     references = sorted({row["reference"] for row in groups})
     families = sorted({row["family"] for row in groups})
     cells = {(row["family"], row["reference"]): f"{row['over']}/{row['runs']}" for row in groups}
-    _table(
+    print_cells(
         console, "Runs with a ratio above 1, of all", ("family", *references),
         [(family, *(cells.get((family, each), "") for each in references)) for family in families],
     )  # fmt: skip
@@ -88,12 +80,7 @@ def _crossed(console: Any, groups: list[dict[str, Any]]) -> None:
 def print_map(summary: dict[str, Any], console: Any) -> None:
     """Print shares of runs that settled within two periods, of those that are asked for.
 
-    Parameters
-    ----------
-    summary : dict
-        From `piezoest.bench.zoo.summary.summarise_cells`.
-    console : rich.console.Console
-        To print on.
+    `summary`: from `piezoest.bench.zoo.summary.summarise_cells`.
     """
     changes = [name for name, _, _ in SEGMENTS]
     cells = summary["cells"]
@@ -104,7 +91,7 @@ def print_map(summary: dict[str, Any], console: Any) -> None:
         highlight=False,
     )
     for title, names in (("by_family", ("family",)), ("by_place", ("amplitude", "frequency"))):
-        _table(
+        print_cells(
             console, f"Settled within two periods [%], and median of the periods, {title.replace('_', ' ')}",
             (*names, *changes),
             [
@@ -120,14 +107,9 @@ def print_map(summary: dict[str, Any], console: Any) -> None:
 def print_contest(summary: dict[str, Any], console: Any) -> None:
     """Print settled errors relative to those of the best single estimator.
 
-    Parameters
-    ----------
-    summary : dict
-        From `piezoest.bench.zoo.contest.summarise_contest`.
-    console : rich.console.Console
-        To print on.
+    `summary`: from `piezoest.bench.zoo.contest.summarise_contest`.
     """
-    _table(
+    print_cells(
         console,
         f"Median settled error of {summary['seeds']} seeds [% of the amplitude], that of the best single "
         "estimator, and their ratio",
@@ -148,17 +130,12 @@ def print_contest(summary: dict[str, Any], console: Any) -> None:
 def print_dwells(summary: dict[str, Any], console: Any) -> None:
     """Print how a controller goes on after a long rest.
 
-    Parameters
-    ----------
-    summary : dict
-        From `piezoest.bench.zoo.dwelling.summarise_dwells`.
-    console : rich.console.Console
-        To print on.
+    `summary`: from `piezoest.bench.zoo.dwelling.summarise_dwells`.
     """
     numbers = ("first", "second", "third", "largest", "excursion", "farthest")
     heads = ("runs", "kept", "first", "second", "third", "largest", "way", "longest")
     for title, names in (("groups", WAYS), ("by_family", ("family",))):
-        _table(
+        print_cells(
             console,
             f"After a rest of {summary['duration']:g} s: largest errors over what is allowed, medians; way "
             "of the voltage in it over its swing",
@@ -192,16 +169,3 @@ def number(value: Any) -> str:
     if value is None:
         return "—"
     return f"{value:.3g}" if isinstance(value, float) else str(value)
-
-
-def _table(console: Any, title: str, heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
-    from rich.box import SIMPLE_HEAD
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False)
-    for k, head in enumerate(heads):
-        table.add_column(head, justify="left" if k == 0 else "right", no_wrap=True)
-    for row in rows:
-        table.add_row(*(escape(str(cell)) for cell in row))
-    console.print(table)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,8 @@ from piezoest.bench.zoo.faults import (
     coordinates,
     gain_schedule,
 )
+from piezoest.bench.zoo.faulty_stages import Drift, Hum
 from piezoest.bench.zoo.references import Reference
-from piezoest.bench.zoo.wrong import Drift, Hum
 from piezoest.compensators import VoltageLimits
 from piezoest.models import Creep, MassSpringDamper
 from piezoest.stage import Amplifier, Gauge, SimulatedStage
@@ -39,42 +39,18 @@ SLOW_POLE = LAG_DAMPING - (LAG_DAMPING**2 - 1.0) ** 0.5  # of the lag, relative 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surroundings:
-    """What lies between a controller and the hysteresis.
+    """What lies between a controller and the hysteresis."""
 
-    Parameters
-    ----------
-    mechanics : str
-        Name in `MECHANICS`, another frequency as in "523 Hz", or "lag".
-    lag : float
-        Corner of the lag [Hz]; 0 without.
-    delay : int
-        Of the reading, in samples.
-    noise : float
-        Standard deviation of the gauge's noise [µm].
-    resolution : float
-        Of the gauge [µm]; 0 for none.
-    volts : float
-        Step of the amplifier's converter [V]; 0 for none.
-    slew_rate : float
-        Of the amplifier [V/s].
-    creep : float
-        Share of the displacement for each decade of time; 0 for none.
-    hum : float
-        Amplitude of 50 Hz on the reading [µm].
-    drift : float
-        Of the stage [µm/s].
-    """
-
-    mechanics: str = "none"
-    lag: float = 0.0
-    delay: int = 0
-    noise: float = 0.0
-    resolution: float = 0.0
-    volts: float = 0.0
-    slew_rate: float = np.inf
-    creep: float = 0.0
-    hum: float = 0.0
-    drift: float = 0.0
+    mechanics: str = "none"  # name in `MECHANICS`, another frequency as in "523 Hz", or "lag"
+    lag: float = 0.0  # corner of the lag [Hz]; 0 without
+    delay: int = 0  # of the reading, in samples
+    noise: float = 0.0  # standard deviation of the gauge's noise [µm]
+    resolution: float = 0.0  # of the gauge [µm]; 0 for none
+    volts: float = 0.0  # step of the amplifier's converter [V]; 0 for none
+    slew_rate: float = np.inf  # of the amplifier [V/s]
+    creep: float = 0.0  # share of the displacement for each decade of time; 0 for none
+    hum: float = 0.0  # amplitude of 50 Hz on the reading [µm]
+    drift: float = 0.0  # of the stage [µm/s]
 
     @property
     def resonance(self) -> tuple[float, float]:
@@ -88,41 +64,19 @@ class Surroundings:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rig:
-    """One rig, and what it is to do.
+    """One rig, and what it is to do."""
 
-    Parameters
-    ----------
-    seed : int
-        Start of all its random numbers.
-    family : str
-        Name in `piezoest.bench.zoo.families.FAMILIES`.
-    model : object
-        The hysteresis.
-    reach : Reach
-        Limits of the voltage.
-    sample_rate, gain, width : float
-        [Hz]; mean slope over the reach [µm/V]; width of the loop, relative.
-    around : Surroundings
-        Mechanics and instruments.
-    plain : Reference
-        Without the fault.
-    fault : Fault
-        Or none.
-    block : int
-        Samples that are handed over at a time; 1 is one by one, by `step`.
-    """
-
-    seed: int
-    family: str
-    model: Any
-    reach: Reach
-    sample_rate: float
-    gain: float
-    width: float
-    around: Surroundings
-    plain: Reference
-    fault: Fault
-    block: int
+    seed: int  # start of all its random numbers
+    family: str  # name in `piezoest.bench.zoo.families.FAMILIES`
+    model: Any  # the hysteresis
+    reach: Reach  # limits of the voltage
+    sample_rate: float  # [Hz]
+    gain: float  # mean slope over the reach [µm/V]
+    width: float  # of the loop, relative
+    around: Surroundings  # mechanics and instruments
+    plain: Reference  # without the fault
+    fault: Fault  # or none
+    block: int  # samples that are handed over at a time; 1 is one by one, by `step`
 
     @property
     def limits(self) -> VoltageLimits:
@@ -184,10 +138,7 @@ class Rig:
     def stage(self, *, healthy: bool = False) -> Any:
         """Make the stage, at rest.
 
-        Parameters
-        ----------
-        healthy : bool
-            Without fault, noise, hum and drift; mechanics, creep and amplifier stay.
+        `healthy`: without fault, noise, hum and drift; mechanics, creep and amplifier stay.
         """
         own, fs = self.around, self.sample_rate
         stage: Any = SimulatedStage(
@@ -218,34 +169,13 @@ class Rig:
 
     def to_dict(self) -> dict[str, Any]:
         """All that was drawn, flat: columns of a row."""
-        own, plain, fault = self.around, self.plain, self.fault
+        plain, fault, around = self.plain, self.fault, asdict(self.around)
+        around["sensor_noise"] = around.pop("noise")
         return {
-            "seed": self.seed,
-            "family": self.family,
-            "gain": self.gain,
-            "width": self.width,
-            "low": self.reach.low,
-            "high": self.reach.high,
-            "sample_rate": self.sample_rate,
-            "mechanics": own.mechanics,
-            "lag": own.lag,
-            "delay": own.delay,
-            "sensor_noise": own.noise,
-            "resolution": own.resolution,
-            "volts": own.volts,
-            "slew_rate": own.slew_rate,
-            "creep": own.creep,
-            "hum": own.hum,
-            "drift": own.drift,
-            "reference": plain.kind,
-            "amplitude": plain.amplitude,
-            "centre": plain.centre,
-            "frequency": plain.frequency,
-            "samples": plain.values.size,
-            "block": self.block,
-            "fault": fault.kind,
-            "mode": fault.mode,
-            "fault_size": fault.size,
-            "fault_start": fault.start / self.sample_rate,
-            "fault_stop": fault.stop / self.sample_rate,
-        }
+            "seed": self.seed, "family": self.family, "gain": self.gain, "width": self.width,
+            "low": self.reach.low, "high": self.reach.high, "sample_rate": self.sample_rate, **around,
+            "reference": plain.kind, "amplitude": plain.amplitude, "centre": plain.centre,
+            "frequency": plain.frequency, "samples": plain.values.size, "block": self.block,
+            "fault": fault.kind, "mode": fault.mode, "fault_size": fault.size,
+            "fault_start": fault.start / self.sample_rate, "fault_stop": fault.stop / self.sample_rate,
+        }  # fmt: skip

@@ -18,14 +18,9 @@ Factory = Callable[..., Any]  # factory(sample_rate, limits) is a controller
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Traces:
-    """A run, each of shape (N,).
+    """A run, each of shape (N,)."""
 
-    Parameters
-    ----------
-    reference, voltage, measured, displacement : ndarray
-        r [µm], u [V], reading [µm], true displacement [µm]; r and it in the gauge's coordinates.
-    """
-
+    # r [µm], u [V], reading [µm], true displacement [µm]; r and it in the gauge's coordinates.
     reference: FloatArray
     voltage: FloatArray
     measured: FloatArray
@@ -40,18 +35,8 @@ class Traces:
 def run_controller(rig: Rig, controller: Any) -> tuple[Traces, float]:
     """Let a controller drive a rig.
 
-    Parameters
-    ----------
-    rig : Rig
-        From `piezoest.bench.zoo.draw`.
-    controller : object
-        With ``step(r)`` and ``run(r)``, which give the voltage, and ``learn(u, x)``.
-
-    Returns
-    -------
-    Traces
-    float
-        Time that the controller took [s].
+    `controller`: with ``step(r)`` and ``run(r)``, which give the voltage, and ``learn(u, x)``. Returns time
+    that the controller took [s].
     """
     r, stage = rig.reference, rig.stage()
     u, x, true = np.empty_like(r), np.empty_like(r), np.empty_like(r)
@@ -61,15 +46,7 @@ def run_controller(rig: Rig, controller: Any) -> tuple[Traces, float]:
 
 
 def run_line(rig: Rig, line: FittedLine) -> Traces:
-    """Let a straight line drive the same rig.
-
-    Parameters
-    ----------
-    rig : Rig
-        From `piezoest.bench.zoo.draw`.
-    line : FittedLine
-        From `fit_line`.
-    """
+    """Let a straight line drive the same rig. `line`: from `fit_line`."""
     r, stage = rig.reference, rig.stage()
     u = np.clip(line.voltage(r), rig.reach.low, rig.reach.high)
     x = stage.run(u)

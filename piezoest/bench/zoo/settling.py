@@ -47,22 +47,12 @@ SEGMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A place of the map, and a seed.
+    """A place of the map, and a seed."""
 
-    Parameters
-    ----------
-    family : str
-        Name in `piezoest.bench.zoo.families.FAMILIES`.
-    amplitude, frequency : float
-        [µm] and [Hz].
-    seed : int
-        Of what is drawn.
-    """
-
-    family: str
-    amplitude: float
-    frequency: float
-    seed: int
+    family: str  # name in `piezoest.bench.zoo.families.FAMILIES`
+    amplitude: float  # [µm]
+    frequency: float  # [Hz]
+    seed: int  # of what is drawn
 
 
 def cells(
@@ -74,26 +64,13 @@ def cells(
 ) -> list[Cell]:
     """All places of the map.
 
-    Parameters
-    ----------
-    seeds : sequence of int
-        For each place.
-    amplitudes, frequencies : sequence of float
-        [µm] and [Hz].
-    families : sequence of str
-        Names in `piezoest.bench.zoo.families.FAMILIES`.
+    `amplitudes`, `frequencies`: [µm] and [Hz]. `families`: names in `piezoest.bench.zoo.families.FAMILIES`.
     """
     return [Cell(*each) for each in itertools.product(families, amplitudes, frequencies, seeds)]
 
 
 def cell_rig(cell: Cell) -> Rig:
-    """Rig of a cell: an ideal one but for noise and steps, and for the gain that changes in the end.
-
-    Parameters
-    ----------
-    cell : Cell
-        From `cells`.
-    """
+    """Rig of a cell: an ideal one but for noise and steps, and for the gain that changes in the end."""
     rng = np.random.default_rng([cell.seed, 24])
     gain = float(np.exp(rng.uniform(*np.log([max(GAINS[0], FREE * cell.amplitude / REACH), GAINS[1]]))))
     period = max(PERIOD, round(SLOWEST / cell.frequency))
@@ -125,13 +102,7 @@ def _values(cell: Cell, period: int) -> FloatArray:
 
 
 def asked(rig: Rig) -> bool:
-    """Whether it is asked for that all settles soon.
-
-    Parameters
-    ----------
-    rig : Rig
-        From `cell_rig`.
-    """
+    """Whether it is asked for that all settles soon."""
     slow = rig.plain.frequency <= SLOW * rig.around.resonance[0]
     return bool(slow and rig.plain.amplitude >= LARGE * rig.noise)
 
@@ -139,18 +110,9 @@ def asked(rig: Rig) -> bool:
 def settle(cell: Cell, factory: Factory) -> dict[str, Any]:
     """Run a controller over a cell.
 
-    Parameters
-    ----------
-    cell : Cell
-        From `cells`.
-    factory : callable
-        ``factory(sample_rate, limits)`` makes a controller.
-
-    Returns
-    -------
-    dict
-        With ``segments``: for each its name, the periods until it settled (None if it did not), the
-        largest error of its last period [µm] and what was allowed. ``asked``: see `asked`.
+    `factory`: ``factory(sample_rate, limits)`` makes a controller. Returns with ``segments``: for each its
+    name, the periods until it settled (None if it did not), the largest error of its last period [µm] and
+    what was allowed. ``asked``: see `asked`.
     """
     rig = cell_rig(cell)
     row: dict[str, Any] = {**asdict(cell), "gain": rig.gain, "width": rig.width, "block": rig.block,

@@ -13,14 +13,8 @@ from piezoest.bench.zoo.settling import SEGMENTS
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
 RATIOS = (
-    "ratio",
-    "ratio_rms",
-    "cycle_ratio",
-    "last_ratio",
-    "last_ratio_rms",
-    "after_ratio",
-    "after_ratio_rms",
-)
+    "ratio", "ratio_rms", "cycle_ratio", "last_ratio", "last_ratio_rms", "after_ratio", "after_ratio_rms",
+)  # fmt: skip
 ENOUGH = 0.95  # of the runs of a cell
 SOON, BACK = 2, 3  # periods until it has settled, and until a fault is forgotten
 
@@ -42,18 +36,9 @@ CRITERIA: dict[str, Callable[[Row], bool]] = {
 def summarise(rows: Iterable[Row], worst: int = 10) -> dict[str, Any]:
     """Sum up runs on the zoo.
 
-    Parameters
-    ----------
-    rows : iterable of dict
-        From `piezoest.bench.zoo.play`.
-    worst : int
-        How many of the worst to name.
-
-    Returns
-    -------
-    dict
-        JSON-safe: ``violations`` and ``healthy`` violations (without a fault) of each criterion,
-        ``quantiles`` of the ratios, groups ``by_family``, ``by_reference`` and ``by_fault``, and ``worst``.
+    `rows`: from `piezoest.bench.zoo.play`. Returns JSON-safe: ``violations`` and ``healthy`` violations
+    (without a fault) of each criterion, ``quantiles`` of the ratios, groups ``by_family``, ``by_reference``
+    and ``by_fault``, and ``worst``.
     """
     rows = list(rows)
     healthy = [row for row in rows if row["fault"] == "none"]
@@ -130,16 +115,9 @@ def _told(group: Sequence[Row]) -> dict[str, Any]:
 def summarise_cells(rows: Iterable[Row]) -> dict[str, Any]:
     """Sum up the map: shares of runs that settled soon.
 
-    Parameters
-    ----------
-    rows : iterable of dict
-        From `piezoest.bench.zoo.settling.settle`.
-
-    Returns
-    -------
-    dict
-        Shares ``by_family`` and ``by_place`` of the runs that are asked for, ``other_places`` of the others;
-        ``cells``: how many there are in which a run is asked for, and in how many of them enough settled.
+    `rows`: from `piezoest.bench.zoo.settling.settle`. Returns shares ``by_family`` and ``by_place`` of the
+    runs that are asked for, ``other_places`` of the others; ``cells``: how many there are in which a run is
+    asked for, and in how many of them enough settled.
     """
     rows = list(rows)
     asked = [row for row in rows if row["asked"]]

@@ -22,30 +22,14 @@ from piezoest.bench.zoo.settling import Cell, settle
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One run: a rig of the zoo, one cell of the map, or a long rest.
+    """One run: a rig of the zoo, one cell of the map, or a long rest."""
 
-    Parameters
-    ----------
-    controller : str
-        As `piezoest.bench.zoo.contenders.contender` reads it.
-    seed : int
-        Of the rig.
-    code : str
-        Fingerprint of what is run.
-    given : dict
-        What is not drawn, see `piezoest.bench.zoo.draw`.
-    cell : Cell, optional
-        Of the map; then the run is `settle`.
-    dwell : Dwell, optional
-        A rest; then the run is `play_dwell`.
-    """
-
-    controller: str
-    seed: int
-    code: str
-    given: dict[str, Any] = field(default_factory=dict)
-    cell: Cell | None = None
-    dwell: Dwell | None = None
+    controller: str  # as `piezoest.bench.zoo.contenders.contender` reads it
+    seed: int  # of the rig
+    code: str  # fingerprint of what is run
+    given: dict[str, Any] = field(default_factory=dict)  # what is not drawn, see `piezoest.bench.zoo.draw`
+    cell: Cell | None = None  # of the map; then the run is `settle`
+    dwell: Dwell | None = None  # a rest; then the run is `play_dwell`
 
     @property
     def key(self) -> str:
@@ -56,13 +40,7 @@ class Task:
 
 @quiet()
 def carry_out(task: Task) -> Row:
-    """Run a task.
-
-    Parameters
-    ----------
-    task : Task
-        What to run.
-    """
+    """Run a task."""
     known = {"key": task.key, "controller": task.controller}
     factory = contender(task.controller)
     if task.cell is not None:
@@ -73,13 +51,7 @@ def carry_out(task: Task) -> Row:
 
 
 def died(task: Task) -> Row:
-    """Row of a task whose process died over it.
-
-    Parameters
-    ----------
-    task : Task
-        What was to be run.
-    """
+    """Row of a task whose process died over it."""
     if task.cell is not None:
         drawn: Row = {**asdict(task.cell), "segments": [], "asked": True}
     elif task.dwell is not None:
@@ -91,55 +63,23 @@ def died(task: Task) -> Row:
 
 
 def runs(controller: str, seeds: range, given: dict[str, Any] | None = None) -> list[Task]:
-    """Runs of a controller on the rigs of these seeds.
-
-    Parameters
-    ----------
-    controller : str
-        As `contender` reads it.
-    seeds : range
-        Of the rigs.
-    given : dict, optional
-        What is not drawn.
-    """
+    """Runs of a controller on the rigs of these seeds."""
     code = code_of(controller)
     return [Task(controller, seed, code, dict(given or {})) for seed in seeds]
 
 
 def cells(controller: str, of: Sequence[Cell]) -> list[Task]:
-    """Runs of a controller over the cells of the map.
-
-    Parameters
-    ----------
-    controller : str
-        As `contender` reads it.
-    of : sequence of Cell
-        From `piezoest.bench.zoo.settling.cells`.
-    """
+    """Runs of a controller over the cells of the map. `of`: from `piezoest.bench.zoo.settling.cells`."""
     code = code_of(controller)
     return [Task(controller, cell.seed, code, cell=cell) for cell in of]
 
 
 def rests(controller: str, of: Sequence[Dwell]) -> list[Task]:
-    """Runs of a controller over long rests.
-
-    Parameters
-    ----------
-    controller : str
-        As `contender` reads it.
-    of : sequence of Dwell
-        From `piezoest.bench.zoo.dwelling.dwells`.
-    """
+    """Runs of a controller over long rests. `of`: from `piezoest.bench.zoo.dwelling.dwells`."""
     code = code_of(controller)
     return [Task(controller, dwell.seed, code, dwell=dwell) for dwell in of]
 
 
 def over_cores(workers: int | None = None) -> Callable[[Iterable[Task]], Iterator[Row]]:
-    """Run tasks in processes of this machine.
-
-    Parameters
-    ----------
-    workers : int, optional
-        How many; default one for each core.
-    """
+    """Run tasks in processes of this machine."""
     return partial(in_processes, carry_out, processes=workers, crashed=died)

@@ -109,40 +109,15 @@ def _chirp(n: int, waves: float, rng: Any) -> FloatArray:
 
 
 SHAPES: dict[str, Callable[[int, float, Any], FloatArray]] = {
-    "triangle": _triangle,
-    "sine": _sine,
-    "growing": _growing,
-    "decaying": _decaying,
-    "sum-of-sines": _sines,
-    "walk": _walk,
-    "staircase": _staircase,
-    "chirp": _chirp,
-}
+    "triangle": _triangle, "sine": _sine, "growing": _growing, "decaying": _decaying, "sum-of-sines": _sines,
+    "walk": _walk, "staircase": _staircase, "chirp": _chirp,
+}  # fmt: skip
 
 
 def draw_voltage(kind: str, n: int, waves: float, rng: np.random.Generator) -> FloatArray:
     """Draw a voltage of a kind, from -1 to 1.
 
-    Parameters
-    ----------
-    kind : str
-        Name in `SHAPES`.
-    n : int
-        Points.
-    waves : float
-        About how many there are in them.
-    rng : numpy.random.Generator
-        Of what is drawn.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Its least value is -1, its largest 1.
-
-    Raises
-    ------
-    ValueError
-        If the kind is unknown.
+    `kind`: name in `SHAPES`. Returns (n,): its least value is -1, its largest 1.
     """
     if kind not in SHAPES:
         raise ValueError(f"kind must be one of {', '.join(SHAPES)}, got {kind!r}")
