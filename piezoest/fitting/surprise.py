@@ -17,7 +17,7 @@ from piezoest.fitting.runs import BoolArray, IntArray
 BLOCK, QUANTILE = 32, 0.7
 NORMAL_QUANTILE = 1.0364  # of |e| of a normal deviate at that quantile
 # Bends of the input on either side of a sample that help to foresee it, and samples to learn that from.
-BENDS, TRAINED_ON = 2, 20_000
+BENDS, TRAINED_ON = 2, 10_000
 
 
 def surprise(y: FloatArray, inputs: FloatArray, each_side: int) -> FloatArray:
