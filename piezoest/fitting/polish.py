@@ -41,7 +41,8 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     varied = coordinates(ColemanHodgdon, () if fit_delay else ("delay",), delayed=True)
     limits = ColemanHodgdon.record_limits(2.0 * log.half) | {"delay": (0.0, LONGEST_DELAY)}
     problem = Problem(log.u, x, varied, np.empty(0) if fit_delay else np.array([delay]), limits=limits)
-    model: Any = fitted.design.model(w).nearest_admissible()
+    model: Any = fitted.design.model(w)
+    model = model.nearest_admissible()
     place = fitted.design.basis.initial_state(w, model) * model.alpha / model.b
     start = varied.of(model, {"delay": delay, "place": place})
     start = np.clip(start, *problem.bounds(start))
