@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -37,7 +37,7 @@ class Found:
     """What a fit says of a log: predictions [µm], shape (N,), by the names of its candidates."""
 
     chosen: str
-    predictions: dict[str, Callable[[], np.ndarray]]
+    predictions: dict[str, np.ndarray]
     held_out: dict[str, float]  # its own account of them [µm rms]
     lower: np.ndarray | None = None
     upper: np.ndarray | None = None
@@ -48,16 +48,14 @@ class Found:
 def fitted(log: Log) -> Found:
     """The one place that knows piezoest's face."""
 
-    def identify(model: str) -> Any:
+    def identify(model: str = "auto") -> Any:
         return pz.identify(log.u, log.x, sample_rate=log.sample_rate, train=TRAIN, model=model)
 
-    found = identify("auto")
+    found = identify()
     predicted = found.predict()
-    predictions = {item.name: lambda name=item.name: identify(name).predict().x for item in found.candidates}
-    predictions[found.chosen] = lambda: predicted.x
     result = Found(
-        found.chosen, predictions, {item.name: item.held_out.rms for item in found.candidates},
-        predicted.lower, predicted.upper,
+        found.chosen, {item.name: item.prediction.x for item in found.candidates},
+        {item.name: item.held_out.rms for item in found.candidates}, predicted.lower, predicted.upper,
     )  # fmt: skip
     if log.family == FAMILY:
         # A log may leave a parameter open, which identify then refuses.
@@ -160,7 +158,7 @@ def judged(log: Log, trained: int, found: Found) -> Row:
     read = np.isfinite(log.x[trained:])
 
     def error(name: str) -> np.ndarray:
-        return (found.predictions[name]()[trained:] - target)[read]
+        return (found.predictions[name][trained:] - target)[read]
 
     missed = error(found.chosen)
     if not np.isfinite(missed).all():

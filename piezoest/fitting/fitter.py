@@ -28,6 +28,8 @@ FEWEST_SAMPLES = 50
 ROUNDING = 1e-9
 # Times that a start which has not settled is looked for, each without what was found before.
 PASSES = 3
+# Most Gauss-Newton steps of a delay.
+REFINED = 3
 NONLINEAR = "SciPy's least squares, with derivatives by CasADi"
 LINEAR = "{} through CasADi; SciPy's bounded least squares agrees to {:.0e}"
 
@@ -152,6 +154,8 @@ class Fitter:
             self._log = replace(self._log, u=late(self._given, self.delay))
             self._begin(plays)
         self._leave_out(settle)
+        if plays and self.delay_estimated:
+            self._refine_delay()
 
     def _begin(self, plays: bool) -> None:
         """Find where plays were before the record; anywhere will do where there are none."""
@@ -181,6 +185,31 @@ class Fitter:
             self._begin(self._plays)
         self.spikes = int(np.count_nonzero(spikes))
 
+    def _refine_delay(self) -> None:
+        """Find the delay again with the richest model: creep and another start look like one, too.
+
+        What misses the blocks ahead by more is no better, though it may miss the record by less.
+        """
+        for _ in range(REFINED):
+            before = self._log, self.start, self.delay
+            ahead = self._richest.ahead
+            step = search.delay_step(self._log, self._given, self._richest, self.delay)
+            delay = float(np.clip(self.delay + step, 0.0, search.LONGEST_DELAY))
+            if abs(delay - self.delay) < search.CLOSE:
+                break
+            self.delay, self._log = delay, replace(self._log, u=late(self._given, delay))
+            self._begin(plays=True)
+            self._forget()
+            if self._richest.ahead > ahead:
+                self._log, self.start, self.delay = before
+                self._forget()
+                break
+
+    def _forget(self) -> None:
+        """Do without fits of another delay."""
+        for name in ("_first", "_plain", "_richest"):
+            self.__dict__.pop(name, None)
+
     @property
     def _bent_plays(self) -> PlayColumns:
         return search.plays(self._log, self.start, bends=search.BENDS)
@@ -200,6 +229,14 @@ class Fitter:
         bent = self._first
         return {True: bent.best(), False: bent.combined(*self._bent_plays.merged()).best()}
 
+    @cached_property
+    def _richest(self) -> Fitted:
+        """Plays with bends and creep."""
+        return self._with_creep(bends=True)
+
+    def _with_creep(self, *, bends: bool) -> Fitted:
+        return search.with_creep(self._log, self._plain[bends], search.creep_times(self._log))
+
     def form(self, name: str) -> Fit:
         """Fit a model of one kind.
 
@@ -218,8 +255,9 @@ class Fitter:
             return loop.best()
         if not form.plays:
             return search.regression(self._log, search.plays(self._log, self.start, 1)).best()
-        plain = self._plain[form.bends]
-        return search.with_creep(self._log, plain, search.creep_times(self._log)) if form.creep else plain
+        if not form.creep:
+            return self._plain[form.bends]
+        return self._richest if form.bends else self._with_creep(bends=False)
 
     def _outcome(self, name: str, fitted: Fitted) -> Fit:
         """Model and figures of a fit, made final by the nonlinear program where there is one."""

@@ -10,6 +10,7 @@ from piezoest._checks import FloatArray, array_1d
 from piezoest.compile import Vector, compiled
 from piezoest.estimators.coordinates import bridged
 from piezoest.fitting.rests import rests_of
+from piezoest.fitting.rows import dot
 from piezoest.fitting.runs import BoolArray, IntArray, runs
 from piezoest.fitting.surprise import is_peak, scale_of, surprise
 
@@ -169,7 +170,7 @@ class _Log:
 def _gain(u: FloatArray, x: FloatArray) -> float:
     """Size of the slope of the displacement over the voltage [µm/V]; jumps and spikes do little to it."""
     about = u - np.mean(u)
-    return abs(float(about @ x)) / float(about @ about)
+    return abs(dot(about, x)) / dot(about, about)
 
 
 def _delay(u: FloatArray, x: FloatArray) -> int:
@@ -179,7 +180,7 @@ def _delay(u: FloatArray, x: FloatArray) -> int:
     # A spike must not decide.
     bent_x = np.clip(bent_x, *np.quantile(bent_x, [0.01, 0.99]))
     longest = min(LONGEST_DELAY, bent_u.size // 4)
-    match = [float(bent_u[: bent_u.size - d] @ bent_x[d:]) for d in range(longest + 1)]
+    match = [dot(bent_u[: bent_u.size - d], bent_x[d:]) for d in range(longest + 1)]
     chance = float(np.linalg.norm(bent_u)) * float(np.std(bent_x))
     best = int(np.argmax(match))
     return best if match[best] - match[0] > UNUSUAL * chance else 0

@@ -19,7 +19,7 @@ from piezoest.fitting.search import LONGEST_DELAY
 from piezoest.models import ColemanHodgdon
 
 # Most passes over the record, and the relative change at which it has ended.
-MOST_PASSES, TOLERANCE = 20, 1e-8
+MOST_PASSES, TOLERANCE = 20, 1e-6
 
 
 class Polished(NamedTuple):
@@ -42,7 +42,10 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     limits = ColemanHodgdon.record_limits(2.0 * log.half) | {"delay": (0.0, LONGEST_DELAY)}
     problem = Problem(log.u, x, varied, np.empty(0) if fit_delay else np.array([delay]), limits=limits)
     model: Any = fitted.design.model(w)
-    start = problem.settled(varied.of(model.nearest_admissible(), {"delay": delay}))
+    model = model.nearest_admissible()
+    place = fitted.design.basis.initial_state(w, model) * model.alpha / model.b
+    start = varied.of(model, {"delay": delay, "place": place})
+    start = np.clip(start, *problem.bounds(start))
     solution = single_shooting(problem, start, "linear", 1.0, MOST_PASSES, TOLERANCE)
     end = outcome(problem, solution.q, coloured=True)
     value = end.value

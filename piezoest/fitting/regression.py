@@ -181,6 +181,17 @@ class Regression:
             w[behind] = self.solved(smoothness, used)[behind]
         return w
 
+    def beside(self, fitted: Fitted, log: Log, column: FloatArray) -> float:
+        """Coefficient of one more column (N,), fitted together with those of a fit and with creep gains."""
+        used = np.union1d(fitted.used, np.r_[self.design.gains])
+        sums = Sums.none(used.size + 1)
+        for place, rows in self.design.blocks(log.u, fitted.w):
+            counts = log.counts[place]
+            wider = np.column_stack([rows[:, used], column[place]])[counts]
+            sums = sums.plus(Sums.of(wider, log.x[place][counts]))
+        cost = np.pad(self._cost(fitted.smoothness)[np.ix_(used, used)], (0, 1))
+        return float(solve(sums, np.append(self.lower[used], -np.inf), cost)[-1])
+
     def gap(self, fitted: Fitted) -> float:
         """How far another solver's optimum is, relative to the displacement's mean square."""
         few, lower, penalty = self._of(fitted.smoothness, fitted.used, None)

@@ -30,3 +30,8 @@ def onto(rows: FloatArray, x: FloatArray) -> FloatArray:
 def times(rows: FloatArray, w: FloatArray) -> FloatArray:
     """Rows times coefficients (n,), shape (N,)."""
     return np.asarray(np.einsum("ij,j->i", rows, w))
+
+
+def dot(a: FloatArray, b: FloatArray) -> float:
+    """Sum of products of (N,) and (N,)."""
+    return float(np.einsum("i,i->", a, b))

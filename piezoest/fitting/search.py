@@ -29,6 +29,8 @@ MOVES = 0.1
 FEW, SMOOTH = 4000, 1e-4
 # Largest delay that is looked for [samples], and how closely it is found.
 LONGEST_DELAY, CLOSE = 10.0, 0.02
+# Samples by which a voltage is moved for the derivative by the delay.
+DELAY_STEP = 0.1
 # Gauss-Newton steps of the creep gains, the relative change at which they have settled, the least of them.
 STEPS, SETTLED, LEAST_CREEP = 8, 1e-3, 1e-3
 # Creep terms are a decade apart, from so many samples to so many times the record.
@@ -92,6 +94,17 @@ def best_delay(log: Log, start: Start) -> float:
         return missed(delayed, plays(delayed, start, bends=BENDS))
 
     return _least(cost, np.linspace(0.0, LONGEST_DELAY, 11), CLOSE)
+
+
+def delay_step(log: Log, given: FloatArray, fitted: Fitted, delay: float) -> float:
+    """Gauss-Newton step of the delay [samples]: all that is linear goes along.
+
+    `given` is the voltage without delay, whose delay by so many samples is the log's.
+    """
+    late_by = (max(delay - DELAY_STEP, 0.0), delay + DELAY_STEP)
+    before, after = (fitted.design.output(late(given, each), fitted.w) for each in late_by)
+    slope = (after - before) / (late_by[1] - late_by[0])
+    return fitted.regression.beside(fitted, log, slope)
 
 
 def best_alpha(log: Log) -> float:

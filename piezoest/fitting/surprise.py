@@ -10,13 +10,14 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.compile import Vector, compiled
+from piezoest.fitting.rows import gram, onto, times
 from piezoest.fitting.runs import BoolArray, IntArray
 
 # A scale that holds for so many samples, in which it is this quantile.
 BLOCK, QUANTILE = 32, 0.7
 NORMAL_QUANTILE = 1.0364  # of |e| of a normal deviate at that quantile
 # Bends of the input on either side of a sample that help to foresee it, and samples to learn that from.
-BENDS, TRAINED_ON = 2, 20_000
+BENDS, TRAINED_ON = 2, 10_000
 
 
 def surprise(y: FloatArray, inputs: FloatArray, each_side: int) -> FloatArray:
@@ -79,17 +80,18 @@ def _robust(A: FloatArray, b: FloatArray) -> FloatArray:
     used = np.ones(b.size, dtype=np.bool_)
     weights: FloatArray = np.zeros(A.shape[1])
     for _ in range(5):
-        off = np.abs(b - A @ weights)
+        off = np.abs(b - times(A, weights))
         scale = float(np.quantile(off, QUANTILE)) / NORMAL_QUANTILE
         used = off <= 4.0 * scale
         if not np.any(b) or np.sum(used) < 2 * weights.size:
             break
         # A column that hardly moves above the noise would else get any weight.
         likely = max(scale, 1e-6 * float(np.max(np.abs(b)))) ** 2 * np.eye(weights.size)
-        G = A[used].T @ A[used] + likely
+        near = A[used]
+        G = gram(near) + likely
         # Of a log without noise no two columns may differ.
         G += (1e-12 * np.max(np.diag(G)) + 1e-300) * np.eye(weights.size)
-        solved = np.linalg.solve(G, A[used].T @ b[used])
+        solved = np.linalg.solve(G, onto(near, b[used]))
         weights = np.asarray(solved, dtype=np.float64)
     return weights
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -10,20 +11,24 @@ from piezoest._checks import FloatArray
 from piezoest.fitting.program import RIDGE
 from piezoest.fitting.regression import EARLIER, Fitted, Log
 from piezoest.fitting.rows import onto, times
-from piezoest.fitting.runs import IntArray
+from piezoest.fitting.runs import BoolArray, IntArray
 
 # Blocks in time over which the gradients of a coloured residual are summed.
 BLOCKS = 25
-# Of readings lie within the interval; wider by this factor, for a fit is to hold for longer than the blocks
-# tell.
-WITHIN, MARGIN = 0.95, 1.15
-# Less and less is known of the level, as creep and drift go on: times ln(1 + time / length of the record),
-# and what is missed within it, or what drifts. Of 150 simulated logs (seeds 7200 to 7349 of
-# benchmarks/logs.py) as many readings lie inside in the first as in the second half behind what was fitted.
-LEVEL, DRIFTING = 1.2, 0.3
-# Beyond the range slopes are known to this fraction of the line's gain; if the model says itself how a stage
-# goes on, what it misses grows by this factor where the voltage goes as far again.
-BEYOND_GAIN, BEYOND_MISSED = 0.5, 3.0
+# Of what blocks left out miss, so much lies within the interval: what comes later is less like the record
+# than its blocks are like each other. In the median of 1000 simulated logs (seeds 7000 to 7999 of
+# benchmarks/logs.py), 97 of 100 later readings lie inside.
+WITHIN = 0.97
+# The level wanders as creep and drift go on: by so much of what the last block is off in the mean under the
+# fit of the first ones, times ln(1 + time behind the record / its length). As that block is half of their
+# length behind them, 2.5 would go on at that pace; but one block may be near by chance.
+LEVEL = 4.0
+# A voltage beyond a range by less than this fraction of it is as good as in it; a block counts whose voltage
+# is, for this part of it.
+NEARLY, ENOUGH = 0.02, 0.2
+# Beyond the range, slopes are known to this fraction of the line's gain; a quarter of it if the model says
+# itself how a stage goes on.
+BEYOND, FORETOLD = 0.4, 0.1
 # A coefficient is at its bound if it is nearer than this, relative to the largest.
 AT_BOUND = 1e-9
 
@@ -61,9 +66,10 @@ class Spread(NamedTuple):
     within : float
         In the record.
     behind : float
-        More behind the record, times ln(1 + time since its end / its length): creep and drift go on.
+        More behind the record, times ln(1 + time since its end / its length): the level wanders.
     by_volt : float
-        More for each volt beyond its range: the slope there is known roughly only [µm/V].
+        More for each volt by which the voltage has gone beyond its range: the slope there is known roughly
+        only, and the stage remembers it [µm/V].
     visited : tuple of float
         That range [V].
     """
@@ -75,24 +81,59 @@ class Spread(NamedTuple):
 
     def along(self, u: FloatArray, later: FloatArray) -> FloatArray:
         """For each voltage, so many lengths of the record after its end, shape (N,)."""
-        low, high = self.visited
-        beyond = np.maximum(low - u, u - high).clip(0.0)
+        beyond = _beyond(u, self.visited)
         return np.sqrt(self.within**2 + (self.behind * np.log1p(later)) ** 2 + (self.by_volt * beyond) ** 2)
+
+
+def _beyond(u: FloatArray, visited: tuple[float, float]) -> FloatArray:
+    """How far the voltage has gone beyond a range so far, shape (N,) [V]."""
+    low, high = visited
+    return np.asarray(np.maximum.accumulate(np.maximum(low - u, u - high).clip(0.0)))
+
+
+def _range(u: FloatArray) -> tuple[float, float]:
+    return float(u.min()), float(u.max())
 
 
 def spread_of(fitted: Fitted, log: Log) -> Spread:
     """How far readings are from predictions, as the blocks left out show it.
 
     What comes after the record is like the blocks between others and like those behind all others: the
-    geometric mean of both counts.
+    geometric mean of both counts, of voltages that the fit without the block has seen.
     """
-    between, ahead = (float(np.nanquantile(np.abs(each), WITHIN)) for each in residuals(fitted, log))
-    within = MARGIN * float(np.sqrt(between * ahead))
-    drift = float(fitted.w[fitted.design.offset + 1])
-    own = BEYOND_MISSED * within / (2.0 * log.half)
-    by_volt = own if fitted.design.basis.foretells else BEYOND_GAIN * fitted.regression.line_gain
-    visited = float(log.u.min()), float(log.u.max())
-    return Spread(within, float(np.hypot(LEVEL * within, DRIFTING * drift)), by_volt, visited)
+    missed, ends = residuals(fitted, log), log.folds
+    blocks = [slice(*each) for each in pairwise(ends[1:])]
+    near = np.zeros(log.u.size, bool)
+    for block in blocks:
+        others = np.delete(log.u, block)
+        near[block] = _nearly_in(log.u[block], _range(others))
+    between = _typical(missed.left_out, near)
+    if between is None:
+        between = float(np.nanquantile(np.abs(missed.left_out), WITHIN))
+    first = int(ends[EARLIER])
+    near[first:] = _nearly_in(log.u[first:], _range(log.u[:first]))
+    ahead = _typical(missed.ahead, near)
+    last = float(np.nanmean(missed.ahead[blocks[-1]]))
+    by_gain = FORETOLD if fitted.design.basis.foretells else BEYOND
+    return Spread(
+        within=float(np.sqrt(between * (between if ahead is None else ahead))),
+        behind=LEVEL * abs(last),
+        by_volt=by_gain * fitted.regression.line_gain,
+        visited=_range(log.u),
+    )
+
+
+def _nearly_in(u: FloatArray, visited: tuple[float, float]) -> BoolArray:
+    return np.asarray(_beyond(u, visited) <= NEARLY * (visited[1] - visited[0]))
+
+
+def _typical(missed: FloatArray, near: BoolArray) -> float | None:
+    """What is missed at voltages near those that were seen [µm], where there are enough of them."""
+    known = np.isfinite(missed)
+    counts = known & near
+    if np.count_nonzero(counts) <= ENOUGH * np.count_nonzero(known):
+        return None
+    return float(np.quantile(np.abs(missed[counts]), WITHIN))
 
 
 def covariance(fitted: Fitted, log: Log) -> FloatArray:

@@ -14,7 +14,7 @@ from piezoest.fitting import FORMS, Fitter
 from piezoest.fitting.design import CHUNK, Design
 from piezoest.fitting.program import Sums
 from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression, add
-from piezoest.fitting.rows import times
+from piezoest.fitting.rows import dot, times
 from piezoest.fitting.search import BENDS, checked_delay, plays
 from piezoest.identification.advice import unsettled_sentence
 from piezoest.identification.choice import simplest
@@ -336,7 +336,7 @@ class _Judge:
                 error = np.abs(part.x[here] - output[here])
                 squares, largest, count = self._sums[held_out, of_line]
                 self._sums[held_out, of_line] = (
-                    squares + float(error @ error),
+                    squares + dot(error, error),
                     np.max(error, initial=largest),
                     count + error.size,
                 )

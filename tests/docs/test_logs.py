@@ -116,7 +116,7 @@ def test_coverage_counts_readings_without_spikes_and_later_jumps(judging: Any) -
 
 def test_the_chosen_and_the_best_are_judged_alike(judging: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     one = log()
-    predictions = {"a": lambda: one.truth + 0.3, "b": lambda: one.truth + 0.1, "c": lambda: one.truth + 9.0}
+    predictions = {"a": one.truth + 0.3, "b": one.truth + 0.1, "c": one.truth + 9.0}
     found = judging.Found("a", predictions, {"a": 0.5, "b": 0.2, "c": 0.9}, one.truth - 1.0, one.truth + 1.0)
     monkeypatch.setattr(judging, "draw", lambda seed: one)
     monkeypatch.setattr(judging, "fitted", lambda log: found)
@@ -136,7 +136,7 @@ def test_errors_are_rows_too(judging: Any, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(judging, "fitted", refuse)
     assert judging.judge(1)["failure"] == "ValueError: too little excitation"
     one = log()
-    found = judging.Found("a", {"a": lambda: np.full(N, np.nan)}, {"a": 0.5})
+    found = judging.Found("a", {"a": np.full(N, np.nan)}, {"a": 0.5})
     monkeypatch.setattr(judging, "fitted", lambda log: found)
     assert "not finite" in judging.judge(1)["failure"]
     assert one.noise == pytest.approx(0.02)
@@ -146,7 +146,7 @@ def test_parameters_are_compared_with_their_standard_errors(judging: Any) -> Non
     model = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
     one = log(family="coleman-hodgdon", model=model)
     found = judging.Found(
-        "a", {"a": lambda: one.truth}, {"a": 0.1}, theta=model.theta + np.array([0.002, -0.01, 0.1]),
+        "a", {"a": one.truth}, {"a": 0.1}, theta=model.theta + np.array([0.002, -0.01, 0.1]),
         errors={"alpha": 0.001, "beta": 0.01, "gamma": 0.0, "offset": 1.0},
     )  # fmt: skip
     row = judging.judged(one, TRAINED, found)
@@ -189,11 +189,12 @@ def test_the_adapter_knows_the_face_of_identify(judging: Any, monkeypatch: pytes
 
     def identify(u: Any, x: Any, *, sample_rate: float, train: float, model: str) -> Any:
         asked.append(model)
-        is_line = model == "line"
-        predicted = SimpleNamespace(x=one.truth + is_line, lower=one.truth - 1.0, upper=one.truth + 1.0)
+        predicted = SimpleNamespace(x=one.truth, lower=one.truth - 1.0, upper=one.truth + 1.0)
         candidates = [
-            SimpleNamespace(name=name, held_out=SimpleNamespace(rms=size))
-            for name, size in (("line", 1.0), ("plays", 0.1))
+            SimpleNamespace(
+                name=name, held_out=SimpleNamespace(rms=size), prediction=SimpleNamespace(x=one.truth + off)
+            )
+            for name, size, off in (("line", 1.0, 1.0), ("plays", 0.1, 0.0))
         ]
         return SimpleNamespace(
             chosen="plays", candidates=candidates, model=pz.ColemanHodgdon(0.02, 0.12, 0.0036),
@@ -202,10 +203,9 @@ def test_the_adapter_knows_the_face_of_identify(judging: Any, monkeypatch: pytes
 
     monkeypatch.setattr(judging.pz, "identify", identify)
     found = judging.fitted(one)
-    np.testing.assert_array_equal(found.predictions["plays"](), one.truth)
+    np.testing.assert_array_equal(found.predictions["plays"], one.truth)
+    np.testing.assert_array_equal(found.predictions["line"], one.truth + 1.0)
     assert asked == ["auto"]
-    np.testing.assert_array_equal(found.predictions["line"](), one.truth + 1.0)
-    assert asked == ["auto", "line"]
     assert found.held_out == {"line": 1.0, "plays": 0.1}
     assert found.theta == pytest.approx([0.02, 0.12, 0.0036])
     assert judging.coverage(one, TRAINED, found.lower, found.upper) == 1.0

@@ -90,6 +90,16 @@ def test_a_start_that_is_not_known_is_found(before: str) -> None:
     assert rms(found.predict().x - x) < 1.5 * sigma
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_creep_is_not_taken_for_a_delay(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    u = voltage(rng)
+    creep = pz.Creep([0.04, 0.04], [0.05, 0.5])
+    x = stage(rng, creep=creep).simulate(np.interp(np.arange(N) - 2.4, np.arange(N), u))
+    found = fit(u, x + noise(1e-3 * float(np.ptp(x))), "plays-creep", delay="auto")
+    assert found.delay == pytest.approx(2.4, abs=0.15)
+
+
 @pytest.mark.parametrize("delay", [0.0, 0.6, 3.3, 9.0])
 @pytest.mark.parametrize("model", ["plays", "coleman-hodgdon"])
 def test_a_delay_is_found_where_the_voltage_has_several_frequencies(delay: float, model: str) -> None:
