@@ -4,8 +4,8 @@ At rest the first readings say where the stage stands; one wrong one among them 
 voltage goes two per cent of its range and rests until the reading has come to rest too. The gain is what lies
 between two rests, where neither delay nor lag counts. An answer that drowns in noise or in steps of the
 converter doubles the way; one that is clear, but not sure, or came more slowly than the voltage went, is
-checked by a way twice as long: both must have been answered alike, else, as with backlash, the way is doubled.
-A gain that a user knows is not sought.
+checked by a way twice as long: both must have been answered alike, else, as with backlash, the way is
+doubled. A gain that a user knows is not sought.
 """
 
 from __future__ import annotations
@@ -64,9 +64,10 @@ FOLLOWS = 0.125
 STUCK = 240.0
 # The way that checks an answer is so many times as long: what slews is later on it.
 CHECK = 2.0
-# At rest the means of three windows differ by less than this fraction of the answer; so many windows are
-# enough at any rate; at least so many are looked at where there is no answer. A stage is slow that changes by
-# less than this fraction of the mean speed of the voltage, which is half as fast again midway.
+# At rest the means of two windows, of a slow stage of three, differ by less than this fraction of the answer;
+# so many windows are enough at any rate; at least so many are looked at where there is no answer. A stage is
+# slow that changes by less than this fraction of the mean speed of the voltage, which is half as fast again
+# midway.
 STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 4.0, 0.75
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
@@ -185,7 +186,10 @@ def _rests(start: Any, settings: Any) -> bool:
     # What rings or is noise differs by chance.
     chance = 3.0 * start.scatter * np.sqrt(2.0 / settings.window) + 0.5 * start.noise
     most = STILL * np.abs(start.now - start.from_x) + chance
-    still = max(np.abs(start.mean - start.mean_before), np.abs(start.mean - start.oldest_mean)) < most
+    # What came slowly may still come, hidden by chance for one window.
+    slow = start.change * settings.ramp < SLOW * np.abs(start.now - start.from_x)
+    still = np.abs(start.mean - start.mean_before) < most
+    still = still and (not slow or np.abs(start.mean - start.oldest_mean) < most)
     # Where nothing is seen yet, it may be late.
     least = 1.0 if np.abs(start.now - start.from_x) > _clear(start) else LATE
     return start.windows > least and (still or start.windows >= MOST_WINDOWS)
