@@ -31,8 +31,9 @@ LINE = record(
 EXPLAINED, CHANGE, LATER_CHANGE, CERTAIN = 0.8, 2.0, 1.3, 4.0
 # Points of which a line explains less than this share teach nothing at all.
 ANSWERED = 0.1
-# Without a line, the stage goes too far at so many times what the gain says.
-FARTHER = 1.5
+# Where no line explains the points, the stage goes too far at so many times what the gain says, if the voltage
+# was at a limit and if not.
+FARTHER, MUCH_FARTHER = 1.5, 2.5
 # A leg whose mean square is so many times that of the next one does not count beside it.
 UNLIKE = 6.0
 # ... and one so much smaller than the last is no leg, but part of the next, for so many turns.
@@ -101,14 +102,15 @@ def _draw(line: Any, u: Any, x: Any, square: Any, square_x: Any, product: Any) -
     """Draw the line through the middle of points, with their slope if they lie near it."""
     most = CHANGE if line.legs < CERTAIN else LATER_CHANGE
     answers = product * line.gain > 0.0 and product * product > ANSWERED * square * square_x
+    farther = (FARTHER if line.clipped != 0.0 else MUCH_FARTHER) * line.gain
     if product * product > EXPLAINED * square * square_x and product * line.gain > 0.0:
         gain = product / square
         line.gain *= min(max(gain / line.gain, 1.0 / most), most)
         if line.legs < 1.0 and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
             # What lags goes on while the voltage hardly moves.
             line.gain = CHANGE * line.first_gain
-    elif line.clipped != 0.0 and square_x > FARTHER * FARTHER * line.gain * line.gain * square > 0.0:
-        # The stage goes much farther than the line says, and the voltage from limit to limit: far too small.
+    elif square_x > farther * farther * square > 0.0:
+        # The stage goes much farther than the line says, late or ringing: with less voltage it does no harm.
         line.gain *= most
     elif not answers:
         # Readings that do not go with the voltage say nothing of the centre either: it would run away.
