@@ -31,8 +31,8 @@ LINE = record(
 EXPLAINED, CHANGE, LATER_CHANGE, CERTAIN = 0.8, 2.0, 1.3, 4.0
 # Points of which a line explains less than this share teach nothing at all.
 ANSWERED = 0.1
-# Where no line explains the points, the stage goes too far at so many times what the gain says, if the voltage
-# was at a limit and if not.
+# Where no line explains the points, the stage goes too far at so many times what the gain says, if the
+# voltage was at a limit and if not.
 FARTHER, MUCH_FARTHER = 1.5, 2.5
 # A leg whose mean square is so many times that of the next one does not count beside it.
 UNLIKE = 6.0
