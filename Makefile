@@ -108,7 +108,7 @@ POLICIES := policies=(RandomWalk(),DeadZone()) policies=(RandomWalk(),OutlierRej
             memory=1.0,offset=True,policies=(DeadZone(),ChangeDetection()) \
             memory=1.0,offset=True,policies=(DeadZone(),AmplitudeMemory())
 
-figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the documentation anew, in some hours
+figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the documentation anew, in some 40 minutes
 	$(BIN)/piezoest bench paper --json docs/data/paper.json --figures docs/figures/paper
 	$(BIN)/piezoest bench --tune 8 --output docs/_build/table --json docs/data/table.json --figures docs/figures/table
 	$(BIN)/piezoest bench --only HysteresisRLS $(foreach with,$(POLICIES),-e "HysteresisRLS($(with))") --stage paper --seeds 10 --output docs/_build/policies --json docs/data/policies.json
