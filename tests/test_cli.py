@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -68,7 +70,7 @@ def test_demo_reduces_the_error_by_ninety_percent(tmp_path: Path) -> None:
     # The start is wrong: without adaptation it is worse than the straight line.
     assert result.fixed.max_error(2) > result.linear.max_error(2)
     # The controller starts from nothing, and finds what the other one finds.
-    assert result.controller_reduction >= 0.88
+    assert result.controller_reduction >= 0.89
     assert result.learnt["beta"] == pytest.approx(result.adaptive.theta[-1, 1], rel=0.05)
     assert (
         LIMITS.minimum <= result.controller.voltage.min() < result.controller.voltage.max() <= LIMITS.maximum
@@ -127,6 +129,15 @@ def test_strict_refuses_a_doubtful_log(log: Path) -> None:
     assert run("identify", log, "--no-plot", "--strict").exit_code == 0
 
 
+def test_identify_the_example(tmp_path: Path, log: Path) -> None:
+    found = json.loads(run("identify", "example", "--json", "--no-plot").stdout)
+    assert found["samples"] == 14_155
+    # A file of that name comes first.
+    Path("example").write_bytes(log.read_bytes())
+    found = json.loads(run("identify", "example", "--json", "--no-plot").stdout)
+    assert found["samples"] < 14_155
+
+
 def test_identify_real_recording(data_dir: Path, tmp_path: Path) -> None:
     file = data_dir / "discrete_backlash_operator" / "test_1hz.csv"
     result = run("identify", file, "--json", "--plot", tmp_path / "figure.png")
@@ -178,6 +189,22 @@ def test_compensate_keeps_within_limits_and_says_so(reference: Path) -> None:
 
 
 LEARNT_ON = {"voltage": [-16.0, 16.0], "displacement": [1.0, 5.0], "rate": 400.0, "frequency": [5.0, 5.0]}
+
+
+@pytest.mark.parametrize("offset", [3.0, 0.0])
+def test_compensate_says_what_the_model_was_not_learnt_on(reference: Path, offset: float) -> None:
+    r = signals.triangle(2.0, 5.0, 4, RATE)
+    write_columns(reference, {"time_s": r.time, "reference_um": r.values + offset})
+    moved = () if offset == TRUE.offset else ("--offset", offset)
+    for change, lines in (
+        ({}, 0),
+        ({"frequency": None}, 0),
+        ({"rate": 100.0, "displacement": [2.0, 4.0]}, 2),
+    ):
+        Path("model.json").write_text(json.dumps({"model": TRUE.to_dict(), "learnt_on": LEARNT_ON | change}))
+        result = run("compensate", reference, "-p", "model.json", "-o", "voltage.csv", *moved)
+        assert result.exit_code == 0
+        assert len(result.stderr.strip().splitlines()) == lines
 
 
 def test_mistakes_in_logs(log: Path) -> None:
@@ -237,12 +264,34 @@ def test_mistakes_in_compensate(reference: Path) -> None:
     assert not Path("voltage.csv").exists()
 
 
+def test_a_disk_that_is_full_and_a_record_that_is_too_long(
+    log: Path, reference: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if Path("/dev/full").exists():
+        refused(run("compensate", reference, *THETA, "-o", "/dev/full"), "/dev/full: No space left")
+
+    def too_long(*_: object, **__: object) -> None:
+        raise MemoryError("Unable to allocate 8 TiB")
+
+    monkeypatch.setattr("piezoest.records.read_record", too_long)
+    refused(run("identify", log, "--no-plot"), "not enough memory: Unable to allocate 8 TiB")
+
+
 def test_nothing_is_written_over_what_was_read(log: Path, reference: Path) -> None:
     refused(run("identify", log, "--no-plot", "--output", log), "log.csv", "named twice")
     refused(run("identify", log, "--plot", "a.png", "--output", "./a.png"), "named twice")
     refused(run("compensate", reference, *THETA, "-o", reference), "reference.csv", "named twice")
     assert log.read_text().startswith("time_s,voltage_V")
     assert reference.read_text().startswith("time_s,reference_um")
+
+
+def test_an_encoding_without_our_signs_is_no_mistake(log: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "piezoest", "identify", str(log), "--no-plot"],
+        capture_output=True, text=True, env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "held out" in done.stdout
 
 
 def test_interrupt_is_quiet(monkeypatch: pytest.MonkeyPatch, log: Path) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -80,3 +82,34 @@ def test_every_page_is_in_a_table_of_contents() -> None:
     text = "\n".join(page.read_text(encoding="utf-8") for page in DOCS.glob("*.rst"))
     listed = set(re.findall(r"^   ([\w/]+)$", text, re.M))
     assert pages <= listed
+
+
+# ---------------------------------------------------------------- links
+
+
+GOOD = (
+    '<html><body id="top"><a href="other.html#there">x</a><a href="https://example.org">y</a></body></html>'
+)
+
+
+@pytest.mark.parametrize(
+    ("link", "said"),
+    [
+        ('<a href="none.html">', "none.html does not exist"),
+        ('<a href="other.html#gone">', "no such anchor"),
+        ('<a href="#gone">', "no such anchor"),
+        ('<img src="none.png">', "does not exist"),
+        ('<script src="https://cdn.example.org/x.js"></script>', "comes from elsewhere"),
+        ('<link rel="stylesheet" href="//cdn.example.org/x.css">', "comes from elsewhere"),
+    ],
+)
+def test_links_that_lead_nowhere_are_found(tmp_path: Path, link: str, said: str) -> None:
+    (tmp_path / "index.html").write_text(GOOD, encoding="utf-8")
+    (tmp_path / "other.html").write_text('<p id="there">z</p>', encoding="utf-8")
+    command = [sys.executable, str(DOCS / "check_links.py"), str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "index.html").write_text(GOOD + link, encoding="utf-8")
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert said in done.stderr
