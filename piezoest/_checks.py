@@ -81,10 +81,7 @@ def fraction(name: str, value: Any, low: float = 0.0, high: float = 1.0) -> floa
 
 
 def integer(name: str, value: Any, minimum: int = 0, maximum: int | None = None) -> int:
-    """Return `value` as an int from `minimum` to `maximum`; 3.0 passes, 3.5 does not.
-
-    What becomes a size has a `maximum`: a slip of the pen must not ask for all memory.
-    """
+    """Return `value` as an int from `minimum` to `maximum`; 3.0 passes, 3.5 does not."""
     number = finite(name, value)
     if number != int(number) or number < minimum or (maximum is not None and number > maximum):
         bounds = f"of at least {minimum}" if maximum is None else f"from {minimum} to {maximum}"
@@ -93,11 +90,7 @@ def integer(name: str, value: Any, minimum: int = 0, maximum: int | None = None)
 
 
 def number_or_nan(value: Any) -> float:
-    """Return what a driver gave as a float: NaN where it is not one real number.
-
-    Numbers of any kind, and arrays, lists and tuples of one of them, are numbers. Text, masked values,
-    complex numbers, other shapes and other objects are missing; nothing is raised.
-    """
+    """Return what a driver gave as a float; NaN where it is not one real number, whatever else it is."""
     if isinstance(value, float):
         return float(value)
     if value is None:

@@ -10,10 +10,7 @@ from typing import Any, get_type_hints
 
 
 def grouped(command: Callable[..., None]) -> Callable[..., None]:
-    """The command as typer reads it, with the fields of its dataclasses as options of its own.
-
-    `command`: arguments annotated with a dataclass are made of the options that its fields describe.
-    """
+    """The command as typer reads it: fields of the dataclasses among its arguments become options."""
     signature = inspect.signature(command, eval_str=True)
     groups: dict[str, Any] = {
         name: each.annotation for name, each in signature.parameters.items() if is_dataclass(each.annotation)

@@ -110,10 +110,7 @@ class Compiled:
         self.dispatcher._cache = MachineCode(function, _OPTIONS)
 
     def of(self, *layouts: named.Record) -> Callable[..., Any]:
-        """Return the machine code for records of these layouts, in the order of the arguments.
-
-        TypeError if there are not as many layouts as records.
-        """
+        """Return the machine code for records of these layouts, in the order of the arguments."""
         entry = self._entries.get(layouts)
         if entry is None:
             entry = self._entries[layouts] = self._made(layouts)

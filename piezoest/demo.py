@@ -107,12 +107,7 @@ class Demo:
 
 
 def run_demo(periods: int = 15, seed: int = 0, progress: Callable[[str], None] | None = None) -> Demo:
-    """Run the demonstration on `PaperStage`, with noise and quantisation.
-
-    `periods`: periods of the smoothed triangle, 0.2 s each; at least 2. `seed`: start of the random numbers
-    of the stage's noise. `progress`: called with a sentence before each part. ValueError if `periods` is
-    below 2.
-    """
+    """Run the demonstration on `PaperStage`, with noise and quantisation."""
     periods = integer("periods", periods, SETTLED_PERIODS)
     say = progress or (lambda _: None)
     # A moment of each way first, so that what Numba compiles once does not count as time of the runs.

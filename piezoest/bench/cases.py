@@ -125,12 +125,7 @@ class Draft:
     def case(
         self, reference: Signal, *, spread: float = WARM, period: float | None = None, **rest: Any
     ) -> Case:
-        """Make the case: a start is drawn, and the stage is as the conditions say.
-
-        `reference`: what the stage has to follow [µm]. `spread`: a start parameter is off by up to this
-        fraction: `COLD` or `WARM`. `period`: samples over which an error is taken; default a period of the
-        wave. `**rest`: other fields of `Case`. ValueError if the reference is not a signal.
-        """
+        """Make the case from a drawn start, off by up to `spread`; `rest` are other fields of `Case`."""
         instance("reference", reference, Signal, "a Signal: make one of values, sample rate and period")
         given = self.conditions
         options = {
@@ -154,10 +149,7 @@ class Draft:
 
 
 def drawn_start(rng: np.random.Generator, spread: float) -> ColemanHodgdon:
-    """Start model with each parameter off by up to `spread`; drawn again until it is admissible.
-
-    `spread`: fraction of each parameter's value.
-    """
+    """Start model with each parameter off by up to `spread`; drawn again until it is admissible."""
     while True:
         model = ColemanHodgdon.from_theta(RIGHT_MODEL.theta * (1.0 + rng.uniform(-spread, spread, 3)))
         if model.is_admissible:

@@ -25,12 +25,9 @@ def compare(
 ) -> dict[str, Any]:
     """Compare the runs of two campaigns with the same settings, pair by pair.
 
-    `level`: false discovery rate: the share of the changes found that may be none. `relevant`: least relative
-    change of the median that counts. Returns ``rows``: for each estimator and number, over all scenarios and
-    for each, the number of pairs and of those that changed, the median ratio of the latter, p, q (p with the
-    other comparisons allowed for) and the verdict; ``pairs``, ``counts`` and ``notes``. A verdict is "same"
-    (to the last bit), "within noise", "negligible", "better", "worse", or "too few seeds": not even a change
-    of all pairs in one direction would be told from noise.
+    Returns for each estimator and number the pairs, how many changed, the median ratio of these, p, q (p with
+    the other comparisons allowed for) and a verdict: "same" (to the last bit), "within noise", "negligible",
+    "better", "worse", or "too few seeds", where not even a change of all pairs would be told from noise.
     """
     both = first.merge(second, on=RUN, suffixes=("", "_after"))
     rows = [
@@ -52,10 +49,7 @@ def compare(
 
 
 def check_conditions(first: Mapping[str, Any], second: Mapping[str, Any]) -> None:
-    """Refuse to compare campaigns whose runs differ in more than the code.
-
-    `first`, `second`: documents of `piezoest.bench.table.describe`.
-    """
+    """Refuse to compare campaigns whose runs differ in more than the code."""
     one, other = first["conditions"], second["conditions"]
     differing = [
         f"{name} is {one.get(name)} in A and {other.get(name)} in B"

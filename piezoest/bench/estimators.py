@@ -97,10 +97,7 @@ def class_of(name: str) -> type:
 
 
 def module_of(text: str) -> Path | None:
-    """File of an estimator of one's own; None for one of the package.
-
-    `text`: as `candidate` reads it, or `LINEAR`.
-    """
+    """File of an estimator of one's own; None for one of the package."""
     if ":" not in name_of(text):
         return None
     source = inspect.getsourcefile(_load(name_of(text)))

@@ -123,11 +123,8 @@ def on_dask(
 ) -> Iterator[Result]:
     """Work on items with Dask: the work of a worker that is lost is done again by another.
 
-    `work`: what is done with each; a function of a module that the workers have. `scheduler`: address of a
-    cluster's scheduler, as in ``tcp://10.0.0.1:8786``; default a cluster of this machine's cores, for the
-    time of the work. `processes`: workers of the latter; default one for each core. `crashed`: result of an
-    item over which worker after worker died. Without it that is an error. `modules`: files that the workers
-    need to import, sent to them first.
+    `scheduler`: address of a cluster's; default one of this machine's cores. `crashed`: result of an item
+    over which worker after worker died; without it that is an error. `modules`: files that workers import.
     """
     try:
         import distributed

@@ -40,10 +40,7 @@ class Metrics:
 
 
 def measure(record: TrackingRecord, linear: TrackingRecord, case: Case) -> Metrics:
-    """Take the numbers of a run.
-
-    `linear`: of linear feed-forward with an estimated gain, on an identical stage.
-    """
+    """Take the numbers of a run."""
     error, linear_error = np.abs(record.error), np.abs(linear.error)
     edges = period_edges(case.change, case.period, error.size)
     periods = edges.size - 1
@@ -74,10 +71,7 @@ def measure(record: TrackingRecord, linear: TrackingRecord, case: Case) -> Metri
 
 
 def settles(errors: FloatArray, level: float) -> int | None:
-    """Periods until every further error is below a level; None if the last one is not.
-
-    `errors` (M,): largest error of each period.
-    """
+    """Periods until every further error is below a level; None if the last one is not."""
     above = np.flatnonzero(~(errors < level))
     if above.size == 0:
         return 0
@@ -86,17 +80,11 @@ def settles(errors: FloatArray, level: float) -> int | None:
 
 
 def period_edges(change: int, period: float, size: int) -> IntArray:
-    """First samples of the whole periods from the change on, and the end of the last.
-
-    `period`: in samples, not necessarily whole.
-    """
+    """First samples of the whole periods from the change on, and the end of the last."""
     edges = np.rint(change + period * np.arange(int((size - change) / period) + 2)).astype(np.int64)
     return edges[edges <= size]
 
 
 def largest(error: FloatArray, edges: IntArray) -> FloatArray:
-    """Largest value between each two edges.
-
-    `error` (N,): of either sign left out. `edges` (M + 1,): rising. Returns shape (M,).
-    """
+    """Largest value between each two edges."""
     return np.maximum.reduceat(error[: edges[-1]], edges[:-1])

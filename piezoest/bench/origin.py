@@ -37,11 +37,7 @@ def put(document: dict[str, Any], path: Path | None) -> None:
 
 
 def json_safe(value: Any, digits: int | None = None) -> Any:
-    """The same with plain lists, and None for what is not finite.
-
-    `value`: of dictionaries, lists, tuples and plain values. `digits`: significant digits of numbers, for a
-    document that is kept: more would say nothing. Default all.
-    """
+    """The same with plain lists, None for what is not finite, and so many significant digits."""
     match value:
         case dict():
             return {key: json_safe(item, digits) for key, item in value.items()}

@@ -14,11 +14,7 @@ HEADINGS = {"overview": "Errors", "adaptation": "Adaptation", "settled": "Where 
 
 
 def write_html(document: Document, path: str | Path) -> None:
-    """Write a result of `piezoest bench` as one page that needs no network.
-
-    `document`: what the command writes with ``--json``. `path`: file to write; an existing one is replaced.
-    OSError if the file cannot be written.
-    """
+    """Write a result of `piezoest bench` as one page that needs no network."""
     suite = document.get("suite")
     if suite not in PAGES:
         raise ValueError(

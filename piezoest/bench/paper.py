@@ -116,13 +116,9 @@ def run_paper(
     workers: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> PaperResult:
-    """Run the paper's experiment on the simulated stage.
+    """Run the paper's experiment on the simulated stage, and one row with further memories.
 
-    `memory`: time constant of the estimator's forgetting [s]; the paper names none. `memories`: further ones,
-    for the error of one row against memory. `seed`: start of the random numbers of the stage's noise.
-    `workers`: processes to run in; default one for each processor, 1 for this one. A script that calls this
-    with others needs ``if __name__ == "__main__":``. `progress`: called with a sentence after each run.
-    ValueError if memory or seed is out of its range.
+    A script that calls this with other `workers` than 1 needs ``if __name__ == "__main__":``.
     """
     memory, seed = positive("memory", memory), integer("seed", seed)
     sweep = sorted({positive("memories", value) for value in memories} - {memory})

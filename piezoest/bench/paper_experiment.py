@@ -150,11 +150,7 @@ class Run:
 
     @property
     def settling_periods(self) -> int | None:
-        """Periods until the largest error of every period stays below 1.1 times `max_error`.
-
-        None if that is not within the first half of the run: what calms down only at its end may not stay
-        calm.
-        """
+        """Periods until all errors stay below 1.1 times `max_error`; None if not in the run's first half."""
         late = np.flatnonzero(np.asarray(self.errors) > SETTLED * self.max_error)
         settled = int(late[-1]) + 1 if late.size else 0
         return settled if settled <= len(self.errors) // 2 else None

@@ -43,10 +43,7 @@ def _figures(result: PaperResult) -> Iterator[tuple[str, Figure]]:
 
 
 def input_output_map(run: Run) -> Figure:
-    """Fig. 3: displacement over voltage, the stage's and that of the identified model.
-
-    `run`: hysteresis compensation of a triangle.
-    """
+    """Fig. 3: displacement over voltage, the stage's and that of the identified model."""
     record = last_periods(run.stationary, 1)
     voltage, displacement = record.voltage, record.displacement
     model = ColemanHodgdon(*run.parameters)
@@ -64,10 +61,7 @@ def input_output_map(run: Run) -> Figure:
 
 
 def triangle_tracking(linear: Run, inverse: Run) -> Figure:
-    """Fig. 4: time series (a), (b) and reference-to-displacement maps (c), (d).
-
-    `linear`, `inverse`: both compensations of the same triangle.
-    """
+    """Fig. 4: time series (a), (b) and reference-to-displacement maps (c), (d)."""
     figure = _figure(10.0, 7.4)
     series, maps = figure.subplots(2, 2, height_ratios=[1.0, 1.3])
     for column, (letters, run) in enumerate((("ac", linear), ("bd", inverse))):
@@ -79,10 +73,7 @@ def triangle_tracking(linear: Run, inverse: Run) -> Figure:
 
 
 def prbs_tracking(linear: Run, inverse: Run) -> Figure:
-    """Fig. 5: time series (a), (b) of the filtered PRBS.
-
-    `linear`, `inverse`: both compensations of the same signal.
-    """
+    """Fig. 5: time series (a), (b) of the filtered PRBS."""
     figure = _figure(10.0, 3.8)
     for axes, letter, run in zip(figure.subplots(1, 2), "ab", (linear, inverse), strict=True):
         _series(axes, letter, run, periods=1)

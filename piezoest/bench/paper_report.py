@@ -98,10 +98,7 @@ def _settling(run: dict[str, Any]) -> str:
 
 
 def print_report(document: dict[str, Any], console: Any) -> None:
-    """Print the tables, the transients, the sweep and the verdict.
-
-    `document`: what `piezoest bench paper --json` writes.
-    """
+    """Print the tables, the transients, the sweep and the verdict."""
     for number, title in TITLES.items():
         heading, body = table(document["tables"], number)
         _print(console, title, heading, body, group=3)

@@ -47,10 +47,7 @@ class Published:
         return bounds.get(self.quantity)
 
     def deviation(self, ours: float) -> float:
-        """Deviation of `ours`, relative to the value or in points of per cent.
-
-        `ours`: the same number from the simulated stage.
-        """
+        """Deviation of `ours`, relative to the value or in points of per cent."""
         difference = ours - self.value
         return difference if self.quantity == IN_POINTS else difference / self.value
 

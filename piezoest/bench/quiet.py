@@ -9,10 +9,7 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Keep what piezoest logs from the screen, where Python puts warnings that nobody has asked for.
-
-    Handlers that somebody has set up are given them as before.
-    """
+    """Keep what piezoest logs from the screen, where Python puts warnings that nobody has asked for."""
     log, nobody = logging.getLogger("piezoest"), logging.NullHandler()
     log.addHandler(nobody)
     try:

@@ -30,10 +30,7 @@ SEGMENTS = 10  # of the rest, the largest error of each of which is taken
 
 
 def logs_of(pattern: str) -> list[str]:
-    """Names that stand for recorded logs in the place of scenarios.
-
-    `pattern`: a file, a folder of CSV files, or a pattern such as ``fleet/*.csv``.
-    """
+    """Names that stand for recorded logs: those of a file, a folder, or a pattern like ``fleet/*.csv``."""
     files = sorted(glob(f"{pattern}/*.csv" if Path(pattern).is_dir() else pattern, recursive=True))
     if not files:
         raise ValueError(f"no log is found at {pattern}")
@@ -41,10 +38,7 @@ def logs_of(pattern: str) -> list[str]:
 
 
 def file_of(scenario: str) -> Path | None:
-    """File of a scenario that is a recorded log; None of any other.
-
-    `scenario`: name in the place of a scenario's.
-    """
+    """File of a scenario that is a recorded log; None of any other."""
     return Path(scenario.removeprefix(LOG)) if scenario.startswith(LOG) else None
 
 
@@ -55,12 +49,7 @@ def digest(path: Path) -> str:
 
 
 def numbers(path: Path, estimator: str | None) -> dict[str, Any]:
-    """Take the numbers of one estimator on one log.
-
-    `path`: of the log, as `piezoest.records.read_record` reads it. `estimator`: as
-    `piezoest.bench.estimators.candidate` reads it; None for the straight line. Returns columns of
-    `piezoest.bench.run.COLUMNS` that a log has: there is no change to settle after.
-    """
+    """Numbers of an estimator, or of the straight line (None), on a log: it has no change to settle after."""
     data, sample_rate = _read(path)
     learnt = round(LEARNT * data.u.size)
     first = prepare(data.u[:learnt], data.measured()[:learnt])

@@ -58,10 +58,7 @@ def overview_table(document: Document) -> Table:
 
 
 def settles(quantiles: Sequence[float | None] | None, settled: int, runs: int) -> str:
-    """Periods until a run settles, and how many of a hundred runs do.
-
-    `quantiles`: median and 5 and 95 % quantile.
-    """
+    """Periods until a run settles, and how many of a hundred runs do."""
     median = "—" if quantiles is None or quantiles[0] is None else f"{quantiles[0]:.0f}"
     return f"{median} ({100 * settled // max(runs, 1)} %)"
 

@@ -57,20 +57,13 @@ class Task:
 
 
 def code_of(estimator: str) -> str:
-    """Fingerprint of this package and, for an estimator of one's own, of its module.
-
-    `estimator`: as `piezoest.bench.estimators.candidate` reads it, or "linear feed-forward".
-    """
+    """Fingerprint of this package and, for an estimator of one's own, of its module."""
     return machine.code_of(module_of(estimator))
 
 
 @quiet()
 def play(task: Task) -> Row:
-    """Run a task.
-
-    Returns `COLUMNS` and ``errors``; what the estimator raised is its ``failure``, its traceback stands under
-    ``traceback``, and then what is not known is None, as is what is not finite.
-    """
+    """Run a task; what it raised is its ``failure``, and what is not known or not finite is None."""
     row = _empty(task)
     try:
         log = recorded.file_of(task.scenario)
@@ -112,11 +105,7 @@ def _linear(scenario: str, seed: int, given: tuple[tuple[str, Any], ...]) -> tup
 
 
 def follow(case: Case, estimator: str) -> TrackingRecord:
-    """Let a stage follow the reference of a case.
-
-    `estimator`: as `piezoest.bench.estimators.candidate` reads it, a controller among them, or "linear
-    feed-forward". ValueError if the estimator is unknown.
-    """
+    """Let a stage follow a case's reference, with an estimator, a controller or linear feed-forward."""
     rate = case.sample_rate
     transfer = max(1, round(TRANSFER * rate))
     compensator: LinearCompensator | InverseCompensator

@@ -34,10 +34,7 @@ class Scenario:
     make: Callable[[Draft], Case] = field(repr=False)  # case from a `Draft`
 
     def build(self, seed: int, **overrides: Any) -> Case:
-        """Make the run of one seed.
-
-        `**overrides`: fields of `Conditions`. ValueError if a value is out of its range.
-        """
+        """Make the run of one seed; `overrides` are fields of `Conditions`."""
         seed = integer("seed", seed)
         rng = np.random.default_rng([seed, *self.name.encode()])
         return self.make(Draft(self.name, seed, rng, Conditions(**overrides)))
@@ -48,10 +45,7 @@ UNREPEATED = ("prbs", "random-walk", "two-tone")  # minor loops, or no period wi
 
 
 def scenario(name: str, description: str) -> Callable[[Callable[[Draft], Case]], Callable[[Draft], Case]]:
-    """Decorator that enters a function from `Draft` to `Case` into `SCENARIOS`.
-
-    `name`, `description`: as in `Scenario`.
-    """
+    """Decorator that enters a function from `Draft` to `Case` into `SCENARIOS`."""
     if name in SCENARIOS:
         raise ValueError(f"there is a scenario {name} already: choose another name")
 

@@ -87,10 +87,7 @@ def counting(what: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextlib.contextmanager
 def usage(folder: Path | None = None) -> Iterator[None]:
-    """Turn a wrong name or value into a message, exit code 2, and an interruption into 130.
-
-    With a folder that finished runs are kept in, an interruption says how to go on.
-    """
+    """Turn a wrong name or value into a message, exit code 2, and Ctrl-C into 130 and how to go on."""
     try:
         yield
     except ValueError as error:

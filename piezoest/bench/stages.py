@@ -29,12 +29,7 @@ def make_stage(
     gain_schedule: Any = None,
     creep: bool = True,
 ) -> SimulatedStage:
-    """Make a stage at rest; the same arguments give the same stage, its noise included.
-
-    `name`: in `STAGES`. `sample_rate`: [Hz]. `seed`: of the shape of the loop and of the noise. `noise`:
-    standard deviation of the gauge's noise [µm]; default that of the paper's. `gain_schedule`: time [s] and
-    factor of the hysteresis, see `PaperStage`.
-    """
+    """Make a stage at rest; the same arguments give the same stage, its noise included."""
     if name not in STAGES:
         raise ValueError(f"stage must be one of {', '.join(STAGES)}, got {name!r}")
     paper = PaperStage(sample_rate, seed, noise=noise, gain_schedule=gain_schedule, creep=creep)

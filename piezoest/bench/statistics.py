@@ -57,10 +57,7 @@ NEEDS = (
 
 
 def relative(runs: pd.DataFrame) -> pd.DataFrame:
-    """Runs with errors relative to the amplitude; what failed has large ones, and never settles.
-
-    `runs`: columns of `piezoest.bench.run.COLUMNS`.
-    """
+    """Runs with errors relative to the amplitude; what failed has large ones, and never settles."""
     frame = runs.copy()
     amplitude = frame["amplitude"].astype(float)
     for name in QUANTITIES:
@@ -73,26 +70,17 @@ def relative(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def logarithms(frame: pd.DataFrame, quantity: str) -> pd.DataFrame:
-    """Logarithm of an error: a row for each stage and scenario, a column for each seed.
-
-    `frame`: runs of one estimator, from `relative`. `quantity`: in `QUANTITIES`.
-    """
+    """Logarithm of an error: a row for each stage and scenario, a column for each seed."""
     return np.log(frame.pivot_table(index=["stage", "scenario"], columns="seed", values=quantity))
 
 
 def over_scenarios(frame: pd.DataFrame, quantity: str) -> float:
-    """Geometric mean over stages and scenarios of the median over the seeds.
-
-    `frame`: runs of one estimator, from `relative`. `quantity`: in `QUANTITIES`.
-    """
+    """Geometric mean over stages and scenarios of the median over the seeds."""
     return math.exp(float(logarithms(frame, quantity).median(axis=1).mean()))
 
 
 def interval(frame: pd.DataFrame, quantity: str) -> list[float]:
-    """The same, and the 95 % interval that other seeds would lie in, by the bootstrap over the seeds.
-
-    `frame`: runs of one estimator, from `relative`. `quantity`: in `QUANTITIES`.
-    """
+    """The same, and the 95 % interval that other seeds would lie in, by the bootstrap over the seeds."""
     values = logarithms(frame, quantity).to_numpy()
     found = math.exp(float(np.mean(np.nanmedian(values, axis=1))))
     seeds = values.shape[1]
@@ -153,10 +141,7 @@ def _ratio(d: FloatArray) -> list[float]:
 
 
 def holm(p: Sequence[float]) -> list[float]:
-    """Values of p that allow for the number of comparisons (Holm 1979).
-
-    `p`: of each comparison; 1 for what is compared with itself, which is none.
-    """
+    """Values of p that allow for the number of comparisons (Holm 1979)."""
     number = sum(value < 1.0 for value in p)
     found, largest = list(p), 0.0
     for rank, k in enumerate(sorted(range(len(p)), key=lambda k: p[k])):
@@ -166,10 +151,7 @@ def holm(p: Sequence[float]) -> list[float]:
 
 
 def signed_rank(d: FloatArray) -> float:
-    """Two-sided p of Wilcoxon's signed ranks; zeros are left out, and few pairs are tried in full.
-
-    `d` (N,): differences, infinite ones larger than all others. Returns 1 if all but one are zero.
-    """
+    """Two-sided p of Wilcoxon's signed ranks; zeros are left out, infinite ones are the largest."""
     from scipy.stats import PermutationMethod, wilcoxon
 
     d = d[d != 0.0]

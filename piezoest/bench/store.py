@@ -29,10 +29,7 @@ Task = TypeVar("Task", bound=Keyed)
 
 
 class Store:
-    """Rows in a file, to be used in a ``with`` statement.
-
-    `path`: made if it is not there; with its folder.
-    """
+    """Rows in a file, made if it is not there; to be used in a ``with`` statement."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -57,10 +54,7 @@ class Store:
         return len(self._rows)
 
     def append(self, row: Row) -> bool:
-        """Keep a row, at once; False if its key is known already, and then the first one stands.
-
-        `row`: JSON-safe, with a ``"key"``.
-        """
+        """Keep a row, at once; False if its key is known already, and then the first one stands."""
         if row["key"] in self._rows:
             return False
         line = json.dumps(row, allow_nan=False, ensure_ascii=False).encode() + b"\n"
@@ -107,12 +101,7 @@ def carry_out(
     execute: Callable[[Iterable[Task]], Iterator[Row]],
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> None:
-    """Run what the store does not hold yet.
-
-    `store`: open; holds all of their rows afterwards. `execute`: gives the row of each task it is given, in
-    any order: see `piezoest.bench.executors`. `progress`: called with the number of finished runs and of all,
-    at first and after each.
-    """
+    """Run what the store does not hold yet; `progress` is called with the runs done, and with all."""
     todo = [task for task in tasks if task.key not in store]
     done = len(tasks) - len(todo)
     progress(done, len(tasks))

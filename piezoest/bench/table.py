@@ -99,11 +99,7 @@ def over_cores(processes: int | None = None) -> Any:
 def over_dask(
     scheduler: str | None = None, processes: int | None = None, estimators: Iterable[str] = ()
 ) -> Any:
-    """Run tasks on Dask.
-
-    `scheduler`: address of a cluster's scheduler; default a cluster of this machine's cores. `processes`:
-    workers of the latter; default one for each core. `estimators`: those whose modules the workers need.
-    """
+    """Run tasks on Dask, a cluster's or this machine's processes; it is sent the estimators' modules."""
     modules = sorted({path for name in estimators if (path := module_of(name)) is not None})
     work = partial(_play_same, ours=fingerprint())
     return partial(on_dask, work, scheduler=scheduler, processes=processes, crashed=crashed, modules=modules)
@@ -119,10 +115,7 @@ def _play_same(task: Task, ours: str) -> Row:
 
 
 def label(text: str, tuned: Iterable[str] = ()) -> str:
-    """Name of an estimator in tables and figures.
-
-    `text`: as `piezoest.bench.estimators.candidate` reads it, or "linear feed-forward".
-    """
+    """Name of an estimator in tables and figures."""
     if text == PAPERS:
         return "HysteresisRLS, the paper's law"
     if text in set(tuned):
@@ -131,10 +124,7 @@ def label(text: str, tuned: Iterable[str] = ()) -> str:
 
 
 def write(rows: Sequence[Row], folder: Path, format: str | None = None) -> pd.DataFrame:
-    """Write the tables `runs` and `periods`.
-
-    `rows`: from `piezoest.bench.run.play`. `format`: default Parquet where pyarrow is installed.
-    """
+    """Write the tables `runs` and `periods`."""
     format = tables.checked_format(format)
     runs = tables.table_of(rows, COLUMNS)
     tables.write_table(runs, folder / f"{RUNS}.{format}")
@@ -144,12 +134,7 @@ def write(rows: Sequence[Row], folder: Path, format: str | None = None) -> pd.Da
 
 
 def costs(estimators: Iterable[str], given: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Times of each estimator per sample, one after the other, on a recorded cold start.
-
-    `estimators`: as `piezoest.bench.estimators.candidate` reads them. `given`: fields of
-    `piezoest.bench.cases.Conditions`. Returns by estimator, from `piezoest.bench.cost.cost`; empty for one
-    that fails.
-    """
+    """Times of each estimator per sample on a recorded cold start; empty for one that fails."""
     case = SCENARIOS["cold-start"].build(0, **given)
     record = follow(case, LINEAR)
     found: dict[str, dict[str, Any]] = {}

@@ -35,21 +35,13 @@ def checked_format(format: str | None) -> str:
 
 
 def table_of(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, type]) -> pd.DataFrame:
-    """Table of rows.
-
-    `rows`: what they have beside the columns is left out. `columns`: names in their order: str, int, float or
-    bool.
-    """
+    """Table of rows."""
     cells = [[row.get(name) for name in columns] for row in rows]
     return pd.DataFrame(cells, columns=list(columns)).astype(_types(columns))
 
 
 def write_table(table: pd.DataFrame, path: Path) -> None:
-    """Write a table, whole or not at all.
-
-    `table`: from `table_of`. ValueError if the name ends in something else, or pyarrow is not installed for
-    Parquet.
-    """
+    """Write a table, whole or not at all."""
     write = table.to_parquet if checked_format(path.suffix[1:]) == "parquet" else table.to_csv
     with replacing(path) as temporary:
         write(temporary, index=False)

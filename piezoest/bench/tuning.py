@@ -73,10 +73,7 @@ class Tunable:
     space: Space = field(default_factory=dict)  # from the names in the template
 
     def text(self, point: Sequence[float]) -> str:
-        """Description of the estimator at a point of its space.
-
-        `point`: within [0, 1), one for each value.
-        """
+        """Description of the estimator at a point of its space."""
         values = {
             name: repr(self.space[name].at(position))
             for name, position in zip(self.space, point, strict=True)
@@ -127,11 +124,7 @@ SPACES: dict[str, tuple[str, Space]] = {
 
 
 def tunable(text: str) -> Tunable:
-    """What may be tuned of an estimator.
-
-    `text`: as `piezoest.bench.estimators.candidate` reads it. What is written with arguments is taken as it
-    stands, but for those that all of a class are given (`piezoest.bench.estimators.KNOWN`).
-    """
+    """What may be tuned of an estimator; what is written with arguments is taken as it stands."""
     name = name_of(text)
     if "(" in text and text != KNOWN.get(name):
         return Tunable(text)
@@ -157,11 +150,7 @@ def _call(name: str, space: Space, given: str = "") -> str:
 
 
 def draws(tunable: Tunable, number: int, seed: int) -> list[str]:
-    """Descriptions of the estimator all over its space: a Sobol sequence, shifted at random.
-
-    `number`: a power of two, for the sequence to be balanced. Returns the default comes first, whatever the
-    number; without a space it is alone.
-    """
+    """The default, then descriptions all over its space: a Sobol sequence, shifted at random."""
     from scipy.stats import qmc
 
     if integer("number", number, 1) & (number - 1):
@@ -184,11 +173,8 @@ def tune(
 ) -> list[dict[str, Any]]:
     """Find the best settings of each estimator, by the same budget, on seeds that nothing is judged on.
 
-    `estimators`: as `piezoest.bench.estimators.candidate` reads them. `number`: settings of each that are
-    tried beside the default; a power of two. `given`: fields of `piezoest.bench.cases.Conditions`. `execute`:
-    such as `piezoest.bench.table.over_cores`. `progress`: as `piezoest.bench.store.carry_out` calls it.
-    Returns of each estimator that has a space and is not slow: its ``default``, its trials with their scores,
-    and the ``chosen`` one. A score is the geometric mean of the typical errors, relative to the amplitude.
+    Slow ones are left out. Returns trials with their scores, geometric means of the typical errors relative
+    to the amplitude, and the ``chosen`` one.
     """
     spaces = [each for text in estimators if not is_slow(text) and (each := tunable(text)).space]
     # The same points for all: two with the same space get the same settings.

@@ -16,10 +16,7 @@ JITTER = 1e-12
 
 
 def arrival_cost(problem: Problem, q: FloatArray, k: int, walk: FloatArray) -> tuple[FloatArray, Prior]:
-    """Coordinates and prior of the window that starts at point k of this one.
-
-    All is linearised about coordinates q (n,), whose random walk meanwhile has the standard deviations (n,).
-    """
+    """Coordinates and prior of the window that starts at point k of this one."""
     prior = problem.prior
     assert prior is not None
     residual, jacobian = problem.evaluate(q)

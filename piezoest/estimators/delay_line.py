@@ -26,10 +26,7 @@ def delay_line(delay: float) -> tuple[Field, dict[str, float]]:
 
 @inlined
 def delayed(line: Any, u: Any) -> Any:
-    """Voltage as the sensor sees it now, u the newest; u itself where nothing is delayed.
-
-    Before the first voltages have passed through, the first one counts.
-    """
+    """Voltage as the sensor sees it now, u the newest; before any has passed through, the first one."""
     if line is None:
         return u
     size = len(line.voltages)

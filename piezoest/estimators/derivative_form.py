@@ -115,10 +115,7 @@ def learn_anew(belief: Any) -> None:
 
 @inlined
 def is_believable(belief: Any, rejection: Any, state: Any, estimate: Any, unit: Any, x: Any) -> Any:
-    """Whether x is a reading that the stage can have made, after the last good one.
-
-    `estimate` is the law's, whose second number is the slope of the model, in the unit [µm/V].
-    """
+    """Whether x is a reading that the stage can have made, after the last good one."""
     if belief is None:
         return True
     dx = x_from_centre(state.centre, x) - state.x_last

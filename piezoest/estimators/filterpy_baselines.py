@@ -45,10 +45,7 @@ class _HysteresisFilter(ExtendedKalmanFilter):  # type: ignore[misc]
 
 
 class _FilterPyBaseline(EstimatorBase):
-    """What the two baselines share: bookkeeping around a filterpy object.
-
-    They hold a `HysteresisEKF`, which takes no samples: its state and settings are theirs.
-    """
+    """What the two baselines share: bookkeeping around a filterpy object."""
 
     __slots__ = ("_ekf", "_filter")
 

@@ -195,10 +195,7 @@ def _update(law: Any, plays: Any, window: Any, settings: Any, half_period: Any, 
 
 @register_jitable
 def _regrid(law: Any, plays: Any, window: Any, settings: Any, half_width: Any) -> None:
-    """Move to a grid of another half-width about the middle of the range seen.
-
-    The covariance returns to its start: what is new is unknown.
-    """
+    """Move to a grid about the middle of the range seen; what is new is unknown: P is the start's."""
     level = len(law.theta) - 1
     expected = output(law.theta, plays)
     play_grid.move(plays, settings, law.theta, half_width)

@@ -159,10 +159,7 @@ def is_discrete(time_base: TimeBase) -> bool:
 
 
 def covariance_matrix(name: str, value: Any, n: int) -> FloatArray:
-    """Return a covariance as a symmetric positive definite (n, n) array.
-
-    `value` may be the matrix, its diagonal or one variance for all.
-    """
+    """Return a matrix, its diagonal or one variance as a symmetric positive definite (n, n) array."""
     matrix = np.asarray(value, dtype=np.float64)
     if matrix.ndim == 0:
         matrix = finite(name, value) * np.eye(n)

@@ -28,11 +28,7 @@ Rule = tuple[str, Any]
 
 
 def check(saved: Any, layout: Record, start: Any, rules: Callable[[Any], Iterable[Rule]]) -> Any:
-    """Return a saved state as a structured array, if it is one of a layout.
-
-    `saved`: numbers by name, as `layout.by_name` gives them. `rules`: ``rules(state)``: what must hold
-    between the numbers, in words, and whether it does.
-    """
+    """Return numbers by name as a structured array, if they are of a layout and its rules hold."""
     state = start.copy()
     _read(saved, layout, state, "state")
     for name, kind, (values, first) in leaves(layout, state, start):
@@ -121,10 +117,7 @@ def is_covariance(P: FloatArray, definite: bool) -> bool:
 
 
 def check_head(name: str, version: int, data: Any, more: tuple[str, ...]) -> None:
-    """Refuse a dictionary that is not of the class `name` and this version's format.
-
-    `more` names the fields that the class has beside those of all.
-    """
+    """Refuse a dictionary that is not of the class `name` and this version's format."""
     if not isinstance(data, dict):
         raise ValueError(f"data must be a dictionary that to_dict() gave, got {type(data).__name__}")
     if data.get("estimator") != name:

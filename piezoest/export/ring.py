@@ -18,11 +18,7 @@ RING = record(voltage=MEASURED, started=FLAG, waited=COUNT, frozen=FLAG, model=n
 
 
 def settings_layout(estimator: Record) -> Record:
-    """Layout of what no sample changes, around the estimator's settings.
-
-    Samples between two changes of model, whether the estimator itself can be held, whether its model has a
-    hysteresis.
-    """
+    """Layout of what no sample changes, around the estimator's settings."""
     return record(interval=COUNT, freezable=FLAG, hysteretic=FLAG, estimator=estimator)
 
 

@@ -19,33 +19,15 @@ HELD_STEPS = 5.0
 
 
 class Top(NamedTuple):
-    """Stretches in which a column stands at its limit while the other column goes on and comes back.
+    """Stretches in which a column stands at its limit while the other column goes on and comes back."""
 
-    Parameters
-    ----------
-    limit : float
-        Value at which it stands.
-    times : int
-        How many stretches.
-    beyond : float
-        How far the other one goes on, in its unit.
-    """
-
-    limit: float
-    times: int
-    beyond: float
+    limit: float  # value at which it stands
+    times: int  # how many stretches
+    beyond: float  # how far the other one goes on, in its unit
 
 
 def flat_tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
-    """Find where a column is clipped; None if it is not.
-
-    Parameters
-    ----------
-    y, other : ndarray, shape (N,)
-        Without gaps and spikes; the other one rises where the column does.
-    goes_on : float
-        Part of its range by which the other one must go on, and come back.
-    """
+    """Find where a column is clipped: the other one goes on by a part of its range; None if it is not."""
     for sign in (1.0, -1.0):
         if found := _tops(sign * y, sign * other, goes_on):
             return found._replace(limit=sign * found.limit)
@@ -69,13 +51,7 @@ def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
 
 
 def levels(y: FloatArray) -> tuple[float, float]:
-    """Step of a column's values and how many of them its range holds; the count is infinite without steps.
-
-    Parameters
-    ----------
-    y : ndarray, shape (N,)
-        Without gaps and spikes.
-    """
+    """Step of a column's values and how many of them its range holds; the count is infinite without steps."""
     values = np.unique(y)
     apart = np.diff(values)
     extent = float(np.ptp(y))
@@ -88,13 +64,7 @@ def levels(y: FloatArray) -> tuple[float, float]:
 
 
 def repeats(y: FloatArray) -> int:
-    """How many times in a row each value stands where all are held alike; 1 if they are not.
-
-    Parameters
-    ----------
-    y : ndarray, shape (N,)
-        Readings.
-    """
+    """How many times in a row each value stands where all are held alike; 1 if they are not."""
     changed = np.flatnonzero(np.diff(y) != 0.0)
     if changed.size < 10:
         return 1

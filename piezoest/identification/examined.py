@@ -19,13 +19,7 @@ UNRELATED = 0.5
 
 
 class Examined:
-    """A record without gaps and spikes, and what several checks ask.
-
-    Parameters
-    ----------
-    record : Record
-        With at least two usable samples.
-    """
+    """A record without gaps and spikes, and what several checks ask."""
 
     def __init__(self, record: Record) -> None:
         self.record, self.rate = record, record.sample_rate

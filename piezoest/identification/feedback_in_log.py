@@ -22,24 +22,12 @@ NOISELESS = 1e-9
 
 
 class Answer(NamedTuple):
-    """How a voltage answers the noise of the displacement.
+    """How a voltage answers the noise of the displacement."""
 
-    Parameters
-    ----------
-    lag : int
-        Samples after which it does, if at all.
-    explained : float
-        Part of the variance of the voltage's own noise that earlier displacement explains.
-    together : float
-        Correlation of what nothing earlier explains of both.
-    closed : bool
-        Whether this is feedback beyond doubt.
-    """
-
-    lag: int = 0
-    explained: float = 0.0
-    together: float = 0.0
-    closed: bool = False
+    lag: int = 0  # samples after which it does, if at all
+    explained: float = 0.0  # part of the variance of the voltage's own noise that earlier x explains
+    together: float = 0.0  # correlation of what nothing earlier explains of both
+    closed: bool = False  # whether this is feedback beyond doubt
 
 
 def answer(u: FloatArray, x: FloatArray, gain: float) -> Answer:
@@ -47,19 +35,8 @@ def answer(u: FloatArray, x: FloatArray, gain: float) -> Answer:
 
     Second differences take away what moves slowly. Each is foreseen from its own past, and from that of the
     other: in open loop the past displacement says nothing about the voltage, but what makes up for noise of
-    the voltage's own reading, with the sign of the gain. Negative feedback has the other sign.
-
-    Parameters
-    ----------
-    u, x : ndarray, shape (N,)
-        Voltage [V], displacement [µm], without gaps.
-    gain : float
-        Of the stage [µm/V].
-
-    Notes
-    -----
-    Source: C. W. J. Granger, Econometrica 37 (1969) 424-438; for the loop, L. Ljung, System Identification,
-    2nd ed., 1999, sec. 13.4.
+    the voltage's own reading, with the sign of the gain. Negative feedback has the other sign. Source: C. W.
+    J. Granger, Econometrica 37 (1969) 424-438; L. Ljung, System Identification, 2nd ed., 1999, sec. 13.4.
     """
     du, dx = gain * np.diff(u, 2), np.diff(x, 2)
     rows = np.arange(LAGS, min(du.size, LAGS + MOST_SAMPLES))

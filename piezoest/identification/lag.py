@@ -21,29 +21,6 @@ def tells_lag(u: Any) -> bool:
 
     The width of a hysteresis loop depends on how far the voltage swings, that of a lag on how fast. Where all
     swings are alike, as in a sine or a triangle of one frequency and one amplitude, the two look the same.
-
-    Parameters
-    ----------
-    u : array_like, shape (N,)
-        Voltage [V], evenly sampled; NaN where a sample is missing. The sample rate does not matter: swings
-        are compared with each other.
-
-    Returns
-    -------
-    bool
-
-    Raises
-    ------
-    ValueError
-        If `u` is not numbers of shape (N,).
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from piezoest.identification.lag import tells_lag
-    >>> t = np.linspace(0.0, 1.0, 10_000)
-    >>> tells_lag(np.sin(50.0 * t)), tells_lag(np.sin(50.0 * t) + np.sin(170.0 * t))
-    (False, True)
     """
     u = array_1d("u", u, allow_nan=True)
     if np.sum(np.isfinite(u)) < 3:

@@ -15,19 +15,12 @@ PLACES = 16
 
 
 class Loop(NamedTuple):
-    """The loop of displacement over voltage, branch by branch.
+    """The loop of displacement over voltage, branch by branch."""
 
-    Parameters
-    ----------
-    openings : ndarray, shape (M,)
-        Mean height of the falling branch above the rising one, at the same voltage [µm]: above zero where the
-        loop runs counter-clockwise, as that of a stage does, whose displacement lags the voltage.
-    strokes : ndarray, shape (M,)
-        What the branch spans of the displacement's straight line [µm].
-    """
-
+    # Mean height of the falling branch above the rising one, at the same voltage [µm]: above zero where the
+    # loop runs counter-clockwise, as that of a stage does, whose displacement lags the voltage.
     openings: FloatArray
-    strokes: FloatArray
+    strokes: FloatArray  # what the branch spans of the displacement's straight line [µm]
 
     @property
     def opening(self) -> float:
@@ -41,17 +34,7 @@ class Loop(NamedTuple):
 
 
 def loop_of(u: FloatArray, x: FloatArray, counts: BoolArray, gain: float) -> Loop:
-    """Compare each branch of a loop with the one before and the one after it, so that a drift cancels.
-
-    Parameters
-    ----------
-    u, x : ndarray, shape (N,)
-        Voltage without gaps [V], displacement [µm].
-    counts : ndarray, shape (N,), bool
-        Samples at which the displacement is known.
-    gain : float
-        Slope of the straight line through the loop [µm/V].
-    """
+    """Compare each branch of a loop with the one before and the one after it, so that a drift cancels."""
     extent = float(np.ptp(u))
     places = turns(u, TURN * extent)
     nothing = Loop(np.empty(0), np.empty(0))

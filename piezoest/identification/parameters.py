@@ -10,10 +10,7 @@ MOST_ROWS = 12
 
 
 def parameter_rows(model: Any, delay: float, errors: dict[str, float]) -> list[Row]:
-    """Rows of parameter name, value, standard error (zero if it was not estimated) and unit.
-
-    Of many plays, gain and sum of the weights stand for all.
-    """
+    """Rows of parameter name, value, standard error (zero if it was not estimated) and unit."""
     values = list(zip(model.parameter_names, model.theta.tolist(), model.parameter_units, strict=True))
     if len(values) > MOST_ROWS:
         values = [row for row in values if row[0] == "gain" or row[0].startswith("creep")]

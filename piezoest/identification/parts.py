@@ -27,15 +27,7 @@ class Part(NamedTuple):
 
 
 def pieces(log: RecordStream, progress: Progress | None) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Voltage and displacement as they are in the file, 50 000 samples at a time.
-
-    Parameters
-    ----------
-    log : RecordStream
-        The log.
-    progress : callable, optional
-        Called with what is done and what there is.
-    """
+    """Voltage and displacement as they are in the file, 50 000 samples at a time."""
     held: list[FloatArray] = []
     for block in log.blocks(progress=progress):
         held.append(np.stack([block.voltage, block.displacement]))
@@ -52,17 +44,7 @@ def pieces(log: RecordStream, progress: Progress | None) -> Iterator[tuple[Float
 
 
 def parts(log: RecordStream, delay: float, progress: Progress | None) -> Iterator[Part]:
-    """The log from its start, with the voltage late and without gaps, where it is the last one known.
-
-    Parameters
-    ----------
-    log : RecordStream
-        The log.
-    delay : float
-        Samples by which the displacement lags the voltage.
-    progress : callable, optional
-        Called with what is done and what there is.
-    """
+    """The log from its start, with the voltage late and without gaps, where it is the last one known."""
     before, seen = None, 0
     whole, rest = divmod(delay, 1.0)
     for u, x in pieces(log, progress):

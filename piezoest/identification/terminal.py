@@ -22,15 +22,7 @@ ERRORS = ("fitted\nrms", "blocks\nleft out", "held out\nrms", "held out\nlargest
 
 
 def print_identification(found: Found, console: Any) -> None:
-    """Print the kinds compared, the parameters of the one to use, and how far to trust it.
-
-    Parameters
-    ----------
-    found : Identification or StreamedIdentification
-        What to print.
-    console : rich.console.Console
-        To print on.
-    """
+    """Print the kinds compared, the parameters of the one to use, and how far to trust it."""
     _say(console, f"{found.source}: {log_sentence(found)}")
     rows = [each.cells() for each in compared(found)]
     _print_table(console, "Free-running error [µm]", ("model", "n", *ERRORS), rows)

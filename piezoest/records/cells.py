@@ -32,10 +32,7 @@ class Style(NamedTuple):
 
 
 def style_of(cells: Iterable[str]) -> Style:
-    """How numbers are written, by what cannot be read in another way.
-
-    ValueError if the cells contradict each other; the message begins with one of them.
-    """
+    """How numbers are written, by what cannot be read in another way."""
     seen: dict[tuple[str, str], str] = {}  # what a mark is for, and a cell that shows it
     for cell in cells:
         text = _without_spaces(cell)

@@ -21,11 +21,7 @@ TIMES = datetime.date | datetime.time | datetime.timedelta
 
 
 class Frame(Source):
-    """A DataFrame of pandas, whose columns may have any names.
-
-    `names`, `titles`: as for `Source`; of columns with times the title need not say the unit. `whole`: as for
-    `Source`.
-    """
+    """A DataFrame of pandas, whose columns may have any names; the rest as for `Source`."""
 
     def __init__(
         self, path: Path, series: list[Any], names: list[str], titles: list[str], first: int, whole: str

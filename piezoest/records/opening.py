@@ -29,10 +29,7 @@ OF_SPREADSHEETS = {"xl/workbook.xml", "xl/workbook.bin", "content.xml"}
 
 
 def open_source(path: Path) -> Source:
-    """Open a log by what it begins with, or else by the ending of its name.
-
-    OSError if it cannot be read. MissingExtraError if its format needs a package that is not installed.
-    """
+    """Open a log by what it begins with, or else by the ending of its name."""
     start, ending = beginning(path, 128), path.suffix.lower()
     if not start.strip():
         raise LogError(f"{path}: the file is empty")

@@ -65,11 +65,7 @@ def _known(blocks: Iterable[tuple[Any, FloatArray]]) -> Iterator[tuple[int, _Kno
 
 
 def scan(where: str, place: str, blocks: Blocks) -> Timing:
-    """Find the timing; ValueError, with the place in the file, if time is not even enough.
-
-    `where`, `place`: file and what it calls a row, for messages. `blocks`: returns an iterable of numbers of
-    rows and their times; is called again where steps are uneven.
-    """
+    """Find the timing; ValueError, with the place in the file, if time is not even enough."""
     rows, count, usual, jitter, absent = 0, 0, 0.0, 0.0, 0
     largest, jump, moved, words, uneven = 0, 0, False, "", ""
     sums, first, last = np.zeros(4), (0, 0.0), (0, 0.0)
@@ -144,10 +140,7 @@ def _deviation(
 
 
 def placed(timing: Timing, blocks: Iterable[list[FloatArray]]) -> Iterator[list[FloatArray]]:
-    """Columns on their samples, NaN where no row falls, by the first one, which is time.
-
-    `timing`: from `scan`. `blocks`: times of rows, and values of any number of columns.
-    """
+    """Columns on their samples, NaN where no row falls, by the first one, which is time."""
     if timing.usual is None:
         yield from (values for _, *values in blocks)
         return

@@ -253,10 +253,7 @@ class Signal:
 
 
 def smooth_rise(n: int) -> FloatArray:
-    """Rise from 0 towards 1, which the sample after these would be; slope and curvature zero at both ends.
-
-    Returns (n,): from 0 upwards.
-    """
+    """Rise from 0 towards 1, which the sample after these would be; slope and curvature zero at both ends."""
     s = np.arange(n) / max(n, 1)
     return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 

@@ -15,21 +15,9 @@ TURN = 0.05
 
 
 def turns(values: Any, threshold: float) -> NDArray[np.intp]:
-    """Places at which a signal turns and then runs back by more than a threshold.
+    """Samples at which a finite signal turns and then runs back by more than a threshold, in one pass.
 
-    `values` (N,): without gaps. `threshold`: ways back of this size or less are noise, in the unit of the
-    values. Returns (n,): rising indices of the first sample of each extreme. The first and the last sample
-    are no turns. ValueError if the values are not 1-D and finite, or the threshold is below zero.
-
-    Notes
-    -----
-    One pass in time. Source: the hysteresis filter of rainflow counting (ASTM E1049).
-
-    Examples
-    --------
-    >>> from piezoest.signals.turns import turns
-    >>> turns([0.0, 1.0, 2.0, 1.9, 2.1, 0.0, 1.0], 0.5).tolist()
-    [4, 5]
+    Source: the hysteresis filter of rainflow counting (ASTM E1049).
     """
     values = array_1d("values", values).copy()
     places = np.empty(values.size)

@@ -44,11 +44,7 @@ def ipopt(
     max_iterations: int,
     tolerance: float,
 ) -> Minimum:
-    """Minimise subject to bounds and constraints = 0, by IPOPT.
-
-    `evaluate`: gives an `Evaluation` at z (n,); called once a point. `start`, `lower`, `upper` (n,): start
-    and bounds. `max_iterations`: IPOPT's ``max_iter``. `tolerance`: IPOPT's ``tol``.
-    """
+    """Minimise subject to bounds and constraints = 0, by IPOPT."""
     point = _Point(evaluate)
     n, m = start.size, constraints
     values = _Output("values", [n], [(1, 1), (m, 1)], lambda e: (e.objective, e.constraints), point)
@@ -167,9 +163,6 @@ def _conic(size: int) -> Any:
 
 
 def quadratic_program(H: FloatArray, g: FloatArray, lower: FloatArray) -> FloatArray:
-    """Minimum of w' H w / 2 - g' w over w >= lower.
-
-    `H` (n, n): symmetric, positive definite. `g`, `lower` (n,): `lower` is -inf where there is no bound.
-    """
+    """Minimum of w' H w / 2 - g' w over w >= lower, for a symmetric positive definite H."""
     found = _conic(g.size)(h=casadi.DM(H), g=-g, lbx=lower, ubx=np.inf)
     return np.fmax(found["x"].full()[:, 0], lower)

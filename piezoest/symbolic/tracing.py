@@ -21,11 +21,7 @@ UNROLLED, CHAINED = 50, 20
 
 
 def trace(function: Callable[..., Any], *sizes: int) -> Any:
-    """CasADi Function of an equation.
-
-    `function`: of numbers and flat arrays, returning a number or a tuple of numbers. `*sizes`: length of each
-    argument; 0 for a number. Returns of the same arguments; one output, the results in one column.
-    """
+    """CasADi Function of an equation."""
     arguments = [casadi.SX.sym(f"v{i}", max(size, 1)) for i, size in enumerate(sizes)]
     # An equation may write into its arrays, and knows their length: they are lists.
     results = function(
@@ -36,11 +32,7 @@ def trace(function: Callable[..., Any], *sizes: int) -> Any:
 
 
 def jacobian(function: Callable[..., Any], *sizes: int) -> Callable[..., FloatArray]:
-    """Exact derivative of an equation with respect to all of its arguments.
-
-    `function`, `*sizes`: as in `trace`. Returns of the same arguments; gives an ndarray of shape (results,
-    arguments).
-    """
+    """Exact derivative of an equation with respect to all of its arguments."""
     traced = trace(function, *sizes)
     symbols = traced.sx_in()
     derivative = casadi.jacobian(traced(*symbols), casadi.vertcat(*symbols))

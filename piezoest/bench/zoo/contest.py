@@ -32,11 +32,7 @@ def contest(
     families: Sequence[str] = tuple(FAMILIES),
     references: Sequence[str] = REFERENCES,
 ) -> list[Task]:
-    """All runs of a controller, and of the default one with each estimator alone.
-
-    `controller`: as `piezoest.bench.zoo.contenders.contender` reads it. `families`, `references`: names in
-    `FAMILIES` and `SHAPES`.
-    """
+    """All runs of a controller, and of the default one with each estimator alone."""
     return [
         task
         for name in (controller, *CANDIDATES)
@@ -47,12 +43,7 @@ def contest(
 
 
 def summarise_contest(rows: Iterable[Row], controller: str) -> dict[str, Any]:
-    """Compare settled errors in each cell.
-
-    `rows`: of the runs that `contest` planned. `controller`: the one that is compared with the others.
-    Returns ``cells``: for each family and reference the median of the settled errors over the amplitude, that
-    of the best single estimator and its name, and their ratio. ``kept``: in how many cells that is allowed.
-    """
+    """Compare settled errors in each cell with those of the best single estimator."""
     rows = list(rows)
     errors: dict[tuple[str, str], dict[str, list[float]]] = {}
     for row in rows:

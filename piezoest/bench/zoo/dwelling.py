@@ -50,10 +50,7 @@ def dwells(seeds: Sequence[int], duration: float = DURATION) -> list[Dwell]:
 
 
 def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
-    """Rig of a dwell, the samples in which its reference rests, and what is drawn beside.
-
-    Returns ``setpoint_noise`` [µm], zero for none, and ``feedback`` [1/s], zero for none.
-    """
+    """Rig of a dwell, the samples in which its reference rests, and what is drawn beside."""
     rng = np.random.default_rng([dwell.seed, 25])
     sample_rate = float(rng.choice(SAMPLE_RATES))
     period = round(sample_rate / float(np.exp(rng.uniform(*np.log(FREQUENCIES)))))
@@ -106,12 +103,7 @@ def play_dwell(dwell: Dwell, factory: Factory) -> dict[str, Any]:
 
 
 def summarise_dwells(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
-    """Sum up rests.
-
-    `rows`: from `play_dwell`. Returns ``groups``, with and without creep, feedback and noise in the
-    reference, and ``by_family``: runs, how many are ``kept``, medians and the largest of the errors over what
-    is allowed, and of the excursion. ``worst``: the seeds that are not kept, the worst ones first.
-    """
+    """Sum up rests."""
     rows = list(rows)
     judged = [row for row in rows if row["failure"] is None]
     ways = sorted({_of(row) for row in rows})

@@ -145,11 +145,7 @@ FAMILIES: dict[str, Callable[[Any, Reach], Make]] = {
 
 
 def draw_family(family: str, rng: np.random.Generator, reach: Reach, *, width: float, gain: float) -> Any:
-    """Draw a model of a family.
-
-    `family`: name in `FAMILIES`. `rng`: where its shape comes from. `width`: of the loop over the reach,
-    relative to its stroke. `gain`: mean slope over the reach [µm/V].
-    """
+    """Draw a model of a family: its loop's width, relative to the stroke, and mean slope [µm/V] are given."""
     if family not in FAMILIES:
         raise ValueError(f"family must be one of {', '.join(FAMILIES)}, got {family!r}")
     u = reach.cycle()

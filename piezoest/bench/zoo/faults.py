@@ -200,10 +200,7 @@ def _usual(size: float, around: Around) -> float:
 
 
 def draw_fault(kind: str, mode: str | None, rng: Any, around: Around) -> Fault:
-    """Draw when a fault is there and how large it is.
-
-    `kind`: name in `FAULTS`, or "none". `mode`: one of its modes; drawn if not given.
-    """
+    """Draw when a fault is there and how large it is."""
     if kind == NONE:
         return Fault()
     if kind not in FAULTS:
@@ -265,8 +262,6 @@ def coordinates(fault: Fault, n: int) -> tuple[float, FloatArray]:
 
     A reference is in the coordinates of the gauge. A gauge that has been wrong from the start, or whose zero
     has moved for good, is right by definition; one that was right and goes wrong is not.
-
-    `fault`: from `draw_fault`.
     """
     zero = np.zeros(n)
     if fault.kind == "zero-off-shifted" or (fault.kind == "zero-off" and fault.right):
@@ -275,11 +270,7 @@ def coordinates(fault: Fault, n: int) -> tuple[float, FloatArray]:
 
 
 def truthful(fault: Fault, first: int, x: FloatArray, seen: FloatArray, tolerance: float) -> Any:
-    """Which readings say something true of how the stage answers; an oracle knows it.
-
-    `x` (M,): readings [µm]. `seen` (M,): what a sound gauge without noise would have read [µm]. `tolerance`:
-    by which a reading may miss that [µm].
-    """
+    """Which readings say something true, as an oracle knows: it has `seen` them as a sound gauge would."""
     told = np.isfinite(x)
     kind = FAULTS.get(fault.kind, Kind())
     if kind.hides and not fault.right:

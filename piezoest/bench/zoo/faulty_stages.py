@@ -17,10 +17,7 @@ FOREVER = 1e9  # s
 
 @dataclass(eq=False)
 class FaultyStage:
-    """A stage with something between it and the rest of the ring; by itself, nothing.
-
-    ValueError if a value is out of its range.
-    """
+    """A stage with something between it and the rest of the ring; by itself, nothing."""
 
     stage: Any  # such as `PaperStage`
     seed: int = field(default=0, kw_only=True)  # start of the random numbers of the fault
@@ -62,10 +59,7 @@ class FaultyStage:
         return float(self._read(np.array([x]))[0])
 
     def run(self, u: Any) -> FloatArray:
-        """Apply a voltage record; the same as a loop of `step`.
-
-        `u` (N,): voltage [V]. Returns (N,): readings [µm]; NaN where there is none.
-        """
+        """Apply a voltage record; the same as a loop of `step`."""
         return self._read(self.stage.run(self._voltage(array_1d("u", u, allow_nan=True))))
 
     def _read(self, x: FloatArray) -> FloatArray:

@@ -29,12 +29,7 @@ class Lines(NamedTuple):
 
 
 def judge(rig: Rig, run: Traces, lines: Lines) -> dict[str, Any]:
-    """Numbers of a run beside those of the lines; None where nothing is judged.
-
-    The lines' error is the larger one of both, in each part of the run.
-
-    `rig`: from `piezoest.bench.zoo.draw`.
-    """
+    """Numbers of a run beside the larger error of both lines in each part; None where nothing is judged."""
     n, first, cycle = run.reference.size, rig.judged_from, rig.plain.cycle
     swing = 2.0 * rig.plain.amplitude
     floor = max(NOISES * rig.noise * abs(rig.coordinates[0]), NEGLIGIBLE * swing)

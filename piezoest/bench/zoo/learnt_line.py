@@ -25,11 +25,7 @@ NOISES = 6.0  # by which a reading may miss what is true
 
 
 def run_learnt_line(rig: Rig, hindsight: FittedLine) -> tuple[Traces, int]:
-    """Let a line that learns leg by leg drive a rig.
-
-    `hindsight`: from `piezoest.bench.zoo.line.fit_line`: from its slope and from the mean slope none is far.
-    Returns first sample that the line drives; before, nothing was known of the stage.
-    """
+    """Let a line that learns leg by leg drive a rig; with the first sample that it drives."""
     r, stage, n = rig.reference, rig.stage(), rig.plain.values.size
     u, x, true = np.full(n, rig.limits.rest), np.empty(n), np.empty(n)
     told, line = _oracle(rig), None

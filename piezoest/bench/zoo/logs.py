@@ -39,66 +39,30 @@ LONGEST_GAP, ROWS = 0.01, 0.3  # part of the log; how often the voltage is missi
 REST = (0.3, 0.02, 0.15)  # part of the log
 DELAY, CYCLED = 0.6, 0.7  # chances alone
 ADDED = (
-    "noise",
-    "creep",
-    "drift",
-    "jumps",
-    "spikes",
-    "dropouts",
-    "rows",
-    "rest",
-    "delay",
-    "cycled",
-    "beyond",
-)
+    "noise", "creep", "drift", "jumps", "spikes", "dropouts", "rows", "rest", "delay", "cycled", "beyond",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Log:
-    """A simulated recording, and what only its maker knows.
-
-    Parameters
-    ----------
-    seed : int
-        The log is a function of it alone.
-    u, x : ndarray, shape (N,)
-        Recorded voltage [V] and displacement [µm]; NaN where samples are missing.
-    sample_rate : float
-        [Hz].
-    truth : ndarray, shape (N,)
-        Displacement that the gauge would have shown [µm]: hysteresis, creep and drift, delayed, without
-        noise, spikes and jumps.
-    jumps : ndarray, shape (N,)
-        What jumps of the gauge have added to it until then [µm].
-    spikes : ndarray of bool, shape (N,)
-        Where the reading is a spike.
-    family : str
-        Name in `piezoest.bench.zoo.families.FAMILIES`.
-    model : object
-        The hysteresis.
-    voltage : str
-        Name in `piezoest.bench.zoo.voltages.SHAPES`.
-    stroke : float
-        Largest less least displacement of the truth [µm].
-    added : dict of str to float
-        What was added, by names in `ADDED`, and how much of it: of noise, drift and jumps relative to the
-        stroke, of creep the share for each decade of time, of spikes, dropouts and rest the part of the
-        samples, of the delay the samples, of `cycled` the turns before the log. `rows` are
-        dropouts of the voltage, too; `beyond` is how far the voltage of the second half leaves the first
-        half's, relative to that.
-    """
+    """A simulated recording, a function of its seed alone, and what only its maker knows."""
 
     seed: int
-    u: FloatArray = field(repr=False)
-    x: FloatArray = field(repr=False)
-    sample_rate: float
+    u: FloatArray = field(repr=False)  # recorded voltage (N,) [V]; NaN where samples are missing
+    x: FloatArray = field(repr=False)  # recorded displacement (N,) [µm]
+    sample_rate: float  # [Hz]
+    # Displacement (N,) of hysteresis, creep and drift, delayed, without noise, spikes and jumps [µm].
     truth: FloatArray = field(repr=False)
-    jumps: FloatArray = field(repr=False)
-    spikes: Any = field(repr=False)
-    family: str
-    model: Any
-    voltage: str
-    stroke: float
+    jumps: FloatArray = field(repr=False)  # what jumps of the gauge have added to it until then (N,) [µm]
+    spikes: Any = field(repr=False)  # where the reading is a spike (N,)
+    family: str  # name in `piezoest.bench.zoo.families.FAMILIES`
+    model: Any  # the hysteresis
+    voltage: str  # name in `piezoest.bench.zoo.voltages.SHAPES`
+    stroke: float  # largest less least displacement of the truth [µm]
+    # How much of each of `ADDED`: of noise, drift and jumps relative to the stroke, of creep the share for
+    # each decade of time, of spikes, dropouts and rest the part of the samples, of the delay the samples, of
+    # `cycled` the turns before the log. `rows` are dropouts of the voltage, too; `beyond` is how far the
+    # voltage of the second half leaves the first half's, relative to that.
     added: dict[str, float]
 
     @property
@@ -108,32 +72,7 @@ class Log:
 
 
 def draw(seed: int, *, family: str | None = None, clean: bool = False) -> Log:
-    """Draw a stage and a recording of it.
-
-    Parameters
-    ----------
-    seed : int
-        Start of all random numbers.
-    family : str, optional
-        In the place of the one that would be drawn.
-    clean : bool
-        Without creep, drift, jumps and spikes: nothing that a model of the family lacks.
-
-    Returns
-    -------
-    Log
-
-    Raises
-    ------
-    ValueError
-        If the seed is not an integer, or the family unknown.
-
-    Examples
-    --------
-    >>> log = draw(5000)
-    >>> log.u.shape == log.x.shape == log.truth.shape
-    True
-    """
+    """Draw a stage and a recording of it."""
     rng = np.random.default_rng(integer("seed", seed))
     reach = REACHES[int(rng.integers(len(REACHES)))]
     gain = _log(rng, *STROKE) / (2.0 * reach.half)

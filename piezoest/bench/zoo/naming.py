@@ -16,12 +16,7 @@ BACK = 1.2  # of the settled error
 
 
 def named(rig: Rig, controller: Any) -> dict[str, Any]:
-    """What a controller said: names of faults, how soon after the fault, and what drove at last.
-
-    `controller`: with ``events`` and ``status``, if it has them. Returns ``named_right``: whether one of the
-    fault's names was said after its beginning; None if it need not be. ``named_periods``: how many periods
-    after the beginning that was. Other columns are as they say.
-    """
+    """What a controller said: names of faults, how soon after the fault, and what drove at last."""
     events = list(getattr(controller, "events", ()))
     status = getattr(controller, "status", {})
     status = status if isinstance(status, dict) else _public(status)
@@ -44,10 +39,7 @@ def named(rig: Rig, controller: Any) -> dict[str, Any]:
 
 
 def settled(error: FloatArray, cycle: int) -> float | None:
-    """Median of the largest errors in the last cycles, None if there is none.
-
-    `error` (N,): absolute errors [µm].
-    """
+    """Median of the largest errors in the last cycles, None if there is none."""
     ends = [error[max(0, error.size - (k + 1) * cycle) : error.size - k * cycle] for k in range(LAST)]
     worst = [float(part.max()) for part in ends if part.size]
     return float(np.median(worst)) if worst else None

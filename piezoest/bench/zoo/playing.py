@@ -31,12 +31,7 @@ def play(rig: Rig, factory: Factory) -> Row:
 
 
 def traced(rig: Rig, factory: Factory) -> tuple[Row, Both]:
-    """Let a controller drive a rig, and judge it beside straight lines.
-
-    `factory`: ``factory(sample_rate, limits)`` makes a controller, with ``step(r)``, ``run(r)`` and
-    ``learn(u, x)``. Returns what was drawn and what came of it, flat and JSON-safe; what the controller
-    raised is its ``failure``; and the traces.
-    """
+    """Let a controller drive a rig, and judge it beside straight lines."""
     line = fit_line(rig)
     lines = Lines(line, run_line(rig, line), *run_learnt_line(rig, line))
     row = {**rig.to_dict(), "line_gain": line.gain, "line_centre": line.centre, "failure": None}

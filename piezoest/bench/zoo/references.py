@@ -111,10 +111,7 @@ def build(
     waves: float,
     rng: Any,
 ) -> Reference:
-    """Make a reference that begins at rest at 0 µm, goes to its first value and then its way.
-
-    `kind`: name in `SHAPES`. `amplitude`, `centre`: [µm]. `frequency`, `sample_rate`: [Hz].
-    """
+    """Make a reference that begins at rest at 0 µm, goes to its first value and then its way."""
     n = round(waves * sample_rate / frequency)
     shape = SHAPES[kind](n, frequency, sample_rate, rng)
     high, low = shape.max(), shape.min()

@@ -78,10 +78,7 @@ def _crossed(console: Any, groups: list[dict[str, Any]]) -> None:
 
 
 def print_map(summary: dict[str, Any], console: Any) -> None:
-    """Print shares of runs that settled within two periods, of those that are asked for.
-
-    `summary`: from `piezoest.bench.zoo.summary.summarise_cells`.
-    """
+    """Print shares of runs that settled within two periods, of those that are asked for."""
     changes = [name for name, _, _ in SEGMENTS]
     cells = summary["cells"]
     kept = ", ".join(f"{name} {cells['kept'][name]}" for name in changes)
@@ -105,10 +102,7 @@ def print_map(summary: dict[str, Any], console: Any) -> None:
 
 
 def print_contest(summary: dict[str, Any], console: Any) -> None:
-    """Print settled errors relative to those of the best single estimator.
-
-    `summary`: from `piezoest.bench.zoo.contest.summarise_contest`.
-    """
+    """Print settled errors relative to those of the best single estimator."""
     print_cells(
         console,
         f"Median settled error of {summary['seeds']} seeds [% of the amplitude], that of the best single "
@@ -128,10 +122,7 @@ def print_contest(summary: dict[str, Any], console: Any) -> None:
 
 
 def print_dwells(summary: dict[str, Any], console: Any) -> None:
-    """Print how a controller goes on after a long rest.
-
-    `summary`: from `piezoest.bench.zoo.dwelling.summarise_dwells`.
-    """
+    """Print how a controller goes on after a long rest."""
     numbers = ("first", "second", "third", "largest", "excursion", "farthest")
     heads = ("runs", "kept", "first", "second", "third", "largest", "way", "longest")
     for title, names in (("groups", WAYS), ("by_family", ("family",))):

@@ -136,10 +136,7 @@ class Rig:
         return factor * true + zero
 
     def stage(self, *, healthy: bool = False) -> Any:
-        """Make the stage, at rest.
-
-        `healthy`: without fault, noise, hum and drift; mechanics, creep and amplifier stay.
-        """
+        """Make the stage, at rest; a healthy one has no fault, noise, hum and drift."""
         own, fs = self.around, self.sample_rate
         stage: Any = SimulatedStage(
             fs,

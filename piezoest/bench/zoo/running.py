@@ -33,11 +33,7 @@ class Traces:
 
 
 def run_controller(rig: Rig, controller: Any) -> tuple[Traces, float]:
-    """Let a controller drive a rig.
-
-    `controller`: with ``step(r)`` and ``run(r)``, which give the voltage, and ``learn(u, x)``. Returns time
-    that the controller took [s].
-    """
+    """Let a controller drive a rig; with the time that it took [s]."""
     r, stage = rig.reference, rig.stage()
     u, x, true = np.empty_like(r), np.empty_like(r), np.empty_like(r)
     drive = _by_sample if rig.block == 1 else _by_block

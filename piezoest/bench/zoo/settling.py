@@ -62,10 +62,7 @@ def cells(
     frequencies: Sequence[float] = FREQUENCIES,
     families: Sequence[str] = KINDS,
 ) -> list[Cell]:
-    """All places of the map.
-
-    `amplitudes`, `frequencies`: [µm] and [Hz]. `families`: names in `piezoest.bench.zoo.families.FAMILIES`.
-    """
+    """All places of the map."""
     return [Cell(*each) for each in itertools.product(families, amplitudes, frequencies, seeds)]
 
 
@@ -108,12 +105,7 @@ def asked(rig: Rig) -> bool:
 
 
 def settle(cell: Cell, factory: Factory) -> dict[str, Any]:
-    """Run a controller over a cell.
-
-    `factory`: ``factory(sample_rate, limits)`` makes a controller. Returns with ``segments``: for each its
-    name, the periods until it settled (None if it did not), the largest error of its last period [µm] and
-    what was allowed. ``asked``: see `asked`.
-    """
+    """Run a controller over a cell."""
     rig = cell_rig(cell)
     row: dict[str, Any] = {**asdict(cell), "gain": rig.gain, "width": rig.width, "block": rig.block,
                            "noise": rig.noise, "mechanics": rig.around.mechanics, "asked": asked(rig),

@@ -34,12 +34,7 @@ CRITERIA: dict[str, Callable[[Row], bool]] = {
 
 
 def summarise(rows: Iterable[Row], worst: int = 10) -> dict[str, Any]:
-    """Sum up runs on the zoo.
-
-    `rows`: from `piezoest.bench.zoo.play`. Returns JSON-safe: ``violations`` and ``healthy`` violations
-    (without a fault) of each criterion, ``quantiles`` of the ratios, groups ``by_family``, ``by_reference``
-    and ``by_fault``, and ``worst``.
-    """
+    """Sum up runs on the zoo."""
     rows = list(rows)
     healthy = [row for row in rows if row["fault"] == "none"]
     ranked = sorted(rows, key=_badness, reverse=True)
@@ -113,12 +108,7 @@ def _told(group: Sequence[Row]) -> dict[str, Any]:
 
 
 def summarise_cells(rows: Iterable[Row]) -> dict[str, Any]:
-    """Sum up the map: shares of runs that settled soon.
-
-    `rows`: from `piezoest.bench.zoo.settling.settle`. Returns shares ``by_family`` and ``by_place`` of the
-    runs that are asked for, ``other_places`` of the others; ``cells``: how many there are in which a run is
-    asked for, and in how many of them enough settled.
-    """
+    """Sum up the map: shares of runs that settled soon."""
     rows = list(rows)
     asked = [row for row in rows if row["asked"]]
     others = [row for row in rows if not row["asked"]]

@@ -115,10 +115,7 @@ SHAPES: dict[str, Callable[[int, float, Any], FloatArray]] = {
 
 
 def draw_voltage(kind: str, n: int, waves: float, rng: np.random.Generator) -> FloatArray:
-    """Draw a voltage of a kind, from -1 to 1.
-
-    `kind`: name in `SHAPES`. Returns (n,): its least value is -1, its largest 1.
-    """
+    """Draw a voltage of a kind, from -1 to 1."""
     if kind not in SHAPES:
         raise ValueError(f"kind must be one of {', '.join(SHAPES)}, got {kind!r}")
     shape = SHAPES[kind](n, waves, rng)
