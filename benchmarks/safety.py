@@ -29,7 +29,7 @@ from piezoest.bench.table import DIGITS
 from piezoest.bench.zoo import contenders, dwelling, judging, naming, settling, summary
 from piezoest.bench.zoo.contest import contest, summarise_contest
 from piezoest.bench.zoo.summary import CRITERIA, summarise
-from piezoest.bench.zoo.tasks import Task, cells, over_cores, rests, runs
+from piezoest.bench.zoo.tasks import Task, over_cores, runs, tasks
 
 Row = dict[str, Any]
 
@@ -151,11 +151,11 @@ def drawn(rows: Sequence[Row]) -> Row:
     }
 
 
-def played(what: str, tasks: Sequence[Task], folder: Path, workers: int | None) -> list[Row]:
+def played(what: str, planned: Sequence[Task], folder: Path, workers: int | None) -> list[Row]:
     """Rows of some runs, of which those that are known are not made again."""
     with store_in(folder) as store, counting(f"runs of {what}") as count:
-        carry_out(tasks, store, over_cores(workers), count)
-        return list(store.rows(task.key for task in tasks))
+        carry_out(planned, store, over_cores(workers), count)
+        return list(store.rows(task.key for task in planned))
 
 
 def draw(document: Row, path: Path) -> None:
@@ -209,8 +209,8 @@ def main(given: Sequence[str] | None = None) -> int:
     for name, controller in CONTROLLERS.items():
         count = arguments.runs if name == "controller" else others
         rows[name] = play(controller, runs(controller, range(first, first + count)))
-    on_map = play("the map", cells(DEFAULT, settling.cells(range(arguments.map))))
-    rested = play("rests", rests(DEFAULT, dwelling.dwells(range(first, first + arguments.dwell))))
+    on_map = play("the map", tasks(DEFAULT, settling.cells(range(arguments.map))))
+    rested = play("rests", tasks(DEFAULT, dwelling.dwells(range(first, first + arguments.dwell))))
     alone = play("single estimators", contest(DEFAULT, range(arguments.singles)))
     document = {
         "suite": "safety",

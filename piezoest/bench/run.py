@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
-import json
 import traceback
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -19,12 +17,11 @@ from piezoest.bench.metrics import measure
 from piezoest.bench.origin import json_safe
 from piezoest.bench.quiet import quiet
 from piezoest.bench.scenarios import SCENARIOS
+from piezoest.bench.store import Keyed, Row
 from piezoest.compensators import InverseCompensator, LinearCompensator
 from piezoest.estimators.rls import HysteresisRLS
 from piezoest.models import LinearGain
 from piezoest.tracking import TrackingRecord, track
-
-Row = dict[str, Any]
 
 TRANSFER = 0.01  # s, of a bumpless change of model: the compensators' default at 50 kHz
 # Linear feed-forward learns its gain from whole loops, at any frequency; 0.4 s at 5 Hz.
@@ -39,7 +36,7 @@ COLUMNS: dict[str, type] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class Task(Keyed):
     """One run."""
 
     scenario: str  # name in `SCENARIOS`, or "log:" and the name of a file
@@ -48,12 +45,6 @@ class Task:
     # Fields of `piezoest.bench.cases.Conditions`, the stage among them.
     given: dict[str, Any] = field(default_factory=dict, hash=False)
     code: str = ""  # fingerprint of what is run, see `code_of`: a row of other code is another run's
-
-    @property
-    def key(self) -> str:
-        """What the run's row is kept under."""
-        text = json.dumps(asdict(self), sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
 def code_of(estimator: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -126,16 +127,18 @@ def safety(
             carry_out(planned, store, tasks.over_cores(workers), count)
             rows = list(store.rows(task.key for task in planned))
     document = {"suite": "safety", **origin(began), "controller": name, "given": given}
-    document |= _write(which, name, rows, written.output, format)
+    rows_of, kept, summarise, show = _kind(which, name)
+    tables.write_table(
+        tables.table_of(rows_of(rows), kept),
+        written.output / f"{which.title.replace('safety', 'runs')}.{format}",
+    )
+    document |= summarise(rows)
     text = json_text(document)
     write_text(written.output / f"{which.title}.json", text)
     if json_to == "-":
         typer.echo(text, nl=False)
         return
-    from piezoest.bench.zoo import report
-
-    shown = {"map": report.print_map, "singles": report.print_contest, "dwell": report.print_dwells}
-    shown.get(which.title, report.print_summary)(document, Console())
+    show(document, Console())
     typer.echo(f"Results: {written.output}")
     write_json(document, target)
 
@@ -163,33 +166,27 @@ def _plan(which: Which, controller: str, given: dict[str, Any]) -> list[Task]:
             f"--{which.title} draws its rigs itself: leave out --set, and all but one of the maps"
         )
     if which.dwell is not None:
-        return tasks.rests(controller, dwelling.dwells(seeds))
+        return tasks.tasks(controller, dwelling.dwells(seeds))
     if which.singles:
         return contest.contest(controller, seeds)
     if which.settling:
-        return tasks.cells(controller, settling.cells(seeds))
+        return tasks.tasks(controller, settling.cells(seeds))
     draw(which.seed, **given)  # a wrong name is told now
     return tasks.runs(controller, seeds, given)
 
 
-def _write(
-    which: Which, controller: str, rows: list[dict[str, Any]], folder: Path, format: str
-) -> dict[str, Any]:
-    """Write the table, and sum it up."""
-    from piezoest.bench.tables import table_of, write_table
-    from piezoest.bench.zoo import columns, contest, dwelling, summary
+def _kind(which: Which, controller: str) -> tuple[Any, dict[str, type], Any, Any]:
+    """Rows of the table from those of the runs, its columns, and what sums runs up and prints that."""
+    from piezoest.bench.zoo import columns, contest, dwelling, report, summary
 
     if which.settling:
-        write_table(table_of(columns.tidy_cells(rows), columns.CELL_COLUMNS), folder / f"map.{format}")
-        return summary.summarise_cells(rows)
+        return columns.tidy_cells, columns.CELL_COLUMNS, summary.summarise_cells, report.print_map
     if which.dwell is not None:
-        write_table(table_of(rows, columns.DWELL_COLUMNS), folder / f"dwell.{format}")
-        return dwelling.summarise_dwells(rows)
-    name = "singles" if which.singles else "runs"
-    write_table(table_of(rows, columns.COLUMNS), folder / f"{name}.{format}")
+        return list, columns.DWELL_COLUMNS, dwelling.summarise_dwells, report.print_dwells
     if which.singles:
-        return contest.summarise_contest(rows, controller)
-    return summary.summarise(rows)
+        compared = partial(contest.summarise_contest, controller=controller)
+        return list, columns.COLUMNS, compared, report.print_contest
+    return list, columns.COLUMNS, summary.summarise, report.print_summary
 
 
 def _show(controller: str, seed: int, given: dict[str, Any], folder: Path) -> None:

@@ -7,22 +7,26 @@ processes may append to one file. A key that comes twice counts once.
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 Row = dict[str, Any]
 
 
-class Keyed(Protocol):
-    """A task whose row is kept under a key."""
+@dataclass(frozen=True, slots=True)
+class Keyed:
+    """A task, whose row is kept under a key that all its fields make."""
 
     @property
     def key(self) -> str:
         """Of the row."""
-        ...
+        text = json.dumps(asdict(self), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
 Task = TypeVar("Task", bound=Keyed)

@@ -19,10 +19,11 @@ from piezoest.bench.executors import in_processes, on_dask
 from piezoest.bench.machine import fingerprint
 from piezoest.bench.origin import json_safe
 from piezoest.bench.recorded import digest, file_of
-from piezoest.bench.run import COLUMNS, Row, Task, code_of, crashed, follow, play
+from piezoest.bench.run import COLUMNS, Task, code_of, crashed, follow, play
 from piezoest.bench.scenarios import SCENARIOS, UNREPEATED
 from piezoest.bench.stages import PAPER, STAGES, STRANGERS
 from piezoest.bench.statistics import NEEDS, QUANTITIES, interval, order, relative
+from piezoest.bench.store import Row
 
 RUNS, PERIODS, DOCUMENT = "runs", "periods", "table.json"
 PERIOD_COLUMNS: dict[str, type] = {

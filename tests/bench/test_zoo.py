@@ -200,11 +200,11 @@ def test_the_map_counts_periods() -> None:
     # A stage without hysteresis, whose inverse is known: all settles at once, but for the gain's step.
     u = np.linspace(-100.0, 100.0, 2001)
     x = rig.gain * u
-    ideal = settling.settle(cell, lambda fs, limits: Exact(rig.gain, 0.0, limits))
+    ideal = cell.play(lambda fs, limits: Exact(rig.gain, 0.0, limits))
     assert [segment["change"] for segment in ideal["segments"]] == [name for name, _, _ in settling.SEGMENTS]
     assert ideal["segments"][-1]["periods"] is None
     assert rig.reference.size == sum(periods for _, _, periods in settling.SEGMENTS) * settling.PERIOD
-    learnt = settling.settle(settling.Cell("coleman-hodgdon", 5.0, 10.0, 1), Parts)
+    learnt = settling.Cell("coleman-hodgdon", 5.0, 10.0, 1).play(Parts)
     assert learnt["segments"][0]["periods"] is not None
     found = summary.summarise_cells([ideal, learnt])
     assert found["runs"] == 2
@@ -271,7 +271,7 @@ def test_the_default_controller_changed() -> None:
 
 def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
     planned = tasks.runs(f"{own}:Dies", range(2), SHORT)
-    cell = tasks.cells(f"{own}:Dies", settling.cells([0], families=["paper"])[:1])
+    cell = tasks.tasks(f"{own}:Dies", settling.cells([0], families=["paper"])[:1])
     for task in (*planned, *cell):
         assert tasks.died(task)["failure"] == "the process died"
         assert tasks.died(task)["key"] == task.key

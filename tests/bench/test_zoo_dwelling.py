@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from piezoest.bench.commands import app
 from piezoest.bench.zoo import columns, tasks
 from piezoest.bench.zoo.controllers import Line
-from piezoest.bench.zoo.dwelling import BEFORE, SHAPES, Dwell, dwell_rig, dwells, play_dwell, summarise_dwells
+from piezoest.bench.zoo.dwelling import BEFORE, SHAPES, Dwell, dwell_rig, dwells, summarise_dwells
 from piezoest.bench.zoo.line import fit_line
 
 
@@ -51,11 +51,11 @@ def test_it_rests_where_the_wave_is(seed: int) -> None:
 def test_a_line_goes_on_as_before_and_a_jump_is_seen() -> None:
     dwell = next(each for each in dwells(range(40), 1.0) if dwell_rig(each)[0].block > 1)
     rig, _, _ = dwell_rig(dwell)
-    row = play_dwell(dwell, line(dwell))
+    row = dwell.play(line(dwell))
     assert row["failure"] is None
     assert row["kept"]
     assert row["excursion"] < 0.05
-    far = play_dwell(dwell, line(dwell, 0.2 * rig.reach.half))
+    far = dwell.play(line(dwell, 0.2 * rig.reach.half))
     assert not far["kept"]
     assert far["excursion"] > row["excursion"]
     found = summarise_dwells([row, {**far, "seed": -1}, {**row, "failure": "ValueError: no"}])
@@ -71,9 +71,9 @@ def test_what_breaks_is_a_row() -> None:
         raise RuntimeError("no idea")
 
     dwell = Dwell(3, True, 1.0)
-    row = play_dwell(dwell, broken)
+    row = dwell.play(broken)
     assert row["failure"] == "RuntimeError: no idea"
-    (task,) = tasks.rests("parts", [dwell])
+    (task,) = tasks.tasks("parts", [dwell])
     died = tasks.died(task)
     assert died["failure"] == "the process died"
     found = summarise_dwells([row, died])

@@ -95,7 +95,7 @@ def test_all_play_on_the_same_ideal_rigs() -> None:
     assert len(planned) == 4 * len(FAMILIES) * 7 * 2
     assert len({task.key for task in planned}) == len(planned)
     assert {task.controller for task in planned} == {DEFAULT, *CANDIDATES}
-    rig = draw(planned[0].seed, **planned[0].given)
+    rig = draw(planned[0].of.seed, **planned[0].of.given)
     assert rig.noise == 0.0
     assert rig.fault.kind == "none"
     assert rig.sample_rate == IDEAL["sample_rate"]

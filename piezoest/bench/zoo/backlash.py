@@ -8,13 +8,13 @@ Pokrovskii, Systems with Hysteresis, Springer 1989.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from numba.extending import register_jitable
 
 from piezoest.bench.zoo.loop import Loop
 from piezoest.equations.play import play
-from piezoest.layout import FIXED, MEASURED, Record, record
+from piezoest.layout import MEASURED, Kind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +25,8 @@ class Backlash(Loop):
     dead: float = 0.0  # half of the dead zone [V]
     place: float = 0.0  # its middle [V]
 
-    wipes_out = True
+    state: ClassVar[dict[str, Kind]] = {"y": MEASURED}  # the play's output [V]
+    wipes_out: ClassVar[bool] = True
 
     def stage_settings(self) -> dict[str, Any]:
         """Numbers by name."""
@@ -37,10 +38,6 @@ class Backlash(Loop):
             "place": self.place,
             "at_rest": max(-self.place - self.dead, 0.0) + min(-self.place + self.dead, 0.0),
         }
-
-    def stage_layouts(self, settings: dict[str, Any]) -> tuple[Record, Record]:
-        """Layouts of state, the play's output, and settings."""
-        return record(__name__, y=MEASURED), record(**dict.fromkeys(settings, FIXED))
 
 
 @register_jitable

@@ -8,13 +8,13 @@ saturates at `width`. It depends on the voltage alone, not on time; it does not 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numba.extending import register_jitable
 
 from piezoest.bench.zoo.loop import Loop
-from piezoest.layout import FIXED, MEASURED, NUMBER, Record, record
+from piezoest.layout import MEASURED, NUMBER, Kind
 
 # Longest step of the integration, relative to the width: the fourth order leaves 1e-7 of the loop.
 LONGEST = 0.05
@@ -28,6 +28,8 @@ class BoucWen(Loop):
     power: float = 1.0  # how sharp the knee is, 1 or more
     fullness: float = 0.5  # how round the loop is, within [-1, 1]
 
+    state: ClassVar[dict[str, Kind]] = {"u": MEASURED, "q": NUMBER}  # last voltage and h/width
+
     def stage_settings(self) -> dict[str, Any]:
         """Numbers by name; a loop that lags is subtracted from the line."""
         return {
@@ -38,11 +40,6 @@ class BoucWen(Loop):
             "beta": 0.5 * (1.0 + self.fullness),
             "gamma": 0.5 * (1.0 - self.fullness),
         }
-
-    def stage_layouts(self, settings: dict[str, Any]) -> tuple[Record, Record]:
-        """Layouts of state, last voltage and h/width, and settings."""
-        names = dict.fromkeys(settings, FIXED)
-        return record(__name__, u=MEASURED, q=NUMBER), record(**names)
 
 
 @register_jitable

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from piezoest.bench.store import Row
 from piezoest.bench.zoo.judging import ERRORS
-from piezoest.bench.zoo.playing import Row
 
 COLUMNS: dict[str, type] = {
     "key": str, "controller": str, "seed": int, "family": str, "gain": float, "width": float, "low": float,

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from piezoest.bench.store import Row
 from piezoest.bench.zoo.contenders import CANDIDATES
 from piezoest.bench.zoo.families import FAMILIES
-from piezoest.bench.zoo.playing import Row
 from piezoest.bench.zoo.references import SHAPES
 from piezoest.bench.zoo.tasks import Task, runs
 

@@ -9,13 +9,13 @@ does not wipe out.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numba.extending import register_jitable
 
 from piezoest.bench.zoo.loop import Loop
-from piezoest.layout import FIXED, MEASURED, NUMBER, Record, record
+from piezoest.layout import MEASURED, NUMBER, Kind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,6 +30,8 @@ class Duhem(Loop):
     bottom: float
     tilt: float = 0.0  # how much the branches grow over the range
     bend: float = 0.0  # change of the line's slope from the middle of the range to its end, relative
+
+    state: ClassVar[dict[str, Kind]] = {"u": MEASURED, "h": NUMBER}  # last voltage and h
 
     def stage_settings(self) -> dict[str, Any]:
         """Numbers by name; a loop that lags is subtracted from the line."""
@@ -46,11 +48,6 @@ class Duhem(Loop):
             "bottom": -self.bottom - slope_down * self.centre,
             "slope_down": slope_down,
         }
-
-    def stage_layouts(self, settings: dict[str, Any]) -> tuple[Record, Record]:
-        """Layouts of state, last voltage and h, and settings."""
-        names = dict.fromkeys(settings, FIXED)
-        return record(__name__, u=MEASURED, h=NUMBER), record(**names)
 
 
 @register_jitable

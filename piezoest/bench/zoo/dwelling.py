@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from piezoest.bench.origin import json_safe
+from piezoest.bench.store import Row
 from piezoest.bench.zoo.drawing import draw
 from piezoest.bench.zoo.families import FAMILIES
 from piezoest.bench.zoo.faults import NONE
@@ -43,6 +44,45 @@ class Dwell:
     feedback: bool  # whether the controller is given ``feedback=``
     duration: float = DURATION  # of the rest [s]
 
+    def play(self, factory: Factory) -> Row:
+        """Let a controller rest, and go on.
+
+        `factory` takes ``feedback=``, too. Returns ``settled``: median of the largest errors of the last
+        three periods before; ``allowed``: 1.2 times the largest of it, three times the noise and 0.2 % of the
+        swing; ``first``, ``second``, ``third``: largest errors of the periods after, all [µm]; ``kept``:
+        whether the first is allowed; ``excursion``: how far the voltage went in the rest, over its swing
+        before.
+        """
+        rig, rest, drawn = dwell_rig(self)
+        row: Row = {**rig.to_dict(), **drawn, "duration": self.duration, "failure": None}
+        options = {"feedback": drawn["feedback"]} if self.feedback else {}
+        try:
+            controller = factory(rig.sample_rate, rig.limits, **options)
+            with np.errstate(all="ignore"):
+                run, _ = run_controller(rig, controller)
+        except Exception as error:
+            return dict(json_safe({**row, "failure": f"{type(error).__name__}: {error}"}))
+        off, cycle, u = np.abs(run.error), rig.plain.cycle, run.voltage
+        level = settled(off[: rest.start], cycle) or 0.0
+        allowed = BACK * max(level, NOISES * rig.noise, 2.0 * NEGLIGIBLE * rig.plain.amplitude)
+        after = off[rest.stop : rest.stop + len(PERIODS) * cycle].reshape(-1, cycle).max(axis=1).tolist()
+        swing = float(np.ptp(u[rest.start - cycle : rest.start]))
+        gone = float(np.max(np.abs(u[rest] - u[rest.start - 1])))
+        row |= {"settled": level, "allowed": allowed, **dict(zip(PERIODS, after, strict=True))}
+        row |= {
+            "kept": after[0] <= allowed,
+            "excursion": gone / swing if swing > 0.0 else None,
+            "events": "; ".join(
+                event.reason.partition(":")[0] for event in getattr(controller, "events", ())
+            ),
+        }
+        return dict(json_safe(row))
+
+    def drawn(self) -> Row:
+        """What the rig is, and the rest."""
+        rig, _, drawn = dwell_rig(self)
+        return {**rig.to_dict(), **drawn, "duration": self.duration}
+
 
 def dwells(seeds: Sequence[int], duration: float = DURATION) -> list[Dwell]:
     """All rests on the rigs of these seeds, without feedback and with it. `duration`: [s]."""
@@ -69,40 +109,7 @@ def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
     return replace(rig, plain=replace(plain, values=values)), slice(start, start + rest.size), drawn
 
 
-def play_dwell(dwell: Dwell, factory: Factory) -> dict[str, Any]:
-    """Let a controller rest, and go on.
-
-    `factory`: ``factory(sample_rate, limits)`` makes a controller, ``factory(sample_rate, limits,
-    feedback=...)`` one with feedback. Returns ``settled``: median of the largest errors of the last three
-    periods before; ``allowed``: 1.2 times the largest of it, three times the noise and 0.2 % of the swing;
-    ``first``, ``second``, ``third``: largest errors of the periods after, all [µm]; ``kept``: whether the
-    first is allowed; ``excursion``: how far the voltage went in the rest, as a fraction of its swing before.
-    """
-    rig, rest, drawn = dwell_rig(dwell)
-    row: dict[str, Any] = {**rig.to_dict(), **drawn, "duration": dwell.duration, "failure": None}
-    options = {"feedback": drawn["feedback"]} if dwell.feedback else {}
-    try:
-        controller = factory(rig.sample_rate, rig.limits, **options)
-        with np.errstate(all="ignore"):
-            run, _ = run_controller(rig, controller)
-    except Exception as error:
-        return dict(json_safe({**row, "failure": f"{type(error).__name__}: {error}"}))
-    off, cycle, u = np.abs(run.error), rig.plain.cycle, run.voltage
-    level = settled(off[: rest.start], cycle) or 0.0
-    allowed = BACK * max(level, NOISES * rig.noise, 2.0 * NEGLIGIBLE * rig.plain.amplitude)
-    after = off[rest.stop : rest.stop + len(PERIODS) * cycle].reshape(-1, cycle).max(axis=1).tolist()
-    swing = float(np.ptp(u[rest.start - cycle : rest.start]))
-    gone = float(np.max(np.abs(u[rest] - u[rest.start - 1])))
-    row |= {"settled": level, "allowed": allowed, **dict(zip(PERIODS, after, strict=True))}
-    row |= {
-        "kept": after[0] <= allowed,
-        "excursion": gone / swing if swing > 0.0 else None,
-        "events": "; ".join(event.reason.partition(":")[0] for event in getattr(controller, "events", ())),
-    }
-    return dict(json_safe(row))
-
-
-def summarise_dwells(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
+def summarise_dwells(rows: Iterable[Row]) -> dict[str, Any]:
     """Sum up rests."""
     rows = list(rows)
     judged = [row for row in rows if row["failure"] is None]
@@ -131,20 +138,20 @@ def summarise_dwells(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _of(row: dict[str, Any]) -> tuple[bool, ...]:
+def _of(row: Row) -> tuple[bool, ...]:
     """Whether the stage creeps, and there is feedback, and noise in the reference."""
     return row["creep"] > 0.0, row["feedback"] > 0.0, row["setpoint_noise"] > 0.0
 
 
-def _ratio(row: dict[str, Any], period: str = "first") -> float:
+def _ratio(row: Row, period: str = "first") -> float:
     """Largest error of a period over what is allowed; infinite where it is no number."""
     value = row[period]
     return np.inf if value is None else float(value / row["allowed"])
 
 
-def _summed(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _summed(rows: Sequence[Row]) -> dict[str, Any]:
     judged = [row for row in rows if row["failure"] is None]
-    found: dict[str, Any] = {"runs": len(rows), "kept": sum(row["kept"] for row in judged)}
+    found: Row = {"runs": len(rows), "kept": sum(row["kept"] for row in judged)}
     for period in PERIODS:
         found[period] = float(np.median([_ratio(row, period) for row in judged])) if judged else None
     found["largest"] = max(map(_ratio, judged), default=None)
@@ -154,9 +161,3 @@ def _summed(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "excursion": float(np.median(gone)) if gone else None,
         "farthest": max(gone, default=None),
     }
-
-
-def died(dwell: Dwell) -> dict[str, Any]:
-    """Row of a run whose process died over it."""
-    rig, _, drawn = dwell_rig(dwell)
-    return {**rig.to_dict(), **drawn, "duration": dwell.duration}

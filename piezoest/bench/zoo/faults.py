@@ -77,25 +77,26 @@ class Kind:
     modes: tuple[str, ...] = (TRANSIENT, PERMANENT)
     # Draws the size from (random numbers, `Around`).
     size: Callable[[Any, Around], float] = lambda rng, around: 0.0
-    # Makes the faulty stage of (stage, `Fault`, `Around`).
-    stage: Callable[[Any, Fault, Around], Any] = lambda stage, fault, around: stage
+    # Class of the faulty stage, and what it is given beside size, start, duration and seed.
+    stage: Callable[..., Any] | None = None
+    more: Callable[[Fault, Around], dict[str, float]] = lambda fault, around: {}
     # Whether nothing can be learnt meanwhile: readings say nothing or lie, or the stage stands still.
     hides: bool = False
     partly: bool = False  # whether some readings are wrong and the others right
     names: tuple[str, ...] = ()  # what a controller may call it; empty if it need not be noticed
 
 
-def _times(fault: Fault, around: Around) -> tuple[float, float]:
-    """Start and duration [s], half a sample early: whatever rounding does, the sample is the one meant."""
+def faulty_stage(stage: Any, fault: Fault, around: Around) -> Any:
+    """Put a fault around a stage."""
+    kind = FAULTS.get(fault.kind, Kind())
+    if kind.stage is None:
+        return stage
+    # Half a sample early: whatever rounding does, the sample is the one meant.
     start = max(fault.start - 0.5, 0.0) / around.sample_rate
-    if fault.lasting:
-        return start, faulty.FOREVER
-    return start, (fault.stop - max(fault.start, 0.5)) / around.sample_rate
-
-
-def _for_a_time(make: Callable[[Any, Fault, Around], Any]) -> Callable[[Any, Fault, Around], Any]:
-    """Let a fault that has no moments of its own hold while it should."""
-    return lambda stage, fault, around: faulty.ForATime(make(stage, fault, around), *_times(fault, around))
+    lasts = (fault.stop - max(fault.start, 0.5)) / around.sample_rate
+    duration = faulty.FOREVER if fault.lasting else lasts
+    given = {"size": fault.size, **kind.more(fault, around)}
+    return kind.stage(stage, start=start, duration=duration, seed=around.seed, **given)
 
 
 def _swing(around: Around) -> float:
@@ -109,86 +110,56 @@ def _zero(rng: Any, around: Around) -> float:
 
 
 ALL = (START, TRANSIENT, PERMANENT)
-STILL, FACTORS = (
-    ("no response", "saturated"),
-    ("reversed", "scaled"),
-)  # readings stand still, or are multiplied
+# Readings stand still, or are multiplied.
+STILL, FACTORS = ("no response", "saturated"), ("reversed", "scaled")
 ANY = (*STILL, *FACTORS, "zero moved")
 
 FAULTS: dict[str, Kind] = {
-    "amplifier-frozen": Kind(
-        ALL, stage=lambda stage, fault, around: faulty.FrozenAmplifier(stage, *_times(fault, around)),
-        hides=True, names=STILL,
-    ),
+    "amplifier-frozen": Kind(ALL, stage=faulty.FrozenAmplifier, hides=True, names=STILL),
     "stage-stuck": Kind(
-        ALL, stage=lambda stage, fault, around: faulty.StuckStage(
-            stage, *_times(fault, around), around.noise, seed=around.seed
-        ),
-        hides=True, names=STILL,
+        ALL, stage=faulty.StuckStage, more=lambda fault, around: {"noise": around.noise}, hides=True,
+        names=STILL,
     ),
-    "sensor-constant": Kind(
-        ALL, stage=lambda stage, fault, around: faulty.Stuck(stage, *_times(fault, around)),
-        hides=True, names=STILL,
-    ),
+    "sensor-constant": Kind(ALL, stage=faulty.Stuck, hides=True, names=STILL),
     "sensor-noise": Kind(
         ALL, size=lambda rng, around: around.reference.centre + rng.uniform(-1.0, 1.0) * around.stroke,
-        stage=lambda stage, fault, around: faulty.Dead(
-            stage, *_times(fault, around), fault.size, 0.002 * _swing(around), seed=around.seed
-        ),
-        hides=True, names=ANY,
+        stage=faulty.Dead, more=lambda fault, around: {"noise": 0.002 * _swing(around)}, hides=True,
+        names=ANY,
     ),
     "sensor-saturated": Kind(
-        ALL, size=lambda rng, around: 0.6 * around.reference.amplitude,
-        stage=_for_a_time(
-            lambda stage, fault, around: faulty.Saturation(stage, fault.size, around.reference.centre)
-        ),
-        partly=True, names=("saturated",),
+        ALL, size=lambda rng, around: 0.6 * around.reference.amplitude, stage=faulty.Saturation,
+        more=lambda fault, around: {"centre": around.reference.centre}, partly=True, names=("saturated",),
     ),
     "sensor-factor": Kind(
-        ALL, size=lambda rng, around: float(rng.choice([-1.0, 1e-3, 1e3])),
-        stage=_for_a_time(lambda stage, fault, around: faulty.Factor(stage, fault.size)), hides=True,
+        ALL, size=lambda rng, around: float(rng.choice([-1.0, 1e-3, 1e3])), stage=faulty.Factor, hides=True,
         names=FACTORS,
     ),
-    "zero-off": Kind(
-        ALL, size=_zero,
-        stage=_for_a_time(lambda stage, fault, around: faulty.OffsetStep(stage, 0.0, fault.size)), hides=True,
-        names=("zero moved",),
-    ),
-    "zero-off-shifted": Kind(
-        ALL, size=_zero,
-        stage=_for_a_time(lambda stage, fault, around: faulty.OffsetStep(stage, 0.0, fault.size)),
-    ),
+    "zero-off": Kind(ALL, size=_zero, stage=faulty.Offset, hides=True, names=("zero moved",)),
+    "zero-off-shifted": Kind(ALL, size=_zero, stage=faulty.Offset),
     "spikes": Kind(
-        ALL, size=lambda rng, around: _swing(around) * rng.choice([0.3, 1.0, 5.0]),
-        stage=_for_a_time(
-            lambda stage, fault, around: faulty.Spikes(
-                stage, 0.01 * around.sample_rate, fault.size, seed=around.seed
-            )
-        ),
+        ALL, size=lambda rng, around: _swing(around) * rng.choice([0.3, 1.0, 5.0]), stage=faulty.Spikes,
         partly=True,
     ),
     "dropouts": Kind(
-        ALL, size=lambda rng, around: float(rng.choice([0.01, 0.2, 0.5])),
-        stage=_for_a_time(lambda stage, fault, around: faulty.Missing(stage, fault.size, seed=around.seed)),
+        ALL, size=lambda rng, around: float(rng.choice([0.01, 0.2, 0.5])), stage=faulty.Missing
     ),
-    "gap": Kind(
-        ALL, stage=lambda stage, fault, around: faulty.Gap(stage, *_times(fault, around)), hides=True
-    ),
+    "gap": Kind(ALL, stage=faulty.Gap, hides=True),
     "hum": Kind(
         ALL, size=lambda rng, around: _usual(0.2, around) if rng.random() < 0.5 else 0.05 * _swing(around),
-        stage=_for_a_time(lambda stage, fault, around: faulty.Hum(stage, fault.size, seed=around.seed)),
+        stage=faulty.Hum,
     ),
     "drift": Kind(
         ALL, size=lambda rng, around: _swing(around) * rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.3),
-        stage=lambda stage, fault, around: faulty.Drift(
-            stage, fault.size * around.sample_rate / max(fault.stop - fault.start, 1), *_times(fault, around)
-        ),
+        stage=faulty.Drift,
+        more=lambda fault, around: {
+            "size": fault.size * around.sample_rate / max(fault.stop - fault.start, 1)
+        },
     ),
-    "gain-step": Kind((TRANSIENT, PERMANENT), size=lambda rng, around: float(rng.choice([0.7, 1.3]))),
-    "amplitude-drop": Kind((TRANSIENT, PERMANENT), size=lambda rng, around: rng.uniform(0.1, 0.4)),
+    "gain-step": Kind(size=lambda rng, around: float(rng.choice([0.7, 1.3]))),
+    "amplitude-drop": Kind(size=lambda rng, around: rng.uniform(0.1, 0.4)),
     "glitch": Kind(
         (TRANSIENT,), size=lambda rng, around: _usual(rng.choice([1.0, 2.0, 10.0]), around),
-        stage=_for_a_time(lambda stage, fault, around: faulty.OffsetStep(stage, 0.0, fault.size)), hides=True,
+        stage=faulty.Offset, hides=True,
     ),
     "dwell": Kind((TRANSIENT,)),
 }  # fmt: skip

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from piezoest._checks import FloatArray
-from piezoest.layout import Record
+from piezoest.layout import FIXED, Kind, Record, record
 from piezoest.stage import SimulatedStage
 
 
@@ -22,6 +22,7 @@ class Loop:
     share: float = 1.0  # of the loop, relative to the line
     offset: float = 0.0  # displacement where both are zero [µm]
 
+    state: ClassVar[dict[str, Kind]] = {}  # what the module's ``deform`` keeps
     wipes_out: ClassVar[bool] = False  # whether a larger swing deletes what smaller ones left behind
 
     def stage_settings(self) -> dict[str, Any]:
@@ -30,7 +31,7 @@ class Loop:
 
     def stage_layouts(self, settings: dict[str, Any]) -> tuple[Record, Record]:
         """Layouts of state and settings of the hysteresis in a stage."""
-        raise NotImplementedError
+        return record(type(self).__module__, **self.state), record(**dict.fromkeys(settings, FIXED))
 
     def simulate(self, u: FloatArray) -> FloatArray:
         """Displacement [µm] for a voltage record [V], from rest at 0 V."""

@@ -7,14 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest.bench.origin import json_safe
+from piezoest.bench.store import Row
 from piezoest.bench.zoo.judging import Lines, judge
 from piezoest.bench.zoo.learnt_line import run_learnt_line
 from piezoest.bench.zoo.line import fit_line
 from piezoest.bench.zoo.naming import named
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Factory, Traces, run_controller, run_line
-
-Row = dict[str, Any]
 
 
 class Both(NamedTuple):

@@ -10,12 +10,12 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo.families import Reach
 from piezoest.bench.zoo.faults import (
-    FAULTS,
     TRANSIENT,
     Around,
     Fault,
     changed_reference,
     coordinates,
+    faulty_stage,
     gain_schedule,
 )
 from piezoest.bench.zoo.faulty_stages import Drift, Hum
@@ -156,9 +156,7 @@ class Rig:
             stage = Drift(stage, own.drift)
         if own.hum:
             stage = Hum(stage, own.hum, seed=self.seed)
-        if self.fault.kind in FAULTS:
-            stage = FAULTS[self.fault.kind].stage(stage, self.fault, self.facts)
-        return stage
+        return faulty_stage(stage, self.fault, self.facts)
 
     def _mechanics(self) -> MassSpringDamper | None:
         frequency, damping = self.around.resonance

@@ -11,13 +11,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from piezoest import signals
 from piezoest._checks import FloatArray
 from piezoest.bench.origin import json_safe
+from piezoest.bench.store import Row
 from piezoest.bench.zoo.drawing import draw
 from piezoest.bench.zoo.faults import Fault
 from piezoest.bench.zoo.references import Reference
@@ -53,6 +53,44 @@ class Cell:
     amplitude: float  # [µm]
     frequency: float  # [Hz]
     seed: int  # of what is drawn
+
+    def play(self, factory: Factory) -> Row:
+        """Run a controller over it.
+
+        Returns with ``segments``: for each its name, the periods until it settled (None if it did not), the
+        largest error of its last period [µm] and what was allowed. ``asked``: see `asked`.
+        """
+        rig = cell_rig(self)
+        row: Row = {**asdict(self), "gain": rig.gain, "width": rig.width, "block": rig.block,
+                               "noise": rig.noise, "mechanics": rig.around.mechanics, "asked": asked(rig),
+                               "failure": None, "segments": []}  # fmt: skip
+        try:
+            controller = factory(rig.sample_rate, rig.limits)
+            with np.errstate(all="ignore"):
+                run, _ = run_controller(rig, controller)
+        except Exception as error:
+            return {**row, "failure": f"{type(error).__name__}: {error}"}
+        worst = np.abs(run.error).reshape(-1, rig.plain.cycle).max(axis=1)
+        first = 0
+        for name, factor, periods in SEGMENTS:
+            allowed = max(SETTLED * factor * self.amplitude, NOISES * rig.noise)
+            part = worst[first : first + periods]
+            late = np.flatnonzero(~(part <= allowed))
+            after = int(late[-1]) + 1 if late.size else 0
+            row["segments"].append(
+                {
+                    "change": name,
+                    "periods": after if after < periods else None,
+                    "error": float(part[-1]),
+                    "allowed": allowed,
+                }
+            )
+            first += periods
+        return dict(json_safe(row))
+
+    def drawn(self) -> Row:
+        """The place."""
+        return {**asdict(self), "segments": [], "asked": True}
 
 
 def cells(
@@ -102,34 +140,3 @@ def asked(rig: Rig) -> bool:
     """Whether it is asked for that all settles soon."""
     slow = rig.plain.frequency <= SLOW * rig.around.resonance[0]
     return bool(slow and rig.plain.amplitude >= LARGE * rig.noise)
-
-
-def settle(cell: Cell, factory: Factory) -> dict[str, Any]:
-    """Run a controller over a cell."""
-    rig = cell_rig(cell)
-    row: dict[str, Any] = {**asdict(cell), "gain": rig.gain, "width": rig.width, "block": rig.block,
-                           "noise": rig.noise, "mechanics": rig.around.mechanics, "asked": asked(rig),
-                           "failure": None, "segments": []}  # fmt: skip
-    try:
-        controller = factory(rig.sample_rate, rig.limits)
-        with np.errstate(all="ignore"):
-            run, _ = run_controller(rig, controller)
-    except Exception as error:
-        return {**row, "failure": f"{type(error).__name__}: {error}"}
-    worst = np.abs(run.error).reshape(-1, rig.plain.cycle).max(axis=1)
-    first = 0
-    for name, factor, periods in SEGMENTS:
-        allowed = max(SETTLED * factor * cell.amplitude, NOISES * rig.noise)
-        part = worst[first : first + periods]
-        late = np.flatnonzero(~(part <= allowed))
-        after = int(late[-1]) + 1 if late.size else 0
-        row["segments"].append(
-            {
-                "change": name,
-                "periods": after if after < periods else None,
-                "error": float(part[-1]),
-                "allowed": allowed,
-            }
-        )
-        first += periods
-    return dict(json_safe(row))

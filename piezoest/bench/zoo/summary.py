@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from piezoest.bench.origin import json_safe
-from piezoest.bench.zoo.playing import Row
+from piezoest.bench.store import Row
 from piezoest.bench.zoo.settling import SEGMENTS
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
