@@ -32,25 +32,6 @@ MEMORIES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # s; its period is 0.2 s
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
-    """A number of the paper beside ours."""
-
-    paper: Published  # the paper's
-    ours: float  # the simulated stage's, in the same unit
-
-    @property
-    def ratio(self) -> float:
-        """Ours over the paper's."""
-        return self.ours / self.paper.value
-
-    @property
-    def within(self) -> bool | None:
-        """Whether the deviation is within its bound; None without one."""
-        bound = self.paper.bound
-        return None if bound is None else bool(abs(self.paper.deviation(self.ours)) <= bound)
-
-
-@dataclass(frozen=True, slots=True)
 class PaperResult:
     """The paper's experiment, run again."""
 
@@ -62,9 +43,18 @@ class PaperResult:
     crossed: dict[str, Run] = field(repr=False)  # rows of Table III
     sweep: dict[float, Run] = field(repr=False)  # inverse compensation of one reference by memory [s]
 
-    def compare(self) -> list[Comparison]:
-        """Every number of the tables beside ours."""
-        return [Comparison(number, self._ours(number)) for number in published()]
+    def _beside(self, number: Published) -> dict[str, Any]:
+        """A number of the paper beside ours, and whether the deviation is within its bound, if it has one."""
+        ours, bound = self._ours(number), number.bound
+        deviation = number.deviation(ours)
+        return {
+            **dataclasses.asdict(number),
+            "ours": ours,
+            "ratio": ours / number.value,
+            "deviation": deviation,
+            "bound": bound,
+            "within": None if bound is None else bool(abs(deviation) <= bound),
+        }
 
     def _ours(self, number: Published) -> float:
         if number.table == "III":
@@ -92,17 +82,7 @@ class PaperResult:
                 "start": START.to_dict(),
                 "linear_start": START_GAIN.to_dict(),
             },
-            "tables": [
-                {
-                    **dataclasses.asdict(pair.paper),
-                    "ours": pair.ours,
-                    "ratio": pair.ratio,
-                    "deviation": pair.paper.deviation(pair.ours),
-                    "bound": pair.paper.bound,
-                    "within": pair.within,
-                }
-                for pair in self.compare()
-            ],
+            "tables": [self._beside(number) for number in published()],
             "adaptation": [run.to_dict() for rows in (self.linear, self.inverse) for run in rows.values()],
             "memory": [run.to_dict() for run in self.sweep.values()],
         }

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from piezoest._tables import print_cells, say
+from piezoest.bench.report import Cells
+
 Entry = dict[str, Any]  # an entry of "tables" in the JSON
-Cells = list[str]
 
 TITLES = {
     "I": "Table I: identified parameters for the stationary response",
@@ -101,41 +103,25 @@ def print_report(document: dict[str, Any], console: Any) -> None:
     """Print the tables, the transients, the sweep and the verdict."""
     for number, title in TITLES.items():
         heading, body = table(document["tables"], number)
-        _print(console, title, heading, body, group=3)
-    console.print(KEY, highlight=False)
-    _print(console, TRANSIENTS, *transients(document["adaptation"]))
+        print_cells(console, title, heading, body, texts=(0, 1), group=3, style=_style)
+    say(console, KEY)
+    print_cells(console, TRANSIENTS, *transients(document["adaptation"]), texts=(0, 1))
     if document["memory"]:
         title = f"Memory of the estimator: {document['memory'][0]['row']}, hysteresis compensation"
-        _print(console, title, *memories(document["memory"]))
+        print_cells(console, title, *memories(document["memory"]), texts=(0, 1))
     conditions, machine = document["conditions"], document["machine"]
-    for line in (
+    say(
+        console,
         *verdict(document["tables"]),
         f"Memory {conditions['memory_s']:g} s, {conditions['sample_rate_hz']:g} Hz, "
         f"seed {conditions['seed']}; {machine['cpu']}, {machine['cores']} cores, {machine['python']}; "
         f"{document['seconds']:.0f} s.",
-    ):
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
-
-
-def _print(console: Any, title: str, heading: Cells, body: list[Cells], group: int = 1) -> None:
-    from rich.markup import escape
-    from rich.table import Table
-
-    shown = Table(title=title, title_justify="left")
-    for k, name in enumerate(heading):
-        shown.add_column(escape(name), justify="left" if k < 2 else "right", no_wrap=True)
-    for k, cells in enumerate(body):
-        styled = [_style(cell) for cell in cells]
-        shown.add_row(*styled, end_section=group > 1 and k % group == group - 1)
-    console.print(shown)
+    )
 
 
 def _style(cell: str) -> str:
-    if cell.endswith("✗"):
-        return f"[bold red]{cell}[/bold red]"
-    if cell.endswith("✓"):
-        return f"[green]{cell}[/green]"
-    return f"[italic]{cell}[/italic]" if cell in (CALIBRATION, HELD_OUT) else cell
+    ends = {"✗": "bold red", "✓": "green"}
+    return ends.get(cell[-1:], "italic" if cell in (CALIBRATION, HELD_OUT) else "")
 
 
 def _digits(value: float) -> str:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
+from piezoest._tables import print_cells, say
+
 Document = dict[str, Any]  # from `piezoest.bench.table.describe`
-Table = tuple[list[str], list[list[str]]]
+Cells = list[str]
+Table = tuple[Cells, list[Cells]]
 
 KEY = (
     "Largest errors in % of the amplitude. settles: periods until every further error is below 1.2 %, the "
@@ -112,39 +115,20 @@ def print_table(document: Document, console: Any, *, scenarios: bool = False) ->
     title = f"{len(document['scenarios'])} scenarios, {plan['seeds']} seeds, stage {plan['stages'][0]}"
     print_cells(console, title, *overview_table(document))
     machine = document["machine"]
-    lines = [
+    names = document["estimators"]
+    say(
+        console,
         KEY,
         f"{document['runs']} runs at {document['conditions']['sample_rate']:g} Hz; {machine['cpu']}, "
         f"{machine['cores']} cores, {machine['python']}.",
-        *(f"{name}: {diverged} of {runs} runs diverge." for name, diverged, runs in _diverged(document)),
-    ]
-    for line in lines:
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
-    for failure in [*document["failures"], *document["tracebacks"]]:
-        console.print(f"failed: {failure}", style="red", highlight=False, markup=False, soft_wrap=True)
-
-
-def _diverged(document: Document) -> list[tuple[str, int, int]]:
-    return [
-        (document["estimators"][row["estimator"]]["name"], row["diverged"], row["runs"])
-        for row in document["overview"]
-        if row["diverged"]
-    ]
-
-
-def print_cells(console: Any, title: str, heading: Sequence[str], body: Iterable[Sequence[Any]]) -> None:
-    """Print a table: the first column is text, the others are numbers."""
-    from rich.box import SIMPLE_HEAD
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False)
-    table.add_column(heading[0])
-    for name in heading[1:]:
-        table.add_column(escape(name), justify="right", no_wrap=True)
-    for cells in body:
-        table.add_row(*(escape(str(cell)) for cell in cells))
-    console.print(table)
+        *(
+            f"{names[row['estimator']]['name']}: {row['diverged']} of {row['runs']} runs diverge."
+            for row in document["overview"]
+            if row["diverged"]
+        ),
+    )
+    failed = [*document["failures"], *document["tracebacks"]]
+    say(console, *(f"failed: {failure}" for failure in failed), style="red")
 
 
 def print_changes(document: Document, console: Any, *, everything: bool = False) -> None:
@@ -161,8 +145,5 @@ def print_changes(document: Document, console: Any, *, everything: bool = False)
         ]  # fmt: skip
         print_cells(console, "B against A", heading, body)
     counts = ", ".join(f"{count} {verdict}" for verdict, count in document["counts"].items())
-    for line in (
-        f"{document['pairs']} pairs of runs; of {len(document['rows'])} comparisons {counts or 'none'}.",
-        *document["notes"],
-    ):
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    pairs = f"{document['pairs']} pairs of runs; of {len(document['rows'])} comparisons {counts or 'none'}."
+    say(console, pairs, *document["notes"])

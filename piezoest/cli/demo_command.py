@@ -10,6 +10,7 @@ from rich.console import Console
 
 from piezoest._errors import errors
 from piezoest._files import save_figure
+from piezoest._tables import print_cells
 from piezoest.cli.shared import Debug, check_figure, progress
 
 if TYPE_CHECKING:
@@ -44,8 +45,6 @@ def demo(
 
 
 def _print_demo(result: Demo) -> None:
-    from rich.table import Table
-
     from piezoest.demo import AMPLITUDE, ESTIMATOR, FREQUENCY, LIMITS, SETTLED_PERIODS
 
     ways = (
@@ -54,16 +53,14 @@ def _print_demo(result: Demo) -> None:
         ("inverse, adaptive", result.adaptive),
         ("AdaptiveFeedforward", result.controller),
     )
-    table = Table(title=f"Largest error [µm]: {AMPLITUDE:g} µm at {FREQUENCY:g} Hz, simulated stage")
-    table.add_column("compensation")
-    for period in range(1, 5):
-        table.add_column(f"period {period}", justify="right")
-    table.add_column("settled", justify="right", style="bold")
+    console = Console()
+    body = []
     for name, record in ways:
         errors = record.max_error_per_period()
-        table.add_row(name, *(f"{e:.3f}" for e in errors[:4]), f"{record.max_error(SETTLED_PERIODS):.4f}")
-    console = Console()
-    console.print(table)
+        body.append((name, *(f"{e:.3f}" for e in errors[:4]), f"{record.max_error(SETTLED_PERIODS):.4f}"))
+    title = f"Largest error [µm]: {AMPLITUDE:g} µm at {FREQUENCY:g} Hz, simulated stage"
+    heading = ("compensation", *(f"period {period}" for period in range(1, 5)), "settled")
+    print_cells(console, title, heading, body)
     names = result.adaptive.parameter_names
     first, last = result.adaptive.theta[0], result.adaptive.theta[-1]
     from_wrong = ", ".join(f"{name} {a:.4g} → {b:.4g}" for name, a, b in zip(names, first, last, strict=True))

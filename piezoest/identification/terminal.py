@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from typing import Any
 
+from piezoest._tables import print_cells, say
 from piezoest.identification.compared import (
     Found,
     compared,
@@ -23,10 +23,10 @@ ERRORS = ("fitted\nrms", "blocks\nleft out", "held out\nrms", "held out\nlargest
 
 def print_identification(found: Found, console: Any) -> None:
     """Print the kinds compared, the parameters of the one to use, and how far to trust it."""
-    _say(console, f"{found.source}: {log_sentence(found)}")
+    say(console, f"{found.source}: {log_sentence(found)}")
     rows = [each.cells() for each in compared(found)]
-    _print_table(console, "Free-running error [µm]", ("model", "n", *ERRORS), rows)
-    _print_table(
+    print_cells(console, "Free-running error [µm]", ("model", "n", *ERRORS), rows)
+    print_cells(
         console,
         f"Model: {label_of(found)}",
         ("parameter", "value", "± standard error", "unit"),
@@ -35,34 +35,6 @@ def print_identification(found: Found, console: Any) -> None:
     )
     if isinstance(found, Identification) and found.validations:
         titles = ("log", "rms", "largest", "rms without mean")
-        _print_table(console, "Error on other logs [µm]", titles, validation_cells(found))
-    for sentence in (reason_sentence(found), residual_sentence(found)):
-        if sentence:
-            _say(console, sentence)
-    for remark in remarks(found):
-        _say(console, f"• {remark}")
-
-
-def _say(console: Any, sentence: str) -> None:
-    console.print(sentence, highlight=False, markup=False, soft_wrap=True)
-
-
-def _print_table(
-    console: Any,
-    title: str,
-    titles: Sequence[str],
-    rows: Iterable[Sequence[str]],
-    texts: Sequence[int] = (0,),
-) -> None:
-    """A table of figures; columns of text are flush left."""
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(title=title)
-    for i, each in enumerate(titles):
-        left = i in texts
-        # Names of files may be long: they are folded, figures are not.
-        table.add_column(each, justify="left" if left else "right", no_wrap=not left, overflow="fold")
-    for row in rows:
-        table.add_row(*map(Text, row))
-    console.print(table)
+        print_cells(console, "Error on other logs [µm]", titles, validation_cells(found))
+    say(console, *filter(None, (reason_sentence(found), residual_sentence(found))))
+    say(console, *(f"• {remark}" for remark in remarks(found)))

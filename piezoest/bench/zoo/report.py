@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from piezoest.bench.report import print_cells
+from piezoest._tables import print_cells, say
 from piezoest.bench.zoo.dwelling import WAYS
 from piezoest.bench.zoo.settling import SEGMENTS
 from piezoest.bench.zoo.summary import ENOUGH, SOON
@@ -45,11 +45,8 @@ def print_summary(summary: dict[str, Any], console: Any) -> None:
             for row in summary["by_fault"]
         ],
     )  # fmt: skip
-    console.print("The worst:", highlight=False)
-    for row in summary["worst"]:
-        console.print(_told(row), highlight=False, markup=False, soft_wrap=True)
-    console.print(KEY, highlight=False, markup=False, soft_wrap=True)
-    console.print(f"Controller: {number(summary['microseconds'])} µs per sample, median.", highlight=False)
+    timed = f"Controller: {number(summary['microseconds'])} µs per sample, median."
+    say(console, "The worst:", *map(_told, summary["worst"]), KEY, timed)
 
 
 def _told(row: dict[str, Any]) -> str:
@@ -82,10 +79,10 @@ def print_map(summary: dict[str, Any], console: Any) -> None:
     changes = [name for name, _, _ in SEGMENTS]
     cells = summary["cells"]
     kept = ", ".join(f"{name} {cells['kept'][name]}" for name in changes)
-    console.print(
+    say(
+        console,
         f"Cells with at least {100.0 * ENOUGH:g} % of the runs settled within {SOON} periods, of "
         f"{cells['asked']} that are asked for: {kept}. All others: {summary['others']} runs.",
-        highlight=False,
     )
     for title, names in (("by_family", ("family",)), ("by_place", ("amplitude", "frequency"))):
         print_cells(
@@ -98,7 +95,7 @@ def print_map(summary: dict[str, Any], console: Any) -> None:
                 for row in summary[title]
             ],
         )  # fmt: skip
-    console.print(f"{summary['runs']} runs, {summary['failures']} failed.", highlight=False)
+    say(console, f"{summary['runs']} runs, {summary['failures']} failed.")
 
 
 def print_contest(summary: dict[str, Any], console: Any) -> None:
@@ -114,10 +111,10 @@ def print_contest(summary: dict[str, Any], console: Any) -> None:
             for row in summary["cells"]
         ],
     )  # fmt: skip
-    console.print(
+    say(
+        console,
         f"{summary['kept']} of {len(summary['cells'])} cells within {summary['allowed']:g}; "
         f"{summary['runs']} runs, {summary['failures']} failed.",
-        highlight=False,
     )
 
 
@@ -139,11 +136,11 @@ def print_dwells(summary: dict[str, Any], console: Any) -> None:
         )  # fmt: skip
     for row in summary["worst"]:
         with_feedback = "with" if row["feedback"] else "without"
-        console.print(f"  {row['seed']} {with_feedback} feedback: {number(row['ratio'])}", highlight=False)
-    console.print(
+        say(console, f"  {row['seed']} {with_feedback} feedback: {number(row['ratio'])}")
+    say(
+        console,
         f"As before in the first period: {summary['kept']} of {summary['runs']} runs, "
         f"{summary['failures']} failed.",
-        highlight=False,
     )
 
 
