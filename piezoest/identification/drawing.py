@@ -9,7 +9,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.identification.data import prepare, turning_voltages
-from piezoest.identification.residual import Misfit, autocorrelation
+from piezoest.identification.residual import Kind, Misfit, autocorrelation
 from piezoest.records import Record
 
 if TYPE_CHECKING:
@@ -21,15 +21,6 @@ MOST_POINTS = 40_000
 ABOVE: dict[str, Any] = {
     "loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 3, "fontsize": "small", "borderaxespad": 0.2,
 }  # fmt: skip
-
-
-class Kind(NamedTuple):
-    """Errors of a kind of model [µm rms]: on blocks left out of the fit, and held out; NaN if unknown."""
-
-    label: str
-    chosen: bool
-    left_out: float
-    held_out: float
 
 
 class Drawn(NamedTuple):
@@ -116,7 +107,8 @@ def _draw_kinds(axes: Any, kinds: tuple[Kind, ...]) -> None:
     chosen = next(k for k, kind in enumerate(kinds) if kind.chosen)
     axes.axhspan(chosen - 0.5, chosen + 0.5, color="C0", alpha=0.15, lw=0)
     axes.plot([kind.left_out for kind in kinds], places, "D", color="C0", label="blocks left out")
-    axes.plot([kind.held_out for kind in kinds], places, "o", color="C1", label="held out")
+    held_out = [np.nan if kind.held_out is None else kind.held_out.rms for kind in kinds]
+    axes.plot(held_out, places, "o", color="C1", label="held out")
     axes.set(xscale="log", yticks=places, ylim=(len(kinds) - 0.5, -0.5), xlabel="error [µm rms]")
     axes.set_yticklabels([kind.label for kind in kinds], fontsize="small")
     axes.grid(alpha=0.3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,6 +40,31 @@ class Misfit:
     def to_dict(self) -> dict[str, float]:
         """Return a JSON-safe dictionary."""
         return {"rms_um": self.rms, "max_um": self.max}
+
+
+class Kind(NamedTuple):
+    """A kind of model beside the others, by what it misses; None where that is not known."""
+
+    label: str
+    chosen: bool
+    left_out: float  # on blocks left out of the fit, by which the kind was chosen [µm rms]
+    parameters: int | None = None
+    train: Misfit | None = None
+    held_out: Misfit | None = None
+
+    def cells(self) -> tuple[str, ...]:
+        """Label, marked if it was chosen, parameters, and errors: fitted, left out, held out, largest."""
+        errors = (
+            None if self.train is None else self.train.rms,
+            self.left_out,
+            None if self.held_out is None else self.held_out.rms,
+            None if self.held_out is None else self.held_out.max,
+        )
+        return (
+            f"{'▸' if self.chosen else ' '} {self.label}",
+            "" if self.parameters is None else f"{self.parameters}",
+            *("" if error is None else f"{error:.3g}" for error in errors),
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
 from piezoest.fitting.regression import Fitted
 from piezoest.identification.parameters import Row, parameter_rows
-from piezoest.identification.residual import Misfit, Whiteness
+from piezoest.identification.residual import Kind, Misfit, Whiteness
 from piezoest.identification.sense import Finding
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record
@@ -367,20 +367,24 @@ class Identification:
         ]
         return "\n".join([*lines, self.reason, *self.advice])
 
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """All kinds that were fitted, from the simplest to the richest, as tables and figures show them."""
+        return tuple(
+            Kind(one.label, one is self.best, one.cross_validated, one.parameters, one.train, one.held_out)
+            for one in self.candidates
+        )
+
     def drawn(self) -> Drawn:
         """What figures show of it."""
-        from piezoest.identification.drawing import Drawn, Kind
+        from piezoest.identification.drawing import Drawn
 
         expected = self.predict()
-        kinds = (
-            Kind(each.label, each is self.best, each.cross_validated, each.held_out.rms)
-            for each in self.candidates
-        )
         return Drawn(
             source=self.source, label=self.best.label, errors=(self.held_out, self.line_held_out),
             record=self.record, prediction=self.prediction, residual=self.residual, left_out=self.left_out,
             trained=self.trained, expected=(expected.lower - expected.x, expected.upper - expected.x),
-            kinds=tuple(kinds),
+            kinds=self.kinds,
         )  # fmt: skip
 
     def plot(self) -> Figure:

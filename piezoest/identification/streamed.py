@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -19,11 +19,11 @@ from piezoest.fitting.search import BENDS, checked_delay, plays
 from piezoest.identification.advice import unsettled_sentence
 from piezoest.identification.choice import simplest
 from piezoest.identification.data import check_excitation, noise_of, prepare
-from piezoest.identification.drawing import Drawn, Kind
+from piezoest.identification.drawing import Drawn
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.parameters import Row, parameter_rows
 from piezoest.identification.parts import Part, Progress, parts, pieces
-from piezoest.identification.residual import Misfit
+from piezoest.identification.residual import Kind, Misfit
 from piezoest.identification.result import left_out_error
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record, RecordStream
@@ -92,24 +92,33 @@ class StreamedIdentification:
     notes: tuple[str, ...] = ()
     advice: tuple[str, ...] = ()
 
+    # What an `Identification` says beside.
+    reason: ClassVar[str] = ""
+    whiteness: ClassVar[None] = None
+    validations: ClassVar[tuple[()]] = ()
+
     def table(self) -> list[Row]:
         """Rows of parameter name, value, standard error (zero: not estimated) and unit."""
         return parameter_rows(self.model, self.delay, {})
 
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """All kinds that were fitted, from the simplest to the richest, as tables and figures show them."""
+        judged = {"line": (self.line_train, self.line_held_out), self.chosen: (self.train, self.held_out)}
+        return tuple(
+            Kind(FORMS[name].label, name == self.chosen, error, None, *judged.get(name, (None, None)))
+            for name, error in self.cross_validated.items()
+        )
+
     def drawn(self) -> Drawn:
         """What figures show of it: samples at equal distances."""
         record, share = self.thinned, len(self.thinned) / self.samples
-        judged = {"line": self.line_held_out.rms, self.chosen: self.held_out.rms}
-        kinds = (
-            Kind(FORMS[name].label, name == self.chosen, left_out, judged.get(name, float("nan")))
-            for name, left_out in self.cross_validated.items()
-        )
         return Drawn(
             source=self.source, label=FORMS[self.chosen].label, errors=(self.held_out, self.line_held_out),
             record=record, prediction=self.prediction, residual=record.displacement - self.prediction,
             left_out=-int(-self.left_out * share // 1),
             trained=min(round(share * self.trained), len(record) - 1),
-            expected=None, kinds=tuple(kinds),
+            expected=None, kinds=self.kinds,
         )  # fmt: skip
 
     def to_dict(self) -> dict[str, Any]:

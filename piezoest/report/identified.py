@@ -5,17 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from piezoest._version import __version__
-from piezoest.identification.compared import (
-    Found,
-    compared,
-    label_of,
-    log_sentence,
-    parameter_cells,
-    reason_sentence,
-    remarks,
-    residual_sentence,
-    validation_cells,
-)
+from piezoest.identification import compared
+from piezoest.identification.compared import Found
 from piezoest.identification.data import prepare, turning_voltages
 from piezoest.identification.drawing import draw, draw_excitation
 from piezoest.identification.result import Identification
@@ -42,21 +33,45 @@ def write_report(found: Found, path: str | Path) -> None:
     """
     if not isinstance(found, Identification | StreamedIdentification):
         raise ValueError(f"found must come from identify or identify_stream, got {type(found).__name__}")
-    page = Page(f"{Path(found.source).name}: what was identified", log_sentence(found))
-    page.cards(_cards(found))
-    _add_kinds(page, found)
-    _add_parameters(page, found)
-    _add_advice(page, found)
-    _add_figures(page, found)
-    _add_excitation(page, found)
+    page = Page(f"{Path(found.source).name}: what was identified", compared.log_sentence(found))
+    kinds, parameters, *others = compared.tables(found)
+    page.cards(_cards(found, parameters.title.partition(": ")[2]))
+    page.heading("Models of all kinds")
+    if reason := compared.reason_sentence(found):
+        page.text(reason)
+    page.table(kinds.heading, kinds.rows, kinds.title)
+    page.heading("Parameters")
+    page.tables(*((each.heading, each.rows, each.title) for each in (parameters, *others)))
+    if sentences := compared.remarks(found):
+        page.heading("Advice")
+        page.advice(sentences)
+    page.heading("Fit")
+    page.text(
+        "Displacement and residual over time, and the loop: what was measured, and the model, which sees "
+        "only the voltage. "
+        + (
+            compared.residual_sentence(found)
+            or "Drawn are samples at equal distances, as the log was read in blocks."
+        )
+    )
+    drawn = found.drawn()
+    page.picture(draw(drawn), "Voltage, displacement, residual, loop, errors of all kinds, autocorrelation")
+    page.heading("Excitation")
+    data = prepare(drawn.record.voltage, drawn.record.displacement)
+    page.text(
+        f"The voltage spans {data.extent:.4g} V about {data.middle:.4g} V and turns "
+        f"{turning_voltages(data).size} times. Hysteresis shows only at turns, and the parameters belong to "
+        "the amplitudes that occur."
+    )
+    page.picture(draw_excitation(drawn), "Where the voltage turns, and its spectrum")
     page.footer(f"piezoest {__version__}. Source: {found.source}")
     page.write(path)
 
 
-def _cards(found: Found) -> list[tuple[str, str]]:
+def _cards(found: Found, label: str) -> list[tuple[str, str]]:
     held, line = found.held_out.rms, found.line_held_out.rms
     cards = [
-        (label_of(found), "the model to use"),
+        (label, "the model to use"),
         (f"{held:.3g} µm", "free-running error, held out, rms"),
         (f"{found.held_out.max:.3g} µm", "the same, largest"),
     ]
@@ -65,59 +80,3 @@ def _cards(found: Found) -> list[tuple[str, str]]:
     share = 100.0 * (1.0 - held / line)
     than = f"than a straight line ({line:.3g} µm rms)"
     return [*cards, (f"{abs(share):.0f} %", f"{'less' if share >= 0.0 else 'more'} {than}")]
-
-
-def _add_kinds(page: Page, found: Found) -> None:
-    page.heading("Models of all kinds")
-    if reason := reason_sentence(found):
-        page.text(reason)
-    page.table(
-        ("free-running error [µm]", "parameters", "fitted\nrms", "blocks left out\nrms", "held out\nrms",
-         "held out\nlargest"),
-        [each.cells() for each in compared(found)],
-    )  # fmt: skip
-
-
-def _add_parameters(page: Page, found: Found) -> None:
-    page.heading("Parameters")
-    tables: list[tuple[tuple[str, ...], list[tuple[str, ...]], str]] = [
-        (
-            (label_of(found), "value", "± standard error", "unit"),
-            [tuple(row) for row in parameter_cells(found)],
-            "",
-        )
-    ]
-    if isinstance(found, Identification) and found.validations:
-        titles = ("other logs, predicted [µm]", "rms", "largest", "rms without mean")
-        tables.append((titles, validation_cells(found), ""))
-    page.tables(*tables)
-
-
-def _add_advice(page: Page, found: Found) -> None:
-    if sentences := remarks(found):
-        page.heading("Advice")
-        page.advice(sentences)
-
-
-def _add_figures(page: Page, found: Found) -> None:
-    page.heading("Fit")
-    page.text(
-        "Displacement and residual over time, and the loop: what was measured, and the model, which sees "
-        "only the voltage. "
-        + (residual_sentence(found) or "Drawn are samples at equal distances, as the log was read in blocks.")
-    )
-    page.picture(
-        draw(found.drawn()), "Voltage, displacement, residual, loop, errors of all kinds, autocorrelation"
-    )
-
-
-def _add_excitation(page: Page, found: Found) -> None:
-    page.heading("Excitation")
-    record = found.drawn().record
-    data = prepare(record.voltage, record.displacement)
-    page.text(
-        f"The voltage spans {data.extent:.4g} V about {data.middle:.4g} V and turns "
-        f"{turning_voltages(data).size} times. Hysteresis shows only at turns, and the parameters belong to "
-        "the amplitudes that occur."
-    )
-    page.picture(draw_excitation(found.drawn()), "Where the voltage turns, and its spectrum")
