@@ -15,50 +15,36 @@ import numpy as np
 import pytest
 
 from piezoest.records import read_record, write_columns
-
-N = 60
-TIME = np.arange(N) / 100.0
-VOLTAGE = 10.0 * np.sin(0.5 * np.arange(N))
-LOG = {"time_s": TIME, "voltage_V": VOLTAGE, "displacement_um": 1.5 * VOLTAGE}
-
-
-def hdf5(path: Path, columns: dict[str, Any] = LOG) -> Any:
-    file = pytest.importorskip("h5py").File(path, "w")
-    for name, values in columns.items():
-        file[name] = values
-    return file
-
+from tests.logs import LOG, TIME, VOLTAGE, N, write_hdf5, write_sheets, write_tdms
 
 # ---------------------------------------------------------------- more than there is room for
 
 
 def hdf5_that_declares_much(path: Path) -> None:
-    with hdf5(path, {}) as file:
+    with pytest.importorskip("h5py").File(path, "w") as file:
         for name in LOG:
             file.create_dataset(name, shape=(2**36,), dtype="f8", chunks=(1024,))
 
 
+def declare(file: Any, *shape: int) -> None:
+    np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
+
+
 def npz_that_expands(path: Path) -> None:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("x.npy", "w") as inside:
-        np.lib.format.write_array_header_1_0(
-            inside, {"descr": "<f8", "fortran_order": False, "shape": (2**26,)}
-        )
+        declare(inside, 2**26)
         for _ in range(512):
             inside.write(bytes(1 << 20))
 
 
 def npz_that_lies(path: Path) -> None:
     with zipfile.ZipFile(path, "w") as archive, archive.open("x.npy", "w") as inside:
-        np.lib.format.write_array_header_1_0(
-            inside, {"descr": "<f8", "fortran_order": False, "shape": (2**50,)}
-        )
+        declare(inside, 2**50)
 
 
 def npy_that_declares_much(path: Path) -> None:
     with path.open("wb") as file:
-        np.lib.format.write_array_header_1_0(
-            file, {"descr": "<f8", "fortran_order": False, "shape": (3, 2**40)}
-        )
+        declare(file, 3, 2**40)
 
 
 def mat_that_declares_much(path: Path) -> None:
@@ -116,9 +102,10 @@ def virtual(file: Any, folder: Path, other: str = "other.h5") -> None:
 
 @pytest.mark.parametrize("elsewhere", [external_storage, external_link, virtual])
 def test_other_files_are_not_opened(tmp_path: Path, elsewhere: Callable[[Any, Path], None]) -> None:
-    hdf5(tmp_path / "other.h5").close()
+    for name in ("other.h5", "log.h5"):
+        write_hdf5(tmp_path / name)
     (tmp_path / "raw").write_bytes(LOG["displacement_um"].tobytes())
-    with hdf5(tmp_path / "log.h5") as file:
+    with pytest.importorskip("h5py").File(tmp_path / "log.h5", "r+") as file:
         elsewhere(file, tmp_path)
     with pytest.raises(ValueError, match=r"log\.h5: \w+ lies in another file"):
         read_record(tmp_path / "log.h5")
@@ -126,7 +113,8 @@ def test_other_files_are_not_opened(tmp_path: Path, elsewhere: Callable[[Any, Pa
 
 def test_what_lies_in_the_file_is_read(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
-    with hdf5(tmp_path / "log.h5") as file:
+    write_hdf5(tmp_path / "log.h5")
+    with h5py.File(tmp_path / "log.h5", "r+") as file:
         file["above"] = file["/"]
         file["nowhere"] = h5py.SoftLink("/nothing")
         file["none"] = h5py.Empty("f8")
@@ -172,16 +160,11 @@ def test_a_damaged_spreadsheet_is_called_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize("rate", [[1e3, 1e3], "fast", np.nan, -5.0])
 def test_a_sample_rate_that_is_none_is_not_taken(tmp_path: Path, rate: Any) -> None:
     columns = {name: values for name, values in LOG.items() if name != "time_s"}
-    with hdf5(tmp_path / "log.h5", columns) as file:
-        file.attrs["sample_rate"] = rate
+    write_hdf5(tmp_path / "log.h5", columns, sample_rate=rate)
     with pytest.raises(ValueError, match=r"log\.h5: no column for time found"):
         read_record(tmp_path / "log.h5")
     assert read_record(tmp_path / "log.h5", sample_rate=50.0).sample_rate == 50.0
-
-
-def test_a_sample_rate_in_an_array_of_one_is_taken(tmp_path: Path) -> None:
-    with hdf5(tmp_path / "log.h5", {"voltage_V": VOLTAGE, "displacement_um": VOLTAGE}) as file:
-        file.attrs["sample_rate"] = [100.0]
+    write_hdf5(tmp_path / "log.h5", columns, sample_rate=[100.0])
     assert read_record(tmp_path / "log.h5").sample_rate == 100.0
 
 
@@ -198,25 +181,11 @@ def labview(path: Path) -> None:
     path.write_text("\n".join([*head, *segment, *rows[:30], "", *segment, *rows[30:]]) + "\n")
 
 
-def tdms(path: Path) -> None:
-    nptdms = pytest.importorskip("nptdms")
-    with nptdms.TdmsWriter(str(path)) as writer:
-        writer.write_segment([nptdms.ChannelObject("run", name, values) for name, values in LOG.items()])
-
-
-def spreadsheet(path: Path) -> None:
-    pytest.importorskip("python_calamine")
-    book = pytest.importorskip("openpyxl").Workbook()
-    for row in (list(LOG), *np.column_stack(list(LOG.values())).tolist()):
-        book.active.append(row)
-    book.save(path)
-
-
 MAKERS: dict[str, Callable[[Path], None]] = {
     "csv.gz": packed,
     "lvm": labview,
-    "tdms": tdms,
-    "xlsx": spreadsheet,
+    "tdms": write_tdms,
+    "xlsx": lambda path: write_sheets(path, log=[list(LOG), *np.column_stack(list(LOG.values())).tolist()]),
     "npz": lambda path: np.savez_compressed(path, **LOG),
 }
 

@@ -11,37 +11,13 @@ import numpy as np
 import pytest
 
 from piezoest.records import Record, as_record, read_record, stream_record
+from tests.logs import DISPLACEMENT, RATE, TIME, VOLTAGE, N, check, write_sheets
 
-N = 60
-RATE = 200.0
-TIME = np.arange(N) / RATE
-VOLTAGE = 10.0 * np.sin(0.5 * np.arange(N))
-DISPLACEMENT = 1.5 * VOLTAGE + 3.0
 START = datetime.datetime(2026, 11, 22, 10)
 STAMPS = [START + datetime.timedelta(seconds=t) for t in TIME.tolist()]
 
 
-def check(record: Record) -> None:
-    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
-    np.testing.assert_allclose(record.voltage, VOLTAGE, atol=1e-12)
-    np.testing.assert_allclose(record.displacement, DISPLACEMENT, atol=1e-12)
-    assert record.sample_rate == pytest.approx(RATE)
-
-
 # ---------------------------------------------------------------- spreadsheets
-
-
-def sheets(path: Path, **tables: list[list[Any]]) -> Path:
-    openpyxl = pytest.importorskip("openpyxl")
-    pytest.importorskip("python_calamine")
-    book = openpyxl.Workbook()
-    book.remove(book.active)
-    for name, rows in tables.items():
-        sheet = book.create_sheet(name)
-        for row in rows:
-            sheet.append(row)
-    book.save(path)
-    return path
 
 
 def rows(time: list[Any], header: tuple[str, ...] = ("t", "drive_V", "gauge (nm)")) -> list[list[Any]]:
@@ -51,16 +27,18 @@ def rows(time: list[Any], header: tuple[str, ...] = ("t", "drive_V", "gauge (nm)
 
 @pytest.mark.parametrize("time", [TIME.tolist(), STAMPS, [stamp.time() for stamp in STAMPS]])
 def test_spreadsheet(tmp_path: Path, time: list[Any]) -> None:
-    check(read_record(sheets(tmp_path / "log.xlsx", log=rows(time))))
+    check(read_record(write_sheets(tmp_path / "log.xlsx", log=rows(time))))
 
 
 def test_the_first_sheet_with_numbers_is_read(tmp_path: Path) -> None:
     table = [["Log of 22 November"], [], *rows(TIME.tolist())]
     empty_column = [[None, *row] for row in table]
-    file = sheets(tmp_path / "log.xlsx", empty=[], words=[["operator", "Ada"]], log=empty_column, other=table)
+    file = write_sheets(
+        tmp_path / "log.xlsx", empty=[], words=[["operator", "Ada"]], log=empty_column, other=table
+    )
     check(read_record(file))
     nameless = rows(TIME.tolist())[1:]
-    assert len(read_record(sheets(file, log=nameless), units={"displacement": "nm"})) == N
+    assert len(read_record(write_sheets(file, log=nameless), units={"displacement": "nm"})) == N
     with pytest.raises(ValueError, match="cannot be streamed: a spreadsheet is read as a whole"):
         stream_record(file)
 
@@ -68,11 +46,11 @@ def test_the_first_sheet_with_numbers_is_read(tmp_path: Path) -> None:
 def test_cells_without_numbers(tmp_path: Path) -> None:
     table = rows(TIME.tolist())
     table[8][1], table[9][2], table[10][1] = None, "N/A", " "
-    record = read_record(sheets(tmp_path / "log.xlsx", log=table))
+    record = read_record(write_sheets(tmp_path / "log.xlsx", log=table))
     assert np.flatnonzero(~record.usable).tolist() == [7, 8, 9]
     table[12][1] = "off"
     with pytest.raises(ValueError, match=r"row 13, column 'drive_V': 'off' is not a number"):
-        read_record(sheets(tmp_path / "log.xlsx", log=table))
+        read_record(write_sheets(tmp_path / "log.xlsx", log=table))
 
 
 # ---------------------------------------------------------------- DataFrames

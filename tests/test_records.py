@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 
 from piezoest.records import Record, read_record, read_reference, write_columns
-
-N = 40
-TIME = np.arange(N) / 100.0
-VOLTAGE = 10.0 * np.sin(0.5 * np.arange(N))
-DISPLACEMENT = 1.5 * VOLTAGE + 3.0
+from tests.logs import DISPLACEMENT, RATE, TIME, VOLTAGE, N, check
 
 
 def log(path: Path, header: str = "time_s,voltage_V,displacement_um", **changes: str) -> Path:
@@ -26,20 +22,12 @@ def log(path: Path, header: str = "time_s,voltage_V,displacement_um", **changes:
     return file
 
 
-def check(record: Record, tolerance: float = 1e-6) -> None:
-    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
-    np.testing.assert_allclose(record.voltage, VOLTAGE, atol=tolerance)
-    np.testing.assert_allclose(record.displacement, DISPLACEMENT, atol=tolerance)
-    assert record.sample_rate == pytest.approx(100.0)
-
-
 def test_plain_log(tmp_path: Path) -> None:
     record = read_record(log(tmp_path))
     check(record)
     assert record.skipped == 0
     assert record.notes == ()
-    assert len(record) == N
-    assert record.duration == pytest.approx(N / 100.0)
+    assert record.duration == pytest.approx(N / RATE)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +61,7 @@ def test_units_are_converted_and_said(tmp_path: Path) -> None:
     columns = {"time_ms": 1e3 * TIME, "position_nm": 1e3 * DISPLACEMENT, "drive_mV": 1e3 * VOLTAGE}
     write_columns(file, columns)
     record = read_record(file)
-    check(record, 1e-6)
+    check(record)
     assert len(record.notes) == 3
     assert "converted to µm (factor 0.001)" in " ".join(record.notes)
 
@@ -103,7 +91,9 @@ def test_rows_without_numbers_are_kept_as_nan_and_counted(tmp_path: Path, line: 
         ({"line9": "0.001,1,1"}, ["line 9", "time does not increase"]),
         ({"line12": "0.1045,1,1"}, ["line 12", "unevenly", "0.01 s is usual"]),
         ({"line12": "0,100,1,5,1,5"}, ["line 12", "6 fields", "3"]),
-        ({"line41": "9.0,1,1"}, ["line 41", "time jumps by", "missing in all"]),
+        ({"line2": "s,V,um"}, ["line 2", "not a number"]),
+        ({"line12": '0.100,"0.1,0.1'}, ["quotation mark"]),
+        ({"line61": "9.0,1,1"}, ["line 61", "time jumps by", "missing in all"]),
         ({"line1": "time_s,current_A,displacement_um"}, ["no column for voltage", "time_s, current_A"]),
         ({"line1": "time_s,voltage_V,gauge_V"}, ["gauge_V", "unit v", "must be in µm"]),
         ({"line1": "time_s,x_um,position_um"}, ["no column for voltage"]),
@@ -117,9 +107,17 @@ def test_refusals_name_place_and_reason(tmp_path: Path, changes: dict[str, str],
         assert word in str(caught.value)
 
 
-def test_empty_files(tmp_path: Path) -> None:
+def test_files_without_a_log(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
-    contents = {"": "is empty", "\n# only this\n": "is empty", "t,u,x\n": "rows", "t,u,x\n0,0,0\n": "rows"}
+    contents = {
+        "": "is empty",
+        "\n# only this\n": "is empty",
+        "t,u,x\n": "no rows below the header",
+        "t,u,x\n0,0,0\n": "rows",
+        "t,u,x\n" + "nan,nan,nan\n" * 200: "only",
+        "\n".join(map(str, range(100))): "1 columns",
+        "Dear colleague,\nhere are\nthe data\n": "no column for",
+    }
     for text, words in contents.items():
         file.write_text(text)
         with pytest.raises(ValueError, match=words):
@@ -131,6 +129,12 @@ def test_empty_files(tmp_path: Path) -> None:
         read_record(tmp_path / "none.csv")
 
 
+def test_what_had_to_be_assumed_is_noted(tmp_path: Path) -> None:
+    for header, line, words in (("t,u,x", "0.080,1,1", "unit taken as"), ("t,u,x", "0.0808,1,1", "uneven")):
+        notes = read_record(log(tmp_path, header, line10=line)).notes
+        assert any(words in note for note in notes)
+
+
 def test_round_trip_and_split(tmp_path: Path) -> None:
     voltage = VOLTAGE.copy()
     voltage[3] = np.nan
@@ -139,9 +143,9 @@ def test_round_trip_and_split(tmp_path: Path) -> None:
     again = read_record(tmp_path / "out.csv")
     np.testing.assert_allclose(again.voltage, voltage, rtol=1e-8)
     first, second = again.split(0.25)
-    assert (len(first), len(second)) == (10, 30)
+    assert (len(first), len(second)) == (15, 45)
     assert (first.skipped, second.skipped) == (1, 0)
-    assert second.time[0] == pytest.approx(0.1)
+    assert second.time[0] == pytest.approx(0.15)
     with pytest.raises(ValueError, match="part"):
         record.split(1.5)
     with pytest.raises(ValueError, match="displacement must have shape"):

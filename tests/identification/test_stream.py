@@ -83,14 +83,6 @@ def test_a_lag_is_found_and_followed(tmp_path: Path) -> None:
     assert given.held_out.rms < 0.7 * pz.identify_stream(stream, delay=0.0).held_out.rms
 
 
-def test_a_lag_that_the_start_cannot_tell_is_not_guessed(tmp_path: Path) -> None:
-    u = 30.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(COUNT) / RATE)
-    x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(u) + noise(2e-3, 0, COUNT)
-    found = pz.identify_stream(saved(tmp_path, u, x))
-    assert found.delay == 0.0
-    assert any("lag of the displacement is not known" in sentence for sentence in found.advice)
-
-
 def test_progress_is_told_in_three_passes(tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     pz.identify_stream(saved(tmp_path, *drawn()), progress=lambda done, all_: told.append((done, all_)))
@@ -168,10 +160,3 @@ def test_a_start_that_has_not_settled_is_left_out(tmp_path: Path) -> None:
     found = pz.identify_stream(saved(tmp_path, u, x), delay=0.0)
     assert found.held_out.rms < 1.2 * whole.held_out.rms
     assert found.train.rms < 1.2 * whole.train.rms
-
-
-def test_a_log_of_whole_parts(tmp_path: Path) -> None:
-    u, x = (np.resize(each, 2 * PART) for each in drawn(2))
-    found = pz.identify_stream(saved(tmp_path, u, x, rows=PART), delay=0.0)
-    assert found.samples == 2 * PART
-    assert found.held_out.rms < 0.2 * found.line_held_out.rms
