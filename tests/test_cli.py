@@ -138,16 +138,6 @@ def test_identify_the_example(tmp_path: Path, log: Path) -> None:
     assert found["samples"] < 14_155
 
 
-def test_identify_real_recording(data_dir: Path, tmp_path: Path) -> None:
-    file = data_dir / "discrete_backlash_operator" / "test_1hz.csv"
-    result = run("identify", file, "--json", "--plot", tmp_path / "figure.png")
-    assert result.exit_code == 0
-    data = json.loads(result.stdout)
-    assert data["held_out"]["rms_um"] <= 0.45
-    assert data["straight_line"]["held_out"]["rms_um"] > 1.2
-    assert (tmp_path / "figure.png").exists()
-
-
 def test_identified_model_goes_into_compensate(log: Path, reference: Path) -> None:
     assert run("identify", log, "--no-plot", "-o", "model.json").exit_code == 0
     result = run("compensate", reference, "--parameters", "model.json", "--offset", 0, "-o", "voltage.csv")

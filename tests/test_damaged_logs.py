@@ -181,7 +181,7 @@ def labview(path: Path) -> None:
     path.write_text("\n".join([*head, *segment, *rows[:30], "", *segment, *rows[30:]]) + "\n")
 
 
-MAKERS: dict[str, Callable[[Path], None]] = {
+MAKERS: dict[str, Callable[[Path], Any]] = {
     "csv.gz": packed,
     "lvm": labview,
     "tdms": write_tdms,

@@ -13,10 +13,9 @@ import pytest
 
 from piezoest.bench import executors, table
 from piezoest.bench.store import carry_out, store_in
+from tests.bench.shared import SMALL
 
 pytest.importorskip("distributed")
-
-SMALL = {"sample_rate": 2000.0, "before": 1, "after": 6, "rest": 0.2, "drift": 1.4, "updates": 20}
 
 # Says which process ran it; a cluster's workers have the environment they were started with.
 OWN = """

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
 from piezoest.bench.paper_tables import PRBS_ROW, Published, published
-from piezoest.cli import app
+from tests.bench.shared import bench as command
 
 # What the stage misses: each has to miss still, so that a better stage shortens the list.
 MISSES = {
@@ -44,8 +43,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
     """The whole procedure, without the sweep over the memory."""
     folder = tmp_path_factory.mktemp("paper")
     target, figures = folder / "paper.json", folder / "figures"
-    arguments = ["bench", "paper", "--quick", "--json", str(target), "--figures", str(figures)]
-    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "80"})
+    result = command("paper", "--quick", "--json", target, "--figures", figures)
     assert result.exit_code == 0, result.output
     return Bench(json.loads(target.read_text(encoding="utf-8")), result.stdout, figures)
 
@@ -74,13 +72,7 @@ def test_number_is_within_its_bound(number: Published, bench: Bench) -> None:
 
 @pytest.mark.parametrize(
     ("quantity", "sign"),
-    [
-        ("alpha", -1),
-        ("beta", 1),
-        ("gamma", -1),
-        ("K", 1),
-        ("compensated_max_error", 1),
-    ],
+    [("alpha", -1), ("beta", 1), ("gamma", -1), ("K", 1), ("compensated_max_error", 1)],
 )
 def test_slow_row_differs_from_the_fast_one_as_in_the_paper(quantity: str, sign: int, bench: Bench) -> None:
     slow, fast = (bench.number(f"5.0 µm @ {f} Hz", quantity) for f in ("2.5", "5.0"))
@@ -119,8 +111,8 @@ def test_figures_are_written(bench: Bench) -> None:
 def test_wrong_usage(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     for arguments in (
-        ["--json", str(tmp_path / "no" / "paper.json")],
-        ["--figures", str(tmp_path / "file")],
-        ["--memory", "0"],
+        ("--json", tmp_path / "no" / "paper.json"),
+        ("--figures", tmp_path / "file"),
+        ("--memory", 0),
     ):
-        assert CliRunner().invoke(app, ["bench", "paper", *arguments]).exit_code == 2
+        assert command("paper", *arguments).exit_code == 2

@@ -68,17 +68,8 @@ def test_an_interval_holds_the_truth_about_as_often_as_it_says() -> None:
     for seed in range(60):
         rng = np.random.default_rng(seed)
         errors = np.exp(rng.normal(0.0, 0.5, 30))
-        rows = [
-            {
-                "stage": "paper",
-                "scenario": "drift",
-                "estimator": "e",
-                "seed": k,
-                "amplitude": 1.0,
-                "typical": e,
-            }
-            for k, e in enumerate(errors)
-        ]
+        where = {"stage": "paper", "scenario": "drift", "estimator": "e", "amplitude": 1.0}
+        rows = [{**where, "seed": k, "typical": e} for k, e in enumerate(errors)]
         _, low, high = interval(relative(table_of(rows, COLUMNS)), "typical")
         covered.append(low <= 1.0 <= high)
     assert 0.85 <= np.mean(covered) <= 1.0
@@ -125,10 +116,7 @@ def test_a_change_of_every_seed_is_found(factor: float, verdict: str) -> None:
 
 def test_noise_is_noise_and_few_seeds_tell_nothing() -> None:
     def verdicts(seeds: int) -> list[str]:
-        before, after = (
-            runs({"e": 1.0, "other": 1.0}, seeds=seeds),
-            runs({"other": 1.0, "e": 1.0}, seeds=seeds),
-        )
+        before, after = (runs(dict.fromkeys(names, 1.0), seeds=seeds) for names in (("e", "o"), ("o", "e")))
         rows = comparison.compare(before, after)["rows"]
         return [row["verdict"] for row in rows if row["scenario"] != comparison.ALL]
 

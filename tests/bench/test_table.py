@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from typer.testing import CliRunner, Result
 
 import piezoest as pz
 from piezoest.bench import recorded, table, tables, tuning
@@ -24,12 +23,8 @@ from piezoest.bench.pages import write_html
 from piezoest.bench.run import COLUMNS, Task, code_of, crashed, play
 from piezoest.bench.stages import STAGES, STRANGERS, make_stage
 from piezoest.bench.store import Store, carry_out, store_in
-from piezoest.cli import app
 from piezoest.records import Record
-
-SMALL: dict[str, Any] = {
-    "sample_rate": 2000.0, "before": 1, "after": 6, "rest": 0.2, "drift": 1.4, "updates": 20,
-}  # fmt: skip
+from tests.bench.shared import SMALL, bench, own_module, said
 
 OWN = """
 import os
@@ -57,31 +52,12 @@ class Dies(Still):
     def step(self, u, x):
         os._exit(3)
 
-class Line:
-    model = None
-
-    def __init__(self, sample_rate, limits):
-        self.limits = limits
-
-    def step(self, r):
-        return r / 0.155
-
-    def run(self, r):
-        return r / 0.155
-
-    def learn(self, u, x):
-        pass
 """
 
 
 @pytest.fixture
 def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    # Each test's own module: another one of the same name would stay loaded.
-    name = f"own_estimators_{tmp_path.name}"
-    (tmp_path / f"{name}.py").write_text(OWN, encoding="utf-8")
-    return name
+    return own_module(tmp_path, monkeypatch, OWN)
 
 
 def task(estimator: str = "HysteresisRLS", scenario: str = "cold-start", **given: Any) -> Task:
@@ -91,12 +67,6 @@ def task(estimator: str = "HysteresisRLS", scenario: str = "cold-start", **given
 def plan(*estimators: str, **given: Any) -> table.Plan:
     asked = {"scenarios": ("cold-start", "noise"), "stages": ("paper",), "seeds": 2, "given": SMALL}
     return table.Plan(estimators=estimators, **{**asked, **given})
-
-
-def bench(*arguments: object) -> Result:
-    return CliRunner().invoke(
-        app, ["bench", *(str(argument) for argument in arguments)], env={"COLUMNS": "80"}
-    )
 
 
 # ---------------------------------------------------------------- stages and estimators
@@ -323,12 +293,8 @@ def test_command_end_to_end(own: str, tmp_path: Path) -> None:
         len(line) <= 80 for line in result.stdout.splitlines() if "─" in line or "HysteresisEKF" in line
     )
     assert "in step" in result.stdout  # the traceback of one's own estimator
-    assert {path.name for path in Path("figures").iterdir()} == {
-        "adaptation.png",
-        "cost.png",
-        "overview.png",
-        "settled.png",
-    }
+    drawn = {path.stem for path in Path("figures").iterdir()}
+    assert drawn == {"adaptation", "cost", "overview", "settled"}
     folder = Path("bench-results-quick")
     document = json.loads((folder / "table.json").read_text(encoding="utf-8"))
     assert document == json.loads(Path("a.json").read_text(encoding="utf-8"))
@@ -368,7 +334,7 @@ def test_compare_with_itself_finds_no_change(own: str) -> None:
 def test_command_refuses_wrong_words(own: str, arguments: tuple[str, ...], words: str) -> None:
     result = bench(*arguments)
     assert result.exit_code == 2
-    assert words in " ".join(result.stderr.replace("│", " ").split())
+    assert words in said(result)
     assert not Path("bench-results").exists()
 
 

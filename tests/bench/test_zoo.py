@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 
 from piezoest.bench.store import Store, carry_out
-from piezoest.bench.tables import table_of, write_table
 from piezoest.bench.zoo import columns, draw, play, settling, summary, tasks, traced
 from piezoest.bench.zoo.contenders import CANDIDATES, CHANGED, DEFAULT, contender
 from piezoest.bench.zoo.controllers import Line, Parts
@@ -20,14 +19,10 @@ from piezoest.bench.zoo.faults import FAULTS
 from piezoest.bench.zoo.line import fit_line
 from piezoest.bench.zoo.references import SHAPES
 from piezoest.bench.zoo.rig import Rig
-from piezoest.cli import app
+from tests.bench import shared
+from tests.bench.shared import bench, own_module, said
 
-SHORT: dict[str, Any] = {
-    "family": "backlash", "limits": "±100", "gain": 0.15, "width": 0.15, "sample_rate": 1000.0,
-    "frequency": 10.0, "amplitude": 10.0, "waves": 14, "reference": "triangle", "delay": 0, "noise": 1e-3,
-    "hum": 0.0, "drift": 0.0, "creep": 0.0, "mechanics": "none", "slew": np.inf, "resolution": 0.0,
-    "volts": 0.0, "block": 20, "fault": "none",
-}  # fmt: skip
+SHORT = {**shared.SHORT, "family": "backlash", "fault": "none"}
 
 OWN = """
 import os
@@ -51,16 +46,11 @@ class Dies(Breaks):
 
 @pytest.fixture
 def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    name = f"own_controllers_{tmp_path.name}"
-    (tmp_path / f"{name}.py").write_text(OWN, encoding="utf-8")
-    return name
+    return own_module(tmp_path, monkeypatch, OWN)
 
 
-def bench(*arguments: object) -> Result:
-    words = ["bench", "safety", *(str(argument) for argument in arguments)]
-    return CliRunner().invoke(app, words, env={"COLUMNS": "160"})
+def safety(*arguments: object) -> Result:
+    return bench("safety", *arguments, columns=160)
 
 
 def best_line(rig: Rig) -> Any:
@@ -106,14 +96,8 @@ def test_a_row_is_a_function_of_its_seed(block: int) -> None:
     rows = [without_time(play(draw(5, **given), Parts)) for _ in range(2)]
     assert rows[0] == rows[1]
     assert rows[0]["failure"] is None
+    assert {*rows[0], "microseconds", "key", "controller"} == set(columns.COLUMNS)
     assert without_time(play(draw(6, **given), Parts)) != rows[0]
-
-
-def test_blocks_change_nothing_for_what_does_not_learn() -> None:
-    rows = [
-        play(draw(5, **{**SHORT, "block": block}), lambda fs, lim: Line(0.15, 0.0, lim)) for block in (1, 9)
-    ]
-    assert rows[0]["worst"] == rows[1]["worst"]
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -212,23 +196,14 @@ def test_the_map_counts_periods() -> None:
     assert len(settling.cells(range(2), families=("paper",))) == 2 * 6 * 4
 
 
-def test_rows_go_into_a_table(tmp_path: Path) -> None:
-    row = {**play(draw(2, **SHORT), Parts), "key": "k", "controller": "parts"}
-    assert set(row) == set(columns.COLUMNS)
-    write_table(table_of([row], columns.COLUMNS), tmp_path / "runs.csv")
-    heads, values = (tmp_path / "runs.csv").read_text(encoding="utf-8").splitlines()
-    assert heads.split(",") == list(columns.COLUMNS)
-    assert values.startswith("k,parts,2,backlash")
-
-
 def test_the_command_goes_on_where_it_was(tmp_path: Path) -> None:
     options = ("--workers", 1, "--out", tmp_path, "--table", "csv", "--controller", "parts")
     given = [f"--set={name}={value}" for name, value in SHORT.items() if name not in ("slew", "fault")]
-    first = bench("--runs", 2, *options, *given)
+    first = safety("--runs", 2, *options, *given)
     assert first.exit_code == 0, first.output
     assert "0 of 2 runs" in first.output
     before = (tmp_path / "runs.jsonl").read_text(encoding="utf-8")
-    second = bench("--runs", 3, *options, *given, "--json", tmp_path / "all.json")
+    second = safety("--runs", 3, *options, *given, "--json", tmp_path / "all.json")
     assert "2 of 3 runs" in second.output
     assert (tmp_path / "runs.jsonl").read_text(encoding="utf-8").startswith(before)
     document = json.loads((tmp_path / "safety.json").read_text(encoding="utf-8"))
@@ -241,7 +216,7 @@ def test_the_command_goes_on_where_it_was(tmp_path: Path) -> None:
 
 def test_the_command_draws_a_run(tmp_path: Path) -> None:
     given = [f"--set={name}={value}" for name, value in SHORT.items() if name != "slew"]
-    result = bench("--show", 3, "--out", tmp_path, "-c", "parts", *given)
+    result = safety("--show", 3, "--out", tmp_path, "-c", "parts", *given)
     assert result.exit_code == 0, result.output
     assert (tmp_path / "run-3.png").stat().st_size > 20_000
     assert "backlash" in result.output
@@ -249,7 +224,7 @@ def test_the_command_draws_a_run(tmp_path: Path) -> None:
 
 def test_controllers_of_ones_own(own: str, tmp_path: Path) -> None:
     given = [f"--set={name}={value}" for name, value in SHORT.items() if name != "slew"]
-    result = bench("--runs", 2, "--workers", 1, "-c", f"{own}:Breaks", "--out", tmp_path / "a", *given)
+    result = safety("--runs", 2, "--workers", 1, "-c", f"{own}:Breaks", "--out", tmp_path / "a", *given)
     assert result.exit_code == 0, result.output
     document = json.loads((tmp_path / "a" / "safety.json").read_text(encoding="utf-8"))
     assert document["violations"]["failed"] == 2
@@ -284,7 +259,7 @@ def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "words"),
     [
         (["-c", "Nothing"], "controller Nothing"),
         (["-c", "LinearGain"], "it is no controller"),
@@ -297,7 +272,7 @@ def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
         (["--dwell", 2, "--set", "gain=1"], "--dwell draws its rigs itself"),
     ],
 )
-def test_what_cannot_be_run_is_said(arguments: list[str], said: str, tmp_path: Path) -> None:
-    result = bench(*arguments, "--out", tmp_path)
+def test_what_cannot_be_run_is_said(arguments: list[str], words: str, tmp_path: Path) -> None:
+    result = safety(*arguments, "--out", tmp_path)
     assert result.exit_code == 2
-    assert said in " ".join(result.output.replace("│", " ").split())
+    assert words in said(result)

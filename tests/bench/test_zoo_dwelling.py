@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from piezoest.bench.commands import app
 from piezoest.bench.zoo import columns, tasks
 from piezoest.bench.zoo.controllers import Line
 from piezoest.bench.zoo.dwelling import BEFORE, SHAPES, Dwell, dwell_rig, dwells, summarise_dwells
 from piezoest.bench.zoo.line import fit_line
+from tests.bench.shared import bench
 
 
 def line(dwell: Dwell, jump: float = 0.0) -> Any:
@@ -83,8 +82,8 @@ def test_what_breaks_is_a_row() -> None:
 
 def test_the_command_plays_it(tmp_path: Path) -> None:
     """By a controller that takes no feedback, so half of the runs fail."""
-    words = ["bench", "safety", "--dwell", "1", "-c", "parts", "--workers", "1", "--table", "csv"]
-    result = CliRunner().invoke(app, [*words[1:], "--out", str(tmp_path)], env={"COLUMNS": "160"})
+    words = ["safety", "--dwell", 1, "-c", "parts", "--workers", 1, "--table", "csv", "--out", tmp_path]
+    result = bench(*words, columns=160)
     assert result.exit_code == 0, result.output
     assert "After a rest of 60 s" in result.output
     document = json.loads((tmp_path / "dwell.json").read_text(encoding="utf-8"))

@@ -11,12 +11,9 @@ from piezoest._checks import FloatArray
 from piezoest.bench.zoo import draw
 from piezoest.bench.zoo.faults import FAULTS, START, TRANSIENT
 from piezoest.bench.zoo.rig import Rig
+from tests.bench import shared
 
-SHORT: dict[str, Any] = {
-    "family": "coleman-hodgdon", "limits": "±100", "gain": 0.15, "sample_rate": 1000.0, "frequency": 20.0,
-    "amplitude": 5.0, "waves": 20, "reference": "triangle", "delay": 0, "noise": 1e-3, "hum": 0.0,
-    "drift": 0.0, "creep": 0.0, "mechanics": "none", "slew": np.inf, "resolution": 0.0, "volts": 0.0,
-}  # fmt: skip
+SHORT = {**shared.SHORT, "frequency": 20.0, "amplitude": 5.0, "waves": 20}
 MODES = [(kind, mode) for kind, each in FAULTS.items() for mode in each.modes]
 
 

@@ -8,24 +8,14 @@ import numpy as np
 import pytest
 
 from piezoest._checks import FloatArray
-from piezoest.bench.zoo import draw, play, traced
+from piezoest.bench.zoo import play, traced
 from piezoest.bench.zoo.controllers import Line
 from piezoest.bench.zoo.faults import truthful
 from piezoest.bench.zoo.learnt_line import run_learnt_line
 from piezoest.bench.zoo.line import fit_line
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Traces, run_line
-
-SHORT: dict[str, Any] = {
-    "family": "coleman-hodgdon", "limits": "±100", "gain": 0.15, "width": 0.15, "sample_rate": 1000.0,
-    "frequency": 10.0, "amplitude": 10.0, "waves": 14, "reference": "triangle", "delay": 0, "noise": 1e-3,
-    "hum": 0.0, "drift": 0.0, "creep": 0.0, "mechanics": "none", "slew": np.inf, "resolution": 0.0,
-    "volts": 0.0, "block": 20, "fault": "none",
-}  # fmt: skip
-
-
-def rig_with(fault: str = "none", mode: str | None = None, **given: Any) -> Rig:
-    return draw(5, **{**SHORT, "fault": fault, "mode": mode, **given})
+from tests.bench.shared import rig_with
 
 
 def learnt(rig: Rig) -> tuple[Traces, int]:

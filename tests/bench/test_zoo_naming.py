@@ -9,23 +9,13 @@ import numpy as np
 import pytest
 
 from piezoest._checks import FloatArray
-from piezoest.bench.zoo import draw, play
+from piezoest.bench.zoo import play
 from piezoest.bench.zoo.contenders import DEFAULT, contender
 from piezoest.bench.zoo.faults import ANY, FAULTS
 from piezoest.bench.zoo.naming import named, recovery, settled
 from piezoest.bench.zoo.rig import Rig
 from piezoest.controller.shown import MEANINGS, Event
-
-SHORT: dict[str, Any] = {
-    "family": "coleman-hodgdon", "limits": "±100", "gain": 0.15, "width": 0.15, "sample_rate": 1000.0,
-    "frequency": 10.0, "amplitude": 10.0, "waves": 20, "reference": "triangle", "delay": 0, "noise": 1e-3,
-    "hum": 0.0, "drift": 0.0, "creep": 0.0, "mechanics": "none", "slew": np.inf, "resolution": 0.0,
-    "volts": 0.0, "block": 20,
-}  # fmt: skip
-
-
-def rig_with(fault: str, mode: str, **given: Any) -> Rig:
-    return draw(5, **{**SHORT, "fault": fault, "mode": mode, **given})
+from tests.bench.shared import rig_with
 
 
 def after(rig: Rig, *said: tuple[float, str]) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import json
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -85,13 +84,6 @@ def test_plays_are_those_of_the_library(judging: Any) -> None:
     np.testing.assert_allclose(judging.plays(u, thresholds) @ [1.0, 0.5], x, atol=1e-7)
 
 
-def test_a_line_is_found(judging: Any) -> None:
-    u = voltage()
-    x = 2.0 * u - 3.0
-    x[5] = np.nan
-    np.testing.assert_allclose(judging.by_line(u, x, TRAINED), 2.0 * u - 3.0)
-
-
 def test_jumps_count_up_to_the_end_of_the_fitted_part(judging: Any) -> None:
     jumps = np.zeros(N)
     jumps[500:] += 1.5
@@ -154,19 +146,6 @@ def test_parameters_are_compared_with_their_standard_errors(judging: Any) -> Non
     assert "z" not in judging.judged(log(model=model), TRAINED, found)
 
 
-def test_clean_logs_are_of_the_family(judging: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    seen: list[Log] = []
-
-    def fitted(log: Log) -> Any:
-        seen.append(log)
-        raise ValueError("no")
-
-    monkeypatch.setattr(judging, "fitted", fitted)
-    assert judging.clean_scores(3) == {"seed": 3, "z": None}
-    assert seen[0].family == "coleman-hodgdon"
-    assert not set(seen[0].added) & {"creep", "drift", "jumps", "spikes"}
-
-
 def test_the_adapter_predicts_what_the_stage_does(judging: Any) -> None:
     u = pz.signals.multi_amplitude([10.0, 20.0, 30.0, 20.0, 30.0], 2.0, 3, 500.0).values
     model = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
@@ -182,33 +161,6 @@ def test_the_adapter_predicts_what_the_stage_does(judging: Any) -> None:
     assert row["best"] <= row["chosen"]
     assert len(row["z"]) == 3
     assert set(found.held_out) == set(found.predictions)
-
-
-def test_the_adapter_knows_the_face_of_identify(judging: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    one, asked = log(family="coleman-hodgdon"), []
-
-    def identify(u: Any, x: Any, *, sample_rate: float, train: float, model: str) -> Any:
-        asked.append(model)
-        predicted = SimpleNamespace(x=one.truth, lower=one.truth - 1.0, upper=one.truth + 1.0)
-        candidates = [
-            SimpleNamespace(
-                name=name, held_out=SimpleNamespace(rms=size), prediction=SimpleNamespace(x=one.truth + off)
-            )
-            for name, size, off in (("line", 1.0, 1.0), ("plays", 0.1, 0.0))
-        ]
-        return SimpleNamespace(
-            chosen="plays", candidates=candidates, model=pz.ColemanHodgdon(0.02, 0.12, 0.0036),
-            predict=lambda: predicted, standard_errors={"alpha": 1.0, "beta": 1.0, "gamma": 1.0},
-        )  # fmt: skip
-
-    monkeypatch.setattr(judging.pz, "identify", identify)
-    found = judging.fitted(one)
-    np.testing.assert_array_equal(found.predictions["plays"], one.truth)
-    np.testing.assert_array_equal(found.predictions["line"], one.truth + 1.0)
-    assert asked == ["auto"]
-    assert found.held_out == {"line": 1.0, "plays": 0.1}
-    assert found.theta == pytest.approx([0.02, 0.12, 0.0036])
-    assert judging.coverage(one, TRAINED, found.lower, found.upper) == 1.0
 
 
 def row(seed: int, chosen: float = 1.0, **given: Any) -> dict[str, Any]:

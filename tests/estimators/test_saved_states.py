@@ -139,20 +139,8 @@ def test_a_covariance_must_be_one(estimator: Any) -> None:
 
 
 ODD: tuple[Any, ...] = (
-    "7",
-    None,
-    np.nan,
-    np.inf,
-    [],
-    [[1.0], [2.0, 3.0]],
-    {},
-    10**400,
-    1e9,
-    -1.0,
-    0.5,
-    1e308,
-    5e-324,
-)
+    "7", None, np.nan, np.inf, [], [[1.0], [2.0, 3.0]], {}, 10**400, 1e9, -1.0, 0.5, 1e308, 5e-324,
+)  # fmt: skip
 
 
 def places(holder: Any) -> list[tuple[Any, Any]]:

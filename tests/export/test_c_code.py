@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import functools
-import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -13,20 +11,12 @@ import pytest
 
 import piezoest as pz
 from piezoest.bench.scenarios import SCENARIOS
-from piezoest.export.compiled import compiler
+from tests.export.building import compile_strictly, under_sanitizers
 
 FS = 50_000.0
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
 LINE = pz.LinearGain(0.15)
 LIMITS = pz.VoltageLimits(-60.0, 60.0)
-STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-O2")
-
-try:
-    compiler()
-except ValueError as absent:
-    pytest.skip(str(absent), allow_module_level=True)
-
-
 PLAYS = pz.PrandtlIshlinskii(0.1, np.linspace(0.5, 30.0, 12), np.full(12, 4e-3), 0.1)
 BENT = pz.PrandtlIshlinskii(
     0.1, np.linspace(2.0, 30.0, 7), np.full(7, 6e-3), 0.1, creep=pz.Creep([0.01, 0.02], [0.01, 1.0]),
@@ -85,26 +75,13 @@ def log() -> tuple[Any, Any]:
     return record.reference, np.concatenate([[np.nan], record.measured[:-1]])
 
 
-def tool(name: str) -> str:
-    found = shutil.which(name)
-    if found is None:
-        pytest.skip(f"{name} is not installed: make tools")
-    return found
-
-
 # ---------------------------------------------------------------- the text
 
 
 @pytest.mark.parametrize(("cc", "precision"), [("gcc", "float"), ("clang", "double")])
 def test_compiles_without_a_warning(cc: str, precision: str, tmp_path: Path) -> None:
-    cc = tool(cc)
     for name in PAIRS:
-        code(name, precision).write(tmp_path)
-        done = subprocess.run(
-            [cc, *STRICT, "-c", "controller.c", "-o", "controller.o"],
-            cwd=tmp_path, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert done.returncode == 0, f"{name}: {done.stderr}"
+        compile_strictly(cc, code(name, precision), tmp_path, "-O2")
 
 
 # ---------------------------------------------------------------- parity
@@ -172,41 +149,15 @@ def test_freeze_holds_the_model_as_in_python(name: str) -> None:
         np.testing.assert_array_equal(voltages[0], voltages[1])
 
 
-DRIVER = """#include "controller.h"
-#include <stdio.h>
-
-int main(void)
-{
-    static controller_state state;
-    double pair[2];
-
-    controller_init(&state);
-    while (fread(pair, sizeof(double), 2, stdin) == 2) {
-        volatile double u = (double)controller_step(&state, (REAL)pair[0], (REAL)pair[1]);
-        if (!(u >= -60.0 && u <= 60.0)) {
-            return 3;
-        }
-    }
-    return 0;
-}
-"""
-
-
 @pytest.mark.parametrize("name", ["rls", "rls-continuous", "rls-delay-highpass", "ekf-offset", "plays-bent"])
 def test_sanitizers_are_silent(name: str, tmp_path: Path, log: tuple[Any, Any]) -> None:
     precision = "float" if name in ("rls-continuous", "ekf-offset") else "double"
-    code(name, precision).write(tmp_path)
-    (tmp_path / "driver.c").write_text(DRIVER)
-    flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O1", f"-DREAL={precision}"]
-    command = [compiler(), "-std=c99", *flags, "driver.c", "controller.c", "-o", "driver", "-lm"]
-    built = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    if built.returncode != 0:
-        pytest.skip(f"the compiler has no sanitizers: {built.stderr.strip().splitlines()[-1]}")
     pairs = np.column_stack(log)
     pairs[3000:3200, 1] = np.nan
     pairs[4000, 1], pairs[4001, 1], pairs[4002, 0] = np.inf, 1e30, -np.inf
-    done = subprocess.run([str(tmp_path / "driver")], input=pairs.tobytes(), capture_output=True, check=False)
-    assert (done.returncode, done.stderr) == (0, b"")
+    call = f"controller_step(&state, ({precision})pair[0], ({precision})pair[1])"
+    done = under_sanitizers(code(name, precision), pairs, tmp_path, call=call, low="-60.0", high="60.0")
+    assert done == (0, b"")
 
 
 # ---------------------------------------------------------------- refusals

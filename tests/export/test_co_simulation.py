@@ -12,16 +12,11 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.export.compiled import compiler
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install piezoest[export]")
 fmi2 = pytest.importorskip("fmpy.fmi2")
 validation = pytest.importorskip("fmpy.validation")
 
-try:
-    compiler()
-except ValueError as absent:
-    pytest.skip(str(absent), allow_module_level=True)
 
 FS = 50_000.0
 LIMITS = pz.VoltageLimits(-60.0, 60.0)

@@ -15,17 +15,11 @@ from piezoest.bench.zoo import draw
 from piezoest.bench.zoo.faults import NONE
 from piezoest.controller.readings import FAULTS
 from piezoest.controller.shown import STAGES
-from piezoest.export.compiled import compiler
+from tests.export.building import compile_strictly, under_sanitizers
 
 FS = 1e4
 LIMITS = pz.VoltageLimits(-100.0, 100.0)
 ESTIMATORS: dict[str, Any] = {"line": (), "default": None, "ekf": (pz.HysteresisEKF,)}
-STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-O1")
-
-try:
-    compiler()
-except ValueError as absent:
-    pytest.skip(str(absent), allow_module_level=True)
 
 
 def controller(estimators: str, limits: pz.VoltageLimits = LIMITS) -> Any:
@@ -174,17 +168,12 @@ def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> N
     ],
 )
 def test_compiles_without_a_warning(estimators: str, precision: Any, cc: str, tmp_path: Path) -> None:
-    if shutil.which(cc) is None:
-        pytest.skip(f"{cc} is not installed: make tools")
     library = controller(estimators)
     code = pz.export.c(library, name="stage", precision=precision)
     assert code == pz.export.c(library, name="stage", precision=precision)
     for word in ("malloc", "calloc", "goto"):
         assert word not in code.source
-    code.write(tmp_path)
-    command = [cc, *STRICT, "-c", "stage.c", "-o", "stage.o"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    compile_strictly(cc, code, tmp_path, "-O1")
     if shutil.which("nm") is None:
         return
     needed = subprocess.run(["nm", "-u", "stage.o"], cwd=tmp_path, capture_output=True, text=True, check=True)
@@ -193,27 +182,6 @@ def test_compiles_without_a_warning(estimators: str, precision: Any, cc: str, tm
     assert names <= own | {"memcpy", "memmove", "memset", "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
     held = subprocess.run(["nm", "stage.o"], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert not {line.split()[-2] for line in held.stdout.splitlines()} & set("bBdDC"), "global state"
-
-
-DRIVER = """#include "stage.h"
-#include <stdio.h>
-
-int main(void)
-{
-    static stage_state state;
-    double pair[2];
-
-    stage_init(&state);
-    while (fread(pair, sizeof(double), 2, stdin) == 2) {
-        volatile double u = stage_step(&state, pair[0]);
-        if (!(u >= -100.0 && u <= 100.0)) {
-            return 3;
-        }
-        stage_learn(&state, u, pair[1]);
-    }
-    return stage_get_stage(&state);
-}
-"""
 
 
 @pytest.mark.slow
@@ -225,16 +193,12 @@ def test_sanitizers_are_silent(tmp_path: Path) -> None:
         pairs[k] = r, stage.step(u)
         library.learn(u, pairs[k, 1])
     library.reset()
-    pz.export.c(library, name="stage").write(tmp_path)
-    (tmp_path / "driver.c").write_text(DRIVER)
-    flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O0"]
-    command = [compiler(), "-std=c99", *flags, "driver.c", "stage.c", "-o", "driver", "-lm"]
-    built = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    if built.returncode != 0:
-        pytest.skip(f"the compiler has no sanitizers: {built.stderr.strip().splitlines()[-1]}")
     pairs[4000:4003] = [[np.inf, 1.0], [0.0, 1e30], [1e30, -np.inf]]
-    done = subprocess.run([str(tmp_path / "driver")], input=pairs.tobytes(), capture_output=True, check=False)
-    assert (done.returncode, done.stderr) == (2, b"")
+    done = under_sanitizers(
+        pz.export.c(library, name="stage"), pairs, tmp_path, call="stage_step(&state, pair[0])",
+        low="-100.0", high="100.0", then="stage_learn(&state, u, pair[1]);", end="stage_get_stage(&state)",
+    )  # fmt: skip
+    assert done == (2, b"")
 
 
 # ---------------------------------------------------------------- refusals

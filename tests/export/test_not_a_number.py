@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 
 import piezoest as pz
-from piezoest.export.compiled import compiler
 
 FloatArray = NDArray[np.float64]
 
@@ -22,11 +21,6 @@ PLAYS = pz.PrandtlIshlinskii(
     bends=[-10.0], bend_weights=[[5e-4, 0.0, 0.0]], sample_rate=FS,
 )  # fmt: skip
 LIMITS = pz.VoltageLimits(-60.0, 60.0)
-
-try:
-    compiler()
-except ValueError as absent:
-    pytest.skip(str(absent), allow_module_level=True)
 
 
 def pair(kind: str) -> Any:

@@ -12,33 +12,14 @@ import numpy as np
 import pytest
 
 from piezoest.compile import compiled
-from piezoest.equations.integrators import NODES
 from piezoest.export.c_file import File
 from piezoest.export.c_translator import translate
-from piezoest.export.c_values import (
-    Array,
-    Number,
-    Root,
-    Struct,
-    TranslationError,
-    Value,
-)
+from piezoest.export.c_values import Array, Number, Root, Struct, TranslationError, Value
 from piezoest.export.compiled import build_shared
-from piezoest.layout import NUMBER, new, numbers, record
+from piezoest.layout import NUMBER, new, record
 
-LAST, FIRST = 2, 0
-
-
-def array(name: str, *shape: int) -> Array:
-    return Array(name, shape, Root(name))
-
-
-def struct(layout: Any, name: str = "state", **values: Any) -> Struct:
-    return Struct(f"{name}->", layout, new(layout, **values), Root(name), name)
-
-
-def reals(*names: str) -> list[Value]:
-    return [Number(name, "real") for name in names]
+LAYOUT = record(gain=NUMBER)
+STATE = Struct("state->", LAYOUT, new(LAYOUT), Root("state"), "state")
 
 
 def text_of(function: Any, *arguments: Value) -> tuple[str, str]:
@@ -61,25 +42,6 @@ def build(folder: Path, function: Any, *arguments: Value) -> Callable[..., Any]:
     return made
 
 
-def pointer(values: Any) -> Any:
-    return ctypes.c_void_p(values.ctypes.data)
-
-
-# ---------------------------------------------------------------- names
-
-
-NESTED = record(swing=record(size=NUMBER, turns=numbers(3)), gain=NUMBER)
-
-
-# ---------------------------------------------------------------- known values
-
-
-def choose(x: Any, way: int) -> Any:
-    if way == FIRST:
-        return x + 1.0
-    return x * NODES[LAST]
-
-
 # ---------------------------------------------------------------- order
 
 
@@ -98,9 +60,9 @@ def does_it_all_the_same(state: Any) -> Any:
 
 
 def test_a_call_in_an_argument_that_is_not_used_is_made(tmp_path: Path) -> None:
-    own = np.array([0.0, 0.0, 0.0, 0.0, 3.0])
-    function = build(tmp_path, does_it_all_the_same, struct(NESTED))
-    assert function(pointer(own)) == 5.0
+    own = np.array([3.0])
+    function = build(tmp_path, does_it_all_the_same, STATE)
+    assert function(ctypes.c_void_p(own.ctypes.data)) == 5.0
 
 
 def in_order(state: Any) -> Any:
@@ -109,9 +71,9 @@ def in_order(state: Any) -> Any:
 
 
 def test_operands_come_from_left_to_right(tmp_path: Path) -> None:
-    own = np.array([0.0, 0.0, 0.0, 0.0, 3.0])
-    function = build(tmp_path, in_order, struct(NESTED))
-    assert function(pointer(own)) == 30.0 + 4.0 * 5.0 - 5.0
+    own = np.array([3.0])
+    function = build(tmp_path, in_order, STATE)
+    assert function(ctypes.c_void_p(own.ctypes.data)) == 30.0 + 4.0 * 5.0 - 5.0
 
 
 # ---------------------------------------------------------------- arithmetic
@@ -130,7 +92,7 @@ def arithmetic(u: float, x: float) -> float:
 
 
 def test_arithmetic_is_the_same(tmp_path: Path) -> None:
-    function = build(tmp_path, arithmetic, *reals("u", "x"))
+    function = build(tmp_path, arithmetic, Number("u", "real"), Number("x", "real"))
     function.argtypes = [ctypes.c_double] * 2  # type: ignore[attr-defined]
     every = np.array([-np.inf, -2.0, -0.7, 0.0, 0.3, 1.0, 2.9, 3.0, 17.0])
     for u in every.tolist():
@@ -155,7 +117,7 @@ def with_a_power(x: Any) -> Any:
 
 
 def with_keywords(x: Any) -> Any:
-    return choose(x, way=1)
+    return ignores(x, value=1)
 
 
 def with_a_default(x: Any = 1.0) -> Any:
@@ -199,7 +161,7 @@ def with_text(x: Any) -> Any:
 )
 def test_what_is_not_in_the_subset_is_refused(function: Any, word: str) -> None:
     arrays = (with_a_step, with_a_slice, with_a_hidden_write)
-    argument = array("x", 10) if function in arrays else Number("x", "real")
+    argument = Array("x", (10,), Root("x")) if function in arrays else Number("x", "real")
     with pytest.raises(TranslationError, match=re.escape(word)) as refusal:
         text_of(function, argument)
     assert "test_translator.py:" in str(refusal.value)

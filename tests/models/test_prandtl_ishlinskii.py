@@ -7,25 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from piezoest import Creep, MassSpringDamper, PrandtlIshlinskii
-
-
-@st.composite
-def models(draw: st.DrawFn) -> PrandtlIshlinskii:
-    """Admissible models, weights of either sign."""
-    n = draw(st.integers(0, 8))
-    steps = [draw(st.floats(0.05, 10.0)) for _ in range(n)]
-    slopes = [draw(st.floats(0.02, 0.5)) for _ in range(n + 1)]
-    return PrandtlIshlinskii(slopes[0], np.cumsum(steps), np.diff(slopes), draw(st.floats(-2.0, 2.0)))
-
-
-@given(models(), st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=20))
-def test_inverse_undoes_simulate(model: PrandtlIshlinskii, u: list[float]) -> None:
-    assert model.is_admissible
-    np.testing.assert_allclose(model.invert(model.simulate(np.array(u))), u, atol=1e-9)
 
 
 def test_initial_state_continues_a_record() -> None:

@@ -1,0 +1,15 @@
+"""Without a C compiler there is nothing to compare."""
+
+from __future__ import annotations
+
+import pytest
+
+from piezoest.export.compiled import compiler
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _compiler() -> None:
+    try:
+        compiler()
+    except ValueError as absent:
+        pytest.skip(str(absent))
