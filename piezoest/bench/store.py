@@ -1,21 +1,20 @@
-"""Where the rows of runs are kept: one JSON line each, appended as it comes, and found by its key.
+"""Where the rows of runs are kept: under their keys, in a file that several processes may append to.
 
-A process that is killed leaves at most its last line torn; the next to append goes on below. Several
-processes may append to one file. A key that comes twice counts once.
+A process that is killed loses at most the row that it is at. A key that comes twice counts once.
 """
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
-import os
+import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
 Row = dict[str, Any]
+PATIENCE = 60.0  # s until another process has to be done with its row
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,66 +36,45 @@ class Store:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._rows: dict[str, Row] = {}
 
     def __enter__(self) -> Self:
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        # Unbuffered: what is written comes to the end of the file in one piece, whoever else appends to it.
-        self._file = self._path.open("ab+", buffering=0)
-        with self._path.open("rb") as lines:
-            for row in filter(None, map(_read, lines)):
-                self._rows.setdefault(row["key"], row)
+        self._rows = sqlite3.connect(self._path, timeout=PATIENCE, isolation_level=None)
+        # With a log written ahead a row costs no wait for the disk.
+        self._rows.execute("PRAGMA journal_mode = WAL")
+        self._rows.execute("PRAGMA synchronous = NORMAL")
+        self._rows.execute("CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, row TEXT)")
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._file.close()
+        self._rows.close()
 
     def __contains__(self, key: str) -> bool:
-        return key in self._rows
+        return self._row(key) is not None
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return int(self._rows.execute("SELECT count(*) FROM runs").fetchone()[0])
 
     def append(self, row: Row) -> bool:
         """Keep a row, at once; False if its key is known already, and then the first one stands."""
-        if row["key"] in self._rows:
-            return False
-        line = json.dumps(row, allow_nan=False, ensure_ascii=False).encode() + b"\n"
-        whole = b"\n" + line if self._torn() else line
+        values = row["key"], json.dumps(row, allow_nan=False, ensure_ascii=False)
         try:
-            if self._file.write(whole) < len(whole):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(self._path)) from None
-        self._rows[row["key"]] = row
-        return True
-
-    def _torn(self) -> bool:
-        """Whether the last line is not whole: of a process that was killed, or that is writing just now."""
-        size = self._file.seek(0, os.SEEK_END)
-        self._file.seek(max(size - 1, 0))
-        return self._file.read(1) not in (b"", b"\n")
+            return self._rows.execute("INSERT OR IGNORE INTO runs VALUES (?, ?)", values).rowcount > 0
+        except sqlite3.OperationalError as error:  # as on a full disk
+            raise OSError(f"{self._path}: {error}") from None
 
     def rows(self, keys: Iterable[str]) -> Iterator[Row]:
         """Rows of these keys, in their order; a key without one is left out."""
-        return (self._rows[key] for key in keys if key in self._rows)
+        return (json.loads(row) for key in keys if (row := self._row(key)) is not None)
 
-
-def _read(line: bytes) -> dict[str, Any] | None:
-    """Row of a whole line; None of a torn one."""
-    try:
-        found = json.loads(line)
-    except (ValueError, RecursionError):
-        return None
-    match found:
-        case {"key": str()}:
-            return dict(found)
-    return None
+    def _row(self, key: str) -> str | None:
+        found = self._rows.execute("SELECT row FROM runs WHERE key = ?", (key,)).fetchone()
+        return found[0] if found else None
 
 
 def store_in(folder: Path) -> Store:
     """Where the runs of a campaign with this folder are kept."""
-    return Store(folder / "runs.jsonl")
+    return Store(folder / "runs.sqlite")
 
 
 def carry_out(

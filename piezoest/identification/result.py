@@ -288,13 +288,12 @@ class Identification:
         *others : Identification
             What to compare with.
         """
-        rows: list[tuple[str, ...]] = [
-            ("log", "model", "held out [µm rms]", "blocks left out [µm rms]", "noise [µm rms]")
-        ]
+        heads = ("log", "model", "held out [µm rms]", "blocks left out [µm rms]", "noise [µm rms]")
+        rows = [heads]
         for each in (self, *others):
             figures = (each.held_out.rms, each.best.cross_validated, each.noise_floor)
             rows.append((Path(each.source).name, each.best.label, *(f"{value:.3g}" for value in figures)))
-        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         return "\n".join(
             "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
             for row in rows

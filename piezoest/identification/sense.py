@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -50,6 +51,9 @@ class Finding:
     severity: Literal["doubt", "note"]
 
 
+doubt, note = partial(Finding, severity="doubt"), partial(Finding, severity="note")
+
+
 def findings(record: Record) -> tuple[Finding, ...]:
     """What is doubtful about a log.
 
@@ -93,39 +97,33 @@ def _basic(record: Record) -> Iterator[Finding]:
     usable = record.usable
     count = int(np.sum(usable))
     if count < FEWEST_SAMPLES:
-        yield Finding(
-            "short",
-            f"The log has {count} usable samples: record at least {FEWEST_SAMPLES}, better 1000.",
-            "doubt",
+        yield doubt(
+            "short", f"The log has {count} usable samples: record at least {FEWEST_SAMPLES}, better 1000."
         )
         return
     for name, unit, values in (("voltage", "V", record.voltage), ("displacement", "µm", record.displacement)):
         if np.ptp(values[usable]) == 0.0:
-            yield Finding(
+            yield doubt(
                 f"constant {name}",
                 f"The {name} stays at {values[usable][0]:.6g} {unit} in all {count} samples: check that the "
                 "right column was taken and the instrument was on.",
-                "doubt",
             )
 
 
 def _missing(log: Examined) -> Iterator[Finding]:
     share = 1.0 - float(np.mean(log.counts))
     if share > MOST_MISSING and not log.record.skipped:
-        yield Finding(
-            "missing",
-            f"{100 * share:.0f} % of the samples are missing: cut the log to where it is whole.",
-            "doubt",
+        yield doubt(
+            "missing", f"{100 * share:.0f} % of the samples are missing: cut the log to where it is whole."
         )
 
 
 def _excitation(log: Examined) -> Iterator[Finding]:
     if log.turns.size < FEWEST_TURNS:
-        yield Finding(
+        yield doubt(
             "no swing",
             f"The voltage turns {log.turns.size} times over {log.swing:.4g} V: hysteresis shows only at "
             "turns, record several swings up and down.",
-            "doubt",
         )
 
 
@@ -133,61 +131,52 @@ def _timing(log: Examined) -> Iterator[Finding]:
     low, high = RATES
     doubtful = "check the unit of time (ms or µs taken for s, or the other way round)"
     if not low <= log.rate <= high:
-        yield Finding(
-            "sample rate",
-            f"The sample rate would be {log.rate:.4g} Hz: {doubtful}, or the sample rate.",
-            "doubt",
+        yield doubt(
+            "sample rate", f"The sample rate would be {log.rate:.4g} Hz: {doubtful}, or the sample rate."
         )
     elif log.wave < WAVES[0] or WAVES[1] < log.wave < np.inf:
-        yield Finding(
+        yield doubt(
             "swing time",
             f"The voltage would take {log.wave:.3g} s there and back at {log.rate:.4g} Hz: {doubtful}.",
-            "doubt",
         )
 
 
 def _related(log: Examined) -> Iterator[Finding]:
     if not log.related:
         share = float(np.std(log.line[1])) / float(np.std(log.level))
-        yield Finding(
+        yield note(
             "unrelated",
             f"A straight line in the voltage leaves {100 * share:.0f} % of the displacement: check that both "
             "columns are of one run and one axis, and that no resonance is excited.",
-            "note",
         )
 
 
 def _size(log: Examined) -> Iterator[Finding]:
     top, gain = float(np.max(np.abs(log.u))), abs(log.gain)
     if top > LARGEST_VOLTAGE:
-        yield Finding(
-            "voltage",
-            f"The voltage reaches {top:.4g} V, which no piezo stage bears: mV taken for V?",
-            "doubt",
+        yield doubt(
+            "voltage", f"The voltage reaches {top:.4g} V, which no piezo stage bears: mV taken for V?"
         )
         return
     said = f"The displacement moves by {log.moved:.3g} µm over {log.swing:.3g} V, {gain:.3g} µm/V"
     highest = LARGEST_INPUT_GAIN if top <= AMPLIFIER_INPUT else GAINS[1]
     if log.moved > STROKES[1] or gain > highest:
-        yield Finding(
+        yield doubt(
             "too large",
             f"{said}, more than piezo stages do (about {GAINS[0]:g} to {GAINS[1]:g} µm/V, up to "
             f"{STROKES[1]:g} µm): nm taken for µm, or V for mV? Give the unit, as in "
             "units displacement='nm'.",
-            "doubt",
         )
     elif gain < GAINS[0]:
-        yield Finding(
+        yield doubt(
             "too small",
             f"{said}, less than piezo stages do (about {GAINS[0]:g} to {GAINS[1]:g} µm/V): mm or m taken "
             "for µm, or volts of the sensor? Give the unit, as in units displacement='mm'.",
-            "doubt",
         )
     elif log.moved < STROKES[0]:
-        yield Finding(
+        yield note(
             "small stroke",
             f"{said}: so small a stroke shows little hysteresis, check the unit or raise the voltage.",
-            "note",
         )
 
 
@@ -195,19 +184,17 @@ def _direction(log: Examined) -> Iterator[Finding]:
     if not log.related:
         return
     if log.gain < 0.0:
-        yield Finding(
+        yield doubt(
             "falls",
             f"The displacement falls as the voltage rises ({log.gain:.4g} µm/V): change the sign of one of "
             "the two columns.",
-            "doubt",
         )
     elif log.loop.opening < -CLOCKWISE and log.loop.clockwise > MOST_BRANCHES:
-        yield Finding(
+        yield doubt(
             "clockwise",
             f"The loop of displacement over voltage runs clockwise, {-100 * log.loop.opening:.2g} % of the "
             "stroke wide, but that of a stage runs counter-clockwise: voltage and displacement are swapped, "
             "the displacement's time stamps are early, or the stage swings above its resonance.",
-            "doubt",
         )
 
 
@@ -218,20 +205,18 @@ def _closed_loop(log: Examined) -> Iterator[Finding]:
     off = float(np.std(log.line[1])) / log.stroke
     opening = abs(log.loop.opening)
     if off < ALMOST_STRAIGHT and opening < ALMOST_STRAIGHT and abs(log.gain - 1.0) < UNITY:
-        yield Finding(
+        yield doubt(
             "reference",
             f"The displacement is {log.gain:.4f} times the voltage, to {100 * off:.2g} % of the stroke: it "
             "looks as if the reference in µm was logged in the place of the voltage; log what drives the "
             "amplifier.",
-            "doubt",
         )
     elif off < STRAIGHT and log.moved > STROKES[0]:
-        yield Finding(
+        yield doubt(
             "straight",
             f"The displacement follows the voltage on a straight line to {100 * off:.2g} % of the stroke, "
             "where a piezo stage shows a loop: perhaps a closed loop tracks and its reference was logged; "
             "log what drives the amplifier, with the servo off.",
-            "doubt",
         )
     feedback = answer(log.u, log.x, log.gain)
     if feedback.closed:
@@ -241,11 +226,10 @@ def _closed_loop(log: Examined) -> Iterator[Finding]:
             if feedback.lag
             else f"noise of voltage and displacement go opposite ways (correlation {feedback.together:.2f})"
         )
-        yield Finding(
+        yield doubt(
             "closed loop",
             f"The log comes from a closed loop: {how}. A fit takes that noise for the stage's answer; "
             "switch the feedback off, or excite well above the noise.",
-            "doubt",
         )
 
 
@@ -259,30 +243,28 @@ def _limits(log: Examined) -> Iterator[Finding]:
         top = flat_tops(y, sign * other, goes_on) if log.related else None
         # A rest in which the stage swings once is no limit of the voltage yet.
         if top and (name == "displacement" or top.times > 1):
-            yield Finding(
+            yield doubt(
                 f"clipped {name}",
                 f"The {name} stands at {top.limit:.5g} {unit} {top.times} times while the {other_name} goes "
                 f"on by up to {top.beyond:.3g} {other_unit} and comes back: it is clipped there; leave these "
                 "stretches out, or reduce the voltage.",
-                "doubt",
             )
 
 
 def _resolution(log: Examined) -> Iterator[Finding]:
     step, count = levels(log.x)
     if count < FEW_LEVELS:
-        yield Finding(
+        say = doubt if count < FEWEST_LEVELS else note
+        yield say(
             "coarse",
             f"The displacement comes in steps of {step:.3g} µm, {count:.0f} over its range, and a loop is "
             "some tenth of it: use a finer range of the converter, or save more digits.",
-            "doubt" if count < FEWEST_LEVELS else "note",
         )
     elif (times := repeats(log.record.displacement[log.counts])) > 1:
-        yield Finding(
+        yield note(
             "repeated",
             f"Each reading stands {times} times in a row: the sensor measures at {log.rate / times:.4g} Hz, "
             f"keep each {times}th sample.",
-            "note",
         )
 
 
@@ -290,36 +272,33 @@ def _flaws(log: Examined) -> Iterator[Finding]:
     flaws = log.flaws
     if count := int(np.sum(flaws.spikes)):
         first = float(log.record.time[np.argmax(flaws.spikes)])
-        yield Finding(
+        say = doubt if count > MANY_SPIKES * log.x.size else note
+        yield say(
             "spikes",
             f"{count} samples of the displacement stand off alone, the first at {first:.6g} s: leave them "
             "out.",
-            "doubt" if count > MANY_SPIKES * log.x.size else "note",
         )
     if flaws.jumps.size:
         largest = int(np.argmax(np.abs(flaws.jump_sizes)))
-        yield Finding(
+        yield doubt(
             "jumps",
             f"The displacement jumps {flaws.jumps.size} times without the voltage, by "
             f"{flaws.jump_sizes[largest]:+.3g} µm at {float(log.record.time[flaws.jumps[largest]]):.6g} s: "
             "cut the log there, or give each stretch an offset of its own.",
-            "doubt",
         )
     if flaws.dropouts.any():
         first = float(log.record.time[np.argmax(flaws.dropouts)])
-        yield Finding(
+        yield doubt(
             "dropouts",
             f"The displacement stands still while the voltage moves, for {int(np.sum(flaws.dropouts))} "
             f"samples from {first:.6g} s on: the sensor was lost, leave them out.",
-            "doubt",
         )
     if len(flaws.rests):
         rested = int(np.sum(np.diff(flaws.rests, axis=1))) / log.rate
-        yield Finding(
+        yield note(
             "rests",
             f"The voltage rests {len(flaws.rests)} times, {rested:.3g} s in all: nothing is learnt of the "
             "loop there, and creep shows.",
-            "note",
         )
 
 
@@ -327,11 +306,10 @@ def _drift(log: Examined) -> Iterator[Finding]:
     weights, _ = log.line
     drift = 2.0 * float(weights[3])
     if abs(drift) > DRIFT * log.moved and log.related and log.turns.size > 3:
-        yield Finding(
+        yield note(
             "drift",
             f"The displacement drifts by {drift:+.3g} µm over the log, {100 * abs(drift) / log.moved:.0f} % "
             "of what the voltage moves: creep or temperature; let the stage settle, or fit a drift.",
-            "note",
         )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -115,10 +114,6 @@ def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
     assert said == [(k, len(tasks)) for k in range(len(tasks) + 1)]
     assert [row["key"] for row in rows] == [task.key for task in tasks]
     assert [row["failure"] for row in rows] == [None] * len(tasks)
-    lines = [
-        json.loads(line) for line in (home / "runs.jsonl").read_text(encoding="utf-8").splitlines() if line
-    ]
-    assert sorted(line["key"] for line in lines) == sorted(task.key for task in tasks)
     assert killed[0].wait() == -9
     # The other one has worked after it, or all along.
     assert {int(line) for line in cluster.notes.read_text().split()} == {

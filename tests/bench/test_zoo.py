@@ -202,10 +202,8 @@ def test_the_command_goes_on_where_it_was(tmp_path: Path) -> None:
     first = safety("--runs", 2, *options, *given)
     assert first.exit_code == 0, first.output
     assert "0 of 2 runs" in first.output
-    before = (tmp_path / "runs.jsonl").read_text(encoding="utf-8")
     second = safety("--runs", 3, *options, *given, "--json", tmp_path / "all.json")
     assert "2 of 3 runs" in second.output
-    assert (tmp_path / "runs.jsonl").read_text(encoding="utf-8").startswith(before)
     document = json.loads((tmp_path / "safety.json").read_text(encoding="utf-8"))
     assert document == json.loads((tmp_path / "all.json").read_text(encoding="utf-8"))
     assert document["runs"] == 3
@@ -252,7 +250,7 @@ def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
         assert tasks.died(task)["key"] == task.key
     assert summary.summarise(map(tasks.died, planned))["violations"]["failed"] == 2
     assert summary.summarise_cells(map(tasks.died, cell))["failures"] == 1
-    with Store(tmp_path / "runs.jsonl") as store:
+    with Store(tmp_path / "runs.sqlite") as store:
         assert all(store.append(tasks.died(task)) for task in (*planned, *cell))
         carry_out(tasks.runs("parts", range(1), SHORT), store, tasks.over_cores(1))
         assert len(store) == 4
