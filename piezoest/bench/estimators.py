@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from piezoest import policies
-from piezoest.bench.machine import imported
+from piezoest.bench.origin import imported
 from piezoest.bench.stages import REACH
 from piezoest.compensators import VoltageLimits
 from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward

@@ -10,7 +10,7 @@ import traceback
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from piezoest.bench import machine, recorded
+from piezoest.bench import origin, recorded
 from piezoest.bench.cases import Case
 from piezoest.bench.estimators import LIMITS, LINEAR, candidate, module_of
 from piezoest.bench.metrics import measure
@@ -49,7 +49,7 @@ class Task(Keyed):
 
 def code_of(estimator: str) -> str:
     """Fingerprint of this package and, for an estimator of one's own, of its module."""
-    return machine.code_of(module_of(estimator))
+    return origin.code_of(module_of(estimator))
 
 
 @quiet()

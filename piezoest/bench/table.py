@@ -16,8 +16,7 @@ from piezoest.bench import cost, tables
 from piezoest.bench.cases import Conditions
 from piezoest.bench.estimators import KNOWN, LINEAR, PAPERS, candidate, is_slow, module_of, name_of
 from piezoest.bench.executors import in_processes, on_dask
-from piezoest.bench.machine import fingerprint
-from piezoest.bench.origin import json_safe
+from piezoest.bench.origin import fingerprint, json_safe
 from piezoest.bench.recorded import digest, file_of
 from piezoest.bench.run import COLUMNS, Task, code_of, crashed, follow, play
 from piezoest.bench.scenarios import SCENARIOS, UNREPEATED

@@ -140,7 +140,7 @@ def identify(
         if out.as_json:
             typer.echo(json.dumps(found.to_dict(), indent=2, allow_nan=False))
             return
-        from piezoest.identification.terminal import print_identification
+        from piezoest.identification.compared import print_identification
 
         print_identification(found, Console())
         for name, path in (("Figure", figure), ("Report", out.html), ("Model", out.output)):

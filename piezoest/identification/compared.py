@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from piezoest._tables import print_cells, say
 from piezoest.fitting import FORMS
 from piezoest.identification.result import Identification
 from piezoest.identification.streamed import StreamedIdentification
@@ -70,3 +71,12 @@ def residual_sentence(found: Found) -> str:
 def remarks(found: Found) -> tuple[str, ...]:
     """Notes on the log and advice, as sentences."""
     return (*(f"{note[:1].upper()}{note[1:]}." for note in found.notes), *found.advice)
+
+
+def print_identification(found: Found, console: Any) -> None:
+    """Print the kinds compared, the parameters of the one to use, and how far to trust it."""
+    say(console, f"{found.source}: {log_sentence(found)}")
+    for table in tables(found):
+        print_cells(console, *table)
+    say(console, *filter(None, (reason_sentence(found), residual_sentence(found))))
+    say(console, *(f"• {remark}" for remark in remarks(found)))

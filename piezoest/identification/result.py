@@ -14,8 +14,7 @@ from piezoest.fitting import Fit, Prediction
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
 from piezoest.fitting.regression import Fitted
-from piezoest.identification.parameters import Row, parameter_rows
-from piezoest.identification.residual import Kind, Misfit, Whiteness
+from piezoest.identification.residual import Kind, Misfit, Row, Whiteness, parameter_rows
 from piezoest.identification.sense import Finding
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record
@@ -289,7 +288,7 @@ class Identification:
             What to compare with.
         """
         heads = ("log", "model", "held out [µm rms]", "blocks left out [µm rms]", "noise [µm rms]")
-        rows = [heads]
+        rows: list[tuple[str, ...]] = [heads]
         for each in (self, *others):
             figures = (each.held_out.rms, each.best.cross_validated, each.noise_floor)
             rows.append((Path(each.source).name, each.best.label, *(f"{value:.3g}" for value in figures)))

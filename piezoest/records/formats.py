@@ -6,14 +6,26 @@ import contextlib
 import importlib
 import logging
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from piezoest import _extras
-from piezoest.records.source import EXTRA, RATES, LogError, check_size, damaged, shown, stated_rate
+from piezoest.records.columns import titled
+from piezoest.records.source import (
+    EXTRA,
+    RATES,
+    LogError,
+    Rows,
+    Source,
+    check_size,
+    damaged,
+    floats,
+    shown,
+    stated_rate,
+)  # fmt: skip
 from piezoest.records.table import Named, Table
 
 ONE_FILE = "save all columns in one file, for no other is opened"
@@ -165,3 +177,58 @@ def _in_tdms(file: Any) -> Iterator[Named]:
                 rates.add(stated_rate(channel.properties.get(INCREMENT)))
     if len(rates) == 1 and (increment := rates.pop()):
         yield "fs", np.asarray(1.0 / increment), ""
+
+
+class Parquet(Source):
+    """A Parquet file; columns of times of day become seconds since the first."""
+
+    def __init__(self, path: Path) -> None:
+        self._parquet = _extras.load("pyarrow.parquet", EXTRA, "reading Parquet")
+        types = _extras.load("pyarrow.types", EXTRA, "reading Parquet")
+        with damaged(path, "Parquet"):
+            contents = self._parquet.read_metadata(path)
+            schema = contents.schema.to_arrow_schema()
+        self._length = int(contents.num_rows)
+        check_size(path, 8 * self._length)
+        units: dict[str, str] = {}
+        for field in schema:
+            if types.is_timestamp(field.type) or types.is_duration(field.type):
+                units[field.name] = "s"
+            elif types.is_integer(field.type) or types.is_floating(field.type):
+                stated = {key.lower(): value.decode(errors="replace") for key, value in _items(field)}
+                units[field.name] = stated.get(b"unit") or stated.get(b"units") or ""
+        if not units:
+            raise LogError(f"{path}: no columns of numbers in it; there are {', '.join(schema.names)}")
+        for key, value in _items(schema):
+            if key.decode(errors="replace").lower() in RATES:
+                self.sample_rate = stated_rate(value)
+        super().__init__(path, list(units), [titled(*named) for named in units.items()], len(units))
+
+    def count(self, positions: Sequence[int]) -> int:
+        """Number of rows."""
+        return self._length
+
+    def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:
+        """Yield blocks of at most so many rows."""
+        start, names = 0, [self.names[i] for i in positions]
+        origins: dict[str, Any] = {}
+        # Without the buffer a whole group of rows, which may be the whole file, would be held.
+        with (
+            damaged(self.path, "Parquet"),
+            self._parquet.ParquetFile(self.path, buffer_size=1 << 16, pre_buffer=False) as file,
+        ):
+            for batch in file.iter_batches(rows, columns=names):
+                columns = [batch.column(name).to_pandas() for name in names]
+                for name, column in zip(names, columns, strict=True):
+                    if column.dtype.kind == "M" and column.notna().any():
+                        origins.setdefault(name, column.min())
+                stop = start + batch.num_rows
+                values = [
+                    floats(column, origins.get(name)) for name, column in zip(names, columns, strict=True)
+                ]
+                yield Rows(np.arange(start + 1, stop + 1), values, stop)
+                start = stop
+
+
+def _items(described: Any) -> Any:
+    return (described.metadata or {}).items()

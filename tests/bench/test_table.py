@@ -18,7 +18,7 @@ import pytest
 import piezoest as pz
 from piezoest.bench import recorded, table, tables, tuning
 from piezoest.bench.estimators import KNOWN, PAPERS, candidate, defaults, found
-from piezoest.bench.machine import fingerprint
+from piezoest.bench.origin import fingerprint
 from piezoest.bench.pages import write_html
 from piezoest.bench.run import COLUMNS, Task, code_of, crashed, play
 from piezoest.bench.stages import STAGES, STRANGERS, make_stage

@@ -7,8 +7,8 @@ import inspect
 from typing import Any
 
 import piezoest
-from piezoest.bench import machine
-from piezoest.bench.machine import imported
+from piezoest.bench import origin
+from piezoest.bench.origin import imported
 from piezoest.bench.zoo.controllers import Parts
 from piezoest.bench.zoo.running import Factory
 
@@ -61,4 +61,4 @@ def _change(name: str) -> dict[str, Any]:
 
 def code_of(name: str) -> str:
     """Fingerprint of this package and, for a controller of one's own, of its file."""
-    return machine.code_of(inspect.getsourcefile(_found(name)) if ":" in name else None)
+    return origin.code_of(inspect.getsourcefile(_found(name)) if ":" in name else None)
