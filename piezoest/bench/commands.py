@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from piezoest._errors import Group
 from piezoest.bench import safety_command, shared, table_command
@@ -49,7 +48,7 @@ def paper(
     The paper's procedure at 50 kHz: each row adapts while it runs, until it is stationary. The stage was
     calibrated to the rows marked calibration; it has never seen those marked held out.
     """
-    target = shared.json_target(json_to)
+    shared.json_target(json_to)
     shared.check_html(html)
     if figures is not None and (figures.exists() and not figures.is_dir()):
         raise typer.BadParameter(f"{figures} is not a folder", param_hint="--figures")
@@ -73,10 +72,6 @@ def paper(
 
         for path in write_figures(result, figures):
             typer.echo(f"Figure: {path}", err=json_to == "-")
-    if json_to == "-":
-        typer.echo(shared.json_text(document), nl=False)
-        return
     from piezoest.bench.paper_report import print_report
 
-    print_report(document, Console())
-    shared.write_json(document, target)
+    shared.show(document, json_to, print_report)

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from piezoest._files import write_text
 from piezoest._options import grouped
 from piezoest.bench.origin import origin
-from piezoest.bench.shared import Json, counting, json_target, json_text, progress, usage, write_json
+from piezoest.bench.shared import Json, counting, json_target, json_text, progress, show, usage
 
 if TYPE_CHECKING:
     from piezoest.bench.zoo.tasks import Task
@@ -104,7 +103,7 @@ def safety(
     none of them without need, and the error stays below 1.5 times that of the best straight line. Stopped and
     started again, it goes on where it was.
     """
-    target = json_target(json_to)
+    json_target(json_to)
     began = time.perf_counter()
     with usage():
         with progress() as say:
@@ -127,20 +126,14 @@ def safety(
             carry_out(planned, store, tasks.over_cores(workers), count)
             rows = list(store.rows(task.key for task in planned))
     document = {"suite": "safety", **origin(began), "controller": name, "given": given}
-    rows_of, kept, summarise, show = _kind(which, name)
+    rows_of, kept, summarise, printed = _kind(which, name)
     tables.write_table(
         tables.table_of(rows_of(rows), kept),
         written.output / f"{which.title.replace('safety', 'runs')}.{format}",
     )
     document |= summarise(rows)
-    text = json_text(document)
-    write_text(written.output / f"{which.title}.json", text)
-    if json_to == "-":
-        typer.echo(text, nl=False)
-        return
-    show(document, Console())
-    typer.echo(f"Results: {written.output}")
-    write_json(document, target)
+    write_text(written.output / f"{which.title}.json", json_text(document))
+    show(document, json_to, printed, f"Results: {written.output}")
 
 
 def _given(pairs: list[str]) -> dict[str, Any]:

@@ -103,3 +103,16 @@ def write_json(document: dict[str, Any], target: Path | None) -> None:
     if target is not None:
         write_text(target, json_text(document))
         typer.echo(f"JSON: {target}")
+
+
+def show(
+    document: dict[str, Any], json_to: str | None, tables: Callable[[Any, Console], None], *said: str
+) -> None:
+    """Print JSON alone where that is asked for, else the tables and what was written; write a JSON file."""
+    if json_to == "-":
+        typer.echo(json_text(document), nl=False)
+        return
+    tables(document, Console())
+    for line in said:
+        typer.echo(line)
+    write_json(document, json_target(json_to))

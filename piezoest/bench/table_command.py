@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 
 from piezoest._files import read_json, write_text
 from piezoest._options import grouped
@@ -130,7 +130,7 @@ def table(
             )
         return
 
-    target = shared.json_target(json_to)
+    shared.json_target(json_to)
     shared.check_html(shown.html)
     folder = shown.output or (QUICK_FOLDER if runs.quick else FOLDER)
     began = time.perf_counter()
@@ -142,14 +142,10 @@ def table(
 
         for path in write_figures(document, shown.figures):
             typer.echo(f"Figure: {path}", err=json_to == "-")
-    if json_to == "-":
-        typer.echo(shared.json_text(document), nl=False)
-        return
     from piezoest.bench.report import print_table
 
-    print_table(document, Console(), scenarios=shown.scenarios)
-    typer.echo(f"Tables and table.json: {folder}")
-    shared.write_json(document, target)
+    tables = partial(print_table, scenarios=shown.scenarios)
+    shared.show(document, json_to, tables, f"Tables and table.json: {folder}")
 
 
 def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: float) -> dict[str, Any]:
@@ -235,7 +231,7 @@ def compare(
     Runs are paired by scenario, stage, estimator and seed; each number is put to Wilcoxon's signed-rank test,
     and the number of comparisons is allowed for by the false discovery rate.
     """
-    target = shared.json_target(json_to)
+    shared.json_target(json_to)
     with shared.usage():
         from piezoest.bench import compare as comparison
         from piezoest.bench import tables
@@ -248,13 +244,9 @@ def compare(
         found = comparison.compare(*sides, level=level, relevant=relevant)
     heads = ({name: document[name] for name in HEAD} for document in documents)
     document = {"suite": "changes", **dict(zip("AB", heads, strict=True)), **found}
-    if json_to == "-":
-        typer.echo(shared.json_text(document), nl=False)
-    else:
-        from piezoest.bench.report import print_changes
+    from piezoest.bench.report import print_changes
 
-        print_changes(document, Console(), everything=everything)
-        shared.write_json(document, target)
+    shared.show(document, json_to, partial(print_changes, everything=everything))
     if fail_if_worse and document["counts"].get("worse"):
         raise typer.Exit(WORSE)
 

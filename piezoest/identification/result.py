@@ -30,6 +30,31 @@ def left_out_error(fitted: Fit | Fitted) -> float:
     return float(np.sqrt(fitted.held_out * fitted.ahead))
 
 
+def figures_of(found: Any) -> dict[str, Any]:
+    """What the dictionaries of all identifications have."""
+    return {
+        "source": found.source,
+        "samples": found.samples,
+        "sample_rate_Hz": found.sample_rate,
+        "model": found.model.to_dict(),
+        "learnt_on": found.learnt_on.to_dict(),
+        "kind": found.chosen,
+        "units": {name: unit for name, _, _, unit in found.table()},
+        "delay_samples": found.delay,
+        "trained_samples": found.trained,
+        "left_out_samples": found.left_out,
+        "train": found.train.to_dict(),
+        "held_out": found.held_out.to_dict(),
+        "straight_line": {
+            "model": found.line.to_dict(),
+            "train": found.line_train.to_dict(),
+            "held_out": found.line_held_out.to_dict(),
+        },
+        "notes": list(found.notes),
+        "advice": list(found.advice),
+    }
+
+
 @dataclass(frozen=True, slots=True)
 class Candidate:
     """One kind of model, fitted and judged.
@@ -307,30 +332,14 @@ class Identification:
         state = self.initial_state
         return {
             "format": "piezoest-identification-2",
-            "source": self.record.source,
-            "samples": len(self.record),
+            **figures_of(self),
             "skipped_rows": self.record.skipped,
-            "sample_rate_Hz": self.record.sample_rate,
-            "model": self.model.to_dict(),
-            "learnt_on": self.learnt_on.to_dict(),
-            "kind": self.chosen,
             "reason": self.reason,
             "candidates": [each.to_dict() for each in self.candidates],
             "standard_errors": dict(self.standard_errors),
-            "units": {name: unit for name, _, _, unit in self.table()},
             "initial_state": state.tolist() if isinstance(state, np.ndarray) else state,
-            "delay_samples": self.delay,
             "delay_estimated": self.delay_estimated,
             "delay_known": self.delay_known,
-            "trained_samples": self.trained,
-            "left_out_samples": self.left_out,
-            "train": self.train.to_dict(),
-            "held_out": self.held_out.to_dict(),
-            "straight_line": {
-                "model": self.line.to_dict(),
-                "train": self.line_train.to_dict(),
-                "held_out": self.line_held_out.to_dict(),
-            },
             "noise_floor_um": self.noise_floor,
             "interval_um": self.fit.spread.within,
             "whiteness": self.whiteness.to_dict(),
@@ -338,8 +347,6 @@ class Identification:
             "validation": [each.to_dict() for each in self.validations],
             "findings": [dataclasses.asdict(each) for each in self.findings],
             "solver": self.fit.solver,
-            "notes": list(self.record.notes),
-            "advice": list(self.advice),
         }
 
     def __repr__(self) -> str:

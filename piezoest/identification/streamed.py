@@ -23,7 +23,7 @@ from piezoest.identification.drawing import Drawn
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.parts import Part, Progress, parts, pieces
 from piezoest.identification.residual import Kind, Misfit, Row, parameter_rows
-from piezoest.identification.result import left_out_error
+from piezoest.identification.result import figures_of, left_out_error
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record, RecordStream
 
@@ -124,27 +124,9 @@ class StreamedIdentification:
         """Return a JSON-safe dictionary; the model under ``"model"`` is that of the model's `to_dict`."""
         return {
             "format": "piezoest-streamed-2",
-            "source": self.source,
-            "samples": self.samples,
+            **figures_of(self),
             "skipped_rows": self.skipped,
-            "sample_rate_Hz": self.sample_rate,
-            "model": self.model.to_dict(),
-            "learnt_on": self.learnt_on.to_dict(),
-            "kind": self.chosen,
             "cross_validated_um": self.cross_validated,
-            "units": {name: unit for name, _, _, unit in self.table()},
-            "delay_samples": self.delay,
-            "trained_samples": self.trained,
-            "left_out_samples": self.left_out,
-            "train": self.train.to_dict(),
-            "held_out": self.held_out.to_dict(),
-            "straight_line": {
-                "model": self.line.to_dict(),
-                "train": self.line_train.to_dict(),
-                "held_out": self.line_held_out.to_dict(),
-            },
-            "notes": list(self.notes),
-            "advice": list(self.advice),
         }
 
 
