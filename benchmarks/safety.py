@@ -95,11 +95,8 @@ def part(rows: Sequence[Row], *, curve: bool = True) -> Row:
 
 def table(rows: Sequence[Row], *names: str) -> list[Row]:
     """Median of the ratio and count above 1, for each value of some columns."""
-    groups: dict[tuple[Any, ...], list[Row]] = {}
-    for row in rows:
-        groups.setdefault(tuple(row[name] for name in names), []).append(row)
     found = []
-    for key, group in sorted(groups.items()):
+    for key, group in summary.parted(rows, *names).items():
         ratios = judged(group)
         found.append(
             {

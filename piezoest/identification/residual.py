@@ -1,4 +1,4 @@
-"""What texts and tables show of a model: its parameters, what it misses, and whether that is white."""
+"""What tables and files say of a model: its parameters, what it misses, and whether that is white."""
 
 from __future__ import annotations
 
@@ -148,3 +148,28 @@ def autocorrelation(residual: FloatArray, lags: int) -> FloatArray:
     e = np.where(known, residual - np.mean(residual[known]), 0.0)
     power = float(e @ e) or 1.0
     return np.array([float(e[: e.size - k] @ e[k:]) / power for k in range(lags + 1)])
+
+
+def figures_of(found: Any) -> dict[str, Any]:
+    """What the dictionaries of all identifications have."""
+    return {
+        "source": found.source,
+        "samples": found.samples,
+        "sample_rate_Hz": found.sample_rate,
+        "model": found.model.to_dict(),
+        "learnt_on": found.learnt_on.to_dict(),
+        "kind": found.chosen,
+        "units": {name: unit for name, _, _, unit in found.table()},
+        "delay_samples": found.delay,
+        "trained_samples": found.trained,
+        "left_out_samples": found.left_out,
+        "train": found.train.to_dict(),
+        "held_out": found.held_out.to_dict(),
+        "straight_line": {
+            "model": found.line.to_dict(),
+            "train": found.line_train.to_dict(),
+            "held_out": found.line_held_out.to_dict(),
+        },
+        "notes": list(found.notes),
+        "advice": list(found.advice),
+    }

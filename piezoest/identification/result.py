@@ -14,7 +14,7 @@ from piezoest.fitting import Fit, Prediction
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
 from piezoest.fitting.regression import Fitted
-from piezoest.identification.residual import Kind, Misfit, Row, Whiteness, parameter_rows
+from piezoest.identification.residual import Kind, Misfit, Row, Whiteness, figures_of, parameter_rows
 from piezoest.identification.sense import Finding
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record
@@ -28,31 +28,6 @@ if TYPE_CHECKING:
 def left_out_error(fitted: Fit | Fitted) -> float:
     """Geometric mean of a fit's errors on blocks between others, and on blocks behind all others [µm rms]."""
     return float(np.sqrt(fitted.held_out * fitted.ahead))
-
-
-def figures_of(found: Any) -> dict[str, Any]:
-    """What the dictionaries of all identifications have."""
-    return {
-        "source": found.source,
-        "samples": found.samples,
-        "sample_rate_Hz": found.sample_rate,
-        "model": found.model.to_dict(),
-        "learnt_on": found.learnt_on.to_dict(),
-        "kind": found.chosen,
-        "units": {name: unit for name, _, _, unit in found.table()},
-        "delay_samples": found.delay,
-        "trained_samples": found.trained,
-        "left_out_samples": found.left_out,
-        "train": found.train.to_dict(),
-        "held_out": found.held_out.to_dict(),
-        "straight_line": {
-            "model": found.line.to_dict(),
-            "train": found.line_train.to_dict(),
-            "held_out": found.line_held_out.to_dict(),
-        },
-        "notes": list(found.notes),
-        "advice": list(found.advice),
-    }
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from piezoest.bench.store import Row
 from piezoest.bench.zoo.contenders import CANDIDATES
 from piezoest.bench.zoo.families import FAMILIES
 from piezoest.bench.zoo.references import SHAPES
+from piezoest.bench.zoo.summary import parted
 from piezoest.bench.zoo.tasks import Task, runs
 
 FLOOR, ALLOWED = 0.001, 1.3  # of the amplitude; settled error over that of the best single estimator
@@ -45,13 +46,9 @@ def contest(
 def summarise_contest(rows: Iterable[Row], controller: str) -> dict[str, Any]:
     """Compare settled errors in each cell with those of the best single estimator."""
     rows = list(rows)
-    errors: dict[tuple[str, str], dict[str, list[float]]] = {}
-    for row in rows:
-        of_cell = errors.setdefault((row["family"], row["reference"]), {})
-        of_cell.setdefault(row["controller"], []).append(_relative(row))
     cells = [
-        {"family": key[0], "reference": key[1], **_compared(of_cell, controller)}
-        for key, of_cell in sorted(errors.items())
+        {"family": family, "reference": reference, **_compared(group, controller)}
+        for (family, reference), group in parted(rows, "family", "reference").items()
     ]
     ratios = [cell["ratio"] for cell in cells]
     return {
@@ -71,8 +68,9 @@ def _relative(row: Row) -> float:
     return np.inf if settled is None else max(settled / row["amplitude"], FLOOR)
 
 
-def _compared(errors: dict[str, list[float]], controller: str) -> dict[str, Any]:
-    medians = {name: float(np.median(each)) for name, each in errors.items()}
+def _compared(rows: Sequence[Row], controller: str) -> dict[str, Any]:
+    played = parted(rows, "controller").items()
+    medians = {name: float(np.median([_relative(row) for row in each])) for (name,), each in played}
     own = medians[controller]
     best = min((name for name in CANDIDATES if name in medians), key=medians.__getitem__)
     found = {"settled": own, "best": best, "best_settled": medians[best], "ratio": own / medians[best]}

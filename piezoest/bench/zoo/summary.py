@@ -89,7 +89,7 @@ def _groups(rows: Sequence[Row], first: str, second: str) -> list[dict[str, Any]
             "ratio": _quantiles(group, "ratio")["50 %"],
             **_told(group),
         }
-        for key, group in _parted(rows, first, second).items()
+        for key, group in parted(rows, first, second).items()
     ]
 
 
@@ -112,7 +112,7 @@ def summarise_cells(rows: Iterable[Row]) -> dict[str, Any]:
     rows = list(rows)
     asked = [row for row in rows if row["asked"]]
     others = [row for row in rows if not row["asked"]]
-    cells = [_shares(group) for group in _parted(asked, "family", "amplitude", "frequency").values()]
+    cells = [_shares(group) for group in parted(asked, "family", "amplitude", "frequency").values()]
     return {
         "runs": len(rows),
         "failures": sum(row["failure"] is not None for row in rows),
@@ -127,7 +127,7 @@ def summarise_cells(rows: Iterable[Row]) -> dict[str, Any]:
     }
 
 
-def _parted(rows: Sequence[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
+def parted(rows: Sequence[Row], *names: str) -> dict[tuple[Any, ...], list[Row]]:
     """Rows by the values of some columns, in order."""
     found: dict[tuple[Any, ...], list[Row]] = {}
     for row in rows:
@@ -139,7 +139,7 @@ def _by(rows: Sequence[Row], *names: str) -> list[dict[str, Any]]:
     """Shares for each value of some columns."""
     return [
         {**dict(zip(names, key, strict=True)), **_shares(group)}
-        for key, group in _parted(rows, *names).items()
+        for key, group in parted(rows, *names).items()
     ]
 
 
