@@ -1,17 +1,17 @@
 """What may be tuned of each estimator: declared here, beside its name, and searched alike for all.
 
 An estimator of one's own declares its space as an attribute of the class, the bounds of a value that
-may be anything between them, evenly in its logarithm, or a list to choose from::
+may be anything between them, evenly in its logarithm, a range of whole numbers, or a list to choose from::
 
     class MyEstimator:
-        tuning_space = {"memory": (0.05, 2.0), "order": [1, 2, 3]}
+        tuning_space = {"memory": (0.05, 2.0), "members": range(5, 50), "order": [1, 2, 3]}
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -28,40 +28,23 @@ TRAINING = ("cold-start", "amplitude-drop", "gain-step", "two-tone")
 TRAINING_SEEDS = (1000, 1001)  # no campaign judges by these
 SHIFT = 2026  # seed of the shift of the settings that are tried
 
-
-@dataclass(frozen=True, slots=True)
-class Between:
-    """Any value from low to high, evenly in its logarithm."""
-
-    low: float
-    high: float
-    whole: bool = False  # whole numbers only
-
-    def __post_init__(self) -> None:
-        if positive("high", self.high) <= positive("low", self.low):
-            raise ValueError(f"high must be above low, got {self.low} and {self.high}")
-
-    def at(self, position: float) -> float | int:
-        """Value at a position along the way, within [0, 1). `position`: 0 for low."""
-        if self.whole:
-            first, last = math.log(self.low), math.log(self.high + 1.0)
-            return min(int(math.exp(first + position * (last - first))), int(self.high))
-        value = math.exp(math.log(self.low) + position * (math.log(self.high) - math.log(self.low)))
-        return float(f"{value:.3g}")
+# What a value may be: anything between two numbers, a whole number of a range, both evenly in the logarithm,
+# or one of a list of literals.
+Values = tuple[float, float] | range | list[Any]
+Space = Mapping[str, Values]
 
 
-@dataclass(frozen=True, slots=True)
-class OneOf:
-    """One of some values."""
-
-    values: tuple[Any, ...]  # literals
-
-    def at(self, position: float) -> Any:
-        """Value at a position along the way, within [0, 1). `position`: 0 for the first."""
-        return self.values[min(int(position * len(self.values)), len(self.values) - 1)]
-
-
-Space = Mapping[str, Between | OneOf]
+def value_at(values: Values, position: float) -> Any:
+    """Value at a position along the way, within [0, 1). `position`: 0 for the first."""
+    match values:
+        case list():
+            return values[min(int(position * len(values)), len(values) - 1)]
+        case range(start=low, stop=high):
+            value = math.exp(math.log(low) + position * (math.log(high) - math.log(low)))
+            return min(int(value), high - 1)
+        case (low, high):
+            value = math.exp(math.log(low) + position * (math.log(high) - math.log(low)))
+            return float(f"{value:.3g}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,51 +57,34 @@ class Tunable:
 
     def text(self, point: Sequence[float]) -> str:
         """Description of the estimator at a point of its space."""
-        values = {
-            name: repr(self.space[name].at(position))
-            for name, position in zip(self.space, point, strict=True)
-        }
-        return self.template.format(**values)
+        places = zip(self.space.items(), point, strict=True)
+        return self.template.format(**{name: repr(value_at(of, position)) for (name, of), position in places})
 
 
 # All know of the offset alike; what else may be turned, and how far.
-FILTER: Space = {
-    "drift": Between(0.02, 5.0),
-    "mismatch": Between(0.02, 5.0),
-    "uncertainty": Between(0.1, 1.0),
-}
-NOISE = Between(5e-4, 1e-2)
+FILTER: Space = {"drift": (0.02, 5.0), "mismatch": (0.02, 5.0), "uncertainty": (0.1, 1.0)}
+NOISE = (5e-4, 1e-2)
 
 SPACES: dict[str, tuple[str, Space]] = {
     "HysteresisRLS": (
         "HysteresisRLS(noise={noise}, policies=(RandomWalk(memory={memory}, drift={drift}), DeadZone(), "
         "OutlierRejection()))",
-        {"memory": Between(0.05, 1.0), "drift": Between(0.1, 2.0), "noise": NOISE},
+        {"memory": (0.05, 1.0), "drift": (0.1, 2.0), "noise": NOISE},
     ),
     "OutputErrorRLS": (
         "OutputErrorRLS(noise={noise}, uncertainty={uncertainty}, policies=("
         "RandomWalk(memory={memory}, drift={drift}), OutlierRejection()))",
-        {
-            "memory": Between(0.05, 1.0),
-            "drift": Between(0.1, 2.0),
-            "uncertainty": Between(0.1, 1.0),
-            "noise": NOISE,
-        },
+        {"memory": (0.05, 1.0), "drift": (0.1, 2.0), "uncertainty": (0.1, 1.0), "noise": NOISE},
     ),
     **dict.fromkeys(("HysteresisEKF", "FilterPyEKF", "FilterPyUKF"), ("", FILTER)),
     "MovingHorizon": (
         "",
-        {"window": Between(0.25, 0.8), "hop": Between(0.05, 0.2), "process_noise": Between(0.01, 1.0)},
+        {"window": (0.25, 0.8), "hop": (0.05, 0.2), "process_noise": (0.01, 1.0)},
     ),
-    "BatchFit": ("", {"hop": Between(0.08, 0.4), "loss": OneOf(("linear", "huber"))}),
+    "BatchFit": ("", {"hop": (0.08, 0.4), "loss": ["linear", "huber"]}),
     "PrandtlIshlinskiiRLS": (
         "",
-        {
-            "thresholds": Between(6, 20, whole=True),
-            "bends": OneOf((0, 1, 2, 3)),
-            "uncertainty": Between(0.1, 2.0),
-            "noise": NOISE,
-        },
+        {"thresholds": range(6, 21), "bends": [0, 1, 2, 3], "uncertainty": (0.1, 2.0), "noise": NOISE},
     ),
 }
 
@@ -132,17 +98,19 @@ def tunable(text: str) -> Tunable:
         template, space = SPACES.get(name, ("", {}))
         given = ", offset=True" if "offset=True" in text else ""
         return Tunable(text, template or _call(name, space, given), space)
-    space = {}
-    for key, values in getattr(class_of(name), "tuning_space", {}).items():
+    own: Space = getattr(class_of(name), "tuning_space", {})
+    for key, values in own.items():
         match values:
-            case tuple((low, high)):
-                space[key] = Between(low, high)
+            case tuple((low, high)) if positive("high", high) > positive("low", low):
+                continue
             case list([_, *_]):
-                space[key] = OneOf(tuple(values))
-            case _:
-                message = f"tuning_space[{key!r}] must be (low, high) or a list, got {values!r}"
-                raise ValueError(f"{text}: {message}")
-    return Tunable(text, _call(name, space), space)
+                continue
+            case range(start=low, stop=high) if positive("stop", high) > positive("start", low):
+                continue
+        raise ValueError(
+            f"{text}: tuning_space[{key!r}] must be (low, high), a range or a list, got {values!r}"
+        )
+    return Tunable(text, _call(name, own), own)
 
 
 def _call(name: str, space: Space, given: str = "") -> str:
@@ -196,7 +164,7 @@ def tune(
         found.append(
             {
                 "default": each.default,
-                "space": {name: asdict(values) for name, values in each.space.items()},
+                "space": {name: str(values) for name, values in each.space.items()},
                 "trials": scored,
                 "chosen": min(scored, key=lambda trial: trial["score"])["estimator"],
             }
