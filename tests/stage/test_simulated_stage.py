@@ -30,7 +30,7 @@ PREISACH = PreisachStage(FS).hysteresis
 U = 40.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(3000) / FS)
 
 
-def full_stage(hysteresis: Any = PLAYS, seed: int = 3) -> SimulatedStage:
+def full_stage(hysteresis: Any = PLAYS, seed: int = 3, temperature: Any = None) -> SimulatedStage:
     return SimulatedStage(
         FS,
         hysteresis,
@@ -39,6 +39,7 @@ def full_stage(hysteresis: Any = PLAYS, seed: int = 3) -> SimulatedStage:
         amplifier=Amplifier(-60.0, 60.0, resolution=0.01, slew_rate=1e5, cutoff=3000.0),
         gauge=Gauge(1e-3, 0.1, 3000.0, delay=2, resolution=1e-3, minimum=-10.0, maximum=10.0),
         gain_schedule=np.array([[0.05, 1.0], [0.2, 1.2]]),
+        temperature=temperature,
         seed=seed,
     )  # fmt: skip
 
@@ -61,11 +62,12 @@ def test_creep_and_mechanics_are_those_of_the_models() -> None:
     )
 
 
+@pytest.mark.parametrize("temperature", [None, [[0.05, 20.0], [0.25, 60.0]], lambda t: 20.0 + 30.0 * t])
 @pytest.mark.parametrize("hysteresis", [LinearGain(0.15), COLEMAN_HODGDON, PLAYS, PREISACH])
-def test_step_run_and_split_run_give_the_same_bits(hysteresis: Any) -> None:
+def test_step_run_and_split_run_give_the_same_bits(hysteresis: Any, temperature: Any) -> None:
     u = U.copy()
     u[100:103] = np.nan, np.inf, -np.inf
-    whole, pieces, single = (full_stage(hysteresis) for _ in range(3))
+    whole, pieces, single = (full_stage(hysteresis, temperature=temperature) for _ in range(3))
     measured = whole.run(u)
     parts = [pieces.run(part) for part in np.split(u, [1, 100, 102, 1700])]
     np.testing.assert_array_equal(np.concatenate(parts), measured)

@@ -39,19 +39,6 @@ def test_law_scales_the_loop_of_coleman_hodgdon() -> None:
     np.testing.assert_allclose(warm, scaled.simulate(U), atol=1e-12)
 
 
-@pytest.mark.parametrize("temperature", [31.0, [[0.05, 20.0], [0.25, 60.0]], lambda t: 20.0 + 30.0 * t])
-@pytest.mark.parametrize("hysteresis", [PLAYS, COLEMAN_HODGDON])
-def test_step_run_and_split_run_give_the_same_bits(hysteresis: Any, temperature: Any) -> None:
-    def stage() -> SimulatedStage:
-        return SimulatedStage(FS, hysteresis, gain_schedule=[[0.0, 1.0], [0.3, 0.9]], temperature=temperature)
-
-    measured = stage().run(U)
-    pieces, single = stage(), stage()
-    parts = [pieces.run(part) for part in np.split(U, [1, 100, 1700])]
-    np.testing.assert_array_equal(np.concatenate(parts), measured)
-    np.testing.assert_array_equal([single.step(u) for u in U.tolist()], measured)
-
-
 def loop(temperature: float | None) -> tuple[float, float]:
     """Gain [µm/V] and half the opening of the loop, relative to the amplitude, at some 5 µm."""
     stage = PaperStage(noise=0.0, quantisation=False, temperature=temperature)
