@@ -44,7 +44,7 @@ def fit(
     flaws: Flaws | None = None,
     settle: float | None = None,
 ) -> Fit:
-    """Fit a model to a record: what the free-running model misses is least.
+    """Fit one kind of model to a record, by the error of the simulated displacement.
 
     All in which a model is linear (slopes of plays, their bends, gain, offset, drift, jumps) is one convex
     program, solved by CasADi and checked by SciPy. Smoothness of neighbouring slopes is chosen by five

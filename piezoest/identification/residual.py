@@ -14,7 +14,7 @@ WHITENESS_LAGS = 20
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """Displacement that a free-running model misses.
+    """Error of a model that computes the displacement from the voltage alone.
 
     Parameters
     ----------
