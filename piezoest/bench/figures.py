@@ -57,7 +57,7 @@ def _styles(document: Document) -> dict[str, dict[str, Any]]:
 
     Linear feed-forward is grey.
     """
-    tuned = {each["chosen"] for each in document["tuned"]} - {each["default"] for each in document["tuned"]}
+    tuned = {each["chosen"] for each in document.get("tuned", ()) if each["chosen"] != each["default"]}
     names = [name for name in document["estimators"] if name not in {LINEAR, *tuned}]
     styles = itertools.cycle(zip(COLOURS, MARKERS, strict=True))
     looks = {
