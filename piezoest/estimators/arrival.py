@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.estimators.fit import Prior, Problem, inverse_information
+from piezoest.fitting.outcome import inverse_information
+from piezoest.fitting.problem import Prior, Problem
 
-# Keeps a correlation matrix positive definite that rounding would not.
-JITTER = 1e-12
+# Keeps a correlation matrix positive definite that rounding would not, and the squares of its root in range.
+JITTER = 1e-9
 
 
 def arrival_cost(problem: Problem, q: FloatArray, k: int, walk: FloatArray) -> tuple[FloatArray, Prior]:
@@ -20,12 +21,9 @@ def arrival_cost(problem: Problem, q: FloatArray, k: int, walk: FloatArray) -> t
 
     All is linearised about coordinates q (n,), whose random walk meanwhile has the standard deviations (n,).
     """
-    prior = problem.prior
-    assert prior is not None
-    residual, jacobian = problem.evaluate(q)
-    J, r = jacobian[:k], residual[:k]
-    covariance = inverse_information(prior.root.T @ prior.root + J.T @ J)
-    step = -covariance @ (prior.root.T @ (prior.root @ (q - prior.mean)) + J.T @ r)
+    sums = problem.sums(q, samples=k)
+    covariance = inverse_information(sums.gram)
+    step = covariance @ sums.moment
     G, follower = np.eye(q.size), q.copy()
     if state := problem.coordinates.where(*problem.coordinates.model.state_names):
         # The states at point k, which the next window starts from.

@@ -11,24 +11,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.estimators.coordinates import coordinates
-from piezoest.estimators.fit import Problem, outcome, single_shooting
+from piezoest.fitting.coordinates import coordinates
+from piezoest.fitting.gauss_newton import single_shooting
 from piezoest.fitting.loop_columns import LoopColumns
+from piezoest.fitting.outcome import outcome
+from piezoest.fitting.problem import Problem
 from piezoest.fitting.regression import Fitted, Log
 from piezoest.fitting.search import LONGEST_DELAY
 from piezoest.models import ColemanHodgdon
 
 # Most passes over the record, and the relative change at which it has ended.
-MOST_PASSES, TOLERANCE = 20, 1e-6
+MOST_PASSES, TOLERANCE = 40, 1e-6
 
 
 class Polished(NamedTuple):
-    """Columns of another alpha, coefficients, delay, and the standard errors of all parameters by name."""
+    """Columns of another alpha, coefficients, delay, standard errors by name, and SciPy's gap."""
 
     basis: LoopColumns
     w: FloatArray
     delay: float
     standard_errors: dict[str, float]
+    gap: float
 
 
 def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Polished:
@@ -53,4 +56,4 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     w = w.copy()
     w[: offset + 1] = found.beta, found.b, value["initial_state"], found.offset
     errors = dict(zip(end.parameter_names, end.standard_errors.tolist(), strict=True))
-    return Polished(LoopColumns(found.alpha), w, value["delay"], errors)
+    return Polished(LoopColumns(found.alpha), w, value["delay"], errors, problem.gap(solution.q))

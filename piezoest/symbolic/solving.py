@@ -166,10 +166,10 @@ def _conic(size: int) -> Any:
     return casadi.conic("program", name, shapes, {**QUADRATIC[name], "error_on_fail": False})
 
 
-def quadratic_program(H: FloatArray, g: FloatArray, lower: FloatArray) -> FloatArray:
-    """Minimum of w' H w / 2 - g' w over w >= lower.
+def quadratic_program(H: FloatArray, g: FloatArray, lower: FloatArray, upper: Any = np.inf) -> FloatArray:
+    """Minimum of w' H w / 2 - g' w over lower <= w <= upper.
 
-    `H` (n, n): symmetric, positive definite. `g`, `lower` (n,): `lower` is -inf where there is no bound.
+    `H` (n, n): symmetric, positive definite. `g`, `lower`, `upper` (n,): bounds may be infinite.
     """
-    found = _conic(g.size)(h=casadi.DM(H), g=-g, lbx=lower, ubx=np.inf)
-    return np.fmax(found["x"].full()[:, 0], lower)
+    found = _conic(g.size)(h=casadi.DM(H), g=-g, lbx=lower, ubx=upper)
+    return np.clip(found["x"].full()[:, 0], lower, upper)

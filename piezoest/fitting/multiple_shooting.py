@@ -11,8 +11,9 @@ from itertools import pairwise
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.estimators.fit import Problem, Solution, bend
-from piezoest.symbolic import Evaluation, Pass, ipopt
+from piezoest.fitting.gauss_newton import Solution
+from piezoest.fitting.problem import Problem
+from piezoest.symbolic import Evaluation, ipopt
 
 SEGMENTS = 20
 # Samples on each side of a segment's start that its start state is guessed from.
@@ -113,10 +114,10 @@ class _Segments:
             before = problem.u[max(rows.start - 1, 0)]
             run = simulation.run(problem.u[rows], v[:n_p], s, problem.decays, before=before)
             V = np.concatenate([by_z[:n_p], by_z[n_p:][own]])
-            cost, g, H = self._sums(run, rows)
-            objective += cost
-            gradient += V.T @ g
-            hessian += V.T @ H @ V
+            sums = problem.sums_of(run, rows, self.loss, self.scale).through(V)
+            objective += problem.loss_of(run, rows, self.loss, self.scale)
+            gradient -= sums.moment
+            hessian += sums.gram
             ends[i], ends_by_z[own] = run.end, run.end_jacobian @ V
         defect = (ends[:-1] - starts[1:]).ravel()
         defect_jacobian = ends_by_z[:-n_s] - by_z[n_p + n_s :]
@@ -129,13 +130,3 @@ class _Segments:
             defect_jacobian * unit / state_unit[:, None],
             hessian * np.outer(unit, unit) * self.normal,
         )
-
-    def _sums(self, run: Pass, rows: slice) -> tuple[float, FloatArray, FloatArray]:
-        """Cost of a segment, gradient and Gauss-Newton Hessian by (p, s)."""
-        weight = self.problem.weight[rows]
-        residual = (run.x - self.problem.x[rows]) * weight
-        rho = bend(self.loss, (residual / self.scale) ** 2)
-        J = run.jacobian * weight[:, None]
-        cost = 0.5 * self.scale**2 * float(rho[0].sum())
-        # Weights in place of the loss's own curvature: an upper bound, which does not overshoot.
-        return cost, J.T @ (rho[1] * residual), (J * rho[1][:, None]).T @ J
