@@ -21,7 +21,7 @@ def arrival_cost(problem: Problem, q: FloatArray, k: int, walk: FloatArray) -> t
 
     All is linearised about coordinates q (n,), whose random walk meanwhile has the standard deviations (n,).
     """
-    sums = problem.sums(q, samples=k)
+    _, sums = problem.about(q, samples=k)
     covariance = inverse_information(sums.gram)
     step = covariance @ sums.moment
     G, follower = np.eye(q.size), q.copy()

@@ -267,7 +267,7 @@ class BatchFit(Hopping):
     def _solve(self, count: int) -> BatchFitResult:
         """Fit the first so many samples."""
         began = time.perf_counter()
-        arguments, creep, scale = self._arguments, self._creep, 1.0
+        arguments, creep = self._arguments, self._creep
         loss, noise = arguments["loss"], arguments["noise"]
         gains = {} if creep is None else {f"creep_gains[{i}]": g for i, g in enumerate(creep.gains)}
         u, x = self._record[:, :count]
@@ -281,10 +281,7 @@ class BatchFit(Hopping):
         given = None if arguments["initial_model"] is None else self._initial
         q = best_start(problem, given, DEFAULT_MODEL, gains)
         solve = partial(METHODS[arguments["method"]], max_iterations=arguments["max_iterations"])
-        if loss == "linear":
-            solution = solve(problem, q, loss, scale)
-        else:
-            solution, scale = robust(problem, q, loss, noise, solve)
+        solution, scale = robust(problem, q, loss, noise, solve)
         end = outcome(problem, solution.q, loss, scale, noise)
         value = end.value
         return BatchFitResult(

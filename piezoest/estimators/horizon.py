@@ -261,14 +261,10 @@ class MovingHorizon(Hopping):
 
     def _accepts(self, problem: Problem, found: Solution) -> bool:
         """Hold what was found, if it is any good."""
-        if not found.success or not np.isfinite(problem.cost(found.q)):
+        _, sums = problem.about(found.q)
+        if not (found.success and np.all(np.isfinite(sums.gram))):
             return False
-        try:
-            covariance = inverse_information(problem.sums(found.q).gram)
-        except np.linalg.LinAlgError:
-            return False
-        if not np.all(np.isfinite(covariance)):
-            return False
+        covariance = inverse_information(sums.gram)
         run, by_q = problem.simulate(found.q)
         row = run.jacobian[-1] @ by_q
         variance = self._state["noise"] ** 2 + row @ covariance @ row

@@ -56,9 +56,9 @@ def single_shooting(
     """
     lower, upper = problem.bounds(start)
     q, damping, more = np.clip(start, lower, upper), 0.0, MORE
-    cost, sums = problem.cost(q, loss, scale), problem.sums(q, loss, scale)
+    cost, sums = problem.about(q, loss, scale)
     for passes in range(1, max_iterations):
-        if not (np.isfinite(cost) and np.all(np.isfinite(sums.gram)) and np.all(np.isfinite(sums.moment))):
+        if not np.all(np.isfinite([cost, *sums.moment, *sums.gram.flat])):
             # Numbers of a size that no stage has; a stream goes on all the same.
             return Solution(start, False, "The model is not finite.", passes)
         own = np.diag(sums.gram)
@@ -67,14 +67,14 @@ def single_shooting(
         other = np.clip(q + step, lower, upper)
         promised = float(sums.moment @ step - 0.5 * step @ sums.gram @ step)
         ended = promised <= tolerance * cost or float(own @ step**2) <= tolerance**2 * float(own @ q**2)
-        kept = cost - problem.cost(other, loss, scale)
+        other_cost, other_sums = problem.about(other, loss, scale)
+        kept = cost - other_cost
         if kept < POOR * promised:
             damping, more = max(more * damping, DAMPED), MORE * more
         else:
             damping, more = damping / LESS if kept > GOOD * promised else damping, MORE
         if kept >= 0.0:
-            q, cost = other, cost - kept
-            sums = problem.sums(q, loss, scale)
+            q, cost, sums = other, other_cost, other_sums
         if ended:
             return Solution(q, True, "The tolerance is satisfied.", passes + 1)
     return Solution(q, False, "The maximum number of function evaluations is exceeded.", max_iterations)
@@ -83,7 +83,12 @@ def single_shooting(
 def robust(
     problem: Problem, q: FloatArray, wanted: str, noise: float | None, solve: Callable[..., Solution]
 ) -> tuple[Solution, float]:
-    """Fit and scale of a robust loss, in turn, until the scale is that of the fit's own residual."""
+    """Fit and scale of a robust loss, in turn, until the scale is that of the fit's own residual.
+
+    Least squares are fitted once.
+    """
+    if wanted == "linear":
+        return solve(problem, q, wanted, 1.0), 1.0
     floor = LEAST_SCALE * (float(np.ptp(problem.x[problem.measured])) or 1.0)
     evaluations, scale, fitted = 0, 0.0, ""
     # A loss that is not convex has false minima, and starts from the fit of one that is.

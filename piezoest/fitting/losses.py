@@ -28,15 +28,3 @@ def bend(loss: str, z: FloatArray) -> FloatArray:
     if loss == "cauchy":
         return np.array([np.log1p(z), 1.0 / (1.0 + z), -1.0 / (1.0 + z) ** 2])
     return np.array([z, np.ones_like(z), np.zeros_like(z)])
-
-
-def weighted(
-    columns: FloatArray, missed: FloatArray, loss: str, scale: float
-) -> tuple[FloatArray, FloatArray]:
-    """Rows (N, n) and what they miss (N,), so that their sums have a loss's gradient and curvature."""
-    if loss == "linear":
-        return columns, missed
-    z = (missed / scale) ** 2
-    _, slope, change = bend(loss, z)
-    root = np.sqrt(np.maximum(slope + 2.0 * change * z, LEAST_CURVATURE))
-    return columns * root[:, None], missed * slope / root

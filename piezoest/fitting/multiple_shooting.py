@@ -114,10 +114,10 @@ class _Segments:
             before = problem.u[max(rows.start - 1, 0)]
             run = simulation.run(problem.u[rows], v[:n_p], s, problem.decays, before=before)
             V = np.concatenate([by_z[:n_p], by_z[n_p:][own]])
-            sums = problem.sums_of(run, rows, self.loss, self.scale).through(V)
-            objective += problem.loss_of(run, rows, self.loss, self.scale)
-            gradient -= sums.moment
-            hessian += sums.gram
+            cost, sums = problem.sums(run, rows, self.loss, self.scale)
+            objective += cost
+            gradient -= V.T @ sums.moment
+            hessian += V.T @ sums.gram @ V
             ends[i], ends_by_z[own] = run.end, run.end_jacobian @ V
         defect = (ends[:-1] - starts[1:]).ravel()
         defect_jacobian = ends_by_z[:-n_s] - by_z[n_p + n_s :]

@@ -90,7 +90,7 @@ def outcome(
     estimated = np.sqrt(float(np.sum((rho[1] * r) ** 2)) / dof) / max(abs(slope), 1e-12)
     noise = float(estimated if noise is None else noise)
     run, by_q = problem.simulate(q)
-    inverse = inverse_information(problem.sums(q).gram[np.ix_(free, free)])
+    inverse = inverse_information(problem.about(q)[1].gram[np.ix_(free, free)])
     _, _, theta, T = problem.coordinates(q, problem.held)
     P = T[:, free] @ inverse @ T[:, free].T * noise**2
     if coloured:

@@ -14,7 +14,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.fitting.coordinates import Coordinates, late
-from piezoest.fitting.losses import bend, weighted
+from piezoest.fitting.losses import LEAST_CURVATURE, bend
 from piezoest.fitting.program import Sums, checked
 from piezoest.fitting.rows import dot
 from piezoest.symbolic import Pass
@@ -79,46 +79,48 @@ class Problem:
         return simulation.run(u[:samples], p, s, self.decays, slope=slope), by_q
 
     def residual(self, q: FloatArray) -> FloatArray:
-        """Weighted residual (N,), measured - model; zero where nothing was measured."""
-        return self.missed(self.simulate(q)[0], slice(None))
+        """Weighted residual (N,), measured less simulated; zero where nothing was measured."""
+        return np.asarray((self.x - self.simulate(q)[0].x) * self.weight)
 
-    def missed(self, run: Pass, rows: slice) -> FloatArray:
-        """The same of a pass over some rows."""
-        return np.asarray((self.x[rows] - run.x) * self.weight[rows])
+    def sums(self, run: Pass, rows: slice, loss: str = "linear", scale: float = 1.0) -> tuple[float, Sums]:
+        """Half the sum of the losses of a pass over some rows, and sums that have its derivatives by (p, s).
 
-    def loss_of(self, run: Pass, rows: slice, loss: str = "linear", scale: float = 1.0) -> float:
-        """Half the sum of the losses of a pass over some rows."""
-        return 0.5 * scale**2 * float(np.sum(bend(loss, (self.missed(run, rows) / scale) ** 2)[0]))
+        A loss is one of `TUNING`, and bends at residuals beyond `scale`.
+        """
+        weight = self.weight[rows]
+        missed = (self.x[rows] - run.x) * weight
+        z = (missed / scale) ** 2
+        rho, slope, change = bend(loss, z)
+        root = np.sqrt(np.maximum(slope + 2.0 * change * z, LEAST_CURVATURE))
+        sums = Sums.of(run.jacobian * (weight * root)[:, None], missed * slope / root)
+        return 0.5 * scale**2 * float(rho.sum()), sums
 
-    def sums_of(self, run: Pass, rows: slice, loss: str = "linear", scale: float = 1.0) -> Sums:
-        """Sums of a pass over some rows, by (p, s), with the curvature and the gradient of a loss."""
-        columns, missed = run.jacobian * self.weight[rows, None], self.missed(run, rows)
-        return Sums.of(*weighted(columns, missed, loss, scale))
-
-    def sums(
+    def about(
         self, q: FloatArray, loss: str = "linear", scale: float = 1.0, samples: int | None = None
-    ) -> Sums:
-        """Sums of the first so many samples by q, and of the prior: the program whose minimum is the step."""
+    ) -> tuple[float, Sums]:
+        """Cost of the first so many samples and of the prior at q, and the program of a step from there.
+
+        The cost is infinite where the model is not finite.
+        """
         run, by_q = self.simulate(q)
         some = run._replace(x=run.x[:samples], jacobian=run.jacobian[:samples])
-        sums = self.sums_of(some, slice(samples), loss, scale).through(by_q)
-        if self.prior is None:
-            return sums
-        return sums.plus(Sums.of(self.prior.root, self.prior.root @ (self.prior.mean - q)))
+        cost, sums = self.sums(some, slice(samples), loss, scale)
+        sums = sums.through(by_q)
+        if self.prior is not None:
+            known = Sums.of(self.prior.root, self.prior.root @ (self.prior.mean - q))
+            cost, sums = cost + 0.5 * known.square, sums.plus(known)
+        return cost if np.isfinite(cost) else np.inf, sums
+
+    def cost(self, q: FloatArray) -> float:
+        """Half the sum of squares."""
+        return self.about(q)[0]
 
     def bounds(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Bounds of the coordinates about a start."""
         return self.coordinates.bounds(q, self._limits)
 
-    def cost(self, q: FloatArray, loss: str = "linear", scale: float = 1.0) -> float:
-        """Half the sum of the losses, infinite where the model is not finite."""
-        value = self.loss_of(self.simulate(q)[0], slice(None), loss, scale)
-        if self.prior is not None:
-            value += 0.5 * float(np.sum((self.prior.root @ (q - self.prior.mean)) ** 2))
-        return value if np.isfinite(value) else np.inf
-
     def gap(self, q: FloatArray) -> float:
         """How much less SciPy's bounded least squares leaves by one more step, relative to what x has."""
-        sums, (lower, upper) = self.sums(q), self.bounds(q)
+        (_, sums), (lower, upper) = self.about(q), self.bounds(q)
         sums = sums._replace(square=dot(self.x, self.x))
         return checked(sums, lower - q, np.zeros_like(sums.gram), np.zeros_like(q), upper - q)
