@@ -17,11 +17,12 @@ from piezoest.estimators.samples import HELD, NAMES, UPDATED
 from piezoest.estimators.saved_state import Rule, no_more_than
 from piezoest.estimators.thinning import thinned
 from piezoest.fitting.coordinates import Coordinates, coordinates
-from piezoest.fitting.gauss_newton import Solution, single_shooting
+from piezoest.fitting.gauss_newton import single_shooting
 from piezoest.fitting.outcome import inverse_information
 from piezoest.fitting.problem import Prior, Problem
 from piezoest.layout import fill
 from piezoest.models import FreeRunning
+from piezoest.symbolic import Solution
 
 # Most samples of a window, all of which are kept.
 LONGEST = 1e7

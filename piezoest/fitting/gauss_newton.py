@@ -8,7 +8,6 @@ D. W. Marquardt, J. SIAM 11 (1963) 431-441.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from piezoest._checks import FloatArray
 from piezoest.fitting.losses import TUNING
 from piezoest.fitting.problem import Problem
 from piezoest.fitting.program import solve
+from piezoest.symbolic import Solution
 
 # A robust fit is repeated until its scale, taken from the residual, changes by less.
 SCALE_CHANGE, SCALE_ROUNDS = 0.02, 5
@@ -30,15 +30,6 @@ DAMPED, POOR, GOOD, MORE, LESS = 1e-3, 0.25, 0.75, 2.0, 3.0
 LEFT = 0.1
 # Least curvature of a step, relative to a column's own: rounding. More would hold back what a prior ties.
 RIDGE = 1e-13
-
-
-class Solution(NamedTuple):
-    """Where a fit ended; `message` is the solver's."""
-
-    q: FloatArray
-    success: bool
-    message: str
-    evaluations: int
 
 
 def single_shooting(

@@ -11,9 +11,8 @@ from itertools import pairwise
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.gauss_newton import Solution
 from piezoest.fitting.problem import Problem
-from piezoest.symbolic import Evaluation, ipopt
+from piezoest.symbolic import Evaluation, Solution, ipopt
 
 SEGMENTS = 20
 # Samples on each side of a segment's start that its start state is guessed from.
@@ -45,12 +44,12 @@ def multiple_shooting(
             TOLERANCE,
         )
     except RuntimeError as error:
-        return Solution(start, False, f"IPOPT: {error}", segments.evaluations)
-    q = (found.z * unit)[: start.size]
+        return Solution(start, False, f"IPOPT: {error}", 0)
+    q = (found.q * unit)[: start.size]
     # Not converged, the segments need not join: the best iterate is then judged in one piece.
     if not found.success and not problem.cost(q) < problem.cost(start):
         q = start
-    return Solution(np.clip(q, lower, upper), found.success, found.message, segments.evaluations)
+    return found._replace(q=np.clip(q, lower, upper))
 
 
 class _Segments:
@@ -58,7 +57,6 @@ class _Segments:
 
     def __init__(self, problem: Problem, q: FloatArray, loss: str, scale: float) -> None:
         self.problem, self.loss, self.scale = problem, loss, scale
-        self.evaluations = 0
         N = problem.u.size
         self.edges = np.unique(np.linspace(0, N, min(SEGMENTS, N) + 1).astype(int))
         self.start = np.concatenate([q, *self._states(q)])
@@ -97,7 +95,6 @@ class _Segments:
 
     def evaluate(self, z: FloatArray) -> Evaluation:
         """Everything IPOPT asks for at a point, by one pass over all segments."""
-        self.evaluations += 1
         z = z * self.unit
         problem, simulation = self.problem, self.problem.coordinates.simulation
         n_q, n_p, n_s = len(problem.coordinates.free), simulation.n_p, simulation.n_s

@@ -20,6 +20,8 @@ from piezoest.fitting.regression import Fitted, Log
 from piezoest.fitting.search import LONGEST_DELAY
 from piezoest.models import ColemanHodgdon
 
+# What a record can tell from a straight line: alpha times the voltage's range, and b/c.
+CURVATURES, BENT = (np.exp(-4.0), np.exp(4.0)), (1e-3, 0.4995)
 # Most passes over the record, and the relative change at which it has ended.
 MOST_PASSES, TOLERANCE = 40, 1e-6
 
@@ -42,13 +44,16 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
         beside += size * (np.arange(log.u.size) >= jump)
     x = np.where(log.counts, log.x - beside, np.nan)
     varied = coordinates(ColemanHodgdon, () if fit_delay else ("delay",), delayed=True)
-    limits = ColemanHodgdon.record_limits(2.0 * log.half) | {"delay": (0.0, LONGEST_DELAY)}
+    limits = {
+        "alpha": (CURVATURES[0] / (2.0 * log.half), CURVATURES[1] / (2.0 * log.half)),
+        "ratio": (1.0 / (1.0 - BENT[0]), 1.0 / (1.0 - BENT[1])),
+        "delay": (0.0, LONGEST_DELAY),
+    }
     problem = Problem(log.u, x, varied, np.empty(0) if fit_delay else np.array([delay]), limits=limits)
     model: Any = fitted.design.model(w)
     model = model.nearest_admissible()
     place = fitted.design.basis.initial_state(w, model) * model.alpha / model.b
     start = varied.of(model, {"delay": delay, "place": place})
-    start = np.clip(start, *problem.bounds(start))
     solution = single_shooting(problem, start, "linear", 1.0, MOST_PASSES, TOLERANCE)
     end = outcome(problem, solution.q, coloured=True)
     value = end.value

@@ -20,9 +20,6 @@ from piezoest.signals import check_continuity
 _FIT_MARGIN = 1e-6
 # Least alpha and beta of a fit, relative to their start.
 _LEAST = 1e-6
-# What a record can tell from a straight line: log of a times the voltage's range, and b/c.
-_LARGEST_LOG = 4.0
-_RATIOS = (1e-3, 0.4995)
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,13 +212,6 @@ class ColemanHodgdon(FreeRunning):
         """1 < ratio < 2; alpha and beta keep a part of their start."""
         positive = {name: (_LEAST * start[name], np.inf) for name in ("alpha", "beta") if name in start}
         return positive | {"ratio": (1.0 + _FIT_MARGIN, 2.0 - _FIT_MARGIN), "place": (-1.0, 1.0)}
-
-    @classmethod
-    def record_limits(cls, extent: float) -> dict[str, tuple[float, float]]:
-        """Limits of a, and of b/c, which is 1 - 1/ratio."""
-        low, high = (1.0 / (1.0 - ratio) for ratio in _RATIOS)
-        largest = float(np.exp(_LARGEST_LOG))
-        return {"alpha": (1.0 / (largest * extent), largest / extent), "ratio": (low, high)}
 
     @classmethod
     def sizes(cls, value: Mapping[str, float]) -> dict[str, float]:

@@ -104,17 +104,6 @@ class FreeRunning(Model):
         return {}
 
     @classmethod
-    def record_limits(cls, extent: float) -> dict[str, tuple[float, float]]:
-        """Narrower bounds: what a record can tell from nothing at all.
-
-        Parameters
-        ----------
-        extent : float
-            Range of the record's voltage [V].
-        """
-        return {}
-
-    @classmethod
     def sizes(cls, value: Mapping[str, float]) -> dict[str, float]:
         """What the uncertainty of each coordinate is a part of.
 
