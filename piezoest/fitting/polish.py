@@ -51,7 +51,6 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     }
     problem = Problem(log.u, x, varied, np.empty(0) if fit_delay else np.array([delay]), limits=limits)
     model: Any = fitted.design.model(w)
-    model = model.nearest_admissible()
     place = fitted.design.basis.initial_state(w, model) * model.alpha / model.b
     start = varied.of(model, {"delay": delay, "place": place})
     solution = single_shooting(problem, start, "linear", 1.0, MOST_PASSES, TOLERANCE)
@@ -59,6 +58,6 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     value = end.value
     found = ColemanHodgdon.from_theta(end.theta[:3], value["offset"])
     w = w.copy()
-    w[: offset + 1] = found.beta, found.b, value["initial_state"], found.offset
+    w[: offset + 1] = found.c - 2.0 * found.b, found.b, value["initial_state"], found.offset
     errors = dict(zip(end.parameter_names, end.standard_errors.tolist(), strict=True))
     return Polished(LoopColumns(found.alpha), w, value["delay"], errors, problem.gap(solution.q))

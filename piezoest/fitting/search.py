@@ -19,7 +19,7 @@ from piezoest.fitting.design import NO_CREEP, Basis, Design
 from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.play_columns import PlayColumns, Start, moving_of, starts
 from piezoest.fitting.regression import Fitted, Log, Regression, sums_of
-from piezoest.models import Creep, FreeRunning
+from piezoest.models import Creep
 
 # Plays, and voltages at which their slopes may change.
 THRESHOLDS, BENDS = 20, 2
@@ -115,16 +115,6 @@ def best_alpha(log: Log) -> float:
 
     low, high = np.log(np.array(ALPHAS) / (2.0 * log.half))
     return float(np.exp(_least(cost, np.linspace(low, high, 10), CLOSE_ALPHA)))
-
-
-def best_loop(log: Log) -> tuple[FreeRunning, float] | None:
-    """Coleman-Hodgdon model that misses least, and its first w_h; None if the displacement does not rise."""
-    loop = regression(log, LoopColumns(best_alpha(log)))
-    if not loop.line_gain > 0.0:
-        return None
-    w = loop.solved(SMOOTH, loop.columns(drift=False))
-    model: Any = loop.design.model(w)
-    return model.nearest_admissible(), float(w[2])
 
 
 def _least(cost: Callable[[float], float], grid: FloatArray, close: float) -> float:

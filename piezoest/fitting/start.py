@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.problem import Problem
 from piezoest.fitting.regression import Log
-from piezoest.fitting.search import best_loop
+from piezoest.fitting.search import SMOOTH, best_alpha, regression
 from piezoest.models import FreeRunning
 
 
@@ -27,9 +29,13 @@ def best_start(
     model, of = problem.coordinates.model, problem.coordinates.of
     starts = [] if given is None else [of(given, others)]
     if model.is_loop:
-        found = best_loop(Log(problem.u, problem.x, problem.measured, 1.0, np.empty(0)))
-        starts += [of(found[0], {**others, "initial_state": found[1]})] if found else []
+        log = Log(problem.u, problem.x, problem.measured, 1.0, np.empty(0))
+        loop = regression(log, LoopColumns(best_alpha(log)))
+        if loop.line_gain > 0.0:
+            w = loop.solved(SMOOTH, loop.columns(drift=False))
+            shown: Any = loop.design.model(w)
+            starts.append(of(shown, {**others, "initial_state": float(w[2])}))
     elif given is None:
-        guess = model.guess(problem.u, np.where(problem.measured, problem.x, np.nan))
-        starts += [of(guess, others)] if guess else []
+        shown = model.guess(problem.u, np.where(problem.measured, problem.x, np.nan))
+        starts += [of(shown, others)] if shown else []
     return min(starts or [of(default, others)], key=problem.cost)
