@@ -26,8 +26,8 @@ TOLERANCE = 1e-10
 # A step that keeps less than the poor part of its promise is damped from here, by more and more; one that
 # keeps the good part has the next damped less.
 DAMPED, POOR, GOOD, MORE, LESS = 1e-3, 0.25, 0.75, 2.0, 3.0
-# Part of a coordinate that has to be above zero which one step leaves at least.
-LEFT = 0.1
+# One step changes a coordinate that has to be above zero by this factor at most.
+FARTHEST = 10.0
 # Least curvature of a step, relative to a column's own: rounding. More would hold back what a prior ties.
 RIDGE = 1e-13
 
@@ -53,8 +53,9 @@ def single_shooting(
             # Numbers of a size that no stage has; a stream goes on all the same.
             return Solution(start, False, "The model is not finite.", passes)
         own = np.diag(sums.gram)
-        nearest = np.where(lower > 0.0, np.maximum(lower, LEFT * q), lower)
-        step = solve(sums, nearest - q, damping / max(sums.rows, 1.0) * np.diag(own), upper - q, RIDGE)
+        near = np.maximum(lower, q / FARTHEST), np.minimum(upper, q * FARTHEST)
+        least, most = np.where(lower > 0.0, near, (lower, upper)) - q
+        step = solve(sums, least, damping / max(sums.rows, 1.0) * np.diag(own), most, RIDGE)
         other = np.clip(q + step, lower, upper)
         promised = float(sums.moment @ step - 0.5 * step @ sums.gram @ step)
         ended = promised <= tolerance * cost or float(own @ step**2) <= tolerance**2 * float(own @ q**2)
