@@ -55,7 +55,7 @@ CROSSED = {
 COLOURS = {"controller": "#D55E00", "no_corridor": "#CC79A7", "line": "#0072B2", "parts": "#888888"}
 NAMES = {
     "controller": "AdaptiveFeedforward", "no_corridor": "without corridor",
-    "line": "without candidates", "parts": "estimator and inverse by hand",
+    "line": "without candidates", "parts": "by hand",
 }  # fmt: skip
 STYLES = {"all": "-", "healthy": "--", "often": ":"}
 GROUPS = {"all": "all runs", "healthy": "healthy rigs", "often": "called often"}
@@ -159,7 +159,7 @@ def draw(document: Row, path: Path) -> None:
     """Draw how large a part of the runs has a ratio above any value."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8.0, 4.0), layout="constrained")
+    figure = Figure(figsize=(6.0, 4.6), layout="constrained")
     axes = figure.subplots()
     above = 1.0 - np.array(document["levels"])
     least = 1.0 / document["runs"]
@@ -174,9 +174,9 @@ def draw(document: Row, path: Path) -> None:
         xscale="log", yscale="log", ylim=(0.8 * least, 1.1),
         xlabel="ratio of the errors", ylabel="part of the runs above it",
     )  # fmt: skip
-    axes.legend(fontsize=8, loc="lower left")
+    figure.legend(loc="outside lower center", ncols=2, frameon=False)
     path.parent.mkdir(parents=True, exist_ok=True)
-    save_figure(figure, path, dpi=110, metadata={"Software": None})
+    save_figure(figure, path, dpi=130, metadata={"Software": None})
 
 
 def main(given: Sequence[str] | None = None) -> int:

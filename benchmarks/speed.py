@@ -314,13 +314,12 @@ def draw(rows: list[Row], path: Path) -> None:
     times = {row["ours"]: (row["ns"], "#D55E00") for row in reversed(rows)}
     times |= {row["peer"]: (row["peer_ns"], "0.6") for row in reversed(rows)}
     names = sorted(times, key=lambda name: -times[name][0])
-    figure = Figure(figsize=(8.0, 0.27 * len(names) + 0.6), layout="constrained")
+    figure = Figure(figsize=(6.0, 0.27 * len(names) + 0.6), layout="constrained")
     axes = figure.subplots()
     axes.barh(names, [times[name][0] for name in names], color=[times[name][1] for name in names])
     axes.set(xscale="log", xlabel="ns per sample; of this library in colour")
-    axes.tick_params(axis="y", labelsize=8)
     path.parent.mkdir(parents=True, exist_ok=True)
-    save_figure(figure, path, dpi=110)
+    save_figure(figure, path, dpi=130)
 
 
 def main() -> int:

@@ -4,21 +4,14 @@ from __future__ import annotations
 
 import re
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import piezoest
 
-sys.path.insert(0, str(Path(__file__).parent))
-import controller_page
-import logs_page
-import paper_page
-import performance_page
-import real_data_page
-import safety_page
-import start_page
-import table_page
-import tuning_page
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
 
 project = "piezoest"
 author = "The piezoest developers"
@@ -47,12 +40,14 @@ autodoc_member_order = "bysource"
 # The types are in the Parameters sections, in words.
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
+toc_object_entries_show_parents = "hide"
 
 html_theme = "pydata_sphinx_theme"
 html_title = "piezoest"
 html_show_sourcelink = False
 html_static_path = ["_static"]
-html_css_files = ["tables.css"]
+html_css_files = ["page.css"]
+html_context = {"default_mode": "auto"}
 html_theme_options = {
     "show_toc_level": 2,
     "header_links_before_dropdown": 4,
@@ -61,20 +56,14 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
-# Pages without sections of their own have nothing to show beside them.
-html_sidebars: dict[str, list[str]] = {
-    page: []
-    for page in (
-        "start", "adaptive_feedforward", "safety", "your_own_stage", "real_data", "tuning", "coming_from",
-        "controller", "which_estimator", "adaptation_speed", "policies", "performance", "mathematics",
-        "paper", "design", "contributing", "changelog",
-    )
-}  # fmt: skip
+# The pages of this folder list what they lead to themselves.
+html_sidebars: dict[str, list[str]] = {"*": []}
 
 sphinx_gallery_conf = {
     "examples_dirs": "examples",
     "gallery_dirs": "gallery",
     "filename_pattern": r"plot_",
+    "within_subsection_order": "FileNameSortKey",
     "abort_on_example_error": True,
     "download_all_examples": False,
     "capture_repr": (),
@@ -110,10 +99,7 @@ def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, li
 
 
 def setup(app: Any) -> None:
-    for page in (
-        controller_page, logs_page, paper_page, performance_page, real_data_page, safety_page, start_page,
-        table_page, tuning_page,
-    ):  # fmt: skip
-        app.connect("builder-inited", page.write)
+    for page in sorted(HERE.glob("*_page.py")):
+        app.connect("builder-inited", import_module(page.stem).write)
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

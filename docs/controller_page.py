@@ -43,7 +43,7 @@ def pieces(parity: Document, target: Document) -> dict[str, str]:
             {
                 "scenario": "scenario",
                 "estimator": "estimator",
-                "samples": lambda row: f"{row['samples']:,}".replace(",", " "),
+                "samples": lambda row: f"{row['samples']:,}".replace(",", "\N{NO-BREAK SPACE}"),
                 "difference, double": lambda row: f"{row['double_difference']:.1e}",
                 "settled error [nm]": lambda row: f"{1e3 * row['settled_error_um']:.2f}",
                 "in float [nm]": lambda row: f"{1e3 * row['settled_error_float_um']:.2f}",
@@ -81,14 +81,14 @@ def draw() -> None:
     from matplotlib.figure import Figure
 
     rows = [row for row in read("target")["rows"] if row["precision"] == "float"]
-    figure = Figure(figsize=(8, 2.8), layout="constrained")
+    figure = Figure(figsize=(6, 3), layout="constrained")
     axes = figure.subplots()
     names = [row["controller"] for row in rows]
     longest, mean = ([100.0 * row[f"load_{name}"] for row in rows] for name in ("largest", "mean"))
     axes.barh(names, longest, color="C0", alpha=0.4, label="longest step")
     axes.barh(names, mean, color="C0", height=0.4, label="mean")
     axes.axvline(50.0, color="0.4", ls="--", lw=1)
-    axes.set(xlabel="time of a step, as a percentage of a sample at 50 kHz", xlim=(0, None))
+    axes.set(xlabel="time of a step [% of a sample at 50 kHz]", xlim=(0, None))
     axes.invert_yaxis()
     axes.legend(loc="lower right")
     FIGURE.parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
-"""Tables of simulated logs on the page `real_data`, from docs/data/logs.json; no number is typed by hand.
+"""Tables of the page `simulated_logs`, from docs/data/logs.json; no number is typed by hand.
 
-Runs at the start of every Sphinx build; by itself: python docs/logs_page.py
+Runs at the start of every Sphinx build.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from page_parts import DOCS, Document, made, percent, read, replacements, short, table, write_pieces
+from page_parts import DOCS, Document, made, percent, read, replacements, short, table, table_of, write_pieces
 
 ADDED = {
     "noise": "noise",
@@ -49,7 +49,6 @@ def pieces(document: Document) -> dict[str, str]:
         "numbers": numbers(document),
         "families": grouped("By family of the hysteresis", "family", families),
         "voltages": grouped("By voltage", "voltage", document["by_voltage"]),
-        "sizes": grouped("By length", "samples", sizes(document)),
         "chosen": grouped("By the model that was chosen", "model", document["by_chosen"]),
         "added": added(document),
         "quantiles": quantiles(document),
@@ -97,19 +96,12 @@ def grouped(title: str, of: str, rows: Sequence[Document]) -> str:
     return table(title, [of, *HEADING], [[row["name"], *cells(row)] for row in rows])
 
 
-def sizes(document: Document) -> list[Document]:
-    """By length, shortest first."""
-    limits = document["criteria"]["sizes"]
-    rows = sorted(document["by_size"], key=lambda row: limits[row["name"]][0])
-    return [{**row, "name": f"{limits[row['name']][0]} and more"} for row in rows]
-
-
 def added(document: Document) -> str:
     """With each thing that was added, and without it."""
     body = []
     for row in document["by_added"]:
         body.append([ADDED[row["name"]], *cells(row)])
-        body.append([f"no {row['name']}", *cells(row["without"])])
+        body.append(["without it", *cells(row["without"])])
     return table("By what was added", ["with", *HEADING], body)
 
 
@@ -126,10 +118,9 @@ def quantiles(document: Document) -> str:
 
 def coverage(document: Document) -> str:
     """Logs by the part of the readings within the interval of 95 %."""
-    found = document["coverage"]
-    counts = found["counts"] if found else {}
-    body = [[name, str(count)] for name, count in counts.items()] or [["—", "no interval was given"]]
-    return table("Readings within the interval of 95 %", ["part of the held-out readings", "logs"], body)
+    counts = (document["coverage"] or {"counts": {}})["counts"]
+    heading = ["part of the held-out readings", "logs"]
+    return table("Readings within the interval of 95 %", heading, counts.items())
 
 
 def scores(document: Document) -> str:
@@ -163,9 +154,4 @@ def worst(document: Document) -> str:
 
 def failures(document: Document) -> str:
     """Logs that were refused."""
-    body = [[str(row["seed"]), row["text"]] for row in document["failures"]]
-    return table("Logs that were refused", ["seed", "message"], body or [["—", "none"]])
-
-
-if __name__ == "__main__":
-    write()
+    return table_of("Logs that were refused", document["failures"], {"seed": "seed", "message": "text"})

@@ -10,10 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from piezoest._files import write_text
+from piezoest.bench.report import Table
 
 DOCS = Path(__file__).resolve().parent
 
 Document = dict[str, Any]
+# Columns of the tables on the first page and in the README.
+NEEDS = {"you have or want": "you have or want", "take": "take", "error\n[%]": "error [%]"}
+SPEED = {
+    "estimator": "estimator", "settles": "settles [periods]", "first": "first [%]", "settled": "settled [%]",
+    "step\n[µs]": "step [µs]",
+}  # fmt: skip
 
 
 def read(name: str) -> Document:
@@ -22,10 +29,13 @@ def read(name: str) -> Document:
 
 
 def write_pieces(target: Path, texts: dict[str, str]) -> None:
-    """Write texts by the name of their file; untouched where nothing changed, so that no rebuild follows."""
+    """Write texts by the name of their file; untouched where nothing changed, so that no rebuild follows.
+
+    No line ends before a per cent sign.
+    """
     target.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
-        path = target / f"{name}.inc"
+        path, text = target / f"{name}.inc", text.replace(" %", "\N{NO-BREAK SPACE}%")
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             write_text(path, text)
 
@@ -34,7 +44,7 @@ def table(title: str, heading: Iterable[str], body: Iterable[Iterable[Any]]) -> 
     """A csv-table; ✗ in bold."""
     body = list(body)
     if not body:
-        return "*There are none.*\n"
+        return f"*{title}: none.*\n"
     written = io.StringIO()
     writer = csv.writer(written, lineterminator="\n", quoting=csv.QUOTE_ALL)
     writer.writerow(name.replace("\n", " ") for name in heading)
@@ -57,6 +67,13 @@ def table_of(
     columns = {key: key for key in rows[0]} if columns is None else columns
     body = [[row[what] if isinstance(what, str) else what(row) for what in columns.values()] for row in rows]
     return table(title, columns, body)
+
+
+def part_of(of: Table, columns: Mapping[str, str]) -> Table:
+    """Some columns of a table, under other headings, without the estimators that were tuned."""
+    places = [of[0].index(name) for name in columns]
+    rows = [[row[k] for k in places] for row in of[1] if not row[0].endswith(", tuned")]
+    return list(columns.values()), rows
 
 
 def shown(cell: Any) -> str:

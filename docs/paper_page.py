@@ -54,7 +54,3 @@ def numbers(document: Document) -> str:
             "paper start gain": f"{conditions['linear_start']['gain']:g} µm/V",
         }
     )
-
-
-if __name__ == "__main__":
-    write()

@@ -1,6 +1,6 @@
 """Tables and numbers of the page `performance`, from docs/data/speed.json; no number is typed by hand.
 
-Runs at the start of every Sphinx build; by itself: python docs/performance_page.py
+Runs at the start of every Sphinx build.
 """
 
 from __future__ import annotations
@@ -82,7 +82,3 @@ def numbers(document: Document) -> str:
         "track": f"{1.0 / once['one second of track()']:.0f}",
     }
     return replacements(made("speed", document) | {f"speed {name}": value for name, value in values.items()})
-
-
-if __name__ == "__main__":
-    write()

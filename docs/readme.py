@@ -11,7 +11,7 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
-from page_parts import DOCS, read
+from page_parts import DOCS, NEEDS, SPEED, part_of, read
 
 from piezoest._files import save_figure, write_text
 from piezoest.bench import report
@@ -21,15 +21,15 @@ FIGURE = DOCS / "figures" / "effect.png"
 BEGIN, END = "<!-- figures: made by docs/readme.py -->\n", "<!-- end of figures -->\n"
 ROW = "5.0 µm @ 5.0 Hz"  # of the paper's tables
 TEXT = """
-Largest errors in % of the amplitude, on the simulated stage of the paper; other stages: {stages}.
-Settles: periods after a change until every further error is below 1.2 %, and the share of runs that
-settle. Geometric means over the scenarios of the medians over {seeds} seeds; a step is one sample from
-Python. {machine}, {date}.
+Errors are the largest ones, in % of the amplitude, on the simulated stage of the paper. *Settles*: periods
+after a change until every further error is below 1.2 %, and the share of runs that settle. *First*: in the
+first period after the change. *Settled*: in the last half of the periods. *Step*: one sample, called from
+Python. Geometric means over the scenarios of the medians over {seeds} seeds; {machine}, {date}.
 
 The paper measured {linear_theirs:g} µm with linear feed-forward and {theirs:g} µm with compensation;
 its procedure gives {linear_ours:.2g} µm and {ours:.2g} µm here. On a recording of a real stage with
-{travel:.0f} µm of travel, the identified model misses {missed:.2f} µm rms on the half it has not seen,
-a straight line {line:.2f} µm.
+{travel:.0f} µm of travel, the error of the identified model is {missed:.2f} µm rms on the half that it has
+not seen, and that of a straight line {line:.2f} µm.
 """
 
 
@@ -39,7 +39,6 @@ def figures() -> str:
     ours, theirs = (paper_row(paper, key) for key in ("ours", "value"))
     found = recording["identify"]
     values = {
-        "stages": ", ".join(runs["plan"]["stages"][1:]),
         "seeds": runs["plan"]["seeds"],
         "machine": runs["machine"]["cpu"],
         "date": runs["date"][:10],
@@ -51,15 +50,19 @@ def figures() -> str:
         "missed": found["held_out"]["rms_um"],
         "line": found["line_held_out"]["rms_um"],
     }
-    needs, overview = (markdown(*table(runs)) for table in (report.needs_table, report.overview_table))
+    needs = markdown(*part_of(report.needs_table(runs), NEEDS))
+    speed = markdown(*part_of(report.overview_table(runs), SPEED))
     said = [textwrap.fill(" ".join(part.split()), 118) for part in TEXT.format(**values).split("\n\n")]
-    return "\n".join([*needs, "", *overview, "", "\n\n".join(said), ""])
+    return "\n".join([*needs, "", *speed, "", "\n\n".join(said), ""])
 
 
 def markdown(heading: list[str], body: list[list[str]]) -> list[str]:
     """Lines of a table, numbers to the right."""
-    rows = [[name.replace("\n", " ") for name in heading], *body]
-    rows.insert(1, ["---", "---" if len(body[0][1]) > 12 else "---:", *["---:"] * (len(heading) - 2)])
+    rows = [
+        heading,
+        ["---", "---" if len(body[0][1]) > 12 else "---:", *["---:"] * (len(heading) - 2)],
+        *body,
+    ]
     return [f"| {' | '.join(row)} |" for row in rows]
 
 
@@ -81,37 +84,38 @@ def parts(text: str) -> tuple[str, str, str]:
 
 
 def draw(path: Path) -> None:
-    """Linear feed-forward and adaptive compensation, as the demonstration runs them."""
+    """The error of a straight line whose gain is learnt, and of the controller, which is told the limits."""
     import matplotlib.pyplot as plt
-    import numpy as np
 
-    from piezoest.demo import AMPLITUDE, FREQUENCY, SAMPLE_RATE, SETTLED_PERIODS, run_demo
+    import piezoest as pz
 
-    result = run_demo(periods=8)
-    ways = (("linear feed-forward", result.linear, "0.55"), ("adaptive compensation", result.adaptive, "C0"))
-    figure, (loop, series) = plt.subplots(
-        1, 2, figsize=(10, 3.7), width_ratios=[1, 1.9], layout="constrained"
+    r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=8, sample_rate=50_000.0)
+    gain = pz.LinearGain(0.12)
+    ways: dict[str, dict[str, Any]] = {
+        "linear feed-forward": {
+            "compensator": pz.LinearCompensator(gain),
+            "estimator": pz.HysteresisRLS(r.sample_rate, initial_model=gain),
+        },
+        "AdaptiveFeedforward": {
+            "controller": pz.AdaptiveFeedforward(r.sample_rate, limits=pz.VoltageLimits(-50.0, 100.0))
+        },
+    }
+    figure, (series, loop) = plt.subplots(
+        1, 2, figsize=(6.4, 3.4), width_ratios=[1.6, 1], layout="constrained"
     )
-    last = slice(-(result.linear.period or 0), None)
-    thin = slice(None, None, 20)
-    for name, record, color in ways:
-        reference, time = record.reference[last], np.arange(record.error.size) / SAMPLE_RATE
-        loop.plot(reference[thin], record.displacement[last][thin], color=color, lw=1.6, label=name)
-        largest = record.max_error(SETTLED_PERIODS)
-        series.plot(
-            time[thin], record.error[thin], color=color, lw=0.9, label=f"{name}: {largest:.3f} µm at last"
-        )
-    loop.set(xlabel="where it should be [µm]", ylabel="where it is [µm]", title="settled")
-    loop.set_aspect("equal")
-    series.set(
-        xlabel="time [s]", ylabel="error [µm]", title=f"a triangle of {AMPLITUDE:g} µm at {FREQUENCY:g} Hz",
-        ylim=(-1.1, 1.1),
-    )  # fmt: skip
-    series.legend(loc="upper right")
+    for (name, loops), color in zip(ways.items(), ("0.55", "C0"), strict=True):
+        record = pz.track(r, stage=pz.PaperStage(r.sample_rate, seed=0), **loops)
+        label = f"{name}: {record.max_error(last_periods=2):.3f} µm at last"
+        series.plot(record.time[::20], record.error[::20], color=color, lw=0.9, label=label)
+        last = slice(-int(r.period), None, 20)
+        loop.plot(record.reference[last], record.displacement[last], color=color, lw=1.6)
+    loop.set(xlabel="where it should be [µm]", ylabel="where it is [µm]", title="settled", aspect="equal")
+    series.set(xlabel="time [s]", ylabel="error [µm]", title="a triangle of 5 µm at 5 Hz")
+    figure.legend(loc="outside lower center", frameon=False)
     for axes in (loop, series):
         axes.grid(alpha=0.3)
     path.parent.mkdir(parents=True, exist_ok=True)
-    save_figure(figure, path, dpi=110)
+    save_figure(figure, path, dpi=130)
 
 
 def main() -> None:

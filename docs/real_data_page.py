@@ -64,7 +64,3 @@ def numbers(document: Document) -> str:
     }
     named = {f"recording {name}": value for name, value in values.items()}
     return replacements(made("recording", document) | named)
-
-
-if __name__ == "__main__":
-    write()

@@ -13,6 +13,9 @@ WHO = {
     "controller": "controller", "no_corridor": "without corridor", "line": "without candidates",
     "parts": "by hand",
 }  # fmt: skip
+# Which runs are shown of whom.
+LINES = [*(("controller", group) for group in GROUPS), *((who, "all") for who in list(WHO)[1:])]
+MODES = {"from the start": "from-start", "for a time": "transient", "until the end": "permanent"}
 CRITERIA = {
     "failed": "error raised", "not finite": "voltage not finite", "outside the limits": "outside the limits",
     "rests at a limit": "rests at a limit", "ratio": "ratio above 1", "cycle_ratio": "any cycle above 1",
@@ -50,12 +53,7 @@ def pieces(document: Document) -> dict[str, str]:
         "violations": violations(document),
         "quantiles": quantiles(document),
         "found": found(document),
-        "by_fault": by(document, "fault", "fault"),
-        "by_mode": table_of(
-            "By fault and its time: median of the ratio; runs above 1",
-            [row for row in mine["by_mode"] if row["judged"]],
-            {"fault": "fault", "time": "mode", "ratio": cell},
-        ),
+        "by_fault": by(document, "fault", "fault", modes(mine["by_mode"])),
         "by_mechanics": by(document, "mechanics", "mechanics"),
         "by_often": by(document, "often", "called often"),
         "crossed": crossed(mine),
@@ -96,17 +94,18 @@ def drawn(of: Document) -> str:
 
 
 def violations(document: Document) -> str:
-    """Counts of each criterion."""
-    body = []
-    for who, title in WHO.items():
-        for group, which in GROUPS.items():
-            of = document[who][group]
-            totals = {name: of["judged" if "ratio" in name else "runs"] for name in CRITERIA}
-            counts = [f"{of['violations'][name]}/{total}" for name, total in totals.items()]
-            body.append([title, which, *counts])
-    return table(
-        "Runs that break a promise, of the runs that are judged by it", ["", "runs", *CRITERIA.values()], body
-    )
+    """Counts of each criterion that some run breaks."""
+    heading = ["", "runs", *CRITERIA.values()]
+    body = [
+        [WHO[who], GROUPS[group], *(
+            f"{of['violations'][name]}/{of['judged' if 'ratio' in name else 'runs']}" for name in CRITERIA
+        )]
+        for who, group in LINES for of in [document[who][group]]
+    ]  # fmt: skip
+    never = [k for k in range(2, len(heading)) if all(row[k].startswith("0/") for row in body)]
+    heading, *body = ([cell for k, cell in enumerate(row) if k not in never] for row in [heading, *body])
+    title = "Runs that break a promise, of the runs that are judged by it"
+    return table(title, heading, body)
 
 
 def quantiles(document: Document) -> str:
@@ -114,7 +113,7 @@ def quantiles(document: Document) -> str:
     ratios = {"ratio": "whole run", "last_ratio": "last cycle"}
     body = [
         [WHO[who], GROUPS[group], title, *document[who][group]["quantiles"][name].values()]
-        for who in WHO for group in GROUPS for name, title in ratios.items()
+        for who, group in LINES for name, title in ratios.items()
     ]  # fmt: skip
     levels = document["controller"]["all"]["quantiles"]["ratio"]
     return table("Quantiles of the ratio", ["", "runs", "ratio", *levels], body)
@@ -125,16 +124,19 @@ def cell(row: Document | None) -> str:
     return f"{short(row['median'])}; {row['over']}/{row['judged']}" if row and row["judged"] else "—"
 
 
-def by(document: Document, column: str, name: str) -> str:
+def by(document: Document, column: str, name: str, more: dict[str, Any] | None = None) -> str:
     """The controller beside the straight line alone."""
     line = {row[column]: row for row in document["line"][f"by_{column}"]}
-    columns = {
-        name: column,
-        "controller": cell,
-        "without candidates": lambda row: cell(line.get(row[column])),
-    }
+    columns = {name: column, "controller": cell, **(more or {})}
     title = f"By {name}: median of the ratio; runs above 1"
-    return table_of(title, document["controller"][f"by_{column}"], columns)
+    beside = {"without candidates": lambda row: cell(line.get(row[column]))}
+    return table_of(title, document["controller"][f"by_{column}"], columns | beside)
+
+
+def modes(rows: list[Document]) -> dict[str, Any]:
+    """A column of the controller's ratio for each time of a fault."""
+    cells = {(row["fault"], row["mode"]): cell(row) for row in rows}
+    return {said: lambda row, mode=mode: cells.get((row["fault"], mode), "—") for said, mode in MODES.items()}
 
 
 def crossed(mine: Document) -> str:
@@ -220,14 +222,17 @@ def share(row: Document, name: str) -> str:
 
 
 def singles(alone: Document | None) -> str:
-    """Settled errors beside those of the best single estimator."""
-    columns = {
-        "family": "family", "reference": "reference", "controller": partial(share, name="settled"),
-        "best single estimator": partial(share, name="best_settled"), "which": "best", "ratio": "ratio",
-    }  # fmt: skip
-    return table_of(
-        "Settled error relative to the amplitude, medians", alone["cells"] if alone else [], columns
+    """Settled errors, and their ratios to those of the best single estimator."""
+    rows = alone["cells"] if alone else []
+    cells = {
+        (row["family"], row["reference"]): f"{share(row, 'settled')}; {short(row['ratio'])}" for row in rows
+    }
+    families, references = (
+        (list(dict.fromkeys(names)) for names in zip(*cells, strict=True)) if rows else ([], [])
     )
+    body = [[family, *(cells.get((family, each), "—") for each in references)] for family in families]
+    title = "Settled error relative to the amplitude, median; its ratio to that of the best single estimator"
+    return table(title, ["family", *references], body)
 
 
 def dwell(rested: Document | None) -> str:
@@ -239,7 +244,3 @@ def dwell(rested: Document | None) -> str:
         "travel": "excursion", "longest travel": "farthest",
     }  # fmt: skip
     return table_of("After a long rest", rested["groups"] if rested else [], columns)
-
-
-if __name__ == "__main__":
-    write()

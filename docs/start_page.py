@@ -12,6 +12,7 @@ from typing import Any
 from page_parts import DOCS, write_pieces
 
 CODE = re.compile(r"^\.\. code-block:: python\n\n(.*?)(?=^\S|\Z)", re.S | re.M)
+MARGIN = {"initial_indent": "   ", "subsequent_indent": "       "}
 
 
 def write(app: Any = None) -> None:
@@ -27,9 +28,6 @@ def pieces(page: str) -> dict[str, str]:
         for number, block in enumerate(CODE.findall(page), 1):
             with contextlib.redirect_stdout(io.StringIO()) as printed:
                 exec(textwrap.dedent(block), names)
-            texts[str(number)] = ".. code-block:: text\n\n" + textwrap.indent(printed.getvalue(), "   ")
+            lines = (textwrap.fill(line, 90, **MARGIN) for line in printed.getvalue().splitlines())
+            texts[str(number)] = "\n".join([".. code-block:: text", "", *lines, ""])
     return texts
-
-
-if __name__ == "__main__":
-    write()

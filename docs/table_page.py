@@ -1,16 +1,16 @@
 """Tables of the pages about estimators, from docs/data; no number is typed by hand.
 
-Runs at the start of every Sphinx build; by itself: python docs/table_page.py
+Runs at the start of every Sphinx build.
 """
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
-from page_parts import DOCS, Document, made, read, replacements, table, write_pieces
+from page_parts import DOCS, NEEDS, SPEED, Document, made, part_of, read, replacements, table, write_pieces
 
 from piezoest.bench import report
-from piezoest.bench.estimators import LINEAR
 from piezoest.bench.scenarios import UNREPEATED
 
 TARGET = DOCS / "generated" / "table"
@@ -21,15 +21,30 @@ def write(app: Any = None) -> None:
     runs, policies = read("table"), read("policies")
     pieces = {
         "numbers": substitutions("table", runs) + substitutions("policies", policies),
-        "overview": table("", *report.overview_table(runs)),
-        "needs": table("", *report.needs_table(runs)),
-        "settles": table("", *settles(runs)),
+        "overview": linked(report.overview_table(runs)),
+        "speed": linked(part_of(report.overview_table(runs), SPEED)),
+        "needs": linked(part_of(report.needs_table(runs), NEEDS)),
+        "margins": linked(report.needs_table(runs)),
+        "settles": linked(settles(runs)),
         "scenarios": table("", ["scenario", "what happens"], list(map(list, runs["scenarios"].items()))),
-        "stages": table("", *stages(runs)),
-        "tuned": table("", *tuned(runs)),
-        "policies": table("", *settles(policies)),
+        "stages": linked(stages(runs)),
+        "tuned": linked(tuned(runs)),
+        "policies": linked(settles(policies)),
     }
     write_pieces(TARGET, pieces)
+
+
+def linked(of: report.Table) -> str:
+    """A table whose estimators are links, but not within code; no line ends before a bracket."""
+    names = re.compile(r"\b(AdaptiveFeedforward|BatchFit|MovingHorizon|\w+(?:RLS|EKF|UKF))\b")
+    body = [
+        [
+            c if "``" in c else names.sub(r":class:`~piezoest.\1`", c).replace(" (", "\N{NO-BREAK SPACE}(")
+            for c in row
+        ]
+        for row in of[1]
+    ]
+    return table("", of[0], body)
 
 
 def names(document: Document) -> list[str]:
@@ -55,7 +70,7 @@ def settles(document: Document) -> report.Table:
 def short(name: str) -> str:
     """Arguments alone, where a name is a call of the estimator that all others are too."""
     call = name.removeprefix("HysteresisRLS(")
-    return name if call == name else f"``{call.removesuffix(')')}``"
+    return name if call == name else f"``{call.removesuffix(')').replace(',', ', ')}``"
 
 
 def periods(quantiles: list[float | None]) -> str:
@@ -100,7 +115,6 @@ def tuned(document: Document) -> report.Table:
 def substitutions(prefix: str, document: Document) -> str:
     """Numbers that stand in sentences."""
     plan, conditions = document["plan"], document["conditions"]
-    linear = next(row for row in document["overview"] if row["estimator"] == LINEAR)
     values = {
         "minutes": f"{document['seconds'] / 60.0:.0f} minutes",
         "runs": document["runs"],
@@ -110,12 +124,7 @@ def substitutions(prefix: str, document: Document) -> str:
         "stages": ", ".join(plan["stages"][1:]) or "none",
         "rest": f"{conditions['rest']:g} s",
         "drift": f"{conditions['drift']:g} s",
-        "linear": f"{report.percent(linear['settled'][0])} %",
     }
     return replacements(
         made(prefix, document) | {f"{prefix} {name}": value for name, value in values.items()}
     )
-
-
-if __name__ == "__main__":
-    write()

@@ -150,27 +150,27 @@ def excitation() -> list[Document]:
 
 
 def draw(document: Document) -> None:
-    """Memory, noise and delay, side by side."""
+    """Memory, noise and delay."""
     import matplotlib.pyplot as plt
 
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13, 3.9), layout="constrained")
+    figure, (first, middle, last) = plt.subplots(3, 1, figsize=(6, 9.5), layout="constrained")
     default, *fixed = document["memories"]
     for name, color in ((WORST, "C3"), (SETTLED, "C0")):
-        left.loglog(MEMORIES, [row[name] for row in fixed], "o-", color=color, label=f"memory=…: {name}")
-        left.axhline(default[name], color=color, ls="--", lw=1.2, label=f"default: {name}")
-    left.axvline(1.0 / FREQUENCY, color="0.6", lw=0.8, label="one period")
-    left.set(xlabel="memory [s]", ylabel="largest error [µm]", title="The gain falls by 20 %")
+        first.loglog(MEMORIES, [row[name] for row in fixed], "o-", color=color, label=f"memory=…: {name}")
+        first.axhline(default[name], color=color, ls="--", lw=1.2, label=f"default: {name}")
+    first.axvline(1.0 / FREQUENCY, color="0.6", lw=0.8, label="one period")
+    first.set(xlabel="memory [s]", ylabel="largest error [µm]", title="The gain falls by 20 %")
     for axes, rows, x, title in (
         (middle, document["noises"], NOISE, "Noise of the sensor"),
-        (right, document["delays"], LAG, "Lag of the sensor"),
+        (last, document["delays"], LAG, "Lag of the sensor"),
     ):
         for name in list(rows[0])[1:]:
             axes.plot([row[x] for row in rows], [row[name] for row in rows], "o-", label=name)
         axes.set(xlabel=x, ylabel="largest settled error [nm]", title=title, ylim=(0.0, None))
-    for axes in (left, middle, right):
+    for axes in (first, middle, last):
         axes.grid(alpha=0.3, which="both")
         axes.legend(fontsize="small")
-    save_figure(figure, DOCS / "figures" / "tuning.png", dpi=110)
+    save_figure(figure, DOCS / "figures" / "tuning.png", dpi=130)
 
 
 if __name__ == "__main__":

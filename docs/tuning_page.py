@@ -28,7 +28,3 @@ def pieces(document: Document) -> dict[str, str]:
     }
     tables = {name: table_of(title, document[name]) for name, title in TITLES.items()}
     return tables | {"numbers": replacements(made("tuning", document) | numbers)}
-
-
-if __name__ == "__main__":
-    write()

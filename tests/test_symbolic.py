@@ -9,7 +9,7 @@ import pytest
 
 import piezoest as pz
 from piezoest import symbolic
-from piezoest.estimators.coordinates import coordinates
+from piezoest.fitting.coordinates import coordinates
 
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429, 0.3)
 RATE = 2000.0

@@ -50,7 +50,7 @@ for candidate in controller.candidates:
 # %%
 # The true error. While the sensor hangs, nothing is learnt and the straight line drives.
 
-figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
+figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
 for name, error in errors.items():
     axes.plot(np.arange(len(r)) / fs, error, lw=0.8, label=name)
 axes.axvspan(*broken, color="0.88", label="the sensor hangs")

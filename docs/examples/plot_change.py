@@ -42,7 +42,7 @@ for name, estimator in estimators.items():
 # %%
 # The largest error of each period:
 
-figure, axes = plt.subplots(figsize=(8, 4), layout="constrained")
+figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
 for name, error in errors.items():
     axes.semilogy(np.arange(1, error.size + 1), error, "o-", ms=4, label=name)
 axes.axvline(2.05 * 5.0 + 0.5, color="0.6", lw=0.8)

@@ -31,7 +31,7 @@ for estimator in (pz.HysteresisRLS(fs), pz.PrandtlIshlinskiiRLS(fs)):
 # %%
 # The path of the voltage in the last period, and the error with either:
 
-figure, (loop, series) = plt.subplots(1, 2, figsize=(10, 4), width_ratios=[1, 2], layout="constrained")
+figure, (loop, series) = plt.subplots(1, 2, figsize=(6.4, 3.2), width_ratios=[1, 1.6], layout="constrained")
 last = slice(-int(fs), None)
 voltage = records["PrandtlIshlinskiiRLS"].voltage[last]
 loop.plot(voltage, r.values[last], lw=0.8)

@@ -41,7 +41,7 @@ print(*record.notes, sep="\n")
 found = pz.identify(record)
 print(found)
 
-figure, (loop, series) = plt.subplots(1, 2, figsize=(10, 4), width_ratios=[1, 2], layout="constrained")
+figure, (loop, series) = plt.subplots(2, 1, figsize=(6.4, 6.4), layout="constrained")
 loop.plot(record.voltage, record.displacement, color="0.7", lw=2, label="measured")
 loop.plot(record.voltage, found.prediction, lw=0.7, label="model, from the voltage alone")
 loop.set(xlabel="voltage [V]", ylabel="displacement [µm]")
@@ -51,7 +51,7 @@ half = 0.5 * (predicted.upper - predicted.lower)
 series.plot(record.time, found.residual, color="C3", lw=0.6)
 series.fill_between(record.time, -half, half, color="C0", alpha=0.2, lw=0, label="95 of 100 readings")
 series.axvspan(record.time[found.trained], record.time[-1], color="C1", alpha=0.15, lw=0, label="held out")
-series.set(xlabel="time [s]", ylabel="measured − model [µm]")
+series.set(xlabel="time [s]", ylabel="measured − model [µm]", ylim=(-0.01, 0.01))
 series.legend()
 
 # %%

@@ -40,7 +40,7 @@ for name, record in records.items():
 # The error while the parameters are learnt, and displacement over reference in the last period, as in the
 # paper's Fig. 4.
 
-figure, (series, loop) = plt.subplots(1, 2, figsize=(10, 4), width_ratios=[2, 1], layout="constrained")
+figure, (series, loop) = plt.subplots(1, 2, figsize=(6.4, 3.2), width_ratios=[1.6, 1], layout="constrained")
 last = slice(-int(r.period), None)
 for name, record in records.items():
     series.plot(np.arange(len(r)) / fs, record.error, lw=0.8, label=name)
@@ -53,7 +53,7 @@ loop.set(xlabel="reference [µm]", ylabel="displacement [µm]")
 # The parameters, relative to their start values:
 
 record = records["adaptive inverse"]
-figure, axes = plt.subplots(figsize=(7, 3.5), layout="constrained")
+figure, axes = plt.subplots(figsize=(6.4, 3.2), layout="constrained")
 axes.plot(np.arange(len(r)) / fs, record.theta / start["adaptive inverse"].theta)
 axes.set(xlabel="time [s]", ylabel="parameter / its start")
 axes.legend(start["adaptive inverse"].parameter_names)

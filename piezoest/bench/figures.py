@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -20,11 +20,16 @@ if TYPE_CHECKING:
 
 DPI = 130
 # Okabe and Ito's colours, told apart by all eyes, and black.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31", "#7A68A6")
-MARKERS = "osD^vPX*h"
+COLOURS = (
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00",
+    "#56B4E9", "#000000", "#8C6D31", "#7A68A6", "#882255",
+)  # fmt: skip
+MARKERS = "osD^vPX*h<"
+WIDTH = 6.0  # inches: letters of ten points are read on a telephone too
 GREY = "0.55"
 FARTHEST = 50.0  # times the best one's error, where the colours end
 
+Place = Literal["outside lower center", "outside upper center"]
 Document = dict[str, Any]  # from `piezoest.bench.table.describe`
 
 
@@ -48,14 +53,17 @@ def write_figures(document: Document, folder: Path) -> list[Path]:
 
 
 def _styles(document: Document) -> dict[str, dict[str, Any]]:
-    """Colour and marker of each estimator; linear feed-forward is grey."""
-    found: dict[str, dict[str, Any]] = {LINEAR: {"color": GREY, "marker": "_"}}
-    styles = zip(itertools.cycle(COLOURS), itertools.cycle(MARKERS), strict=True)
-    for name, (color, marker) in zip(
-        (n for n in document["estimators"] if n != LINEAR), styles, strict=False
-    ):
-        found[name] = {"color": color, "marker": marker}
-    return found
+    """Colour and marker of each estimator but the tuned ones, whose lines lie on those of the untuned.
+
+    Linear feed-forward is grey.
+    """
+    tuned = {each["chosen"] for each in document.get("tuned", ()) if each["chosen"] != each["default"]}
+    names = [name for name in document["estimators"] if name not in {LINEAR, *tuned}]
+    styles = itertools.cycle(zip(COLOURS, MARKERS, strict=True))
+    looks = {
+        name: {"color": color, "marker": marker} for name, (color, marker) in zip(names, styles, strict=False)
+    }
+    return {LINEAR: {"color": GREY, "marker": "_"}, **looks}
 
 
 def overview(document: Document) -> Figure:
@@ -92,11 +100,13 @@ def cost(document: Document) -> Figure:
     """Settled and first error against the cost of a step, with the interval that other seeds would lie in."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8, 4.6), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 4.8), layout="constrained")
     style = _styles(document)
     shown = {"first": "first period after a change", "settled": "once settled"}
     for axes, (quantity, said) in zip(figure.subplots(1, 2, sharex=True), shown.items(), strict=True):
         for row in document["overview"]:
+            if row["estimator"] not in style:
+                continue
             about, value = document["estimators"][row["estimator"]], row[quantity]
             if row["estimator"] == LINEAR and value:
                 axes.axhline(100.0 * value[0], color=GREY, ls="--", lw=1, label=LINEAR)
@@ -108,10 +118,10 @@ def cost(document: Document) -> Figure:
                     **style[row["estimator"]],
                 )  # fmt: skip
         axes.set(title=said, xlabel="one step [µs]", xscale="log", yscale="log")
-        _plain_numbers(axes.xaxis)
+        _plain_numbers(axes.xaxis, (1.0,))
         _plain_numbers(axes.yaxis)
         axes.grid(alpha=0.3)
-    figure.axes[0].set_ylabel("largest error [% of the amplitude]")
+    figure.axes[0].set_ylabel("largest error [% of amplitude]")
     _legend(figure, figure.axes[0], 2)
     return figure
 
@@ -134,19 +144,15 @@ def profile(document: Document) -> Figure:
         [[settled.get((scenario, name), np.nan) for scenario in scenarios] for name in names], dtype=float
     )
     ratio = table / np.nanmin(table, axis=0)
-    figure = Figure(figsize=(8.5, 0.42 * len(names) + 2.0), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 0.32 * len(names) + 1.2), layout="constrained")
     axes = figure.subplots()
-    image = axes.imshow(
-        np.clip(ratio, 1.0, FARTHEST), norm=LogNorm(1.0, FARTHEST), cmap="YlOrRd", aspect="auto"
-    )
+    axes.imshow(np.clip(ratio, 1.0, FARTHEST), norm=LogNorm(1.0, FARTHEST), cmap="YlOrRd", aspect="auto")
     for (i, k), value in np.ndenumerate(ratio):
         text = "—" if not np.isfinite(value) else f"{value:.0f}" if value >= 9.95 else f"{value:.1f}"
         dark = value > FARTHEST**0.6
         axes.text(k, i, text, ha="center", va="center", fontsize=9, color="white" if dark else "black")
-    axes.set_xticks(range(len(scenarios)), scenarios, rotation=35, ha="right")
+    axes.set_xticks(range(len(scenarios)), scenarios, rotation=60, ha="right", rotation_mode="anchor")
     axes.set_yticks(range(len(names)), [document["estimators"][name]["name"] for name in names])
-    bar = figure.colorbar(image, ax=axes, label="settled error / the best one's", pad=0.01)
-    _plain_numbers(bar.ax.yaxis, (1.0, 3.0))
     return figure
 
 
@@ -159,37 +165,37 @@ def adaptation(document: Document) -> Figure:
     style = _styles(document)
     columns = 2
     rows = -(-len(scenarios) // columns)
-    figure = Figure(figsize=(8, 2.7 * rows + 1.2), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 2.1 * rows + 1.3), layout="constrained")
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for axes, scenario in zip(panels, scenarios, strict=False):
         mine = [cell for cell in cells if cell["scenario"] == scenario]
-        for cell in mine:
+        for cell in (cell for cell in mine if cell["estimator"] in style):
             _transient(axes, cell, document["estimators"][cell["estimator"]]["name"], style)
         axes.axhline(100.0 * SETTLED, color="0.3", ls=":", lw=1)
         seconds = mine[0]["period"]
-        axes.set(title=scenario, xlabel=f"period after the change ({seconds:.3g} s each)", yscale="log")
+        axes.set(title=scenario, xlabel=f"period ({seconds:.3g} s each)", yscale="log")
         _plain_numbers(axes.yaxis)
         axes.grid(alpha=0.3)
         axes.xaxis.get_major_locator().set_params(integer=True)
     for axes in panels[len(scenarios) :]:
         axes.remove()
     for axes in panels[: len(scenarios) : columns]:
-        axes.set_ylabel("error [% of amplitude]")
-    _legend(figure, panels[0], 2)
+        axes.set_ylabel("error [%]")
+    _legend(figure, panels[0], 2, "outside upper center")
     return figure
 
 
 def _transient(axes: Axes, cell: Document, name: str, style: dict[str, dict[str, Any]]) -> None:
     errors: list[Any] = [None if error is None else 100.0 * error for error in cell["transient"]]
-    looks: dict[str, Any] = {**style[cell["estimator"]], "lw": 1.4, "ms": 4}
+    looks: dict[str, Any] = {**style[cell["estimator"]], "lw": 1.2, "ms": 3.5}
     if cell["estimator"] == LINEAR:
         looks |= {"marker": None, "ls": "--", "zorder": 1}
     axes.plot(range(1, len(errors) + 1), errors, label=name, **looks)
 
 
-def _legend(figure: Figure, axes: Axes, columns: int) -> None:
+def _legend(figure: Figure, axes: Axes, columns: int, place: Place = "outside lower center") -> None:
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=9)
+    figure.legend(handles, labels, loc=place, ncols=columns, frameon=False)
 
 
 def _plain_numbers(axis: Axis, digits: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:

@@ -17,7 +17,8 @@ from piezoest.tracking import draw_map, draw_series
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DPI = 110
+DPI = 130
+WIDTH = 6.0  # inches: letters of ten points are read on a telephone too
 WAYS = {"linear": "linear feed-forward", "inverse": "hysteresis compensation"}
 
 
@@ -62,11 +63,11 @@ def input_output_map(run: Run) -> Figure:
 
 def triangle_tracking(linear: Run, inverse: Run) -> Figure:
     """Fig. 4: time series (a), (b) and reference-to-displacement maps (c), (d)."""
-    figure = _figure(10.0, 7.4)
-    series, maps = figure.subplots(2, 2, height_ratios=[1.0, 1.3])
-    for column, (letters, run) in enumerate((("ac", linear), ("bd", inverse))):
-        _series(series[column], letters[0], run, periods=2)
-        _map(maps[column], letters[1], run)
+    figure = _figure(WIDTH, 7.6)
+    panels = figure.subplot_mosaic([["a", "a"], ["b", "b"], ["c", "d"]], height_ratios=[1.0, 1.0, 1.2])
+    for letters, run in (("ac", linear), ("bd", inverse)):
+        _series(panels[letters[0]], letters[0], run, periods=2)
+        _map(panels[letters[1]], letters[1], run)
     _legend(figure)
     figure.suptitle(f"Fig. 4: {linear.experiment.reference.name}")
     return figure
@@ -74,8 +75,8 @@ def triangle_tracking(linear: Run, inverse: Run) -> Figure:
 
 def prbs_tracking(linear: Run, inverse: Run) -> Figure:
     """Fig. 5: time series (a), (b) of the filtered PRBS."""
-    figure = _figure(10.0, 3.8)
-    for axes, letter, run in zip(figure.subplots(1, 2), "ab", (linear, inverse), strict=True):
+    figure = _figure(WIDTH, 5.2)
+    for axes, letter, run in zip(figure.subplots(2, 1), "ab", (linear, inverse), strict=True):
         _series(axes, letter, run, periods=1)
     _legend(figure)
     figure.suptitle(f"Fig. 5: {linear.experiment.reference.name}")
@@ -84,7 +85,7 @@ def prbs_tracking(linear: Run, inverse: Run) -> Figure:
 
 def adaptation(result: PaperResult) -> Figure:
     """Largest error of each period after the start, for every row of Table II."""
-    figure = _figure(10.0, 4.2)
+    figure = _figure(WIDTH, 4.6)
     axes = figure.subplots(1, 2, sharey=True)
     for ax, way, runs in ((axes[0], "linear", result.linear), (axes[1], "inverse", result.inverse)):
         for (name, run), marker in zip(runs.items(), "os^vD", strict=True):
@@ -95,10 +96,11 @@ def adaptation(result: PaperResult) -> Figure:
         ax.set(xlabel="time [s]", yscale="log", title=WAYS[way])
         ax.grid(alpha=0.3, which="both")
     axes[0].set_ylabel("largest error of the period [µm]")
-    axes[1].legend(fontsize="small", loc="upper right")
+    _legend(figure, columns=2)
     figure.suptitle(
-        f"Adaptation, memory {result.memory:g} s; ringed: first period that stays "
-        f"within {100.0 * (SETTLED - 1.0):.0f} % of the stationary error"
+        f"Memory {result.memory:g} s; ringed: first period that stays within\n"
+        f"{100.0 * (SETTLED - 1.0):.0f} % of the stationary error",
+        fontsize="medium",
     )
     return figure
 
@@ -107,11 +109,11 @@ def error_against_memory(result: PaperResult) -> Figure:
     """Stationary error and time to settle over the memory of the estimator."""
     memory = np.array(list(result.sweep))
     runs = list(result.sweep.values())
-    figure = _figure(10.0, 3.9)
-    left, right = figure.subplots(1, 2)
+    figure = _figure(WIDTH, 5.6)
+    left, right = figure.subplots(2, 1, sharex=True)
     left.loglog(memory, [run.max_error for run in runs], "o-")
     left.loglog(result.memory, result.sweep[result.memory].max_error, "o", ms=11.0, mfc="none", color="C3")
-    left.set(xlabel="memory [s]", ylabel="largest stationary error [µm]")
+    left.set(ylabel="largest stationary error [µm]")
     times = [np.nan if run.settling_time is None else run.settling_time for run in runs]
     right.semilogx(memory, times, "o-")
     right.set(xlabel="memory [s]", ylabel="settles after [s]")
@@ -124,7 +126,7 @@ def error_against_memory(result: PaperResult) -> Figure:
         )
         axes.grid(alpha=0.3, which="both")
     figure.suptitle(
-        f"Memory of the estimator, {runs[0].experiment.reference.name}; ringed: that of the tables"
+        f"{runs[0].experiment.reference.name}; ringed: the memory of the tables", fontsize="medium"
     )
     return figure
 
@@ -149,8 +151,8 @@ def _map(axes: Any, letter: str, run: Run) -> None:
     axes.set_title(f"({letter}) {WAYS[run.experiment.compensation]}", fontsize="medium")
 
 
-def _legend(figure: Figure) -> None:
+def _legend(figure: Figure, columns: int = 3) -> None:
     """One legend for all series, where it hides nothing: the curves are the same in each."""
     handles = [line for axes in figure.axes for line in axes.get_lines()]
     by_name = {str(line.get_label()): line for line in handles if not str(line.get_label()).startswith("_")}
-    figure.legend(by_name.values(), by_name.keys(), loc="outside lower center", ncols=3)
+    figure.legend(by_name.values(), by_name.keys(), loc="outside lower center", ncols=columns)

@@ -19,7 +19,7 @@ HandOver = Literal["path", "place"]
 
 @dataclass(frozen=True, slots=True)
 class CompensatorStatus:
-    """What happened to the samples a compensator was given.
+    """Counts of the samples of a compensator.
 
     Parameters
     ----------

@@ -47,8 +47,8 @@ class AdaptiveFeedforward(Face):
         initial_model=..., noise=...)``, because they work in units of half a swing, in which the stage has
         a gain of about one.
     corridor : float
-        Largest distance of the voltage from the straight line, as a fraction of half the widest swing of
-        late, 0 to 1.
+        Largest distance of the voltage from the straight line, as a fraction of half the widest recent
+        swing, 0 to 1.
     gain : float, optional
         Approximate gain of the stage [µm/V]; negative if the displacement falls with the voltage. It is
         checked at the start. If it is wrong by more than a factor of three, the gain is measured.
@@ -143,7 +143,7 @@ class AdaptiveFeedforward(Face):
         Raises
         ------
         ValueError
-            If the voltage is none within the limits, or the displacement no number of µm.
+            If the voltage is outside the limits, or the displacement is not a number.
         """
         u = making.rest(self._limits, voltage)
         x = None if displacement is None else making.measured("displacement", displacement)

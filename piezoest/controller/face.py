@@ -91,8 +91,8 @@ class Face:
     def candidates(self) -> tuple[Candidate, ...]:
         """All models that can drive, the line first: frozen records.
 
-        Each has a ``name``, ``missed`` (what it has missed of late, root mean square [µm]; None if nothing is
-        known), ``drives`` and ``model``.
+        Each has a ``name``, ``missed`` (its recent error, root mean square [µm]; None if nothing is known),
+        ``drives`` and ``model``.
         """
         driving = int(self._state["driving"])
         misses = shown.misses(self._state)

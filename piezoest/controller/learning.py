@@ -128,7 +128,7 @@ def _follow_zero(state: Any) -> None:
         state.zero += jump
         reading.notice(state, reading.MOVED)
     lines.forget(line.now)
-    line.before.count = 0.0
+    lines.forget_legs(line)
     line.centre += jump
     line.last_centre += jump
     line.held_centre += jump

@@ -1,7 +1,9 @@
 """The straight line x = gain u + centre that readings show: linear feed-forward, always a candidate.
 
-Least squares over the last two legs of the reference, up and down, so that a loop's width cancels. It is
-fitted again at each turn; between turns nothing that a resonance or a lag does can lead it astray.
+Least squares over the last legs of the reference, those up and those down alike, so that a loop's width
+cancels. It is fitted again at each turn; between turns nothing that a resonance or a lag does can lead it
+astray. Small loops are flatter than the wide one that they lie in: a leg makes those before it forgotten only
+as far as it is long, so that a line through the last two small ones is not taken for the stage's.
 """
 
 from __future__ import annotations
@@ -11,19 +13,22 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.layout import AMOUNT, COUNT, FLAG, MEASURED, NUMBER, record
+from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, record
 
 # Points: how many; means of voltage and reading; mean squares of their deviations, mean product.
 POINTS = record(
     count=AMOUNT, mean_u=MEASURED, mean_x=MEASURED, square=AMOUNT, square_x=AMOUNT, product=NUMBER
 )
+# Legs of late in one direction, and their length in all [µm].
+LEGS = record(length=DISTANCE, points=POINTS)
 # The line; the one before the last turn, and before the one before; the gain it began with; whether the
-# voltage was at a limit since the last turn; legs it rests on, turns since the last one, legs of late that
-# agreed with it; length of the first leg when it was looked at last; points of this leg and of the last one.
+# voltage was at a limit since the last turn; legs so far, those of late that agreed with it; length of the
+# first leg when it was looked at last [V], of the longest leg of late [µm]; points of this leg, of those
+# before it, and of both directions together.
 LINE = record(
     gain=NUMBER, centre=NUMBER, last_gain=NUMBER, last_centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER,
-    first_gain=NUMBER, clipped=FLAG, legs=COUNT, small=COUNT, agreed=AMOUNT, looked=AMOUNT,
-    now=POINTS, before=POINTS,
+    first_gain=NUMBER, clipped=FLAG, legs=COUNT, agreed=AMOUNT, looked=AMOUNT, longest=DISTANCE,
+    now=POINTS, up=LEGS, down=LEGS, both=POINTS,
 )  # fmt: skip
 
 # Points of which a line explains less than this share teach nothing about its gain; it changes by no more
@@ -34,12 +39,14 @@ ANSWERED = 0.1
 # Where no line explains the points, the stage goes too far at so many times what the gain says, if the
 # voltage was at a limit and if not.
 FARTHER, MUCH_FARTHER = 1.5, 2.5
-# A leg whose mean square is so many times that of the next one does not count beside it.
-UNLIKE = 6.0
-# ... and one so much smaller than the last is no leg, but part of the next, for so many turns.
-SMALL = 4.0
-# A leg agrees with the line within this factor.
-ALIKE = 1.6
+# After a leg as long as the longest of late those before count for this share of its length; after a shorter
+# one for so many times what it lacks, too. The longest one fades by this factor at each turn.
+LEFT, KEPT, FADES = 1.0 / 3.0, 2.0, 0.95
+# Before so many legs only the last two count, which may lead from rest to where the reference is; and of them
+# the last one alone, if the mean square of the one before is so many times larger.
+SETTLED, UNLIKE = 4.0, 6.0
+# A leg agrees with the line within this factor; one shorter than this fraction of the longest says nothing.
+ALIKE, SHORT = 1.6, 0.3
 
 
 @register_jitable
@@ -47,8 +54,9 @@ def begin(line: Any, gain: Any, u: Any, x: Any, leg: Any) -> None:
     """Begin with a gain and a line through one point; legs shorter than half of `leg` are not looked at."""
     line.gain = line.last_gain = line.held_gain = line.first_gain = gain
     line.centre = line.last_centre = line.held_centre = x - gain * u
-    line.agreed = line.legs = line.before.count = 0.0
+    line.agreed = line.legs = line.longest = 0.0
     line.looked = 0.25 * leg
+    forget_legs(line)
     forget(line.now)
 
 
@@ -56,6 +64,12 @@ def begin(line: Any, gain: Any, u: Any, x: Any, leg: Any) -> None:
 def forget(points: Any) -> None:
     """Forget all points."""
     points.count = points.mean_u = points.mean_x = points.square = points.square_x = points.product = 0.0
+
+
+@register_jitable
+def forget_legs(line: Any) -> None:
+    """Forget all legs that are over."""
+    line.up.length = line.down.length = 0.0
 
 
 @register_jitable
@@ -98,8 +112,28 @@ def voltage(line: Any, r: Any) -> float:
 
 
 @register_jitable
-def _draw(line: Any, u: Any, x: Any, square: Any, square_x: Any, product: Any) -> None:
+def _join(points: Any, more: Any, share: Any) -> None:
+    """Take more points into others, of which they are a share of one or less then."""
+    keep = 1.0 - share
+    du, dx = more.mean_u - points.mean_u, more.mean_x - points.mean_x
+    points.mean_u += share * du
+    points.mean_x += share * dx
+    points.square = keep * (points.square + share * du * du) + share * more.square
+    points.square_x = keep * (points.square_x + share * dx * dx) + share * more.square_x
+    points.product = keep * (points.product + share * du * dx) + share * more.product
+
+
+@register_jitable
+def _take(legs: Any, now: Any, leg: Any, kept: Any) -> None:
+    """Take a leg of some length; of those before so much length still counts."""
+    legs.length = min(legs.length, kept) + leg
+    _join(legs.points, now, leg / legs.length)
+
+
+@register_jitable
+def _draw(line: Any, points: Any) -> None:
     """Draw the line through the middle of points, with their slope if they lie near it."""
+    square, square_x, product = points.square, points.square_x, points.product
     most = CHANGE if line.legs < CERTAIN else LATER_CHANGE
     answers = product * line.gain > 0.0 and product * product > ANSWERED * square * square_x
     farther = (FARTHER if line.clipped != 0.0 else MUCH_FARTHER) * line.gain
@@ -115,35 +149,41 @@ def _draw(line: Any, u: Any, x: Any, square: Any, square_x: Any, product: Any) -
     elif not answers:
         # Readings that do not go with the voltage say nothing of the centre either: it would run away.
         return
-    line.centre = x - line.gain * u
+    line.centre = points.mean_x - line.gain * points.mean_u
 
 
 @register_jitable
-def turn(line: Any) -> None:
-    """The voltage has turned: draw the line through the last two legs."""
-    now, before = line.now, line.before
-    line.small += 1.0
-    most = SMALL if line.legs > 2.0 else 1.0
-    if now.count < 4.0 or (UNLIKE * now.square < before.square and line.small < most):
+def _through_both(line: Any, legs: Any, others: Any) -> None:
+    """Draw the line through the legs of both directions, which count alike, however long they took."""
+    if line.legs <= SETTLED and others.points.square > UNLIKE * line.now.square:
+        others.length = 0.0
+    _join(line.both, legs.points, 1.0)
+    if others.length > 0.0:
+        _join(line.both, others.points, 0.5)
+    _draw(line, line.both)
+
+
+@register_jitable
+def turn(line: Any, direction: Any, leg: Any) -> None:
+    """The reference has turned after a leg in a direction: draw the line through the legs of late."""
+    now = line.now
+    if now.count < 4.0 or leg <= 0.0:
         return
-    line.small = 0.0
+    line.longest = max(leg, FADES * line.longest) if line.legs >= SETTLED else leg
+    kept = KEPT * (line.longest - leg) + LEFT * leg if line.legs >= SETTLED else 0.0
     line.legs += 1.0
     line.held_gain, line.held_centre = line.last_gain, line.last_centre
     line.last_gain, line.last_centre = line.gain, line.centre
-    ratio = slope(now) / line.gain
-    agrees = explained(now) > EXPLAINED and 1.0 / ALIKE < ratio < ALIKE
-    line.agreed = line.agreed + 1.0 if agrees else 0.5 * line.agreed
-    if before.count == 0.0 or before.square > UNLIKE * now.square:
-        _draw(line, now.mean_u, now.mean_x, now.square, now.square_x, now.product)
+    if leg > SHORT * line.longest:
+        ratio = slope(now) / line.gain
+        agrees = explained(now) > EXPLAINED and 1.0 / ALIKE < ratio < ALIKE
+        line.agreed = line.agreed + 1.0 if agrees else 0.5 * line.agreed
+    if direction > 0.0:
+        _take(line.up, now, leg, kept)
+        _through_both(line, line.up, line.down)
     else:
-        # Both legs count alike, however long they took.
-        u, x = 0.5 * (now.mean_u - before.mean_u), 0.5 * (now.mean_x - before.mean_x)
-        _draw(
-            line, before.mean_u + u, before.mean_x + x, 0.5 * (now.square + before.square) + u * u,
-            0.5 * (now.square_x + before.square_x) + x * x, 0.5 * (now.product + before.product) + u * x,
-        )  # fmt: skip
-    before.count, before.mean_u, before.mean_x = now.count, now.mean_u, now.mean_x
-    before.square, before.square_x, before.product = now.square, now.square_x, now.product
+        _take(line.down, now, leg, kept)
+        _through_both(line, line.down, line.up)
     line.clipped = 0.0
     forget(now)
 
@@ -155,7 +195,7 @@ def grow(line: Any, leg: Any) -> bool:
     if line.legs > 0.0 or leg < 2.0 * line.looked or now.count < 16.0:
         return False
     line.looked = leg
-    _draw(line, now.mean_u, now.mean_x, now.square, now.square_x, now.product)
+    _draw(line, now)
     return True
 
 
@@ -165,7 +205,7 @@ def hold(line: Any) -> None:
     line.gain, line.centre = line.held_gain, line.held_centre
     line.last_gain, line.last_centre = line.gain, line.centre
     forget(line.now)
-    line.before.count = 0.0
+    forget_legs(line)
 
 
 @register_jitable

@@ -66,10 +66,10 @@ def pay(state: Any, settings: Any, moved: Any) -> None:
 @register_jitable
 def draw(state: Any) -> None:
     """Draw the line anew where the reference has turned; what that changes is owed."""
-    line, travel = state.line, state.travel
+    line, travel, reference = state.line, state.travel, state.reference
     before = driving.line_z(state)
-    if state.reference.turned_now != 0.0:
-        lines.turn(line)
+    if reference.turned_now != 0.0:
+        lines.turn(line, -reference.direction, reference.leg)
     elif not lines.grow(line, np.abs(travel.furthest - travel.turned)):
         return
     state.owed += before - driving.line_z(state)

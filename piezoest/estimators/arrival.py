@@ -9,20 +9,18 @@ from __future__ import annotations
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.estimators.fit import Prior, Problem, inverse_information
+from piezoest.fitting.outcome import inverse_information
+from piezoest.fitting.problem import Prior, Problem
 
-# Keeps a correlation matrix positive definite that rounding would not.
-JITTER = 1e-12
+# Keeps a correlation matrix positive definite that rounding would not, and the squares of its root in range.
+JITTER = 1e-9
 
 
 def arrival_cost(problem: Problem, q: FloatArray, k: int, walk: FloatArray) -> tuple[FloatArray, Prior]:
     """Coordinates and prior of the window that starts at point k of this one."""
-    prior = problem.prior
-    assert prior is not None
-    residual, jacobian = problem.evaluate(q)
-    J, r = jacobian[:k], residual[:k]
-    covariance = inverse_information(prior.root.T @ prior.root + J.T @ J)
-    step = -covariance @ (prior.root.T @ (prior.root @ (q - prior.mean)) + J.T @ r)
+    _, sums = problem.about(q, samples=k)
+    covariance = inverse_information(sums.gram)
+    step = covariance @ sums.moment
     G, follower = np.eye(q.size), q.copy()
     if state := problem.coordinates.where(*problem.coordinates.model.state_names):
         # The states at point k, which the next window starts from.

@@ -13,10 +13,14 @@ import numpy as np
 from piezoest._checks import WILDEST, FloatArray, array_1d, finite, instance, integer, moderate, positive
 from piezoest.estimators.base import DEFAULT_MODEL, Status
 from piezoest.estimators.batch_result import BatchFitResult
-from piezoest.estimators.coordinates import Coordinates, bridged, coordinates
-from piezoest.estimators.fit import TUNING, Problem, best_start, outcome, robust, single_shooting
 from piezoest.estimators.hopping import LEAST_HANDED_OUT, Hopping
-from piezoest.estimators.multiple_shooting import multiple_shooting
+from piezoest.fitting.coordinates import Coordinates, bridged, coordinates
+from piezoest.fitting.gauss_newton import robust, single_shooting
+from piezoest.fitting.losses import TUNING
+from piezoest.fitting.multiple_shooting import multiple_shooting
+from piezoest.fitting.outcome import outcome
+from piezoest.fitting.problem import Problem
+from piezoest.fitting.start import best_start
 from piezoest.layout import COUNT, MOST, record
 from piezoest.models import Creep, FreeRunning
 
@@ -43,16 +47,16 @@ class BatchFit(Hopping):
         [Hz].
     initial_model : FreeRunning, optional
         A ColemanHodgdon, a LinearGain or another model that can be fitted; a model of this class is fitted.
-        The fit starts from it or, for Coleman-Hodgdon, from the linear least-squares fit of the derivative
-        form, whichever is better. Default: a Coleman-Hodgdon model that is scaled to the record.
+        The fit starts from it or, for Coleman-Hodgdon, from the best of fits that are linear for a given
+        alpha, whichever misses less. Default: a Coleman-Hodgdon model that is scaled to the record.
     offset : bool
         Also fit the displacement at zero voltage and w_h = 0; else it is `initial_model`'s, or 0.
     creep : Creep, optional
         Creep terms. The gains are fitted and the time constants are kept. Before the first sample the terms
         are at rest, z = 0.
     method : {"single-shooting", "multiple-shooting"}
-        ``"single-shooting"``: one simulation with its sensitivities, by scipy's trust-region reflective
-        method. ``"multiple-shooting"``: 20 segments with continuity as constraints, by IPOPT with the
+        ``"single-shooting"``: Gauss-Newton steps, each a convex program with bounds on the sensitivities of
+        one simulation. ``"multiple-shooting"``: 20 segments with continuity as constraints, by IPOPT with the
         Gauss-Newton Hessian, for records on which the first method fails.
     loss : {"linear", "huber", "soft_l1", "cauchy"}
         ``"linear"`` is least squares. The others reduce the weight of outliers; their scale gives 95 %
@@ -263,7 +267,7 @@ class BatchFit(Hopping):
     def _solve(self, count: int) -> BatchFitResult:
         """Fit the first so many samples."""
         began = time.perf_counter()
-        arguments, creep, scale = self._arguments, self._creep, 1.0
+        arguments, creep = self._arguments, self._creep
         loss, noise = arguments["loss"], arguments["noise"]
         gains = {} if creep is None else {f"creep_gains[{i}]": g for i, g in enumerate(creep.gains)}
         u, x = self._record[:, :count]
@@ -275,12 +279,9 @@ class BatchFit(Hopping):
             None if creep is None else creep.decays(self.sample_rate),
         )
         given = None if arguments["initial_model"] is None else self._initial
-        q = best_start(problem, self.sample_rate, given, DEFAULT_MODEL, gains)
+        q = best_start(problem, given, DEFAULT_MODEL, gains)
         solve = partial(METHODS[arguments["method"]], max_iterations=arguments["max_iterations"])
-        if loss == "linear":
-            solution = solve(problem, q, loss, scale)
-        else:
-            solution, scale = robust(problem, q, loss, noise, solve)
+        solution, scale = robust(problem, q, loss, noise, solve)
         end = outcome(problem, solution.q, loss, scale, noise)
         value = end.value
         return BatchFitResult(

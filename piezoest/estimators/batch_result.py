@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from piezoest.estimators.fit import Outcome
+from piezoest.fitting.outcome import Outcome
 from piezoest.models import Creep, FreeRunning
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.estimators.base import EstimatorBase, Trace
-from piezoest.estimators.coordinates import Coordinates
+from piezoest.fitting.coordinates import Coordinates
 from piezoest.models import FreeRunning
 
 # Slope of a model that is handed out, relative to that of the model to start from.

@@ -12,14 +12,17 @@ from piezoest._checks import WILDEST, FloatArray, integer, moderate, positive
 from piezoest.estimators import horizon_kernel as kernel
 from piezoest.estimators.arrival import arrival_cost
 from piezoest.estimators.base import Status
-from piezoest.estimators.coordinates import Coordinates, coordinates
-from piezoest.estimators.fit import Prior, Problem, Solution, inverse_information, single_shooting
 from piezoest.estimators.hopping import LEAST_HANDED_OUT, Hopping
 from piezoest.estimators.samples import HELD, NAMES, UPDATED
 from piezoest.estimators.saved_state import Rule, no_more_than
 from piezoest.estimators.thinning import thinned
+from piezoest.fitting.coordinates import Coordinates, coordinates
+from piezoest.fitting.gauss_newton import single_shooting
+from piezoest.fitting.outcome import inverse_information
+from piezoest.fitting.problem import Prior, Problem
 from piezoest.layout import fill
 from piezoest.models import FreeRunning
+from piezoest.symbolic import Solution
 
 # Most samples of a window, all of which are kept.
 LONGEST = 1e7
@@ -252,22 +255,17 @@ class MovingHorizon(Hopping):
             state["failures"] += 1.0
         self._move_on(problem, q, int(np.searchsorted(points, leaving)), leaving)
         if good and (count := int(np.count_nonzero(problem.measured))):
-            residual = problem.evaluate(q)[0][: points.size]
+            residual = problem.residual(q)
             chi = np.sqrt(float(residual @ residual) / count)
             state["noise"] = max(self._arguments["noise"], state["noise"] * chi)
         return found.message
 
     def _accepts(self, problem: Problem, found: Solution) -> bool:
         """Hold what was found, if it is any good."""
-        if not found.success or not np.isfinite(problem.cost(found.q)):
+        _, sums = problem.about(found.q)
+        if not (found.success and np.all(np.isfinite(sums.gram))):
             return False
-        _, jacobian = problem.evaluate(found.q)
-        try:
-            covariance = inverse_information(jacobian.T @ jacobian)
-        except np.linalg.LinAlgError:
-            return False
-        if not np.all(np.isfinite(covariance)):
-            return False
+        covariance = inverse_information(sums.gram)
         run, by_q = problem.simulate(found.q)
         row = run.jacobian[-1] @ by_q
         variance = self._state["noise"] ** 2 + row @ covariance @ row

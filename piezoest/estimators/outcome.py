@@ -36,7 +36,7 @@ class Estimator(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What happened to the samples an estimator was given.
+    """Counts of the samples that an estimator has used, skipped or left out.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ LARGEST_START = 1e50
 
 
 class RecursiveLeastSquares(Copied):
-    """Recursive least squares with forgetting for any regression z = theta . phi (App. A).
+    """Recursive least squares with forgetting for any regression z = theta^T phi (appendix A).
 
     Parameters
     ----------

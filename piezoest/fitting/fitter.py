@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, fraction, positive
-from piezoest.estimators.coordinates import bridged, late
 from piezoest.fitting import search, trust
+from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.design import Design
 from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.fitting.forms import FORMS, Form
@@ -30,8 +30,7 @@ ROUNDING = 1e-9
 PASSES = 3
 # Most Gauss-Newton steps of a delay.
 REFINED = 3
-NONLINEAR = "SciPy's least squares, with derivatives by CasADi"
-LINEAR = "{} through CasADi; SciPy's bounded least squares agrees to {:.0e}"
+SOLVER = "{} through CasADi; SciPy's bounded least squares agrees to {:.0e}"
 
 
 def fit(
@@ -44,7 +43,7 @@ def fit(
     flaws: Flaws | None = None,
     settle: float | None = None,
 ) -> Fit:
-    """Fit a model to a record: what the free-running model misses is least.
+    """Fit one kind of model to a record, by the error of the simulated displacement.
 
     All in which a model is linear (slopes of plays, their bends, gain, offset, drift, jumps) is one convex
     program, solved by CasADi and checked by SciPy. Smoothness of neighbouring slopes is chosen by five
@@ -265,12 +264,12 @@ class Fitter:
         delay = self.delay
         if form.loop:
             given = replace(log, u=self._given)
-            basis, w, delay, errors = polished(given, fitted, delay, fit_delay=self.delay_estimated)
+            basis, w, delay, errors, gap = polished(given, fitted, delay, fit_delay=self.delay_estimated)
             log = replace(log, u=late(self._given, delay))
             fitted = replace(search.regression(log, basis).best(), w=w)
-            solver, parameters = NONLINEAR, 5 + self.delay_estimated
+            parameters = 5 + self.delay_estimated
         else:
-            solver = LINEAR.format(quadratic_solver(), fitted.regression.gap(fitted))
+            gap = fitted.regression.gap(fitted)
             # Creep gains are no columns of the last linear program, but they were fitted as well.
             with_gains = replace(fitted, used=np.union1d(fitted.used, np.r_[fitted.design.gains]))
             errors = trust.standard_errors(with_gains, log)
@@ -295,7 +294,7 @@ class Fitter:
             left_out=self.left_out,
             spikes=self.spikes,
             drift=float(w[design.offset + 1]),
-            solver=solver,
+            solver=SOLVER.format(quadratic_solver(), gap),
             _design=wider[0],
             _w=wider[1],
             _rest=rest,

@@ -8,7 +8,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray, array_1d
 from piezoest.compile import Vector, compiled
-from piezoest.estimators.coordinates import bridged
+from piezoest.fitting.coordinates import bridged
 from piezoest.fitting.rests import rests_of
 from piezoest.fitting.rows import dot
 from piezoest.fitting.runs import BoolArray, IntArray, runs

@@ -1,8 +1,8 @@
 """The Coleman-Hodgdon model of a given alpha as columns of a regression.
 
 x = c u + w_h + offset, and w_h is linear in b and in where it begins: with b = 1 and w_h = 0 at the start
-it is f(u), so x = (c - b) u + b (u + f) + w_h(0) exp(-a travel) + offset. Equations (2)-(4) of Eielsen et
-al. (2012).
+it is f(u), so x = (c - 2b) u + b (2u + f) + w_h(0) exp(-a travel) + offset. Models are admissible whose
+first two coefficients are above zero. Equations (2)-(4) of Eielsen et al. (2012).
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from piezoest.compile import Matrix, Vector, compiled
 from piezoest.equations.coleman_hodgdon import hysteresis_step
 from piezoest.models import ColemanHodgdon, Creep
 
-# beta = c - b, and b, are at least these fractions of the straight line's gain.
-LEAST_BETA, LEAST_LOOP = 0.02, 1e-6
+# c - 2b, and b, are at least this fraction of the straight line's gain.
+LEAST = 1e-6
 # What is left of the start, relative to it, that counts for nothing.
 FORGOTTEN = 1e-26
 
 
 @dataclass(frozen=True, slots=True)
 class LoopColumns:
-    """Columns of beta, b and w_h(0), for one `alpha` [1/V].
+    """Columns of c - 2b, b and w_h(0), for one `alpha` [1/V].
 
     With `rested` the stage comes from a rest at 0 V, and nothing of w_h(0) is left.
     """
@@ -55,8 +55,8 @@ class LoopColumns:
         return rows
 
     def lower(self, gain: float) -> FloatArray:
-        """Admissible are a slope and a loop above zero."""
-        return np.array([LEAST_BETA * gain, LEAST_LOOP * gain, -np.inf])
+        """What is admissible."""
+        return np.array([LEAST * gain, LEAST * gain, -np.inf])
 
     def line(self) -> FloatArray:
         """The voltage alone."""
@@ -76,11 +76,11 @@ class LoopColumns:
 
     def model(self, w: FloatArray, offset: float, creep: Creep | None, rate: float) -> ColemanHodgdon:
         """Model of these coefficients; it has no creep."""
-        return ColemanHodgdon.from_loop(self.alpha, float(w[1]), float(w[0] + w[1]), offset)
+        return ColemanHodgdon.from_loop(self.alpha, float(w[1]), float(w[0] + 2.0 * w[1]), offset)
 
     def names(self, w: FloatArray) -> dict[str, FloatArray]:
         """beta; gamma = alpha c is not linear in them."""
-        return {"beta": np.array([1.0, 0.0, 0.0])}
+        return {"beta": np.array([1.0, 1.0, 0.0])}
 
     def initial_state(self, w: FloatArray, model: ColemanHodgdon) -> float:
         """w_h at the first sample [µm]."""
@@ -98,5 +98,5 @@ def _loop(u: Vector, alpha: float, state: Vector, rows: Matrix) -> None:
         state[2] = left if left > FORGOTTEN else 0.0
         state[0] = u[k]
         rows[k, 0] = u[k]
-        rows[k, 1] = u[k] + state[1]
+        rows[k, 1] = 2.0 * u[k] + state[1]
         rows[k, 2] = state[2]

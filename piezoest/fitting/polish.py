@@ -11,24 +11,29 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.estimators.coordinates import coordinates
-from piezoest.estimators.fit import Problem, outcome, single_shooting
+from piezoest.fitting.coordinates import coordinates
+from piezoest.fitting.gauss_newton import single_shooting
 from piezoest.fitting.loop_columns import LoopColumns
+from piezoest.fitting.outcome import outcome
+from piezoest.fitting.problem import Problem
 from piezoest.fitting.regression import Fitted, Log
 from piezoest.fitting.search import LONGEST_DELAY
 from piezoest.models import ColemanHodgdon
 
+# What a record can tell from a straight line: alpha times the voltage's range, and b/c.
+CURVATURES, BENT = (np.exp(-4.0), np.exp(4.0)), (1e-3, 0.4995)
 # Most passes over the record, and the relative change at which it has ended.
-MOST_PASSES, TOLERANCE = 20, 1e-6
+MOST_PASSES, TOLERANCE = 40, 1e-6
 
 
 class Polished(NamedTuple):
-    """Columns of another alpha, coefficients, delay, and the standard errors of all parameters by name."""
+    """Columns of another alpha, coefficients, delay, standard errors by name, and SciPy's gap."""
 
     basis: LoopColumns
     w: FloatArray
     delay: float
     standard_errors: dict[str, float]
+    gap: float
 
 
 def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Polished:
@@ -39,18 +44,20 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
         beside += size * (np.arange(log.u.size) >= jump)
     x = np.where(log.counts, log.x - beside, np.nan)
     varied = coordinates(ColemanHodgdon, () if fit_delay else ("delay",), delayed=True)
-    limits = ColemanHodgdon.record_limits(2.0 * log.half) | {"delay": (0.0, LONGEST_DELAY)}
+    limits = {
+        "alpha": (CURVATURES[0] / (2.0 * log.half), CURVATURES[1] / (2.0 * log.half)),
+        "ratio": (1.0 / (1.0 - BENT[0]), 1.0 / (1.0 - BENT[1])),
+        "delay": (0.0, LONGEST_DELAY),
+    }
     problem = Problem(log.u, x, varied, np.empty(0) if fit_delay else np.array([delay]), limits=limits)
     model: Any = fitted.design.model(w)
-    model = model.nearest_admissible()
     place = fitted.design.basis.initial_state(w, model) * model.alpha / model.b
     start = varied.of(model, {"delay": delay, "place": place})
-    start = np.clip(start, *problem.bounds(start))
     solution = single_shooting(problem, start, "linear", 1.0, MOST_PASSES, TOLERANCE)
     end = outcome(problem, solution.q, coloured=True)
     value = end.value
     found = ColemanHodgdon.from_theta(end.theta[:3], value["offset"])
     w = w.copy()
-    w[: offset + 1] = found.beta, found.b, value["initial_state"], found.offset
+    w[: offset + 1] = found.c - 2.0 * found.b, found.b, value["initial_state"], found.offset
     errors = dict(zip(end.parameter_names, end.standard_errors.tolist(), strict=True))
-    return Polished(LoopColumns(found.alpha), w, value["delay"], errors)
+    return Polished(LoopColumns(found.alpha), w, value["delay"], errors, problem.gap(solution.q))

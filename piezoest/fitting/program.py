@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.rows import gram, onto
+from piezoest.fitting.rows import dot, gram, onto
 from piezoest.symbolic import quadratic_program
 
 # Least curvature relative to a column's own: what a record does not tell stays near zero.
@@ -25,7 +25,7 @@ class Sums(NamedTuple):
     @classmethod
     def of(cls, columns: FloatArray, x: FloatArray) -> Self:
         """Sums over rows of a matrix (N, n) and what they are to give (N,)."""
-        return cls(gram(columns), onto(columns, x), float(x @ x), float(x.size))
+        return cls(gram(columns), onto(columns, x), dot(x, x), float(x.size))
 
     @classmethod
     def none(cls, columns: int) -> Self:
@@ -40,6 +40,10 @@ class Sums(NamedTuple):
             self.square + sign * other.square,
             self.rows + sign * other.rows,
         )
+
+    def only(self, used: Any) -> Self:
+        """Sums of some of the columns."""
+        return self._replace(gram=self.gram[np.ix_(used, used)], moment=self.moment[used])
 
     def through(self, transform: FloatArray) -> Self:
         """Sums of other columns, each a combination (n, m) of these."""
@@ -67,19 +71,21 @@ def total(sums: list[Sums]) -> Sums:
     return found
 
 
-def solve(sums: Sums, lower: FloatArray, penalty: FloatArray) -> FloatArray:
-    """Coefficients (n,) that miss least, plus w' penalty w per row, and are nowhere below `lower`."""
-    scale, H, g = _scaled(sums, penalty)
-    return quadratic_program(H, g, lower * scale) / scale
+def solve(
+    sums: Sums, lower: FloatArray, penalty: FloatArray, upper: Any = np.inf, ridge: float = RIDGE
+) -> FloatArray:
+    """Coefficients (n,) that miss least, plus w' penalty w per row, between `lower` and `upper`."""
+    scale, H, g = _scaled(sums, penalty, ridge)
+    return quadratic_program(H, g, lower * scale, upper * scale) / scale
 
 
-def checked(sums: Sums, lower: FloatArray, penalty: FloatArray, w: FloatArray) -> float:
+def checked(sums: Sums, lower: FloatArray, penalty: FloatArray, w: FloatArray, upper: Any = np.inf) -> float:
     """How much less SciPy's bounded least squares leaves than `w` does, relative to what x has."""
     from scipy.optimize import lsq_linear
 
     scale, H, g = _scaled(sums, penalty)
     L = np.linalg.cholesky(H)
-    other = lsq_linear(L.T, np.linalg.solve(L, g), (lower * scale, np.inf), method="bvls").x
+    other = lsq_linear(L.T, np.linalg.solve(L, g), (lower * scale, upper * scale), method="bvls").x
 
     def cost(v: FloatArray) -> float:
         return float(0.5 * v @ H @ v - g @ v)
@@ -87,11 +93,13 @@ def checked(sums: Sums, lower: FloatArray, penalty: FloatArray, w: FloatArray) -
     return abs(cost(w * scale) - cost(other)) / max(sums.square / max(sums.rows, 1.0), 1e-300)
 
 
-def _scaled(sums: Sums, penalty: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _scaled(
+    sums: Sums, penalty: FloatArray, ridge: float = RIDGE
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Unit of each column, then Hessian and gradient in these units, per row."""
     rows = max(sums.rows, 1.0)
     own = np.diag(sums.gram) / rows
     scale = np.sqrt(np.where(own > 0.0, own, 1.0))
     H = (sums.gram / rows + penalty) / np.outer(scale, scale)
-    H[np.diag_indices_from(H)] += RIDGE
+    H[np.diag_indices_from(H)] += ridge
     return scale, H, sums.moment / rows / scale

@@ -208,8 +208,7 @@ class Regression:
         self, smoothness: float, used: IntArray, sums: Sums | None
     ) -> tuple[Sums, FloatArray, FloatArray]:
         sums = self.all if sums is None else sums
-        few = Sums(sums.gram[np.ix_(used, used)], sums.moment[used], sums.square, sums.rows)
-        return few, self.lower[used], self._cost(smoothness)[np.ix_(used, used)]
+        return sums.only(used), self.lower[used], self._cost(smoothness)[np.ix_(used, used)]
 
     def left_out(self, smoothness: float, used: IntArray) -> tuple[float, list[FloatArray]]:
         """Mean square of what each block but the first misses under the fit of the others, and those fits.

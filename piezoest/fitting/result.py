@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, positive
-from piezoest.estimators.coordinates import bridged, late
 from piezoest.fitting import trust
+from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.design import Design
 from piezoest.fitting.forms import FORMS
 from piezoest.fitting.runs import BoolArray

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from piezoest._checks import FloatArray, finite, fraction
-from piezoest.estimators.coordinates import late
+from piezoest.fitting.coordinates import late
 from piezoest.fitting.design import NO_CREEP, Basis, Design
 from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.play_columns import PlayColumns, Start, moving_of, starts

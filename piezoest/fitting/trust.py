@@ -8,13 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.fitting.outcome import BLOCKS, sandwich
 from piezoest.fitting.program import RIDGE
 from piezoest.fitting.regression import EARLIER, Fitted, Log
 from piezoest.fitting.rows import onto, times
 from piezoest.fitting.runs import BoolArray, IntArray
 
-# Blocks in time over which the gradients of a coloured residual are summed.
-BLOCKS = 25
 # Of what blocks left out miss, so much lies within the interval: what comes later is less like the record
 # than its blocks are like each other. In the median of 1000 simulated logs (seeds 7000 to 7999 of
 # benchmarks/logs.py), 97 of 100 later readings lie inside.
@@ -159,10 +158,8 @@ def covariance(fitted: Fitted, log: Log) -> FloatArray:
     bread = np.linalg.inv(H) / np.outer(scale, scale)
     dof = max(fitted.regression.all.rows - free.size, 1.0)
     white = np.diag(bread) * square / dof
-    wide = bread @ (gradients.T @ gradients) @ bread * BLOCKS / (BLOCKS - 1.0)
-    widening = np.sqrt(np.maximum(white / np.maximum(np.diag(wide), 1e-300), 1.0))
     P = np.zeros((fitted.w.size, fitted.w.size))
-    P[np.ix_(free, free)] = wide * np.outer(widening, widening)
+    P[np.ix_(free, free)] = sandwich(gradients @ bread, white, lost=1)
     return P
 
 

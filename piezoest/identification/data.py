@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.estimators.coordinates import bridged, late
+from piezoest.fitting.coordinates import bridged, late
 from piezoest.models import ColemanHodgdon, LinearGain
 from piezoest.signals.turns import TURN, turns
 

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.estimators.coordinates import bridged
+from piezoest.fitting.coordinates import bridged
 from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.identification.loop_direction import Loop, loop_of
 from piezoest.records import Record

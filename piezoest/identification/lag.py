@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import array_1d
-from piezoest.estimators.coordinates import bridged
+from piezoest.fitting.coordinates import bridged
 from piezoest.signals.turns import TURN, turns
 
 # Swings whose durations or sizes differ by this factor move at rates that tell.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.estimators.coordinates import bridged
+from piezoest.fitting.coordinates import bridged
 from piezoest.records import Record
 from piezoest.signals.turns import TURN, turns
 

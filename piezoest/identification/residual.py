@@ -29,7 +29,7 @@ def parameter_rows(model: Any, delay: float, errors: dict[str, float]) -> list[R
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """Displacement that a free-running model misses.
+    """Error of a model that computes the displacement from the voltage alone.
 
     Parameters
     ----------

@@ -96,7 +96,7 @@ class Candidate:
 
 
 class Validation(NamedTuple):
-    """Error of a model on another log of the stage, without a start that has not settled.
+    """Error of a model on another log of the same stage, from where the start has settled.
 
     The error is given as it is and without its mean, because the offset may change between two days.
     """

@@ -20,12 +20,6 @@ from piezoest.signals import check_continuity
 _FIT_MARGIN = 1e-6
 # Least alpha and beta of a fit, relative to their start.
 _LEAST = 1e-6
-# Values of a, times the range of the voltage, among which a fit's start is sought.
-_CURVATURES = (0.5, 2.0, 6.0)
-# What a record can tell from a straight line: log of a times the voltage's range, and b/c.
-_LARGEST_LOG = 4.0
-_RATIOS = (1e-3, 0.4995)
-_RATIOS_OF_START = (0.02, 0.48)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,26 +162,7 @@ class ColemanHodgdon(FreeRunning):
     # ------------------------------------------------------------ what a fit varies
 
     state_names: ClassVar[tuple[str, ...]] = ("initial_state",)
-    has_derivative_form: ClassVar[bool] = True
-    linear_coordinates: ClassVar[tuple[str, ...]] = ("offset", "initial_state", "place")
-
-    @classmethod
-    def guess(cls, u: FloatArray, x: FloatArray) -> Self | None:
-        """For some values of a the best b, c and offset, in which x is linear, and of these the best."""
-        counts = np.isfinite(x)
-        extent, middle = float(np.ptp(u)), 0.5 * float(u.max() + u.min())
-        least, best = np.inf, None
-        for curvature in _CURVATURES if extent > 0.0 else ():
-            unit = cls.from_loop(curvature / extent, 1.0, 1.0)
-            at_rest = unit.simulate(u, allow_jumps=True) - u
-            of_state = unit.simulate(u, initial_state=1.0, allow_jumps=True) - u - at_rest
-            columns = np.column_stack([at_rest, u - middle, np.ones_like(u), of_state])[counts]
-            b, c, centre, state = np.linalg.lstsq(columns, x[counts], rcond=None)[0]
-            cost = float(np.sum((columns @ (b, c, centre, state) - x[counts]) ** 2))
-            if c > 0.0 and cost < least:
-                b = float(np.clip(b / c, *_RATIOS_OF_START)) * c
-                least, best = cost, cls.from_loop(curvature / extent, b, c, centre - c * middle)
-        return best
+    is_loop: ClassVar[bool] = True
 
     @classmethod
     def coordinates(cls, held: Collection[str], within_reach: bool) -> tuple[str, ...]:
@@ -237,13 +212,6 @@ class ColemanHodgdon(FreeRunning):
         """1 < ratio < 2; alpha and beta keep a part of their start."""
         positive = {name: (_LEAST * start[name], np.inf) for name in ("alpha", "beta") if name in start}
         return positive | {"ratio": (1.0 + _FIT_MARGIN, 2.0 - _FIT_MARGIN), "place": (-1.0, 1.0)}
-
-    @classmethod
-    def record_limits(cls, extent: float) -> dict[str, tuple[float, float]]:
-        """Limits of a, and of b/c, which is 1 - 1/ratio."""
-        low, high = (1.0 / (1.0 - ratio) for ratio in _RATIOS)
-        largest = float(np.exp(_LARGEST_LOG))
-        return {"alpha": (1.0 / (largest * extent), largest / extent), "ratio": (low, high)}
 
     @classmethod
     def sizes(cls, value: Mapping[str, float]) -> dict[str, float]:

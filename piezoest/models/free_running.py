@@ -24,22 +24,19 @@ class FreeRunning(Model):
     offset: float
     #: States that the model carries from sample to sample.
     state_names: ClassVar[tuple[str, ...]] = ()
-    #: Whether `HysteresisRLS` learns a start for it.
-    has_derivative_form: ClassVar[bool] = False
-
-    #: Coordinates in which the displacement is linear while the others stay.
-    linear_coordinates: ClassVar[tuple[str, ...]] = ("offset",)
+    #: Whether it is a loop (2), (3), which is linear in all but alpha: a fit finds its start by that.
+    is_loop: ClassVar[bool] = False
 
     @classmethod
-    @abstractmethod
     def guess(cls, u: FloatArray, x: FloatArray) -> Self | None:
-        """Model of a record's size to start from; None where the record shows none.
+        """Model of a record's size to start from; None where the record alone does not say.
 
         Parameters
         ----------
         u, x : ndarray, shape (N,)
             Voltage [V] without gaps, and displacement [µm] with NaN where it is missing.
         """
+        return None
 
     @classmethod
     def coordinates(cls, held: Collection[str], within_reach: bool) -> tuple[str, ...]:
@@ -103,17 +100,6 @@ class FreeRunning(Model):
         ----------
         start : mapping
             Coordinates by name that the fit starts from.
-        """
-        return {}
-
-    @classmethod
-    def record_limits(cls, extent: float) -> dict[str, tuple[float, float]]:
-        """Narrower bounds: what a record can tell from nothing at all.
-
-        Parameters
-        ----------
-        extent : float
-            Range of the record's voltage [V].
         """
         return {}
 

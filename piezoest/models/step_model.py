@@ -105,11 +105,6 @@ class StepModel(FreeRunning):
         return {name: (LEAST * start[name], np.inf) for name in above}
 
     @classmethod
-    def guess(cls, u: FloatArray, x: FloatArray) -> Self | None:
-        """Return None: the record alone does not say where to start from."""
-        return None
-
-    @classmethod
     def free_step(cls, state: Any, u_0: Any, u_1: Any, constants: Any) -> tuple[tuple[Any, ...], Any]:
         """State and displacement without offset after a sample."""
         after = [state[i] for i in range(len(cls.state_names))]

@@ -58,7 +58,7 @@ def write_columns(path: str | Path, columns: Mapping[str, Any], *, allow_nan: bo
 
 
 def writer_for(path: str | Path) -> Callable[[Path, Columns], None]:
-    """Function that writes a file of this name, with the package that it needs loaded.
+    """Function that writes a file of this name; the package that it needs is loaded.
 
     Parameters
     ----------

@@ -4,10 +4,10 @@ The only package that imports CasADi. The functions of `piezoest.equations` are 
 symbols, so nothing is written a second time.
 """
 
-from piezoest.symbolic.solving import Evaluation, Minimum, ipopt, quadratic_program, quadratic_solver
+from piezoest.symbolic.solving import Evaluation, Solution, ipopt, quadratic_program, quadratic_solver
 from piezoest.symbolic.tracing import Pass, Simulation, jacobian, simulation, trace
 
 __all__ = [
-    "Evaluation", "Minimum", "Pass", "Simulation", "ipopt", "jacobian", "quadratic_program",
+    "Evaluation", "Pass", "Simulation", "Solution", "ipopt", "jacobian", "quadratic_program",
     "quadratic_solver", "simulation", "trace",
 ]  # fmt: skip

@@ -26,13 +26,13 @@ class Evaluation(NamedTuple):
     hessian: FloatArray
 
 
-class Minimum(NamedTuple):
-    """Where IPOPT ended, and its own words."""
+class Solution(NamedTuple):
+    """Where a solver ended, its own words, and at how many points it was."""
 
-    z: FloatArray
+    q: FloatArray
     success: bool
     message: str
-    iterations: int
+    evaluations: int
 
 
 def ipopt(
@@ -43,23 +43,18 @@ def ipopt(
     constraints: int,
     max_iterations: int,
     tolerance: float,
-) -> Minimum:
+) -> Solution:
     """Minimise subject to bounds and constraints = 0, by IPOPT."""
-    point = _Point(evaluate)
-    n, m = start.size, constraints
-    values = _Output("values", [n], [(1, 1), (m, 1)], lambda e: (e.objective, e.constraints), point)
-    functions = {
-        "grad_f": _Output("grad_f", [n, 0], [(1, 1), (n, 1)], lambda e: (e.objective, e.gradient), point),
-        "jac_g": _Output(
-            "jac_g", [n, 0], [(m, 1), (m, n)], lambda e: (e.constraints, e.constraint_jacobian), point
-        ),
-        "hess_lag": _Hessian("hess_lag", [n, 0, 1, m], [(n, n)], lambda e: (np.triu(e.hessian),), point),
-    }
-    z = casadi.MX.sym("z", n)
-    objective, g = values(z)
-    problem: Any = {"x": z, "f": objective, "g": g}
+    point = _Point(evaluate, start.size, constraints)
+    q, none = casadi.MX.sym("q", start.size), casadi.MX.sym("p", 0)
+    weight, multipliers = casadi.MX.sym("w"), casadi.MX.sym("l", constraints)
+    f, gradient, g, jacobian, hessian = point(q)
+    upper_half = weight * casadi.triu(hessian)
+    problem: Any = {"x": q, "f": f, "g": g}
     options: Any = {
-        **functions,
+        "grad_f": casadi.Function("grad_f", [q, none], [f, gradient]),
+        "jac_g": casadi.Function("jac_g", [q, none], [g, jacobian]),
+        "hess_lag": casadi.Function("hess_lag", [q, none, weight, multipliers], [upper_half]),
         "print_time": False,
         "no_nlp_grad": True,
         "ipopt": {
@@ -74,71 +69,34 @@ def ipopt(
     solver = casadi.nlpsol("solver", "ipopt", problem, options)
     solution = solver(x0=start, lbx=lower, ubx=upper, lbg=0.0, ubg=0.0)
     stats = solver.stats()
-    return Minimum(
+    return Solution(
         solution["x"].full()[:, 0],
         bool(stats["success"]),
         f"IPOPT: {stats['return_status']}",
-        int(stats["iter_count"]),
+        point.last.cache_info().misses,
     )
 
 
-class _Point:
-    """Last point evaluated: IPOPT asks for value, gradient, Jacobian and Hessian one by one."""
+class _Point(casadi.Callback):
+    """An `Evaluation` as a CasADi Function of q; the last is kept: IPOPT asks for its parts one by one."""
 
-    __slots__ = ("_evaluate", "_value", "_z")
-
-    def __init__(self, evaluate: Callable[[FloatArray], Evaluation]) -> None:
-        self._evaluate = evaluate
-        self._z: bytes | None = None
-        self._value: Evaluation
-
-    def __call__(self, z: FloatArray) -> Evaluation:
-        if z.tobytes() != self._z:
-            self._value, self._z = self._evaluate(z), z.tobytes()
-        return self._value
-
-
-class _Output(casadi.Callback):
-    """Something of an `Evaluation` as a CasADi Function of z."""
-
-    def __init__(
-        self,
-        name: str,
-        inputs: list[int],
-        outputs: list[tuple[int, int]],
-        choose: Callable[[Evaluation], tuple[Any, ...]],
-        point: _Point,
-    ) -> None:
+    def __init__(self, evaluate: Callable[[FloatArray], Evaluation], n: int, m: int) -> None:
         super().__init__()
-        self._inputs, self._outputs, self._choose, self._point = inputs, outputs, choose, point
-        self.construct(name, {})
-
-    def get_n_in(self) -> int:
-        return len(self._inputs)
+        self.last = lru_cache(maxsize=1)(lambda q: evaluate(np.frombuffer(q)))
+        self._inputs, self._outputs = n, ((1, 1), (n, 1), (m, 1), (m, n), (n, n))
+        self.construct("point", {})
 
     def get_n_out(self) -> int:
         return len(self._outputs)
 
     def get_sparsity_in(self, i: int) -> Any:
-        return casadi.Sparsity.dense(self._inputs[i], 1)
+        return casadi.Sparsity.dense(self._inputs, 1)
 
     def get_sparsity_out(self, i: int) -> Any:
         return casadi.Sparsity.dense(*self._outputs[i])
 
     def eval(self, arguments: Any) -> list[Any]:
-        chosen = self._choose(self._point(arguments[0].full()[:, 0]))
-        return [casadi.DM(value) for value in chosen]
-
-
-class _Hessian(_Output):
-    """Upper triangle of the objective's Hessian, times its multiplier."""
-
-    def get_sparsity_out(self, i: int) -> Any:
-        return casadi.Sparsity.upper(self._outputs[i][0])
-
-    def eval(self, arguments: Any) -> list[Any]:
-        (hessian,) = super().eval(arguments)
-        return [casadi.project(hessian * float(arguments[2]), self.get_sparsity_out(0))]
+        return [casadi.DM(value) for value in self.last(arguments[0].full()[:, 0].tobytes())]
 
 
 # Solvers of convex programs, the fastest first; which of them there are depends on how CasADi was built.
@@ -162,7 +120,7 @@ def _conic(size: int) -> Any:
     return casadi.conic("program", name, shapes, {**QUADRATIC[name], "error_on_fail": False})
 
 
-def quadratic_program(H: FloatArray, g: FloatArray, lower: FloatArray) -> FloatArray:
-    """Minimum of w' H w / 2 - g' w over w >= lower, for a symmetric positive definite H."""
-    found = _conic(g.size)(h=casadi.DM(H), g=-g, lbx=lower, ubx=np.inf)
-    return np.fmax(found["x"].full()[:, 0], lower)
+def quadratic_program(H: FloatArray, g: FloatArray, lower: FloatArray, upper: Any = np.inf) -> FloatArray:
+    """Minimum of w' H w / 2 - g' w over lower <= w <= upper."""
+    found = _conic(g.size)(h=casadi.DM(H), g=-g, lbx=lower, ubx=upper)
+    return np.clip(found["x"].full()[:, 0], lower, upper)

@@ -10,7 +10,7 @@ import pytest
 
 import piezoest as pz
 from piezoest.estimators.batch import BatchFit
-from piezoest.estimators.fit import bend
+from piezoest.fitting.losses import bend
 from piezoest.models import FreeRunning
 
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.estimators import fit, horizon
+from piezoest.estimators import horizon
 from piezoest.estimators.batch import BatchFit
 from piezoest.estimators.horizon import MovingHorizon
 from piezoest.estimators.thinning import thinned
+from piezoest.fitting import gauss_newton
 
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 RATE = 2000.0
@@ -25,7 +26,7 @@ def record(seconds: float = 1.0, noise: float = NOISE, seed: int = 0, model: Any
 
 def test_solves_once_a_hop_and_holds_between(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[int] = []
-    solve = fit.single_shooting
+    solve = gauss_newton.single_shooting
 
     def counted(*arguments: Any) -> Any:
         calls.append(estimator.status.samples)

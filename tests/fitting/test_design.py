@@ -69,7 +69,7 @@ def test_a_loop_simulates_what_its_columns_give(seed: int) -> None:
     basis = LoopColumns(float(rng.uniform(0.005, 0.1)))
     w = np.array([*rng.uniform(0.05, 0.2, 2), rng.uniform(-1.0, 1.0), 3.0, 0.0])
     model = basis.model(w, 3.0, None, RATE)
-    assert (model.alpha, model.beta) == pytest.approx((basis.alpha, w[0]))
+    assert (model.alpha, model.beta) == pytest.approx((basis.alpha, w[0] + w[1]))
     state = basis.initial_state(w, model)
     x = Design(basis, RATE, u.size).output(u, w)
     np.testing.assert_allclose(model.simulate(u, initial_state=state), x, atol=1e-9)

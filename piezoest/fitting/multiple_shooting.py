@@ -11,8 +11,8 @@ from itertools import pairwise
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.estimators.fit import Problem, Solution, bend
-from piezoest.symbolic import Evaluation, Pass, ipopt
+from piezoest.fitting.problem import Problem
+from piezoest.symbolic import Evaluation, Solution, ipopt
 
 SEGMENTS = 20
 # Samples on each side of a segment's start that its start state is guessed from.
@@ -44,12 +44,12 @@ def multiple_shooting(
             TOLERANCE,
         )
     except RuntimeError as error:
-        return Solution(start, False, f"IPOPT: {error}", segments.evaluations)
-    q = (found.z * unit)[: start.size]
+        return Solution(start, False, f"IPOPT: {error}", 0)
+    q = (found.q * unit)[: start.size]
     # Not converged, the segments need not join: the best iterate is then judged in one piece.
     if not found.success and not problem.cost(q) < problem.cost(start):
         q = start
-    return Solution(np.clip(q, lower, upper), found.success, found.message, segments.evaluations)
+    return found._replace(q=np.clip(q, lower, upper))
 
 
 class _Segments:
@@ -57,7 +57,6 @@ class _Segments:
 
     def __init__(self, problem: Problem, q: FloatArray, loss: str, scale: float) -> None:
         self.problem, self.loss, self.scale = problem, loss, scale
-        self.evaluations = 0
         N = problem.u.size
         self.edges = np.unique(np.linspace(0, N, min(SEGMENTS, N) + 1).astype(int))
         self.start = np.concatenate([q, *self._states(q)])
@@ -96,7 +95,6 @@ class _Segments:
 
     def evaluate(self, z: FloatArray) -> Evaluation:
         """Everything IPOPT asks for at a point, by one pass over all segments."""
-        self.evaluations += 1
         z = z * self.unit
         problem, simulation = self.problem, self.problem.coordinates.simulation
         n_q, n_p, n_s = len(problem.coordinates.free), simulation.n_p, simulation.n_s
@@ -113,10 +111,10 @@ class _Segments:
             before = problem.u[max(rows.start - 1, 0)]
             run = simulation.run(problem.u[rows], v[:n_p], s, problem.decays, before=before)
             V = np.concatenate([by_z[:n_p], by_z[n_p:][own]])
-            cost, g, H = self._sums(run, rows)
+            cost, sums = problem.sums(run, rows, self.loss, self.scale)
             objective += cost
-            gradient += V.T @ g
-            hessian += V.T @ H @ V
+            gradient -= V.T @ sums.moment
+            hessian += V.T @ sums.gram @ V
             ends[i], ends_by_z[own] = run.end, run.end_jacobian @ V
         defect = (ends[:-1] - starts[1:]).ravel()
         defect_jacobian = ends_by_z[:-n_s] - by_z[n_p + n_s :]
@@ -129,13 +127,3 @@ class _Segments:
             defect_jacobian * unit / state_unit[:, None],
             hessian * np.outer(unit, unit) * self.normal,
         )
-
-    def _sums(self, run: Pass, rows: slice) -> tuple[float, FloatArray, FloatArray]:
-        """Cost of a segment, gradient and Gauss-Newton Hessian by (p, s)."""
-        weight = self.problem.weight[rows]
-        residual = (run.x - self.problem.x[rows]) * weight
-        rho = bend(self.loss, (residual / self.scale) ** 2)
-        J = run.jacobian * weight[:, None]
-        cost = 0.5 * self.scale**2 * float(rho[0].sum())
-        # Weights in place of the loss's own curvature: an upper bound, which does not overshoot.
-        return cost, J.T @ (rho[1] * residual), (J * rho[1][:, None]).T @ J
