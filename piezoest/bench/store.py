@@ -5,6 +5,7 @@ A process that is killed loses at most the row that it is at. A key that comes t
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import sqlite3
@@ -39,11 +40,12 @@ class Store:
 
     def __enter__(self) -> Self:
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        self._rows = sqlite3.connect(self._path, timeout=PATIENCE, isolation_level=None)
-        # With a log written ahead a row costs no wait for the disk.
-        self._rows.execute("PRAGMA journal_mode = WAL")
-        self._rows.execute("PRAGMA synchronous = NORMAL")
-        self._rows.execute("CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, row TEXT)")
+        with self._named():
+            self._rows = sqlite3.connect(self._path, timeout=PATIENCE, isolation_level=None)
+            # With a log written ahead a row costs no wait for the disk.
+            self._rows.execute("PRAGMA journal_mode = WAL")
+            self._rows.execute("PRAGMA synchronous = NORMAL")
+            self._rows.execute("CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, row TEXT)")
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -55,13 +57,19 @@ class Store:
     def __len__(self) -> int:
         return int(self._rows.execute("SELECT count(*) FROM runs").fetchone()[0])
 
+    @contextlib.contextmanager
+    def _named(self) -> Iterator[None]:
+        """Say of which file it is that cannot be written, as on a full disk."""
+        try:
+            yield
+        except sqlite3.DatabaseError as error:
+            raise OSError(f"{self._path}: {error}") from None
+
     def append(self, row: Row) -> bool:
         """Keep a row, at once; False if its key is known already, and then the first one stands."""
         values = row["key"], json.dumps(row, allow_nan=False, ensure_ascii=False)
-        try:
+        with self._named():
             return self._rows.execute("INSERT OR IGNORE INTO runs VALUES (?, ?)", values).rowcount > 0
-        except sqlite3.OperationalError as error:  # as on a full disk
-            raise OSError(f"{self._path}: {error}") from None
 
     def rows(self, keys: Iterable[str]) -> Iterator[Row]:
         """Rows of these keys, in their order; a key without one is left out."""

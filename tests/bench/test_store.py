@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from piezoest.bench.store import Store
 
 
@@ -22,9 +24,18 @@ def test_a_store_keeps_the_first_row_of_each_key_and_goes_on(tmp_path: Path) -> 
         assert [row["value"] for row in store.rows(["c", "no", "a", "b"])] == [4, 1, 3]
 
 
+def test_a_file_that_is_no_store_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "runs.sqlite"
+    path.write_text("no rows" * 1000)
+    with pytest.raises(OSError, match=r"runs\.sqlite: file is not a database"), Store(path):
+        pass
+
+
 APPEND = """
 import sys
 from pathlib import Path
+
+import pytest
 
 from piezoest.bench.store import Store
 
