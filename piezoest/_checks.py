@@ -89,6 +89,11 @@ def integer(name: str, value: Any, minimum: int = 0, maximum: int | None = None)
     return int(number)
 
 
+def measured(name: str, value: Any) -> float:
+    """Return a displacement, or a voltage, that can be."""
+    return fraction(name, value, -0.5 * WILDEST, 0.5 * WILDEST)
+
+
 def number_or_nan(value: Any) -> float:
     """Return what a driver gave as a float; NaN where it is not one real number, whatever else it is."""
     if isinstance(value, float):

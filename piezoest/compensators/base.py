@@ -7,7 +7,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, instance, integer, number_or_nan, positive
+from piezoest._checks import FloatArray, array_1d, instance, integer, measured, number_or_nan, positive
 from piezoest.compensators import inverse_kernel as kernel
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.layout import Copied, Named, Record, new
@@ -106,13 +106,37 @@ class Compensator(Copied):
         kept, slots = cast(Any, super().__getstate__())
         return kept, {**slots, "_loops": None}
 
-    def reset(self) -> None:
-        """Return to the state after construction, with the model given there."""
+    def reset(self, voltage: float | None = None, displacement: float | None = None) -> None:
+        """Return to the state after construction, with the model given there.
+
+        Parameters
+        ----------
+        voltage : float, optional
+            Voltage at which the stage rests [V], within the limits. Default: the one nearest to 0 V.
+        displacement : float, optional
+            Reading of the sensor there [µm]. Default: what the model expects. The difference to it decays
+            over `transfer_samples`, as after a change of model: the voltage does not jump.
+
+        Raises
+        ------
+        ValueError
+            If the voltage is outside the limits, or the displacement is not a number.
+
+        Examples
+        --------
+        >>> import piezoest as pz
+        >>> compensator = pz.LinearCompensator(pz.LinearGain(0.15))
+        >>> compensator.reset(voltage=20.0, displacement=3.1)
+        >>> round(compensator.step(3.1), 2)  # where the stage is; the model alone has 20.67 V
+        20.0
+        """
+        u = self._limits.resting(voltage)
+        x = None if displacement is None else measured("displacement", displacement)
         self._projected = False
         self._waiting: Model | None = None
         self._model = self._start
         self._make_room()
-        kernel.begin(*self._named(), self._limits.rest, self._model.slope)
+        kernel.begin(*self._named(), u, self._model.slope, x)
 
     def _make_room(self) -> None:
         """State of zeros, and settings, for the model."""

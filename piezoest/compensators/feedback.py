@@ -81,7 +81,7 @@ class IntegralFeedback(AroundCompensator):
                 self._integral += growth
         return self._compensator.step(r + self._integral)
 
-    def reset(self) -> None:
-        """Return to the state after construction."""
+    def reset(self, voltage: float | None = None, displacement: float | None = None) -> None:
+        """Return to the state after construction, at rest at a voltage [V] and a displacement [µm]."""
         self._integral = 0.0
-        self._compensator.reset()
+        self._compensator.reset(voltage, displacement)

@@ -128,13 +128,15 @@ def change(state: Record, settings: Record, new: Vector) -> None:
 # Rare, and not compiled: in Python, on `piezoest.layout.Named` records.
 
 
-def begin(state: Any, settings: Any, u: float, slope: float) -> None:
-    """Begin with a state of zeros, at rest at voltage u, with a model of this slope."""
+def begin(state: Any, settings: Any, u: float, slope: float, x: float | None) -> None:
+    """Begin with a state of zeros, at rest at voltage u and displacement x, with a model of this slope."""
     state.voltage = u
     recent_path.begin(state.path, u, 1.0)
     remember(state.memory, u)
     state.inverse.place(state, settings)
-    corridor.begin(state.corridor, settings, u, state.inverse.expected(state, settings), slope)
+    expected = state.inverse.expected(state, settings)
+    state.owed = 0.0 if x is None else x - expected
+    corridor.begin(state.corridor, settings, u, expected + state.owed, slope)
 
 
 def go_on(state: Any, settings: Any, expected: float, stays: bool) -> None:

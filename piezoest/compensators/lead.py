@@ -143,7 +143,7 @@ class LeadFilter(AroundCompensator):
         _run.of(STATE, SETTINGS)(self._state, self._settings, lead)
         return self._compensator.run(lead)
 
-    def reset(self) -> None:
-        """Return to the state after construction."""
+    def reset(self, voltage: float | None = None, displacement: float | None = None) -> None:
+        """Return to the state after construction, at rest at a voltage [V] and a displacement [µm]."""
         self._state = new(STATE)
-        self._compensator.reset()
+        self._compensator.reset(voltage, displacement)

@@ -10,7 +10,7 @@ from typing import Any, Self, cast
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, moderate, number_or_nan
+from piezoest._checks import FloatArray, array_1d, measured, moderate, number_or_nan
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import kernel, making, saved, shown, team
 from piezoest.controller.face import Face
@@ -145,8 +145,8 @@ class AdaptiveFeedforward(Face):
         ValueError
             If the voltage is outside the limits, or the displacement is not a number.
         """
-        u = making.rest(self._limits, voltage)
-        x = None if displacement is None else making.measured("displacement", displacement)
+        u = self._limits.resting(voltage)
+        x = None if displacement is None else measured("displacement", displacement)
         write(self._state, self._start[0])
         write(self._settings, self._start[1])
         self._events = deque(maxlen=MOST_EVENTS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from piezoest._checks import WILDEST, finite, fraction, instance, integer, moderate, non_negative, positive
+from piezoest._checks import finite, fraction, instance, integer, moderate, non_negative, positive
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import candidate, homing, kernel, pace, slots
 from piezoest.controller.feedback import FASTEST
@@ -83,16 +83,6 @@ def options(
     }
 
 
-def rest(limits: VoltageLimits, voltage: Any) -> float:
-    """Return the voltage at which a stage rests; None for the one nearest to 0 V."""
-    u = limits.rest if voltage is None else finite("voltage", voltage)
-    if not limits.minimum <= u <= limits.maximum:
-        raise ValueError(
-            f"voltage must lie within the limits, {limits.minimum:g} V to {limits.maximum:g} V, got {u:g} V"
-        )
-    return u
-
-
 def sweep(
     limits: VoltageLimits, sample_rate: float, amplitude: Any, frequency: Any, cycles: Any
 ) -> tuple[float, float, float]:
@@ -108,11 +98,6 @@ def sweep(
             f"sample_rate, got {frequency:g} Hz"
         )
     return amplitude, frequency / sample_rate, float(integer("cycles", cycles, 1, int(homing.MOST)))
-
-
-def measured(name: str, value: Any) -> float:
-    """Return a displacement, or a voltage, that can be."""
-    return fraction(name, value, -0.5 * WILDEST, 0.5 * WILDEST)
 
 
 def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, Any]) -> dict[str, Any]:

@@ -193,3 +193,32 @@ def test_integral_feedback_removes_a_constant_error() -> None:
     record = pz.track(np.full(2000, 2.0), stage=stage, compensator=loop, allow_jumps=True)
     assert abs(record.error[-1]) < 1e-6
     assert abs(record.error[0]) > 0.09
+
+
+@pytest.mark.parametrize(
+    "model", [MODEL, pz.LinearGain(0.155, offset=0.3), pz.PrandtlIshlinskii(0.1, [2.0], [0.04])]
+)
+def test_begins_where_the_stage_is_told_to_be(model: Any) -> None:
+    """From a voltage and a reading there the voltage does not jump; the model's own way is the end of it."""
+    compensator = pz.InverseCompensator(model, pz.VoltageLimits(0.0, 100.0), transfer_samples=20)
+    compensator.reset(voltage=40.0, displacement=7.0)
+    u = compensator.run(np.full(400, 7.0))
+    assert abs(u[0] - 40.0) < 1.0
+    assert np.abs(np.diff(u)).max() < 1.0
+    compensator.reset(voltage=40.0)
+    assert compensator.voltage == 40.0
+    compensator.reset()
+    assert compensator.voltage == 0.0
+    with pytest.raises(ValueError, match="voltage must lie within the limits"):
+        compensator.reset(voltage=101.0)
+    with pytest.raises(ValueError, match="displacement"):
+        compensator.reset(displacement=float("nan"))
+
+
+def test_what_is_around_is_told_too() -> None:
+    for around in (
+        pz.IntegralFeedback(pz.InverseCompensator(MODEL), gain=10.0, sample_rate=FS),
+        pz.LeadFilter(pz.InverseCompensator(MODEL), pz.MassSpringDamper(780.0, 0.02), sample_rate=FS),
+    ):
+        around.reset(voltage=10.0, displacement=2.0)
+        assert around.compensator.voltage == 10.0
