@@ -77,11 +77,14 @@ def widest(travel: Any) -> float:
 
 @register_jitable
 def progress(travel: Any, gone: Any) -> float:
-    """What a sample counts, about one in all for a leg: half by travel, half by time, rests soon nothing."""
+    """What a sample counts, about one in all for a leg as long as the widest swing, less for a shorter one.
+
+    Half by travel, half by time; rests soon count nothing.
+    """
     usual = max(travel.usual, 8.0)
-    return 0.5 * in_swings(travel, gone) + (
-        0.5 / max(usual, travel.count) if travel.count < 2.0 * usual else 0.0
-    )
+    by_time = 1.0 / max(usual, travel.count) if travel.count < 2.0 * usual else 0.0
+    wide = widest(travel)
+    return 0.5 * (in_swings(travel, gone) + by_time) * (travel.swing / wide if wide > 0.0 else 1.0)
 
 
 @register_jitable
