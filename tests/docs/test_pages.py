@@ -113,3 +113,14 @@ def test_links_that_lead_nowhere_are_found(tmp_path: Path, link: str, said: str)
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert said in done.stderr
+
+
+def test_tests_that_pages_name_are_there() -> None:
+    pages = [*DOCS.glob("*.rst"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+    texts = [page.read_text(encoding="utf-8") for page in pages]
+    named = [found for text in texts for found in re.findall(r"(tests/[\w/]+\.py)::(\w+)", text)]
+    assert named
+    missing = [
+        each for each in named if f"def {each[1]}(" not in (ROOT / each[0]).read_text(encoding="utf-8")
+    ]
+    assert not missing
