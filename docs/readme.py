@@ -21,7 +21,8 @@ FIGURE = DOCS / "figures" / "effect.png"
 BEGIN, END = "<!-- figures: made by docs/readme.py -->\n", "<!-- end of figures -->\n"
 ROW = "5.0 µm @ 5.0 Hz"  # of the paper's tables
 TEXT = """
-Errors are the largest ones, in % of the amplitude, on the simulated stage of the paper. *Settles*: periods
+Errors are the largest ones, in % of the amplitude, on the simulated stage of the paper. It consists of
+plays, which favours PrandtlIshlinskiiRLS; real stages do not. *Settles*: periods
 after a change until every further error is below 1.2 %, and the share of runs that settle. *First*: in the
 first period after the change. *Settled*: in the last half of the periods. *Step*: one sample, called from
 Python. Geometric means over the scenarios of the medians over {seeds} seeds; {machine}, {date}.

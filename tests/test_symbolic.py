@@ -75,3 +75,16 @@ def test_coordinates_of_a_model_are_the_model(held: tuple[str, ...]) -> None:
         other = varied(moved, values)
         np.testing.assert_allclose(by_q[:, i], (other[0] - v) / h, rtol=1e-4, atol=1e-8)
         np.testing.assert_allclose(theta_by_q[:, i], (other[2] - theta) / h, rtol=1e-4, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("H", "lower"),
+    [
+        (np.diag([1.0, -1.0]), np.zeros(2)),
+        (np.eye(2), np.array([0.0, np.nan])),
+        (np.full((2, 2), np.nan), np.zeros(2)),
+    ],
+)
+def test_a_program_without_an_optimum_is_refused(H: Any, lower: Any) -> None:
+    with pytest.raises(np.linalg.LinAlgError, match="no solver ends"):
+        symbolic.quadratic_program(H, np.ones(2), lower)

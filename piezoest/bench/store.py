@@ -9,6 +9,7 @@ import contextlib
 import hashlib
 import json
 import sqlite3
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -42,11 +43,27 @@ class Store:
         self._path.parent.mkdir(parents=True, exist_ok=True)
         with self._named():
             self._rows = sqlite3.connect(self._path, timeout=PATIENCE, isolation_level=None)
-            # With a log written ahead a row costs no wait for the disk.
-            self._rows.execute("PRAGMA journal_mode = WAL")
-            self._rows.execute("PRAGMA synchronous = NORMAL")
-            self._rows.execute("CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, row TEXT)")
+        try:
+            self._write_ahead()
+            self._execute("PRAGMA synchronous = NORMAL")
+            self._execute("CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, row TEXT)")
+        except OSError:
+            self._rows.close()
+            raise
         return self
+
+    def _write_ahead(self) -> None:
+        """Let a log be written ahead, with which a row costs no wait for the disk."""
+        end = time.monotonic() + PATIENCE
+        while True:
+            try:
+                self._execute("PRAGMA journal_mode = WAL")
+                return
+            except OSError as error:
+                # This alone does not wait for a process that is doing the same.
+                if "locked" not in str(error) or time.monotonic() > end:
+                    raise
+                time.sleep(0.01)
 
     def __exit__(self, *error: object) -> None:
         self._rows.close()
@@ -55,28 +72,31 @@ class Store:
         return self._row(key) is not None
 
     def __len__(self) -> int:
-        return int(self._rows.execute("SELECT count(*) FROM runs").fetchone()[0])
+        return int(self._execute("SELECT count(*) FROM runs").fetchone()[0])
 
     @contextlib.contextmanager
     def _named(self) -> Iterator[None]:
-        """Say of which file it is that cannot be written, as on a full disk."""
+        """Name the file in an error of SQLite, as on a full disk."""
         try:
             yield
         except sqlite3.DatabaseError as error:
             raise OSError(f"{self._path}: {error}") from None
 
+    def _execute(self, statement: str, *values: str) -> sqlite3.Cursor:
+        with self._named():
+            return self._rows.execute(statement, values)
+
     def append(self, row: Row) -> bool:
         """Keep a row, at once; False if its key is known already, and then the first one stands."""
-        values = row["key"], json.dumps(row, allow_nan=False, ensure_ascii=False)
-        with self._named():
-            return self._rows.execute("INSERT OR IGNORE INTO runs VALUES (?, ?)", values).rowcount > 0
+        text = json.dumps(row, allow_nan=False, ensure_ascii=False)
+        return self._execute("INSERT OR IGNORE INTO runs VALUES (?, ?)", row["key"], text).rowcount > 0
 
     def rows(self, keys: Iterable[str]) -> Iterator[Row]:
         """Rows of these keys, in their order; a key without one is left out."""
         return (json.loads(row) for key in keys if (row := self._row(key)) is not None)
 
     def _row(self, key: str) -> str | None:
-        found = self._rows.execute("SELECT row FROM runs WHERE key = ?", (key,)).fetchone()
+        found = self._execute("SELECT row FROM runs WHERE key = ?", key).fetchone()
         return found[0] if found else None
 
 

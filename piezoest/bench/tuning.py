@@ -105,10 +105,11 @@ def tunable(text: str) -> Tunable:
                 continue
             case list([_, *_]):
                 continue
-            case range(start=low, stop=high) if positive("stop", high) > positive("start", low):
+            case range(start=low, stop=high, step=1) if positive("stop", high) > positive("start", low):
                 continue
         raise ValueError(
-            f"{text}: tuning_space[{key!r}] must be (low, high), a range or a list, got {values!r}"
+            f"{text}: tuning_space[{key!r}] must be (low, high), a range without a step or a list, "
+            f"got {values!r}"
         )
     return Tunable(text, _call(name, own), own)
 

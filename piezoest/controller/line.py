@@ -2,8 +2,8 @@
 
 Least squares over the last legs of the reference, those up and those down alike, so that a loop's width
 cancels. It is fitted again at each turn; between turns nothing that a resonance or a lag does can lead it
-astray. Small loops are flatter than the wide one that they lie in: a leg makes those before it forgotten only
-as far as it is long, so that a line through the last two small ones is not taken for the stage's.
+astray. A short leg takes little weight from those before it: small loops are flatter than the wide one around
+them, and a line through the last two small ones would be wrong.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, record
+from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SIGN, record
 
 # Points: how many; means of voltage and reading; mean squares of their deviations, mean product.
 POINTS = record(
@@ -23,12 +23,12 @@ POINTS = record(
 LEGS = record(length=DISTANCE, points=POINTS)
 # The line; the one before the last turn, and before the one before; the gain it began with; whether the
 # voltage was at a limit since the last turn; legs so far, those of late that agreed with it; length of the
-# first leg when it was looked at last [V], of the longest leg of late [µm]; points of this leg, of those
-# before it, and of both directions together.
+# first leg when it was looked at last [V], of the longest leg of late [µm]; direction of the last leg;
+# points of this leg, of those before it, and of both directions together.
 LINE = record(
     gain=NUMBER, centre=NUMBER, last_gain=NUMBER, last_centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER,
     first_gain=NUMBER, clipped=FLAG, legs=COUNT, agreed=AMOUNT, looked=AMOUNT, longest=DISTANCE,
-    now=POINTS, up=LEGS, down=LEGS, both=POINTS,
+    direction=SIGN, now=POINTS, up=LEGS, down=LEGS, both=POINTS,
 )  # fmt: skip
 
 # Points of which a line explains less than this share teach nothing about its gain; it changes by no more
@@ -39,8 +39,8 @@ ANSWERED = 0.1
 # Where no line explains the points, the stage goes too far at so many times what the gain says, if the
 # voltage was at a limit and if not.
 FARTHER, MUCH_FARTHER = 1.5, 2.5
-# After a leg as long as the longest of late those before count for this share of its length; after a shorter
-# one for so many times what it lacks, too. The longest one fades by this factor at each turn.
+# After a leg those before it count for KEPT (longest - leg) + LEFT leg of their length; the longest one of
+# late fades by this factor at each turn.
 LEFT, KEPT, FADES = 1.0 / 3.0, 2.0, 0.95
 # Before so many legs only the last two count, which may lead from rest to where the reference is; and of them
 # the last one alone, if the mean square of the one before is so many times larger.
@@ -54,7 +54,7 @@ def begin(line: Any, gain: Any, u: Any, x: Any, leg: Any) -> None:
     """Begin with a gain and a line through one point; legs shorter than half of `leg` are not looked at."""
     line.gain = line.last_gain = line.held_gain = line.first_gain = gain
     line.centre = line.last_centre = line.held_centre = x - gain * u
-    line.agreed = line.legs = line.longest = 0.0
+    line.agreed = line.legs = line.longest = line.direction = 0.0
     line.looked = 0.25 * leg
     forget_legs(line)
     forget(line.now)
@@ -153,10 +153,13 @@ def _draw(line: Any, points: Any) -> None:
 
 
 @register_jitable
-def _through_both(line: Any, legs: Any, others: Any) -> None:
+def _through_both(line: Any, legs: Any, others: Any, direction: Any) -> None:
     """Draw the line through the legs of both directions, which count alike, however long they took."""
-    if line.legs <= SETTLED and others.points.square > UNLIKE * line.now.square:
+    unlike = line.legs <= SETTLED and others.points.square > UNLIKE * line.now.square
+    # Where a quick way back has too few readings, those of an earlier one become old.
+    if unlike or direction == line.direction:
         others.length = 0.0
+    line.direction = direction
     _join(line.both, legs.points, 1.0)
     if others.length > 0.0:
         _join(line.both, others.points, 0.5)
@@ -180,10 +183,10 @@ def turn(line: Any, direction: Any, leg: Any) -> None:
         line.agreed = line.agreed + 1.0 if agrees else 0.5 * line.agreed
     if direction > 0.0:
         _take(line.up, now, leg, kept)
-        _through_both(line, line.up, line.down)
+        _through_both(line, line.up, line.down, direction)
     else:
         _take(line.down, now, leg, kept)
-        _through_both(line, line.down, line.up)
+        _through_both(line, line.down, line.up, direction)
     line.clipped = 0.0
     forget(now)
 

@@ -51,17 +51,23 @@ def single_shooting(
     for passes in range(1, max_iterations):
         if not np.all(np.isfinite([cost, *sums.moment, *sums.gram.flat])):
             # Numbers of a size that no stage has; a stream goes on all the same.
-            return Solution(start, False, "The model is not finite.", passes)
+            return Solution(q, False, "The model is not finite.", passes)
         own = np.diag(sums.gram)
         near = np.maximum(lower, q / FARTHEST), np.minimum(upper, q * FARTHEST)
         least, most = np.where(lower > 0.0, near, (lower, upper)) - q
-        step = solve(sums, least, damping / max(sums.rows, 1.0) * np.diag(own), most, RIDGE)
+        penalty = damping / max(sums.rows, 1.0) * np.diag(own)
+        try:
+            step = solve(sums, least, penalty, most, RIDGE)
+        except np.linalg.LinAlgError:
+            # Rounding has made the program concave: with damping it is not.
+            damping, more = max(more * damping, DAMPED), MORE * more
+            continue
         other = np.clip(q + step, lower, upper)
         promised = float(sums.moment @ step - 0.5 * step @ sums.gram @ step)
         ended = promised <= tolerance * cost or float(own @ step**2) <= tolerance**2 * float(own @ q**2)
         other_cost, other_sums = problem.about(other, loss, scale)
         kept = cost - other_cost
-        if kept < POOR * promised:
+        if not kept >= POOR * promised:
             damping, more = max(more * damping, DAMPED), MORE * more
         else:
             damping, more = damping / LESS if kept > GOOD * promised else damping, MORE

@@ -35,8 +35,6 @@ APPEND = """
 import sys
 from pathlib import Path
 
-import pytest
-
 from piezoest.bench.store import Store
 
 path, name = Path(sys.argv[1]), sys.argv[2]

@@ -96,7 +96,7 @@ def test_continuous_law_in_seconds_adapts_over_seconds() -> None:
     u = signals.triangle(33.0, 5.0, 5, sample_rate).values
     errors = []
     for base in ("discrete", "continuous"):
-        estimator = HysteresisRLS(sample_rate, memory=0.4, time_base=base)  # type: ignore[arg-type]
+        estimator = HysteresisRLS(sample_rate, memory=0.4, time_base=base)
         estimator.run(u, true.simulate(u))
         errors.append(np.abs(estimator.theta / true.theta - 1.0).max())
     assert errors[0] < 1e-3 < errors[1]

@@ -16,7 +16,6 @@ from piezoest.equations import least_squares as ls
 FS = 5000.0
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 BASE = (p.DeadZone(), p.OutlierRejection())
-MANY = (p.ChangeDetection(), p.ExcitationGate(), p.AmplitudeMemory())
 POLICIES: dict[str, tuple[Any, ...]] = {
     "directional": (p.DirectionalForgetting(),),
     "directional-seconds": (p.DirectionalForgetting(0.2, "second"),),

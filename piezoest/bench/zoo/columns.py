@@ -36,7 +36,7 @@ DWELL_COLUMNS: dict[str, type] = {
 
 
 def tidy_cells(rows: Iterable[Row]) -> Iterator[Row]:
-    """A row for each change of each run of the map. `rows`: from `piezoest.bench.zoo.settling.settle`."""
+    """A row for each change of each run of the map. `rows`: from `piezoest.bench.zoo.settling.Cell.play`."""
     for row in rows:
         for segment in row["segments"] or [{}]:
             yield {**row, **segment}

@@ -1,0 +1,47 @@
+"""The straight line of a controller: what it remembers of legs of different length."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import piezoest as pz
+from piezoest.controller import line as lines
+from piezoest.layout import Named, new
+
+FS = 10_000.0
+
+
+def test_gain_does_not_swing_with_the_size_of_the_legs() -> None:
+    """Small loops on a wide one are flatter; a line through them alone would be wrong by a third."""
+    t = np.arange(30_000) / FS
+    r = 4.0 * np.sin(4.0 * np.pi * t) + 1.2 * np.sin(26.0 * np.pi * t)
+    stage = pz.PaperStage(FS, seed=3)
+    controller = pz.AdaptiveFeedforward(FS, limits=pz.VoltageLimits(-100.0, 100.0), estimators=())
+    gains = []
+    for k in range(0, r.size, 50):
+        u = controller.run(r[k : k + 50])
+        controller.learn(u, stage.run(u))
+        gains.append(float(controller.state["line"]["gain"]))
+    late = np.array(gains[200:])
+    assert np.ptp(late) < 0.1 * late.mean()
+
+
+def _leg(line: Any, gain: float, zero: float, direction: float, readings: int) -> None:
+    for u in direction * np.linspace(-10.0, 10.0, readings):
+        lines.add(line.now, u, gain * u + zero, 1e9)
+    lines.turn(line, direction, 20.0 * gain)
+
+
+def test_a_way_back_of_few_readings_leaves_nothing_old() -> None:
+    """A quick flyback has too few readings to be a leg: what the one before it has shown is not kept."""
+    line = Named(new(lines.LINE), lines.LINE)
+    lines.begin(line, 0.2, 0.0, 0.0, 1.0)
+    for k in range(20):
+        _leg(line, 0.2, 0.0, 1.0 - 2.0 * (k % 2), 50)
+    for _ in range(20):
+        _leg(line, 0.14, 1.0, 1.0, 50)
+        _leg(line, 0.14, 1.0, -1.0, 3)
+    assert abs(line.gain / 0.14 - 1.0) < 0.02
+    assert abs(line.centre - 1.0) < 0.02
