@@ -83,6 +83,13 @@ def test_a_lag_is_found_and_followed(tmp_path: Path) -> None:
     assert given.held_out.rms < 0.7 * pz.identify_stream(stream, delay=0.0).held_out.rms
 
 
+def test_where_all_swings_are_alike_the_lag_is_said_to_be_unknown(tmp_path: Path) -> None:
+    u = 30.0 * np.sin(2.0 * np.pi * np.arange(6_000) / 500.0)
+    stream = saved(tmp_path, u, pz.ColemanHodgdon(0.021, 0.147, 0.00429).simulate(u))
+    (said,) = [each for each in pz.identify_stream(stream).advice if "lag" in each]
+    assert "not known" in said
+
+
 def test_progress_is_told_in_three_passes(tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     pz.identify_stream(saved(tmp_path, *drawn()), progress=lambda done, all_: told.append((done, all_)))
