@@ -9,7 +9,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, instance, integer, measured, number_or_nan, positive
 from piezoest.compensators import inverse_kernel as kernel
-from piezoest.compensators.limits import VoltageLimits
+from piezoest.compensators.limits import VoltageLimits, resting
 from piezoest.layout import Copied, Named, Record, new
 from piezoest.models import Model
 
@@ -130,7 +130,7 @@ class Compensator(Copied):
         >>> round(compensator.step(3.1), 2)  # where the stage is; the model alone has 20.67 V
         20.0
         """
-        u = self._limits.resting(voltage)
+        u = resting(self._limits, voltage)
         x = None if displacement is None else measured("displacement", displacement)
         self._projected = False
         self._waiting: Model | None = None

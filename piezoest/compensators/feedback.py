@@ -82,6 +82,12 @@ class IntegralFeedback(AroundCompensator):
         return self._compensator.step(r + self._integral)
 
     def reset(self, voltage: float | None = None, displacement: float | None = None) -> None:
-        """Return to the state after construction, at rest at a voltage [V] and a displacement [µm]."""
+        """Return to the state after construction, at rest.
+
+        Parameters
+        ----------
+        voltage, displacement : float, optional
+            Where the stage rests [V] and [µm], see `InverseCompensator.reset`.
+        """
         self._integral = 0.0
         self._compensator.reset(voltage, displacement)

@@ -144,6 +144,12 @@ class LeadFilter(AroundCompensator):
         return self._compensator.run(lead)
 
     def reset(self, voltage: float | None = None, displacement: float | None = None) -> None:
-        """Return to the state after construction, at rest at a voltage [V] and a displacement [µm]."""
+        """Return to the state after construction, at rest.
+
+        Parameters
+        ----------
+        voltage, displacement : float, optional
+            Where the stage rests [V] and [µm], see `InverseCompensator.reset`.
+        """
         self._state = new(STATE)
         self._compensator.reset(voltage, displacement)

@@ -67,14 +67,15 @@ class VoltageLimits:
         """The voltage within the range that is nearest to 0 V."""
         return finite("rest", min(max(0.0, self.minimum), self.maximum))
 
-    def resting(self, voltage: Any) -> float:
-        """Return where a stage rests [V], `rest` for None; ValueError if that is outside the limits."""
-        u = self.rest if voltage is None else finite("voltage", voltage)
-        if not self.minimum <= u <= self.maximum:
-            raise ValueError(
-                f"voltage must lie within the limits, {self.minimum:g} V to {self.maximum:g} V, got {u:g} V"
-            )
-        return u
+
+def resting(limits: VoltageLimits, voltage: Any) -> float:
+    """Return a voltage at which a stage rests [V]; None for the one nearest to 0 V."""
+    u = limits.rest if voltage is None else finite("voltage", voltage)
+    if not limits.minimum <= u <= limits.maximum:
+        raise ValueError(
+            f"voltage must lie within the limits, {limits.minimum:g} V to {limits.maximum:g} V, got {u:g} V"
+        )
+    return u
 
 
 def _bound(name: str, value: Any) -> float:

@@ -11,7 +11,7 @@ from typing import Any, Self, cast
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, measured, moderate, number_or_nan
-from piezoest.compensators.limits import VoltageLimits
+from piezoest.compensators.limits import VoltageLimits, resting
 from piezoest.controller import kernel, making, saved, shown, team
 from piezoest.controller.face import Face
 from piezoest.layout import by_name, from_bytes, write
@@ -145,7 +145,7 @@ class AdaptiveFeedforward(Face):
         ValueError
             If the voltage is outside the limits, or the displacement is not a number.
         """
-        u = self._limits.resting(voltage)
+        u = resting(self._limits, voltage)
         x = None if displacement is None else measured("displacement", displacement)
         write(self._state, self._start[0])
         write(self._settings, self._start[1])
