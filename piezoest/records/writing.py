@@ -106,7 +106,8 @@ def _write_hdf5(path: Path, columns: Columns) -> None:
     with h5py.File(image, "w") as file:
         for name, values in columns.items():
             file[name] = values
-    path.write_bytes(image.getbuffer())
+    # A copy: where the disk is full a view of the image outlives it.
+    path.write_bytes(image.getvalue())
 
 
 def _write_mat(path: Path, columns: Columns) -> None:

@@ -105,7 +105,7 @@ def test_all_estimators_are_compared_and_all_are_told_of_the_offset() -> None:
         ("json:NoSuch", "has no attribute .NoSuch."),
         ("json:JSONDecoder", "has no step"),
         ("HysteresisRLS(0.4)", "every argument needs its name"),
-        ("HysteresisRLS(memory=)", "invalid syntax"),
+        ("HysteresisRLS(memory=)", "HysteresisRLS.memory=.: "),
         ("HysteresisRLS(wrong=1)", "takes no wrong"),
         ("HysteresisRLS(memory=open)", "no number, string, tuple or policy"),
         ("HysteresisRLS(policies=(Nothing(),))", "is no policy"),
