@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piezoest._files import save_figure
+from piezoest.bench.figures import DPI, WIDTH
 from piezoest.bench.paper import SWEPT, PaperResult
 from piezoest.bench.paper_experiment import PRBS, SETTLED, Run, last_periods
 from piezoest.models import ColemanHodgdon
@@ -17,8 +18,6 @@ from piezoest.tracking import draw_map, draw_series
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DPI = 130
-WIDTH = 6.0  # inches: letters of ten points are read on a telephone too
 WAYS = {"linear": "linear feed-forward", "inverse": "hysteresis compensation"}
 
 

@@ -89,5 +89,5 @@ class IntegralFeedback(AroundCompensator):
         voltage, displacement : float, optional
             Where the stage rests [V] and [µm], see `InverseCompensator.reset`.
         """
-        self._integral = 0.0
         self._compensator.reset(voltage, displacement)
+        self._integral = 0.0

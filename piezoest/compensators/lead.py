@@ -151,5 +151,5 @@ class LeadFilter(AroundCompensator):
         voltage, displacement : float, optional
             Where the stage rests [V] and [µm], see `InverseCompensator.reset`.
         """
-        self._state = new(STATE)
         self._compensator.reset(voltage, displacement)
+        self._state = new(STATE)

@@ -60,7 +60,7 @@ def single_shooting(
             step = solve(sums, least, penalty, most, RIDGE)
         except np.linalg.LinAlgError:
             # Rounding has made the program concave: with damping it is not.
-            damping, more = max(more * damping, DAMPED), MORE * more
+            damping, more = _more(damping, more)
             continue
         other = np.clip(q + step, lower, upper)
         promised = float(sums.moment @ step - 0.5 * step @ sums.gram @ step)
@@ -68,7 +68,7 @@ def single_shooting(
         other_cost, other_sums = problem.about(other, loss, scale)
         kept = cost - other_cost
         if not kept >= POOR * promised:
-            damping, more = max(more * damping, DAMPED), MORE * more
+            damping, more = _more(damping, more)
         else:
             damping, more = damping / LESS if kept > GOOD * promised else damping, MORE
         if kept >= 0.0:
@@ -76,6 +76,11 @@ def single_shooting(
         if ended:
             return Solution(q, True, "The tolerance is satisfied.", passes + 1)
     return Solution(q, False, "The maximum number of function evaluations is exceeded.", max_iterations)
+
+
+def _more(damping: float, more: float) -> tuple[float, float]:
+    """Damping of the next step, and by how much the one after it would grow."""
+    return max(more * damping, DAMPED), MORE * more
 
 
 def robust(

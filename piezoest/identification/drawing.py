@@ -9,7 +9,8 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.identification.data import prepare, turning_voltages
-from piezoest.identification.residual import Kind, Misfit, autocorrelation
+from piezoest.identification.residual import Misfit, autocorrelation
+from piezoest.identification.told import Kind
 from piezoest.records import Record
 
 if TYPE_CHECKING:

@@ -14,8 +14,9 @@ from piezoest.fitting import Fit, Prediction
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
 from piezoest.fitting.regression import Fitted
-from piezoest.identification.residual import Kind, Misfit, Row, Whiteness, figures_of, parameter_rows
+from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.sense import Finding
+from piezoest.identification.told import Kind, Row, figures_of, parameter_rows
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record
 

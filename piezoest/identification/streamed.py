@@ -22,8 +22,9 @@ from piezoest.identification.data import check_excitation, noise_of, prepare
 from piezoest.identification.drawing import Drawn
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.parts import Part, Progress, parts, pieces
-from piezoest.identification.residual import Kind, Misfit, Row, figures_of, parameter_rows
+from piezoest.identification.residual import Misfit
 from piezoest.identification.result import left_out_error
+from piezoest.identification.told import Kind, Row, figures_of, parameter_rows
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record, RecordStream
 

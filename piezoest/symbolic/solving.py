@@ -109,26 +109,25 @@ QUADRATIC: dict[str, dict[str, Any]] = {
 
 
 @lru_cache(maxsize=1)
-def _solvers() -> tuple[str, ...]:
-    return tuple(name for name in QUADRATIC if casadi.has_conic(name))
-
-
 def quadratic_solver() -> str:
     """Name of the solver of convex programs that is used."""
-    return _solvers()[0]
+    return next(name for name in QUADRATIC if casadi.has_conic(name))
 
 
 @lru_cache(maxsize=64)
-def _conic(name: str, size: int) -> Any:
+def _conic(size: int) -> Any:
+    name = quadratic_solver()
     shapes = {"h": casadi.Sparsity.dense(size, size), "a": casadi.Sparsity(0, size)}
     return casadi.conic("program", name, shapes, QUADRATIC[name])
 
 
 def quadratic_program(H: FloatArray, g: FloatArray, lower: FloatArray, upper: Any = np.inf) -> FloatArray:
-    """Minimum of w' H w / 2 - g' w over lower <= w <= upper; LinAlgError if no solver finds one."""
-    for name in _solvers() if np.isfinite(H).all() and np.isfinite(g).all() else ():
+    """Minimum of w' H w / 2 - g' w over lower <= w <= upper; LinAlgError if the solver finds none."""
+    if np.isfinite(H).all() and np.isfinite(g).all():
         with contextlib.suppress(RuntimeError):
-            found = _conic(name, g.size)(h=casadi.DM(H), g=-g, lbx=lower, ubx=upper)["x"].full()[:, 0]
-            if np.all(np.isfinite(found)):
+            found = _conic(g.size)(h=casadi.DM(H), g=-g, lbx=lower, ubx=upper)["x"].full()[:, 0]
+            if np.isfinite(found).all():
                 return np.clip(found, lower, upper)
-    raise np.linalg.LinAlgError("a program is not convex, or its bounds are no numbers: no solver ends")
+    raise np.linalg.LinAlgError(
+        "a program is not convex, or its numbers are too large: no solver ends; check the units of the record"
+    )

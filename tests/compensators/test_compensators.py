@@ -222,3 +222,14 @@ def test_what_is_around_is_told_too() -> None:
     ):
         around.reset(voltage=10.0, displacement=2.0)
         assert around.compensator.voltage == 10.0
+
+
+def test_a_reset_that_is_refused_changes_nothing() -> None:
+    feedback = pz.IntegralFeedback(pz.InverseCompensator(MODEL), gain=10.0, sample_rate=FS)
+    feedback.step(2.0, 1.5)
+    feedback.step(2.0, 1.5)
+    before = feedback.integral, feedback.compensator.voltage
+    assert before[0] > 0.0
+    with pytest.raises(ValueError, match="displacement"):
+        feedback.reset(displacement=float("nan"))
+    assert (feedback.integral, feedback.compensator.voltage) == before
