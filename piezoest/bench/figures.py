@@ -118,6 +118,10 @@ def cost(document: Document) -> Figure:
                     **style[row["estimator"]],
                 )  # fmt: skip
         axes.set(title=said, xlabel="one step [µs]", xscale="log", yscale="log")
+        low, high = axes.dataLim.intervalx
+        if low == high:
+            # By itself Matplotlib may leave no width around one point.
+            axes.set_xlim(0.5 * low, 2.0 * high)
         _plain_numbers(axes.xaxis, (1.0,))
         _plain_numbers(axes.yaxis)
         axes.grid(alpha=0.3)
