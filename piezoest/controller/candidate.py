@@ -16,15 +16,22 @@ from numba.extending import register_jitable
 from piezoest.equations import recent_path
 from piezoest.equations.turning_points import TURNING_POINTS, remember
 from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
-from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, Record, record
+from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, Record, numbers, record
 
 # What a score remembers, in swings.
 MEMORY = 0.6
 # The largest miss of late counts like a root mean square so many times smaller.
 PEAK = 2.5
+# Whatever was missed before so many blocks of travel, in swings, counts no more than the largest miss since:
+# what a model missed before it had learnt says nothing about it now.
+BLOCKS, BLOCK = 5, 0.2
 
-# Weight and mean square of the misses, the largest of late; where the model stands, what changes of it owe.
-SCORE = record(weight=AMOUNT, square=AMOUNT, peak=AMOUNT, z=MEASURED, owed=NUMBER)
+# Weight and mean square of the misses, the largest of late; the largest of each block, the present one first,
+# and how long that is; where the model stands, what changes of it owe.
+SCORE = record(
+    weight=AMOUNT, square=AMOUNT, peak=AMOUNT, peaks=numbers(BLOCKS, kind=AMOUNT), block=AMOUNT, z=MEASURED,
+    owed=NUMBER,
+)  # fmt: skip
 
 
 def layouts(estimator: tuple[Record, Record], inverse: tuple[Record, Record]) -> tuple[Record, Record]:
@@ -86,6 +93,29 @@ def judge(score: Any, miss: Any, swings: Any) -> None:
     share = min(swings / score.weight, 1.0) if score.weight > 0.0 else 0.0
     score.square += share * (miss * miss - score.square)
     score.peak = max(np.abs(miss), score.peak * (1.0 - share))
+    if score.block >= BLOCK:
+        _forget_what_was_before(score)
+    score.block += swings
+    score.peaks[0] = max(np.abs(miss), score.peaks[0])
+
+
+@register_jitable
+def _forget_what_was_before(score: Any) -> None:
+    """Begin a block; what was missed before all blocks counts no more than the largest miss in them."""
+    largest = 0.0
+    for i in range(1, BLOCKS):
+        score.peaks[BLOCKS - i] = score.peaks[BLOCKS - 1 - i]
+        largest = max(largest, score.peaks[BLOCKS - i])
+    score.peaks[0] = score.block = 0.0
+    score.square, score.peak = min(score.square, largest * largest), min(score.peak, largest)
+
+
+@register_jitable
+def forget(score: Any) -> None:
+    """Forget all misses."""
+    score.weight = score.peak = score.block = 0.0
+    for i in range(BLOCKS):
+        score.peaks[i] = 0.0
 
 
 @register_jitable

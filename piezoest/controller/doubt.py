@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.controller import driving, slots
+from piezoest.controller import candidate, driving, slots
 from piezoest.controller import readings as reading
 
 # A voltage that may not have been written does not matter below this fraction of a swing.
@@ -18,7 +18,9 @@ NOTHING = 1.0 / 64.0
 def all_models(state: Any) -> None:
     """Let the line drive, and forget how well each model has done."""
     driving.drive(state, 0.0)
-    state.since = state.score.weight = state.outcome.weight = state.outcome.peak = 0.0
+    state.since = 0.0
+    candidate.forget(state.score)
+    candidate.forget(state.outcome)
     slots.forget(state.candidates)
 
 

@@ -92,7 +92,7 @@ def _choose(state: Any) -> float:
     floor = noise + (ALIKE * state.travel.swing) ** 2
     best, least = 0.0, np.inf
     present = np.inf
-    for number in range(5):
+    for number in range(slots.MOST + 2):
         miss = slots.missed(state.candidates, number * 1.0, np.inf) + faked if number > 0 else line
         if number == state.driving:
             present = miss
@@ -139,7 +139,8 @@ def _change(state: Any, chosen: Any) -> None:
     """Let another model drive; after each fall back to the line the models have to wait longer."""
     if chosen == 0.0:
         state.patience = min(2.0 * state.patience, LONGEST_PATIENCE)
-    state.since = state.outcome.weight = state.outcome.peak = 0.0
+    state.since = 0.0
+    candidate.forget(state.outcome)
     drive(state, chosen)
 
 

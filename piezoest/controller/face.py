@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import Any
 
@@ -64,9 +65,9 @@ class Face:
         """What happened so far, and how it stands: a frozen record.
 
         ``samples`` learnt from, ``missing`` references, ``stage`` of the work (``"seeking"``,
-        ``"approaching"``, ``"running"``, ``"homing"``), ``driving`` (``"line"`` or the name of an estimator),
-        ``fault`` of the readings (empty if none), samples ``saturated`` and ``slewed``, ``switches`` of the
-        model.
+        ``"approaching"``, ``"running"``, ``"homing"``), ``driving`` (``"line"``, ``"recorded loop"`` or the
+        name of an estimator), ``fault`` of the readings (empty if none), samples ``saturated`` and
+        ``slewed``, ``switches`` of the model.
         """
         state = self._state
         counted = ("samples", "missing", "saturated", "slewed", "switches")
@@ -89,7 +90,7 @@ class Face:
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """All models that can drive, the line first: frozen records.
+        """All that can drive, the line first, the recorded loop last: frozen records.
 
         Each has a ``name``, ``missed`` (its recent error, root mean square [µm]; None if nothing is known),
         ``drives`` and ``model``.
@@ -105,12 +106,16 @@ class Face:
         """The model that drives, in µm and V; None until the gain is known.
 
         A `LinearGain`, `ColemanHodgdon` or `PrandtlIshlinskii`. While it takes over from another one, the
-        voltage is not its own yet.
+        voltage is not its own yet. The recorded loop is a model of one motion only: while it drives, this is
+        the best of the others.
         """
         return self._model(int(self._state["driving"]))
 
     def _model(self, number: int) -> Model | None:
-        """The line, or the model of an estimator."""
+        """The line, or the model of an estimator; for the recorded loop the best of them."""
+        if number > len(self._estimators):
+            misses = [math.inf if each is None else each for each in shown.misses(self._state)[:-1]]
+            number = misses.index(min(misses))
         if number == 0:
             return shown.line(self._state)
         start = self._estimators[number - 1].model

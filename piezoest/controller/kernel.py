@@ -11,7 +11,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest.compile import Record, Vector, compiled
-from piezoest.controller import candidate, homing, redraw
+from piezoest.controller import candidate, homing, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import outside as outsides
 from piezoest.controller import pace as paces
@@ -24,7 +24,7 @@ from piezoest.layout import AMOUNT, COUNT, FIXED, MEASURED, NUMBER, Field, recor
 from piezoest.layout import Record as Layout
 
 # Half-width of the corridor, as a fraction of half the widest swing of the reference of late.
-WIDTH = 0.3
+WIDTH = 0.4
 
 
 def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layout]:
@@ -40,7 +40,7 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         confirmed=AMOUNT, railed=AMOUNT, frozen=AMOUNT,
         # The model that drives, 0 for the line; what changes of the line owe; swings since another one drove,
         # those that one drives at least, changes so far.
-        driving=whole(0.0, 4.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,
+        driving=whole(0.0, slots.MOST + 1.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,
         # z = (x - zero)/unit is what candidates know of a reading.
         unit=NUMBER, zero=MEASURED,
         # Half the swing that they began with; zero before [V].

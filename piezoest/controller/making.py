@@ -7,7 +7,7 @@ from typing import Any
 
 from piezoest._checks import finite, fraction, instance, integer, moderate, non_negative, positive
 from piezoest.compensators.limits import VoltageLimits
-from piezoest.controller import candidate, homing, kernel, pace, slots
+from piezoest.controller import candidate, homing, kernel, pace, recorded_loop, recorder, slots
 from piezoest.controller.feedback import FASTEST
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import Field, Record, new
@@ -151,6 +151,14 @@ def room(
         settings.append(pair[1])
         values.append({"estimator": estimator.state})
         given.append({"estimator": estimator.settings, "inverse": inverse, "by_path": 1.0})
+    if estimators:
+        recorded = candidate.layouts(
+            (recorder.STATE, recorder.SETTINGS), (recorded_loop.STATE, recorded_loop.LOOP)
+        )
+        states.append(recorded[0])
+        settings.append(recorded[1])
+        values.append({})
+        given.append({})
     layouts = kernel.layouts(slots.layout(states), slots.layout(settings))
     fixed = _settings_of(sample_rate, limits, options) | {"candidates": slots.values(given)}
     return layouts, (new(layouts[0], candidates=slots.values(values)), new(layouts[1], **fixed))

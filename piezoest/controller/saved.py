@@ -15,7 +15,7 @@ from piezoest.estimators import saved_state
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.layout import FIXED, NUMBER, Kind, Numbers, Record, by_name
 
-FORMAT = 1
+FORMAT = 2
 _FIELDS = (
     "controller", "format", "sample_rate", "limits", "corridor", "gain", "feedback", "resonance",
     "learnt_on", "estimators", "state", "models", "planned", "events",
@@ -72,7 +72,7 @@ def read_models(data: Any, layout: Record, settings: Any) -> Any:
     settings = settings.copy()
     inverses = list(_inverses(layout, settings))
     if len(instance("models", data, list, "a list")) != len(inverses):
-        raise ValueError(f"models must be {len(inverses)}, one for each estimator, got {len(data)}")
+        raise ValueError(f"models must be {len(inverses)}, one for each candidate, got {len(data)}")
     for each, (kept, numbers) in zip(data, inverses, strict=True):
         numbers[...] = saved_state.check(each, changeable(kept), numbers, lambda state: ())
     return settings

@@ -1,4 +1,4 @@
-"""The candidates of a controller: up to four beside the straight line, whatever estimators they hold.
+"""The candidates of a controller beside the straight line: up to four estimators and the recorded loop.
 
 They are a chain: a ``model`` with its estimator, see `piezoest.controller.candidate`, and the ``others``,
 which are None behind the last. What compiled code does for all of them stands here; nothing is compiled for
@@ -102,7 +102,7 @@ def judge(slots: Any, z: Any, swings: Any, bound: Any) -> None:
 def forget(slots: Any) -> None:
     """Forget what each model has missed."""
     if slots is not None:
-        slots.model.score.weight = 0.0
+        candidate.forget(slots.model.score)
         forget(slots.others)
 
 

@@ -27,6 +27,8 @@ DEFAULT: tuple[Factory, ...] = (HysteresisRLS, OutputErrorRLS, PrandtlIshlinskii
 KNOWN = (HysteresisRLS, OutputErrorRLS, PrandtlIshlinskiiRLS, HysteresisEKF)
 # Inverses whose numbers a controller can hand over.
 INVERSES = (loop_inverse, play_inverse)
+# What the recorded loop is called, which is there where any estimator is.
+RECORDED = "recorded loop"
 # Gain of a first model, about.
 LEAST, MOST = 0.1, 10.0
 # What they begin with: a loop of the usual width, and noise of so small a part of half a swing.
@@ -78,14 +80,14 @@ def checked(name: str, estimator: Any) -> None:
 
 
 def names(estimators: tuple[CompiledEstimator, ...]) -> tuple[str, ...]:
-    """Names of the line and of the estimators; the second one of a class is numbered."""
+    """Names of the line, of the estimators and of the recorded loop; a second one of a class is numbered."""
     found = ["line"]
     for estimator in estimators:
         name, number = type(estimator).__name__, 2
         while name in found:
             name, number = f"{type(estimator).__name__} {number}", number + 1
         found.append(name)
-    return tuple(found)
+    return (*found, RECORDED) if estimators else tuple(found)
 
 
 def saved(estimator: CompiledEstimator) -> dict[str, Any]:

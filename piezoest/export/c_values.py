@@ -215,12 +215,12 @@ class Struct(Value):
             return Known(None)
         text, values = f"{self.text}{name}", self.values[name]
         if name in members(self.layout) and not self.constant:
-            if values.dtype.names:
+            if values.dtype.names is not None:
                 return Struct(f"{text}.", inner, values, self.root, path)  # type: ignore[arg-type]
             if values.shape:
                 return Array(text, values.shape, self.root)
             return Number(text, "real", uses=frozenset({self.root.name}), reads=True)
-        if values.dtype.names:
+        if values.dtype.names is not None:
             return Struct("", inner, values, Root(""), path, constant=True)  # type: ignore[arg-type]
         if values.shape:
             return Array(path.replace(".", "_"), values.shape, Root(""), values)

@@ -1,0 +1,169 @@
+"""What records the loop: the last leg of the voltage in each direction becomes a smooth curve.
+
+A leg is kept as means in bins of equal width; each time it outgrows them two become one. At its end a
+polynomial of least squares is drawn through them, without what rings and most of the noise. The functions are
+those of an estimator's kernel, see `piezoest.estimators.compiled.CompiledEstimator`.
+
+Source: G. E. Forsythe, J. Soc. Indust. Appl. Math. 5 (1957) 74-88 (polynomials orthogonal on given points).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST
+from piezoest.compile import like
+from piezoest.controller.recorded_loop import KNOTS, LOOP, STEEP
+from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
+from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SIGN, numbers, record
+
+BINS = 32
+# Direction of travel; furthest voltage in it, where this leg began, length of the last leg, of the longest of
+# late; width of a bin; points in each bin, sums of their voltages and displacements; the loop, and whether
+# nobody has taken it yet.
+STATE = record(
+    __name__, direction=SIGN, furthest=MEASURED, turned=MEASURED, last=DISTANCE, longest=DISTANCE,
+    width=AMOUNT, count=numbers(BINS, kind=COUNT), sum_u=numbers(BINS, kind=NUMBER),
+    sum_x=numbers(BINS, kind=NUMBER), loop=LOOP, fresh=FLAG,
+)  # fmt: skip
+SETTINGS = record()
+
+# A way back of this part of a leg is a turn; one shorter than this part of the longest is not recorded, which
+# fades by this part at each turn after a leg as long.
+TURN, SHORT, FADES = 0.01, 0.05, 0.03
+# First width of a bin, in units; degree of the polynomial, and bins that it needs.
+NARROW, DEGREE, LEAST = 1e-3, 4, 8
+
+
+@register_jitable
+def _begin_leg(state: Any, u: Any) -> None:
+    """Begin a leg at the furthest point of the last one."""
+    state.turned, state.furthest, state.width = state.furthest, u, NARROW
+    for i in range(BINS):
+        state.count[i] = state.sum_u[i] = state.sum_x[i] = 0.0
+
+
+@register_jitable
+def _widen(numbers: Any) -> None:
+    """Join each two bins."""
+    for i in range(BINS // 2):
+        numbers[i] = numbers[2 * i] + numbers[2 * i + 1]
+    for i in range(BINS // 2, BINS):
+        numbers[i] = 0.0
+
+
+@register_jitable
+def _add(state: Any, u: Any, x: Any) -> None:
+    """Take a point of this leg."""
+    while np.abs(u - state.turned) >= BINS * state.width:
+        state.width *= 2.0
+        _widen(state.count)
+        _widen(state.sum_u)
+        _widen(state.sum_x)
+    i = int(np.abs(u - state.turned) / state.width)
+    state.count[i] += 1.0
+    state.sum_u[i] += u
+    state.sum_x[i] += x
+
+
+@register_jitable
+def _draw(state: Any, curve: Any) -> None:
+    """Draw a polynomial through the bins of a leg, from its lowest to its highest voltage."""
+    lowest = min(state.turned, state.furthest)
+    curve.lowest, curve.apart = lowest, np.abs(state.furthest - state.turned) / (KNOTS - 1.0)
+    # Each polynomial and the one before it, in the bins and at the knots: p(t), t = -1...1 along the curve.
+    in_bins, bins_before = like(state.count), like(state.count)
+    at_knots, knots_before = like(curve.x), like(curve.x)
+    for i in range(BINS):
+        in_bins[i], bins_before[i] = 1.0, 0.0
+    for k in range(KNOTS):
+        at_knots[k], knots_before[k], curve.x[k] = 1.0, 0.0, 0.0
+    half, norm_before = 0.5 * (KNOTS - 1.0), 1.0
+    for _ in range(DEGREE + 1):
+        norm = product = middle = 0.0
+        for i in range(BINS):
+            if state.count[i] > 0.0:
+                t = (state.sum_u[i] / state.count[i] - lowest) / (curve.apart * half) - 1.0
+                norm += state.count[i] * in_bins[i] * in_bins[i]
+                middle += state.count[i] * t * in_bins[i] * in_bins[i]
+                product += state.sum_x[i] * in_bins[i]
+        if not norm > 0.0:
+            break
+        share, middle, before = product / norm, middle / norm, norm / norm_before
+        norm_before = norm
+        for i in range(BINS):
+            if state.count[i] > 0.0:
+                t = (state.sum_u[i] / state.count[i] - lowest) / (curve.apart * half) - 1.0
+                next_one = (t - middle) * in_bins[i] - before * bins_before[i]
+                in_bins[i], bins_before[i] = next_one, in_bins[i]
+        for k in range(KNOTS):
+            curve.x[k] += share * at_knots[k]
+            next_one = (k / half - 1.0 - middle) * at_knots[k] - before * knots_before[k]
+            at_knots[k], knots_before[k] = next_one, at_knots[k]
+    for k in range(1, KNOTS):
+        curve.x[k] = max(curve.x[k], curve.x[k - 1] + STEEP * curve.apart)
+
+
+@register_jitable
+def _end_leg(state: Any) -> None:
+    """Record a leg that is over, if it has points enough."""
+    used, loop = 0, state.loop
+    for i in range(BINS):
+        used += state.count[i] > 0.0
+    if used < LEAST:
+        return
+    if state.direction > 0.0:
+        _draw(state, loop.up)
+        loop.end_x = loop.up.x[KNOTS - 1]
+    else:
+        _draw(state, loop.down)
+        loop.end_x = loop.down.x[0]
+    loop.end_u = state.furthest
+    state.fresh = 1.0
+
+
+@register_jitable
+def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """What becomes of one sample; x is NaN where there is no reading."""
+    way = u - state.furthest
+    if way * state.direction < 0.0:
+        leg = np.abs(state.furthest - state.turned)
+        if not np.abs(way) > TURN * max(leg, state.last):
+            return
+        state.longest = max(state.longest, leg)
+        if leg > SHORT * state.longest:
+            _end_leg(state)
+        if state.longest > 0.0:
+            state.longest -= FADES * leg * leg / state.longest
+        state.last, state.direction = leg, -state.direction
+        _begin_leg(state, u)
+    elif state.direction == 0.0:
+        state.direction = np.sign(way)
+        _begin_leg(state, u)
+    state.furthest = u
+    if state.direction != 0.0 and np.abs(x) < WILDEST:
+        _add(state, u, x)
+
+
+@register_jitable
+def _copy(curve: Any, to: Any) -> None:
+    """Write one curve over another."""
+    to.lowest, to.apart = curve.lowest, curve.apart
+    for k in range(KNOTS):
+        to.x[k] = curve.x[k]
+
+
+@register_jitable
+def write_model(state: Any, settings: Any, model: Any) -> float:
+    """Use the loop as it is recorded now, once."""
+    loop = state.loop
+    if state.fresh == 0.0 or loop.up.apart == 0.0 or loop.down.apart == 0.0:
+        return NO_MODEL
+    state.fresh = 0.0
+    _copy(loop.up, model.up)
+    _copy(loop.down, model.down)
+    model.end_u, model.end_x = loop.end_u, loop.end_x
+    return TO_BE_PLACED

@@ -1,0 +1,125 @@
+"""The recorded loop: repeated motion needs no model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
+from piezoest.controller import recorded_loop, recorder, team
+from piezoest.layout import NUMBER, Named, new, record
+
+FS = 5000.0
+LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
+# What `candidate` has around an inverse.
+AROUND = record(voltage=NUMBER, inverse=recorded_loop.STATE)
+GIVEN = record(inverse=recorded_loop.LOOP)
+
+
+def recorded(u: FloatArray, x: FloatArray) -> Any:
+    """The recorder's state after a record."""
+    state = Named(new(recorder.STATE), recorder.STATE)
+    for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+        recorder.sample(state, None, u_k, x_k)
+    return state
+
+
+def placed(state: Any, u: float) -> tuple[Any, Any]:
+    """An inverse that uses what was recorded, at a voltage."""
+    own, given = Named(new(AROUND), AROUND), Named(new(GIVEN), GIVEN)
+    recorder.write_model(state, None, given.inverse)
+    own.voltage = u
+    own.inverse.direction = state.direction
+    recorded_loop.place(own, given)
+    return own, given
+
+
+def loop(periods: float = 2.0, largest: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """A loop of no model: 20 % wide, bent, and not symmetric."""
+    t = np.arange(int(400 * periods)) / 400.0
+    u = largest * np.cos(2.0 * np.pi * t)
+    down = np.sin(2.0 * np.pi * t) > 0.0
+    x = 0.9 * u + 0.1 * u**2 + np.where(down, 0.12, -0.08) * (1.0 - u**2)
+    return u, x
+
+
+def test_the_curves_are_those_of_the_record() -> None:
+    u, x = loop()
+    state = recorded(u, x)
+    own, given = placed(state, float(u[-1]))
+    expected = []
+    for k in range(400, 800):
+        recorded_loop.follow(own, given, np.nan, u[k])
+        own.voltage = u[k]
+        expected.append(recorded_loop.expected(own, given))
+    np.testing.assert_allclose(expected[20:], x[420:], atol=3e-3)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_inverse_is_exact_wherever_it_turns(seed: int) -> None:
+    u, x = loop()
+    own, given = placed(recorded(u, x), float(u[-1]))
+    # Turns anywhere, also beyond both ends, and rests.
+    rng = np.random.default_rng(seed)
+    ends = rng.uniform(-1.3, 1.3, 30)
+    r = np.interp(np.arange(0.0, 29.0, rng.uniform(0.02, 0.4)), np.arange(30), ends)
+    for r_k in np.repeat(r, rng.integers(1, 3, r.size)).tolist():
+        wanted = recorded_loop.wanted(own, given, r_k)
+        recorded_loop.follow(own, given, wanted, wanted)
+        own.voltage = wanted
+        # The end of the way back to a curve can lie between two knots.
+        assert recorded_loop.expected(own, given) == pytest.approx(r_k, abs=0.02)
+
+
+def test_noise_and_ringing_are_not_recorded() -> None:
+    u, x = loop()
+    t = np.arange(u.size)
+    rings = x + 0.02 * np.sin(2.0 * np.pi * t / 20.0) + np.random.default_rng(0).normal(0.0, 0.01, t.size)
+    plain, noisy = recorded(u, x).loop, recorded(u, rings).loop
+    for curve, other in ((plain.up, noisy.up), (plain.down, noisy.down)):
+        assert np.abs(curve.x - other.x)[1:-1].max() < 0.01
+        assert np.all(np.diff(other.x) > 0.0)
+
+
+def test_small_waves_and_gaps_leave_it() -> None:
+    u, x = loop()
+    state = recorded(np.append(u, 0.9), np.append(x, 0.9))  # the last leg is over
+    before = state.loop.up.x.copy(), state.loop.down.x.copy()
+    for k in range(5000):  # the setpoint of a long rest is noisy
+        small = 0.9 + 0.02 * np.sin(0.7 * k)
+        recorder.sample(state, None, float(small), 0.0)
+        recorder.sample(state, None, float(small), np.nan)
+    np.testing.assert_array_equal(state.loop.up.x, before[0])
+    np.testing.assert_array_equal(state.loop.down.x, before[1])
+
+
+def test_a_smaller_motion_is_recorded_anew() -> None:
+    state = recorded(*loop(2.0))
+    u, x = loop(3.0, largest=0.2)
+    for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+        recorder.sample(state, None, u_k, x_k)
+    assert state.loop.up.lowest == pytest.approx(-0.2, abs=0.01)
+    assert 16.0 * state.loop.down.apart == pytest.approx(0.4, abs=0.02)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_repeated_motion_is_learnt_in_periods_on_any_stage(family: str) -> None:
+    """Largest error of a period, in % of the amplitude, where the line misses some 10."""
+    model = draw_family(family, np.random.default_rng(5), Reach(-60.0, 60.0), width=0.15, gain=0.1)
+    stage = pz.SimulatedStage(FS, model, gauge=pz.Gauge(noise=2e-4), seed=1)
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
+    r = pz.signals.triangle(3.0, 5.0, 8, FS).values
+    true = np.empty_like(r)
+    for k, r_k in enumerate(r.tolist()):
+        u = driver.step(r_k)
+        x = stage.step(u)
+        true[k] = stage.displacement
+        driver.learn(u, x)
+    worst = np.abs(r - true).reshape(8, -1).max(axis=1) / 3.0
+    assert worst[-1] < (0.06 if family == "backlash" else 0.008), worst
+    assert driver.candidates[-1].name == team.RECORDED
+    assert isinstance(driver.model, pz.LinearGain | pz.ColemanHodgdon | pz.PrandtlIshlinskii)
