@@ -16,7 +16,7 @@ from piezoest.controller import travel as travels
 # The gain is sought; the voltage goes to where the reference needs it; all is learnt; hysteresis is erased.
 SEEK, APPROACH, RUN, HOME = 0.0, 1.0, 2.0, 3.0
 # The corridor reaches no farther from the line than so many times what the line has missed of late.
-WIDER = 1.3
+WIDER = 2.0
 # A model's voltage moves no faster than so many times the line's.
 RATE = 5.0
 # On the way to the reference the voltage goes no farther than so many times the way that was answered; a

@@ -96,28 +96,34 @@ def test_a_duhem_loop_is_that_of_its_differential_equation() -> None:
     np.testing.assert_allclose(model.simulate(u), line - np.array(values), atol=5e-3)
 
 
+def lines_of(model: Relays) -> FloatArray:
+    return np.linspace(model.low, model.high, model.levels + 1)
+
+
 def slow_relays(model: Relays, u: FloatArray) -> FloatArray:
-    """Every relay by itself."""
-    v = np.linspace(model.low, model.high, model.levels)
-    up, down = np.meshgrid(v, v, indexing="ij")
+    """Every relay by itself, for voltages on the lines of the grid: a cell switches between two of them."""
+    v = lines_of(model)
+    up, down = np.meshgrid(v[1:], v[:-1], indexing="ij")
     state = np.zeros_like(up, dtype=bool)
     sums = []
     for voltage in (0.0, *u):
-        state = np.where(up <= voltage, True, np.where(down > voltage, False, state))
+        state = np.where(up <= voltage, True, np.where(down >= voltage, False, state))
         sums.append(model.weights[state].sum())
     return model.gain * (u + model.share * (np.array(sums[1:]) - sums[0]))
 
 
 def test_relays_are_relays() -> None:
     rng = np.random.default_rng(5)
-    for low, high in ((-101.3, 103.1), (-3.7, 151.0)):
+    for low, high in ((-100.0, 130.0), (-10.0, 220.0)):  # with a line at 0 V, where all begins
         middle = 0.5 * (low + high)
         model = Relays(
             gain=0.1, share=0.7, low=low, high=high, half_width=20.0, half_width_spread=15.0, place=middle,
             place_spread=40.0, levels=23,
         )  # fmt: skip
-        u = middle + 0.55 * (high - low) * rng.uniform(-1.0, 1.0, 500)
+        u = rng.choice(lines_of(model), 500)
         np.testing.assert_allclose(model.simulate(u), slow_relays(model, u), atol=1e-11)
+        fine = model.simulate(np.linspace(low, high, 100_001))
+        assert np.diff(fine).max() < 20.0 * (high - low) * 0.1 / 100_000  # no step anywhere
 
 
 def test_backlash_has_play_and_a_place_where_it_does_not_pull() -> None:

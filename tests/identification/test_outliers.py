@@ -21,7 +21,7 @@ def apart(rng: np.random.Generator, size: int, count: int, least: int) -> FloatA
 def test_healthy_logs_are_without_flaw() -> None:
     flawed_ones = []
     for seed in SEEDS:
-        u, x, _, _ = zoo_log(seed, smooth=True)
+        u, x, _, _ = zoo_log(seed)
         flaws = flawed(u, x)
         if flaws.unusable.any() or flaws.jumps.size:
             flawed_ones.append((seed, int(flaws.spikes.sum()), int(flaws.dropouts.sum()), flaws.jumps.size))
@@ -32,7 +32,7 @@ def test_spikes_are_found() -> None:
     found = spikes = wrong = 0
     for seed in SEEDS:
         rng = np.random.default_rng(seed)
-        u, x, _, noise = zoo_log(seed, smooth=True)
+        u, x, _, noise = zoo_log(seed)
         places = apart(rng, x.size, round(x.size * 10.0 ** rng.uniform(-3.0, np.log10(0.02))), 4)
         # What is less than a part in a thousand of the range is left alone.
         least = max(10.0 * noise, 3e-3 * np.ptp(x))
@@ -50,7 +50,7 @@ def test_jumps_are_found() -> None:
     found = jumps = wrong = 0
     for seed in SEEDS:
         rng = np.random.default_rng(seed)
-        u, x, _, noise = zoo_log(seed, smooth=True)
+        u, x, _, noise = zoo_log(seed)
         places = apart(rng, x.size, 5, 50)
         sizes = max(10.0 * noise, 0.01 * float(np.ptp(x))) * 10.0 ** rng.uniform(0.05, 1.0, places.size)
         y = x + np.sum([(np.arange(x.size) >= k) * s for k, s in zip(places, sizes, strict=True)], axis=0)
@@ -85,7 +85,7 @@ def test_stretches_between_jumps_are_numbered() -> None:
 
 
 def test_missing_samples_are_no_flaws() -> None:
-    u, x, _, _ = zoo_log(1, smooth=True)
+    u, x, _, _ = zoo_log(1)
     y = x.copy()
     y[300:320] = np.nan
     y[700] = np.nan

@@ -14,14 +14,11 @@ KINDS = ("triangle", "sine", "steps", "walk", "chirp", "raster", "sum-of-sines")
 
 
 @cache
-def zoo_log(seed: int, smooth: bool = False) -> tuple[FloatArray, FloatArray, float, float]:
-    """Voltage, displacement, sample rate, and the standard deviation of the sensor's noise.
-
-    `smooth` leaves out the relays: they are so few that they move in steps, which no sensor needs to do.
-    """
+def zoo_log(seed: int) -> tuple[FloatArray, FloatArray, float, float]:
+    """Voltage, displacement, sample rate, and the standard deviation of the sensor's noise."""
     rng = np.random.default_rng([seed, 1])
     gain = float(np.exp(rng.uniform(np.log(0.02), np.log(2.0))))
-    families = [name for name in FAMILIES if not (smooth and name == "relays")]
+    families = list(FAMILIES)
     rig = draw(
         seed,
         family=families[seed % len(families)],

@@ -1,9 +1,9 @@
-"""True relays on a grid over the Preisach plane, with a Gaussian density that does not separate into plays.
+"""Preisach relays with a Gaussian density over their plane that does not separate into plays.
 
-A relay (i, j) goes up as the voltage comes to level i and down as it falls below level j < i. Relays of
-one row i are up below a column m[i], as falling voltage switches whole columns: the state is m alone, and
-a sample costs what it switches. Source: I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991,
-ch. 1.
+A relay goes up as the voltage comes to its upper level and down as it falls to its lower one. Between two turns
+the relays that switch fill a triangle of the plane, whose weight is taken from sums over a grid, with linear
+interpolation: relays without number move without steps. Source: I. D. Mayergoyz, Mathematical Models of
+Hysteresis, Springer 1991, ch. 1.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from numba.extending import register_jitable
 
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo.loop import Loop
-from piezoest.layout import COUNT, FIXED, NUMBER, Length, Record, numbers, record
+from piezoest.layout import COUNT, FIXED, MEASURED, NUMBER, Length, Record, numbers, record
+
+MOST = 64  # turns that are remembered: the smallest loops are forgotten first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,13 +31,14 @@ class Relays(Loop):
     half_width_spread: float  # [V]
     place: float  # mean of the middles of the relays [V]
     place_spread: float  # [V]
-    levels: int = 500  # grid lines
+    levels: int = 300  # cells of the grid along each side
     weights: FloatArray = field(init=False, repr=False, compare=False)
 
     wipes_out = True
 
     def __post_init__(self) -> None:
-        v = np.linspace(self.low, self.high, self.levels)
+        lines = np.linspace(self.low, self.high, self.levels + 1)
+        v = 0.5 * (lines[1:] + lines[:-1])
         up, down = v[:, None], v[None, :]
         half, middle = 0.5 * (up - down), 0.5 * (up + down)
         weights = np.exp(
@@ -47,52 +50,66 @@ class Relays(Loop):
         object.__setattr__(self, "weights", weights * ((self.high - self.low) / weights.sum()))
 
     def stage_settings(self) -> dict[str, Any]:
-        """Numbers by name; `rows` holds, row by row, the sums of the first m weights."""
-        rows = np.zeros((self.levels, self.levels + 1))
-        np.cumsum(self.weights, axis=1, out=rows[:, 1:])
-        spacing = (self.high - self.low) / (self.levels - 1)
-        below = int(np.floor(-self.low / spacing)) + 1
-        at_rest = sum(rows[i, i] for i in range(min(max(below, 0), self.levels)))
+        """Numbers by name; `sums` holds, row by row, the weight of all cells below and left of a corner."""
+        sums = np.zeros((self.levels + 1, self.levels + 1))
+        sums[1:, 1:] = self.weights.cumsum(axis=0).cumsum(axis=1)
         return {
             "gain": self.gain,
             "share": self.share,
             "low": self.low,
-            "spacing": spacing,
-            "at_rest": at_rest,
-            "rows": rows.ravel(),
+            "high": self.high,
+            "spacing": (self.high - self.low) / self.levels,
+            "sums": sums.ravel(),
         }
 
     def stage_layouts(self, settings: dict[str, Any]) -> tuple[Record, Record]:
-        """Layouts of state, rows that are up to a column, and settings."""
+        """Layouts of state: turns and the weight that is up at each; and settings."""
         state = record(
-            __name__, level=COUNT, sum=NUMBER, m=numbers(Length("levels", self.levels), kind=COUNT)
-        )
-        cells = numbers(Length("cells", len(settings["rows"])), kind=FIXED)
-        names = {name: FIXED for name in settings if name != "rows"}
-        return state, record(**names, rows=cells)
+            __name__, count=COUNT, at_rest=NUMBER,
+            turns=numbers(MOST, kind=MEASURED), up=numbers(MOST, kind=NUMBER),
+        )  # fmt: skip
+        corners = numbers(Length("corners", len(settings["sums"])), kind=FIXED)
+        names = {name: FIXED for name in settings if name != "sums"}
+        return state, record(**names, sums=corners)
 
 
 @register_jitable
-def _set(own: Any, rows: Any, i: Any, m: Any) -> None:
-    """Put the first m relays of row i up, the others down."""
-    start = i * (len(own.m) + 1)
-    own.sum = own.sum + rows[start + m] - rows[start + int(own.m[i])]
-    own.m[i] = m
+def _sum(settings: Any, up: Any, down: Any) -> float:
+    """Weight of the relays with levels below these."""
+    n = int(np.round((settings.high - settings.low) / settings.spacing))
+    a, b = (up - settings.low) / settings.spacing, (down - settings.low) / settings.spacing
+    i, j = min(max(int(a), 0), n - 1), min(max(int(b), 0), n - 1)
+    a, b, corner = a - i, b - j, i * (n + 1) + j
+    below = (1.0 - b) * settings.sums[corner] + b * settings.sums[corner + 1]
+    above = (1.0 - b) * settings.sums[corner + n + 1] + b * settings.sums[corner + n + 2]
+    return (1.0 - a) * below + a * above
+
+
+@register_jitable
+def _between(settings: Any, one: Any, other: Any) -> float:
+    """Weight of the relays that switch on the way from one voltage to another; negative on the way down."""
+    # Below the diagonal of the square between them there are none.
+    square = _sum(settings, one, one) - _sum(settings, one, other)
+    square += _sum(settings, other, other) - _sum(settings, other, one)
+    return square if other > one else -square
 
 
 @register_jitable
 def deform(own: Any, settings: Any, u: Any) -> Any:
     """Displacement without offset after the next voltage; zero at rest, having come from below."""
-    n, last = len(own.m), int(own.level)
-    level = min(max(int(np.floor((u - settings.low) / settings.spacing)) + 1, 0), n)
-    rows = settings.rows
-    for i in range(last, level):
-        _set(own, rows, i, i)
-    if level < last:
-        for i in range(level + 1, n):
-            # Rows further up were up earlier, and have seen lower voltages since.
-            if own.m[i] <= level:
-                break
-            _set(own, rows, i, level)
-    own.level = level
-    return settings.gain * (u + settings.share * (own.sum - settings.at_rest))
+    turns, up = own.turns, own.up
+    if own.count == 0.0:
+        own.at_rest = _between(settings, settings.low, 0.0)
+        turns[0], up[0], turns[1], up[1], own.count = settings.low, 0.0, 0.0, own.at_rest, 2.0
+    n, v = int(own.count), min(max(u, settings.low), settings.high)
+    way = v - turns[n - 1]
+    if way != 0.0:
+        if n == 1 or way * (turns[n - 1] - turns[n - 2]) < 0.0:
+            n = min(n + 1, MOST)
+        # A loop that the voltage has passed is wiped out with both its ends.
+        while n >= 3 and way * (v - turns[n - 3]) >= 0.0:
+            n -= 2
+        turns[n - 1] = v
+        up[n - 1] = up[n - 2] + _between(settings, turns[n - 2], v) if n > 1 else 0.0
+        own.count = n
+    return settings.gain * (u + settings.share * (up[n - 1] - own.at_rest))
