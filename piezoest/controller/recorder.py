@@ -21,12 +21,12 @@ from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SIGN, numbers, record
 
 BINS = 32
-# Direction of travel; furthest voltage in it, where this leg began, length of the last leg, of the longest of
-# late; width of a bin; points in each bin, sums of their voltages and displacements; the loop, and whether
-# nobody has taken it yet.
+# Direction of travel; furthest voltage in it, where this leg began, samples since, length of the last leg, of
+# the longest of late; width of a bin; points in each bin, sums of their voltages and displacements; the loop,
+# and whether nobody has taken it yet.
 STATE = record(
-    __name__, direction=SIGN, furthest=MEASURED, turned=MEASURED, last=DISTANCE, longest=DISTANCE,
-    width=AMOUNT, count=numbers(BINS, kind=COUNT), sum_u=numbers(BINS, kind=NUMBER),
+    __name__, direction=SIGN, furthest=MEASURED, turned=MEASURED, passed=COUNT, last=DISTANCE,
+    longest=DISTANCE, width=AMOUNT, count=numbers(BINS, kind=COUNT), sum_u=numbers(BINS, kind=NUMBER),
     sum_x=numbers(BINS, kind=NUMBER), loop=LOOP, fresh=FLAG,
 )  # fmt: skip
 SETTINGS = record()
@@ -36,12 +36,14 @@ SETTINGS = record()
 TURN, SHORT, FADES = 0.01, 0.05, 0.03
 # First width of a bin, in units; degree of the polynomial, and bins that it needs.
 NARROW, DEGREE, LEAST = 1e-3, 4, 8
+# Parts of a leg, and of its samples, of which there must be readings: beyond them a polynomial is wild.
+COVERED, READ = 0.9, 0.5
 
 
 @register_jitable
 def _begin_leg(state: Any, u: Any) -> None:
     """Begin a leg at the furthest point of the last one."""
-    state.turned, state.furthest, state.width = state.furthest, u, NARROW
+    state.turned, state.furthest, state.width, state.passed = state.furthest, u, NARROW, 0.0
     for i in range(BINS):
         state.count[i] = state.sum_u[i] = state.sum_x[i] = 0.0
 
@@ -108,12 +110,24 @@ def _draw(state: Any, curve: Any) -> None:
 
 
 @register_jitable
-def _end_leg(state: Any) -> None:
-    """Record a leg that is over, if it has points enough."""
-    used, loop = 0, state.loop
+def _is_known(state: Any) -> bool:
+    """Whether there are readings all along a leg."""
+    used, points, nearest, farthest = 0, 0.0, np.inf, 0.0
     for i in range(BINS):
-        used += state.count[i] > 0.0
-    if used < LEAST:
+        if state.count[i] > 0.0:
+            used += 1
+            points += state.count[i]
+            way = np.abs(state.sum_u[i] / state.count[i] - state.turned)
+            nearest, farthest = min(nearest, way), max(farthest, way)
+    leg = np.abs(state.furthest - state.turned)
+    return used >= LEAST and points >= READ * state.passed and farthest - nearest >= COVERED * leg
+
+
+@register_jitable
+def _end_leg(state: Any) -> None:
+    """Record a leg that is over, if it is known."""
+    loop = state.loop
+    if not _is_known(state):
         return
     if state.direction > 0.0:
         _draw(state, loop.up)
@@ -144,6 +158,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         state.direction = np.sign(way)
         _begin_leg(state, u)
     state.furthest = u
+    state.passed += 1.0
     if state.direction != 0.0 and np.abs(x) < WILDEST:
         _add(state, u, x)
 

@@ -97,6 +97,19 @@ def test_small_waves_and_gaps_leave_it() -> None:
     np.testing.assert_array_equal(state.loop.down.x, before[1])
 
 
+@pytest.mark.parametrize("end", [0.3, 0.75])
+def test_a_leg_that_is_read_in_part_is_not_recorded(end: float) -> None:
+    """A polynomial is wild where it has no points, as in a block that is planned ahead."""
+    u, x = loop()
+    state = recorded(np.append(u, 0.9), np.append(x, 0.9))
+    before = state.loop.up.x.copy(), state.loop.down.x.copy()
+    blind = (np.arange(u.size) - 1) % 200 >= 200.0 * end  # the end, too
+    for u_k, x_k in zip(u.tolist(), np.where(blind, np.nan, 2.0 * x).tolist(), strict=True):
+        recorder.sample(state, None, u_k, x_k)
+    np.testing.assert_array_equal(state.loop.up.x, before[0])
+    np.testing.assert_array_equal(state.loop.down.x, before[1])
+
+
 def test_a_smaller_motion_is_recorded_anew() -> None:
     state = recorded(*loop(2.0))
     u, x = loop(3.0, largest=0.2)

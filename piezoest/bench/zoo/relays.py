@@ -1,9 +1,9 @@
 """Preisach relays with a Gaussian density over their plane that does not separate into plays.
 
-A relay goes up as the voltage comes to its upper level and down as it falls to its lower one. Between two turns
-the relays that switch fill a triangle of the plane, whose weight is taken from sums over a grid, with linear
-interpolation: relays without number move without steps. Source: I. D. Mayergoyz, Mathematical Models of
-Hysteresis, Springer 1991, ch. 1.
+A relay goes up as the voltage comes to its upper level and down as it falls to its lower one. Between two
+turns the relays that switch fill a triangle of the plane, whose weight is taken from sums over a grid, with
+linear interpolation: relays without number move without steps. Source: I. D. Mayergoyz, Mathematical Models
+of Hysteresis, Springer 1991, ch. 1.
 """
 
 from __future__ import annotations
