@@ -3,7 +3,7 @@
 The model is simulated along the voltage that was written. Its error is the error that the stage would have
 had if this model had computed the voltage. Estimator and model work in units in which the line has gain one
 and the voltage swings from about -1 to 1, so nothing need be known of the stage beforehand. Their output is
-z = (x - zero)/unit, a voltage.
+z = (x - zero)/unit, a voltage. For the recorded loop the recorder takes the place of the estimator.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, Record
 MEMORY = 0.6
 # The largest miss of late counts like a root mean square so many times smaller.
 PEAK = 2.5
-# Whatever was missed before so many blocks of travel, in swings, counts no more than the largest miss since:
-# what a model missed before it had learnt says nothing about it now.
+# A score looks back over BLOCKS blocks of travel, BLOCK swings each. What was missed before them counts no
+# more than the largest miss in them: it says nothing about a model that has learnt since.
 BLOCKS, BLOCK = 5, 0.2
 
-# Weight and mean square of the misses, the largest of late; the largest of each block, the present one first,
-# and how long that is; where the model stands, what changes of it owe.
+# Weight and mean square of the misses, the largest of late; the largest miss in each block, the present block
+# first; travel in the present block; where the model stands, what changes of it owe.
 SCORE = record(
     weight=AMOUNT, square=AMOUNT, peak=AMOUNT, peaks=numbers(BLOCKS, kind=AMOUNT), block=AMOUNT, z=MEASURED,
     owed=NUMBER,
@@ -89,19 +89,19 @@ def learn(state: Any, settings: Any, u: Any, z: Any) -> None:
 @register_jitable
 def judge(score: Any, miss: Any, swings: Any) -> None:
     """Count a miss, after a travel of so many swings."""
+    if score.block >= BLOCK:
+        _forget_what_was_before(score)
     score.weight = min(score.weight + swings, MEMORY)
     share = min(swings / score.weight, 1.0) if score.weight > 0.0 else 0.0
     score.square += share * (miss * miss - score.square)
     score.peak = max(np.abs(miss), score.peak * (1.0 - share))
-    if score.block >= BLOCK:
-        _forget_what_was_before(score)
     score.block += swings
     score.peaks[0] = max(np.abs(miss), score.peaks[0])
 
 
 @register_jitable
 def _forget_what_was_before(score: Any) -> None:
-    """Begin a block; what was missed before all blocks counts no more than the largest miss in them."""
+    """Begin a block, and limit the score to the largest miss in the blocks that remain."""
     largest = 0.0
     for i in range(1, BLOCKS):
         score.peaks[BLOCKS - i] = score.peaks[BLOCKS - 1 - i]

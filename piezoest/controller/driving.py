@@ -81,10 +81,11 @@ def _faked(state: Any) -> float:
 
 
 @register_jitable
-def _choose(state: Any) -> float:
+def _choose(state: Any, settings: Any) -> float:
     """The model with the smallest recent error, if it is clearly better than the present one.
 
-    Who learns from late readings is right about them: the line gets what the models lose by that.
+    Who learns from late readings is right about them: the line gets what the models lose by that. The
+    recorded loop is of no use where the reference does not repeat, however good it was before.
     """
     faked = _faked(state)
     line = max(candidate.missed(state.score) - faked, 0.0)
@@ -94,12 +95,15 @@ def _choose(state: Any) -> float:
     present = np.inf
     for number in range(slots.MOST + 2):
         miss = slots.missed(state.candidates, number * 1.0, np.inf) + faked if number > 0 else line
+        if number == settings.recorded and state.reference.repeats == 0.0:
+            miss = np.inf
         if number == state.driving:
             present = miss
         if miss < least:
             best, least = number * 1.0, miss
     better = least * least + floor < BETTER * BETTER * (present * present + floor)
-    return best if better and state.since >= state.patience else state.driving
+    free = state.since >= state.patience or present == np.inf
+    return best if better and free else state.driving
 
 
 @register_jitable
@@ -145,9 +149,9 @@ def _change(state: Any, chosen: Any) -> None:
 
 
 @register_jitable
-def reconsider(state: Any) -> None:
+def reconsider(state: Any, settings: Any) -> None:
     """Let the best model drive."""
-    chosen = 0.0 if _disappoints(state) else _choose(state)
+    chosen = 0.0 if _disappoints(state) else _choose(state, settings)
     if chosen != state.driving:
         _change(state, chosen)
     elif chosen > 0.0 and state.since > SHOWN * state.patience:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from typing import Any
 
@@ -93,7 +92,7 @@ class Face:
         """All that can drive, the line first, the recorded loop last: frozen records.
 
         Each has a ``name``, ``missed`` (its recent error, root mean square [µm]; None if nothing is known),
-        ``drives`` and ``model``.
+        ``drives`` and ``model``; for the recorded loop, this is the best of the others.
         """
         driving = int(self._state["driving"])
         misses = shown.misses(self._state)
@@ -114,8 +113,9 @@ class Face:
     def _model(self, number: int) -> Model | None:
         """The line, or the model of an estimator; for the recorded loop the best of them."""
         if number > len(self._estimators):
-            misses = [math.inf if each is None else each for each in shown.misses(self._state)[:-1]]
-            number = misses.index(min(misses))
+            misses = shown.misses(self._state)
+            known = [i for i in range(number) if misses[i] is not None and self._model(i) is not None]
+            number = min(known, key=lambda i: misses[i] or 0.0, default=0)
         if number == 0:
             return shown.line(self._state)
         start = self._estimators[number - 1].model

@@ -62,6 +62,8 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED, feedback=FIXED,
         # Samples of the shortest period that is far from the resonance, zero where nobody knows it.
         shortest=FIXED, allowed=outsides.ALLOWED,
+        # Number of the recorded loop among the candidates, -1 without any.
+        recorded=FIXED,
         start=starts.SETTINGS, candidates=candidate_settings,
     )  # fmt: skip
     return state, settings

@@ -95,7 +95,7 @@ def _hand_over(state: Any, settings: Any) -> None:
     if state.scale > 0.0:
         slots.hand_over(state.candidates, settings.candidates)
     if state.line.legs >= FIRST_LEGS:
-        driving.reconsider(state)
+        driving.reconsider(state, settings)
 
 
 @register_jitable
@@ -299,8 +299,9 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
 
 @register_jitable
 def _is_due(state: Any, gone: Any) -> bool:
-    """Whether the voltage has travelled far enough for other models."""
-    return gone > 0.0 and state.handed >= HAND_OVER * state.travel.swing
+    """Whether the voltage has travelled far enough for other models, or the reference has turned."""
+    turned = state.reference.turned_now != 0.0
+    return gone > 0.0 and (turned or state.handed >= HAND_OVER * state.travel.swing)
 
 
 @register_jitable

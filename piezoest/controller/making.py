@@ -160,5 +160,6 @@ def room(
         values.append({})
         given.append({})
     layouts = kernel.layouts(slots.layout(states), slots.layout(settings))
-    fixed = _settings_of(sample_rate, limits, options) | {"candidates": slots.values(given)}
+    fixed = _settings_of(sample_rate, limits, options)
+    fixed |= {"candidates": slots.values(given), "recorded": len(given) or -1.0}
     return layouts, (new(layouts[0], candidates=slots.values(values)), new(layouts[1], **fixed))

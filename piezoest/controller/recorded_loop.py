@@ -1,9 +1,10 @@
-"""The recorded loop: the curves on which the displacement went last, one up and one down, sample by sample.
+"""The recorded loop as a model: the last measured curve for rising and for falling voltage.
 
-Hysteresis that is driven around the same loop again goes the same way again, whatever its law: repeated
-motion needs no model. Where the voltage turns at another place than the recorded end, the displacement there
-is off the curve that follows; this is lost evenly on the way to its other end, where all loops meet. The
-functions are those of an inverse, see `piezoest.compensators.inverse_kernel`.
+If the voltage repeats a loop, the displacement repeats as well, whatever the law of the hysteresis is:
+repeated motion needs no model. If the voltage turns elsewhere than in the record, the displacement there is
+not on the curve of the new direction. This difference decreases linearly with the voltage, down to zero at
+the end of that curve, where all loops meet. The functions are those of an inverse, see
+`piezoest.compensators.inverse_kernel`.
 
 Source: the wiping-out property, I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991.
 """
@@ -18,15 +19,15 @@ from numba.extending import register_jitable
 from piezoest.layout import AMOUNT, MEASURED, NUMBER, SIGN, numbers, record
 
 KNOTS = 17
-# Displacements at evenly spaced voltages from the lowest on; no distance between them where nothing is known.
+# Displacements at evenly spaced voltages, from the lowest on; `apart` is zero while nothing is known.
 CURVE = record(lowest=MEASURED, apart=AMOUNT, x=numbers(KNOTS, kind=MEASURED))
-# Both curves, and where the last leg has ended.
-LOOP = record(up=CURVE, down=CURVE, end_u=MEASURED, end_x=MEASURED)
-# Direction of travel, where it began, and how far the displacement was from the curve there.
+# Both curves; direction of the last recorded leg, voltage and displacement where it ended.
+LOOP = record(up=CURVE, down=CURVE, ended=SIGN, end_u=MEASURED, end_x=MEASURED)
+# Direction of travel, voltage of the last turn, and how far the displacement was from the curve there.
 STATE = record(__name__, direction=SIGN, turned=MEASURED, off=NUMBER)
 
-# A curve rises by this, relative to the unit, at least; what it is off is lost on no shorter a way than so
-# many times that, and than this part of the curve.
+# Least slope of a curve. The difference `off` is lost over a way of at least GENTLE times itself, and of at
+# least this part of the curve; 1/GENTLE is less than STEEP, so the displacement always goes with the voltage.
 STEEP, GENTLE, SHORTEST = 0.1, 20.0, 0.25
 
 
@@ -51,12 +52,17 @@ def _at(curve: Any, direction: Any, turned: Any, off: Any, u: Any) -> float:
 
 
 @register_jitable
+def _stands(own: Any, loop: Any, u: Any) -> float:
+    """Displacement at a voltage of the present way."""
+    if own.direction > 0.0:
+        return _at(loop.up, 1.0, own.turned, own.off, u)
+    return _at(loop.down, -1.0, own.turned, own.off, u)
+
+
+@register_jitable
 def expected(state: Any, settings: Any) -> float:
     """Displacement at the last voltage."""
-    own, loop = state.inverse, settings.inverse
-    if own.direction > 0.0:
-        return _at(loop.up, 1.0, own.turned, own.off, state.voltage)
-    return _at(loop.down, -1.0, own.turned, own.off, state.voltage)
+    return _stands(state.inverse, settings.inverse, state.voltage)
 
 
 @register_jitable
@@ -66,33 +72,42 @@ def _off(loop: Any, direction: Any, u: Any, x: Any) -> float:
 
 
 @register_jitable
+def _turn(own: Any, loop: Any, direction: Any, u: Any) -> None:
+    """Turn at a voltage."""
+    here = _stands(own, loop, u)
+    own.direction, own.turned, own.off = direction, u, _off(loop, direction, u, here)
+
+
+@register_jitable
 def follow(state: Any, settings: Any, wanted: Any, given: Any) -> None:
     """Turn where the voltage does."""
-    own = state.inverse
     way = given - state.voltage
-    if way != 0.0 and way * own.direction <= 0.0:
-        here = expected(state, settings)
-        own.direction, own.turned = np.sign(way), state.voltage
-        own.off = _off(settings.inverse, own.direction, own.turned, here)
+    if way != 0.0 and way * state.inverse.direction <= 0.0:
+        _turn(state.inverse, settings.inverse, np.sign(way), state.voltage)
 
 
 @register_jitable
 def place(state: Any, settings: Any) -> None:
-    """Go on from where the last leg has ended."""
+    """Go on from where the last recorded leg has ended."""
     own, loop = state.inverse, settings.inverse
-    if own.direction != 0.0:
-        own.turned = loop.end_u
-        own.off = _off(loop, own.direction, loop.end_u, loop.end_x)
+    direction, turned = own.direction, own.turned
+    if direction == 0.0:
+        return
+    own.direction, own.turned = -loop.ended, loop.end_u
+    own.off = _off(loop, own.direction, loop.end_u, loop.end_x)
+    if direction == loop.ended:
+        # It has turned again since, by less than the recorder notices.
+        _turn(own, loop, direction, turned)
 
 
 @register_jitable
 def _solve(curve: Any, direction: Any, turned: Any, off: Any, u: Any, r: Any) -> float:
-    """Voltage from u on, in a direction, at which the displacement is r: from knot to knot."""
+    """Voltage at which the displacement is r, in a direction from u; searched from knot to knot."""
     here = _at(curve, direction, turned, off, u)
     if curve.apart == 0.0:
         return u + r - here
     first = curve.lowest if direction > 0.0 else curve.lowest + (KNOTS - 1.0) * curve.apart
-    passed = int(min(max((u - first) * direction / curve.apart, 0.0), 1.0 * KNOTS))
+    passed = int(min(max((u - first) * direction / curve.apart, 0.0), KNOTS - 1.0))
     for knot in range(passed + 1, KNOTS + 1):
         inside = knot < KNOTS - 1
         to = first + direction * knot * curve.apart if inside else u + direction * KNOTS * curve.apart

@@ -1,8 +1,9 @@
-"""What records the loop: the last leg of the voltage in each direction becomes a smooth curve.
+"""Records the loop: the last leg of the voltage in each direction becomes a smooth curve.
 
-A leg is kept as means in bins of equal width; each time it outgrows them two become one. At its end a
-polynomial of least squares is drawn through them, without what rings and most of the noise. The functions are
-those of an estimator's kernel, see `piezoest.estimators.compiled.CompiledEstimator`.
+The samples of a leg are averaged in bins of equal width. When the leg becomes longer than all bins,
+neighbours are joined in pairs. At its end a polynomial is fitted by least squares, which removes oscillations
+and most of the noise. The functions are those of an estimator's kernel, see
+`piezoest.estimators.compiled.CompiledEstimator`.
 
 Source: G. E. Forsythe, J. Soc. Indust. Appl. Math. 5 (1957) 74-88 (polynomials orthogonal on given points).
 """
@@ -23,7 +24,7 @@ from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SIG
 BINS = 32
 # Direction of travel; furthest voltage in it, where this leg began, samples since, length of the last leg, of
 # the longest of late; width of a bin; points in each bin, sums of their voltages and displacements; the loop,
-# and whether nobody has taken it yet.
+# and whether it is newer than the model in use.
 STATE = record(
     __name__, direction=SIGN, furthest=MEASURED, turned=MEASURED, passed=COUNT, last=DISTANCE,
     longest=DISTANCE, width=AMOUNT, count=numbers(BINS, kind=COUNT), sum_u=numbers(BINS, kind=NUMBER),
@@ -31,12 +32,13 @@ STATE = record(
 )  # fmt: skip
 SETTINGS = record()
 
-# A way back of this part of a leg is a turn; one shorter than this part of the longest is not recorded, which
-# fades by this part at each turn after a leg as long.
+# A way back longer than TURN times the leg is a turn. A leg shorter than SHORT times the longest of late is
+# not recorded. The longest fades by FADES at each turn after a leg as long, by less after shorter ones.
 TURN, SHORT, FADES = 0.01, 0.05, 0.03
-# First width of a bin, in units; degree of the polynomial, and bins that it needs.
+# First width of a bin, in units; degree of the polynomial; least number of bins with readings.
 NARROW, DEGREE, LEAST = 1e-3, 4, 8
-# Parts of a leg, and of its samples, of which there must be readings: beyond them a polynomial is wild.
+# The readings must cover this part of a leg, and there must be one for this part of its samples: far from its
+# points a polynomial is useless.
 COVERED, READ = 0.9, 0.5
 
 
@@ -60,6 +62,7 @@ def _widen(numbers: Any) -> None:
 @register_jitable
 def _add(state: Any, u: Any, x: Any) -> None:
     """Take a point of this leg."""
+    state.width = max(state.width, NARROW)
     while np.abs(u - state.turned) >= BINS * state.width:
         state.width *= 2.0
         _widen(state.count)
@@ -83,24 +86,24 @@ def _draw(state: Any, curve: Any) -> None:
         in_bins[i], bins_before[i] = 1.0, 0.0
     for k in range(KNOTS):
         at_knots[k], knots_before[k], curve.x[k] = 1.0, 0.0, 0.0
-    half, norm_before = 0.5 * (KNOTS - 1.0), 1.0
+    half, norm_before, t = 0.5 * (KNOTS - 1.0), 1.0, like(state.count)
+    for i in range(BINS):
+        t[i] = 0.0
+        if state.count[i] > 0.0:
+            t[i] = (state.sum_u[i] / state.count[i] - lowest) / (curve.apart * half) - 1.0
     for _ in range(DEGREE + 1):
         norm = product = middle = 0.0
         for i in range(BINS):
-            if state.count[i] > 0.0:
-                t = (state.sum_u[i] / state.count[i] - lowest) / (curve.apart * half) - 1.0
-                norm += state.count[i] * in_bins[i] * in_bins[i]
-                middle += state.count[i] * t * in_bins[i] * in_bins[i]
-                product += state.sum_x[i] * in_bins[i]
+            norm += state.count[i] * in_bins[i] * in_bins[i]
+            middle += state.count[i] * t[i] * in_bins[i] * in_bins[i]
+            product += state.sum_x[i] * in_bins[i]
         if not norm > 0.0:
             break
         share, middle, before = product / norm, middle / norm, norm / norm_before
         norm_before = norm
         for i in range(BINS):
-            if state.count[i] > 0.0:
-                t = (state.sum_u[i] / state.count[i] - lowest) / (curve.apart * half) - 1.0
-                next_one = (t - middle) * in_bins[i] - before * bins_before[i]
-                in_bins[i], bins_before[i] = next_one, in_bins[i]
+            next_one = (t[i] - middle) * in_bins[i] - before * bins_before[i]
+            in_bins[i], bins_before[i] = next_one, in_bins[i]
         for k in range(KNOTS):
             curve.x[k] += share * at_knots[k]
             next_one = (k / half - 1.0 - middle) * at_knots[k] - before * knots_before[k]
@@ -135,7 +138,7 @@ def _end_leg(state: Any) -> None:
     else:
         _draw(state, loop.down)
         loop.end_x = loop.down.x[0]
-    loop.end_u = state.furthest
+    loop.ended, loop.end_u = state.direction, state.furthest
     state.fresh = 1.0
 
 
@@ -143,6 +146,9 @@ def _end_leg(state: Any) -> None:
 def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     """What becomes of one sample; x is NaN where there is no reading."""
     way = u - state.furthest
+    if way == 0.0:
+        # A rest is no part of a leg: creep would pass for hysteresis.
+        return
     if way * state.direction < 0.0:
         leg = np.abs(state.furthest - state.turned)
         if not np.abs(way) > TURN * max(leg, state.last):
@@ -159,7 +165,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         _begin_leg(state, u)
     state.furthest = u
     state.passed += 1.0
-    if state.direction != 0.0 and np.abs(x) < WILDEST:
+    if np.abs(x) < WILDEST:
         _add(state, u, x)
 
 
@@ -173,12 +179,12 @@ def _copy(curve: Any, to: Any) -> None:
 
 @register_jitable
 def write_model(state: Any, settings: Any, model: Any) -> float:
-    """Use the loop as it is recorded now, once."""
+    """Hand over the loop if it is new."""
     loop = state.loop
     if state.fresh == 0.0 or loop.up.apart == 0.0 or loop.down.apart == 0.0:
         return NO_MODEL
     state.fresh = 0.0
     _copy(loop.up, model.up)
     _copy(loop.down, model.down)
-    model.end_u, model.end_x = loop.end_u, loop.end_x
+    model.ended, model.end_u, model.end_x = loop.ended, loop.end_u, loop.end_x
     return TO_BE_PLACED

@@ -60,6 +60,8 @@ def _rules(state: Any) -> Iterator[tuple[str, Any]]:
     seeking = state["start"]
     rests = seeking["stage"] == start.REST
     yield "the readings at rest have a place each", not rests or seeking["samples"] < start.FIRST
+    candidates = sum(1 for _ in slots.every(state["candidates"]))
+    yield "what drives must be the line or a candidate", state["driving"] <= candidates
 
 
 def models(layout: Record, settings: Any) -> list[dict[str, Any]]:

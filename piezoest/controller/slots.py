@@ -15,6 +15,7 @@ from numba.extending import register_jitable
 from piezoest.controller import candidate
 from piezoest.layout import ABSENT, Field, Record, record
 
+# Most estimators.
 MOST = 4
 
 

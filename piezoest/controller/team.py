@@ -27,7 +27,7 @@ DEFAULT: tuple[Factory, ...] = (HysteresisRLS, OutputErrorRLS, PrandtlIshlinskii
 KNOWN = (HysteresisRLS, OutputErrorRLS, PrandtlIshlinskiiRLS, HysteresisEKF)
 # Inverses whose numbers a controller can hand over.
 INVERSES = (loop_inverse, play_inverse)
-# What the recorded loop is called, which is there where any estimator is.
+# Name of the recorded loop; a controller with at least one estimator has it.
 RECORDED = "recorded loop"
 # Gain of a first model, about.
 LEAST, MOST = 0.1, 10.0

@@ -13,7 +13,7 @@ from numba.extending import register_jitable
 from piezoest.equations.play import play
 from piezoest.layout import MEASURED, SIGN, numbers, record, whole
 
-MOST = 40  # nested loops older than this many turns are kept, newer ones are forgotten
+MOST = 40  # turns that are kept
 
 # Direction of travel, count, and the turning points, the last of which is the present input; all zero is an
 # input at rest at zero.
@@ -31,8 +31,8 @@ def remember(memory, u):
     way = 1.0 if u > last else -1.0
     if way != memory.direction:
         memory.direction = way
-        if count < MOST - 1:
-            count += 1
+        # Without room the smallest loop is forgotten, with both its ends.
+        count = count + 1 if count < MOST - 1 else MOST - 2
     elif count == 0:
         count = 1
     # A loop that the input has passed is wiped out with both its ends.

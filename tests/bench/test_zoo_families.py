@@ -126,6 +126,15 @@ def test_relays_are_relays() -> None:
         assert np.diff(fine).max() < 20.0 * (high - low) * 0.1 / 100_000  # no step anywhere
 
 
+def test_of_too_many_loops_the_smallest_are_forgotten() -> None:
+    """A decaying sweep of more turns than are kept; a large swing then deletes it."""
+    model = draw_family("relays", np.random.default_rng(6), REACHES[0], width=0.2, gain=0.1)
+    turns = 60.0 * 0.97 ** np.arange(200) * (-1.0) ** np.arange(200)
+    x = model.simulate(np.concatenate((turns, [90.0, -20.0])))
+    assert np.abs(np.diff(x[150:200])).max() < 0.15  # near the middle, as the voltage is
+    np.testing.assert_allclose(x[-2:], model.simulate(np.array([90.0, -20.0])), atol=1e-9)
+
+
 def test_backlash_has_play_and_a_place_where_it_does_not_pull() -> None:
     model = Backlash(gain=0.1, share=2.0, width=10.0, dead=5.0, place=30.0)
     u = np.array([0.0, 30.0, 35.0, 45.0, 60.0, 45.0, 40.0, 30.0, 10.0])

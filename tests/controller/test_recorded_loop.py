@@ -75,6 +75,36 @@ def test_the_inverse_is_exact_wherever_it_turns(seed: int) -> None:
         assert recorded_loop.expected(own, given) == pytest.approx(r_k, abs=0.02)
 
 
+def test_the_inverse_goes_on_beyond_the_end_of_a_steep_curve() -> None:
+    u, x = loop()
+    own, given = placed(recorded(u, 3.0 * x), float(u[-1]))
+    for r in np.linspace(3.0, 4.5, 200).tolist():
+        before = own.voltage
+        own.voltage = recorded_loop.wanted(own, given, r)
+        assert own.voltage >= before
+        assert recorded_loop.expected(own, given) == pytest.approx(r, abs=1e-3)
+
+
+def test_a_way_back_too_small_to_be_recorded_does_not_confuse_it() -> None:
+    u, x = loop()
+    state = recorded(np.append(u, [0.97, 0.975]), np.append(x, [0.97, 0.975]))
+    plain, given = placed(state, 0.97)
+    back, _ = placed(state, 0.975)
+    back.inverse.direction, back.inverse.turned = 1.0, 0.97
+    recorded_loop.place(back, given)
+    small = 2.0 * 0.005  # what the displacement can do on so small a way
+    assert recorded_loop.expected(back, given) == pytest.approx(
+        recorded_loop.expected(plain, given), abs=small
+    )
+
+
+def test_a_rest_is_not_recorded() -> None:
+    u, x = loop()
+    plain = recorded(u, x).loop
+    rests = np.insert(u, 500, np.full(3000, u[499])), np.insert(x, 500, np.full(3000, x[499] - 0.1))
+    np.testing.assert_array_equal(recorded(*rests).loop.down.x, plain.down.x)
+
+
 def test_noise_and_ringing_are_not_recorded() -> None:
     u, x = loop()
     t = np.arange(u.size)

@@ -1,9 +1,9 @@
-"""Preisach relays with a Gaussian density over their plane that does not separate into plays.
+"""Preisach relays with a Gaussian density over half-width and place, cut off at the ends of the range.
 
 A relay goes up as the voltage comes to its upper level and down as it falls to its lower one. Between two
 turns the relays that switch fill a triangle of the plane, whose weight is taken from sums over a grid, with
-linear interpolation: relays without number move without steps. Source: I. D. Mayergoyz, Mathematical Models
-of Hysteresis, Springer 1991, ch. 1.
+linear interpolation. This is the limit of infinitely many relays, which moves without steps. Source: I. D.
+Mayergoyz, Mathematical Models of Hysteresis, Springer 1991, ch. 1.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from piezoest._checks import FloatArray
 from piezoest.bench.zoo.loop import Loop
 from piezoest.layout import COUNT, FIXED, MEASURED, NUMBER, Length, Record, numbers, record
 
-MOST = 64  # turns that are remembered: the smallest loops are forgotten first
+MOST = 64  # turns that are remembered
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,7 +105,8 @@ def deform(own: Any, settings: Any, u: Any) -> Any:
     way = v - turns[n - 1]
     if way != 0.0:
         if n == 1 or way * (turns[n - 1] - turns[n - 2]) < 0.0:
-            n = min(n + 1, MOST)
+            # Without room the smallest loop is forgotten, with both its ends.
+            n = n + 1 if n < MOST else MOST - 1
         # A loop that the voltage has passed is wiped out with both its ends.
         while n >= 3 and way * (v - turns[n - 3]) >= 0.0:
             n -= 2
