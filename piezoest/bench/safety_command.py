@@ -53,7 +53,8 @@ class Which:
         bool, typer.Option("--map", help="How soon it settles, over amplitude, frequency and family.")
     ] = False
     singles: Annotated[
-        bool, typer.Option("--singles", help="Each family and reference, beside each estimator of it alone.")
+        bool,
+        typer.Option("--singles", help="Each family and reference, beside controllers with one estimator."),
     ] = False
     dwell: Annotated[
         int | None,

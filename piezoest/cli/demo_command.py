@@ -73,7 +73,7 @@ def _print_demo(result: Demo) -> None:
         f"[bold]{100.0 * result.controller_reduction:.1f} %[/bold] "
         f"({result.seconds:.1f} s for the four runs).",
         f"AdaptiveFeedforward is told nothing but the limits of the voltage, {LIMITS.minimum:g} V to "
-        f"{LIMITS.maximum:g} V. Here it learns by {ESTIMATOR.__name__} alone, which compiles sooner than "
-        "the estimators that it has by default.",
+        f"{LIMITS.maximum:g} V. Here {ESTIMATOR.__name__} is its only estimator, which compiles sooner than "
+        "those that it has by default.",
     ):
         console.print(said, highlight=False, soft_wrap=True)

@@ -13,7 +13,7 @@ from piezoest.bench.zoo.controllers import Parts
 from piezoest.bench.zoo.running import Factory
 
 PARTS = "parts"
-# The default controller, changed: with the line alone, with one candidate beside it, and with all the room.
+# The default controller, changed: with the line alone, with one estimator, and with all the room.
 CANDIDATES = ("HysteresisRLS", "OutputErrorRLS", "PrandtlIshlinskiiRLS")  # of the default one
 ALONE = (*CANDIDATES, "HysteresisEKF")
 CHANGED = ("line", "no-corridor", *ALONE)
@@ -27,7 +27,7 @@ def contender(name: str) -> Factory:
     `name`: "parts", a class of the package, or a class or function of one's own as ``module:name``. It is
     called as ``name(sample_rate, limits=limits)``. Or the default controller, changed: "line" has no
     candidate beside the line, "no-corridor" leaves the voltage all its room, and the name of an estimator has
-    that one alone.
+    no other estimator, but the recorded loop.
     """
     found = _found(name)
     if inspect.isclass(found) and (missing := [each for each in NEEDED if not hasattr(found, each)]):

@@ -1,4 +1,4 @@
-"""Whether the controller is as good as the best of its estimators alone, on each kind of stage and reference.
+"""Whether the controller is as good as one with the best of its estimators, on each stage and reference.
 
 The rigs are healthy and ideal: what is left of the error is what a model does not know of the hysteresis.
 """
