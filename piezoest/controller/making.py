@@ -141,24 +141,18 @@ def room(
     estimators: tuple[CompiledEstimator, ...],
 ) -> tuple[tuple[Record, Record], tuple[Any, Any]]:
     """Layouts of state and settings, and both as they are before the start."""
-    states: list[Field] = []
-    settings: list[Field] = []
-    values, given = [], []
+    pairs, values, given = list[tuple[Record, Record]](), [], []
     for estimator in estimators:
         inverse = estimator.model.inverse_settings(sample_rate)
-        pair = candidate.layouts(estimator.layouts, estimator.model.inverse.layouts(inverse))
-        states.append(pair[0])
-        settings.append(pair[1])
+        pairs.append(candidate.layouts(estimator.layouts, estimator.model.inverse.layouts(inverse)))
         values.append({"estimator": estimator.state})
         given.append({"estimator": estimator.settings, "inverse": inverse, "by_path": 1.0})
     if estimators:
-        recorded = candidate.layouts(
-            (recorder.STATE, recorder.SETTINGS), (recorded_loop.STATE, recorded_loop.LOOP)
-        )
-        states.append(recorded[0])
-        settings.append(recorded[1])
+        pairs.append(candidate.layouts(recorder.LAYOUTS, recorded_loop.LAYOUTS))
         values.append({})
         given.append({})
+    states: list[Field] = [state for state, _ in pairs]
+    settings: list[Field] = [fixed for _, fixed in pairs]
     layouts = kernel.layouts(slots.layout(states), slots.layout(settings))
     fixed = _settings_of(sample_rate, limits, options)
     fixed |= {"candidates": slots.values(given), "recorded": len(given) or -1.0}

@@ -25,6 +25,7 @@ CURVE = record(lowest=MEASURED, apart=AMOUNT, x=numbers(KNOTS, kind=MEASURED))
 LOOP = record(up=CURVE, down=CURVE, ended=SIGN, end_u=MEASURED, end_x=MEASURED)
 # Direction of travel, voltage of the last turn, and how far the displacement was from the curve there.
 STATE = record(__name__, direction=SIGN, turned=MEASURED, off=NUMBER)
+LAYOUTS = STATE, LOOP  # of state and settings
 
 # Least slope of a curve. The difference `off` is lost over a way of at least GENTLE times itself, and of at
 # least this part of the curve; 1/GENTLE is less than STEEP, so the displacement always goes with the voltage.

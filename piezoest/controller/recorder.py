@@ -30,7 +30,7 @@ STATE = record(
     longest=DISTANCE, width=AMOUNT, count=numbers(BINS, kind=COUNT), sum_u=numbers(BINS, kind=NUMBER),
     sum_x=numbers(BINS, kind=NUMBER), loop=LOOP, fresh=FLAG,
 )  # fmt: skip
-SETTINGS = record()
+LAYOUTS = STATE, record()  # of state and settings, of which there are none
 
 # A way back longer than TURN times the leg is a turn. A leg shorter than SHORT times the longest of late is
 # not recorded. The longest fades by FADES at each turn after a leg as long, by less after shorter ones.

@@ -63,6 +63,16 @@ def test_turning_points_hold_all_the_memory_of_plays(seed: int, scale: float) ->
         np.testing.assert_array_equal([turning_points.recall(memory, r) for r in thresholds], y)
 
 
+def test_of_more_nested_loops_than_are_kept_the_smallest_are_forgotten() -> None:
+    memory = Named(new(turning_points.TURNING_POINTS))
+    thresholds = np.array([20.0, 30.0, 45.0])  # V: the loops that are forgotten move none of them
+    y = np.zeros(3)
+    for value in (60.0 * 0.97 ** np.arange(200) * (-1.0) ** np.arange(200)).tolist():
+        y = np.array([play(old, value, r) for old, r in zip(y, thresholds, strict=True)])
+        turning_points.remember(memory, value)
+        np.testing.assert_array_equal([turning_points.recall(memory, r) for r in thresholds], y)
+
+
 def line(*turns: float) -> Any:
     """Straight lines from turn to turn."""
     parts = [np.linspace(a, b, 101)[1:] for a, b in itertools.pairwise(turns)]

@@ -58,7 +58,7 @@ class Relays(Loop):
             "share": self.share,
             "low": self.low,
             "high": self.high,
-            "spacing": (self.high - self.low) / self.levels,
+            "levels": self.levels,
             "sums": sums.ravel(),
         }
 
@@ -76,8 +76,8 @@ class Relays(Loop):
 @register_jitable
 def _sum(settings: Any, up: Any, down: Any) -> float:
     """Weight of the relays with levels below these."""
-    n = int(np.round((settings.high - settings.low) / settings.spacing))
-    a, b = (up - settings.low) / settings.spacing, (down - settings.low) / settings.spacing
+    n, spacing = int(settings.levels), (settings.high - settings.low) / settings.levels
+    a, b = (up - settings.low) / spacing, (down - settings.low) / spacing
     i, j = min(max(int(a), 0), n - 1), min(max(int(b), 0), n - 1)
     a, b, corner = a - i, b - j, i * (n + 1) + j
     below = (1.0 - b) * settings.sums[corner] + b * settings.sums[corner + 1]
