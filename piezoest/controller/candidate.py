@@ -135,6 +135,8 @@ def hand_over(state: Any, settings: Any) -> None:
     z = _expected(state, settings)
     if state.usable != 0.0:
         state.score.owed += state.score.z - z
+    else:
+        forget(state.score)
     state.usable = 1.0
     state.handed += 1.0
     state.score.z = z

@@ -85,7 +85,7 @@ def _choose(state: Any, settings: Any) -> float:
     """The model with the smallest recent error, if it is clearly better than the present one.
 
     Who learns from late readings is right about them: the line gets what the models lose by that. The
-    recorded loop is of no use where the reference does not repeat, however good it was before.
+    recorded loop knows nothing of where the reference leaves it, however good it was before.
     """
     faked = _faked(state)
     line = max(candidate.missed(state.score) - faked, 0.0)
@@ -95,7 +95,7 @@ def _choose(state: Any, settings: Any) -> float:
     present = np.inf
     for number in range(slots.MOST + 2):
         miss = slots.missed(state.candidates, number * 1.0, np.inf) + faked if number > 0 else line
-        if number == settings.recorded and state.reference.repeats == 0.0:
+        if number == settings.recorded and state.reference.nested == 0.0:
             miss = np.inf
         if number == state.driving:
             present = miss

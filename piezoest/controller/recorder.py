@@ -134,11 +134,13 @@ def _end_leg(state: Any) -> None:
         return
     if state.direction > 0.0:
         _draw(state, loop.up)
-        loop.end_x = loop.up.x[KNOTS - 1]
+        if loop.down.apart == 0.0:
+            _mirror(loop.up, loop.down)
     else:
         _draw(state, loop.down)
-        loop.end_x = loop.down.x[0]
-    loop.ended, loop.end_u = state.direction, state.furthest
+        if loop.up.apart == 0.0:
+            _mirror(loop.down, loop.up)
+    loop.ended = state.direction
     state.fresh = 1.0
 
 
@@ -178,13 +180,21 @@ def _copy(curve: Any, to: Any) -> None:
 
 
 @register_jitable
+def _mirror(curve: Any, to: Any) -> None:
+    """Write the same curve the other way round: usual loops are about as steep in both directions."""
+    to.lowest, to.apart = curve.lowest, curve.apart
+    for k in range(KNOTS):
+        to.x[k] = curve.x[0] + curve.x[KNOTS - 1] - curve.x[KNOTS - 1 - k]
+
+
+@register_jitable
 def write_model(state: Any, settings: Any, model: Any) -> float:
     """Hand over the loop if it is new."""
     loop = state.loop
-    if state.fresh == 0.0 or loop.up.apart == 0.0 or loop.down.apart == 0.0:
+    if state.fresh == 0.0:
         return NO_MODEL
     state.fresh = 0.0
     _copy(loop.up, model.up)
     _copy(loop.down, model.down)
-    model.ended, model.end_u, model.end_x = loop.ended, loop.end_u, loop.end_x
+    model.ended = loop.ended
     return TO_BE_PLACED

@@ -14,17 +14,18 @@ from piezoest.layout import COUNT, DISTANCE, FLAG, MEASURED, SIGN, record
 
 # Direction of travel, furthest value in it, where this leg began, length of the last leg; size of a usual
 # swing, least one before two turns were seen; turns so far, the last value, whether it has just turned;
-# samples of this leg and of the last one; the extremes of late; whether the last two legs were alike.
+# samples of this leg and of the last one; the extremes of late; whether neither this leg nor the last one is
+# longer than the one before it.
 TRAVEL = record(
     direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE, swing=DISTANCE, least=DISTANCE,
     turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, usual=COUNT,
-    highest=MEASURED, lowest=MEASURED, repeats=FLAG,
+    highest=MEASURED, lowest=MEASURED, nested=FLAG,
 )  # fmt: skip
 
 # A way back of this fraction of a swing is a turn; so many turns show a swing. Before, a smaller one is: the
 # first way may lead to a bias that small waves lie on.
 TURN, SHOWN, FIRST_TURN = 0.05, 2.0, 0.02
-# Legs are alike that differ by no more than this part of the longer one.
+# No leg is longer than another that exceeds it by this part.
 ALIKE = 0.1
 # A leg is long that has taken so many times the last one.
 LONG = 2.0
@@ -60,13 +61,15 @@ def follow(travel: Any, value: Any) -> float:
         swing = max(leg, travel.leg, LEAST * travel.swing, travel.least if travel.turns < SHOWN else 0.0)
         travel.turned_now = 1.0
         travel.usual, travel.count = travel.count, 0.0
-        travel.repeats = 1.0 if np.abs(leg - travel.leg) <= ALIKE * max(leg, travel.leg) else 0.0
+        travel.nested = 1.0 if leg <= (1.0 + ALIKE) * travel.leg else 0.0
         travel.swing, travel.leg = swing, leg
         travel.turned = travel.furthest
         travel.furthest = value
         travel.direction = -travel.direction
         travel.highest += FADES * (max(travel.turned, value) - travel.highest)
         travel.lowest += FADES * (min(travel.turned, value) - travel.lowest)
+    if np.abs(value - travel.turned) > (1.0 + ALIKE) * travel.leg:
+        travel.nested = 0.0
     travel.highest, travel.lowest = max(travel.highest, value), min(travel.lowest, value)
     travel.swing = max(travel.swing, np.abs(value - travel.turned))
     return gone

@@ -223,7 +223,7 @@ WRONG: dict[str, tuple[tuple[Any, ...], Any]] = {
     "feedback must": (("feedback",), "x"),
     "gain must": (("gain",), np.nan),
     "learnt_on must": (("learnt_on",), 3),
-    "format 1": (("format",), 1),
+    "format 2": (("format",), 2),
     "unknown fields": (("more",), 1),
     "sample_rate must": (("sample_rate",), -1.0),
     "limits must be finite": (("limits", "maximum"), np.inf),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
-from piezoest.controller import recorded_loop, recorder, team
+from piezoest.controller import recorded_loop, recorder, team, travel
 from piezoest.layout import NUMBER, Named, new, record
 
 FS = 5000.0
@@ -33,7 +34,7 @@ def placed(state: Any, u: float) -> tuple[Any, Any]:
     own, given = Named(new(AROUND), AROUND), Named(new(GIVEN), GIVEN)
     recorder.write_model(state, None, given.inverse)
     own.voltage = u
-    own.inverse.direction = state.direction
+    own.inverse.direction[0], own.inverse.furthest = state.direction, u
     recorded_loop.place(own, given)
     return own, given
 
@@ -47,16 +48,91 @@ def loop(periods: float = 2.0, largest: float = 1.0) -> tuple[FloatArray, FloatA
     return u, x
 
 
+def plays(u: FloatArray) -> FloatArray:
+    """Plays of ten thresholds, from rest at zero."""
+    thresholds = np.linspace(0.0, 0.9, 10)
+    w, x = np.zeros(10), np.empty_like(u)
+    for k, u_k in enumerate(u.tolist()):
+        w = np.clip(w, u_k - thresholds, u_k + thresholds)
+        x[k] = 0.6 * u_k + 0.04 * w.sum()
+    return x
+
+
+def follows(own: Any, given: Any, u: FloatArray) -> FloatArray:
+    """Where the recorded loop stands along a voltage."""
+    stands = np.empty_like(u)
+    for k, u_k in enumerate(u.tolist()):
+        recorded_loop.follow(own, given, np.nan, u_k)
+        own.voltage = u_k
+        stands[k] = recorded_loop.expected(own, given)
+    return stands
+
+
+@pytest.mark.parametrize(
+    "turns",
+    [
+        (1.0, -0.3, 0.3, -0.3, 0.3, -0.3),
+        (1.0, -0.2, 0.1, -0.05, 0.05, -0.8),
+        (1.0, -1.0, -0.4, -0.6, 0.5, 0.3, 1.0),
+    ],
+    ids=["smaller", "inner loops", "both ways"],
+)
+def test_after_other_turns_it_goes_as_plays_do(turns: tuple[float, ...]) -> None:
+    """Masing's rule and the wiping-out property hold for plays."""
+    u = np.interp(np.arange(0.0, 5.0, 0.005), np.arange(6), [0.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+    more = np.interp(np.arange(0.0, len(turns) - 1.0, 0.01), np.arange(len(turns)), turns)
+    x = plays(np.append(u, more))
+    state = recorded(np.append(u, more[:8]), x[: u.size + 8])
+    own, given = placed(state, float(more[7]))
+    stands = follows(own, given, more[8:])
+    np.testing.assert_allclose(stands, x[u.size + 8 :], atol=0.015)
+    # Without memory, on the absolute curves, it would be up to half a loop beside.
+    absolute = np.where(
+        np.diff(more[7:]) > 0.0,
+        np.interp(more[8:], np.linspace(-1.0, 1.0, 17), given.inverse.up.x),
+        np.interp(more[8:], np.linspace(-1.0, 1.0, 17), given.inverse.down.x),
+    )
+    assert np.abs(absolute - x[u.size + 8 :]).max() > 0.05
+
+
+def test_the_first_leg_stands_for_both_directions() -> None:
+    u, x = loop(0.6)
+    state = recorded(u, x)
+    np.testing.assert_allclose(np.diff(state.loop.up.x), np.diff(state.loop.down.x)[::-1])
+    np.testing.assert_allclose(state.loop.up.x[[0, -1]], state.loop.down.x[[0, -1]])
+    state = recorded(*loop(1.2))
+    assert np.abs(np.diff(state.loop.up.x) - np.diff(state.loop.down.x)[::-1]).max() > 1e-3
+
+
+def test_the_reference_leaves_the_loop_where_it_goes_farther_than_before() -> None:
+    reference = Named(new(travel.TRAVEL), travel.TRAVEL)
+    travel.begin(reference, 0.0, 0.1)
+    ends = [0.0, 1.0, -1.0, 1.0, -0.5, 0.5, -0.5, 2.0, -2.0, 2.0, -2.0, -1.0]
+    inside = []
+    for begin, end in itertools.pairwise(ends):
+        for value in np.linspace(begin, end, 50)[1:]:
+            travel.follow(reference, value)
+        inside.append(reference.nested)
+    assert inside == [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0]
+
+
+def test_what_was_missed_before_anything_was_recorded_does_not_count() -> None:
+    model = draw_family("preisach", np.random.default_rng(5), Reach(-60.0, 60.0), width=0.15, gain=0.1)
+    stage = pz.SimulatedStage(FS, model, seed=1)
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
+    for r_k in pz.signals.triangle(3.0, 5.0, 8, FS).values[:1400].tolist():  # 1.4 periods
+        u = driver.step(r_k)
+        driver.learn(u, stage.step(u))
+    missed = driver.candidates[-1].missed
+    assert missed is not None
+    assert missed < 0.04 * 3.0
+
+
 def test_the_curves_are_those_of_the_record() -> None:
     u, x = loop()
     state = recorded(u, x)
     own, given = placed(state, float(u[-1]))
-    expected = []
-    for k in range(400, 800):
-        recorded_loop.follow(own, given, np.nan, u[k])
-        own.voltage = u[k]
-        expected.append(recorded_loop.expected(own, given))
-    np.testing.assert_allclose(expected[20:], x[420:], atol=3e-3)
+    np.testing.assert_allclose(follows(own, given, u[400:])[20:], x[420:], atol=3e-3)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -90,7 +166,7 @@ def test_a_way_back_too_small_to_be_recorded_does_not_confuse_it() -> None:
     state = recorded(np.append(u, [0.97, 0.975]), np.append(x, [0.97, 0.975]))
     plain, given = placed(state, 0.97)
     back, _ = placed(state, 0.975)
-    back.inverse.direction, back.inverse.turned = 1.0, 0.97
+    back.inverse.direction[0], back.inverse.u[0] = 1.0, 0.97
     recorded_loop.place(back, given)
     small = 2.0 * 0.005  # what the displacement can do on so small a way
     assert recorded_loop.expected(back, given) == pytest.approx(
