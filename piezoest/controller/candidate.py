@@ -136,6 +136,7 @@ def hand_over(state: Any, settings: Any) -> None:
     if state.usable != 0.0:
         state.score.owed += state.score.z - z
     else:
+        # What it missed while it had no model says nothing of this one.
         forget(state.score)
     state.usable = 1.0
     state.handed += 1.0

@@ -105,8 +105,8 @@ class Face:
         """The model that drives, in µm and V; None until the gain is known.
 
         A `LinearGain`, `ColemanHodgdon` or `PrandtlIshlinskii`. While it takes over from another one, the
-        voltage is not its own yet. The recorded loop is a model of one motion only: while it drives, this is
-        the best of the others.
+        voltage is not its own yet. The recorded loop is no such model: while it drives, this is the best of
+        the others.
         """
         return self._model(int(self._state["driving"]))
 

@@ -16,44 +16,41 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.layout import AMOUNT, COUNT, MEASURED, NUMBER, SIGN, numbers, record, whole
+from piezoest.layout import AMOUNT, MEASURED, SIGN, numbers, record, whole
 
 KNOTS = 17
-# Displacements at evenly spaced voltages, from the lowest on; `apart` is zero while nothing is known.
-CURVE = record(lowest=MEASURED, apart=AMOUNT, x=numbers(KNOTS, kind=MEASURED))
+# Voltage where a curve begins, and displacements from there on, at evenly spaced voltages in the direction of
+# travel; `apart` is zero while nothing is known.
+CURVE = record(begins=MEASURED, apart=AMOUNT, x=numbers(KNOTS, kind=MEASURED))
 # Both curves, and direction of the last recorded leg.
 LOOP = record(up=CURVE, down=CURVE, ended=SIGN)
 WAYS = 8
-# Ways from turn to turn, not yet wiped out: their directions, voltages and displacements where they began;
-# what is added at each knot of the curve from there on, and at how many. After the present way comes the way
-# back from where it has led.
+# The ways from turn to turn that are not wiped out, outermost first: the direction of each, voltage and
+# displacement where it began, and how many times as steep as its curve it is. Number `present` is the way of
+# now; the next one is the way back from the furthest voltage, which is not taken yet.
 STATE = record(
-    __name__, present=whole(0.0, WAYS - 2.0), furthest=MEASURED, direction=numbers(WAYS, kind=SIGN),
-    u=numbers(WAYS, kind=MEASURED), x=numbers(WAYS, kind=MEASURED), added=numbers(WAYS, kind=NUMBER),
-    knots=numbers(WAYS, kind=COUNT),
+    __name__, present=whole(0.0, WAYS - 3.0), furthest=MEASURED, direction=numbers(WAYS, kind=SIGN),
+    u=numbers(WAYS, kind=MEASURED), x=numbers(WAYS, kind=MEASURED), steeper=numbers(WAYS, kind=AMOUNT),
 )  # fmt: skip
 LAYOUTS = STATE, LOOP  # of state and settings
 
-# Least slope of a curve, and what is added to it at most: less, so the displacement goes with the voltage.
-# A way back longer than this part of a curve is a turn.
-STEEP, GENTLE, TURN = 0.1, 0.05, 0.01
+# Least slope of a curve. A way is at most so many times as steep as its curve, or as flat. A way back longer
+# than this part of a curve is a turn.
+STEEP, STEEPER, TURN = 0.1, 3.0, 0.01
 
 
 @register_jitable
-def _gone(curve: Any, direction: Any, far: Any) -> float:
-    """Displacement so far from the beginning of a curve; beyond its end as on its last piece."""
+def _gone(curve: Any, far: Any) -> float:
+    """Displacement so far from the beginning of a curve; beyond its ends as on its first or last piece."""
     place = far / curve.apart
-    i = int(min(place, KNOTS - 2.0))
-    if direction > 0.0:
-        return curve.x[i] - curve.x[0] + (place - i) * (curve.x[i + 1] - curve.x[i])
-    k = KNOTS - 1 - i
-    return curve.x[k] - curve.x[KNOTS - 1] - (place - i) * (curve.x[k] - curve.x[k - 1])
+    i = int(min(max(place, 0.0), KNOTS - 2.0))
+    return curve.x[i] - curve.x[0] + (place - i) * (curve.x[i + 1] - curve.x[i])
 
 
 @register_jitable
 def _on_curve(loop: Any, direction: Any, far: Any) -> float:
     """Displacement so far from the beginning of the curve of a direction."""
-    return _gone(loop.up, 1.0, far) if direction > 0.0 else _gone(loop.down, -1.0, far)
+    return _gone(loop.up, far) if direction > 0.0 else _gone(loop.down, far)
 
 
 @register_jitable
@@ -65,58 +62,51 @@ def _apart(loop: Any, direction: Any) -> float:
 @register_jitable
 def _begins(loop: Any, direction: Any) -> float:
     """Voltage at which the curve of a direction begins."""
-    return loop.up.lowest if direction > 0.0 else loop.down.lowest + (KNOTS - 1.0) * loop.down.apart
+    return loop.up.begins if direction > 0.0 else loop.down.begins
 
 
 @register_jitable
 def _first(loop: Any, direction: Any) -> float:
     """Displacement at which the curve of a direction begins."""
-    return loop.up.x[0] if direction > 0.0 else loop.down.x[KNOTS - 1]
+    return loop.up.x[0] if direction > 0.0 else loop.down.x[0]
 
 
 @register_jitable
 def _at(own: Any, loop: Any, way: Any, u: Any) -> float:
     """Displacement at a voltage of a way; the voltage itself while nothing is known."""
     direction = own.direction[way]
-    apart, far = _apart(loop, direction), np.abs(u - own.u[way])
-    if apart == 0.0 or direction == 0.0:
+    if direction == 0.0 or _apart(loop, direction) == 0.0:
         return u
-    return own.x[way] + _on_curve(loop, direction, far) + own.added[way] * min(far / apart, own.knots[way])
+    return own.x[way] + own.steeper[way] * _on_curve(loop, direction, (u - own.u[way]) * direction)
 
 
 @register_jitable
 def _meet(own: Any, loop: Any, way: Any, u: Any, x: Any) -> None:
-    """Let a way lead to a voltage and a displacement, about."""
-    direction = own.direction[way]
-    apart, far = _apart(loop, direction), np.abs(u - own.u[way])
-    if apart > 0.0:
-        own.knots[way] = int(min(max(far / apart + 0.5, 1.0), KNOTS - 1.0)) * 1.0
-        missed = (x - own.x[way] - _on_curve(loop, direction, far)) / own.knots[way]
-        own.added[way] = min(max(missed, -GENTLE * apart), GENTLE * apart)
+    """Let a way lead to a voltage and a displacement."""
+    direction, steeper = own.direction[way], 1.0
+    if _apart(loop, direction) > 0.0:
+        gone = _on_curve(loop, direction, (u - own.u[way]) * direction)
+        if gone != 0.0:
+            steeper = min(max((x - own.x[way]) / gone, 1.0 / STEEPER), STEEPER)
+    own.steeper[way] = steeper
 
 
 @register_jitable
 def _go(own: Any, loop: Any, u: Any) -> None:
-    """Go as far as a voltage; loops that are passed are wiped out."""
+    """Go as far as a voltage; loops that are closed on the way are wiped out."""
     own.furthest, now = u, int(own.present)
-    while now > 1 and (u - own.u[now - 1]) * own.direction[now] > 0.0:
+    while now > 1 and (u - own.u[now - 1]) * own.direction[now] >= 0.0:
         met = own.u[now - 1]
         own.x[now - 2] += _at(own, loop, now, met) - _at(own, loop, now - 2, met)
+        now -= 2
+    if now == WAYS - 2:
+        # Without room for another turn the innermost loop is forgotten.
+        own.direction[now - 2], own.u[now - 2] = own.direction[now], own.u[now]
+        own.x[now - 2], own.steeper[now - 2] = own.x[now], own.steeper[now]
         now -= 2
     own.present, back = now, now + 1
     own.direction[back], own.u[back], own.x[back] = -own.direction[now], u, _at(own, loop, now, u)
     _meet(own, loop, back, own.u[now], own.x[now])
-
-
-@register_jitable
-def _turn(own: Any) -> None:
-    """Turn at the furthest voltage; without room the widest loop is forgotten."""
-    own.present += 1.0
-    if own.present > WAYS - 2.0:
-        own.present -= 2.0
-        for i in range(WAYS - 2):
-            own.direction[i], own.u[i], own.x[i] = own.direction[i + 2], own.u[i + 2], own.x[i + 2]
-            own.added[i], own.knots[i] = own.added[i + 2], own.knots[i + 2]
 
 
 @register_jitable
@@ -138,9 +128,9 @@ def follow(state: Any, settings: Any, wanted: Any, given: Any) -> None:
         own.x[now] = own.furthest = state.voltage
     way = (given - own.furthest) * own.direction[now]
     if way < 0.0:
-        if -way <= TURN * (KNOTS - 1.0) * loop.up.apart:
+        if -way <= TURN * (KNOTS - 1.0) * _apart(loop, own.direction[now]):
             return
-        _turn(own)
+        own.present += 1.0
     _go(own, loop, given)
 
 
@@ -148,30 +138,27 @@ def follow(state: Any, settings: Any, wanted: Any, given: Any) -> None:
 def place(state: Any, settings: Any) -> None:
     """Go on from where the last recorded leg has ended."""
     own, loop = state.inverse, settings.inverse
-    now = int(own.present)
-    direction, turned, furthest = own.direction[now], own.u[now], own.furthest
-    if direction == 0.0:
+    furthest = own.furthest
+    if own.direction[int(own.present)] == 0.0:
         return
-    own.present = own.added[0] = 0.0
+    own.present, own.steeper[0] = 0.0, 1.0
     own.direction[0], own.u[0], own.x[0] = loop.ended, _begins(loop, loop.ended), _first(loop, loop.ended)
     _go(own, loop, own.u[0] + loop.ended * (KNOTS - 1.0) * _apart(loop, loop.ended))
     _end_as_recorded(own, loop)
-    _turn(own)
-    if direction == loop.ended:
-        # It has turned again since, or not at all: by less than the recorder notices, or this here does.
-        _go(own, loop, turned)
-        _turn(own)
+    own.present = 1.0
     _go(own, loop, furthest)
 
 
 @register_jitable
 def _end_as_recorded(own: Any, loop: Any) -> None:
-    """Let the way back end where its curve does, if that is near: what creeps goes on while a leg begins."""
+    """Let the way back lead to where its own curve ended, if that is near.
+
+    At its end the stage may rest and creep: where the other curve began is after that.
+    """
     back, apart = own.direction[1], _apart(loop, own.direction[1])
-    length = (KNOTS - 1.0) * apart
-    off = (_begins(loop, back) + back * length - own.u[0]) * back
-    if np.abs(off) < apart:
-        own.x[0] = _first(loop, back) + _on_curve(loop, back, length - off)
+    length = (own.u[0] - _begins(loop, back)) * back
+    if np.abs(length - (KNOTS - 1.0) * apart) < apart:
+        own.x[0] = _first(loop, back) + _on_curve(loop, back, length)
         _meet(own, loop, 1, own.u[0], own.x[0])
 
 
@@ -180,7 +167,8 @@ def _solve(own: Any, loop: Any, way: Any, u: Any, r: Any) -> float:
     """Voltage at which the displacement is r, on a way from u on; searched from knot to knot."""
     direction, first = own.direction[way], own.u[way]
     apart, here = _apart(loop, direction), _at(own, loop, way, u)
-    for knot in range(int(min(np.abs(u - first) / apart, KNOTS - 1.0)) + 1, KNOTS):
+    passed = int(min(max((u - first) * direction / apart, 0.0), KNOTS - 1.0))
+    for knot in range(passed + 1, KNOTS):
         to = first + direction * knot * apart
         there = _at(own, loop, way, to)
         if (there - r) * direction >= 0.0:
@@ -197,12 +185,12 @@ def wanted(state: Any, settings: Any, r: Any) -> float:
     own, loop = state.inverse, settings.inverse
     now, u = int(own.present), own.furthest
     direction = own.direction[now]
-    if loop.up.apart == 0.0 or direction == 0.0:
+    if direction == 0.0 or loop.up.apart == 0.0 or loop.down.apart == 0.0:
         return r
     if (r - own.x[now + 1]) * direction < 0.0:
-        return _solve(own, loop, now + 1, u, r)
+        now, direction = now + 1, -direction
     while now > 1:
-        # Beyond the loop that the present way closes goes the way before.
+        # Where the way closes a loop, the one before it goes on.
         met = own.u[now - 1]
         x = _at(own, loop, now, met)
         if (r - x) * direction <= 0.0:

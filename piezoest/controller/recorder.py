@@ -24,11 +24,11 @@ from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SIG
 BINS = 32
 # Direction of travel; furthest voltage in it, where this leg began, samples since, length of the last leg, of
 # the longest of late; width of a bin; points in each bin, sums of their voltages and displacements; the loop,
-# and whether it is newer than the model in use.
+# the direction that alone was recorded, and whether the loop is newer than the model in use.
 STATE = record(
     __name__, direction=SIGN, furthest=MEASURED, turned=MEASURED, passed=COUNT, last=DISTANCE,
     longest=DISTANCE, width=AMOUNT, count=numbers(BINS, kind=COUNT), sum_u=numbers(BINS, kind=NUMBER),
-    sum_x=numbers(BINS, kind=NUMBER), loop=LOOP, fresh=FLAG,
+    sum_x=numbers(BINS, kind=NUMBER), loop=LOOP, alone=SIGN, fresh=FLAG,
 )  # fmt: skip
 LAYOUTS = STATE, record()  # of state and settings, of which there are none
 
@@ -76,9 +76,8 @@ def _add(state: Any, u: Any, x: Any) -> None:
 
 @register_jitable
 def _draw(state: Any, curve: Any) -> None:
-    """Draw a polynomial through the bins of a leg, from its lowest to its highest voltage."""
-    lowest = min(state.turned, state.furthest)
-    curve.lowest, curve.apart = lowest, np.abs(state.furthest - state.turned) / (KNOTS - 1.0)
+    """Draw a polynomial through the bins of a leg, from its beginning to its end."""
+    curve.begins, curve.apart = state.turned, np.abs(state.furthest - state.turned) / (KNOTS - 1.0)
     # Each polynomial and the one before it, in the bins and at the knots: p(t), t = -1...1 along the curve.
     in_bins, bins_before = like(state.count), like(state.count)
     at_knots, knots_before = like(curve.x), like(curve.x)
@@ -90,7 +89,7 @@ def _draw(state: Any, curve: Any) -> None:
     for i in range(BINS):
         t[i] = 0.0
         if state.count[i] > 0.0:
-            t[i] = (state.sum_u[i] / state.count[i] - lowest) / (curve.apart * half) - 1.0
+            t[i] = np.abs(state.sum_u[i] / state.count[i] - state.turned) / (curve.apart * half) - 1.0
     for _ in range(DEGREE + 1):
         norm = product = middle = 0.0
         for i in range(BINS):
@@ -109,7 +108,8 @@ def _draw(state: Any, curve: Any) -> None:
             next_one = (k / half - 1.0 - middle) * at_knots[k] - before * knots_before[k]
             at_knots[k], knots_before[k] = next_one, at_knots[k]
     for k in range(1, KNOTS):
-        curve.x[k] = max(curve.x[k], curve.x[k - 1] + STEEP * curve.apart)
+        gone = (curve.x[k] - curve.x[k - 1]) * state.direction
+        curve.x[k] = curve.x[k - 1] + max(gone, STEEP * curve.apart) * state.direction
 
 
 @register_jitable
@@ -132,14 +132,17 @@ def _end_leg(state: Any) -> None:
     loop = state.loop
     if not _is_known(state):
         return
+    # Until there is a leg in the other direction, this one stands for both.
+    alone = loop.ended == 0.0 or state.alone == state.direction
+    state.alone = state.direction if alone else 0.0
     if state.direction > 0.0:
         _draw(state, loop.up)
-        if loop.down.apart == 0.0:
-            _mirror(loop.up, loop.down)
+        if alone:
+            _reverse(loop.up, loop.down, state.furthest)
     else:
         _draw(state, loop.down)
-        if loop.up.apart == 0.0:
-            _mirror(loop.down, loop.up)
+        if alone:
+            _reverse(loop.down, loop.up, state.furthest)
     loop.ended = state.direction
     state.fresh = 1.0
 
@@ -174,17 +177,17 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
 @register_jitable
 def _copy(curve: Any, to: Any) -> None:
     """Write one curve over another."""
-    to.lowest, to.apart = curve.lowest, curve.apart
+    to.begins, to.apart = curve.begins, curve.apart
     for k in range(KNOTS):
         to.x[k] = curve.x[k]
 
 
 @register_jitable
-def _mirror(curve: Any, to: Any) -> None:
-    """Write the same curve the other way round: usual loops are about as steep in both directions."""
-    to.lowest, to.apart = curve.lowest, curve.apart
+def _reverse(curve: Any, to: Any, u: Any) -> None:
+    """Write a curve as that of the other direction, from where it ended: loops are about symmetric."""
+    to.begins, to.apart = u, curve.apart
     for k in range(KNOTS):
-        to.x[k] = curve.x[0] + curve.x[KNOTS - 1] - curve.x[KNOTS - 1 - k]
+        to.x[k] = curve.x[KNOTS - 1] - (curve.x[k] - curve.x[0])
 
 
 @register_jitable

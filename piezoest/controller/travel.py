@@ -25,8 +25,8 @@ TRAVEL = record(
 # A way back of this fraction of a swing is a turn; so many turns show a swing. Before, a smaller one is: the
 # first way may lead to a bias that small waves lie on.
 TURN, SHOWN, FIRST_TURN = 0.05, 2.0, 0.02
-# No leg is longer than another that exceeds it by this part.
-ALIKE = 0.1
+# A leg is longer than another if it exceeds it by this part.
+LONGER = 0.1
 # A leg is long that has taken so many times the last one.
 LONG = 2.0
 # No swing counts for less than this fraction of the one before: noise at rest would.
@@ -61,14 +61,14 @@ def follow(travel: Any, value: Any) -> float:
         swing = max(leg, travel.leg, LEAST * travel.swing, travel.least if travel.turns < SHOWN else 0.0)
         travel.turned_now = 1.0
         travel.usual, travel.count = travel.count, 0.0
-        travel.nested = 1.0 if leg <= (1.0 + ALIKE) * travel.leg else 0.0
+        travel.nested = 1.0 if leg <= (1.0 + LONGER) * travel.leg else 0.0
         travel.swing, travel.leg = swing, leg
         travel.turned = travel.furthest
         travel.furthest = value
         travel.direction = -travel.direction
         travel.highest += FADES * (max(travel.turned, value) - travel.highest)
         travel.lowest += FADES * (min(travel.turned, value) - travel.lowest)
-    if np.abs(value - travel.turned) > (1.0 + ALIKE) * travel.leg:
+    if np.abs(value - travel.turned) > (1.0 + LONGER) * travel.leg:
         travel.nested = 0.0
     travel.highest, travel.lowest = max(travel.highest, value), min(travel.lowest, value)
     travel.swing = max(travel.swing, np.abs(value - travel.turned))

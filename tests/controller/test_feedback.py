@@ -74,7 +74,7 @@ def test_in_an_exact_rest_a_model_is_corrected_too() -> None:
     assert driver.status.driving == "HysteresisRLS"
     assert np.abs(r - x)[28_000:30_000].max() < 0.02
     assert np.abs(np.diff(u))[29_990:30_010].max() < 2.0 * np.abs(np.diff(u))[30_010:].max()
-    # The recorded loop drives on, and closes its inner loop sooner than this stage does: 0.13.
+    # 2 % of the swing, by the recorded loop; with a jump by the correction it would be 0.4.
     assert np.abs(r - x)[30_000:30_020].max() < 0.15
 
 
