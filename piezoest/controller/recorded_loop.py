@@ -125,7 +125,7 @@ def follow(state: Any, settings: Any, wanted: Any, given: Any) -> None:
     now = int(own.present)
     if own.direction[now] == 0.0:
         own.direction[now], own.u[now] = np.sign(given - state.voltage), state.voltage
-        own.x[now] = own.furthest = state.voltage
+        own.x[now], own.steeper[now], own.furthest = state.voltage, 1.0, state.voltage
     way = (given - own.furthest) * own.direction[now]
     if way < 0.0:
         if -way <= TURN * (KNOTS - 1.0) * _apart(loop, own.direction[now]):
