@@ -113,7 +113,7 @@ def _forget_what_was_before(score: Any) -> None:
 @register_jitable
 def forget(score: Any) -> None:
     """Forget all misses."""
-    score.weight = score.peak = score.block = 0.0
+    score.weight = score.square = score.peak = score.block = 0.0
     for i in range(BLOCKS):
         score.peaks[i] = 0.0
 

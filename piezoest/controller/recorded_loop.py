@@ -2,8 +2,9 @@
 
 If the voltage repeats a loop, the displacement repeats as well, whatever the law of the hysteresis is:
 repeated motion needs no model. If the voltage turns elsewhere than in the record, the displacement goes
-on as it did from the beginning of the curve of the new direction (Masing's rule), and meets the last way
-where that began. The functions are those of an inverse, see `piezoest.compensators.inverse_kernel`.
+on as it did from the beginning of the curve of the new direction (Masing's rule). It meets the last way
+about where that began, and there the way before the last goes on. The functions are those of an inverse,
+see `piezoest.compensators.inverse_kernel`.
 
 Sources: G. Masing, Proc. 2nd Int. Congr. Appl. Mech., Zürich 1926, 332-335; the wiping-out property,
 I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991.
@@ -27,15 +28,15 @@ LOOP = record(up=CURVE, down=CURVE, ended=SIGN)
 WAYS = 8
 # The ways from turn to turn that are not wiped out, outermost first: the direction of each, voltage and
 # displacement where it began, and how many times as steep as its curve it is. Number `present` is the way of
-# now; the next one is the way back from the furthest voltage, which is not taken yet.
+# now; the next one is the way back from the furthest voltage, which is not a turn while it is small.
 STATE = record(
     __name__, present=whole(0.0, WAYS - 3.0), furthest=MEASURED, direction=numbers(WAYS, kind=SIGN),
     u=numbers(WAYS, kind=MEASURED), x=numbers(WAYS, kind=MEASURED), steeper=numbers(WAYS, kind=AMOUNT),
 )  # fmt: skip
 LAYOUTS = STATE, LOOP  # of state and settings
 
-# Least slope of a curve. A way is at most so many times as steep as its curve, or as flat. A way back longer
-# than this part of a curve is a turn.
+# Least slope of a curve in the record. A way is at most so many times as steep as its curve, or as flat.
+# A way back longer than this part of the present direction's curve is a turn.
 STEEP, STEEPER, TURN = 0.1, 3.0, 0.01
 
 
@@ -128,7 +129,9 @@ def follow(state: Any, settings: Any, wanted: Any, given: Any) -> None:
         own.x[now], own.steeper[now], own.furthest = state.voltage, 1.0, state.voltage
     way = (given - own.furthest) * own.direction[now]
     if way < 0.0:
-        if -way <= TURN * (KNOTS - 1.0) * _apart(loop, own.direction[now]):
+        small = -way <= TURN * (KNOTS - 1.0) * _apart(loop, own.direction[now])
+        if small and (now == 0 or (given - own.u[now]) * own.direction[now] > 0.0):
+            # No turn yet, nor does it close the present loop.
             return
         own.present += 1.0
     _go(own, loop, given)
@@ -143,9 +146,11 @@ def place(state: Any, settings: Any) -> None:
         return
     own.present, own.steeper[0] = 0.0, 1.0
     own.direction[0], own.u[0], own.x[0] = loop.ended, _begins(loop, loop.ended), _first(loop, loop.ended)
-    _go(own, loop, own.u[0] + loop.ended * (KNOTS - 1.0) * _apart(loop, loop.ended))
-    _end_as_recorded(own, loop)
-    own.present = 1.0
+    end = own.u[0] + loop.ended * (KNOTS - 1.0) * _apart(loop, loop.ended)
+    _go(own, loop, end)
+    if (furthest - end) * loop.ended <= 0.0:
+        _end_as_recorded(own, loop)
+        own.present = 1.0
     _go(own, loop, furthest)
 
 

@@ -14,8 +14,8 @@ from piezoest.layout import COUNT, DISTANCE, FLAG, MEASURED, SIGN, record
 
 # Direction of travel, furthest value in it, where this leg began, length of the last leg; size of a usual
 # swing, least one before two turns were seen; turns so far, the last value, whether it has just turned;
-# samples of this leg and of the last one; the extremes of late; whether neither this leg nor the last one is
-# longer than the one before it.
+# samples of this leg and of the last one; the extremes of late; whether each of the last two legs, this
+# one and the last, is no longer than the one before it.
 TRAVEL = record(
     direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE, swing=DISTANCE, least=DISTANCE,
     turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, usual=COUNT,

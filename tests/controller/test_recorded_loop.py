@@ -188,6 +188,35 @@ def test_the_inverse_is_exact_wherever_it_turns(seed: int) -> None:
         assert recorded_loop.expected(own, given) == pytest.approx(r_k, abs=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_inverse_is_exact_between_curves_of_different_length(seed: int) -> None:
+    """A way back that is no turn for the one direction is one for the other."""
+    u, x = loop()
+    own, given = placed(recorded(u, x), float(u[-1]))
+    given.inverse.down.apart *= 3.0
+    rng = np.random.default_rng(seed)
+    for r_k in np.cumsum(rng.normal(0.0, 0.02, 3000)).tolist():
+        wanted = recorded_loop.wanted(own, given, r_k)
+        recorded_loop.follow(own, given, wanted, wanted)
+        own.voltage = wanted
+        assert recorded_loop.expected(own, given) == pytest.approx(r_k, abs=1e-9)
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_beyond_the_recorded_end_it_goes_on(direction: float) -> None:
+    """The voltage turned back a little, and on again, before the loop was handed over."""
+    u, x = loop(2.5 if direction < 0.0 else 2.0)
+    state = recorded(np.append(u, 0.95 * u[-1]), np.append(x, x[-1]))
+    own, given = placed(state, 1.2 * direction)
+    before = recorded_loop.expected(own, given)
+    assert before * direction > x[-1] * direction + 0.05
+    for r in np.linspace(before, before + direction, 50)[1:].tolist():
+        last = own.voltage
+        own.voltage = recorded_loop.wanted(own, given, r)
+        assert (own.voltage - last) * direction > 0.0
+        recorded_loop.follow(own, given, own.voltage, own.voltage)
+
+
 def test_the_inverse_goes_on_beyond_the_end_of_a_steep_curve() -> None:
     u, x = loop()
     own, given = placed(recorded(u, 3.0 * x), float(u[-1]))
