@@ -25,12 +25,12 @@ KNOTS = 17
 CURVE = record(begins=MEASURED, apart=AMOUNT, x=numbers(KNOTS, kind=MEASURED))
 # Both curves, and direction of the last recorded leg.
 LOOP = record(up=CURVE, down=CURVE, ended=SIGN)
-WAYS = 8
+WAYS = 7
 # The ways from turn to turn that are not wiped out, outermost first: the direction of each, voltage and
 # displacement where it began, and how many times as steep as its curve it is. Number `present` is the way of
 # now; the next one is the way back from the furthest voltage, which is not a turn while it is small.
 STATE = record(
-    __name__, present=whole(0.0, WAYS - 3.0), furthest=MEASURED, direction=numbers(WAYS, kind=SIGN),
+    __name__, present=whole(0.0, WAYS - 2.0), furthest=MEASURED, direction=numbers(WAYS, kind=SIGN),
     u=numbers(WAYS, kind=MEASURED), x=numbers(WAYS, kind=MEASURED), steeper=numbers(WAYS, kind=AMOUNT),
 )  # fmt: skip
 LAYOUTS = STATE, LOOP  # of state and settings
@@ -100,7 +100,7 @@ def _go(own: Any, loop: Any, u: Any) -> None:
         met = own.u[now - 1]
         own.x[now - 2] += _at(own, loop, now, met) - _at(own, loop, now - 2, met)
         now -= 2
-    if now == WAYS - 2:
+    if now == WAYS - 1:
         # Without room for another turn the innermost loop is forgotten.
         own.direction[now - 2], own.u[now - 2] = own.direction[now], own.u[now]
         own.x[now - 2], own.steeper[now - 2] = own.x[now], own.steeper[now]

@@ -17,7 +17,7 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.compile import like
-from piezoest.controller.recorded_loop import KNOTS, LOOP, STEEP
+from piezoest.controller.recorded_loop import KNOTS, LOOP, STEEP, TURN
 from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SIGN, numbers, record
 
@@ -32,9 +32,9 @@ STATE = record(
 )  # fmt: skip
 LAYOUTS = STATE, record()  # of state and settings, of which there are none
 
-# A way back longer than TURN times the leg is a turn. A leg shorter than SHORT times the longest of late is
-# not recorded. The longest fades by FADES at each turn after a leg as long, by less after shorter ones.
-TURN, SHORT, FADES = 0.01, 0.05, 0.03
+# A leg shorter than SHORT times the longest of late is not recorded. The longest fades by FADES at each turn
+# after a leg as long, by less after shorter ones.
+SHORT, FADES = 0.05, 0.03
 # First width of a bin, in units; degree of the polynomial; least number of bins with readings.
 NARROW, DEGREE, LEAST = 1e-3, 4, 8
 # The readings must cover this part of a leg, and there must be one for this part of its samples: far from its
@@ -127,22 +127,33 @@ def _is_known(state: Any) -> bool:
 
 
 @register_jitable
+def _reverse(curve: Any, to: Any, u: Any) -> None:
+    """Write a curve as that of the other direction, from where it ended: loops are about symmetric."""
+    to.begins, to.apart = u, curve.apart
+    for k in range(KNOTS):
+        to.x[k] = curve.x[KNOTS - 1] - (curve.x[k] - curve.x[0])
+
+
+@register_jitable
+def _record(state: Any, curve: Any, other: Any) -> None:
+    """Record a leg; until there is one in the other direction, it stands for both."""
+    _draw(state, curve)
+    if state.alone == state.direction:
+        _reverse(curve, other, state.furthest)
+
+
+@register_jitable
 def _end_leg(state: Any) -> None:
     """Record a leg that is over, if it is known."""
     loop = state.loop
     if not _is_known(state):
         return
-    # Until there is a leg in the other direction, this one stands for both.
     alone = loop.ended == 0.0 or state.alone == state.direction
     state.alone = state.direction if alone else 0.0
     if state.direction > 0.0:
-        _draw(state, loop.up)
-        if alone:
-            _reverse(loop.up, loop.down, state.furthest)
+        _record(state, loop.up, loop.down)
     else:
-        _draw(state, loop.down)
-        if alone:
-            _reverse(loop.down, loop.up, state.furthest)
+        _record(state, loop.down, loop.up)
     loop.ended = state.direction
     state.fresh = 1.0
 
@@ -180,14 +191,6 @@ def _copy(curve: Any, to: Any) -> None:
     to.begins, to.apart = curve.begins, curve.apart
     for k in range(KNOTS):
         to.x[k] = curve.x[k]
-
-
-@register_jitable
-def _reverse(curve: Any, to: Any, u: Any) -> None:
-    """Write a curve as that of the other direction, from where it ended: loops are about symmetric."""
-    to.begins, to.apart = u, curve.apart
-    for k in range(KNOTS):
-        to.x[k] = curve.x[KNOTS - 1] - (curve.x[k] - curve.x[0])
 
 
 @register_jitable

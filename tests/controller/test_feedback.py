@@ -68,14 +68,15 @@ def test_a_long_dwell_ends_where_it_should(noise: tuple[float, float], moved: bo
 
 def test_in_an_exact_rest_a_model_is_corrected_too() -> None:
     """Its voltage must not stand still while the correction grows: it would jump in the end."""
-    r = np.concatenate([np.tile(WAVE, 2), np.full(20_000, WAVE[0]), WAVE])
+    # Where each way of the wave is longer than the last one, the recorded loop does not drive.
+    grows = np.maximum(0.5, 1.15 ** (np.arange(-10_000, 0) / 250.0))
+    r = np.concatenate([np.tile(WAVE, 2) * grows, np.full(20_000, WAVE[0]), WAVE])
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(pz.HysteresisRLS,), feedback=2.0)
     u, x, _ = drive(driver, r, lambda t: 0.02 * max(t - 10.0, 0.0))
     assert driver.status.driving == "HysteresisRLS"
     assert np.abs(r - x)[28_000:30_000].max() < 0.02
     assert np.abs(np.diff(u))[29_990:30_010].max() < 2.0 * np.abs(np.diff(u))[30_010:].max()
-    # 2 % of the swing, by the recorded loop; with a jump by the correction it would be 0.4.
-    assert np.abs(r - x)[30_000:30_020].max() < 0.15
+    assert np.abs(r - x)[30_000:30_020].max() < 0.05
 
 
 def test_none_changes_nothing() -> None:
