@@ -6,8 +6,6 @@ it runs the stage itself, and its settled error is compared with the library's. 
     python benchmarks/controller.py [--samples N] [--only SCENARIO] [--json FILE]
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -5,8 +5,6 @@ Absolute times are the machine's; beside them stands how many simulations by 20 
     python benchmarks/fits.py [--repeats N] [--json FILE]
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Callable

@@ -6,8 +6,6 @@ first part. Jumps that come later, which nobody can know, are left out; creep an
 does that.
 """
 
-from __future__ import annotations
-
 import contextlib
 import time
 import warnings

@@ -9,8 +9,6 @@ straight line.
 A log takes about a second.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """What speed.py compares with: C by hand, the library's own C, bare loops over filterpy and padasip."""
 
-from __future__ import annotations
-
 import ctypes
 import math
 import subprocess

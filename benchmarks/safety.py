@@ -9,8 +9,6 @@ the rest. What is written sums them up and is as small for many runs as for few.
 A run takes about half a second.
 """
 
-from __future__ import annotations
-
 import argparse
 import functools
 import sys

@@ -8,8 +8,6 @@ medians of the ratios within a round. Ours must come to its peer's result. Needs
 It takes some minutes.
 """
 
-from __future__ import annotations
-
 import argparse
 import functools
 import itertools

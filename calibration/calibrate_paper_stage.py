@@ -14,8 +14,6 @@ of the whole displacement with these time constants) and the estimator's memory 
 calibration rows too.
 """
 
-from __future__ import annotations
-
 import json
 import time
 import warnings

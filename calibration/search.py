@@ -1,7 +1,5 @@
 """The calibration rows of Tables I and II, and the search: the smoothest stage within their tolerances."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -6,8 +6,6 @@ point of estimator and compensator. It takes milliseconds where the ring takes s
 a per cent or so; the calibration measures that difference with the ring and corrects for it.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

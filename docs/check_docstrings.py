@@ -3,8 +3,6 @@
 python docs/check_docstrings.py
 """
 
-from __future__ import annotations
-
 import inspect
 import re
 import sys

@@ -6,8 +6,6 @@ from another host.
     python docs/check_links.py docs/_build/html
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser

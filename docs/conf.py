@@ -1,7 +1,5 @@
 """Sphinx configuration. The build needs no network, and neither do the pages it makes."""
 
-from __future__ import annotations
-
 import re
 import sys
 from importlib import import_module

@@ -3,8 +3,6 @@
 Tables and numbers are written at every Sphinx build; the figure by python docs/controller_page.py --figure
 """
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the programs of the pages share: reading docs/data, tables, and numbers that stand in sentences."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

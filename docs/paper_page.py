@@ -1,7 +1,5 @@
 """Tables and numbers of the page `paper`, from docs/data/paper.json; written at every Sphinx build."""
 
-from __future__ import annotations
-
 import json
 from importlib import resources
 from typing import Any

@@ -3,8 +3,6 @@
 Runs at the start of every Sphinx build.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from page_parts import DOCS, Document, made, read, replacements, table, write_pieces

@@ -4,8 +4,6 @@ python docs/readme.py            # rewrites the table
 python docs/readme.py --figure   # and draws docs/figures/effect.png, in some seconds
 """
 
-from __future__ import annotations
-
 import argparse
 import textwrap
 from pathlib import Path

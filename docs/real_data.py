@@ -6,8 +6,6 @@ PIEZOEST_DATA, or --data, names its folder. Without it, the old numbers of that 
     python docs/real_data.py [--data DIR] [--json FILE] [--figures DIR]
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

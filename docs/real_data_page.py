@@ -1,7 +1,5 @@
 """Tables and numbers of the page `real_data`, from its JSON in docs/data; written at every Sphinx build."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from page_parts import DOCS, Document, made, percent, read, replacements, table_of, write_pieces

@@ -1,7 +1,5 @@
 """Tables and numbers of the page `safety`, from docs/data/safety.json; written at every Sphinx build."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

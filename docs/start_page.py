@@ -1,7 +1,5 @@
 """What the code of the page `start` prints: it runs at every Sphinx build."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re

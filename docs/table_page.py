@@ -3,8 +3,6 @@
 Runs at the start of every Sphinx build.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

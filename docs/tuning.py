@@ -3,8 +3,6 @@
 Writes docs/data/tuning.json and docs/figures/tuning.png, in about a minute: python docs/tuning.py
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables and numbers of the page `tuning`, from docs/data/tuning.json; written at every Sphinx build."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from page_parts import DOCS, Document, made, read, replacements, table_of, write_pieces

@@ -6,8 +6,6 @@ runs on a simulated stage:
     python examples/own_stage.py
 """
 
-from __future__ import annotations
-
 import signal
 import sys
 import time

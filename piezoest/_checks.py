@@ -1,7 +1,5 @@
 """Checks of arguments: every message names the argument, what came, and what to do."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Any

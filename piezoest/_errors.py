@@ -1,7 +1,5 @@
 """What a command says where it cannot go on."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import sys

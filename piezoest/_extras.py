@@ -1,7 +1,5 @@
 """Packages that only some uses need: loaded then, and named with their extra where they are absent."""
 
-from __future__ import annotations
-
 import importlib
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Files that come out whole or not at all, and JSON that comes in."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import json

@@ -1,7 +1,5 @@
 """Groups of options: a command has a dataclass for an argument, and typer shows the options of its fields."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What commands print: tables of figures, and sentences as they are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container, Iterable, Sequence
 from typing import Any
 

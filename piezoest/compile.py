@@ -14,13 +14,11 @@ One machine code serves one set of layouts, see `piezoest.compiled_records`. It 
 the function that comes back goes by just these arguments, unchecked, which is fast.
 """
 
-from __future__ import annotations
-
 import functools
 import inspect
 import re
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from numba import njit, types
 from numba.core import config
@@ -37,16 +35,19 @@ from piezoest.compiled_records import nth as nth
 from piezoest.compiled_records import record_type
 from piezoest.machine_code import MachineCode
 
-# Arguments of compiled functions, by their annotation; whatever else is a record.
-Vector = FloatArray
-Matrix = FloatArray
-Cube = FloatArray
+# Arguments of compiled functions, by their annotation or its name; whatever else is a record.
+Vector = Annotated[FloatArray, 1]
+Matrix = Annotated[FloatArray, 2]
+Cube = Annotated[FloatArray, 3]
 Record = Any
-_ARGUMENTS: dict[str, Any] = {
-    "float": types.float64,
-    "int": types.intp,
-    **{name: types.Array(types.float64, 1 + i, "C") for i, name in enumerate(("Vector", "Matrix", "Cube"))},
+_KINDS: dict[str, tuple[Any, Any]] = {
+    "float": (float, types.float64),
+    "int": (int, types.intp),
+    "Vector": (Vector, types.Array(types.float64, 1, "C")),
+    "Matrix": (Matrix, types.Array(types.float64, 2, "C")),
+    "Cube": (Cube, types.Array(types.float64, 3, "C")),
 }
+_ARGUMENTS: dict[Any, Any] = {key: kind for name, (of, kind) in _KINDS.items() for key in (name, of)}
 
 # References to arrays are not counted: each view of one costs two atomic operations else, more than the
 # arithmetic. Such functions make no arrays of their own. A division by zero gives infinity, as in NumPy, C.
@@ -102,7 +103,7 @@ class Compiled:
             function.__module__,
         )
         self._arguments = [
-            _ARGUMENTS.get(getattr(parameter.annotation, "__name__", parameter.annotation))
+            _ARGUMENTS.get(parameter.annotation)
             for parameter in inspect.signature(function).parameters.values()
         ]
         self._entries: dict[tuple[named.Record, ...], Any] = {}

@@ -11,8 +11,6 @@ Numba learns of each type how it is passed (a data model), what an operation on 
 the LLVM instructions of that operation (a lowering).
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import importlib

@@ -7,8 +7,6 @@ functions are made of (`sources`), and is taken from the disk only if that, Numb
 options are the same.
 """
 
-from __future__ import annotations
-
 import ast
 import contextlib
 import functools

@@ -1,7 +1,5 @@
 """Compile and load everything that a live loop will call, before it runs."""
 
-from __future__ import annotations
-
 import functools
 import time
 from typing import Any

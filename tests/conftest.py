@@ -1,7 +1,5 @@
 """What every test shares: reproducible hypothesis runs, and the folder of recorded data."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """One small log, what its record must hold, and files of it as other programs write them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

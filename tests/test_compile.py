@@ -1,7 +1,5 @@
 """Compiled functions on named numbers: machine code and Python do the same, and nothing else compiles."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

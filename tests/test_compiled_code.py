@@ -1,7 +1,5 @@
 """Machine code that is kept on the disk is that of the function, of the present sources, or not run."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import os

@@ -5,8 +5,6 @@ The first line of a fenced block says where it goes: ``# new file PATH``, ``# ad
 compile the copy would take a minute. So are the tests that find by themselves what was added.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Logs that are damaged, or not what they say: one sentence that names the file, and no memory taken."""
 
-from __future__ import annotations
-
 import gzip
 import random
 import struct

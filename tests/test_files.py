@@ -1,7 +1,5 @@
 """What is written is there whole, or as it was before: on a full disk, and where the process is killed."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 import signal

@@ -1,7 +1,5 @@
 """How the package is laid out: short files, no circle of imports, no private name of another sub-package."""
 
-from __future__ import annotations
-
 import ast
 import graphlib
 from collections.abc import Iterator

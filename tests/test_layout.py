@@ -1,7 +1,5 @@
 """Layouts: names, what numbers can be, sizes that users choose, and what is absent."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from typing import Any

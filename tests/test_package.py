@@ -1,7 +1,5 @@
 """The package itself: light to import, complete in names, strict about keywords; its pages' code runs."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import inspect
 import re

@@ -1,7 +1,5 @@
 """Logs in formats other than text: what is found in them, and what is said of damaged ones."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

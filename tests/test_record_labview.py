@@ -1,7 +1,5 @@
 """LabVIEW's logs: .lvm with its headers, and TDMS."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

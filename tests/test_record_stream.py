@@ -1,7 +1,5 @@
 """Logs in blocks: the same bits as in memory, whatever the blocks, and little memory."""
 
-from __future__ import annotations
-
 import tracemalloc
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Logs from spreadsheets, DataFrames and arrays, and the one that comes with the package."""
 
-from __future__ import annotations
-
 import datetime
 import sys
 from pathlib import Path

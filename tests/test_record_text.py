@@ -1,7 +1,5 @@
 """Text logs as instruments and spreadsheets write them: marks in numbers, time stamps, packed files."""
 
-from __future__ import annotations
-
 import gzip
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Recorded logs: what is recognised, what is refused, and in which words."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Signals: shapes, continuity, the paper's PRBS, periods, and the refusal of jumps."""
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """The CasADi face: the same numbers as NumPy and Numba, and derivatives that are derivatives."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The ring: what goes round it, and what it says when something does not fit."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`warmup`: what a live loop will call is there before it runs."""
 
-from __future__ import annotations
-
 import pytest
 
 import piezoest as pz

@@ -5,8 +5,6 @@ careful side: every load and store takes its full time, every taken branch refil
 cycles beside its own), divisions take their longest. Not in it: wait states of the flash.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

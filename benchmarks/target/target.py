@@ -5,8 +5,6 @@ Needs arm-none-eabi-gcc with newlib, and qemu-system-arm (`make tools`).
     python benchmarks/target/target.py [--samples N] [--traced N] [--json FILE]
 """
 
-from __future__ import annotations
-
 import argparse
 import copy
 import re

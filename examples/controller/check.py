@@ -6,8 +6,6 @@ The log has the columns reference_um and displacement_um; the displacement is me
 the same line. Without a log, one is made with the simulated stage.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

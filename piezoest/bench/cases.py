@@ -3,8 +3,6 @@
 The same scenario, seed and conditions give the same case, to the bit.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`piezoest bench`: its commands. Heavy imports wait inside them."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """What changed between two campaigns, and whether beyond the noise: `piezoest bench compare`."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping

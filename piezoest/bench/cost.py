@@ -1,7 +1,5 @@
 """What an estimator costs: times per sample, alone on a recorded voltage and displacement, and its size."""
 
-from __future__ import annotations
-
 import math
 import pickle
 import time

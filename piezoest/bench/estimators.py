@@ -1,7 +1,5 @@
 """Estimators as one writes them on a command line: a name, a class of one's own, with arguments."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 from collections.abc import Callable

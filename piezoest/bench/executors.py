@@ -3,8 +3,6 @@
 All three give each item's result once, in no particular order, and survive what kills a process.
 """
 
-from __future__ import annotations
-
 import contextlib
 import multiprocessing
 import os

@@ -1,7 +1,5 @@
 """What a run of a scenario comes down to: how soon it settles, its errors, and whether it diverged."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What every file of results says of the machine and the code, and where such a file goes."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import importlib

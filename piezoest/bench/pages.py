@@ -1,7 +1,5 @@
 """Results of a benchmark as one page of HTML, from the document alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The paper's tables beside those of `PaperStage`: what `piezoest bench paper` shows."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The paper's tables beside ours, for the terminal and as rows of text for the documentation."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Tables I, II and III as published, and how close the simulated stage has to come to them."""
 
-from __future__ import annotations
-
 import csv
 import functools
 from dataclasses import dataclass

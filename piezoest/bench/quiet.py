@@ -1,7 +1,5 @@
 """Warnings of a campaign's runs, which are in its table and not on the screen."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 from collections.abc import Iterator

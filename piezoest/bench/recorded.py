@@ -4,8 +4,6 @@ The model sees nothing but the voltage, from the first sample on. What it misses
 part that was learnt from is its error, beside that of the straight line that fits the learnt part best.
 """
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import math

@@ -1,7 +1,5 @@
 """The table of runs for the terminal and for pages: headings and cells, in 80 columns."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -3,8 +3,6 @@
 `play` is a function of its task alone, whichever process or machine it runs in.
 """
 
-from __future__ import annotations
-
 import functools
 import traceback
 from dataclasses import asdict, dataclass, field

@@ -3,8 +3,6 @@
 A scenario is a function from a `Draft` to a `Case`, entered into `SCENARIOS` by its decorator.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any

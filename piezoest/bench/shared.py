@@ -1,7 +1,5 @@
 """What the commands of `piezoest bench` share: options, progress, and checks of what is to be written."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
 import time

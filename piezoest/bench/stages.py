@@ -1,7 +1,5 @@
 """Stages of the bench by name: the paper's, and others whose hysteresis the seed draws from a family."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

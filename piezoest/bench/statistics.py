@@ -10,8 +10,6 @@ F. Wilcoxon, Biometrics Bulletin 1 (1945) 80-83; S. Holm, Scandinavian Journal o
 Y. Benjamini, Y. Hochberg, Journal of the Royal Statistical Society B 57 (1995) 289-300.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 A process that is killed loses at most the row that it is at. A key that comes twice counts once.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """The table of runs: scenarios × stages × estimators × seeds, planned, and summed up in one document."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field

@@ -1,7 +1,5 @@
 """`piezoest bench` itself, and `piezoest bench compare`."""
 
-from __future__ import annotations
-
 import dataclasses
 import time
 from dataclasses import dataclass

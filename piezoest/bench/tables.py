@@ -1,7 +1,5 @@
 """Tables of runs in memory and as files: Parquet where pyarrow is installed, else CSV."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any

@@ -7,8 +7,6 @@ may be anything between them, evenly in its logarithm, a range of whole numbers,
         tuning_space = {"memory": (0.05, 2.0), "members": range(5, 50), "order": [1, 2, 3]}
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

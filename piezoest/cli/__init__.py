@@ -1,7 +1,5 @@
 """The command line: demo, identify, compensate, bench, export. Heavy imports wait inside the commands."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
 from typing import Annotated

@@ -1,7 +1,5 @@
 """What the commands share: progress, and checks of what is to be written."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path

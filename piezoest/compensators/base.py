@@ -1,7 +1,5 @@
 """What linear and inverse feed-forward share: the model's inverse, limits, gradual change of the model."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 

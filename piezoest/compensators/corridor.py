@@ -11,8 +11,6 @@ back into the range, so that the voltage need not stay there. The noise of a set
 that is set once, and drives for two turns, was not learnt in such a loop and has no corridor.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

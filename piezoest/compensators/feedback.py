@@ -1,7 +1,5 @@
 """Integral feedback around a feed-forward (last remark of Sec. I of the paper)."""
 
-from __future__ import annotations
-
 import math
 
 from piezoest._checks import number_or_nan, positive

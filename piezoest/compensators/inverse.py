@@ -1,7 +1,5 @@
 """Feed-forward through the inverse of the hysteresis, (14)-(17) and App. C."""
 
-from __future__ import annotations
-
 from piezoest.compensators.base import Compensator, HandOver, Method
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.models import Model

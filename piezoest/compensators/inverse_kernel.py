@@ -13,8 +13,6 @@ What depends on the model stands in the module that its class names as ``inverse
   settings within compiled code, which then can be handed a model.
 """
 
-from __future__ import annotations
-
 import functools
 from typing import Any
 

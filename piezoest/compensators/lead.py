@@ -1,7 +1,5 @@
 """A lead for mechanics and delay, before a feed-forward."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Limits of the voltage that a compensator may ask for."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from numbers import Real

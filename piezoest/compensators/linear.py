@@ -1,7 +1,5 @@
 """Linear feed-forward, u = r/K (11)."""
 
-from __future__ import annotations
-
 from piezoest._checks import instance
 from piezoest.compensators.base import Compensator
 from piezoest.compensators.limits import VoltageLimits

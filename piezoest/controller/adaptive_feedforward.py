@@ -1,7 +1,5 @@
 """Adaptive feed-forward as one object: it takes a reference, returns a voltage, and learns from readings."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import logging

@@ -6,8 +6,6 @@ and the voltage swings from about -1 to 1, so nothing need be known of the stage
 z = (x - zero)/unit, a voltage. For the recorded loop the recorder takes the place of the estimator.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where nobody knows what the hysteresis remembers: the line drives, and all models have to show again."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

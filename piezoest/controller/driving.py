@@ -1,7 +1,5 @@
 """Which model drives, the line or a candidate, by their recent errors; the voltage changes gradually."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a controller shows to its user; nothing is changed here."""
 
-from __future__ import annotations
-
 from collections import deque
 from typing import Any
 

@@ -4,8 +4,6 @@ The reference of the feed-forward is r + i, with di/dt = gain (r - x). Source: K
 Feedback Systems, Princeton 2008, sec. 10.4.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

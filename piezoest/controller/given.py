@@ -5,8 +5,6 @@ room, and rests there until the readings have answered about as the gain says: o
 Where they speak against it for long, the gain is sought as if nothing were known.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ The voltage goes from one extreme to the other, each time a little less far, unt
 the stage remembered, it has been wiped out by then.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 `plan` changes nothing that hysteresis remembers: `take` does, by the voltage that was written.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From the voltage that was written and its reading to all that is learnt."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -6,8 +6,6 @@ astray. A short leg takes little weight from those before it: small loops are fl
 them, and a line through the last two small ones would be wrong.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a controller is made of: limits that are checked, layouts, numbers to begin with."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Whether reference or voltage leave what the model was learnt on: noted once, for learning goes on."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from numba.extending import register_jitable

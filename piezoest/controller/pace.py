@@ -5,8 +5,6 @@ fractions of what they came to, is the time between them, for a lag and for a de
 around it. Both voltages and readings are those of the same sample, so blocks do not count.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

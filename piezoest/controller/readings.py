@@ -5,8 +5,6 @@ spike. Where readings do not follow the voltage for longer than the widest hyste
 hides the truth: nobody learns from it, and it has a name.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

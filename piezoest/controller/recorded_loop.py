@@ -10,8 +10,6 @@ Sources: G. Masing, Proc. 2nd Int. Congr. Appl. Mech., Zürich 1926, 332-335; th
 I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

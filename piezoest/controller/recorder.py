@@ -8,8 +8,6 @@ and most of the noise. The functions are those of an estimator's kernel, see
 Source: G. E. Forsythe, J. Soc. Indust. Appl. Math. 5 (1957) 74-88 (polynomials orthogonal on given points).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

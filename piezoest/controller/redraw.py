@@ -3,8 +3,6 @@
 What changes at one sample would shake the stage: the difference is owed, and paid on the way.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A controller as a JSON-safe dictionary, and what one must be before it is believed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

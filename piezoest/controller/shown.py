@@ -1,7 +1,5 @@
 """What a controller shows of itself: what happened, who drives, and models in µm."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

@@ -5,8 +5,6 @@ which are None behind the last. What compiled code does for all of them stands h
 None: a test for that stands alone, as no other would be seen through.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

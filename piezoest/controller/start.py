@@ -8,8 +8,6 @@ checked by a way twice as long: both must have been answered alike, else, as wit
 doubled. A gain that a user knows is not sought.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

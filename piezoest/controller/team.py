@@ -5,8 +5,6 @@ needs to be known of the stage beforehand. What they begin with must be made for
 controller makes them itself.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

@@ -3,8 +3,6 @@
 Hysteresis depends on travel and not on time, so everything is counted in swings of the voltage.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From the reference to the voltage: seeking the gain, on the way to the reference, by a model."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -5,8 +5,6 @@ Projection onto a linearised constraint in the metric of a covariance: D. Simon,
 filtering with state constraints, IET Control Theory Appl. 4 (2010) 1303-1318, sec. 2.3.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

@@ -3,8 +3,6 @@
 Rules of this library: a voltage explains a change of its travel times the slope of (2) or (12).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from piezoest.compile import inlined

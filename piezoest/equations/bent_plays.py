@@ -8,8 +8,6 @@ operator (M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, Springer 19
 Symbols: voltage u [V], play states y [V], thresholds r [V], bends d [V], displacement w [µm].
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

@@ -5,8 +5,6 @@ equation numbers are used below. Symbols: voltage u [V], displacement w [µm],
 alpha [1/V], beta [µm/V], gamma [µm/V²]; in the second form a [1/V], b and c [µm/V].
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

@@ -5,8 +5,6 @@ piezoelectrically actuated systems, IEEE Trans. Autom. Control 54 (2009) 537-550
 constants a decade apart give x proportional to log t between the shortest and the longest.
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 from piezoest.compile import inlined

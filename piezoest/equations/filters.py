@@ -4,8 +4,6 @@ Source: K. J. Åström, B. Wittenmark, Computer-Controlled Systems, 3rd ed., Pre
 held over the sample) and ch. 8 (the bilinear transform and its warping).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

@@ -3,8 +3,6 @@
 Of T. Fortescue, L. Kershenbaum, B. Ydstie, Automatica 17 (1981) 831-835, where it is not known before.
 """
 
-from __future__ import annotations
-
 from piezoest.compile import inlined
 from piezoest.layout import AMOUNT, Kind, record
 

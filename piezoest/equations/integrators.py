@@ -4,8 +4,6 @@ P. Bogacki, L. F. Shampine, A 3(2) pair of Runge-Kutta formulas, Appl. Math. Let
 321-325: the fixed-step method the paper runs at 50 kHz (Sec. IV).
 """
 
-from __future__ import annotations
-
 from numba.extending import register_jitable
 
 # Nodes of the stages and weights of the third-order solution.

@@ -6,8 +6,6 @@ first row of the transition's Jacobian differs from the identity. A covariance P
 kept exactly symmetric.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from piezoest.compile import inlined, like

@@ -12,8 +12,6 @@ Source: S. Devasia, E. Eleftheriou, S. O. R. Moheimani, A survey of control issu
 IEEE Trans. Control Syst. Technol. 15 (2007) 802-823, sec. IV (model-based feed-forward).
 """
 
-from __future__ import annotations
-
 import math
 
 from numba.extending import register_jitable

@@ -8,8 +8,6 @@ Symbols: theta parameters, phi regressor, z output, R variance of its noise; `pr
 phi.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

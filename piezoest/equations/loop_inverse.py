@@ -4,8 +4,6 @@ Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), (
 `piezoest.compensators.inverse_kernel` says what each function is for.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

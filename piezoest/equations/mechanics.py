@@ -4,8 +4,6 @@ f is the displacement that the stage would take if it had no inertia [µm], so t
 gain is one. Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012).
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 

@@ -10,8 +10,6 @@ an output-error model: L. Ljung, System Identification, 2nd ed. (1999), sec. 10.
 b and d stay separate keeps the regression linear while both are unknown.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

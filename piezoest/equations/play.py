@@ -6,8 +6,6 @@ Proc. Control Theory Appl. 148 (2001) 185-192 (the operator and its inverse).
 Symbols: voltage u [V], play states y [V], thresholds r [V], displacement w [µm].
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

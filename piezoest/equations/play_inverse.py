@@ -4,8 +4,6 @@ Source: P. Krejci, K. Kuhnen, IEE Proc. Control Theory Appl. 148 (2001) 185-192.
 `piezoest.compensators.inverse_kernel` says what each function is for.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -9,8 +9,6 @@ their place, which no Prandtl-Ishlinskii operator can do.
 Symbols: voltage u [V], play states y [V], thresholds r [V], displacement w [µm].
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

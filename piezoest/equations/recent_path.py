@@ -5,8 +5,6 @@ follows from the last few swings, so a compensator can change to a new model as 
 Unlike the equations, these functions have branches and work on numbers only.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

@@ -3,8 +3,6 @@
 White noise behind the low-pass W_p of App. A of Eielsen et al. (2012).
 """
 
-from __future__ import annotations
-
 from piezoest.compile import inlined
 from piezoest.layout import AMOUNT, MEASURED, record, whole
 

@@ -3,8 +3,6 @@
 Hysteresis depends on travel, see (3), and not on time.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

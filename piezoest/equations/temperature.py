@@ -7,8 +7,6 @@ reference temperature and never changes sign.
 Symbols: temperature [°C], coefficient [1/K].
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

@@ -5,8 +5,6 @@ Source: I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991 (wipin
 Unlike the equations, these functions have branches and work on numbers only.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba.extending import register_jitable
 

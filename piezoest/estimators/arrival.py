@@ -4,8 +4,6 @@ C. V. Rao, J. B. Rawlings, D. Q. Mayne, Constrained state estimation for nonline
 IEEE Trans. Autom. Control 48 (2003) 246-258; here the Gauss-Newton posterior of those samples.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from piezoest._checks import FloatArray

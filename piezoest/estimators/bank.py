@@ -1,7 +1,5 @@
 """Many stages at once: one estimator's law on many channels, over all cores."""
 
-from __future__ import annotations
-
 import itertools
 import os
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The methods and attributes that all estimators have in common."""
 
-from __future__ import annotations
-
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Output-error fit of a whole record, on CasADi."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """Outcome of `BatchFit`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from piezoest.fitting.outcome import Outcome

@@ -1,7 +1,5 @@
 """What estimators whose samples go through compiled functions share."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, cast
 
 import numpy as np

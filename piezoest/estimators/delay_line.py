@@ -1,7 +1,5 @@
 """The delay between voltage and measured displacement, undone on the voltage's side."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from piezoest._checks import non_negative

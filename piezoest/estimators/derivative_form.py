@@ -4,8 +4,6 @@ z = dx/dt against the regressor (20) of the Coleman-Hodgdon model, or z = x agai
 from one good sample to the next, both sides through the low-pass W_p of App. A and an optional high-pass.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Extended Kalman filter: the loop's state and its parameters estimated jointly."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, ClassVar
 

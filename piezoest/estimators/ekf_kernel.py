@@ -3,8 +3,6 @@
 The settings of a hysteresis have `least`, those of a linear gain have `gain` instead; the other is absent.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What estimators have in common that fit once in a while and hold the fit between."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Moving-horizon estimation: the output-error problem on a sliding window, on CasADi."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
 from typing import Any

@@ -1,7 +1,5 @@
 """What `MovingHorizon` keeps by name, and the compiled way of samples into its window."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ The derivative form sees the offset through |du| only, which takes a good sensor
 Over a whole period (two swings of the voltage) what the model misses of the loop's shape cancels.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from piezoest.compile import inlined

@@ -3,8 +3,6 @@
 The state's layout names the kernel, see `piezoest.estimators.compiled`.
 """
 
-from __future__ import annotations
-
 from piezoest.compile import Cube, Matrix, Record, Vector, compiled, nth
 
 

@@ -4,8 +4,6 @@
 `CHANGED`, or `TO_BE_PLACED` where what the inverse remembers of the voltage has to be found again.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

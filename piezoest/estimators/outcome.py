@@ -1,7 +1,5 @@
 """What `piezoest.track` needs of an estimator, and the status and the trace that estimators return."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 

@@ -1,7 +1,5 @@
 """Recursive least squares of the Coleman-Hodgdon model in output-error form, from raw (u, x)."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import numpy as np

@@ -4,8 +4,6 @@ The filter's vector is s = (b, c, d, centre, disturbance): b, c and d relative t
 centre and the disturbance relative to that times a volt.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

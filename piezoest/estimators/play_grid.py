@@ -1,7 +1,5 @@
 """Plays on a grid: where thresholds and bends lie, what starts there, regressors, and how slopes move on."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any, NamedTuple
 

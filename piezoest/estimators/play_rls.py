@@ -1,7 +1,5 @@
 """Recursive least squares of a Prandtl-Ishlinskii model with creep and asymmetry."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """The compiled inside of `PrandtlIshlinskiiRLS`: plays, windows of travel, and the law."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The paper's recursive least squares (App. A) for any regression z = theta . phi."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 import numpy as np

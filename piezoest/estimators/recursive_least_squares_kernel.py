@@ -4,8 +4,6 @@ Policies come in by their hooks, see `piezoest.policies.base`. State and setting
 it as ``law``, its policies as ``policies``, the regressor as ``phi``.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The paper's estimator: recursive least squares on the derivative form, from raw (u, x)."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The compiled inside of `HysteresisRLS`: from raw (u, x) to a regression, and into the law."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

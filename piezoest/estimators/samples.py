@@ -1,7 +1,5 @@
 """What becomes of a sample: its code in the state, and what loops over records keep of it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from piezoest.compile import inlined

@@ -4,8 +4,6 @@ Much in a state becomes an index, a count or a divisor in compiled code, which a
 says of each number what it can be.
 """
 
-from __future__ import annotations
-
 import inspect
 import math
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """Fewer points for a record, without losing the voltage's path or the displacement's information."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A controller in C99: estimator, hand-over of the model and inverse, from the library's own equations."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

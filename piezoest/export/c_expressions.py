@@ -1,7 +1,5 @@
 """Expressions of the kernels in C: what is known is computed here, the rest becomes text."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import inspect

@@ -1,7 +1,5 @@
 """Python functions as the translator reads them: tree, comments, and how often names are assigned."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import textwrap

@@ -5,8 +5,6 @@ reached disappear, what is absent is not there, loops have fixed ends. The subse
 anything else is refused, so that no construct is translated by guess.
 """
 
-from __future__ import annotations
-
 import ast
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A co-simulation unit (FMI 2.0) from the generated C code."""
 
-from __future__ import annotations
-
 import platform
 import sys
 import tempfile

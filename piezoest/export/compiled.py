@@ -1,7 +1,5 @@
 """The generated code, compiled and run on this computer."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import shutil

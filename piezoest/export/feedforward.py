@@ -1,7 +1,5 @@
 """An `AdaptiveFeedforward` in C99: its kernel, translated, with the models in use among its state."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

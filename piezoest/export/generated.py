@@ -1,7 +1,5 @@
 """Generated code: one header, one source, their templates, and what is checked of every order."""
 
-from __future__ import annotations
-
 import keyword
 import re
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """One sample of the control loop on a controller: measurement, estimate, model, voltage."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables for controllers that take no code: the settled voltage of a periodic reference, and its branches."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What an output-error fit varies, and what that means in parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any

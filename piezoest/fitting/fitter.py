@@ -1,7 +1,5 @@
 """One fit for every model: a record in, the model that misses it least out, and how far to trust it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, Literal

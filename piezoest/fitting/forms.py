@@ -1,7 +1,5 @@
 """Kinds of models that a record can be fitted with."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

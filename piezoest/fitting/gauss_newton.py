@@ -5,8 +5,6 @@ linear come to their optimum, for what the others are then. Steps that promise m
 D. W. Marquardt, J. SIAM 11 (1963) 431-441.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -3,8 +3,6 @@
 P. J. Huber, Robust Statistics (1981); W. J. J. Rey, Introduction to Robust Methods (1983).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from piezoest._checks import FloatArray

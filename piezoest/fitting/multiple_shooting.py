@@ -4,8 +4,6 @@ H. G. Bock, K. J. Plitt, A multiple shooting algorithm for direct solution of op
 IFAC Proc. 17 (1984) 1603-1608; for parameter estimation the objective is a sum of squares.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

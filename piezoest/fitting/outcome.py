@@ -3,8 +3,6 @@
 L. Ljung, System Identification, 2nd ed. (1999), ch. 9.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Samples that no model is to follow, as a fit's residual shows them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

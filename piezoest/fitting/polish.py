@@ -4,8 +4,6 @@ The linear fits at one alpha after the other end near the optimum; a few passes 
 CasADi makes end in it, and give the standard errors of all, the delay among them.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

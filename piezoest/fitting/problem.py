@@ -5,8 +5,6 @@ Coleman-Hodgdon model of `fit` (a log, with a delay). What depends on the model 
 behind `FreeRunning`. L. Ljung, System Identification, 2nd ed. (1999), ch. 7 and 10.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Rests of a log: stretches in which its voltage stands still."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from piezoest._checks import FloatArray

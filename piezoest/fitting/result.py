@@ -1,7 +1,5 @@
 """What a fit found: a model, how far to trust it, and what it predicts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 

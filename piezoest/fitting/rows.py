@@ -4,8 +4,6 @@ A threaded BLAS gains nothing in them, and on a computer that is busy with somet
 each other: fits took twenty times as long. Nor does the last bit depend on how many threads there are.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from piezoest._checks import FloatArray

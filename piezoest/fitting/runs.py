@@ -1,7 +1,5 @@
 """Stretches of samples that a mark is set for."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

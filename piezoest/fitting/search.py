@@ -5,8 +5,6 @@ others are tried, with everything linear solved anew (variable projection: G. H.
 Numer. Anal. 10 (1973) 413-432).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Literal

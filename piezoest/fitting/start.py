@@ -1,7 +1,5 @@
 """Where a nonlinear fit starts: from what the user knows, or what linear fits show of the record."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ How the neighbours are weighed is learnt from the log itself, so that noise, rin
 wave are nothing unusual.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from piezoest._checks import FloatArray

@@ -1,7 +1,5 @@
 """How far to trust a fit: standard errors for residuals that are not white, and an interval for readings."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """What to know before using an identified model, in plain sentences."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from piezoest.fitting.search import LONGEST_DELAY

@@ -1,7 +1,5 @@
 """Which of several fitted models to use, and why."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from piezoest.identification.result import Candidate

@@ -1,7 +1,5 @@
 """Readings that end at a limit, come in coarse steps, or come more often than the sensor measures."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

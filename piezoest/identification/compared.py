@@ -1,7 +1,5 @@
 """An identification in tables and sentences, as a terminal and a page show them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """A log as identification sees it: where it counts, how it moves, and whether that is enough."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

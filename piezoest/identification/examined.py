@@ -1,7 +1,5 @@
 """A log as the checks see it: without gaps and spikes, with its line and its loop."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

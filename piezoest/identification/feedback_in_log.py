@@ -1,7 +1,5 @@
 """Signs of a feedback loop in a log: the voltage answers the noise of the displacement."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

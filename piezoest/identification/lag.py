@@ -1,7 +1,5 @@
 """Whether a log's voltage can tell a lag of the displacement from the width of the hysteresis loop."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which way round a log's loop runs, and how wide it is, whatever drifts."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A log larger than memory in parts of equal size, for any size of the blocks of its file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """From a recorded log to a model: checks of the log, the best model, and its accuracy."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """The noise floor of a log: by how much periods differ that the voltage repeats."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from piezoest._checks import FloatArray

@@ -1,7 +1,5 @@
 """Whether a log makes sense, before a model is fitted to it: units, columns, loop and sensor."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """A log larger than memory to a model: plays from sums over the log, judged in another pass."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """What tables and files say of an identification: parameters, kinds of models, all figures."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from piezoest.identification.residual import Misfit

@@ -1,7 +1,5 @@
 """Models per size of the voltage's swing: what was learnt at each amplitude, as a file."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The Coleman-Hodgdon model of a stage, (1)-(4)."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self

@@ -1,7 +1,5 @@
 """Creep of a stage: what is added to the hysteresis, slowly."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Self

@@ -1,7 +1,5 @@
 """What an output-error fit needs of a model: its equation, its coordinates and where to start."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Collection, Mapping
 from typing import Any, ClassVar, Self

@@ -1,7 +1,5 @@
 """The ideal linear stage, x = K u (8)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self

@@ -1,7 +1,5 @@
 """Mechanics of a stage: one lightly damped resonance, (5)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The Prandtl-Ishlinskii model of a stage: a gain and a weighted sum of plays."""
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self

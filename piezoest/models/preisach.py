@@ -1,7 +1,5 @@
 """A Preisach model of a stage, to be simulated: neither Coleman-Hodgdon nor Prandtl-Ishlinskii."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Models as they come from files: of whichever class, and with what they were learnt on."""
 
-from __future__ import annotations
-
 import inspect
 from dataclasses import dataclass, replace
 from os import PathLike

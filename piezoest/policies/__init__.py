@@ -3,8 +3,6 @@
 A policy is registered by the import of its file, here.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

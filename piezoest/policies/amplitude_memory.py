@@ -1,7 +1,5 @@
 """Remembers what was learnt at each size of the swing, and uses it again."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, cast
 

@@ -1,7 +1,5 @@
 """Adapt again when the innovation shows a change."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

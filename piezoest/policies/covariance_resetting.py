@@ -1,7 +1,5 @@
 """Reset a covariance that has become too small to adapt."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

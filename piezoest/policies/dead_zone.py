@@ -1,7 +1,5 @@
 """No update when the regressor contains no information."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Forgetting along the present regressor alone."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """No update while a direction of the parameters is not excited."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Exponential forgetting, in time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

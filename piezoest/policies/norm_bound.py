@@ -1,7 +1,5 @@
 """A bound on the covariance."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The normalised gain of the continuous law."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from piezoest.policies.base import Conditions, Policy

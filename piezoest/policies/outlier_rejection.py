@@ -1,7 +1,5 @@
 """Impossible readings are ignored."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from piezoest._checks import integer

@@ -1,7 +1,5 @@
 """Keep the estimate itself admissible."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Forgetting by a random walk of the parameters, counted in swings of the voltage."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A memory that becomes shorter when the model no longer fits."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

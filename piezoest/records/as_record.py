@@ -1,7 +1,5 @@
 """A record of whatever holds one."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

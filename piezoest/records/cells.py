@@ -1,7 +1,5 @@
 """What a cell of a text file holds: a number, as this file writes numbers, or a time stamp."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Which column holds what: names, numbers and units, as given or guessed."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

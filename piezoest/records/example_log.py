@@ -1,7 +1,5 @@
 """A recording of a real stage that comes with the package."""
 
-from __future__ import annotations
-
 from importlib import resources
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """NumPy, MATLAB, HDF5 and TDMS files: the arrays in them, by name."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import logging

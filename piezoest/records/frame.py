@@ -1,7 +1,5 @@
 """Columns of a table in memory: a DataFrame of pandas or Polars, or the sheet of a spreadsheet."""
 
-from __future__ import annotations
-
 import datetime
 import zipfile
 from collections.abc import Iterator, Sequence

@@ -3,8 +3,6 @@
 Reference: NI, *Specification for the LabVIEW Measurement File (.lvm)*.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field

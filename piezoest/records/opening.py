@@ -1,7 +1,5 @@
 """Opens a log of whatever format, by what it begins with."""
 
-from __future__ import annotations
-
 import importlib
 import zipfile
 from pathlib import Path

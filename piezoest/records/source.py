@@ -1,7 +1,5 @@
 """A file with columns, of whatever format, as blocks of rows."""
 
-from __future__ import annotations
-
 import abc
 import contextlib
 from collections.abc import Iterator, Sequence

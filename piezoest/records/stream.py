@@ -1,7 +1,5 @@
 """A recorded log of any format and any length, block by block."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple

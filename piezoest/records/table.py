@@ -1,7 +1,5 @@
 """Columns in arrays, or in what is sliced like arrays, of files that name them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path

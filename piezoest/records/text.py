@@ -1,7 +1,5 @@
 """Columns of a text file: how it is written is recognised here, and pandas reads it."""
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

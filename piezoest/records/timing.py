@@ -1,7 +1,5 @@
 """The column of time, block by block: evenly spaced samples, or a refusal that names the line."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple

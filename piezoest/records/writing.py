@@ -1,7 +1,5 @@
 """Columns into a file: CSV, Parquet, HDF5, MATLAB or NumPy, by the ending of its name."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable, Mapping
 from pathlib import Path

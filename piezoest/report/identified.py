@@ -1,7 +1,5 @@
 """What an identification found, as a page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from piezoest._version import __version__

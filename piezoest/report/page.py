@@ -1,7 +1,5 @@
 """One self-contained page: text, tables and pictures, which needs no network."""
 
-from __future__ import annotations
-
 import base64
 import html
 import io

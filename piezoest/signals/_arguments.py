@@ -1,7 +1,5 @@
 """Checks that the signals share."""
 
-from __future__ import annotations
-
 from piezoest._checks import positive
 
 

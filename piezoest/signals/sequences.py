@@ -1,7 +1,5 @@
 """Signals made of levels and of chance: low-passed steps, PRBS, random walk, dwell, and any array."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where a signal turns: the ends of its swings."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Waves with a closed form: triangle, sine, modulated and multi-amplitude waves, two tones, chirp."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Literal

@@ -4,8 +4,6 @@ Each is a frozen description with the numbers made from it, `settings` (constant
 sample rate) and `rest` (its state at rest), and one function per sample that works on them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -10,8 +10,6 @@ the displacement without offset after the next voltage. Models without it are th
 which one machine code serves.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from numba.extending import register_jitable

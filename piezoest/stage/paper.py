@@ -1,7 +1,5 @@
 """The stage of the paper's experiment, rebuilt from its tables."""
 
-from __future__ import annotations
-
 import functools
 import json
 from importlib import resources

@@ -1,7 +1,5 @@
 """A second stage to judge by: a Preisach plane with creep, of plays under a bell."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

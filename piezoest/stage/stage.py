@@ -1,7 +1,5 @@
 """A simulated stage: amplifier, hysteresis, creep, mechanics, gauge."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
 from typing import Any, Protocol, cast

@@ -1,7 +1,5 @@
 """How a simulated stage changes with temperature."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from piezoest._checks import FloatArray, finite

@@ -1,7 +1,5 @@
 """Solvers through CasADi: IPOPT for nonlinear programs, and convex quadratic ones."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable
 from functools import lru_cache

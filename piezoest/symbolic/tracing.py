@@ -1,7 +1,5 @@
 """Equations as CasADi expressions: their derivatives, and the simulation of a whole record."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple

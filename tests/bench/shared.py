@@ -1,7 +1,5 @@
 """What tests of benchmarks share: a small rig, modules of one's own, and the command."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

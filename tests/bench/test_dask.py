@@ -1,7 +1,5 @@
 """Campaigns on Dask: a real scheduler and workers in processes of their own, on this machine only."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Metrics of records made by hand, whose numbers one can see."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The paper's tables from the simulated stage, against their bounds."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Scenarios: the same seed the same case, each with what its name says."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Orders, intervals and tests, on runs whose truth is known."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any
 

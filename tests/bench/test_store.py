@@ -1,7 +1,5 @@
 """Where rows are kept: each under its key, whoever else appends, and whatever ends the writing."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The table of runs: what a run is, how runs are kept, resumed and summed up. No time is asserted."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

@@ -1,7 +1,5 @@
 """The zoo: what a run is, how it is judged, and `piezoest bench safety`."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

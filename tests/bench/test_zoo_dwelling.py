@@ -1,7 +1,5 @@
 """Whether a controller goes on after a long rest as it did before."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The families of the zoo: known limits, textbook versions, and what hysteresis without a clock must do."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What goes wrong on the rigs of the zoo does what it says, one by one and together."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The line that a user could have had: it is learnt leg by leg, from true readings alone, and held else."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simulated recordings: functions of their seed, with all that users' logs have, true to what they say."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

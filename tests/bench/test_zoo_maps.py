@@ -1,7 +1,5 @@
 """How soon a controller settles over its map, and whether it is as good as the best single estimator."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a controller said about a fault is compared with what it was, and how soon all was as before."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

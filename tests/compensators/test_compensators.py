@@ -1,7 +1,5 @@
 """Compensators: exactness, limits, bumpless change of model, feedback."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Models handed over as often as one likes: the voltage stays near the line, the loop does not run away."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

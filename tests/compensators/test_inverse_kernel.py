@@ -1,7 +1,5 @@
 """One kernel for all inverses: a model handed over within compiled code, and a model that brings its own."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Loops wired by hand, a model handed over at every sample: what drove the voltage to a limit for good."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

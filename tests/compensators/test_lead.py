@@ -1,7 +1,5 @@
 """The lead: exact to second order, stable, bounded, and worth it near the resonance."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

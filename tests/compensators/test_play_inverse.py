@@ -1,7 +1,5 @@
 """Inverse of Prandtl-Ishlinskii models in the compensator: exact, limited, bumpless."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

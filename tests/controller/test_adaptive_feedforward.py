@@ -1,7 +1,5 @@
 """Adaptive feed-forward as one object: what it promises whatever comes in, and what it shows."""
 
-from __future__ import annotations
-
 import copy
 import functools
 import json

@@ -1,7 +1,5 @@
 """Integral feedback within the controller: what it removes, and how far a wrong sensor can drive it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

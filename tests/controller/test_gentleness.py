@@ -1,7 +1,5 @@
 """What a controller does not do to a stage: jumps, shaking, following what is not true."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Erasing what hysteresis remembers, and writes of which nobody knows the outcome."""
 
-from __future__ import annotations
-
 import copy
 import json
 from typing import Any

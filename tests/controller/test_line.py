@@ -1,7 +1,5 @@
 """The straight line of a controller: what it remembers of legs of different length."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is healthy gets no name, and what is wrong gets the right one, on rigs of the zoo."""
 
-from __future__ import annotations
-
 import pytest
 
 import piezoest as pz

@@ -1,7 +1,5 @@
 """A controller notes, once, that the run leaves what the user's model was learnt on."""
 
-from __future__ import annotations
-
 import json
 import logging
 from pathlib import Path

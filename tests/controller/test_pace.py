@@ -1,7 +1,5 @@
 """A reference that is too fast is told, once: near the resonance, or where lag passes for hysteresis."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The recorded loop: repeated motion needs no model."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

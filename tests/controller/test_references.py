@@ -1,7 +1,5 @@
 """References that do not repeat: minor loops, a walk, and the first period of all."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A long rest within a leg: the line stays what the legs have shown."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What a user knows of a stage: its gain, where it stands; and what a controller does if that is wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

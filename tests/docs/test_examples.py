@@ -1,7 +1,5 @@
 """The examples in docstrings run and show what they print; classes and functions that users call have one."""
 
-from __future__ import annotations
-
 import doctest
 import inspect
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The judge of fits to logs: its own fits, what it judges against, what it counts, and the page's tables."""
 
-from __future__ import annotations
-
 import importlib
 import json
 from pathlib import Path

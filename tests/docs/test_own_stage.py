@@ -1,7 +1,5 @@
 """The program for hardware, `examples/own_stage.py`, on simulated drivers, of which some fail."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The documentation: its numbers are those of docs/data, its pages are complete, its links are checked."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """The page *On anybody's rig*: what it says follows from its data, and its data from the runs."""
 
-from __future__ import annotations
-
 import copy
 import importlib
 import json

@@ -1,7 +1,5 @@
 """The pages about estimators are no older than the code: some of their numbers are made again."""
 
-from __future__ import annotations
-
 import json
 import random
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The admissible set and its nearest point."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

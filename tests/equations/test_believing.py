@@ -1,7 +1,5 @@
 """Readings that a stage cannot have made are left out."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Bent plays: segments, the walk of the inverse, the memory of turning points, Preisach's properties."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The Coleman-Hodgdon equations: identities of the paper, exact steps, the inverse."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

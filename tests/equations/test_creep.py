@@ -1,7 +1,5 @@
 """Creep as first-order terms."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

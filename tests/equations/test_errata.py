@@ -1,7 +1,5 @@
 """What the paper prints or leaves open, and what it has to mean."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The filter's steps against the textbook's matrices, and as NumPy, Numba and CasADi."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

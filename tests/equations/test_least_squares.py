@@ -1,7 +1,5 @@
 """The recursions of Appendix A against the textbook, and against each other."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

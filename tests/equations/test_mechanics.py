@@ -1,7 +1,5 @@
 """The mass-spring-damper, discretised exactly."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The play operator, the Prandtl-Ishlinskii operator and its inverse."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The recent path of the voltage tells where any Coleman-Hodgdon model would stand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """An equation is one function: NumPy, Numba and CasADi give the same numbers, results and states alike."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One function of named numbers, run as Python, as machine code and by CasADi."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The default HysteresisRLS: random-walk forgetting on the reference's own clock, and its guards."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

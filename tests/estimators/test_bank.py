@@ -1,7 +1,5 @@
 """A bank of estimators is so many single ones; streaming keeps nothing."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

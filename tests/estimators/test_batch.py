@@ -1,7 +1,5 @@
 """BatchFit: recovery, standard errors, bounds, masks, gaps, outliers, failure, saving."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 

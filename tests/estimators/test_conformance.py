@@ -5,8 +5,6 @@ cannot keep a promise says so itself: ``conformance_exceptions`` on the class ma
 promise, which is that of its test here without ``test_``, to the reason.
 """
 
-from __future__ import annotations
-
 import copy
 import inspect
 import itertools

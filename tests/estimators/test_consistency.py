@@ -7,8 +7,6 @@ normalised estimation error squared (NEES) has the mean n, and the normalised in
 Navigation (2001), sec. 5.4.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """HysteresisEKF: textbook parity, derivatives, reductions, tuning per second, the admissible set."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import casadi

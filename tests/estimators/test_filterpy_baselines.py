@@ -1,7 +1,5 @@
 """The baselines on filterpy: equal to the compiled filter, and open to filterpy's own tools."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """MovingHorizon: one solve a hop, parity, tracking, arrival cost, thinning, bad solves."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

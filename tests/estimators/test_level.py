@@ -1,7 +1,5 @@
 """The loop's centre from levels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The default estimator over a hundred million samples: half an hour of a stage at 50 kHz."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Whatever comes in, nothing that is not a number comes out: of any estimator, with any settings."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

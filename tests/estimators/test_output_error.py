@@ -1,7 +1,5 @@
 """OutputErrorRLS: exact on its own plant, textbook parity, noise, a larger start, rest, holes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

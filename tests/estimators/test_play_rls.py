@@ -1,7 +1,5 @@
 """PrandtlIshlinskiiRLS: what it learns, what it leaves alone, in the ring and on a recording."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

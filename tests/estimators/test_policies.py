@@ -1,7 +1,5 @@
 """Policies that are off by default: each does what it says, refuses bad values, and is saved."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """RecursiveLeastSquares: the law of App. A for any regression."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Arguments that an estimator or a policy cannot use are refused by name, before a sample is taken."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

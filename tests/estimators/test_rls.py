@@ -1,7 +1,5 @@
 """HysteresisRLS: parity with the textbook, convergence, offsets, delays, gaps, dwells."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

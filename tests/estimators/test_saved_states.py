@@ -1,7 +1,5 @@
 """A saved estimator that was changed is refused in words, or works: no crash, no hang, nothing infinite."""
 
-from __future__ import annotations
-
 import copy
 import itertools
 from typing import Any

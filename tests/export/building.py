@@ -1,7 +1,5 @@
 """Generated C put to compilers: every warning an error, and sanitizers that stop at the first fault."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Without a C compiler there is nothing to compare."""
 
-from __future__ import annotations
-
 import pytest
 
 from piezoest.export.compiled import compiler

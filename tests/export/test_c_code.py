@@ -1,7 +1,5 @@
 """Generated controllers: clean to compilers, equal to the library, safe with any input."""
 
-from __future__ import annotations
-
 import functools
 from pathlib import Path
 from typing import Any

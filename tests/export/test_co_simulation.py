@@ -1,7 +1,5 @@
 """The co-simulation unit: valid, and equal to the library where it runs."""
 
-from __future__ import annotations
-
 import errno
 import os
 import zipfile

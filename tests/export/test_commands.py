@@ -1,7 +1,5 @@
 """`piezoest export`: what it writes and refuses."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

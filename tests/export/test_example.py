@@ -1,7 +1,5 @@
 """The example of a control loop, and the count on an emulated target, run as a reader would run them."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """An exported `AdaptiveFeedforward`: the library's voltages to the last bit, whatever happens on a rig."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Generated controllers fed with any bits: what they learn and what they put out are numbers."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

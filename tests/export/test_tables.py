@@ -1,7 +1,5 @@
 """Tables: settled waveforms and branches, exact against the model."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

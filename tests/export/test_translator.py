@@ -1,7 +1,5 @@
 """The translator on small functions: what it makes of them, and what it refuses."""
 
-from __future__ import annotations
-
 import ctypes
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Stages of plays and voltages drawn at random, and plays by plain NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import piezoest as pz

@@ -1,7 +1,5 @@
 """Columns times coefficients are what the model simulates, in one piece and in many."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

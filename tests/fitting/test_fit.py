@@ -1,7 +1,5 @@
 """The face of a fit: what it refuses, what it shows, and where it goes on."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Gauss-Newton steps of convex programs against SciPy's trust region, on rows and not on sums."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The convex program against SciPy and its own optimality conditions, and sums against dense algebra."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear, nnls

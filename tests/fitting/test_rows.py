@@ -1,7 +1,5 @@
 """Products in small pieces are those of whole matrices."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

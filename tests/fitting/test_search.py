@@ -1,7 +1,5 @@
 """What a fit finds of stages that are known: slopes, start, delay, creep, drift, jumps, spikes, dropouts."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How far to trust a fit: standard errors and intervals hold what they promise."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Logs as they should not be, and the finding that says so of each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Identification of a recorded log: known models, the real recording, what says too little."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any, cast

@@ -1,7 +1,5 @@
 """Spikes and jumps are found where they are, and nowhere else."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

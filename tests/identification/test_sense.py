@@ -1,7 +1,5 @@
 """Doubts about logs: none about healthy ones of any family, and the right one where columns are swapped."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

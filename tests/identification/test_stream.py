@@ -1,7 +1,5 @@
 """Identification of a log that need not fit in memory: as that of one which does, whatever its blocks."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Open-loop logs of stages of all families, drawn at random, with what belongs to a healthy one."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

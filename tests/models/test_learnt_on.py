@@ -1,7 +1,5 @@
 """Ranges that a model was learnt on, and models with them in files."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """The Prandtl-Ishlinskii model, creep and mechanics as objects."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A model that two functions of one sample describe, compiled: simulated, inverted, in a stage, fitted."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Models of two functions: what is wrong with one is said in its own words."""
 
-from __future__ import annotations
-
 import importlib
 import itertools
 from collections.abc import Callable, Iterator

@@ -4,8 +4,6 @@ A case is a function without arguments that returns named arrays of numbers. It 
 so that no case depends on another.
 """
 
-from __future__ import annotations
-
 from tests.oracle import compensator_cases, filter_cases, model_cases, ring_cases, rls_cases
 
 CASES = {

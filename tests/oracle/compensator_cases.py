@@ -1,7 +1,5 @@
 """Cases of compensators: limits, faults in the reference, hand-over of models."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Cases of the Kalman filters, of output error, of Prandtl-Ishlinskii and of the fits."""
 
-from __future__ import annotations
-
 import tempfile
 from functools import partial
 from pathlib import Path

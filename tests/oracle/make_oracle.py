@@ -3,8 +3,6 @@
 With prefixes of names only those cases are made anew, and the others stay; the computer must be the file's.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from pathlib import Path

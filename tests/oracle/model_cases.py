@@ -1,7 +1,5 @@
 """Cases of models and simulated stages."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Public results as named arrays of numbers."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Records that the oracle's cases are run on: voltages, and what a stage made of them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cases of the ring: estimator, compensator and a stage, in Python and in exported C."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Cases of recursive least squares: every option, every policy."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

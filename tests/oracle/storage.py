@@ -1,7 +1,5 @@
 """The file of the oracle: some numbers of every case, and a fingerprint of all of them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import platform

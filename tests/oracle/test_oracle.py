@@ -1,7 +1,5 @@
 """Every case gives what the file says: to the last bit where the file was made, else closely."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

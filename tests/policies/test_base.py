@@ -1,7 +1,5 @@
 """A policy that is asked for is carried out, or refused: never silently ignored."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import importlib.util

@@ -1,7 +1,5 @@
 """The paper's estimator written out with matrices: (18)-(20), W_p, discrete least squares."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

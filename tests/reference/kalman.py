@@ -1,7 +1,5 @@
 """The extended Kalman filter of a hysteresis and its parameters, from the textbook, with matrices."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

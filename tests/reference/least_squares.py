@@ -1,7 +1,5 @@
 """Recursive least squares from the textbook, with matrices."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

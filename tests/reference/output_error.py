@@ -1,7 +1,5 @@
 """The output-error filter as a textbook has it: NumPy matrices, one sample after the other, no holes."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Reports: what is on them, and that they need nothing from elsewhere."""
 
-from __future__ import annotations
-
 import re
 from html.parser import HTMLParser
 from pathlib import Path

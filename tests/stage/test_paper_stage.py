@@ -1,7 +1,5 @@
 """The paper's stage: its loops are those of Tables I and II."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The simulated stage: its parts, its streams, its seeds."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

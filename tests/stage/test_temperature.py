@@ -1,7 +1,5 @@
 """Stages that warm: the law, the schedules, the same bits in step and run."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

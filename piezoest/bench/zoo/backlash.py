@@ -5,8 +5,6 @@ and is as far from a smooth loop as a stage gets. Source of the play: M. A. Kras
 Pokrovskii, Systems with Hysteresis, Springer 1989.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

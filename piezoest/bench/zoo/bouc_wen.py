@@ -5,8 +5,6 @@ piezos: T. S. Low, W. Guo, J. Microelectromech. Syst. 4 (1995) 230-237. With bet
 saturates at `width`. It depends on the voltage alone, not on time; it does not wipe out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Columns of the tables: of runs on the zoo, and of the map."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 from piezoest.bench.store import Row

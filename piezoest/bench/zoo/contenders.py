@@ -1,7 +1,5 @@
 """Controllers by name, as the command line gives them."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 from typing import Any

@@ -3,8 +3,6 @@
 The rigs are healthy and ideal: what is left of the error is what a model does not know of the hysteresis.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Controllers to try the zoo with, and to compare with: a line, and the library's parts wired by hand."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A rig from a seed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -6,8 +6,6 @@ Sprekels, Hysteresis and Phase Transitions, Springer 1996, ch. 5. Each monotone 
 does not wipe out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

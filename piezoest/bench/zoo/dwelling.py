@@ -6,8 +6,6 @@ largest error is to be as it was. The stage may creep: what it does meanwhile is
 voltage goes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

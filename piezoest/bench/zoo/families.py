@@ -3,8 +3,6 @@
 Width is the largest opening of the loop between the limits of the voltage, at one voltage, over its stroke.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """What goes wrong on a rig of the zoo: which fault, from when to when, and what it does to the run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

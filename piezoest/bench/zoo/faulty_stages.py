@@ -3,8 +3,6 @@
 Every fault is seeded, and `step` and `run` give the same bits.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

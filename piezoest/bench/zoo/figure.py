@@ -1,7 +1,5 @@
 """A picture of one run: reference and displacement, voltage, error and loop, beside the lines'."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

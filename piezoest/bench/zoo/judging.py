@@ -1,7 +1,5 @@
 """Whether a run was safe, and how good: the numbers of its row."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -5,8 +5,6 @@ anew through the true readings of the last two. It drives a twin of the rig with
 oracle says which readings are true, and how late they are: while there are none, the line is held.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

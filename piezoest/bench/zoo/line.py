@@ -6,8 +6,6 @@ u = (r - centre)/gain, where displacement = gain u + centre is the least-squares
 that is driven over the same reference; in the coordinates of the gauge.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

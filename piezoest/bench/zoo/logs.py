@@ -4,8 +4,6 @@ The voltage is a function of time, drawn on a grid finer than the samples; so th
 fraction of a sample, as it is where an amplifier and a gauge have filters.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -4,8 +4,6 @@ x = gain (u + share h) + offset, with h [V] the part that depends on the voltage
 module: a class that holds its numbers and, beside it, the compiled ``deform`` of one sample.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """What a controller said about a fault, and how soon the run was as good as before."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One run: a rig and a controller in, a row out."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """References of the zoo: waves, rasters, walks and steps, as arrays of any length."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -6,8 +6,6 @@ linear interpolation. This is the limit of infinitely many relays, which moves w
 Mayergoyz, Mathematical Models of Hysteresis, Springer 1991, ch. 1.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Runs on the zoo for the terminal."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from piezoest._tables import print_cells, say

@@ -1,7 +1,5 @@
 """A rig of the zoo: a stage of some family, what is around it, a reference and at most one fault."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One controller on one rig: what went in and what came out, sample by sample."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ amplitude, or three times the noise. The stage has a resonance. Settling soon is
 is slow beside it, and large beside the noise.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace

@@ -1,7 +1,5 @@
 """What many runs say together: violations, quantiles, tables and the worst."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 

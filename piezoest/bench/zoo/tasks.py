@@ -1,7 +1,5 @@
 """The runs of a campaign: what each is, the key it is kept under, and what happens if its process dies."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial

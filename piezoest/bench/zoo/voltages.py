@@ -3,8 +3,6 @@
 Each shape is a function of the number of points, the number of waves in them and a random generator.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
