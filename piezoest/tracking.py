@@ -297,7 +297,7 @@ def _turn(
             u[k] = compensator.step(float(r[k]), float(x[k - 1]) if k > 0 else None)
         else:
             u[k] = compensator.step(float(r[k]))
-        x[k] = stage.step(float(u[k]))
+        x[k] = number_or_nan(stage.step(float(u[k])))
         true[k] = getattr(stage, "displacement", x[k])
 
 

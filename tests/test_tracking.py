@@ -96,3 +96,17 @@ def test_the_compiled_ring_is_the_loop_over_its_parts(model: Any, make: Any, opt
     for one, other in zip(results[0][0], results[1][0], strict=True):
         np.testing.assert_array_equal(one, other)
     assert results[0][1:] == results[1][1:]
+
+
+def test_a_driver_may_return_what_is_no_number() -> None:
+    class Driver:
+        def __init__(self) -> None:
+            self.readings = iter(["late", [1.0], None, 0.5])
+
+        def step(self, u: float) -> object:
+            return next(self.readings)
+
+    record = pz.track(
+        np.zeros(4), stage=Driver(), compensator=pz.LinearCompensator(pz.LinearGain(0.1)), sample_rate=100.0
+    )
+    np.testing.assert_array_equal(np.isfinite(record.measured), [False, True, False, True])

@@ -281,8 +281,7 @@ class AdaptiveFeedforward(Face):
                 f"got {u.size} and {x.size}"
             )
         self._planned = None
-        # Compiled loops take writeable arrays only, though they write into none.
-        self._teach(self._compiled()[3], r, u.copy(), x.copy())
+        self._teach(self._compiled()[3], r, u, x)
 
     def _teach(self, loop: Any, *samples: Any) -> None:
         """Go through samples, and note what was noticed on the way."""

@@ -76,7 +76,7 @@ class EstimatorBank(Copied):
         if dimensions == 1 and not (isinstance(values, np.ndarray) and values.dtype.kind in "biuf"):
             # One channel's driver must not stop the others.
             values = [number_or_nan(value) for value in values] if np.iterable(values) else values
-        array = np.require(as_floats(name, values), requirements=["C", "W"])
+        array = np.require(as_floats(name, values), requirements=["C"])
         if array.ndim != dimensions or array.shape[-1] != len(self):
             shape = f"(K, {len(self)})" if dimensions == 2 else f"({len(self)},)"
             raise ValueError(f"{name} must have shape {shape}, got {array.shape}")

@@ -265,11 +265,8 @@ class EstimatorBase(Copied, ABC):
 
     def _records(self, u: Any, x: Any) -> tuple[FloatArray, FloatArray]:
         """Check records, and finish what `predict` has left over."""
-        # The compiled loops take writeable arrays only, though they write into none.
         u = array_1d("u", u, allow_nan=True)
         x = array_1d("x", x, allow_nan=True)
-        if not (u.flags.writeable and x.flags.writeable):
-            u, x = u.copy(), x.copy()
         if u.size != x.size:
             raise ValueError(f"u and x must have the same length, got {u.size} and {x.size}")
         if self._pending is not None:

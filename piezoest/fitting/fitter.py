@@ -15,7 +15,7 @@ from piezoest.fitting.forms import FORMS, Form
 from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.outliers import lonely, unsettled
 from piezoest.fitting.play_columns import PlayColumns, Start
-from piezoest.fitting.polish import polished
+from piezoest.fitting.polish import Polished, polished
 from piezoest.fitting.regression import Fitted, Log, Regression
 from piezoest.fitting.result import Fit
 from piezoest.models import Model
@@ -26,8 +26,6 @@ FEWEST_SAMPLES = 50
 ROUNDING = 1e-9
 # Times that a start which has not settled is looked for, each without what was found before.
 PASSES = 3
-# Most Gauss-Newton steps of a delay.
-REFINED = 3
 SOLVER = "{} through CasADi; SciPy's bounded least squares agrees to {:.0e}"
 
 
@@ -101,7 +99,8 @@ def _known(model: str) -> None:
 class Fitter:
     """A record made ready for fits of all kinds, with one delay, one start and the same samples left out.
 
-    The parameters are those of `fit`; without `plays` it is only for kinds that have none, and faster.
+    The parameters are those of `fit`; without `plays` it is only for kinds that have none, and faster. A
+    record that does not tell a lag from a wider loop has none where plays find none.
     `start` says where plays were before the record, `delay` is the one used, and `delay_estimated`,
     `left_out` and `spikes` are as in `Fit`.
     """
@@ -116,6 +115,7 @@ class Fitter:
         flaws: Flaws | None = None,
         settle: float | None = None,
         plays: bool = True,
+        tells_lag: bool = True,
     ) -> None:
         u, x = (array_1d(name, each, allow_nan=True) for name, each in (("u", u), ("x", x)))
         if u.size != x.size:
@@ -144,7 +144,8 @@ class Fitter:
             raise ValueError(
                 f"x must rise with u, a straight line has {gain:.4g} µm/V: change the sign of one of them"
             )
-        self._plays = plays
+        self._plays, self._tells_lag = plays, tells_lag
+        self._log = replace(self._log, drifts=search.drifts(self._log))
         self._begin(plays or self.delay_estimated)
         self.delay = search.best_delay(self._log, self.start) if isinstance(delay, str) else delay
         if self.delay > 0.0:
@@ -187,7 +188,7 @@ class Fitter:
 
         What misses the blocks ahead by more is no better, though it may miss the record by less.
         """
-        for _ in range(REFINED):
+        for _ in range(search.REFINED):
             before = self._log, self.start, self.delay
             ahead = self._richest.ahead
             step = search.delay_step(self._log, self._given, self._richest, self.delay)
@@ -256,15 +257,25 @@ class Fitter:
             return self._plain[form.bends]
         return self._richest if form.bends else self._with_creep(bends=False)
 
+    def _polished(self, fitted: Fitted) -> Polished:
+        """The best loop near this one, or near one without delay: to plays, another loop may look late."""
+        given = replace(self._log, u=self._given)
+        free = self.delay_estimated and (self._tells_lag or self.delay > 0.0)
+        found = polished(given, fitted, self.delay, fit_delay=free)
+        if not free or self.delay == 0.0:
+            return found
+        plain = search.regression(given, LoopColumns(search.best_alpha(given))).best()
+        return min(found, polished(given, plain, 0.0, fit_delay=True), key=lambda each: each.cost)
+
     def _outcome(self, name: str, fitted: Fitted) -> Fit:
         """Model and figures of a fit, made final by the nonlinear program where there is one."""
         form, log = FORMS[name], self._log
         delay = self.delay
         if form.loop:
-            given = replace(log, u=self._given)
-            basis, w, delay, errors, gap = polished(given, fitted, delay, fit_delay=self.delay_estimated)
+            found = self._polished(fitted)
+            delay, errors, gap = found.delay, found.standard_errors, found.gap
             log = replace(log, u=late(self._given, delay))
-            fitted = replace(search.regression(log, basis).best(), w=w)
+            fitted = replace(search.regression(log, found.basis).best(), w=found.w)
             parameters = 5 + self.delay_estimated
         else:
             gap = fitted.regression.gap(fitted)

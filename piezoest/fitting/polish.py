@@ -25,11 +25,12 @@ MOST_PASSES, TOLERANCE = 40, 1e-6
 
 
 class Polished(NamedTuple):
-    """Columns of another alpha, coefficients, delay, standard errors by name, and SciPy's gap."""
+    """Columns of another alpha, coefficients, delay, what is missed, standard errors by name, SciPy's gap."""
 
     basis: LoopColumns
     w: FloatArray
     delay: float
+    cost: float
     standard_errors: dict[str, float]
     gap: float
 
@@ -58,4 +59,6 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     w = w.copy()
     w[: offset + 1] = found.c - 2.0 * found.b, found.b, value["initial_state"], found.offset
     errors = dict(zip(end.parameter_names, end.standard_errors.tolist(), strict=True))
-    return Polished(LoopColumns(found.alpha), w, value["delay"], errors, problem.gap(solution.q))
+    return Polished(
+        LoopColumns(found.alpha), w, value["delay"], problem.cost(solution.q), errors, problem.gap(solution.q)
+    )

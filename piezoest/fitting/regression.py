@@ -44,6 +44,8 @@ class Log:
         [Hz].
     jumps : ndarray
         First samples behind jumps of the displacement.
+    drifts : bool
+        Whether it drifts so much that starts, delays and alphas are compared beside a drift.
     """
 
     u: FloatArray
@@ -51,6 +53,7 @@ class Log:
     counts: Any
     sample_rate: float
     jumps: FloatArray
+    drifts: bool = False
 
     @property
     def middle(self) -> float:

@@ -25,10 +25,12 @@ THRESHOLDS, BENDS = 20, 2
 MOVES = 0.1
 # Rows by which delays, starts and alphas are compared, and with which smoothness.
 FEW, SMOOTH = 4000, 1e-4
+# A drift is clear if only this part of the squares is left with it.
+CLEAR_DRIFT = 0.25
 # Largest delay that is looked for [samples], and how closely it is found.
 LONGEST_DELAY, CLOSE = 10.0, 0.02
-# Samples by which a voltage is moved for the derivative by the delay.
-DELAY_STEP = 0.1
+# Most Gauss-Newton steps of a delay.
+REFINED = 3
 # Gauss-Newton steps of the creep gains, the relative change at which they have settled, the least of them.
 STEPS, SETTLED, LEAST_CREEP = 8, 1e-3, 1e-3
 # Creep terms are a decade apart, from so many samples to so many times the record.
@@ -66,13 +68,19 @@ def line_gain(log: Log) -> float:
 def missed(log: Log, basis: Basis) -> float:
     """Mean square that a basis leaves, by some thousand rows."""
     found = regression(log, basis, max(1, int(np.count_nonzero(log.counts)) // FEW))
-    w = found.solved(SMOOTH, found.columns(drift=False))
+    w = found.solved(SMOOTH, found.columns(drift=log.drifts))
     return found.all.missed(w) / max(found.all.rows, 1.0)
 
 
 def best_start(log: Log) -> Start:
     """The start under which plays miss least."""
     return min(starts(log.u), key=lambda start: missed(log, plays(log, start)))
+
+
+def drifts(log: Log) -> bool:
+    """Whether a drift is clear, whatever the start."""
+    basis = plays(log, best_start(log))
+    return missed(replace(log, drifts=True), basis) < CLEAR_DRIFT * missed(log, basis)
 
 
 def checked_delay(delay: Any) -> float | Literal["auto"]:
@@ -85,24 +93,33 @@ def checked_delay(delay: Any) -> float | Literal["auto"]:
 
 
 def best_delay(log: Log, start: Start) -> float:
-    """Delay [samples] under which plays miss least; no sample has a voltage later than it."""
+    """Delay [samples] under which plays miss least; no sample has a voltage later than it.
 
-    def cost(delay: float) -> float:
-        delayed = replace(log, u=late(log.u, delay))
-        return missed(delayed, plays(delayed, start, bends=BENDS))
+    Only whole numbers are compared by what they miss: a voltage between two samples has less noise.
+    """
 
-    return _least(cost, np.linspace(0.0, LONGEST_DELAY, 11), CLOSE)
+    def delayed(delay: float) -> tuple[Log, PlayColumns]:
+        moved = replace(log, u=late(log.u, delay))
+        return moved, plays(moved, start, bends=BENDS)
+
+    whole = delay = float(min(np.arange(LONGEST_DELAY + 1.0), key=lambda each: missed(*delayed(each))))
+    for _ in range(REFINED):
+        moved, basis = delayed(delay)
+        step = delay_step(moved, log.u, regression(moved, basis).best(SMOOTH), delay)
+        before, delay = delay, float(np.clip(delay + step, max(whole - 1.0, 0.0), whole + 1.0))
+        if abs(delay - before) < CLOSE:
+            break
+    return whole if abs(delay - whole) < CLOSE else min(delay, LONGEST_DELAY)
 
 
 def delay_step(log: Log, given: FloatArray, fitted: Fitted, delay: float) -> float:
     """Gauss-Newton step of the delay [samples]: all that is linear goes along.
 
-    `given` is the voltage without delay, whose delay by so many samples is the log's.
+    `given` is the voltage without delay, whose delay by so many samples is the log's. The derivative is that
+    between the samples before and after: it has the voltage's noise of these, not that of the residual.
     """
-    late_by = (max(delay - DELAY_STEP, 0.0), delay + DELAY_STEP)
-    before, after = (fitted.design.output(late(given, each), fitted.w) for each in late_by)
-    slope = (after - before) / (late_by[1] - late_by[0])
-    return fitted.regression.beside(fitted, log, slope)
+    before, after = (fitted.design.output(late(given, delay + each), fitted.w) for each in (-1.0, 1.0))
+    return fitted.regression.beside(fitted, log, 0.5 * (after - before))
 
 
 def best_alpha(log: Log) -> float:

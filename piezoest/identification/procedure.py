@@ -125,9 +125,10 @@ def identify(
         record.voltage[:trained],
         record.displacement[:trained],
         sample_rate=record.sample_rate,
-        delay=wanted if told else 0.0,
+        delay=wanted,
         flaws=flaws.before(trained),
         settle=settle,
+        tells_lag=told,
     )
     candidates = []
     for name in FORMS if model == "auto" else dict.fromkeys(("line", model)):

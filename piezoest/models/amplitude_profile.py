@@ -40,7 +40,7 @@ class AmplitudeProfile:
     theta: FloatArray
 
     def __post_init__(self) -> None:
-        swings = array_1d("swings", self.swings)
+        swings = array_1d("swings", self.swings).copy()
         theta = as_floats("theta", self.theta).copy()
         if theta.size == swings.size == 0:
             theta = theta.reshape(-1, 3)

@@ -180,12 +180,17 @@ class PrandtlIshlinskii(Model, EqualByContent):
     def is_admissible(self) -> bool:
         """Whether x rises with u from every state, so that the inverse exists."""
         negative_creep = float(np.minimum(self._creep_gains, 0.0).sum())
+        rising = self._rising
+        within = np.all(rising > admissible.SMALLEST) and np.all(rising < admissible.LARGEST)
+        return bool(within and negative_creep > -1.0)
+
+    @property
+    def _rising(self) -> FloatArray:
+        """Least slope while so many plays move, shape (n + 1,) [µm/V]."""
         lowest = np.vstack([np.zeros(self.weights.size + 1), np.cumsum(self.bend_weights, axis=0)])
         slopes = np.append(self.gain, self.weights) + lowest.min(axis=0)
         with np.errstate(over="ignore", invalid="ignore"):
-            rising = np.cumsum(slopes)
-        within = np.all(rising > admissible.SMALLEST) and np.all(rising < admissible.LARGEST)
-        return bool(within and negative_creep > -1.0)
+            return np.asarray(np.cumsum(slopes))
 
     def stage_settings(self) -> dict[str, Any]:
         """How the model sits in a `SimulatedStage`: see `piezoest.stage.kernel.hysteresis_layouts`.
@@ -255,10 +260,10 @@ class PrandtlIshlinskii(Model, EqualByContent):
             `initial_state` behind, the sample rate is missing, or the voltage is too large for a number.
         """
         if not self.is_admissible:
-            slopes = self.gain + np.concatenate(([0.0], np.cumsum(self.weights)))
             raise ValueError(
-                f"the model has no inverse, its lowest slope is {slopes.min():g} µm/V: gain and "
-                "gain + weights[0] + … + weights[i] must be above zero, with every bend"
+                f"the model has no inverse, its lowest slope is {self._rising.min():g} µm/V, its creep gains "
+                f"sum to {self._creep_gains.sum():g}: gain and gain + weights[0] + … + weights[i] must be "
+                "above zero with every bend, and the negative creep gains above -1 in sum"
             )
         u = array_1d("r", r).copy()
         self._through(_invert, u, initial_state, sample_rate)

@@ -61,7 +61,6 @@ class Signal:
     name: str = "signal"
 
     def __post_init__(self) -> None:
-        # The copy stays writable: Numba compiles its loops a second time for read-only arrays.
         values = array_1d("values", self.values, minimum_length=1).copy()
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "sample_rate", positive("sample_rate", self.sample_rate))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from piezoest.bench.origin import json_safe
 from piezoest.bench.store import Row
 from piezoest.bench.zoo.contenders import CANDIDATES
 from piezoest.bench.zoo.families import FAMILIES
@@ -71,5 +72,6 @@ def _compared(rows: Sequence[Row], controller: str) -> dict[str, Any]:
     medians = {name: float(np.median([_relative(row) for row in each])) for (name,), each in played}
     own = medians[controller]
     best = min((name for name in CANDIDATES if name in medians), key=medians.__getitem__)
-    found = {"settled": own, "best": best, "best_settled": medians[best], "ratio": own / medians[best]}
-    return {name: None if value in (np.inf, np.nan) else value for name, value in found.items()}
+    ratio = own / medians[best] if np.isfinite(own) else np.inf
+    found = {"settled": own, "best": best, "best_settled": medians[best], "ratio": ratio}
+    return dict(json_safe(found))

@@ -118,7 +118,7 @@ def summarise_dwells(rows: Iterable[Row]) -> dict[str, Any]:
     ]
     families = sorted({row["family"] for row in rows})
     broken = sorted((row for row in judged if not row["kept"]), key=_ratio, reverse=True)
-    return {
+    summary = {
         "runs": len(rows),
         "failures": len(rows) - len(judged),
         "rigs": len({row["seed"] for row in rows}),
@@ -134,6 +134,7 @@ def summarise_dwells(rows: Iterable[Row]) -> dict[str, Any]:
             for row in broken[:10]
         ],
     }
+    return dict(json_safe(summary))
 
 
 def _of(row: Row) -> tuple[bool, ...]:
