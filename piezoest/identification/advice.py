@@ -45,22 +45,30 @@ def _left_out(found: Identification, data: Data) -> list[str]:
     return said
 
 
-def _delay(found: Identification, data: Data) -> list[str]:
-    if not found.delay_known:
+def delay_sentences(delay: float, sample_rate: float, known: bool, estimated: bool) -> list[str]:
+    """What to know of the samples by which the displacement lags the voltage."""
+    if not known:
         return [
             "The lag of the displacement is not known: all swings of the voltage are alike, so it looks like "
             "a wider loop. Record swings of several sizes or frequencies, or pass delay= in samples."
         ]
-    if not found.delay_estimated:
+    if not estimated:
         return []
-    if found.delay > 0.99 * LONGEST_DELAY:
-        return ["The delay is at the end of its range: check that the columns belong together."]
-    if found.delay > 0.1:
+    if delay > 0.99 * LONGEST_DELAY:
         return [
-            f"The displacement lags the voltage by {found.delay:.2f} samples "
-            f"({1e3 * found.delay / found.sample_rate:.3g} ms): estimators take delay={found.delay:.2g}."
+            f"The displacement lags the voltage by {LONGEST_DELAY:g} samples or more, the most that can be "
+            "found: shift one of the columns, or resample the log."
+        ]
+    if delay > 0.1:
+        return [
+            f"The displacement lags the voltage by {delay:.2f} samples ({1e3 * delay / sample_rate:.3g} ms): "
+            f"estimators take delay={delay:.2g}."
         ]
     return []
+
+
+def _delay(found: Identification, data: Data) -> list[str]:
+    return delay_sentences(found.delay, found.sample_rate, found.delay_known, found.delay_estimated)
 
 
 def _centre(found: Identification, data: Data) -> list[str]:

@@ -1,16 +1,23 @@
 """A log as identification sees it: where it counts, how it moves, and whether that is enough."""
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.fitting.coordinates import bridged, late
+from piezoest.identification.examined import FEWEST_TURNS
+from piezoest.identification.sense import Finding
 from piezoest.models import ColemanHodgdon, LinearGain
+from piezoest.records.source import counted
 from piezoest.signals.turns import TURN, turns
 
-FEWEST_TURNS = 2
 SMALLEST_SIGNAL_TO_NOISE = 10.0
+# How late a displacement may answer a voltage, in samples, and samples in which that is looked for.
+LATEST, MOST_SAMPLES = 10, 100_000
+# Part of its range that the displacement rises by, as a straight line, with the voltage.
+SMALLEST_RISE = 1e-6
 
 
 class Data(NamedTuple):
@@ -52,14 +59,21 @@ def prepare(voltage: FloatArray, displacement: FloatArray) -> Data:
 
 
 def noise_of(data: Data) -> float:
-    """Standard deviation of the displacement's noise [µm], from its third differences, robustly."""
-    x = data.x[data.counts]
-    third = np.diff(x, 3)
-    return max(float(1.4826 * np.median(np.abs(third)) / np.sqrt(20.0)), 1e-9 * float(np.ptp(x)), 1e-12)
+    """Standard deviation of the displacement's noise [µm], from its third differences, robustly.
+
+    What those of the voltage explain, as it is and up to some samples late, is no noise.
+    """
+    x, third = data.x[data.counts], np.diff(data.x[data.counts], 3)
+    inputs = np.diff(data.u[data.counts], 3)[:MOST_SAMPLES]
+    target = third[LATEST : inputs.size]
+    late = np.stack([inputs[LATEST - k : inputs.size - k] for k in range(LATEST + 1)], axis=1)
+    left = target - late @ np.linalg.lstsq(late, target)[0]
+    third_size = min(float(np.median(np.abs(each))) for each in (third, left))
+    return max(1.4826 * third_size / np.sqrt(20.0), 1e-9 * float(np.ptp(x)), 1e-12)
 
 
-def check_excitation(data: Data, noise: float) -> FloatArray:
-    """Refuse a voltage that cannot show a hysteresis; return the voltages at its turns."""
+def check_excitation(data: Data, noise: float, found: Iterable[Finding]) -> None:
+    """Refuse a log that cannot show a hysteresis, or that falls; `found` says whether it is related."""
     if data.extent == 0.0:
         raise ValueError(
             f"too little excitation: the voltage stays at {data.middle:.6g} V over the fitted part, "
@@ -69,7 +83,8 @@ def check_excitation(data: Data, noise: float) -> FloatArray:
     if turned.size < FEWEST_TURNS:
         raise ValueError(
             f"too little excitation: over the fitted part the voltage moves by {data.extent:.4g} V but "
-            f"turns {turned.size} times, at least {FEWEST_TURNS} are needed: hysteresis shows only at turns"
+            f"turns {counted(turned.size)}, at least {FEWEST_TURNS} are needed: hysteresis shows only at "
+            "turns"
         )
     extent = float(np.ptp(data.x[data.counts]))
     if extent < SMALLEST_SIGNAL_TO_NOISE * noise:
@@ -78,13 +93,14 @@ def check_excitation(data: Data, noise: float) -> FloatArray:
             f"rms, {extent / noise:.1f} times that, at least {SMALLEST_SIGNAL_TO_NOISE:g} are needed: "
             "raise the voltage"
         )
-    gain = data.line().gain
-    if gain < 0.0:
+    if data.line().gain * data.extent <= SMALLEST_RISE * extent:
+        said = {each.name: each.sentence for each in found}
         raise ValueError(
-            f"the displacement falls as the voltage rises ({gain:.4g} µm/V): change the sign of one of the "
-            "two columns"
+            said.get("falls")
+            or said.get("unrelated")
+            or "the displacement falls as the voltage rises over the fitted part, not over the whole log: "
+            "check what changed"
         )
-    return turned
 
 
 def turning_voltages(data: Data) -> FloatArray:

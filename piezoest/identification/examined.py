@@ -66,6 +66,16 @@ class Examined:
         return loop_of(self.u, self.level, self.counts & ~self.flaws.unusable, self.gain)
 
     @property
+    def off(self) -> float:
+        """Standard deviation from that line [µm]; what gaps are bridged by does not count."""
+        return float(np.std(self.line[1][self.counts]))
+
+    @property
+    def unexplained(self) -> float:
+        """The same relative to the scatter of the displacement."""
+        return self.off / float(np.std(self.level[self.counts]))
+
+    @property
     def related(self) -> bool:
         """Whether the displacement follows the voltage enough for a word about gain and loop."""
-        return float(np.std(self.line[1])) < UNRELATED * float(np.std(self.level))
+        return self.unexplained < UNRELATED

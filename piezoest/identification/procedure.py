@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ from piezoest.identification.lag import tells_lag
 from piezoest.identification.repeats import noise_floor
 from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.result import Candidate, Identification, Validation
-from piezoest.identification.sense import findings
+from piezoest.identification.sense import Finding, findings
 from piezoest.models import LearntOn
 from piezoest.records import Record
 from piezoest.records.as_record import as_record
@@ -75,9 +76,10 @@ def identify(
         Seconds to leave out at the start. Default: while the error exceeds four robust standard deviations,
         at most a tenth of the fitted part.
     validate : sequence
-        Other logs of the stage, each a record, a file or a table, which the model predicts.
+        Other logs of the stage, each a record, a file or a table, which the model predicts. They are checked
+        as `data` is.
     strict : bool
-        Raise an error if the log is doubtful.
+        Raise an error if one of the logs is doubtful.
     say : callable, optional
         Called with a few words before each step.
 
@@ -89,7 +91,8 @@ def identify(
     ------
     ValueError
         If the log is too short, its voltage moves too little (with the number), its displacement falls when
-        the voltage rises, an argument is out of its range, or `strict` and the log is doubtful.
+        the voltage rises or does not follow it, an argument is out of its range, or `strict` and a log is
+        doubtful.
     OSError
         If a file cannot be read.
 
@@ -114,9 +117,12 @@ def identify(
     trained = round(train * len(record))
     first = _checked(record, trained)
     noise = noise_of(first)
-    check_excitation(first, noise)
     found = findings(record)
-    if strict and (doubts := [each.sentence for each in found if each.severity == "doubt"]):
+    check_excitation(first, noise, found)
+    of_others = [
+        f"Other log {Path(each.source).name}: {said}" for each in others for said in _doubts(findings(each))
+    ]
+    if strict and (doubts := [*_doubts(found), *of_others]):
         raise ValueError(" ".join(doubts))
     flaws = flawed(record.voltage, record.displacement)
     wanted = checked_delay(delay)
@@ -144,7 +150,8 @@ def identify(
         candidates=tuple(candidates),
         reason=reason_for(known, best),
         whiteness=Whiteness.of(best.residual[best.fit.left_out : trained]),
-        noise_floor=noise_floor(record, fallback=noise),
+        # What a model misses by less than the noise, where that was held out, is none.
+        noise_floor=min(noise_floor(record, fallback=noise), best.train.rms, best.held_out.rms),
         drift=_slope(best.residual, best.fit.left_out),
         delay_known=told,
         trained=trained,
@@ -154,7 +161,11 @@ def identify(
         learnt_on=LearntOn.of(record.voltage[:trained], record.displacement[:trained], record.sample_rate),
         validations=tuple(Validation.of(best.fit, each) for each in others),
     )
-    return dataclasses.replace(result, advice=advice_of(result, first))
+    return dataclasses.replace(result, advice=(*advice_of(result, first), *of_others))
+
+
+def _doubts(found: Sequence[Finding]) -> list[str]:
+    return [each.sentence for each in found if each.severity == "doubt"]
 
 
 def _checked(record: Record, trained: int) -> Data:

@@ -63,8 +63,7 @@ def findings(record: Record) -> tuple[Finding, ...]:
     Returns
     -------
     tuple of Finding
-        What most upsets a fit comes first; empty for a log that looks as that of a piezo stage does. What
-        reading the file said already, in the record's notes, is not said again.
+        What most upsets a fit comes first; empty for a log that looks as that of a piezo stage does.
 
     Raises
     ------
@@ -110,7 +109,7 @@ def _basic(record: Record) -> Iterator[Finding]:
 
 def _missing(log: Examined) -> Iterator[Finding]:
     share = 1.0 - float(np.mean(log.counts))
-    if share > MOST_MISSING and not log.record.skipped:
+    if share > MOST_MISSING:
         yield doubt(
             "missing", f"{100 * share:.0f} % of the samples are missing: cut the log to where it is whole."
         )
@@ -141,11 +140,10 @@ def _timing(log: Examined) -> Iterator[Finding]:
 
 def _related(log: Examined) -> Iterator[Finding]:
     if not log.related:
-        share = float(np.std(log.line[1])) / float(np.std(log.level))
-        yield note(
+        yield doubt(
             "unrelated",
-            f"A straight line in the voltage leaves {100 * share:.0f} % of the displacement: check that both "
-            "columns are of one run and one axis, and that no resonance is excited.",
+            f"A straight line in the voltage leaves {100 * log.unexplained:.0f} % of the displacement: check "
+            "that both columns are of one run and one axis, and that no resonance is excited.",
         )
 
 
@@ -200,7 +198,7 @@ def _closed_loop(log: Examined) -> Iterator[Finding]:
     # With a wrong sign, feedback cannot be told from what it is not.
     if not log.related or log.gain < 0.0:
         return
-    off = float(np.std(log.line[1])) / log.stroke
+    off = log.off / log.stroke
     opening = abs(log.loop.opening)
     if off < ALMOST_STRAIGHT and opening < ALMOST_STRAIGHT and abs(log.gain - 1.0) < UNITY:
         yield doubt(

@@ -14,7 +14,7 @@ from piezoest.fitting.program import Sums
 from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression, add
 from piezoest.fitting.rows import dot, times
 from piezoest.fitting.search import BENDS, checked_delay, plays
-from piezoest.identification.advice import unsettled_sentence
+from piezoest.identification.advice import delay_sentences, unsettled_sentence
 from piezoest.identification.choice import simplest
 from piezoest.identification.data import check_excitation, noise_of, prepare
 from piezoest.identification.drawing import Drawn
@@ -22,9 +22,11 @@ from piezoest.identification.lag import tells_lag
 from piezoest.identification.parts import Part, Progress, parts, pieces
 from piezoest.identification.residual import Misfit
 from piezoest.identification.result import left_out_error
+from piezoest.identification.sense import Finding, findings
 from piezoest.identification.told import Kind, Row, figures_of, parameter_rows
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record, RecordStream
+from piezoest.records.source import counted
 
 FEWEST_SAMPLES = 50
 # Points kept for figures, and for how far plays move.
@@ -65,6 +67,8 @@ class StreamedIdentification:
         Every k-th sample, for figures.
     prediction : ndarray
         Free-running displacement [µm] at the samples of `thinned`.
+    findings : tuple of Finding
+        What is odd about the fitted part's first 50 000 samples.
     notes, advice : tuple of str
         Assumptions made to read the log, and what to know before using the model, in sentences.
     """
@@ -87,6 +91,7 @@ class StreamedIdentification:
     left_out: int
     thinned: Record = field(repr=False)
     prediction: FloatArray = field(repr=False)
+    findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
     advice: tuple[str, ...] = ()
 
@@ -141,7 +146,8 @@ def identify_stream(
 
     Plays, with and without bends, are fitted to the first part by sums over the log, as `fit` does; the kind
     is chosen by blocks of which each is predicted from the others. Another pass lets the model run free over
-    the whole log. Creep is not fitted, and jumps of the displacement are not looked for.
+    the whole log. Creep and jumps of the displacement are not fitted. The checks of `identify` are made on
+    the first 50 000 samples.
 
     Parameters
     ----------
@@ -190,7 +196,8 @@ def identify_stream(
             f"at least {FEWEST_SAMPLES} are needed"
         )
     data = prepare(head.voltage, head.displacement)
-    check_excitation(data, noise_of(data))
+    odd = findings(head)
+    check_excitation(data, noise_of(data), odd)
     wanted = checked_delay(delay)
     told = wanted != "auto" or tells_lag(head.voltage)
     fitter = Fitter(
@@ -223,20 +230,22 @@ def identify_stream(
         left_out=fitter.left_out,
         thinned=judge.thinned(log),
         prediction=judge.prediction,
+        findings=odd,
         notes=log.notes,
     )
-    return dataclasses.replace(found, advice=tuple(_advice(found, told)))
+    lag = delay_sentences(fitter.delay, log.sample_rate, told, fitter.delay_estimated)
+    return dataclasses.replace(found, advice=(*_advice(found, len(head)), *lag))
 
 
-def _advice(found: StreamedIdentification, told: bool) -> list[str]:
-    said = []
+def _advice(found: StreamedIdentification, looked_at: int) -> list[str]:
+    said = [f"In the first {looked_at} samples: {each.sentence}" for each in found.findings]
+    if found.skipped:
+        said.append(
+            f"{counted(found.skipped, 'sample')} of {found.samples} did not count: without usable numbers, "
+            "or spikes or dropouts."
+        )
     if found.left_out:
         said.append(unsettled_sentence(found.left_out / found.sample_rate))
-    if not told:
-        said.append(
-            "The lag of the displacement is not known: all swings at the log's start are alike, so it looks "
-            "like a wider loop."
-        )
     if found.held_out.rms > found.line_held_out.rms and found.chosen != "line":
         said.append("A straight line does better: check signs, columns and the delay.")
     return said
@@ -248,7 +257,7 @@ class _Survey:
     def __init__(self, log: RecordStream, trained: int, progress: Progress | None) -> None:
         every = max(1, -(-trained // MOST_POINTS))
         voltage, displacement, points = np.empty(0), np.empty(0), []
-        seen, known = 0, None
+        seen, known, self.usable = 0, None, 0
         low, high = np.inf, -np.inf
         for whole_u, whole_x in pieces(log, progress):
             u, x = whole_u[: trained - seen], whole_x[: trained - seen]
@@ -256,6 +265,7 @@ class _Survey:
                 break
             if seen == 0:
                 voltage, displacement = u, x
+            self.usable += int(np.sum(np.isfinite(u) & np.isfinite(x)))
             if np.any(np.isfinite(u)) and np.any(np.isfinite(x)):
                 here = LearntOn.of(u, x, log.sample_rate)
                 known = here if known is None else known.joined(here)
@@ -281,10 +291,15 @@ def _fits(
     basis = plays(thinned, fitter.start, bends=BENDS)
     design = Design(basis, log.sample_rate, trained)
     along, sums = design.along(), [Sums.none(design.columns) for _ in range(FOLDS)]
+    counted_before = 0
     for part in parts(log, fitter.delay, progress):
         # A start that has not settled is left out.
         part.counts[: max(fitter.left_out - part.first, 0)] = False
-        fold = np.minimum(np.arange(part.first, part.first + part.u.size) * FOLDS // trained, FOLDS)
+        # As many samples that count in each block; those behind the fitted part are in none.
+        so_far = counted_before + np.cumsum(part.counts)
+        counted_before = int(so_far[-1])
+        fold = np.minimum(so_far * FOLDS // survey.usable, FOLDS - 1)
+        fold[max(trained - part.first, 0) :] = FOLDS
         for k in range(0, part.u.size, CHUNK):
             rows = along.rows(part.u[k : k + CHUNK])
             piece = slice(k, k + CHUNK)
@@ -341,7 +356,13 @@ class _Judge:
     def misfit(self, *, held_out: bool, of_line: bool = False) -> Misfit:
         """Return the error so far, of the model or of the line, in the fitted part or behind it."""
         squares, largest, count = self._sums[int(held_out), int(of_line)]
-        return Misfit(float(np.sqrt(squares / max(count, 1.0))), float(largest))
+        if count < FEWEST_SAMPLES:
+            name = "held-out part" if held_out else "fitted part"
+            raise ValueError(
+                f"the {name} of the log has {count:.0f} usable samples, at least {FEWEST_SAMPLES} are "
+                "needed: record longer"
+            )
+        return Misfit(float(np.sqrt(squares / count)), float(largest))
 
     def thinned(self, log: RecordStream) -> Record:
         """Every k-th sample."""

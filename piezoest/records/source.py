@@ -92,6 +92,11 @@ def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
     return "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text)
 
 
+def counted(number: int, noun: str = "time") -> str:
+    """How many, in words: ``once`` and ``3 times``, or ``1 sample`` and ``3 samples``."""
+    return "once" if number == 1 and noun == "time" else f"{number} {noun}{'s' * (number != 1)}"
+
+
 def stated_rate(value: Any) -> float | None:
     """Sample rate that a file states [Hz]; None if it is not one number above zero."""
     try:

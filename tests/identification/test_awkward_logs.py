@@ -203,7 +203,7 @@ FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "a long rest": (with_rest, "rests", "rests 1 times"),
     "a strong drift": (drifting, "drift", "drifts by +3"),
 }
-NOTES = ("small stroke", "repeated", "rests", "drift", "unrelated")
+NOTES = ("small stroke", "repeated", "rests", "drift")
 NOTED = (*(name for name, case in FOUND.items() if case[1] in NOTES), "six bits", "some spikes")
 
 
@@ -214,6 +214,14 @@ def test_what_is_odd_is_said(name: str) -> None:
     assert finding in found, list(found)
     assert phrase in found[finding].sentence
     assert found[finding].severity == ("note" if name in NOTED else "doubt")
+
+
+def test_missing_readings_hide_nothing() -> None:
+    u, x, rate = early(25)
+    x = x.copy()
+    x[1500:4500] = np.nan
+    record = Record(np.arange(u.size) / rate, u, x, rate, skipped=3000)
+    assert [found.name for found in findings(record)] == ["clockwise", "missing"]
 
 
 def test_flaws_say_where() -> None:

@@ -67,6 +67,30 @@ def test_gaps_and_a_late_start_do_no_harm(tmp_path: Path) -> None:
     assert len(found.thinned) == COUNT
 
 
+def test_where_half_of_the_fitted_part_is_missing_it_is_as_good_as_in_memory(tmp_path: Path) -> None:
+    u, x = drawn(2)
+    x[2000:5000] = np.nan
+    found = pz.identify_stream(saved(tmp_path, u, x), delay=0.0)
+    assert found.chosen != "line"
+    assert min(found.cross_validated.values()) > 0.0
+    wanted = pz.identify(tmp_path / "log.npy", delay=0.0, model=found.chosen)
+    assert found.held_out.rms == pytest.approx(wanted.held_out.rms, rel=0.05)
+    assert any("3000" in said for said in found.advice)
+    x[5000:] = np.nan
+    with pytest.raises(ValueError, match="held-out part"):
+        pz.identify_stream(saved(tmp_path, *drawn(2)[:1], x), delay=0.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [(lambda u, x: (x, u), "clockwise"), (lambda u, x: (u, 1e4 * x), "too large")],
+)
+def test_the_start_is_checked(tmp_path: Path, change: Any, name: str) -> None:
+    found = pz.identify_stream(saved(tmp_path, *change(*drawn())))
+    assert [each.name for each in found.findings if each.severity == "doubt"] == [name]
+    assert found.findings[0].sentence in found.advice[0]
+
+
 def test_a_lag_is_found_and_followed(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     u = np.tile(voltage(rng), 2)
