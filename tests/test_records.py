@@ -93,7 +93,7 @@ def test_rows_without_numbers_are_kept_as_nan_and_counted(tmp_path: Path, line: 
         ({"line12": '0.100,"0.1,0.1'}, ["quotation mark"]),
         ({"line61": "9.0,1,1"}, ["line 61", "time jumps by", "missing in all"]),
         ({"line1": "time_s,current_A,displacement_um"}, ["no column for voltage", "time_s, current_A"]),
-        ({"line1": "time_s,voltage_V,gauge_V"}, ["gauge_V", "unit v", "must be in µm"]),
+        ({"line1": "time_s,voltage_V,gauge_V"}, ["gauge_V", "such as µm"]),
         ({"line1": "time_s,x_um,position_um"}, ["no column for voltage"]),
         ({"line1": "t,u,x,position"}, ["columns x, position could all be the displacement"]),
     ],
@@ -111,9 +111,9 @@ def test_files_without_a_log(tmp_path: Path) -> None:
         "": "is empty",
         "\n# only this\n": "is empty",
         "t,u,x\n": "no rows below the header",
-        "t,u,x\n0,0,0\n": "rows",
+        "t,u,x\n0,0,0\n": "1 row",
         "t,u,x\n" + "nan,nan,nan\n" * 200: "only",
-        "\n".join(map(str, range(100))): "1 columns",
+        "\n".join(map(str, range(100))): "1 column ",
         "Dear colleague,\nhere are\nthe data\n": "no column for",
     }
     for text, words in contents.items():

@@ -10,6 +10,9 @@ from piezoest.signals.turns import TURN, turns
 # range in it.
 SHORTEST_REST, REST_OF_SWING = 20, 0.1
 RESTING = 1e-3
+# A voltage with noise must stand for so much longer, and bend or rise by no more than so many standard
+# deviations of what noise makes of that: the top of a slow swing looks like a rest.
+LONGER_IN_NOISE, BENT = 5, 10.0
 
 
 def rests_of(u: FloatArray) -> IntArray:
@@ -26,7 +29,9 @@ def rests_of(u: FloatArray) -> IntArray:
     noise = 1.4826 * float(np.median(np.abs(np.diff(u, 3)))) / np.sqrt(20.0) if u.size > 3 else 0.0
     tolerance = max(RESTING * extent, 7.0 * noise)
     swings = turns(u, max(TURN * extent, tolerance)).size + 1
-    shortest = max(SHORTEST_REST, round(REST_OF_SWING * u.size / swings))
+    noisy = tolerance > RESTING * extent
+    longer = LONGER_IN_NOISE if noisy else 1
+    shortest = max(SHORTEST_REST, round(longer * REST_OF_SWING * u.size / swings))
     if shortest >= u.size or extent == 0.0 or tolerance > 0.1 * extent:
         return np.empty((0, 2), np.int64)
     # The filters' window ends at its sample: then it begins `shortest - 1` samples before.
@@ -36,4 +41,16 @@ def rests_of(u: FloatArray) -> IntArray:
     still = high - low <= tolerance
     still[: shortest - 1] = False
     starts, ends = runs(still)
-    return np.stack((starts - (shortest - 1), ends), axis=1)
+    found = np.stack((starts - (shortest - 1), ends), axis=1)
+    if not noisy:
+        return found
+    lengths = np.diff(found, axis=1)[:, 0]
+    allowed = RESTING * extent * lengths / shortest + BENT * noise / np.sqrt(lengths)
+    moved = np.array([_moved(u[start:end]) for start, end in found])
+    return found[moved <= allowed]
+
+
+def _moved(u: FloatArray) -> float:
+    """How far a parabola through a stretch goes [V]."""
+    t = np.linspace(-1.0, 1.0, u.size)
+    return float(np.ptp(np.polyval(np.polyfit(t, u, 2), t)))

@@ -36,12 +36,6 @@ def _left_out(found: Identification, data: Data) -> list[str]:
             f"{spikes} of the fitted samples {'is' if spikes == 1 else 'are'} off the rest alone, as spikes "
             "of a sensor are: left out."
         )
-    if flaws.jumps.size:
-        said.append(
-            f"The displacement jumps {flaws.jumps.size} time{'s' if flaws.jumps.size > 1 else ''} by up to "
-            f"{np.max(np.abs(flaws.jump_sizes)):.3g} µm without a step of the voltage: the jumps were fitted "
-            "beside the model."
-        )
     return said
 
 
@@ -73,12 +67,12 @@ def _delay(found: Identification, data: Data) -> list[str]:
 
 def _centre(found: Identification, data: Data) -> list[str]:
     said = []
-    extent = float(np.ptp(data.x[data.counts]))
-    if abs(data.middle) > 0.1 * data.extent or abs(found.model.offset) > 0.1 * extent:
+    x = data.x[data.counts]
+    centre = float(np.mean(x))
+    if abs(data.middle) > 0.1 * data.extent or abs(centre) > 0.1 * float(np.ptp(x)):
         said.append(
-            f"The loop is not centred at zero (voltage {data.middle:.3g} V, displacement "
-            f"{float(np.mean(data.x[data.counts])):.4g} µm): let estimators find the offset, as "
-            "HysteresisRLS does by default."
+            f"The loop is not centred at zero (voltage {data.middle:.3g} V, displacement {centre:.4g} µm): "
+            "let estimators find the offset, as HysteresisRLS does by default."
         )
     turns = turning_voltages(data)
     tops = np.abs(turns - data.middle)
@@ -89,7 +83,7 @@ def _centre(found: Identification, data: Data) -> list[str]:
 
 def _remainder(found: Identification, data: Data) -> list[str]:
     said = []
-    floor, error = found.noise_floor, found.best.cross_validated
+    floor, error = found.noise_floor, min(found.best.cross_validated, found.held_out.rms)
     if error > ABOVE_NOISE * floor:
         said.append(
             f"Between the noise of {floor:.2g} µm rms and the error of {error:.2g} µm lies what no model "
@@ -100,22 +94,26 @@ def _remainder(found: Identification, data: Data) -> list[str]:
             "The residual is not white: what is left is not noise but what the model cannot do "
             "(creep, drift, rate, minor loops); the standard errors are widened for it."
         )
-    if found.held_out.rms > 0.9 * found.line_held_out.rms and found.fit.form != "line":
+    odd = _drift(found) or any(each.severity == "doubt" or each.name == "drift" for each in found.findings)
+    if found.held_out.rms > 0.9 * found.line_held_out.rms and found.fit.form != "line" and not odd:
         said.append("A straight line does about as well: the record shows little hysteresis.")
     return said
 
 
-def _along(found: Identification, data: Data) -> list[str]:
-    said = []
-    if abs(found.fit.drift) > DRIFT_WORTH_A_WORD * found.train.rms:
-        said.append(
+def _drift(found: Identification) -> list[str]:
+    least = DRIFT_WORTH_A_WORD * found.train.rms
+    if abs(found.fit.drift) > least:
+        return [
             f"The displacement drifts by about {found.fit.drift:+.2g} µm over the fitted part: fitted beside "
             "the model."
-        )
-    elif abs(found.drift) > DRIFT_WORTH_A_WORD * found.train.rms:
-        said.append(
-            f"The displacement drifts by about {found.drift:+.2g} µm over the record against the model."
-        )
+        ]
+    if abs(found.drift) > least:
+        return [f"The displacement drifts by about {found.drift:+.2g} µm over the record against the model."]
+    return []
+
+
+def _along(found: Identification, data: Data) -> list[str]:
+    said = _drift(found)
     if found.held_out.rms > WORSE_ON_HELD_OUT * found.train.rms:
         said.append(
             f"The held-out error is {found.held_out.rms / found.train.rms:.1f} times the fitted one: "

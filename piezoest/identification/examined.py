@@ -36,12 +36,24 @@ class Examined:
     @cached_property
     def line(self) -> tuple[FloatArray, FloatArray]:
         """Weights and rest of a line in the voltage and its rate, and a parabola in time."""
-        t = np.linspace(-1.0, 1.0, self.u.size)
-        A = np.stack([self.u - self.u.mean(), np.gradient(self.u), np.ones_like(t), t, t * t], axis=1)
+        return self._line(slice(None))
+
+    def _line(self, part: slice) -> tuple[FloatArray, FloatArray]:
+        u, level, counts = self.u[part], self.level[part], self.counts[part]
+        t = np.linspace(-1.0, 1.0, u.size)
+        A = np.stack([u - u.mean(), np.gradient(u), np.ones_like(t), t, t * t], axis=1)
         size = np.sqrt(np.mean(A**2, axis=0))
         A = A / np.where(size > 0.0, size, 1.0)
-        weights = np.linalg.lstsq(A[self.counts], self.level[self.counts])[0]
-        return weights / np.where(size > 0.0, size, 1.0), self.level - A @ weights
+        weights = np.linalg.lstsq(A[counts], level[counts])[0]
+        return weights / np.where(size > 0.0, size, 1.0), level - A @ weights
+
+    @property
+    def drift(self) -> float:
+        """Rise in time of that line between the first turn and the last one [µm].
+
+        Before and behind them the voltage may rest, where hysteresis leaves the displacement beside the line.
+        """
+        return 2.0 * float(self._line(slice(self.turns[0], self.turns[-1] + 1))[0][3])
 
     @property
     def gain(self) -> float:

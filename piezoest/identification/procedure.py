@@ -22,6 +22,7 @@ from piezoest.identification.sense import Finding, findings
 from piezoest.models import LearntOn
 from piezoest.records import Record
 from piezoest.records.as_record import as_record
+from piezoest.records.source import counted
 
 FEWEST_SAMPLES = 50
 # A parameter that is not known to this fraction of itself was not excited by the record.
@@ -179,8 +180,8 @@ def _enough(name: str, record: Record, part: slice) -> None:
     usable = int(np.sum(record.usable[part]))
     if usable < FEWEST_SAMPLES:
         raise ValueError(
-            f"the {name} of {record.source} has {usable} usable samples, at least {FEWEST_SAMPLES} are "
-            "needed: record longer"
+            f"the {name} of {record.source} has {counted(usable, 'usable sample')}, at least "
+            f"{FEWEST_SAMPLES} are needed: record longer"
         )
 
 

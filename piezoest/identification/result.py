@@ -19,6 +19,7 @@ from piezoest.identification.sense import Finding
 from piezoest.identification.told import Kind, Row, figures_of, parameter_rows
 from piezoest.models import LearntOn, Model
 from piezoest.records import Record
+from piezoest.records.source import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -329,7 +330,7 @@ class Identification:
         return (
             f"<Identification of {Path(self.source).name}: {self.best.label}, "
             f"{self.held_out.rms:.3g} µm rms held out (straight line {self.line_held_out.rms:.3g}), "
-            f"{len(self.advice)} remarks>"
+            f"{counted(len(self.advice), 'remark')}>"
         )
 
     def __str__(self) -> str:

@@ -11,6 +11,7 @@ from piezoest.identification.clipping import flat_tops, levels, repeats
 from piezoest.identification.examined import FEWEST_TURNS, Examined
 from piezoest.identification.feedback_in_log import answer
 from piezoest.records import Record
+from piezoest.records.source import counted
 
 FEWEST_SAMPLES = 50
 MOST_MISSING = 0.1
@@ -95,7 +96,8 @@ def _basic(record: Record) -> Iterator[Finding]:
     count = int(np.sum(usable))
     if count < FEWEST_SAMPLES:
         yield doubt(
-            "short", f"The log has {count} usable samples: record at least {FEWEST_SAMPLES}, better 1000."
+            "short",
+            f"The log has {counted(count, 'usable sample')}: record at least {FEWEST_SAMPLES}, better 1000.",
         )
         return
     for name, unit, values in (("voltage", "V", record.voltage), ("displacement", "µm", record.displacement)):
@@ -119,7 +121,7 @@ def _excitation(log: Examined) -> Iterator[Finding]:
     if log.turns.size < FEWEST_TURNS:
         yield doubt(
             "no swing",
-            f"The voltage turns {log.turns.size} times over {log.swing:.4g} V: hysteresis shows only at "
+            f"The voltage turns {counted(log.turns.size)} over {log.swing:.4g} V: hysteresis shows only at "
             "turns, record several swings up and down.",
         )
 
@@ -161,13 +163,14 @@ def _size(log: Examined) -> Iterator[Finding]:
             "too large",
             f"{said}, more than piezo stages do (about {GAINS[0]:g} to {GAINS[1]:g} µm/V, up to "
             f"{STROKES[1]:g} µm): nm taken for µm, or V for mV? Give the unit, as in "
-            "units displacement='nm'.",
+            "units displacement='nm'; multiply an array by 0.001.",
         )
     elif gain < GAINS[0]:
         yield doubt(
             "too small",
             f"{said}, less than piezo stages do (about {GAINS[0]:g} to {GAINS[1]:g} µm/V): mm or m taken "
-            "for µm, or volts of the sensor? Give the unit, as in units displacement='mm'.",
+            "for µm, or volts of the sensor? Give the unit, as in units displacement='mm'; "
+            "multiply an array by 1000.",
         )
     elif log.moved < STROKES[0]:
         yield note(
@@ -218,7 +221,7 @@ def _closed_loop(log: Examined) -> Iterator[Finding]:
     if feedback.closed:
         how = (
             f"{100 * feedback.explained:.0f} % of the voltage's noise answers the displacement's, "
-            f"{feedback.lag} samples later"
+            f"{counted(feedback.lag, 'sample')} later"
             if feedback.lag
             else f"noise of voltage and displacement go opposite ways (correlation {feedback.together:.2f})"
         )
@@ -241,9 +244,9 @@ def _limits(log: Examined) -> Iterator[Finding]:
         if top and (name == "displacement" or top.times > 1):
             yield doubt(
                 f"clipped {name}",
-                f"The {name} stands at {top.limit:.5g} {unit} {top.times} times while the {other_name} goes "
-                f"on by up to {top.beyond:.3g} {other_unit} and comes back: it is clipped there; leave these "
-                "stretches out, or reduce the voltage.",
+                f"The {name} stands at {top.limit:.5g} {unit} {counted(top.times)} while the {other_name} "
+                f"goes on by up to {top.beyond:.3g} {other_unit} and comes back: it is clipped there; leave "
+                "these stretches out, or reduce the voltage.",
             )
 
 
@@ -260,7 +263,7 @@ def _resolution(log: Examined) -> Iterator[Finding]:
         yield note(
             "repeated",
             f"Each reading stands {times} times in a row: the sensor measures at {log.rate / times:.4g} Hz, "
-            f"keep each {times}th sample.",
+            f"keep one sample of {times}.",
         )
 
 
@@ -271,41 +274,42 @@ def _flaws(log: Examined) -> Iterator[Finding]:
         say = doubt if count > MANY_SPIKES * log.x.size else note
         yield say(
             "spikes",
-            f"{count} samples of the displacement stand off alone, the first at {first:.6g} s: leave them "
-            "out.",
+            f"{counted(count, 'sample')} of the displacement {'stands' if count == 1 else 'stand'} off "
+            f"alone, the first at {first:.6g} s: leave them out, as identify does.",
         )
     if flaws.jumps.size:
         largest = int(np.argmax(np.abs(flaws.jump_sizes)))
         yield doubt(
             "jumps",
-            f"The displacement jumps {flaws.jumps.size} times without the voltage, by "
+            f"The displacement jumps {counted(flaws.jumps.size)} without the voltage, by "
             f"{flaws.jump_sizes[largest]:+.3g} µm at {float(log.record.time[flaws.jumps[largest]]):.6g} s: "
-            "cut the log there, or give each stretch an offset of its own.",
+            "give each stretch an offset of its own, as identify does.",
         )
     if flaws.dropouts.any():
         first = float(log.record.time[np.argmax(flaws.dropouts)])
         yield doubt(
             "dropouts",
-            f"The displacement stands still while the voltage moves, for {int(np.sum(flaws.dropouts))} "
-            f"samples from {first:.6g} s on: the sensor was lost, leave them out.",
+            "The displacement stands still while the voltage moves, for "
+            f"{int(np.sum(flaws.dropouts))} samples from {first:.6g} s on: the sensor was lost, leave them "
+            "out, as identify does.",
         )
     if len(flaws.rests):
         rested = int(np.sum(np.diff(flaws.rests, axis=1))) / log.rate
         yield note(
             "rests",
-            f"The voltage rests {len(flaws.rests)} times, {rested:.3g} s in all: nothing is learnt of the "
+            f"The voltage rests {counted(len(flaws.rests))}, {rested:.3g} s in all: nothing is learnt of the "
             "loop there, and creep shows.",
         )
 
 
 def _drift(log: Examined) -> Iterator[Finding]:
-    weights, _ = log.line
-    drift = 2.0 * float(weights[3])
-    if abs(drift) > DRIFT * log.moved and log.related and log.turns.size > 3:
+    if log.turns.size > 3 and log.related and abs(log.drift) > DRIFT * log.moved:
+        share = 100.0 * abs(log.drift) / log.moved
         yield note(
             "drift",
-            f"The displacement drifts by {drift:+.3g} µm over the log, {100 * abs(drift) / log.moved:.0f} % "
-            "of what the voltage moves: creep or temperature; let the stage settle, or fit a drift.",
+            f"The displacement drifts by {log.drift:+.3g} µm between the first turn and the last one, "
+            f"{share:.0f} % of what the voltage moves: creep or temperature; let the stage settle, or fit a "
+            "drift.",
         )
 
 

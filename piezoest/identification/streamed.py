@@ -359,8 +359,8 @@ class _Judge:
         if count < FEWEST_SAMPLES:
             name = "held-out part" if held_out else "fitted part"
             raise ValueError(
-                f"the {name} of the log has {count:.0f} usable samples, at least {FEWEST_SAMPLES} are "
-                "needed: record longer"
+                f"the {name} of the log has {counted(int(count), 'usable sample')}, at least "
+                f"{FEWEST_SAMPLES} are needed: record longer"
             )
         return Misfit(float(np.sqrt(squares / count)), float(largest))
 

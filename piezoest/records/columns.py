@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from piezoest.records.source import LogError, Source, shown
+from piezoest.records.source import LogError, Source, counted, shown
 
 # Names by which logs call the quantities, in lower case; the unit stands beside them.
 NAMES = {
@@ -47,7 +47,7 @@ def choose(
     stated = {quantity: _stated_factor(quantity, text) for quantity, text in units.items()}
     if not source.titles and not named and source.width < len(wanted):
         raise LogError(
-            f"{source.path}: {source.width} columns without a header, {len(wanted)} are needed: "
+            f"{source.path}: {counted(source.width, 'column')} without a header, {len(wanted)} are needed: "
             f"{', '.join(wanted)}"
         )
     chosen: dict[str, Column] = {}
@@ -156,8 +156,8 @@ def _factor(source: Source, title: str, quantity: str) -> tuple[float, str]:
     base = BASE_UNITS[quantity]
     if unit and unit not in UNITS[quantity]:
         raise LogError(
-            f"{source.path}: column {title!r} has the unit {unit}, but {quantity} must be in {base}: convert "
-            f"it, or say what one of it is: units {quantity}='2 {base}' where a volt stands for 2 {base}"
+            f"{source.path}: column {title!r} has no unit of {quantity}, such as {base}: convert it, or say "
+            f"what one of it is: units {quantity}='2 {base}' where a volt stands for 2 {base}"
         )
     if not unit:
         return 1.0, f"column {title!r}: unit taken as {base}"

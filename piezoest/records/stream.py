@@ -9,7 +9,7 @@ import numpy as np
 from piezoest._checks import WILDEST, FloatArray, integer, positive
 from piezoest.records.columns import BASE_UNITS, Column, choose, has_column
 from piezoest.records.opening import open_source
-from piezoest.records.source import ROWS, Rows, Source
+from piezoest.records.source import ROWS, Rows, Source, counted
 from piezoest.records.timing import Timing, placed, scan
 
 FEWEST_ROWS = 10
@@ -154,7 +154,9 @@ class RecordStream:
             usable += int(np.sum(np.isfinite(block.voltage) & np.isfinite(block.displacement)))
             yield block
         if usable < FEWEST_ROWS:
-            raise ValueError(f"{self.path}: only {usable} usable rows, at least {FEWEST_ROWS} are needed")
+            raise ValueError(
+                f"{self.path}: only {counted(usable, 'usable row')}, at least {FEWEST_ROWS} are needed"
+            )
 
     def _samples(self, progress: Progress | None = None) -> Iterator[list[FloatArray]]:
         """Yield blocks of time and the wanted columns, evenly sampled, NaN where a row is missing."""
@@ -281,7 +283,7 @@ def without_gaps(log: RecordStream) -> FloatArray:
                 f"{where} {bad}: no number in the time or the reference; a reference must have no gaps"
             )
     if count < FEWEST_ROWS:
-        raise ValueError(f"{log.path}: only {count} rows, at least {FEWEST_ROWS} are needed")
+        raise ValueError(f"{log.path}: only {counted(count, 'row')}, at least {FEWEST_ROWS} are needed")
     if log._timing is not None and log._timing.samples > count:
         raise ValueError(f"{where} {log._timing.jump}: time jumps here; a reference must have no gaps")
     return np.concatenate([values for _, values in log._samples()])

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.records.source import LogError
+from piezoest.records.source import LogError, counted
 
 # A step of time may differ from whole samples by this part of a sample, and rows may be
 # missing for this part of the record; beyond, the timing is not known well enough.
@@ -108,7 +108,7 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
         moved = moved or bool(np.any(gaps))
         jitter, absent = max(jitter, float(off.max())), absent + int(gaps.sum())
     if count < 2:
-        raise LogError(f"{where}: only {count} rows with a time")
+        raise LogError(f"{where}: only {counted(count, 'row')} with a time")
     if uneven:
         # Steps may be so where times are not: of 3, 4 and 3 ms, where three decimals are too few for 10/3.
         absent, moved, jitter = 0, False, _deviation(sums / count, first, blocks())

@@ -8,6 +8,7 @@ import pytest
 import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting.flaws import flawed
+from piezoest.fitting.rests import rests_of
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.sense import findings
 from piezoest.models import ColemanHodgdon
@@ -173,7 +174,7 @@ FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "displacement early": (lambda: early(25), "clockwise", "time stamps"),
     "the reference in um": (lambda: followed(1.0), "reference", "reference in µm"),
     "the reference in volts": (lambda: followed(0.1), "straight", "servo off"),
-    "closed loop, reading after": (lambda: closed_loop(False), "closed loop", "samples later"),
+    "closed loop, reading after": (lambda: closed_loop(False), "closed loop", "later"),
     "closed loop, reading before": (lambda: closed_loop(True), "closed loop", "opposite ways"),
     "sensor clipped above": (
         lambda: clipped_displacement(-9.0, 3.0),
@@ -191,16 +192,16 @@ FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "thirty samples": (lambda: cut(30), "short", "30 usable samples"),
     "nothing but gaps": (lambda: times(x=np.nan), "short", "0 usable samples"),
     "one way": (lambda: ramp(0), "no swing", "turns 0 times"),
-    "one turn": (lambda: ramp(1), "no swing", "turns 1 times"),
+    "one turn": (lambda: ramp(1), "no swing", "turns once"),
     "a quarter missing": (gaps, "missing", "25 %"),
     "another axis": (unrelated, "unrelated", "one axis"),
     "some spikes": (lambda: spiky(8, 1.0), "spikes", "8 samples"),
     "many spikes": (lambda: spiky(80, -2.0), "spikes", "stand off alone"),
-    "a jump of the sensor": (lambda: stepped(3000), "jumps", "jumps 1 times"),
+    "a jump of the sensor": (lambda: stepped(3000), "jumps", "jumps once"),
     "two jumps": (lambda: stepped(2000, 6100), "jumps", "jumps 2 times"),
     "sensor frozen": (lambda: frozen(1800, 1880, None), "dropouts", "80 samples"),
     "sensor lost": (lambda: frozen(1800, 1860, 11.0), "dropouts", "60 samples"),
-    "a long rest": (with_rest, "rests", "rests 1 times"),
+    "a long rest": (with_rest, "rests", "rests once"),
     "a strong drift": (drifting, "drift", "drifts by +3"),
 }
 NOTES = ("small stroke", "repeated", "rests", "drift")
@@ -230,6 +231,18 @@ def test_flaws_say_where() -> None:
     np.testing.assert_allclose(flawed(*with_rest()[:2]).rests, [[2000, 5000]], atol=1)
 
 
+@pytest.mark.parametrize("deviation", [0.0, 0.1, 0.5, 1.0])
+def test_noise_of_the_voltage_hides_no_rest_and_makes_none(deviation: float) -> None:
+    hiss = noise(deviation=deviation, seed=7)
+    assert len(rests_of(SINE * np.linspace(0.2, 1.0, N) + hiss)) == 0
+    np.testing.assert_allclose(rests_of(with_rest()[0] + hiss), [[2000, 5000]], atol=10)
+
+
+def test_a_displacement_left_beside_the_line_at_rest_is_no_drift() -> None:
+    u, x, rate = HEALTHY["ending at rest"]()
+    assert [found.name for found in findings(Record.from_arrays(u, x, rate))] == ["rests"]
+
+
 def triangle(frequency: float = 2.0) -> FloatArray:
     return pz.signals.triangle(60.0, frequency, N / FS * frequency, FS).values
 
@@ -252,6 +265,7 @@ HEALTHY: dict[str, Callable[[], Log]] = {
     "without noise": lambda: (SINE, STAGE.simulate(SINE), FS),
     "a triangle without noise": lambda: (triangle(), STAGE.simulate(triangle()), FS),
     "noisy": lambda: (SINE, log()[1] + noise(deviation=0.05, seed=5), FS),
+    "ending at rest": lambda: log(np.append(SINE[: N // 2], np.zeros(N // 2))),
     "noise in the recorded voltage": lambda: (SINE + noise(deviation=0.05, seed=6), log()[1], FS),
     "late": lambda: (SINE[5:], log()[1][:-5], FS),
     "creep": lambda: (SINE, log()[1] + 0.1 * np.log10(1.0 + 10.0 * T), FS),

@@ -153,13 +153,6 @@ def test_noise_is_what_repeated_periods_differ_by() -> None:
     assert identify(u, x, sample_rate=RATE, model="line").noise_floor == pytest.approx(0.02, rel=0.2)
 
 
-def test_what_a_fast_voltage_moves_is_no_noise() -> None:
-    u = np.random.default_rng(4).uniform(-30.0, 30.0, 6000)
-    x = pz.PrandtlIshlinskii(0.1, [5.0, 15.0], [0.02, 0.02]).simulate(u)
-    found = identify(u, x + noise(5e-3, 0, u.size), sample_rate=RATE, model="plays")
-    assert found.noise_floor == pytest.approx(5e-3, rel=0.2)
-
-
 # ---------------------------------------------------------------- which kind
 
 
@@ -260,16 +253,6 @@ def test_doubts_are_errors_where_they_are_to_be() -> None:
     with pytest.raises(ValueError, match="%"):
         identify(changed(gap), model="line", train=0.2, strict=True)
     assert identify(record, model="line", strict=True).chosen == "line"
-
-
-def test_other_logs_are_checked_too() -> None:
-    record = made()
-    falls = changed(-record.displacement)
-    found = identify(record, model="line", validate=[record, falls])
-    assert [said for said in found.advice if "falls" in said]
-    assert not found.findings
-    with pytest.raises(ValueError, match="falls"):
-        identify(record, model="line", validate=[falls], strict=True)
 
 
 def test_every_step_is_told() -> None:

@@ -1,0 +1,78 @@
+"""What identification says of a log: advice, noise, other logs; and what it does not say."""
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest import signals
+from piezoest._checks import FloatArray
+from piezoest.identification import identify
+from piezoest.models import ColemanHodgdon
+from piezoest.records import Record
+from tests.fitting.stages import noise
+
+FS = 1000.0
+LOOP = ColemanHodgdon(0.02, 0.12, 0.0036)
+WEIGHTS = np.exp(-np.linspace(0.0, 2.0, 30))
+PLAYS = pz.PrandtlIshlinskii(0.065, np.linspace(2.0, 50.0, 30), 0.035 * WEIGHTS / WEIGHTS.sum())
+
+
+def swings() -> FloatArray:
+    return np.tile(signals.multi_amplitude([20.0, 35.0, 10.0, 30.0], 5.0, 2, FS).values, 2)
+
+
+def late(x: FloatArray, samples: int) -> FloatArray:
+    return np.interp(np.arange(x.size) - samples, np.arange(x.size), x)
+
+
+def log(u: FloatArray, x: FloatArray, deviation: float = 2e-3) -> Record:
+    return Record.from_arrays(u, x + noise(deviation, 0, u.size), FS)
+
+
+def test_nothing_lies_between_noise_and_an_error_held_out_that_is_noise() -> None:
+    u = signals.multi_amplitude([10.0, 30.0, 50.0, 20.0, 40.0, 50.0], 5.0, 4, FS).values
+    found = identify(log(u, PLAYS.simulate(u), 8e-3))
+    # Only blocks of the part that grows are foreseen worse.
+    assert found.best.cross_validated > 1.5 * found.noise_floor
+    assert not any("Between the noise" in said for said in found.advice)
+
+
+def test_a_log_is_centred_whatever_the_offset_of_its_model() -> None:
+    u = 50.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(12_000) / FS)
+    found = identify(log(u, late(PLAYS.simulate(u), 30), 8e-3))
+    assert abs(found.model.offset) > 1.0
+    assert not any("not centred" in said for said in found.advice)
+
+
+def test_a_line_is_not_recommended_for_columns_swapped() -> None:
+    right = log(swings(), LOOP.simulate(swings()))
+    swapped = identify(right.displacement, right.voltage, sample_rate=FS, model="plays")
+    assert any("clockwise" in said for said in swapped.advice)
+    assert not any("straight line" in said for said in swapped.advice)
+
+
+def test_a_lag_longer_than_is_looked_for_is_said() -> None:
+    found = identify(log(swings(), late(LOOP.simulate(swings()), 14)), model="line")
+    assert any("10 samples or more" in said for said in found.advice)
+
+
+def test_one_jump_is_said_once() -> None:
+    x = LOOP.simulate(swings())
+    x[-400:] += 5.0
+    (said,) = [said for said in identify(log(swings(), x), model="line").advice if "jump" in said]
+    assert "once" in said
+
+
+def test_what_a_fast_voltage_moves_is_no_noise() -> None:
+    u = np.random.default_rng(4).uniform(-30.0, 30.0, 6000)
+    x = pz.PrandtlIshlinskii(0.1, [5.0, 15.0], [0.02, 0.02]).simulate(u)
+    assert identify(log(u, x, 5e-3), model="plays").noise_floor == pytest.approx(5e-3, rel=0.2)
+
+
+def test_other_logs_are_checked_too() -> None:
+    right, falls = log(swings(), LOOP.simulate(swings())), log(swings(), -LOOP.simulate(swings()))
+    found = identify(right, model="line", validate=[right, falls])
+    assert [said for said in found.advice if "falls" in said]
+    assert not found.findings
+    with pytest.raises(ValueError, match="falls"):
+        identify(right, model="line", validate=[falls], strict=True)
