@@ -41,6 +41,11 @@ def test_the_first_sheet_with_numbers_is_read(tmp_path: Path) -> None:
         stream_record(file)
 
 
+def test_a_row_of_units_in_a_spreadsheet(tmp_path: Path) -> None:
+    table = [["t", "drive", "gauge"], ["s", "V", "nm"], *rows(TIME.tolist())[1:]]
+    check(read_record(write_sheets(tmp_path / "log.xlsx", log=table)))
+
+
 def test_cells_without_numbers(tmp_path: Path) -> None:
     table = rows(TIME.tolist())
     table[8][1], table[9][2], table[10][1] = None, "N/A", " "
@@ -52,6 +57,12 @@ def test_cells_without_numbers(tmp_path: Path) -> None:
 
 
 # ---------------------------------------------------------------- DataFrames
+
+
+def test_complex_numbers_are_refused() -> None:
+    pd = pytest.importorskip("pandas")
+    with pytest.raises(ValueError, match="column 'u'"):
+        Record.from_frame(pd.DataFrame({"t": TIME, "u": VOLTAGE + 0j, "x": DISPLACEMENT}))
 
 
 def test_frame_of_pandas() -> None:

@@ -37,6 +37,43 @@ def check(path: Path) -> None:
     assert record.sample_rate == pytest.approx(RATE)
 
 
+PREAMBLE = "Oscilloscope DSO-X\nDate,2026-11-01\nSample rate,1000\n\n"
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        PREAMBLE + "t,u,x",
+        PREAMBLE + "time,voltage,displacement\ns,V,um",
+        "Scope of the laboratory\nt (s),u (volts),position (micrometers)",
+        "time,voltage,displacement\n[s],[V],",
+        "% from MATLAB\n  % t u x",
+    ],
+)
+def test_lines_of_an_instrument_above_the_rows(tmp_path: Path, above: str) -> None:
+    file = write(tmp_path / "log.csv", ",", rows_of(str), header="")
+    file.write_text(above + "\n" + file.read_text())
+    check(file)
+
+
+def test_a_line_of_units_is_heeded(tmp_path: Path) -> None:
+    file = write(tmp_path / "log.csv", ",", rows_of(str), header="")
+    file.write_text("time,voltage,displacement\nms,mV,nm\n" + file.read_text())
+    record = read_record(file)
+    assert record.sample_rate == pytest.approx(1e3 * RATE)
+    np.testing.assert_allclose(record.voltage, 1e-3 * VOLTAGE)
+    np.testing.assert_allclose(record.displacement, 1e-3 * DISPLACEMENT)
+
+
+def test_rows_below_other_lines_without_a_header_go_by_number(tmp_path: Path) -> None:
+    file = write(tmp_path / "log.csv", ",", rows_of(str), header="")
+    file.write_text("Scope\nDate,2026-11-01\n" + file.read_text())
+    with pytest.raises(ValueError, match="1, 2, 3"):
+        read_record(file)
+    record = read_record(file, columns={"time": "1", "voltage": "2", "displacement": "3"})
+    np.testing.assert_array_equal(record.voltage, VOLTAGE)
+
+
 def german(value: float) -> str:
     return f"{value:,.3f}".translate(str.maketrans(",.", ".,"))
 

@@ -89,7 +89,7 @@ def test_rows_without_numbers_are_kept_as_nan_and_counted(tmp_path: Path, line: 
         ({"line9": "0.001,1,1"}, ["line 9", "time does not increase"]),
         ({"line12": "0.1045,1,1"}, ["line 12", "unevenly", "0.01 s is usual"]),
         ({"line12": "0,100,1,5,1,5"}, ["line 12", "6 fields", "3"]),
-        ({"line2": "s,V,um"}, ["line 2", "not a number"]),
+        ({"line2": "s,V,kg"}, ["line 2", "not a number"]),
         ({"line12": '0.100,"0.1,0.1'}, ["quotation mark"]),
         ({"line61": "9.0,1,1"}, ["line 61", "time jumps by", "missing in all"]),
         ({"line1": "time_s,current_A,displacement_um"}, ["no column for voltage", "time_s, current_A"]),
@@ -103,6 +103,34 @@ def test_refusals_name_place_and_reason(tmp_path: Path, changes: dict[str, str],
         read_record(log(tmp_path, **changes))
     for word in words:
         assert word in str(caught.value)
+
+
+def test_columns_by_whole_numbers(tmp_path: Path) -> None:
+    check(read_record(log(tmp_path), columns={"time": 1, "voltage": 2, "displacement": 3}))  # type: ignore[dict-item]
+    with pytest.raises(ValueError, match="columns must be a mapping"):
+        read_record(log(tmp_path), columns="voltage=2")  # type: ignore[arg-type]
+
+
+def test_a_sample_rate_that_contradicts_time_is_said(tmp_path: Path) -> None:
+    right = read_record(log(tmp_path)).sample_rate
+    assert not read_record(log(tmp_path), sample_rate=right).notes
+    (note,) = read_record(log(tmp_path), sample_rate=5.0 * right).notes
+    assert "ignored" in note
+
+
+def test_infinity_in_arrays_is_counted() -> None:
+    displacement = DISPLACEMENT.copy()
+    displacement[3:5] = np.inf
+    record = Record.from_arrays(VOLTAGE, displacement, 100.0)
+    assert record.skipped == 2
+    assert "2 samples" in record.notes[0]
+
+
+def test_a_column_without_numbers_is_named(tmp_path: Path) -> None:
+    text = "t,u,x\n" + "".join(f"{t},1.5,nan\n" for t in range(50))
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(ValueError, match="no number in column 'x'"):
+        read_record(tmp_path / "log.csv")
 
 
 def test_files_without_a_log(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from piezoest._checks import FloatArray, fraction
+from piezoest._checks import FloatArray, fraction, instance
 from piezoest.fitting import FORMS, Fitter
 from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.fitting.search import checked_delay
@@ -111,7 +111,8 @@ def identify(
         raise ValueError(f"model must be auto or one of {', '.join(FORMS)}, got {model!r}")
     train = fraction("train", train, 0.1, 0.9)
     record = as_record(data, displacement, sample_rate=sample_rate, columns=columns, units=units)
-    others = [as_record(each) for each in validate]
+    logs = instance("validate", validate, (list, tuple), "a list of logs: validate=[log]")
+    others = [as_record(each) for each in logs]
     for each in others:
         _enough("part to validate", each, slice(None))
     say("looking at the log")

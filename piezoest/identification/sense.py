@@ -128,8 +128,9 @@ def _excitation(log: Examined) -> Iterator[Finding]:
 
 def _timing(log: Examined) -> Iterator[Finding]:
     low, high = RATES
-    doubtful = "check the unit of time (ms or µs taken for s, or the other way round)"
-    if not low <= log.rate <= high:
+    doubtful = "check the unit of time (ms, µs or days taken for s, or the other way round)"
+    # Exactly 1 Hz is what times in samples, or in ms at 1 kHz, come to.
+    if not low * (1.0 + 1e-6) < log.rate <= high:
         yield doubt(
             "sample rate", f"The sample rate would be {log.rate:.4g} Hz: {doubtful}, or the sample rate."
         )

@@ -132,7 +132,7 @@ class LearntModel:
         ValueError
             If there is no model, or model or ranges are refused.
         """
-        nested = isinstance(data.get("model"), dict)
+        nested = isinstance(instance("data", data, dict, "a model's dictionary").get("model"), dict)
         described = data["model"] if nested else data
         ranges = data.get("learnt_on") if nested else None
         return cls(

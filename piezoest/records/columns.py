@@ -18,10 +18,15 @@ NAMES = {
     "reference": ("reference", "ref", "r", "setpoint", "target", "desired"),
 }  # fmt: skip
 UNITS = {
-    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "seconds": 1.0},
-    "voltage": {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "kv": 1e3},
-    "displacement": {"um": 1.0, "micron": 1.0, "microns": 1.0, "nm": 1e-3, "pm": 1e-6, "mm": 1e3, "m": 1e6},
-}
+    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0,
+             "second": 1.0, "seconds": 1.0, "milliseconds": 1e-3, "microseconds": 1e-6, "minutes": 60.0,
+             "hours": 3600.0, "days": 86_400.0},
+    "voltage": {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "kv": 1e3, "millivolts": 1e-3},
+    "displacement": {"um": 1.0, "micron": 1.0, "microns": 1.0, "nm": 1e-3, "pm": 1e-6, "mm": 1e3, "m": 1e6,
+                     "micrometer": 1.0, "micrometers": 1.0, "micrometre": 1.0, "micrometres": 1.0,
+                     "nanometers": 1e-3, "nanometres": 1e-3, "millimeters": 1e3, "millimetres": 1e3,
+                     "angstrom": 1e-4, "angstroms": 1e-4},
+}  # fmt: skip
 UNITS["reference"] = UNITS["displacement"]
 BASE_UNITS = {"time": "s", "voltage": "V", "displacement": "µm", "reference": "µm"}
 # More than these are counted in a message, not listed.
@@ -46,9 +51,10 @@ def choose(
             raise LogError(f"{argument} has {unknown}: known are time, voltage and displacement")
     stated = {quantity: _stated_factor(quantity, text) for quantity, text in units.items()}
     if not source.titles and not named and source.width < len(wanted):
+        without_time = source.width == len(wanted) - 1 and "time" in wanted
         raise LogError(
             f"{source.path}: {counted(source.width, 'column')} without a header, {len(wanted)} are needed: "
-            f"{', '.join(wanted)}"
+            f"{', '.join(wanted)}{'; without time give the sample rate' if without_time else ''}"
         )
     chosen: dict[str, Column] = {}
     for i, quantity in enumerate(wanted):
@@ -142,6 +148,15 @@ def titled(name: str, unit: str) -> str:
     """Name with the unit that the file states beside it, in place of one that the name states."""
     plain, own = split_unit(name)
     return f"{plain if own else name} [{unit}]" if unit else name
+
+
+def with_units(names: list[str], below: list[str]) -> list[str]:
+    """Names with the units of the line below them; no names if that line holds anything else."""
+    units = [cell.strip(" []()") for cell in below]
+    known = {unit for units in UNITS.values() for unit in units}
+    if not any(units) or not all(unit == "" or _plain(unit).lower() in known for unit in units):
+        return []
+    return [titled(*named) for named in zip(names, units, strict=True)] if len(names) == len(units) else []
 
 
 def _plain(text: str) -> str:

@@ -12,10 +12,11 @@ import numpy as np
 from piezoest import _extras
 from piezoest._checks import FloatArray
 from piezoest.records.cells import is_missing
-from piezoest.records.columns import NAMES, split_unit, titled
+from piezoest.records.columns import NAMES, split_unit, titled, with_units
 from piezoest.records.source import EXTRA, LogError, Rows, Source, check_size, damaged, floats, shown
 
 TIMES = datetime.date | datetime.time | datetime.timedelta
+NO_NUMBERS = bool | np.bool_ | complex | np.complexfloating
 
 
 class Frame(Source):
@@ -58,7 +59,7 @@ class Frame(Source):
 
 
 def _are_numbers(cells: Any) -> Any:
-    return cells.map(lambda cell: isinstance(cell, Number | TIMES) and not isinstance(cell, bool | np.bool_))
+    return cells.map(lambda cell: isinstance(cell, Number | TIMES) and not isinstance(cell, NO_NUMBERS))
 
 
 # ---------------------------------------------------------------- DataFrames
@@ -131,7 +132,10 @@ def open_sheet(path: Path) -> Frame:
     table = sheet.iloc[begins:].dropna(axis=1, how="all")
     table = table.loc[: table.last_valid_index()]
     above = sheet.iloc[:begins][table.columns].dropna(how="all")
-    names = [] if above.empty else [str(name).strip() for name in above.iloc[-1].fillna("")]
+    lines = [[str(name).strip() for name in line] for line in above.fillna("").to_numpy()]
+    names = lines[-1] if lines else []
+    if len(lines) > 1:
+        names = with_units(lines[-2], names) or names
     # A title above the table is no header.
     header = names if sum(map(bool, names)) > 1 else []
     series = [_typed(table[i]) for i in table.columns]

@@ -27,7 +27,8 @@ CONTROL = frozenset(range(32)) - frozenset(b"\t\n\v\f\r\x1a\x1b")
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 PACKED = b"\x1f\x8b"
 # A line that is blank or a comment, in a text that begins with the end of a line.
-SPECIAL = re.compile(r"\n[^\S\n]*(?:#|\n|\Z)")
+COMMENTS = ("#", "%")
+SPECIAL = re.compile(r"\n[^\S\n]*(?:[#%]|\n|\Z)")
 
 
 class Lines(NamedTuple):
@@ -113,7 +114,7 @@ def sample_lines(path: Path, encoding: str, begins: int, skip_blank: bool, rows:
             continue
         kept: list[tuple[int, str]] = []
         for number, line in enumerate(text.split("\n"), first):
-            if number < begins or line.lstrip().startswith("#"):
+            if number < begins or line.lstrip().startswith(COMMENTS):
                 continue
             if line.strip():
                 kept += [*blank, (number, line)]

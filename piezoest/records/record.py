@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, fraction, positive
 from piezoest.records.frame import frame_source
+from piezoest.records.source import counted
 from piezoest.records.stream import RecordStream, sane, without_gaps
 from piezoest.records.writing import write_columns
 
@@ -83,7 +84,7 @@ class Record:
         """
         voltage = array_1d("voltage", voltage, allow_nan=True)
         time = np.arange(voltage.size) / positive("sample_rate", sample_rate)
-        return cls(time, voltage, displacement, sample_rate, source)
+        return cls(time, voltage, displacement, sample_rate, source)._counted()
 
     @classmethod
     def from_frame(
@@ -136,6 +137,14 @@ class Record:
     def usable(self) -> Any:
         """Where both voltage and displacement are known, shape (N,), bool."""
         return np.isfinite(self.voltage) & np.isfinite(self.displacement)
+
+    def _counted(self) -> Self:
+        """Return it with the number of its unusable samples, and a note on them."""
+        if not (skipped := int(np.sum(~self.usable))):
+            return self
+        verb = "is" if skipped == 1 else "are"
+        said = f"{counted(skipped, 'sample')} {verb} without usable numbers: skipped, the timing is kept"
+        return replace(self, skipped=skipped, notes=(*self.notes, said))
 
     def split(self, part: float) -> tuple[Record, Record]:
         """Cut in two.
@@ -198,7 +207,8 @@ def read_record(
     path : str or Path
         File with one row per sample; the format is recognised. In text files, delimiter (comma, semicolon,
         tab, blank), decimal comma, separators of thousands, time stamps of ISO 8601 and header are
-        recognised too, lines that begin with # are comments, and gzip may have packed them (``.csv.gz``).
+        recognised too, with lines of an instrument above the header or of units below it; lines that begin
+        with # or % are comments, and gzip may have packed them (``.csv.gz``).
         Of a spreadsheet the first sheet with a table of numbers is read, of LabVIEW's files and TDMS all
         channels.
         Of HDF5 and MATLAB files every vector is a column, and so is every column of a matrix (``data:1``,
@@ -249,11 +259,8 @@ def _record(stream: RecordStream) -> Record:
         columns[:, count : count + block.time.size] = block
         count += block.time.size
     time, voltage, displacement = columns
-    notes = list(stream.notes)
-    if skipped := int(np.sum(~(np.isfinite(voltage) & np.isfinite(displacement)))):
-        noun = "sample is" if skipped == 1 else "samples are"
-        notes.append(f"{skipped} {noun} without usable numbers: skipped, the timing is kept")
-    return Record(time, voltage, displacement, stream.sample_rate, str(stream.path), skipped, tuple(notes))
+    record = Record(time, voltage, displacement, stream.sample_rate, str(stream.path), notes=stream.notes)
+    return record._counted()
 
 
 def read_reference(

@@ -6,13 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from piezoest._checks import WILDEST, FloatArray, integer, positive
+from piezoest._checks import WILDEST, FloatArray, instance, integer, positive
 from piezoest.records.columns import BASE_UNITS, Column, choose, has_column
 from piezoest.records.opening import open_source
-from piezoest.records.source import ROWS, Rows, Source, counted
+from piezoest.records.source import ROWS, LogError, Rows, Source, counted
 from piezoest.records.timing import Timing, placed, scan
 
 FEWEST_ROWS = 10
+# Rows by which a sample rate that is given is compared with the column of time, and how near it must be.
+FIRST_ROWS, SAME_RATE = 1000, 0.01
 
 # Called with how much is done, and of how much.
 Progress = Callable[[int, int], object]
@@ -78,7 +80,8 @@ class RecordStream:
         wanted: tuple[str, ...] = ("voltage", "displacement"),
         held: bool = False,
     ) -> None:
-        named = dict(columns or {})
+        named = {quantity: str(name) for quantity, name in _mapping("columns", columns).items()}
+        units = _mapping("units", units)
         self._rows = integer("rows", rows, 1)
         self._source = source = path if isinstance(path, Source) else open_source(Path(path))
         notes = []
@@ -86,7 +89,9 @@ class RecordStream:
             sample_rate = source.sample_rate
             notes.append(f"sample rate of {sample_rate:g} Hz as the file states it")
         timed = ("time",) if sample_rate is None else ()
-        self._chosen = choose(source, (*timed, *wanted), named, dict(units or {}))
+        self._chosen = choose(source, (*timed, *wanted), named, units)
+        if sample_rate is not None and not notes:
+            notes += _contradicted(source, named, units, sample_rate)
         self._positions = [column.position for column in self._chosen.values()]
         source.check(self._positions)
         self._held = list(source.read(self._positions, ROWS)) if held else None
@@ -148,14 +153,18 @@ class RecordStream:
         ...     pass
         100%
         """
-        usable = 0
+        known, usable = np.zeros(2, np.int64), 0
         for time, voltage, displacement in self._samples(progress):
             block = Block(time, sane(voltage), sane(displacement))
-            usable += int(np.sum(np.isfinite(block.voltage) & np.isfinite(block.displacement)))
+            finite = np.isfinite([block.voltage, block.displacement])
+            known, usable = known + finite.sum(axis=1), usable + int(np.sum(finite.all(axis=0)))
             yield block
         if usable < FEWEST_ROWS:
+            columns = zip(("voltage", "displacement"), known, strict=True)
+            empty = [repr(self._chosen[quantity].title) for quantity, count in columns if not count]
+            said = f"; no number in column {' and '.join(empty)}" if empty else ""
             raise ValueError(
-                f"{self.path}: only {counted(usable, 'usable row')}, at least {FEWEST_ROWS} are needed"
+                f"{self.path}: only {counted(usable, 'usable row')}, at least {FEWEST_ROWS} are needed{said}"
             )
 
     def _samples(self, progress: Progress | None = None) -> Iterator[list[FloatArray]]:
@@ -261,6 +270,34 @@ def _states_its_rate(source: Source) -> bool:
     if source.sample_rate is None:
         return False
     return not has_column(source, "time") if source.titles else source.width == 2
+
+
+def _mapping(name: str, given: Any) -> dict[str, Any]:
+    return dict(
+        instance(name, {} if given is None else given, Mapping, f"a mapping: {name}={{'voltage': ...}}")
+    )
+
+
+def _contradicted(
+    source: Source, named: dict[str, str], units: Mapping[str, str], sample_rate: float
+) -> list[str]:
+    """What to say where a column of time, by its first rows, has another sample rate than is given."""
+    if "time" not in named and not (source.titles and has_column(source, "time")):
+        return []
+    try:
+        column = choose(source, ("time",), _only_time(named), _only_time(units))["time"]
+        times = next(source.read([column.position], FIRST_ROWS)).values[0][:FIRST_ROWS]
+    except (LogError, StopIteration):
+        return []
+    steps = column.factor * np.diff(times[np.isfinite(times)])
+    rate = 1.0 / float(np.median(steps)) if steps.size and np.median(steps) > 0.0 else sample_rate
+    if abs(rate / sample_rate - 1.0) < SAME_RATE:
+        return []
+    return [f"column {column.title!r} has {rate:.4g} Hz, it is ignored: {sample_rate:g} Hz was given"]
+
+
+def _only_time(given: Mapping[str, str]) -> dict[str, str]:
+    return {quantity: value for quantity, value in given.items() if quantity == "time"}
 
 
 def _notes(source: Source, chosen: dict[str, Column]) -> list[str]:

@@ -63,12 +63,7 @@ class Table(Source):
             )
         check_size(path, 8 * max(self._lengths))
         leaves = [leaf(name) for name in names]
-        titles = [
-            titled(title, unit)
-            for title, (_, _, unit) in zip(
-                leaves if len(set(leaves)) == len(leaves) else names, columns, strict=True
-            )
-        ]
+        titles = [titled(title, unit) for title, (_, _, unit) in zip(leaves, columns, strict=True)]
         # One matrix and nothing else: its columns have no names.
         alone = len(names) > 1 and all(name.endswith(f":{i}") for i, name in enumerate(names, 1))
         super().__init__(path, *(([], []) if alone else (names, titles)), len(names))

@@ -12,14 +12,19 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.records.cells import MISSING, Style, is_missing, is_number, is_stamp, number, style_of
-from piezoest.records.columns import titled
-from piezoest.records.lines import Lines, chunks, encoding_of, sample_lines
+from piezoest.records.columns import titled, with_units
+from piezoest.records.lines import COMMENTS, Lines, chunks, encoding_of, sample_lines
 from piezoest.records.source import LogError, Rows, Source, finite, floats, shown
 
 # Blank lines among the others: more are the way the file is written, fewer are samples that were lost.
 MOST_BLANK = 0.1
 # Lines by which the layout is recognised, and rows in which a time stamp is looked for.
 HEAD_LINES, STAMP_ROWS = 10_000, 100
+# Lines that instruments write above the header, at most.
+LONGEST_PREAMBLE = 200
+
+
+Numbered = tuple[int, str]  # a line and its number in the file
 
 
 class Layout(NamedTuple):
@@ -45,18 +50,15 @@ def layout_of(path: Path) -> Layout:
     head = [
         (place, line)
         for place, line in itertools.islice(lines, HEAD_LINES)
-        if not line.lstrip().startswith("#")
+        if not line.lstrip().startswith(COMMENTS)
     ]
     filled = [(place, line) for place, line in head if line.strip()]
     if not filled:
         raise LogError(f"{path}: the file is empty")
     between = sum(filled[0][0] < place < filled[-1][0] for place, line in head if not line.strip())
-    delimiter = next((mark for mark in ";\t,|" if mark in filled[0][1]), " ")
-    first = split(path, [filled[0][1]], delimiter)[0]
-    header = [] if all(map(is_number, first)) else [cell.strip() for cell in first]
-    if header and len(filled) == 1:
+    delimiter, header, rows = _table(path, filled)
+    if not rows:
         raise LogError(f"{path}: no rows below the header")
-    rows = filled[1:] if header else filled
     texts = [line for _, line in rows]
     stamps: dict[int, Any] = {}
     if any(":" in line for line in texts[:STAMP_ROWS]):
@@ -64,10 +66,39 @@ def layout_of(path: Path) -> Layout:
             for i, cell in enumerate(row):
                 if i not in stamps and is_stamp(cell):
                     stamps[i] = _stamps([cell])[0]
-    return Layout(
-        path, encoding, delimiter, header, len(first), rows[0][0], between > MOST_BLANK * len(filled),
-        _style(path, texts, delimiter), stamps,
-    )  # fmt: skip
+    width, skip_blank = len(header or _cells(path, texts[0])), between > MOST_BLANK * len(filled)
+    style = _style(path, texts, delimiter)
+    return Layout(path, encoding, delimiter, header, width, rows[0][0], skip_blank, style, stamps)
+
+
+def _delimiter(line: str) -> str:
+    return next((mark for mark in ";\t,|" if mark in line), " ")
+
+
+def _cells(path: Path, line: str) -> list[str]:
+    return [cell.strip() for cell in split(path, [line], _delimiter(line))[0]]
+
+
+def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Numbered]]:
+    """Delimiter, header and rows; instruments may have written other lines above, units below the header."""
+    first = _cells(path, filled[0][1])
+    head = [_cells(path, line) for _, line in filled[:LONGEST_PREAMBLE] if line.count('"') % 2 == 0]
+    pairs = enumerate(itertools.pairwise(head))
+    begins = next((k for k, rows in pairs if len(rows[0]) == len(rows[1]) > 1 and _numeric(*rows)), 0)
+    if begins < 2 or len(head[begins]) == len(first) or len(head) < min(len(filled), LONGEST_PREAMBLE):
+        header, begins = ([], 0) if _numeric(first) else (first, 1)
+        if header and len(head) > 2 and (named := with_units(header, head[1])):
+            header, begins = named, 2
+        return _delimiter(filled[0][1]), header, filled[begins:]
+    header = with_units(head[begins - 2], head[begins - 1]) or head[begins - 1]
+    if len(header) != len(head[begins]):
+        # Nothing says what is what: columns go by their numbers.
+        header = [str(k + 1) for k in range(len(head[begins]))]
+    return _delimiter(filled[begins][1]), header, filled[begins:]
+
+
+def _numeric(*rows: list[str]) -> bool:
+    return all(is_number(cell) for row in rows for cell in row)
 
 
 def _style(path: Path, lines: list[str], delimiter: str) -> Style:

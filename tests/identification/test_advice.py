@@ -69,6 +69,11 @@ def test_what_a_fast_voltage_moves_is_no_noise() -> None:
     assert identify(log(u, x, 5e-3), model="plays").noise_floor == pytest.approx(5e-3, rel=0.2)
 
 
+def test_one_log_to_validate_is_no_list() -> None:
+    with pytest.raises(ValueError, match="validate must be a list"):
+        identify(log(swings(), LOOP.simulate(swings())), validate="log.csv")
+
+
 def test_other_logs_are_checked_too() -> None:
     right, falls = log(swings(), LOOP.simulate(swings())), log(swings(), -LOOP.simulate(swings()))
     found = identify(right, model="line", validate=[right, falls])

@@ -161,6 +161,7 @@ FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "mV taken for V": (lambda: times(u=1e3), "voltage", "mV taken for V"),
     "a stroke of some nm": (lambda: times(u=1e-3, x=1e-3), "small stroke", "raise the voltage"),
     "us taken for s": (lambda: times(rate=1e-6 * FS), "sample rate", "unit of time"),
+    "ms taken for s": (lambda: times(rate=1.0), "sample rate", "ms"),
     "s taken for us": (lambda: times(rate=1e6 * FS), "sample rate", "unit of time"),
     "a swing of hours": (
         lambda: (*log(SINE[np.arange(80 * N) // 80])[:2], 1.1),

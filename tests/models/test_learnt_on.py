@@ -141,4 +141,6 @@ def test_a_model_comes_in_many_forms(tmp_path: Path) -> None:
         assert LearntModel.of(file) == LearntModel.of(str(file)) == expected
     line = LearntModel(pz.LinearGain(0.1), KNOWN)
     assert LearntModel.from_dict(line.to_dict()) == line
+    with pytest.raises(ValueError, match="dictionary"):
+        LearntModel.from_dict([1])  # type: ignore[arg-type]
     assert model_from_dict(both.to_dict()["model"]) == LOOP
