@@ -42,9 +42,10 @@ def _left_out(found: Identification, data: Data) -> list[str]:
 def delay_sentences(delay: float, sample_rate: float, known: bool, estimated: bool) -> list[str]:
     """What to know of the samples by which the displacement lags the voltage."""
     if not known:
+        used = f" The fit has {delay:.2g} samples of it." if delay > 0.0 else ""
         return [
             "The lag of the displacement is not known: all swings of the voltage are alike, so it looks like "
-            "a wider loop. Record swings of several sizes or frequencies, or pass delay= in samples."
+            f"a wider loop.{used} Record swings of several sizes or frequencies, or pass delay= in samples."
         ]
     if not estimated:
         return []

@@ -70,9 +70,9 @@ def identify(
     train : float
         The fraction of the log to fit, from its start, 0.1 to 0.9; the rest is held out.
     delay : float or "auto"
-        Samples by which the displacement lags the voltage, 0 to 10, fractions too. ``"auto"`` estimates it if
-        the log contains swings of several sizes or frequencies, which show the difference between a delay and
-        a wider loop; else it is 0.
+        Samples by which the displacement lags the voltage, 0 to 10, fractions too. ``"auto"`` estimates it.
+        Only swings of several sizes or frequencies, or steps, show the difference between a delay and a wider
+        loop: see ``delay_known`` of the result.
     settle : float, optional
         Seconds to leave out at the start. Default: while the error exceeds four robust standard deviations,
         at most a tenth of the fitted part.

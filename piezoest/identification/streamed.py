@@ -157,7 +157,7 @@ def identify_stream(
         Part of the log to fit, from its start; the rest is held out. 0.1 to 0.9.
     delay : float or "auto"
         Samples by which the displacement lags the voltage, 0 to 10; ``"auto"`` looks for it in the first
-        50 000 samples, where they can tell it from the width of the loop.
+        50 000 samples.
     progress : callable, optional
         Called with what is done and what there is, in each of three passes over the log; the first two
         end with the fitted part.
@@ -201,7 +201,7 @@ def identify_stream(
     wanted = checked_delay(delay)
     told = wanted != "auto" or tells_lag(head.voltage)
     fitter = Fitter(
-        head.voltage, head.displacement, sample_rate=log.sample_rate, delay=wanted if told else 0.0
+        head.voltage, head.displacement, sample_rate=log.sample_rate, delay=wanted, tells_lag=told
     )
     say("fitting plays")
     fits = _fits(log, survey, fitter, trained, progress)
