@@ -12,6 +12,7 @@ from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.design import Design
 from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.fitting.forms import FORMS, Form
+from piezoest.fitting.gaps import forgotten
 from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.outliers import lonely, unsettled
 from piezoest.fitting.play_columns import PlayColumns, Start
@@ -24,6 +25,8 @@ from piezoest.symbolic import quadratic_solver
 FEWEST_SAMPLES = 50
 # A displacement that rises by no more than this fraction of its size over the record stands still.
 ROUNDING = 1e-9
+# Samples behind gaps of the voltage are only left out if this part of all remains.
+ENOUGH = 0.5
 # Times that a start which has not settled is looked for, each without what was found before.
 PASSES = 3
 SOLVER = "{} through CasADi; SciPy's bounded least squares agrees to {:.0e}"
@@ -134,6 +137,8 @@ class Fitter:
         flaws = flawed(u, x) if flaws is None else flaws
         if flaws.unusable.size != u.size:
             raise ValueError(f"flaws must be those of u and x: {u.size} samples, got {flaws.unusable.size}")
+        remembered = counts & ~flaws.unusable & ~forgotten(u, self._given)
+        counts = remembered if np.count_nonzero(remembered) > ENOUGH * np.count_nonzero(counts) else counts
         counts &= ~flaws.unusable
         self.delay_estimated = delay == "auto"
         self._log = Log(

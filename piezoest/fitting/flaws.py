@@ -40,6 +40,8 @@ ONE_SIDED, BOTH_SIDES = 0.6, 0.15
 BESIDE = np.arange(2, 7)
 # A sensor that stands still for so many samples while the stage moves by so many of its steps.
 SHORTEST_DROPOUT, MOVED_IN_DROPOUT = 8, 50.0
+# Part of the range that the voltage moves, and from its ends, at which no stage stands still by itself.
+MOST, FAR_INSIDE = 0.6, 0.02
 # Part of what the voltage moves by which the reading then jumps.
 JUMPED = 0.2
 
@@ -296,8 +298,14 @@ def _dropouts(log: _Log, known: BoolArray) -> BoolArray:
 
 
 def _is_lost(log: _Log, start: int, end: int, moved: float) -> bool:
-    """Whether the reading comes to its rest, or goes on, by a jump; where it does neither it is clipped."""
+    """Whether the reading comes to its rest, or goes on, by a jump; where it does neither it is clipped.
+
+    It is not clipped far from both ends of the range while the stage goes through most of it.
+    """
     value = log.x[start]
+    inside = min(value - log.x.min(), log.x.max() - value)
     if end >= log.x.size - 1:
-        return bool(value not in (log.x.min(), log.x.max()))
+        return bool(inside > 0.0)
+    if moved > MOST * log.range and inside > FAR_INSIDE * log.range:
+        return True
     return bool(max(abs(value - log.x[max(start - 1, 0)]), abs(value - log.x[end])) > JUMPED * moved)
