@@ -46,7 +46,6 @@ def pieces(parity: Document, target: Document) -> dict[str, str]:
                 "settled error [nm]": lambda row: f"{1e3 * row['settled_error_um']:.2f}",
                 "in float [nm]": lambda row: f"{1e3 * row['settled_error_float_um']:.2f}",
                 "change": lambda row: percent(row["float_difference"]),
-                "change by a rounded reference": lambda row: percent(moved_by_rounding(row)),
             },
         ),
         "target": table_of(
@@ -66,12 +65,6 @@ def pieces(parity: Document, target: Document) -> dict[str, str]:
             },
         ),
     }
-
-
-def moved_by_rounding(row: Document) -> float | None:
-    """Relative change of the library's settled error when its reference is rounded to float."""
-    rounded = row["settled_error_of_rounded_reference_um"]
-    return None if rounded is None else abs(rounded / row["settled_error_um"] - 1.0)
 
 
 def draw() -> None:

@@ -64,6 +64,7 @@ def numbers(document: Document) -> str:
         {
             **made("logs", document),
             "logs count": document["logs"],
+            "logs clean": document["clean"],
             "logs seeds": f"{first} to {first + document['logs'] - 1}",
             "logs near": f"{criteria['near']:g}",
             "logs plays": criteria["plays"],

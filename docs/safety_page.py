@@ -30,6 +30,7 @@ SPANS = {
     "block": "samples in a block", "sensor_noise": "noise of the readings [µm]",
     "creep": "creep per decade of time, relative to the displacement",
 }  # fmt: skip
+PLACE = {"amplitude [µm]": "amplitude", "frequency [Hz]": "frequency"}
 CHANGES = {
     "cold start": "cold-start", "60 % of the amplitude": "switch", "20 %": "drop", "100 %": "switch-back",
     "gain changes by 30 %": "gain-step",
@@ -201,16 +202,16 @@ def told(rows: list[Document]) -> str:
 def settling(document: Document) -> dict[str, str]:
     """Share of runs that settled soon after each change, by family and by place of the map."""
     parts = {
-        "by_family": ("required", ["family"]),
-        "by_place": ("required", ["amplitude", "frequency"]),
-        "other_places": ("not required", ["amplitude", "frequency"]),
+        "by_family": ("required", {"family": "family"}),
+        "by_place": ("required", PLACE),
+        "other_places": ("not required", PLACE),
     }
     texts = {}
     for part, (asked, names) in parts.items():
         rows = document["map"][part] if document["map"] else []
         title = f"Runs that settled within {document['criteria']['soon']} periods, where this is {asked}"
         shares = {each: partial(share, name=name) for each, name in CHANGES.items()}
-        columns = {name: name for name in [*names, "runs"]} | shares
+        columns = names | {"runs": "runs"} | shares
         texts[f"map_{part}"] = table_of(title, rows, columns)
     return texts
 

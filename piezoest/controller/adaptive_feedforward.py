@@ -59,7 +59,7 @@ class AdaptiveFeedforward(Face):
         learnt on by more than 5 %. Give at most one of the three.
     feedback : float, optional
         Integral gain of a feedback from plausible readings [1/s], as in `IntegralFeedback`. Its correction
-        is at most the corridor's width. Default: no feedback.
+        is at most half the corridor's width plus three times the noise. Default: no feedback.
     resonance : float, optional
         Lowest resonance of the stage [Hz]. An event warns, once, when the reference is above 5 % of it.
         Default: unknown, no warning.
@@ -75,8 +75,8 @@ class AdaptiveFeedforward(Face):
     Notes
     -----
     Learning depends on how far the voltage travels and not on time. A negative gain is found as well. The
-    first controller with a choice of estimators is compiled, in up to a minute; later ones load the
-    compiled code. Source: a rule of this library.
+    first controller with a choice of estimators is compiled; later ones load the compiled code. Source: a
+    rule of this library.
 
     Examples
     --------
