@@ -150,7 +150,12 @@ class Run:
 
     @property
     def settling_periods(self) -> int | None:
-        """Periods until all errors stay below 1.1 times `max_error`; None if not in the run's first half."""
+        """Periods until all errors stay below 1.1 times `max_error`; None if not in the run's first half.
+
+        None also if the error became larger than it was in the first period: that run has failed.
+        """
+        if self.max_error > SETTLED * self.errors[0]:
+            return None
         late = np.flatnonzero(np.asarray(self.errors) > SETTLED * self.max_error)
         settled = int(late[-1]) + 1 if late.size else 0
         return settled if settled <= len(self.errors) // 2 else None

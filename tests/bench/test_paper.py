@@ -4,10 +4,12 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from piezoest.bench.paper_experiment import Run
 from piezoest.bench.paper_tables import PRBS_ROW, Published, published
 from tests.bench.shared import bench as command
 
@@ -114,3 +116,10 @@ def test_wrong_usage(tmp_path: Path) -> None:
         ("--memory", 0),
     ):
         assert command("paper", *arguments).exit_code == 2
+
+
+def test_a_run_that_becomes_worse_never_settles() -> None:
+    experiment: Any = None
+    stationary: Any = SimpleNamespace(max_error=lambda: 2.5)
+    runs = [Run(experiment, (), errors, stationary) for errors in ((0.5, 2.5, 2.5), (9.0, 2.5, 2.5))]
+    assert [run.settling_periods for run in runs] == [None, 1]
