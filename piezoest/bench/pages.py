@@ -28,9 +28,9 @@ def write_html(document: Document, path: str | Path) -> None:
 
 def _table(page: Page, document: Document) -> None:
     page.table(*report.overview_table(document))
-    page.text(report.KEY)
+    page.text(report.key(document))
     page.advice(f"Failed: {failure}" for failure in document["failures"])
-    if document["needs"]:
+    if document["needs"] and not report.on_logs(document):
         page.heading("Which estimator")
         page.table(*report.needs_table(document))
     for name, figure in figures.drawings(document).items():

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from piezoest._tables import print_cells, say
+from piezoest.bench.recorded import LEARNT
 
 Document = dict[str, Any]  # from `piezoest.bench.table.describe`
 Cells = list[str]
@@ -15,6 +16,10 @@ KEY = (
     "median, and the share of runs that settle. first: in the first period after the change. settled: in the "
     "last half of the periods; the same for references that do not repeat, and on stages of other families. "
     "Geometric means over the scenarios of the medians over the seeds. step: one sample from Python."
+)
+LOGS_KEY = (
+    f"Learnt from the first {100.0 * LEARNT:g} % of each log; errors of the prediction of the rest, in % of "
+    "the amplitude. first: in the first tenth of it; largest: in all of it. Geometric means over the logs."
 )
 SURE = 0.05
 
@@ -30,9 +35,24 @@ def number(value: float | None, digits: int = 3) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+def counted(count: int, what: str) -> str:
+    """How many there are of something."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def percent(share: float | None, digits: int = 2) -> str:
     """A share in per cent; a dash for what is not known or infinite."""
     return number(None if share is None else 100.0 * share, digits)
+
+
+def on_logs(document: Document) -> bool:
+    """Whether all runs are on recorded logs, which have no stage."""
+    return not any(cell["stage"] for cell in document["cells"])
+
+
+def key(document: Document) -> str:
+    """What the numbers of a campaign mean."""
+    return LOGS_KEY if on_logs(document) else KEY
 
 
 def best_first(document: Document) -> list[Document]:
@@ -42,6 +62,8 @@ def best_first(document: Document) -> list[Document]:
 
 def overview_table(document: Document) -> Table:
     """Heading and a row for each estimator, the one that adapts best first."""
+    if on_logs(document):
+        return _predicted(document, best_first(document))
     heading = ["estimator", "settles", "first", "settled", "not\nrepeated", "other\nstages", "step\n[µs]"]
     body = []
     for row in best_first(document):
@@ -69,6 +91,8 @@ def scenario_table(document: Document, scenario: str, stage: str) -> Table:
     heading = ["estimator", "settles", "first", "settled", "worst"]
     cells = [cell for cell in document["cells"] if cell["scenario"] == scenario and cell["stage"] == stage]
     cells.sort(key=lambda cell: cell["typical"][0])
+    if not stage:
+        return _predicted(document, cells)
     body = [
         [
             document["estimators"][cell["estimator"]]["name"],
@@ -78,6 +102,18 @@ def scenario_table(document: Document, scenario: str, stage: str) -> Table:
         for cell in cells
     ]
     return heading, body
+
+
+def _predicted(document: Document, rows: Sequence[Document]) -> Table:
+    """Heading and a row for each estimator, on one log or on all."""
+    body = [
+        [
+            document["estimators"][row["estimator"]]["name"],
+            *(percent(row[name][0] if row[name] else None) for name in ("first", "settled")),
+        ]
+        for row in rows
+    ]
+    return ["estimator", "first", "largest"], body
 
 
 def needs_table(document: Document) -> Table:
@@ -109,16 +145,20 @@ def print_table(document: Document, console: Any, *, scenarios: bool = False) ->
             where = f"{scenario}, {stage}" if stage else scenario
             title = f"{where}: {document['scenarios'][scenario]}"
             print_cells(console, title, *scenario_table(document, scenario, stage))
-    plan = document["plan"]
-    title = f"{len(document['scenarios'])} scenarios, {plan['seeds']} seeds, stage {plan['stages'][0]}"
+    plan, count = document["plan"], len(document["scenarios"])
+    if on_logs(document):
+        title, rate = counted(count, "log"), ""
+    else:
+        title = f"{counted(count, 'scenario')}, {counted(plan['seeds'], 'seed')}, stage {plan['stages'][0]}"
+        rate = f" at {document['conditions']['sample_rate']:g} Hz"
     print_cells(console, title, *overview_table(document))
     machine = document["machine"]
     names = document["estimators"]
     say(
         console,
-        KEY,
-        f"{document['runs']} runs at {document['conditions']['sample_rate']:g} Hz; {machine['cpu']}, "
-        f"{machine['cores']} cores, {machine['python']}.",
+        key(document),
+        f"{counted(document['runs'], 'run')}{rate}; {machine['cpu']}, {machine['cores']} cores, "
+        f"{machine['python']}.",
         *(
             f"{names[row['estimator']]['name']}: {row['diverged']} of {row['runs']} runs diverge."
             for row in document["overview"]

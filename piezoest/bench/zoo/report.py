@@ -30,17 +30,22 @@ def print_summary(summary: dict[str, Any], console: Any) -> None:
         [(name, *map(number, each.values())) for name, each in quantiles.items()],
     )  # fmt: skip
     _crossed(console, summary["by_family"])
-    columns = ("runs", "over", "over_rms", "over_last", "over_after", "at_limit")
+    faults = [(", ".join(dict.fromkeys([row["fault"], row["mode"]])), row) for row in summary["by_fault"]]
     print_cells(
-        console,
-        "By fault: runs with a ratio above 1, or at a limit; faults named, in how many periods; as good as "
-        "before within three cycles",
-        ("fault", "mode", "runs", "over", "rms", "last", "after", "limit", "median", "named", "in", "back"),
+        console, "By fault: runs with a ratio above 1, in the last cycle, or at a limit",
+        ("fault", "runs", "over", "last", "limit", "median"),
         [
-            (row["fault"], row["mode"], *(row[name] for name in columns), number(row["ratio"]),
-             _of(row["named"], row["to_name"]), number(row["named_periods"]),
+            (name, row["runs"], row["over"], row["over_last"], row["at_limit"], number(row["ratio"]))
+            for name, row in faults
+        ],
+    )  # fmt: skip
+    print_cells(
+        console, "Faults named, in how many periods; as good as before within three cycles",
+        ("fault", "named", "in", "back"),
+        [
+            (name, _of(row["named"], row["to_name"]), number(row["named_periods"]),
              _of(row["recovered_soon"], row["to_recover"]))
-            for row in summary["by_fault"]
+            for name, row in faults if row["to_name"] or row["to_recover"]
         ],
     )  # fmt: skip
     timed = f"Controller: {number(summary['microseconds'])} µs per sample, median."
@@ -67,9 +72,14 @@ def _crossed(console: Any, groups: list[dict[str, Any]]) -> None:
     families = sorted({row["family"] for row in groups})
     cells = {(row["family"], row["reference"]): f"{row['over']}/{row['runs']}" for row in groups}
     print_cells(
-        console, "Runs with a ratio above 1, of all", ("family", *references),
-        [(family, *(cells.get((family, each), "") for each in references)) for family in families],
+        console, "Runs with a ratio above 1, of all", ("family", *map(_narrow, references)),
+        [(_narrow(family), *(cells.get((family, each), "") for each in references)) for family in families],
     )  # fmt: skip
+
+
+def _narrow(name: str) -> str:
+    """A name with a line for each of its parts: a terminal has 80 columns."""
+    return name.replace("-", "-\n")
 
 
 def print_map(summary: dict[str, Any], console: Any) -> None:
