@@ -149,7 +149,7 @@ def class_named(data: Any, key: str, classes: Iterable[Any]) -> Any:
     known = {cls.__name__: cls for cls in classes}
     name = data.get(key) if hasattr(data, "get") else data
     if str(name) not in known:
-        raise ValueError(f"{key} {name!r} is unknown: choose of {sorted(known)}")
+        raise ValueError(f"{key} {name!r} is unknown: choose one of {sorted(known)}")
     return known[str(name)]
 
 
@@ -166,7 +166,7 @@ def fields(name: str, data: Any, needed: Iterable[str], optional: Iterable[str] 
         raise ValueError(f"{name} has no {', '.join(map(repr, missing))}")
     known = {*needed, *optional}
     if unknown := [field for field in data if field not in known]:
-        raise ValueError(f"{name} has unknown fields {unknown}: choose of {sorted(known)}")
+        raise ValueError(f"{name} has unknown fields {unknown}: choose one of {sorted(known)}")
     return data
 
 

@@ -2,13 +2,19 @@
 
 import functools
 import inspect
+import re
 from collections.abc import Callable
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, get_type_hints
 
+import typer
+
 
 def grouped(command: Callable[..., None]) -> Callable[..., None]:
-    """The command as typer reads it: fields of the dataclasses among its arguments become options."""
+    """The command as typer reads it: fields of the dataclasses among its arguments become options.
+
+    Paragraphs of its docstring become lines, which the help wraps to the terminal.
+    """
     signature = inspect.signature(command, eval_str=True)
     groups: dict[str, Any] = {
         name: each.annotation for name, each in signature.parameters.items() if is_dataclass(each.annotation)
@@ -26,7 +32,19 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
 
     run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    run.__doc__ = re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.cleandoc(command.__doc__ or ""))
     return run
+
+
+def one_of(*known: str) -> Callable[[str | None], str | None]:
+    """Callback of an option that takes one of these words."""
+
+    def check(given: str | None) -> str | None:
+        if given is not None and given not in known:
+            raise typer.BadParameter(f"{given!r} is not one of {', '.join(known)}")
+        return given
+
+    return check
 
 
 def _options(group: Any) -> list[inspect.Parameter]:

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from piezoest._errors import Group
+from piezoest._options import grouped
 from piezoest.bench import safety_command, shared, table_command
 from piezoest.bench.origin import origin
 
@@ -23,6 +24,7 @@ app.command(epilog=safety_command.EPILOG)(safety_command.safety)
     epilog="Examples: piezoest bench paper; piezoest bench paper --json paper.json --figures figures; "
     "piezoest bench paper --memory 0.4 --quick"
 )
+@grouped
 def paper(
     json_to: shared.Json = None,
     figures: Annotated[
@@ -31,7 +33,9 @@ def paper(
     memory: Annotated[
         float | None,
         typer.Option(
-            min=0.01, max=20.0, help="Of the estimator [s]; the paper names none. Default: the calibration's."
+            min=0.01,
+            max=20.0,
+            help="Memory of the estimator, in seconds; the paper names none. Default: the calibration's.",
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Start of the random numbers of the stage.")] = 0,

@@ -90,7 +90,7 @@ def class_of(name: str) -> type:
         return _load(name)
     known = found()
     if name not in known:
-        raise ValueError(f"{name}: choose of {', '.join(known)}, or name your own as module:Class")
+        raise ValueError(f"{name}: choose one of {', '.join(known)}, or name your own as module:Class")
     return known[name]
 
 
@@ -149,7 +149,7 @@ def _value(node: ast.expr, text: str) -> Any:
 
 def _policy(name: str, arguments: dict[str, Any], text: str) -> Any:
     if name not in policies.__all__:
-        raise ValueError(f"{text}: {name} is no policy: choose of {', '.join(policies.__all__)}")
+        raise ValueError(f"{text}: {name} is no policy: choose one of {', '.join(policies.__all__)}")
     try:
         return getattr(policies, name)(**arguments)
     except TypeError as error:

@@ -31,7 +31,7 @@ def logs_of(pattern: str) -> list[str]:
     """Names that stand for recorded logs: those of a file, a folder, or a pattern like ``fleet/*.csv``."""
     files = sorted(glob(f"{pattern}/*.csv" if Path(pattern).is_dir() else pattern, recursive=True))
     if not files:
-        raise ValueError(f"no log is found at {pattern}")
+        raise FileNotFoundError(f"no log is found at {pattern}")
     return [LOG + file for file in files]
 
 

@@ -50,9 +50,9 @@ class Plan:
 
     def __post_init__(self) -> None:
         if unknown := [name for name in self.scenarios if name not in SCENARIOS and not file_of(name)]:
-            raise ValueError(f"scenario {', '.join(unknown)}: choose of {', '.join(SCENARIOS)}")
+            raise ValueError(f"scenario {', '.join(unknown)}: choose one of {', '.join(SCENARIOS)}")
         if unknown := [name for name in self.stages if name not in STAGES]:
-            raise ValueError(f"stage {', '.join(unknown)}: choose of {', '.join(STAGES)}")
+            raise ValueError(f"stage {', '.join(unknown)}: choose one of {', '.join(STAGES)}")
         for estimator in self.estimators:
             candidate(estimator)
         Conditions(**self.given)

@@ -211,6 +211,7 @@ def _with_tuned(plan: Any, tuned: list[dict[str, Any]]) -> Any:
     return dataclasses.replace(plan, tuned=tuple(dict.fromkeys(chosen)))
 
 
+@grouped
 def compare(
     before: Annotated[Path, typer.Argument(metavar="A", help="Folder of a campaign.")],
     after: Annotated[Path, typer.Argument(metavar="B", help="Folder of another.")],
@@ -230,16 +231,15 @@ def compare(
     and the number of comparisons is allowed for by the false discovery rate.
     """
     shared.json_target(json_to)
-    with shared.usage():
-        from piezoest.bench import compare as comparison
-        from piezoest.bench import tables
-        from piezoest.bench.run import COLUMNS
-        from piezoest.bench.table import RUNS
+    from piezoest.bench import compare as comparison
+    from piezoest.bench import tables
+    from piezoest.bench.run import COLUMNS
+    from piezoest.bench.table import RUNS
 
-        documents = _read(before), _read(after)
-        comparison.check_conditions(*documents)
-        sides = [tables.read_table(folder, RUNS, COLUMNS) for folder in (before, after)]
-        found = comparison.compare(*sides, level=level, relevant=relevant)
+    documents = _read(before), _read(after)
+    comparison.check_conditions(*documents)
+    sides = [tables.read_table(folder, RUNS, COLUMNS) for folder in (before, after)]
+    found = comparison.compare(*sides, level=level, relevant=relevant)
     heads = ({name: document[name] for name in HEAD} for document in documents)
     document = {"suite": "changes", **dict(zip("AB", heads, strict=True)), **found}
     from piezoest.bench.report import print_changes

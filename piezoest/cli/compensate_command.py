@@ -99,14 +99,14 @@ def compensate(
         )
         if limited := compensator.status.saturated:
             typer.echo(
-                f"{limited} samples ({100.0 * limited / voltage.size:.1f} %) are at a limit of the voltage: "
-                "there the stage will not follow the reference",
+                f"warning: {limited} samples ({100.0 * limited / voltage.size:.1f} %) are at a limit of the "
+                "voltage: there the stage will not follow the reference",
                 err=True,
             )
         for left in _leaves(learnt, voltage, signal):
             typer.echo(
-                f"{left}: nobody has seen how the stage answers there; change the reference, or identify a "
-                "log that goes as far",
+                f"warning: {left}: the model is not tested there; change the reference, or identify a log "
+                "that goes as far",
                 err=True,
             )
 

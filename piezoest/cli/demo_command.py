@@ -10,6 +10,7 @@ from rich.console import Console
 
 from piezoest._errors import errors
 from piezoest._files import save_figure
+from piezoest._options import grouped
 from piezoest._tables import print_cells
 from piezoest.cli.shared import Debug, check_figure, progress
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 EPILOG = "Example: piezoest demo --output figure.png"
 
 
+@grouped
 def demo(
     output: Annotated[Path, typer.Option("--output", "-o", help="Figure to write (PNG, PDF, SVG).")] = Path(
         "piezoest_demo.png"

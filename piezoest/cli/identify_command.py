@@ -70,7 +70,9 @@ class Fitting:
             "coleman-hodgdon, plays, plays-creep, plays-asymmetric, plays-asymmetric-creep."
         ),
     ] = "auto"
-    train: Annotated[float, typer.Option(help="Part to fit, from the start; the rest is held out.")] = 0.5
+    train: Annotated[
+        float, typer.Option(min=0.1, max=0.9, help="Part to fit, from the start; the rest is held out.")
+    ] = 0.5
     delay: Annotated[
         str, typer.Option(help="Samples by which the displacement lags the voltage, or auto.")
     ] = "auto"
@@ -169,7 +171,8 @@ def _identified(file: Path, reading: Reading, fitting: Fitting, say: Shown) -> I
     from piezoest.records import read_record
 
     if fitting.model not in ("auto", *FORMS):
-        raise ValueError(f"--model must be auto or one of {', '.join(FORMS)}, got {fitting.model}")
+        said = f"{fitting.model!r} is not one of auto, {', '.join(FORMS)}"
+        raise typer.BadParameter(said, param_hint="--model")
     delay = _delay(fitting.delay)
     say(f"reading {file.name}")
     logs = (file, *(fitting.validate or ()))
@@ -209,7 +212,7 @@ def _pairs(option: str, example: str, text: str | None) -> dict[str, str] | None
         return None
     pairs = [pair.partition("=") for pair in text.split(",")]
     if any(not name.strip() or not value.strip() for name, _, value in pairs):
-        raise ValueError(f"{option} must read like {example}, got {text!r}")
+        raise typer.BadParameter(f"{text!r} does not read like {example}", param_hint=option)
     return {name.strip(): value.strip() for name, _, value in pairs}
 
 
@@ -219,4 +222,5 @@ def _delay(text: str) -> float | Literal["auto"]:
     try:
         return float(text)
     except ValueError:
-        raise ValueError(f"--delay must be a number of samples or auto, got {text!r}") from None
+        said = f"{text!r} is neither a number of samples nor auto"
+        raise typer.BadParameter(said, param_hint="--delay") from None

@@ -10,7 +10,7 @@ import typer
 
 from piezoest._errors import Group
 from piezoest._files import read_object
-from piezoest._options import grouped
+from piezoest._options import grouped, one_of
 
 if TYPE_CHECKING:
     from piezoest.models import Model
@@ -21,6 +21,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Take a model or an estimator to a controller: C, co-simulation unit, tables.",
+    epilog="Example: piezoest export c model.json -o firmware --minimum 0 --maximum 150",
 )
 
 Source = Annotated[
@@ -38,7 +39,10 @@ class Stated:
     """What stands beside the file, or replaces what is in it."""
 
     estimator: Annotated[
-        str | None, typer.Option(help="rls or ekf learns from the model on; none keeps it.")
+        str | None,
+        typer.Option(
+            callback=one_of("rls", "ekf", "none"), help="rls or ekf learns from the model on; none keeps it."
+        ),
     ] = None
     sample_rate: Annotated[float | None, typer.Option(help="Samples per second of the controller.")] = None
     minimum: Annotated[float | None, typer.Option(help="Least voltage [V].")] = None
@@ -53,7 +57,9 @@ class Written:
     name: Annotated[str, typer.Option(help="Prefix of all names, and name of the files.")] = (
         "piezoest_controller"
     )
-    precision: Annotated[str, typer.Option(help="double or float.")] = "double"
+    precision: Annotated[str, typer.Option(callback=one_of("double", "float"), help="double or float.")] = (
+        "double"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +120,8 @@ def adaptive(
     }  # fmt: skip
     names = [] if estimators == "none" else estimators.split(",")
     if unknown := [name for name in names if name not in known]:
-        raise ValueError(f"--estimators must be none or of {', '.join(known)}, got {unknown[0]!r}")
+        said = f"{unknown[0]!r} is not one of {', '.join(known)}, none"
+        raise typer.BadParameter(said, param_hint="--estimators")
     limits = pz.VoltageLimits(minimum, maximum, slew_rate, sample_rate)
     factories = tuple(known[name] for name in names)
     controller = pz.AdaptiveFeedforward(sample_rate, limits=limits, estimators=factories)
@@ -164,6 +171,7 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
     """Model, estimator or None, and limits of a JSON file."""
     from piezoest._checks import class_named
     from piezoest.estimators.ekf import HysteresisEKF
+    from piezoest.estimators.output_error import OutputErrorRLS
     from piezoest.estimators.rls import HysteresisRLS
     from piezoest.models import model_from_dict
 
@@ -177,7 +185,7 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
     estimator = None
     if learnt is not None:
         try:
-            kind = class_named(learnt, "estimator", (HysteresisRLS, HysteresisEKF))
+            kind = class_named(learnt, "estimator", (HysteresisRLS, HysteresisEKF, OutputErrorRLS))
             estimator = kind.from_dict(learnt)
         except ValueError as error:
             raise ValueError(f"{path}: its estimator is not what to_dict() gave: {error}") from None
@@ -194,16 +202,19 @@ def _pair(path: Path, stated: Stated) -> tuple[Any, Any]:
     from piezoest.compensators import InverseCompensator, LinearCompensator, VoltageLimits
     from piezoest.estimators.ekf import HysteresisEKF
     from piezoest.estimators.rls import HysteresisRLS
-    from piezoest.models import LinearGain
+    from piezoest.models import ColemanHodgdon, LinearGain
 
     model, estimator, limits = _read(path)
     if stated.estimator is not None:
         kinds: dict[str, Any] = {"none": None, "rls": HysteresisRLS, "ekf": HysteresisEKF}
-        if stated.estimator not in kinds:
-            raise ValueError(f"--estimator must be rls, ekf or none, got {stated.estimator!r}")
         kind = kinds[stated.estimator]
         if kind is not None and stated.sample_rate is None:
             raise ValueError("an estimator needs --sample-rate")
+        if kind is not None and not isinstance(model, ColemanHodgdon | LinearGain):
+            raise ValueError(
+                f"--estimator {stated.estimator} needs a ColemanHodgdon or a LinearGain, {path} holds a "
+                f"{type(model).__name__}: run identify with --model coleman-hodgdon, or leave --estimator out"
+            )
         estimator = None if kind is None else kind(stated.sample_rate, initial_model=model)
     rate = stated.sample_rate or getattr(estimator, "sample_rate", None)
     own = {"minimum": stated.minimum, "maximum": stated.maximum, "slew_rate": stated.slew_rate}

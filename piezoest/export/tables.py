@@ -108,7 +108,10 @@ def table(
         if before is not None and np.max(np.abs(voltage - before)) <= _SETTLED * np.max(np.abs(voltage)):
             break
         if periods > _MOST_PERIODS:
-            raise ValueError("the loop of this model does not settle on the reference: check the model")
+            raise ValueError(
+                "the loop of this model does not settle on the reference; with creep it never does: "
+                "identify with --model plays or plays-asymmetric"
+            )
         before, periods = voltage, 2 * periods
     return Table(rate, period, voltage, _branches(period, voltage, points))
 

@@ -69,7 +69,9 @@ class ColemanHodgdon(FreeRunning):
     parameter_names: ClassVar[tuple[str, ...]] = ("alpha", "beta", "gamma")
     parameter_units: ClassVar[tuple[str, ...]] = ("1/V", "µm/V", "µm/V²")
     inverse: ClassVar[Any] = loop_inverse
-    remedy: ClassVar[str] = "use nearest_admissible()"
+    remedy: ClassVar[str] = (
+        "gamma must be between alpha·beta and 2·alpha·beta, where nearest_admissible() moves it"
+    )
 
     def __post_init__(self) -> None:
         self._check_finite()
@@ -295,7 +297,7 @@ class ColemanHodgdon(FreeRunning):
             large for a number.
         """
         if not self.is_admissible:
-            raise ValueError(f"{self} is not admissible and has no inverse: use nearest_admissible()")
+            raise ValueError(f"{self} is not admissible and has no inverse: {self.remedy}")
         if abs(initial_state) * self.a > self.b * (1.0 + 1e-9):
             raise ValueError(
                 f"initial_state must lie within ±b/a = ±{self.b / self.a:.6g} µm, got {initial_state:g} µm"

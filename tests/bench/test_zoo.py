@@ -260,7 +260,7 @@ def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
         (["-c", "Nothing"], "controller Nothing"),
         (["-c", "LinearGain"], "it is no controller"),
         (["-c", "parts", "--set", "colour"], "write it as name=value"),
-        (["-c", "parts", "--set", "colour=red"], "choose of amplitude"),
+        (["-c", "parts", "--set", "colour=red"], "choose one of amplitude"),
         (["-c", "parts", "--map", "--set", "gain=1"], "--map draws its rigs itself"),
         (["--singles", "--set", "gain=1"], "--singles draws its rigs itself"),
         (["--singles", "--map"], "leave out --set, and all but one of the maps"),

@@ -144,5 +144,5 @@ def test_a_fault_that_is_unknown_is_refused() -> None:
         draw(0, fault="gremlins")
     with pytest.raises(ValueError, match="dwell is transient"):
         draw(0, fault="dwell", mode="permanent")
-    with pytest.raises(ValueError, match="colour: choose of"):
+    with pytest.raises(ValueError, match="colour: choose one of"):
         draw(0, colour="red")

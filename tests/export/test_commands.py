@@ -69,11 +69,12 @@ def test_an_adaptive_feedforward_needs_no_model(tmp_path: Path) -> None:
     assert (tmp_path / "stage.c").read_text() == pz.export.c(controller, name="stage").source
     assert run("adaptive", *own, "--estimators", "none").exit_code == 0
     assert "Model that drives: 0 line. */" in (tmp_path / "stage.h").read_text()
-    refused(run("adaptive", *own, "--estimators", "kalman"), "kalman")
+    assert run("adaptive", *own, "--estimators", "kalman").exit_code == 2
 
 
-def test_profile_is_the_same_as_the_objects(model: Path) -> None:
-    estimator = pz.HysteresisRLS(50_000.0)
+@pytest.mark.parametrize("kind", [pz.HysteresisRLS, pz.HysteresisEKF, pz.OutputErrorRLS])
+def test_profile_is_the_same_as_the_objects(model: Path, kind: type) -> None:
+    estimator = kind(50_000.0)
     profile = {
         "model": MODEL,
         "estimator": estimator.to_dict(),
@@ -100,10 +101,16 @@ def test_tables_are_written(model: Path) -> None:
     ("arguments", "word"),
     [
         (("c", "model.json", "-o", "out", "--estimator", "rls"), "--sample-rate"),
-        (("c", "model.json", "-o", "out", "--precision", "half"), "precision"),
         (("c", "model.json", "-o", "out", "--minimum", 5, "--maximum", 1), "minimum"),
         (("fmu", "model.json", "-o", "out.fmu"), "sample_rate"),
     ],
 )
 def test_mistakes_are_one_sentence(model: Path, arguments: tuple[object, ...], word: str) -> None:
     refused(run(*arguments), word)
+
+
+@pytest.mark.parametrize("option", ["--precision", "--estimator"])
+def test_unknown_words_are_wrong_usage(model: Path, option: str) -> None:
+    result = run("c", model, "-o", "out", option, "half")
+    assert result.exit_code == 2
+    assert option in result.stderr

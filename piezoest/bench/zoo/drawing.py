@@ -37,7 +37,7 @@ class _Draw:
     def check(self) -> None:
         """Refuse a name that nothing is drawn for."""
         if unknown := sorted(self._given.keys() - self._asked):
-            raise ValueError(f"{', '.join(unknown)}: choose of {', '.join(sorted(self._asked))}")
+            raise ValueError(f"{', '.join(unknown)}: choose one of {', '.join(sorted(self._asked))}")
 
     def log(self, low: float, high: float) -> float:
         """Log-uniform."""
