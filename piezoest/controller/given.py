@@ -20,6 +20,10 @@ ALIKE = 3.0
 FREE = 4.0
 # The answer, a mean, is clear above so many times the noise of a reading.
 CLEAR = 3.0
+# No lag counts below this part of the time in which the way doubles.
+SMALL = 0.03
+# An answer rests that grows by no more than this part of it until its time is so many times as long.
+RESTS, LATER = 0.04, 1.25
 
 
 @register_jitable
@@ -29,7 +33,8 @@ def compare(state: Any, settings: Any) -> None:
     gone = readings.recent.mean_u - start.origin
     answer = readings.recent.mean_x - start.zero
     way, longest = np.abs(gone), starts.MOST_WINDOWS * settings.start.window
-    start.total += start.gain * gone - answer
+    start.gone += gone
+    start.answered += answer
     if way < FREE * settings.start.way:
         state.confirmed = max(state.confirmed, way)
         return
@@ -41,20 +46,32 @@ def compare(state: Any, settings: Any) -> None:
     if clear and alike:
         start.agreed += 1.0
     else:
-        start.agreed = 0.0
+        start.agreed = start.largest = start.look = 0.0
         start.doubted += 1.0
     if not clear:
         # Nobody can tell yet.
         state.confirmed = max(state.confirmed, min(way, 0.5 * settings.start.longest))
-    if start.agreed >= settings.doubling:
-        # The area between what the gain says and the answer: about the time constant of a lag. Nobody is
-        # warned of it, for the gain may be off.
-        start.lag, state.pace.late = min(max(start.total / answer, 0.0), longest), 1.0
-        start.given = start.doubted = 0.0
+    if start.agreed >= settings.doubling and start.agreed + start.doubted >= start.look:
+        _conclude(state, settings, gone, answer)
     elif start.doubted > 2.0 * longest:
         start.given = start.doubted = 0.0
         if clear:
             _forget(state, settings, answered)
+
+
+@register_jitable
+def _conclude(state: Any, settings: Any, gone: Any, answer: Any) -> None:
+    """Believe the gain if the answer has come to rest; else look again later."""
+    start = state.start
+    scatter = CLEAR * np.sqrt(state.readings.noise / settings.doubling)
+    if np.abs(answer) > (1.0 + RESTS) * start.largest + scatter:
+        start.largest, start.look = np.abs(answer), LATER * (start.agreed + start.doubted)
+        return
+    # The area between the way and the answer, both as parts of what they came to: about the time constant
+    # of a lag, whatever the gain. Creep and a bent answer look like a small one, so nobody is warned.
+    late = start.gone / gone - start.answered / answer - SMALL * settings.doubling
+    start.lag, state.pace.late = min(max(late, 0.0), starts.MOST_WINDOWS * settings.start.window), 1.0
+    start.given = start.doubted = 0.0
 
 
 @register_jitable

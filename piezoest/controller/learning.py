@@ -60,6 +60,8 @@ def _begin_learning(state: Any, settings: Any) -> None:
     state.railed, state.patience = 0.0, driving.PATIENCE
     state.owed = 0.0
     reading.forget(state.readings)
+    # The last readings may be as old as the start is long.
+    state.readings.before = state.readings.last = start.now
 
 
 @register_jitable
@@ -181,7 +183,15 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
 
 @register_jitable
 def _leave_limit(state: Any, settings: Any, moved: Any) -> None:
-    """Where the voltage rests at a limit for long, all that is known may be wrong: start again."""
+    """Where the voltage rests at a limit for long, all that is known may be wrong: start again.
+
+    Not where the readings agree with the line, and the stage stands before the reference: that is out of
+    reach.
+    """
+    left = (state.r - state.readings.last) * state.line.gain
+    short = (state.u <= settings.minimum and left < 0.0) or (state.u >= settings.maximum and left > 0.0)
+    if short and state.readings.fault == reading.NONE and state.readings.spikes == 0.0:
+        return
     rests = state.u <= settings.minimum or state.u >= settings.maximum
     # Beside a line that was learnt from wrong readings, right ones look scaled or moved.
     fault = state.readings.fault

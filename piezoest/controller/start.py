@@ -36,8 +36,9 @@ START = record(
     # Largest change between two windows [µm]; fastest change of the voltage that a slow stage follows [V],
     # zero for a fast one; both per sample.
     change=AMOUNT, fastest=AMOUNT,
-    # Sum of what an answer lacks of the user's gain; how late the stage answers [samples].
-    total=NUMBER, lag=AMOUNT,
+    # Sums of the ways gone from the start and of the answers to them; the answer at the last look, samples
+    # until the next; how late the stage answers [samples].
+    gone=NUMBER, answered=NUMBER, largest=AMOUNT, look=AMOUNT, lag=AMOUNT,
     # Gain of the last way [µm/V], of the one before; ways for nothing; samples without the voltage.
     gain=NUMBER, gain_before=NUMBER, tries=AMOUNT, stuck=COUNT, first=numbers(FIRST, kind=MEASURED),
     # Whether the gain is the user's, and not confirmed yet; readings in a row that spoke for it, all against.
@@ -117,7 +118,7 @@ def rest_at(start: Any, settings: Any, u: Any, x: Any, gain: Any) -> None:
     if gain != 0.0:
         start.stage, start.gain = DONE, gain
         start.voltage = start.origin = u
-        start.total = start.agreed = start.doubted = 0.0
+        start.gone = start.answered = start.largest = start.look = start.agreed = start.doubted = 0.0
 
 
 @register_jitable

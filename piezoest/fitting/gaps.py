@@ -38,7 +38,9 @@ def forgotten(u: FloatArray, bridged: FloatArray) -> BoolArray:
             continue
         least, most = max(sides[0] - farther, low), min(sides[1] + farther, high)
         behind, near = bridged[end:], NEAR * (high - low)
-        both = (np.minimum.accumulate(behind) <= least + near) & (np.maximum.accumulate(behind) >= most - near)
+        both = (np.minimum.accumulate(behind) <= least + near) & (
+            np.maximum.accumulate(behind) >= most - near
+        )
         far = np.cumsum(np.abs(np.diff(behind, prepend=behind[0]))) > LONGEST * (high - low)
         known = both | far
         found[end : end + (int(np.argmax(known)) if known.any() else behind.size)] = True

@@ -193,3 +193,19 @@ def test_a_fast_reference_and_hum_do_not_lead_astray(gain: float) -> None:
     assert ("seeking" in stages[4:]) == (gain < 0.0)
     assert stages[-1] == "running"
     assert np.abs(u).max() < 50.0
+
+
+@pytest.mark.parametrize("gain", [0.1, 0.15, 0.3])
+def test_a_gain_that_is_only_about_right_is_no_lag(gain: float) -> None:
+    driver = controller(None, gain=gain)
+    _, x, _ = drive(driver, loop(), np.tile(SINE, 2))
+    assert driver.status.driving != "line"
+    assert np.abs(SINE - x[SINE.size :])[-1000:].max() < 0.1
+
+
+def test_a_reference_out_of_reach_is_no_reason_to_begin_again() -> None:
+    driver, beyond = controller(), 40.0 + 2.0 * np.sin(2.0 * np.pi * np.arange(10 * 500) / 500.0)
+    u, _, stages = drive(driver, loop(), beyond)
+    last = stages.index("running")
+    assert "seeking" not in stages[last:]
+    np.testing.assert_array_equal(u[-2000:], driver.limits.maximum)
