@@ -6,6 +6,7 @@ from typing import Any
 
 from piezoest._tables import print_cells, say
 from piezoest.bench.recorded import LEARNT
+from piezoest.records.source import counted
 
 Document = dict[str, Any]  # from `piezoest.bench.table.describe`
 Cells = list[str]
@@ -33,11 +34,6 @@ def number(value: float | None, digits: int = 3) -> str:
     places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
     text = f"{value:.{places}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
-
-
-def counted(count: int, what: str) -> str:
-    """How many there are of something."""
-    return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def percent(share: float | None, digits: int = 2) -> str:

@@ -51,27 +51,23 @@ def compare(state: Any, settings: Any) -> None:
     if not clear:
         # Nobody can tell yet.
         state.confirmed = max(state.confirmed, min(way, 0.5 * settings.start.longest))
-    if start.agreed >= settings.doubling and start.agreed + start.doubted >= start.look:
-        _conclude(state, settings, gone, answer)
+    waited = start.agreed + start.doubted
+    if start.agreed >= settings.doubling and waited >= start.look:
+        scatter = CLEAR * np.sqrt(readings.noise / settings.doubling)
+        if np.abs(answer) > (1.0 + RESTS) * start.largest + scatter:
+            # It still grows: look again later.
+            start.largest, start.look = np.abs(answer), LATER * waited
+            return
+        # The area between the way and the answer, both as parts of what they came to: about the time
+        # constant of a lag, whatever the gain. Creep and a bent answer look like a small one, so nobody is
+        # warned.
+        late = start.gone / gone - start.answered / answer - SMALL * settings.doubling
+        start.lag, state.pace.late = min(max(late, 0.0), longest), 1.0
+        start.given = start.doubted = 0.0
     elif start.doubted > 2.0 * longest:
         start.given = start.doubted = 0.0
         if clear:
             _forget(state, settings, answered)
-
-
-@register_jitable
-def _conclude(state: Any, settings: Any, gone: Any, answer: Any) -> None:
-    """Believe the gain if the answer has come to rest; else look again later."""
-    start = state.start
-    scatter = CLEAR * np.sqrt(state.readings.noise / settings.doubling)
-    if np.abs(answer) > (1.0 + RESTS) * start.largest + scatter:
-        start.largest, start.look = np.abs(answer), LATER * (start.agreed + start.doubted)
-        return
-    # The area between the way and the answer, both as parts of what they came to: about the time constant
-    # of a lag, whatever the gain. Creep and a bent answer look like a small one, so nobody is warned.
-    late = start.gone / gone - start.answered / answer - SMALL * settings.doubling
-    start.lag, state.pace.late = min(max(late, 0.0), starts.MOST_WINDOWS * settings.start.window), 1.0
-    start.given = start.doubted = 0.0
 
 
 @register_jitable

@@ -36,8 +36,8 @@ START = record(
     # Largest change between two windows [µm]; fastest change of the voltage that a slow stage follows [V],
     # zero for a fast one; both per sample.
     change=AMOUNT, fastest=AMOUNT,
-    # Sums of the ways gone from the start and of the answers to them; the answer at the last look, samples
-    # until the next; how late the stage answers [samples].
+    # Sums of the ways gone from the start and of the answers to them; the answer at the last look, the
+    # samples before the next; how late the stage answers [samples].
     gone=NUMBER, answered=NUMBER, largest=AMOUNT, look=AMOUNT, lag=AMOUNT,
     # Gain of the last way [µm/V], of the one before; ways for nothing; samples without the voltage.
     gain=NUMBER, gain_before=NUMBER, tries=AMOUNT, stuck=COUNT, first=numbers(FIRST, kind=MEASURED),

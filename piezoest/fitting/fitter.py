@@ -137,9 +137,9 @@ class Fitter:
         flaws = flawed(u, x) if flaws is None else flaws
         if flaws.unusable.size != u.size:
             raise ValueError(f"flaws must be those of u and x: {u.size} samples, got {flaws.unusable.size}")
-        remembered = counts & ~flaws.unusable & ~forgotten(u, self._given)
-        counts = remembered if np.count_nonzero(remembered) > ENOUGH * np.count_nonzero(counts) else counts
         counts &= ~flaws.unusable
+        remembered = counts & ~forgotten(u, self._given)
+        counts = remembered if np.count_nonzero(remembered) > ENOUGH * np.count_nonzero(counts) else counts
         self.delay_estimated = delay == "auto"
         self._log = Log(
             self._given, np.where(counts, x, 0.0), counts, self._rate, flaws.jumps.astype(np.float64)
@@ -150,8 +150,10 @@ class Fitter:
                 f"x must rise with u, a straight line has {gain:.4g} µm/V: change the sign of one of them"
             )
         self._plays, self._tells_lag = plays, tells_lag
-        self._log = replace(self._log, drifts=search.drifts(self._log))
-        self._begin(plays or self.delay_estimated)
+        self._begin(plays=True)
+        if search.drifts(self._log, self.start):
+            self._log = replace(self._log, drifts=True)
+            self._begin(plays=True)
         self.delay = search.best_delay(self._log, self.start) if isinstance(delay, str) else delay
         if self.delay > 0.0:
             self._log = replace(self._log, u=late(self._given, self.delay))

@@ -77,9 +77,9 @@ def best_start(log: Log) -> Start:
     return min(starts(log.u), key=lambda start: missed(log, plays(log, start)))
 
 
-def drifts(log: Log) -> bool:
-    """Whether a drift is clear, whatever the start."""
-    basis = plays(log, best_start(log))
+def drifts(log: Log, start: Start) -> bool:
+    """Whether a drift is clear beside plays with this start."""
+    basis = plays(log, start)
     return missed(replace(log, drifts=True), basis) < CLEAR_DRIFT * missed(log, basis)
 
 
