@@ -24,7 +24,7 @@ from piezoest.bench.origin import json_safe, origin, put
 from piezoest.bench.shared import counting
 from piezoest.bench.store import carry_out, store_in
 from piezoest.bench.table import DIGITS
-from piezoest.bench.zoo import contenders, dwelling, judging, naming, settling, summary
+from piezoest.bench.zoo import contenders, dwelling, judging, settling, summary
 from piezoest.bench.zoo.contest import contest, summarise_contest
 from piezoest.bench.zoo.summary import CRITERIA, summarise
 from piezoest.bench.zoo.tasks import Task, over_cores, runs, tasks
@@ -216,7 +216,7 @@ def main(given: Sequence[str] | None = None) -> int:
         "controllers": CONTROLLERS,
         "criteria": {
             "line": judging.ALLOWED, "noise": judging.NOISES, "swing": judging.NEGLIGIBLE,
-            "calls": CALLS, "late": LATE, "back": naming.BACK, "soon": summary.SOON,
+            "calls": CALLS, "late": LATE, "back": judging.BACK, "soon": summary.SOON,
             "enough": summary.ENOUGH, "settled": settling.SETTLED, "slow": settling.SLOW,
             "large": settling.LARGE,
         },

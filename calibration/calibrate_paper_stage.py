@@ -26,7 +26,7 @@ import surrogate
 
 import piezoest as pz
 from piezoest._files import write_text
-from piezoest.bench import paper_experiment as paper
+from piezoest.bench import paper
 from piezoest.bench.paper_tables import PRBS_ROW
 
 FOLDER = Path(__file__).parent

@@ -57,8 +57,7 @@ def paper(
     began = time.perf_counter()
     with shared.usage(), shared.progress() as say:
         say("loading (compiles once after the installation)")
-        from piezoest.bench.paper import MEMORIES, run_paper
-        from piezoest.bench.paper_experiment import MEMORY
+        from piezoest.bench.paper import MEMORIES, MEMORY, run_paper
 
         result = run_paper(
             memory=MEMORY if memory is None else memory,

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from piezoest import policies
+from piezoest.bench.cases import REACH
 from piezoest.bench.origin import imported
-from piezoest.bench.stages import REACH
 from piezoest.compensators import VoltageLimits
 from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
 from piezoest.estimators.base import EstimatorBase

@@ -4,6 +4,7 @@ All three give each item's result once, in no particular order, and survive what
 """
 
 import contextlib
+import logging
 import multiprocessing
 import os
 import signal
@@ -173,3 +174,14 @@ def _client(scheduler: str | None, processes: int | None) -> Iterator[Any]:
         except (OSError, ValueError) as error:
             raise ValueError(f"scheduler {scheduler} does not answer: {error}") from None
         yield stack.enter_context(client)
+
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Keep what piezoest logs from the screen, where Python puts warnings that nobody has asked for."""
+    log, nobody = logging.getLogger("piezoest"), logging.NullHandler()
+    log.addHandler(nobody)
+    try:
+        yield
+    finally:
+        log.removeHandler(nobody)

@@ -10,8 +10,7 @@ import numpy as np
 
 from piezoest._files import save_figure
 from piezoest.bench.figures import DPI, WIDTH
-from piezoest.bench.paper import SWEPT, PaperResult
-from piezoest.bench.paper_experiment import PRBS, SETTLED, Run, last_periods
+from piezoest.bench.paper import PRBS, SETTLED, SWEPT, PaperResult, Run, last_periods
 from piezoest.models import ColemanHodgdon
 from piezoest.tracking import draw_map, draw_series
 

@@ -11,9 +11,9 @@ from typing import Any
 from piezoest.bench import origin, recorded
 from piezoest.bench.cases import Case
 from piezoest.bench.estimators import LIMITS, LINEAR, candidate, module_of
+from piezoest.bench.executors import quiet
 from piezoest.bench.metrics import measure
 from piezoest.bench.origin import json_safe
-from piezoest.bench.quiet import quiet
 from piezoest.bench.scenarios import SCENARIOS
 from piezoest.bench.store import Keyed, Row
 from piezoest.compensators import InverseCompensator, LinearCompensator

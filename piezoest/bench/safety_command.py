@@ -171,21 +171,21 @@ def _plan(which: Which, controller: str, given: dict[str, Any]) -> list[Task]:
 
 def _kind(which: Which, controller: str) -> tuple[Any, dict[str, type], Any, Any]:
     """Rows of the table from those of the runs, its columns, and what sums runs up and prints that."""
-    from piezoest.bench.zoo import columns, contest, dwelling, report, summary
+    from piezoest.bench.zoo import contest, dwelling, judging, report, settling, summary
 
     if which.settling:
-        return columns.tidy_cells, columns.CELL_COLUMNS, summary.summarise_cells, report.print_map
+        return settling.tidy_cells, settling.CELL_COLUMNS, summary.summarise_cells, report.print_map
     if which.dwell is not None:
-        return list, columns.DWELL_COLUMNS, dwelling.summarise_dwells, report.print_dwells
+        return list, dwelling.DWELL_COLUMNS, dwelling.summarise_dwells, report.print_dwells
     if which.singles:
         compared = partial(contest.summarise_contest, controller=controller)
-        return list, columns.COLUMNS, compared, report.print_contest
-    return list, columns.COLUMNS, summary.summarise, report.print_summary
+        return list, judging.COLUMNS, compared, report.print_contest
+    return list, judging.COLUMNS, summary.summarise, report.print_summary
 
 
 def _show(controller: str, seed: int, given: dict[str, Any], folder: Path) -> None:
     """Run one seed again, print its row and draw it."""
-    from piezoest.bench.quiet import quiet
+    from piezoest.bench.executors import quiet
     from piezoest.bench.zoo import draw, traced
     from piezoest.bench.zoo.contenders import contender
     from piezoest.bench.zoo.figure import write_figure

@@ -11,14 +11,13 @@ import numpy as np
 import pandas as pd
 
 from piezoest.bench import cost, tables
-from piezoest.bench.cases import Conditions
+from piezoest.bench.cases import PAPER, STAGES, STRANGERS, Conditions
 from piezoest.bench.estimators import KNOWN, LINEAR, PAPERS, candidate, is_slow, module_of, name_of
 from piezoest.bench.executors import in_processes, on_dask
 from piezoest.bench.origin import fingerprint, json_safe
 from piezoest.bench.recorded import digest, file_of
 from piezoest.bench.run import COLUMNS, Task, code_of, crashed, follow, play
 from piezoest.bench.scenarios import SCENARIOS, UNREPEATED
-from piezoest.bench.stages import PAPER, STAGES, STRANGERS
 from piezoest.bench.statistics import NEEDS, QUANTITIES, interval, order, relative
 from piezoest.bench.store import Row
 
@@ -39,7 +38,7 @@ class Plan:
     estimators: tuple[str, ...]
     # Names in `SCENARIOS`, or of logs, see `piezoest.bench.recorded.logs_of`.
     scenarios: tuple[str, ...] = tuple(SCENARIOS)
-    stages: tuple[str, ...] = (PAPER, *STRANGERS)  # names in `piezoest.bench.stages.STAGES`
+    stages: tuple[str, ...] = (PAPER, *STRANGERS)  # names in `piezoest.bench.cases.STAGES`
     seeds: int = 30  # runs of each
     # Runs of each estimator that is slow; these run on the first stage only, and on no scenario of
     # `piezoest.bench.scenarios.UNREPEATED`, whose runs are long.

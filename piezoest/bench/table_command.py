@@ -152,7 +152,7 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
         with shared.progress() as say:
             say("loading (compiles once after the installation)")
             from piezoest.bench import table, tables
-            from piezoest.bench.quiet import quiet
+            from piezoest.bench.executors import quiet
             from piezoest.bench.store import carry_out, store_in
             from piezoest.bench.tuning import tune
 
@@ -184,10 +184,10 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
 
 def _plan(runs: Runs) -> Any:
     from piezoest.bench import table
+    from piezoest.bench.cases import PAPER, STRANGERS
     from piezoest.bench.estimators import KNOWN, defaults
     from piezoest.bench.recorded import logs_of
     from piezoest.bench.scenarios import SCENARIOS
-    from piezoest.bench.stages import PAPER, STRANGERS
 
     given = dict(table.QUICK) if runs.quick else {}
     if runs.sample_rate is not None:

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import integer, positive
+from piezoest.bench.cases import PAPER
 from piezoest.bench.estimators import KNOWN, class_of, is_slow, name_of
 from piezoest.bench.run import COLUMNS, Task, code_of
-from piezoest.bench.stages import PAPER
 from piezoest.bench.statistics import over_scenarios, relative
 from piezoest.bench.store import Store, carry_out
 from piezoest.bench.tables import table_of

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
+from piezoest._checks import FloatArray
 from piezoest.bench.zoo import draw
 from piezoest.bench.zoo.rig import Rig
 from piezoest.cli import app
+from piezoest.compensators import VoltageLimits
 
 # A run of the table, and a rig of the zoo.
 SMALL: dict[str, Any] = {
@@ -21,6 +23,25 @@ SHORT: dict[str, Any] = {
     "hum": 0.0, "drift": 0.0, "creep": 0.0, "mechanics": "none", "slew": np.inf, "resolution": 0.0,
     "volts": 0.0, "block": 20,
 }  # fmt: skip
+
+
+class Line:
+    """u = (r - centre)/gain within the limits; learns nothing. `gain`, `centre`: [µm/V] and [µm]."""
+
+    def __init__(self, gain: float, centre: float, limits: VoltageLimits) -> None:
+        self._gain, self._centre, self._limits = gain, centre, limits
+        self.events: tuple[()] = ()
+        self.status: dict[str, Any] = {"model": "line"}
+
+    def step(self, r: float) -> float:
+        u = (r - self._centre) / self._gain
+        return min(max(u, self._limits.minimum), self._limits.maximum)
+
+    def run(self, r: FloatArray) -> FloatArray:
+        return np.clip((r - self._centre) / self._gain, self._limits.minimum, self._limits.maximum)
+
+    def learn(self, u: Any, x: Any) -> None:
+        pass
 
 
 def rig_with(fault: str = "none", mode: str | None = None, **given: Any) -> Rig:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from piezoest.bench.paper_experiment import Run
+from piezoest.bench.paper import Run
 from piezoest.bench.paper_tables import PRBS_ROW, Published, published
 from tests.bench.shared import bench as command
 

@@ -15,11 +15,11 @@ import pytest
 
 import piezoest as pz
 from piezoest.bench import figures, recorded, table, tables, tuning
+from piezoest.bench.cases import STAGES, STRANGERS, make_stage
 from piezoest.bench.estimators import KNOWN, PAPERS, candidate, defaults, found
 from piezoest.bench.origin import fingerprint
 from piezoest.bench.pages import write_html
 from piezoest.bench.run import COLUMNS, Task, code_of, crashed, play
-from piezoest.bench.stages import STAGES, STRANGERS, make_stage
 from piezoest.bench.store import Store, carry_out, store_in
 from piezoest.records import Record
 from tests.bench.shared import SMALL, bench, own_module, said

@@ -9,22 +9,21 @@ import pytest
 from typer.testing import Result
 
 from piezoest.bench.store import Store, carry_out
-from piezoest.bench.zoo import columns, draw, play, settling, summary, tasks, traced
-from piezoest.bench.zoo.contenders import CANDIDATES, CHANGED, DEFAULT, contender
-from piezoest.bench.zoo.controllers import Line, Parts
+from piezoest.bench.zoo import draw, judging, play, settling, summary, tasks, traced
+from piezoest.bench.zoo.contenders import CANDIDATES, CHANGED, DEFAULT, Parts, contender
 from piezoest.bench.zoo.families import FAMILIES
 from piezoest.bench.zoo.faults import FAULTS
 from piezoest.bench.zoo.line import fit_line
 from piezoest.bench.zoo.references import SHAPES
 from piezoest.bench.zoo.rig import Rig
 from tests.bench import shared
-from tests.bench.shared import bench, own_module, said
+from tests.bench.shared import Line, bench, own_module, said
 
 SHORT = {**shared.SHORT, "family": "backlash", "fault": "none"}
 
 OWN = """
 import os
-from piezoest.bench.zoo.controllers import Line
+from tests.bench.shared import Line
 
 def weak(sample_rate, limits):
     return Line(0.3, 0.0, limits)
@@ -94,7 +93,7 @@ def test_a_row_is_a_function_of_its_seed(block: int) -> None:
     rows = [without_time(play(draw(5, **given), Parts)) for _ in range(2)]
     assert rows[0] == rows[1]
     assert rows[0]["failure"] is None
-    assert {*rows[0], "microseconds", "key", "controller"} == set(columns.COLUMNS)
+    assert {*rows[0], "microseconds", "key", "controller"} == set(judging.COLUMNS)
     assert without_time(play(draw(6, **given), Parts)) != rows[0]
 
 

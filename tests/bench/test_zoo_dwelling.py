@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from piezoest.bench.zoo import columns, tasks
-from piezoest.bench.zoo.controllers import Line
+from piezoest.bench.zoo import dwelling, tasks
 from piezoest.bench.zoo.dwelling import BEFORE, SHAPES, Dwell, dwell_rig, dwells, summarise_dwells
 from piezoest.bench.zoo.line import fit_line
-from tests.bench.shared import bench
+from tests.bench.shared import Line, bench
 
 
 def line(dwell: Dwell, jump: float = 0.0) -> Any:
@@ -87,4 +86,4 @@ def test_the_command_plays_it(tmp_path: Path) -> None:
     document = json.loads((tmp_path / "dwell.json").read_text(encoding="utf-8"))
     assert (document["runs"], document["failures"]) == (2, 1)
     heads = (tmp_path / "dwell.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
-    assert heads == list(columns.DWELL_COLUMNS)
+    assert heads == list(dwelling.DWELL_COLUMNS)

@@ -7,13 +7,11 @@ import pytest
 
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo import play, traced
-from piezoest.bench.zoo.controllers import Line
 from piezoest.bench.zoo.faults import truthful
-from piezoest.bench.zoo.learnt_line import run_learnt_line
-from piezoest.bench.zoo.line import fit_line
+from piezoest.bench.zoo.line import fit_line, run_learnt_line, run_line
 from piezoest.bench.zoo.rig import Rig
-from piezoest.bench.zoo.running import Traces, run_line
-from tests.bench.shared import rig_with
+from piezoest.bench.zoo.running import Traces
+from tests.bench.shared import Line, rig_with
 
 
 def learnt(rig: Rig) -> tuple[Traces, int]:

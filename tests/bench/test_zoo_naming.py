@@ -10,7 +10,7 @@ from piezoest._checks import FloatArray
 from piezoest.bench.zoo import play
 from piezoest.bench.zoo.contenders import DEFAULT, contender
 from piezoest.bench.zoo.faults import ANY, FAULTS
-from piezoest.bench.zoo.naming import named, recovery, settled
+from piezoest.bench.zoo.judging import named, recovery, settled
 from piezoest.bench.zoo.rig import Rig
 from piezoest.controller.shown import MEANINGS, Event
 from tests.bench.shared import rig_with

@@ -6,6 +6,6 @@
 """
 
 from piezoest.bench.zoo.drawing import draw
-from piezoest.bench.zoo.playing import play, traced
+from piezoest.bench.zoo.judging import play, traced
 
 __all__ = ["draw", "play", "traced"]

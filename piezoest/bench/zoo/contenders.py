@@ -1,14 +1,59 @@
-"""Controllers by name, as the command line gives them."""
+"""Controllers by name, as the command line gives them, and the library's parts wired by hand."""
 
 import functools
 import inspect
 from typing import Any
 
+import numpy as np
+
 import piezoest
+from piezoest._checks import FloatArray
 from piezoest.bench import origin
 from piezoest.bench.origin import imported
-from piezoest.bench.zoo.controllers import Parts
 from piezoest.bench.zoo.running import Factory
+from piezoest.compensators import InverseCompensator, VoltageLimits
+from piezoest.estimators.rls import HysteresisRLS
+
+
+class Parts:
+    """`InverseCompensator` and `HysteresisRLS` wired by hand, with all their defaults."""
+
+    def __init__(self, sample_rate: float, limits: VoltageLimits, *, update_interval: int = 50) -> None:
+        self._estimator = HysteresisRLS(sample_rate)
+        self._compensator = InverseCompensator(self._estimator.model, limits)
+        self._interval = update_interval
+        self._u: list[FloatArray] = []
+        self._x: list[FloatArray] = []
+
+    @property
+    def events(self) -> tuple[()]:
+        """None: there is nobody who watches."""
+        return ()
+
+    @property
+    def status(self) -> dict[str, Any]:
+        """Model in use."""
+        return {"model": "coleman-hodgdon"}
+
+    def step(self, r: float) -> float:
+        """Voltage for a reference."""
+        return float(self._compensator.step(r))
+
+    def run(self, r: FloatArray) -> FloatArray:
+        """Voltages for references, shape (N,)."""
+        return self._compensator.run(r)
+
+    def learn(self, u: Any, x: Any) -> None:
+        """Take up voltages and readings, and now and then a model."""
+        self._u.append(np.array(u, ndmin=1, dtype=float))
+        self._x.append(np.array(x, ndmin=1, dtype=float))
+        if sum(part.size for part in self._u) < self._interval:
+            return
+        u, x = (np.concatenate(parts) for parts in (self._u, self._x))
+        self._u, self._x = [], []
+        self._estimator.absorb(u, x)
+        self._compensator.model = self._estimator.model
+
 
 PARTS = "parts"
 # The default controller, changed: with the line alone, with one estimator, and with all the room.

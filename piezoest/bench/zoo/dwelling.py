@@ -17,8 +17,7 @@ from piezoest.bench.store import Row
 from piezoest.bench.zoo.drawing import draw
 from piezoest.bench.zoo.families import FAMILIES
 from piezoest.bench.zoo.faults import NONE
-from piezoest.bench.zoo.judging import NEGLIGIBLE, NOISES
-from piezoest.bench.zoo.naming import BACK, settled
+from piezoest.bench.zoo.judging import BACK, COLUMNS, NEGLIGIBLE, NOISES, settled
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Factory, run_controller
 
@@ -32,6 +31,12 @@ NOISE = (1e-4, 1e-3)  # µm, of the reference that rests
 FEEDBACK = (0.5, 5.0)  # 1/s
 PERIODS = ("first", "second", "third")
 WAYS = ("creep", "feedback", "noise")
+DWELL_COLUMNS: dict[str, type] = {
+    **dict(list(COLUMNS.items())[: list(COLUMNS).index("block") + 1]),
+    "setpoint_noise": float, "feedback": float, "duration": float, "failure": str, "settled": float,
+    "allowed": float, "first": float, "second": float, "third": float, "kept": bool, "excursion": float,
+    "events": str,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

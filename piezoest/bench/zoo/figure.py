@@ -7,7 +7,7 @@ import numpy as np
 
 from piezoest._files import save_figure
 from piezoest.bench.store import Row
-from piezoest.bench.zoo.playing import Both
+from piezoest.bench.zoo.judging import Both
 from piezoest.bench.zoo.rig import Rig
 
 POINTS = 20_000  # that are drawn, at most

@@ -1,4 +1,4 @@
-"""Whether a run was safe, and how good: the numbers of its row."""
+"""One run: a rig and a controller in, a row out; whether it was safe, how good, and what was said."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -6,15 +6,97 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.bench.zoo.faults import PERMANENT, TRANSIENT
-from piezoest.bench.zoo.line import FittedLine
-from piezoest.bench.zoo.naming import recovery, settled
+from piezoest.bench.origin import json_safe
+from piezoest.bench.store import Row
+from piezoest.bench.zoo.faults import NONE, PERMANENT, TRANSIENT
+from piezoest.bench.zoo.line import FittedLine, fit_line, run_learnt_line, run_line
 from piezoest.bench.zoo.rig import Rig
-from piezoest.bench.zoo.running import Traces
+from piezoest.bench.zoo.running import Factory, Traces, run_controller
 
+LAST = 3  # cycles that a settled error is taken over, and the least number after a fault that tells anything
+BACK = 1.2  # of the settled error
 ALLOWED, NOISES, NEGLIGIBLE = 1.5, 3.0, 0.002  # of the line's error, of the noise, of the swing
 AT_LIMIT, WITHIN = 1e-6, 0.01  # of the voltage's range: on a limit, and clearly within both
 ERRORS = ("worst", "rms", "line_worst", "line_rms", "learnt_worst", "learnt_rms", "ratio", "ratio_rms")
+# Of the table of runs.
+COLUMNS: dict[str, type] = {
+    "key": str, "controller": str, "seed": int, "family": str, "gain": float, "width": float, "low": float,
+    "high": float, "sample_rate": float, "mechanics": str, "lag": float, "delay": int, "sensor_noise": float,
+    "resolution": float, "volts": float, "slew_rate": float, "creep": float, "hum": float, "drift": float,
+    "reference": str, "amplitude": float, "centre": float, "frequency": float, "samples": int, "block": int,
+    "fault": str, "mode": str, "fault_size": float, "fault_start": float, "fault_stop": float,
+    "line_gain": float, "line_centre": float, "failure": str, "finite": bool, "within_limits": bool,
+    "rail": float, "rests_at_rail": bool, "swing": float, "noise": float, "floor": float,
+    "judged_from": float, **{f"{part}{name}": float for part in ("", "last_", "after_") for name in ERRORS},
+    "cycle_ratio": float, "settled": float, "events": int, "named": str, "named_first": str,
+    "named_after": float, "named_right": bool, "named_periods": float,
+    "recovery": bool, "recovered": int, "driver": str, "status": str, "microseconds": float,
+}  # fmt: skip
+
+
+def named(rig: Rig, controller: Any) -> dict[str, Any]:
+    """What a controller said: names of faults, how soon after the fault, and what drove at last."""
+    events = list(getattr(controller, "events", ()))
+    status = getattr(controller, "status", {})
+    status = status if isinstance(status, dict) else _public(status)
+    fault, start = rig.fault, rig.fault.start / rig.sample_rate
+    said = [(float(event.time), _name(event)) for event in events]
+    later = [(time - start, name) for time, name in said if time >= start] if fault.kind != NONE else []
+    right = [time for time, name in later if name in fault.names]
+    return {
+        "events": len(events),
+        "named": "; ".join(dict.fromkeys(name for _, name in said)),
+        "named_first": later[0][1] if later else None,
+        "named_after": later[0][0] if later else None,
+        "named_right": bool(right) if fault.names else None,
+        "named_periods": right[0] * rig.plain.frequency if right else None,
+        "driver": next(
+            (_short(status[key]) for key in ("driving", "driver", "drives", "model") if key in status), None
+        ),
+        "status": "; ".join(f"{key}={_short(value)}" for key, value in status.items()),
+    }
+
+
+def settled(error: FloatArray, cycle: int) -> float | None:
+    """Median of the largest errors in the last cycles, None if there is none."""
+    ends = [error[max(0, error.size - (k + 1) * cycle) : error.size - k * cycle] for k in range(LAST)]
+    worst = [float(part.max()) for part in ends if part.size]
+    return float(np.median(worst)) if worst else None
+
+
+def recovery(rig: Rig, error: FloatArray, floor: float) -> dict[str, Any]:
+    """How soon after a transient fault the error is as small as before.
+
+    `error` (N,): absolute errors of the run [µm]. `floor`: error that is small anyway [µm]. Returns
+    ``recovery``: whether it is judged: after a transient fault, where the reference repeats itself and goes
+    on for three cycles. ``recovered``: the cycle, from the fault's end on, in which the largest error is
+    below 1.2 times the settled one before the fault; None if none is. Without a settled error before, for the
+    fault was there at the start, it is the one at the end.
+    """
+    fault, cycle, first = rig.fault, rig.plain.cycle, rig.judged_from
+    after = [error[begin : begin + cycle].max() for begin in range(fault.stop, error.size - cycle + 1, cycle)]
+    asked = fault.mode == TRANSIENT and rig.plain.repeats and len(after) >= LAST
+    if not asked:
+        return {"recovery": False, "recovered": None}
+    level = settled(error[first : fault.start] if first < fault.start else error[first:], cycle)
+    small = np.flatnonzero(np.array(after) < BACK * max(level or 0.0, floor))
+    return {"recovery": True, "recovered": int(small[0]) + 1 if small.size else None}
+
+
+def _name(event: Any) -> str:
+    """The fault's name where a reason begins with it, else what was done."""
+    head = str(getattr(event, "reason", "")).partition(":")
+    return head[0] if head[1] else str(getattr(event, "name", None) or getattr(event, "action", ""))
+
+
+def _public(status: Any) -> dict[str, Any]:
+    """Fields of a record."""
+    names = getattr(status, "__dataclass_fields__", {})
+    return {name: getattr(status, name) for name in names}
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)[:80]
 
 
 class Lines(NamedTuple):
@@ -115,3 +197,36 @@ def _rail(rig: Rig, run: Traces, lines: Lines) -> Any:
     rests = ((u <= low + AT_LIMIT * span) | (u >= high - AT_LIMIT * span)) & inside
     count = np.cumsum(rests)
     return count - np.maximum.accumulate(np.where(rests, 0, count))
+
+
+class Both(NamedTuple):
+    """Traces of the controller, None if it failed; the lines, and what the controller said."""
+
+    run: Traces | None
+    lines: Lines
+    events: tuple[Any, ...] = ()
+
+
+def play(rig: Rig, factory: Factory) -> Row:
+    """Let a controller drive a rig, and judge it; see `traced`."""
+    return traced(rig, factory)[0]
+
+
+def traced(rig: Rig, factory: Factory) -> tuple[Row, Both]:
+    """Let a controller drive a rig, and judge it beside straight lines."""
+    line = fit_line(rig)
+    lines = Lines(line, run_line(rig, line), *run_learnt_line(rig, line))
+    row = {**rig.to_dict(), "line_gain": line.gain, "line_centre": line.centre, "failure": None}
+    run: Traces | None = None
+    controller: Any = None
+    try:
+        controller = factory(rig.sample_rate, rig.limits)
+        with np.errstate(all="ignore"):
+            run, seconds = run_controller(rig, controller)
+            row |= judge(rig, run, lines)
+            row |= named(rig, controller)
+        row["microseconds"] = 1e6 * seconds / run.reference.size
+    except Exception as error:
+        row["failure"] = f"{type(error).__name__}: {error}"
+    row = dict(json_safe(row))
+    return row, Both(run, lines, tuple(getattr(controller, "events", ())))

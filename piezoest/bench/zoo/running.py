@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.bench.zoo.line import FittedLine
 from piezoest.bench.zoo.rig import Rig
 
 Factory = Callable[..., Any]  # factory(sample_rate, limits) is a controller
@@ -31,51 +30,22 @@ class Traces:
 
 
 def run_controller(rig: Rig, controller: Any) -> tuple[Traces, float]:
-    """Let a controller drive a rig; with the time that it took [s]."""
-    r, stage = rig.reference, rig.stage()
+    """Let a controller drive a rig, by samples or by blocks; with the time that it took [s]."""
+    r, stage, clock, seconds = rig.reference, rig.stage(), time.perf_counter, 0.0
     u, x, true = np.empty_like(r), np.empty_like(r), np.empty_like(r)
-    drive = _by_sample if rig.block == 1 else _by_block
-    seconds = drive(controller, stage, r, u, x, true, rig.block)
+    single = rig.block == 1
+    answer, move = (controller.step, stage.step) if single else (controller.run, stage.run)
+    for start in range(0, r.size, rig.block):
+        part = slice(start, min(start + rig.block, r.size))
+        wanted = r.item(start) if single else r[part]
+        began = clock()
+        voltage = answer(wanted)
+        seconds += clock() - began
+        u[part] = voltage
+        given = u.item(start) if single else u[part]
+        reading = move(given)
+        x[part], true[part] = reading, stage.displacement
+        began = clock()
+        controller.learn(given, reading)
+        seconds += clock() - began
     return Traces(r, u, x, rig.seen(true)), seconds
-
-
-def run_line(rig: Rig, line: FittedLine) -> Traces:
-    """Let a straight line drive the same rig. `line`: from `fit_line`."""
-    r, stage = rig.reference, rig.stage()
-    u = np.clip(line.voltage(r), rig.reach.low, rig.reach.high)
-    x = stage.run(u)
-    return Traces(r, u, x, rig.seen(np.asarray(stage.displacement)))
-
-
-def _by_sample(
-    controller: Any, stage: Any, r: FloatArray, u: FloatArray, x: FloatArray, true: FloatArray, block: int
-) -> float:
-    seconds, clock = 0.0, time.perf_counter
-    for k, wanted in enumerate(r.tolist()):
-        began = clock()
-        voltage = float(controller.step(wanted))
-        seconds += clock() - began
-        reading = stage.step(voltage)
-        u[k], x[k] = voltage, reading
-        true[k : k + 1] = stage.displacement  # a number, or an array of one
-        began = clock()
-        controller.learn(voltage, reading)
-        seconds += clock() - began
-    return seconds
-
-
-def _by_block(
-    controller: Any, stage: Any, r: FloatArray, u: FloatArray, x: FloatArray, true: FloatArray, block: int
-) -> float:
-    seconds, clock = 0.0, time.perf_counter
-    for start in range(0, r.size, block):
-        part = slice(start, min(start + block, r.size))
-        began = clock()
-        u[part] = controller.run(r[part])
-        seconds += clock() - began
-        x[part] = stage.run(u[part])
-        true[part] = stage.displacement
-        began = clock()
-        controller.learn(u[part], x[part])
-        seconds += clock() - began
-    return seconds

@@ -7,7 +7,7 @@ is slow beside it, and large beside the noise.
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -41,6 +41,11 @@ SEGMENTS = (
     ("cold-start", 1.0, 6), ("switch", 0.6, 4), ("drop", 0.2, 4), ("switch-back", 1.0, 4),
     ("gain-step", 1.0, 6),
 )  # fmt: skip
+CELL_COLUMNS: dict[str, type] = {
+    "key": str, "controller": str, "family": str, "amplitude": float, "frequency": float, "seed": int,
+    "gain": float, "width": float, "block": int, "noise": float, "mechanics": str, "asked": bool,
+    "failure": str, "change": str, "periods": int, "error": float, "allowed": float,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +94,13 @@ class Cell:
     def drawn(self) -> Row:
         """The place."""
         return {**asdict(self), "segments": [], "asked": True}
+
+
+def tidy_cells(rows: Iterable[Row]) -> Iterator[Row]:
+    """A row for each change of each run of the map. `rows`: from `Cell.play`."""
+    for row in rows:
+        for segment in row["segments"] or [{}]:
+            yield {**row, **segment}
 
 
 def cells(

@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
-from piezoest.bench.executors import in_processes
+from piezoest.bench.executors import in_processes, quiet
 from piezoest.bench.origin import json_safe
-from piezoest.bench.quiet import quiet
 from piezoest.bench.store import Keyed, Row
 from piezoest.bench.zoo.contenders import code_of, contender
 from piezoest.bench.zoo.drawing import draw
-from piezoest.bench.zoo.playing import play
+from piezoest.bench.zoo.judging import play
 from piezoest.bench.zoo.running import Factory
 
 
