@@ -61,8 +61,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def inlined(function: Function) -> Function:
     """Put a function into its caller's place in compiled code; in Python it is as it was."""
-    marked: Function = register_jitable(forceinline=True)(function)
-    return marked
+    return register_jitable(forceinline=True)(function)
 
 
 def _cause(message: str) -> str:

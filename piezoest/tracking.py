@@ -85,8 +85,7 @@ class TrackingRecord:
         return self.period
 
     def _row(self, sample: int) -> FloatArray:
-        row: FloatArray = self.parameters[sample // self.update_interval]
-        return row
+        return self.parameters[sample // self.update_interval]
 
     def _tail(self, last_periods: int | None) -> slice:
         if last_periods is None:

@@ -52,8 +52,7 @@ def _given(made: Any, record: TrackingRecord) -> tuple[FloatArray, ...]:
 def _one(made: Any) -> Callable[..., None]:
     """A step of it: a controller answers, and learns from what was recorded."""
     if not hasattr(made, "learn"):
-        step: Callable[..., None] = made.step
-        return step
+        return made.step
 
     def both(r: float, u: float, x: float) -> None:
         made.step(r)

@@ -33,6 +33,13 @@ Place = Literal["outside lower center", "outside upper center"]
 Document = dict[str, Any]  # from `piezoest.bench.table.describe`
 
 
+def new_figure(width: float, height: float) -> Figure:
+    """Figure of this size in inches, whose parts keep out of each other's way."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
 def drawings(document: Document) -> dict[str, Figure]:
     """Draw all pictures of a campaign, by name."""
     found = {"overview": overview(document), "settled": profile(document), "cost": cost(document)}
@@ -68,10 +75,8 @@ def _styles(document: Document) -> dict[str, dict[str, Any]]:
 
 def overview(document: Document) -> Figure:
     """First and settled error of each estimator, with the interval that other seeds would lie in; narrow."""
-    from matplotlib.figure import Figure
-
     rows = [row for row in best_first(document) if row["typical"]][::-1]
-    figure = Figure(figsize=(5.2, 0.4 * len(rows) + 1.5), layout="constrained")
+    figure = new_figure(5.2, 0.4 * len(rows) + 1.5)
     axes = figure.subplots()
     shown = {
         "first": ("first period after a change", "#D55E00", "o"),
@@ -98,9 +103,7 @@ def overview(document: Document) -> Figure:
 
 def cost(document: Document) -> Figure:
     """Settled and first error against the cost of a step, with the interval that other seeds would lie in."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH, 4.8), layout="constrained")
+    figure = new_figure(WIDTH, 4.8)
     style = _styles(document)
     shown = {"first": "first period after a change", "settled": "once settled"}
     for axes, (quantity, said) in zip(figure.subplots(1, 2, sharex=True), shown.items(), strict=True):
@@ -133,7 +136,6 @@ def cost(document: Document) -> Figure:
 def profile(document: Document) -> Figure:
     """What each is weak at: its settled error in each scenario, relative to the best one's there."""
     from matplotlib.colors import LogNorm
-    from matplotlib.figure import Figure
 
     names = [row["estimator"] for row in best_first(document)]
     stage = document["plan"]["stages"][0]
@@ -148,7 +150,7 @@ def profile(document: Document) -> Figure:
         [[settled.get((scenario, name), np.nan) for scenario in scenarios] for name in names], dtype=float
     )
     ratio = table / np.nanmin(table, axis=0)
-    figure = Figure(figsize=(WIDTH, 0.32 * len(names) + 1.2), layout="constrained")
+    figure = new_figure(WIDTH, 0.32 * len(names) + 1.2)
     axes = figure.subplots()
     axes.imshow(np.clip(ratio, 1.0, FARTHEST), norm=LogNorm(1.0, FARTHEST), cmap="YlOrRd", aspect="auto")
     for (i, k), value in np.ndenumerate(ratio):
@@ -162,14 +164,12 @@ def profile(document: Document) -> Figure:
 
 def adaptation(document: Document) -> Figure:
     """Largest error of each period after the change, of every estimator: a panel for each scenario."""
-    from matplotlib.figure import Figure
-
     cells = [cell for cell in document["cells"] if cell["transient"] and cell["stage"]]
     scenarios = list(dict.fromkeys(cell["scenario"] for cell in cells))
     style = _styles(document)
     columns = 2
     rows = -(-len(scenarios) // columns)
-    figure = Figure(figsize=(WIDTH, 2.1 * rows + 1.3), layout="constrained")
+    figure = new_figure(WIDTH, 2.1 * rows + 1.3)
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     for axes, scenario in zip(panels, scenarios, strict=False):
         mine = [cell for cell in cells if cell["scenario"] == scenario]

@@ -16,6 +16,7 @@ from typing import Any
 
 from piezoest._files import write_text
 
+# This package and those that do its arithmetic.
 DISTRIBUTIONS = ("piezoest", "numpy", "scipy", "numba", "casadi", "filterpy")
 
 
@@ -27,21 +28,6 @@ def cpu_name() -> str:
         lines = []
     names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.processor() or platform.machine()
-
-
-def describe_machine() -> dict[str, Any]:
-    """Processor, system and Python."""
-    return {
-        "cpu": cpu_name(),
-        "cores": os.cpu_count(),
-        "platform": platform.platform(),
-        "python": f"{platform.python_implementation()} {platform.python_version()}",
-    }
-
-
-def versions() -> dict[str, str]:
-    """Versions of this package and of those that do its arithmetic."""
-    return {name: importlib.metadata.version(name) for name in DISTRIBUTIONS}
 
 
 @functools.cache
@@ -77,8 +63,13 @@ def origin(began: float | None = None) -> dict[str, Any]:
     """When, on what and by which versions; and how long it took since `began` on `time.perf_counter`."""
     head = {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": describe_machine(),
-        "versions": versions(),
+        "machine": {
+            "cpu": cpu_name(),
+            "cores": os.cpu_count(),
+            "platform": platform.platform(),
+            "python": f"{platform.python_implementation()} {platform.python_version()}",
+        },
+        "versions": {name: importlib.metadata.version(name) for name in DISTRIBUTIONS},
     }
     return head if began is None else {**head, "seconds": round(time.perf_counter() - began, 1)}
 

@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 
 from piezoest import signals
-from piezoest._checks import FloatArray, integer, positive
+from piezoest._checks import integer, positive
 from piezoest.bench.executors import in_processes
 from piezoest.bench.paper_tables import PRBS_ROW, Published, crossed_row, published, triangle_row
 from piezoest.compensators import InverseCompensator, LinearCompensator
@@ -186,19 +186,9 @@ class Run:
 def last_periods(record: TrackingRecord, periods: int) -> TrackingRecord:
     """The end of a record, its time from zero."""
     n = periods * (record.period or 1)
-
-    def last(values: FloatArray) -> FloatArray:
-        return values[-n:].copy()
-
-    return dataclasses.replace(
-        record,
-        reference=last(record.reference),
-        voltage=last(record.voltage),
-        measured=last(record.measured),
-        displacement=last(record.displacement),
-        parameters=last(record.theta),
-        update_interval=1,
-    )
+    names = ("reference", "voltage", "measured", "displacement")
+    last = {name: getattr(record, name)[-n:].copy() for name in names}
+    return dataclasses.replace(record, **last, parameters=record.theta[-n:].copy(), update_interval=1)
 
 
 REFERENCES = (*TRIANGLES, PRBS)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piezoest._files import save_figure
-from piezoest.bench.figures import DPI, WIDTH
+from piezoest.bench.figures import DPI, WIDTH, new_figure
 from piezoest.bench.paper import PRBS, SETTLED, SWEPT, PaperResult, Run, last_periods
 from piezoest.models import ColemanHodgdon
 from piezoest.tracking import draw_map, draw_series
@@ -48,7 +48,7 @@ def input_output_map(run: Run) -> Figure:
     model = ColemanHodgdon(*run.parameters)
     # Round after round, until the model's loop has closed as the stage's has.
     response = model.simulate(np.tile(voltage, 10), allow_jumps=True)[-voltage.size :]
-    figure = _figure(5.2, 4.2)
+    figure = new_figure(5.2, 4.2)
     axes = figure.subplots()
     axes.plot(voltage, displacement, color="0.55", lw=3.0, label="stage")
     axes.plot(voltage, response, color="C0", lw=1.0, label="identified model")
@@ -61,7 +61,7 @@ def input_output_map(run: Run) -> Figure:
 
 def triangle_tracking(linear: Run, inverse: Run) -> Figure:
     """Fig. 4: time series (a), (b) and reference-to-displacement maps (c), (d)."""
-    figure = _figure(WIDTH, 7.6)
+    figure = new_figure(WIDTH, 7.6)
     panels = figure.subplot_mosaic([["a", "a"], ["b", "b"], ["c", "d"]], height_ratios=[1.0, 1.0, 1.2])
     for letters, run in (("ac", linear), ("bd", inverse)):
         _series(panels[letters[0]], letters[0], run, periods=2)
@@ -73,7 +73,7 @@ def triangle_tracking(linear: Run, inverse: Run) -> Figure:
 
 def prbs_tracking(linear: Run, inverse: Run) -> Figure:
     """Fig. 5: time series (a), (b) of the filtered PRBS."""
-    figure = _figure(WIDTH, 5.2)
+    figure = new_figure(WIDTH, 5.2)
     for axes, letter, run in zip(figure.subplots(2, 1), "ab", (linear, inverse), strict=True):
         _series(axes, letter, run, periods=1)
     _legend(figure)
@@ -83,7 +83,7 @@ def prbs_tracking(linear: Run, inverse: Run) -> Figure:
 
 def adaptation(result: PaperResult) -> Figure:
     """Largest error of each period after the start, for every row of Table II."""
-    figure = _figure(WIDTH, 4.6)
+    figure = new_figure(WIDTH, 4.6)
     axes = figure.subplots(1, 2, sharey=True)
     for ax, way, runs in ((axes[0], "linear", result.linear), (axes[1], "inverse", result.inverse)):
         for (name, run), marker in zip(runs.items(), "os^vD", strict=True):
@@ -107,7 +107,7 @@ def error_against_memory(result: PaperResult) -> Figure:
     """Stationary error and time to settle over the memory of the estimator."""
     memory = np.array(list(result.sweep))
     runs = list(result.sweep.values())
-    figure = _figure(WIDTH, 5.6)
+    figure = new_figure(WIDTH, 5.6)
     left, right = figure.subplots(2, 1, sharex=True)
     left.loglog(memory, [run.max_error for run in runs], "o-")
     left.loglog(result.memory, result.sweep[result.memory].max_error, "o", ms=11.0, mfc="none", color="C3")
@@ -127,12 +127,6 @@ def error_against_memory(result: PaperResult) -> Figure:
         f"{runs[0].experiment.reference.name}; ringed: the memory of the tables", fontsize="medium"
     )
     return figure
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
 
 
 def _series(axes: Any, letter: str, run: Run, periods: int) -> None:

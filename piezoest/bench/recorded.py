@@ -90,8 +90,7 @@ def _learn(estimator: str, data: Data, sample_rate: float) -> Model:
     for begins in range(0, data.u.size, AT_A_TIME):
         block = slice(begins, begins + AT_A_TIME)
         feed(made, data.u[block], x[block])
-    model: Model = made.model
-    return model
+    return made.model
 
 
 def _missed(model: Any, data: Data, learnt: int) -> FloatArray:
@@ -103,5 +102,4 @@ def _missed(model: Any, data: Data, learnt: int) -> FloatArray:
     jumps = {"allow_jumps": True} if isinstance(model, ColemanHodgdon) else {}
     error = data.x - model.simulate(data.u, **jumps)
     before = error[:learnt][data.counts[:learnt]]
-    after: FloatArray = np.abs(error[learnt:][data.counts[learnt:]] - np.mean(before))
-    return after
+    return np.abs(error[learnt:][data.counts[learnt:]] - np.mean(before))

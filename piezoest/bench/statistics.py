@@ -126,8 +126,7 @@ def order(frame: pd.DataFrame, need: Need, stages: Sequence[str]) -> list[dict[s
 def _by_seed(ours: pd.DataFrame, theirs: pd.DataFrame, quantity: str) -> FloatArray:
     """Mean logarithm of the ratio of two estimators' errors, for each seed that both have."""
     difference = logarithms(ours, quantity) - logarithms(theirs, quantity)
-    values: FloatArray = difference.mean(axis=0).dropna().to_numpy()
-    return values
+    return difference.mean(axis=0).dropna().to_numpy()
 
 
 def _ratio(d: FloatArray) -> list[float]:

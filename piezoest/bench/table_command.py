@@ -168,7 +168,9 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
             if runs.tune is not None:
                 with shared.counting("runs to tune by") as count:
                     tuned = tune(plan.estimators, runs.tune, plan.given, store, execute, count)
-                plan = _with_tuned(plan, tuned)
+                # Beside the others, where these are not the defaults.
+                chosen = (each["chosen"] for each in tuned if each["chosen"] != each["default"])
+                plan = dataclasses.replace(plan, tuned=tuple(dict.fromkeys(chosen)))
             tasks = plan.tasks()
             with shared.counting("runs") as count:
                 carry_out(tasks, store, execute, count)
@@ -203,12 +205,6 @@ def _plan(runs: Runs) -> Any:
         slow_seeds=runs.slow_seeds or min(seeds, SLOW_SEEDS),
         given=given,
     )
-
-
-def _with_tuned(plan: Any, tuned: list[dict[str, Any]]) -> Any:
-    """Plan with the estimators that tuning has chosen, where these are not the defaults."""
-    chosen = (each["chosen"] for each in tuned if each["chosen"] != each["default"])
-    return dataclasses.replace(plan, tuned=tuple(dict.fromkeys(chosen)))
 
 
 @grouped

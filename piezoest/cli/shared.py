@@ -38,18 +38,12 @@ def progress(text: str, *, bar: bool = False) -> Iterator[Shown]:
     if not console.is_terminal:
         yield Shown()
         return
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        SpinnerColumn,
-        TaskProgressColumn,
-        TextColumn,
-        TimeElapsedColumn,
-    )
+    from rich import progress as parts
 
-    length = (BarColumn(), TaskProgressColumn()) if bar else ()
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), *length, TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as shown:
+    length = (parts.BarColumn(), parts.TaskProgressColumn()) if bar else ()
+    words = parts.TextColumn("{task.description}")
+    columns = (parts.SpinnerColumn(), words, *length, parts.TimeElapsedColumn())
+    with parts.Progress(*columns, console=console, transient=True) as shown:
         yield Shown(shown, text)
 
 

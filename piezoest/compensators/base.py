@@ -267,8 +267,7 @@ class Compensator(Copied):
             r = number_or_nan(r)
         if self._waiting is not None and self.hand_over_due:
             self._use_waiting()
-        voltage: float = self._compiled()[0](self._state, self._settings, r)
-        return voltage
+        return self._compiled()[0](self._state, self._settings, r)
 
     def _compiled(self) -> tuple[Any, Any]:
         """Machine code for a sample and for a record."""

@@ -21,37 +21,20 @@ from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SHA
 
 CORRIDOR = record(
     # Turns of the reference since the last hand-over, whether one came soon after another.
-    turns=COUNT,
-    soon=FLAG,
+    turns=COUNT, soon=FLAG,
     # Direction of travel, furthest reference in it, where this leg began, length of the last [µm].
-    direction=SIGN,
-    furthest=MEASURED,
-    turned=MEASURED,
-    leg=DISTANCE,
+    direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE,
     # The reference now, the same behind a play, its travel since the last sample, the one at the last
     # hand-over [µm], whether it is time for the next, half the recent swing, what is noise at any rate [µm].
-    present=MEASURED,
-    smooth=MEASURED,
-    travel=DISTANCE,
-    handed=MEASURED,
-    due=FLAG,
-    half_swing=DISTANCE,
+    present=MEASURED, smooth=MEASURED, travel=DISTANCE, handed=MEASURED, due=FLAG, half_swing=DISTANCE,
     least=DISTANCE,
     # Gain of the first model; gain and centre of the line; means of voltage and reference over the last
     # swings, mean square of the voltage's deviation and mean product of both, weight of all that.
-    first_gain=NUMBER,
-    gain=NUMBER,
-    centre=NUMBER,
-    mean_u=MEASURED,
-    mean_r=MEASURED,
-    square=AMOUNT,
-    product=NUMBER,
-    known=SHARE,
+    first_gain=NUMBER, gain=NUMBER, centre=NUMBER, mean_u=MEASURED, mean_r=MEASURED, square=AMOUNT,
+    product=NUMBER, known=SHARE,
     # Samples at which the corridor was in the way, whether there was any, legs so far.
-    used=COUNT,
-    begun=FLAG,
-    legs=COUNT,
-)
+    used=COUNT, begun=FLAG, legs=COUNT,
+)  # fmt: skip
 
 # Half-width, as a fraction of half the recent swing of the reference; before the line is known by half.
 WIDTH, FIRST_WIDTH, ENOUGH = 0.3, 1.0, 0.5

@@ -170,14 +170,12 @@ class HysteresisEKF(CompiledEstimator):
     @property
     def s(self) -> FloatArray:
         """The filter's own state: (w_h, a, b, c[, offset]) or (gain[, offset])."""
-        s: FloatArray = self._state["filter"]["s"]
-        return s.copy()
+        return np.array(self._state["filter"]["s"])
 
     @property
     def state_covariance(self) -> FloatArray:
         """Covariance of `s`, shape (n, n)."""
-        P: FloatArray = self._state["filter"]["P"]
-        return P.copy()
+        return np.array(self._state["filter"]["P"])
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -198,8 +196,7 @@ class HysteresisEKF(CompiledEstimator):
     @property
     def K(self) -> FloatArray:
         """Last gain, of `s`."""
-        K: FloatArray = self._state["filter"]["K"]
-        return K.copy()
+        return np.array(self._state["filter"]["K"])
 
     def _is_projected(self) -> bool:
         projection = self._state["projection"]

@@ -8,7 +8,6 @@ import numpy as np
 
 from piezoest._checks import WILDEST, FloatArray, integer, moderate, positive
 from piezoest.estimators import horizon_kernel as kernel
-from piezoest.estimators.arrival import arrival_cost
 from piezoest.estimators.base import Status
 from piezoest.estimators.hopping import LEAST_HANDED_OUT, Hopping
 from piezoest.estimators.samples import HELD, NAMES, UPDATED
@@ -30,6 +29,8 @@ POINTS = 2000
 OFFSET_UNCERTAINTY = 1e3
 # Relative change at which a solve has ended: far below what a hop's new samples move.
 TOLERANCE = 1e-8
+# Keeps a correlation matrix positive definite that rounding would not, and the squares of its root in range.
+JITTER = 1e-9
 
 
 class MovingHorizon(Hopping):
@@ -281,7 +282,7 @@ class MovingHorizon(Hopping):
         walk = self._sizes(q) * np.sqrt(leaving / self.sample_rate)
         walk[problem.coordinates.where(*self._initial.state_names)] = state["noise"]
         try:
-            follower, prior = arrival_cost(problem, q, k, walk * self._arguments["process_noise"])
+            follower, prior = _arrival_cost(problem, q, k, walk * self._arguments["process_noise"])
         except np.linalg.LinAlgError:
             return
         if np.all(np.isfinite(prior.root)) and np.all(np.isfinite(prior.mean)):
@@ -328,3 +329,23 @@ class MovingHorizon(Hopping):
         """Return to the state after construction."""
         super().reset()
         self._message, self._seconds = "", float("nan")
+
+
+def _arrival_cost(problem: Problem, q: FloatArray, k: int, walk: FloatArray) -> tuple[FloatArray, Prior]:
+    """Coordinates and prior of the window that starts at point k of this one.
+
+    The Gauss-Newton posterior of the samples that leave the window.
+    """
+    _, sums = problem.about(q, samples=k)
+    covariance = inverse_information(sums.gram)
+    step = covariance @ sums.moment
+    G, follower = np.eye(q.size), q.copy()
+    if state := problem.coordinates.where(*problem.coordinates.model.state_names):
+        # The states at point k, which the next window starts from.
+        run, by_q = problem.pass_over(q, k + 1)
+        follower[state], G[state] = run.end, run.end_jacobian @ by_q
+    covariance = G @ covariance @ G.T + np.diag(walk**2)
+    scale = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(scale, scale) + JITTER * np.eye(q.size)
+    root = np.linalg.inv(np.linalg.cholesky(correlation)) / scale
+    return follower, Prior(follower + G @ step, root)

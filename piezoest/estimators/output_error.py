@@ -185,8 +185,7 @@ class OutputErrorRLS(Freezable):
     def _decay_of(self, s: FloatArray) -> FloatArray:
         """Decay a of rows (…, 6) of the filter's state and the member in use, shape (…)."""
         correction = output_error.log_ratio(s[..., 0], s[..., 2], float(self._settings["step"]))
-        decays: FloatArray = self._settings["decays"][s[..., -1].astype(int)] * np.exp(correction)
-        return decays
+        return self._settings["decays"][s[..., -1].astype(int)] * np.exp(correction)
 
     @property
     def row_size(self) -> int:
@@ -269,9 +268,3 @@ class OutputErrorRLS(Freezable):
     def _is_projected(self) -> bool:
         b, c = self._state["law"]["s"][:2].tolist()
         return not (c >= kernel.LEAST_C and kernel.LEAST_B * c <= b <= 0.5 * (1.0 - kernel.MARGIN) * c)
-
-    @property
-    def model(self) -> ColemanHodgdon:
-        """Admissible model as known now: `theta` itself, or its nearest point in the metric of P."""
-        found: ColemanHodgdon = super().model
-        return found

@@ -235,20 +235,17 @@ class PrandtlIshlinskiiRLS(Freezable):
     @property
     def thresholds(self) -> FloatArray:
         """Thresholds of the plays in use [V], shape (n,)."""
-        thresholds: FloatArray = self._state["plays"]["reach"][self._columns :: self._columns].copy()
-        return thresholds
+        return self._state["plays"]["reach"][self._columns :: self._columns].copy()
 
     @property
     def theta(self) -> FloatArray:
         """Slopes [µm/V] and creep gains [1] as estimated, shape (n,), in the order of `parameter_names`."""
-        theta: FloatArray = self._state["law"]["theta"][:-1] * self._scale
-        return theta
+        return self._state["law"]["theta"][:-1] * self._scale
 
     @property
     def P(self) -> FloatArray:
         """Covariance of `theta` as the law sees it, shape (n, n)."""
-        P: FloatArray = self._state["law"]["P"][:-1, :-1] * np.outer(self._scale, self._scale)
-        return P
+        return self._state["law"]["P"][:-1, :-1] * np.outer(self._scale, self._scale)
 
     @property
     def K(self) -> FloatArray:
@@ -257,8 +254,7 @@ class PrandtlIshlinskiiRLS(Freezable):
         phi = state["plays"]["phi"]
         product = state["law"]["P"] @ phi
         misfit = kernel.SLACK * (settings["unit"] * state["plays"]["half_width"])
-        gain: FloatArray = product[:-1] * self._scale / (phi @ product + misfit**2 + settings["noise"] ** 2)
-        return gain
+        return product[:-1] * self._scale / (phi @ product + misfit**2 + settings["noise"] ** 2)
 
     def _is_projected(self) -> bool:
         return bool(np.any(self._state["law"]["force"][:-1] > 0.0))

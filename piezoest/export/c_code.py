@@ -92,7 +92,8 @@ def c(
             "give an AdaptiveFeedforward alone, or an estimator or None and, as compensator, an "
             f"InverseCompensator or a LinearCompensator, got {estimator!r} and {compensator!r}"
         )
-    if estimator is not None and not _has_kernel(estimator):
+    exportable = isinstance(estimator, CompiledEstimator) and hasattr(estimator.kernel, "proposed")
+    if estimator is not None and not exportable:
         hint = "only estimators with a compiled kernel can be exported"
         if isinstance(getattr(estimator, "model", None), PrandtlIshlinskii):
             hint = "learn a Prandtl-Ishlinskii model beside the controller, and export " + _FIXED
@@ -100,11 +101,6 @@ def c(
             f"estimator must be one such as HysteresisRLS, got {type(estimator).__name__}: {hint}"
         )
     return _Generator(estimator, compensator, name, precision, interval).code()
-
-
-def _has_kernel(estimator: Any) -> bool:
-    """Whether the compiled functions that it names take its samples and propose its model."""
-    return isinstance(estimator, CompiledEstimator) and hasattr(estimator.kernel, "proposed")
 
 
 def _described(model: Model) -> str:

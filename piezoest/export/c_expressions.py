@@ -85,8 +85,7 @@ class Expressions(ast.NodeVisitor):
 
     def value(self, node: ast.expr) -> Value:
         """Translate an expression."""
-        found: Value = self.visit(node)
-        return found
+        return self.visit(node)
 
     def number(self, value: Value, kind: str = "") -> Number:
         """A value as a number that C computes."""

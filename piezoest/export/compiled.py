@@ -207,8 +207,7 @@ class CompiledFeedforward:
         float
             Voltage [V], within the limits.
         """
-        voltage: float = self._library.step(number_or_nan(r))
-        return voltage
+        return self._library.step(number_or_nan(r))
 
     def learn(self, u: float | None, x: float | None) -> None:
         """Learn from the voltage that was written and what was measured then.

@@ -99,18 +99,18 @@ class EqualByContent:
         return hash(repr(self.to_dict()))
 
 
-def rising_pair(name: str, thresholds: Any, other: str, weights: Any) -> tuple[FloatArray, FloatArray]:
+def rising_pair(thresholds: Any, weights: Any) -> tuple[FloatArray, FloatArray]:
     """Rising thresholds and as many weights, as arrays of their own."""
-    thresholds = array_1d(name, thresholds).copy()
-    weights = array_1d(other, weights).copy()
+    thresholds = array_1d("thresholds", thresholds).copy()
+    weights = array_1d("weights", weights).copy()
     if thresholds.size != weights.size:
         raise ValueError(
-            f"{other} must have one value per threshold, got {weights.size} weights for "
+            f"weights must have one value per threshold, got {weights.size} weights for "
             f"{thresholds.size} thresholds"
         )
     if np.any(np.diff(thresholds) <= 0.0):
         raise ValueError(
-            f"{name} must rise from entry to entry, got {thresholds}: "
+            f"thresholds must rise from entry to entry, got {thresholds}: "
             "sort them together with the weights and merge equal ones"
         )
     return thresholds, weights
@@ -152,7 +152,7 @@ class Model(ABC):
     @property
     def is_in_range(self) -> bool:
         """Whether no parameter is beyond what its inverse can use: an estimator can run away."""
-        return bool(np.all(np.abs([*self.theta, self.offset]) < WILDEST))
+        return all(abs(value) < WILDEST for value in (*self.theta.tolist(), self.offset))
 
     def inverse_settings(self, sample_rate: float | None) -> dict[str, Any]:
         """Numbers by name that the compiled functions of the inverse are given.

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from piezoest._checks import WILDEST, FloatArray, array_1d, finite
+from piezoest._checks import FloatArray, array_1d, finite
 from piezoest.compile import Vector, compiled
 from piezoest.equations import admissible, loop_inverse
 from piezoest.equations import coleman_hodgdon as equations
@@ -112,19 +112,9 @@ class ColemanHodgdon(FreeRunning):
         """Whether the parameters are thermodynamically admissible and invertible."""
         return bool(admissible.has_inverse(self.alpha, self.beta, self.gamma))
 
-    @property
-    def is_in_range(self) -> bool:
-        """Whether no parameter is beyond what its inverse can use."""
-        return all(abs(v) < WILDEST for v in (self.alpha, self.beta, self.gamma, self.offset))
-
     def inverse_settings(self, sample_rate: float | None) -> dict[str, Any]:
         """Second form (4) and offset, whatever the sample rate."""
         return {"a": self.a, "b": self.b, "c": self.c, "offset": self.offset}
-
-    @property
-    def slope(self) -> float:
-        """Slope from rest [µm/V]."""
-        return self.beta
 
     @property
     def line(self) -> tuple[float, float]:

@@ -94,7 +94,7 @@ class PrandtlIshlinskii(Model, EqualByContent):
         bend_weights: ArrayLike = (),
         sample_rate: float | None = None,
     ) -> None:
-        thresholds, weights = rising_pair("thresholds", thresholds, "weights", weights)
+        thresholds, weights = rising_pair(thresholds, weights)
         if thresholds.size and thresholds[0] <= 0.0:
             raise ValueError(
                 f"thresholds must be above zero, got {thresholds[0]:g} first: "

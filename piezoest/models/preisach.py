@@ -69,7 +69,7 @@ class Preisach(Model, EqualByContent):
         width: float,
         offset: float = 0.0,
     ) -> None:
-        thresholds, weights = rising_pair("thresholds", thresholds, "weights", weights)
+        thresholds, weights = rising_pair(thresholds, weights)
         if thresholds.size and thresholds[0] <= 0.0:
             raise ValueError(f"thresholds must be above zero, got {thresholds[0]:g} first: leave it out")
         if np.any(weights < 0.0):

@@ -27,8 +27,7 @@ def model_from_dict(data: Any) -> Model:
         If the name is unknown or the fields do not fit.
     """
     classes = [each for each in REGISTERED.values() if not inspect.isabstract(each)]
-    model: Model = class_named(data, "model", classes).from_dict(data)
-    return model
+    return class_named(data, "model", classes).from_dict(data)
 
 
 @dataclass(frozen=True, slots=True)

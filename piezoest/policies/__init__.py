@@ -56,5 +56,4 @@ def policy_from_dict(data: Any) -> Policy:
     names = [field.name for field in dataclasses.fields(cls)]
     values = dict(fields(cls.__name__, data, ["policy", *names]))
     del values["policy"]
-    policy: Policy = cls(**values)
-    return policy
+    return cls(**values)

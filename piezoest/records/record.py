@@ -1,9 +1,10 @@
-"""A recorded log in memory: read from a file of any format, and written to one."""
+"""A recorded log in memory: read from a file of any format, and written to one; and one to try."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -261,6 +262,28 @@ def _record(stream: RecordStream) -> Record:
     time, voltage, displacement = columns
     record = Record(time, voltage, displacement, stream.sample_rate, str(stream.path), notes=stream.notes)
     return record._counted()
+
+
+def example_log() -> Path:
+    """Path of a recorded log: 71 s of a piezo micromanipulator at 200 Hz, a sine of 1 Hz.
+
+    Constant and growing amplitude with dwells; after the middle the voltage holds the authors' own
+    compensation. Y. N. Aye and W. T. Ang, *A Discrete Backlash Operator for Identification and Compensation
+    of Hysteresis and Non-linearity for Piezoelectric Micromanipulator*, ICSTSD, 2018; MIT licence, whose
+    text and origin stand beside the file.
+
+    Returns
+    -------
+    Path
+        A CSV file with the columns time_s, voltage_V, displacement_um and reference_um, packed by gzip.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> len(pz.read_record(pz.records.example_log()))
+    14155
+    """
+    return Path(str(resources.files("piezoest.records") / "example" / "micromanipulator.csv.gz"))
 
 
 def read_reference(

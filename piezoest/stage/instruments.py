@@ -46,18 +46,6 @@ def clip(x: Any, minimum: Any, maximum: Any) -> Any:
 
 
 @inlined
-def finite_or_held(u: Any, held: Any) -> Any:
-    """u, or `held` where u is NaN or infinite."""
-    return u if np.isfinite(u) else held
-
-
-@inlined
-def next_place(place: Any, length: Any) -> Any:
-    """The place after `place` in a circular buffer of `length`."""
-    return place + 1 if place + 1 < length else 0
-
-
-@inlined
 def amplifier_step(state: Any, settings: Any, u: Any) -> Any:
     """Voltage at the stage for the commanded `u`.
 
@@ -65,7 +53,7 @@ def amplifier_step(state: Any, settings: Any, u: Any) -> Any:
     rate).
     """
     low, high = settings.minimum, settings.maximum
-    u = finite_or_held(u, state.command)
+    u = u if np.isfinite(u) else state.command
     state.command = u
     u = clip(quantise(clip(u, low, high), settings.resolution), low, high)
     u = clip(biquad_step(state.filter, u, settings.filter), low, high)
@@ -76,11 +64,11 @@ def amplifier_step(state: Any, settings: Any, u: Any) -> Any:
 
 @inlined
 def gauge_step(state: Any, line: Any, settings: Any, x: Any, noise: Any) -> Any:
-    """Reading for the displacement `x`; `noise` is standard normal."""
+    """Reading for the displacement `x`; `noise` is standard normal, `line` a circular buffer."""
     x = biquad_step(state.filter, x + settings.bias + settings.noise * noise, settings.filter)
     place = int(state.place)
     line[place] = x
-    place = next_place(place, len(line))
+    place = place + 1 if place + 1 < len(line) else 0
     state.place = place
     return clip(quantise(line[place], settings.resolution), settings.minimum, settings.maximum)
 

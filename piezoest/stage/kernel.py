@@ -22,14 +22,7 @@ from piezoest.equations.play import prandtl_ishlinskii_step
 from piezoest.equations.preisach import preisach_step
 from piezoest.layout import FIXED, MEASURED, NUMBER, Length, numbers, record
 from piezoest.layout import Record as Layout
-from piezoest.stage.instruments import (
-    AMPLIFIER,
-    AMPLIFIER_SETTINGS,
-    GAUGE_SETTINGS,
-    amplifier_step,
-    gauge_layout,
-    gauge_step,
-)
+from piezoest.stage import instruments
 
 
 def hysteresis_layouts(settings: dict[str, Any]) -> tuple[Layout, Layout]:
@@ -46,11 +39,11 @@ def hysteresis_layouts(settings: dict[str, Any]) -> tuple[Layout, Layout]:
 def state_layout(hysteresis: Layout, terms: int, delay: int) -> Layout:
     """Layout of the state of a stage with so many creep terms and samples of delay."""
     return record(
-        amplifier=AMPLIFIER,
+        amplifier=instruments.AMPLIFIER,
         hysteresis=hysteresis,
         creep=record(z=numbers(Length("terms", terms))),
         mechanics=numbers(2),  # displacement [µm] and velocity [µm/s]
-        gauge=gauge_layout(delay),
+        gauge=instruments.gauge_layout(delay),
     )
 
 
@@ -58,19 +51,19 @@ def settings_layout(hysteresis: Layout, terms: int) -> Layout:
     """Layout of the settings of a stage with so many creep terms."""
     each = numbers(Length("terms", terms), kind=FIXED)
     return record(
-        amplifier=AMPLIFIER_SETTINGS,
+        amplifier=instruments.AMPLIFIER_SETTINGS,
         hysteresis=hysteresis,
         creep=record(gains=each, decays=each),
         offset=FIXED,
         mechanics=numbers(6, kind=FIXED),
-        gauge=GAUGE_SETTINGS,
+        gauge=instruments.GAUGE_SETTINGS,
     )
 
 
 @register_jitable
 def _amplify(x: Any, state: Any, settings: Any) -> None:
     for k in range(len(x)):
-        x[k] = amplifier_step(state, settings, x[k])
+        x[k] = instruments.amplifier_step(state, settings, x[k])
 
 
 @register_jitable
@@ -123,7 +116,7 @@ def _measure(x: Any, noise: Any, measured: Any, state: Any, settings: Any) -> No
     every = int(len(noise) > 1)
     line = state.line
     for k in range(len(x)):
-        measured[k] = gauge_step(state, line, settings, x[k], noise[k * every])
+        measured[k] = instruments.gauge_step(state, line, settings, x[k], noise[k * every])
 
 
 @register_jitable

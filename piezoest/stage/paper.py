@@ -135,8 +135,7 @@ def mechanics_and_instruments(
 def _data() -> dict[str, Any]:
     """The data file: a section for each part, its numbers and their origin."""
     text = resources.files("piezoest.stage").joinpath("paper_stage.json").read_text(encoding="utf-8")
-    data: dict[str, Any] = json.loads(text)
-    return data
+    return json.loads(text)
 
 
 def _numbers(section: dict[str, Any]) -> dict[str, Any]:

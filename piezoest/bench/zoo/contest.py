@@ -25,19 +25,13 @@ IDEAL: dict[str, Any] = {
 REFERENCES = tuple(kind for kind in SHAPES if kind != "beyond")  # there the limits decide
 
 
-def contest(
-    controller: str,
-    seeds: range,
-    *,
-    families: Sequence[str] = tuple(FAMILIES),
-    references: Sequence[str] = REFERENCES,
-) -> list[Task]:
+def contest(controller: str, seeds: range) -> list[Task]:
     """All runs of a controller, and of the default one with each estimator alone."""
     return [
         task
         for name in (controller, *CANDIDATES)
-        for family in families
-        for reference in references
+        for family in FAMILIES
+        for reference in REFERENCES
         for task in runs(name, seeds, {**IDEAL, "family": family, "reference": reference})
     ]
 

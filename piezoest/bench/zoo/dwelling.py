@@ -20,6 +20,7 @@ from piezoest.bench.zoo.faults import NONE
 from piezoest.bench.zoo.judging import BACK, COLUMNS, NEGLIGIBLE, NOISES, settled
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Factory, run_controller
+from piezoest.bench.zoo.summary import parted
 
 DURATION = 60.0  # s
 SHAPES = ("triangle", "sine", "raster")
@@ -114,14 +115,8 @@ def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
 
 def summarise_dwells(rows: Iterable[Row]) -> dict[str, Any]:
     """Sum up rests."""
-    rows = list(rows)
+    rows = [{**row, **_way(row)} for row in rows]
     judged = [row for row in rows if row["failure"] is None]
-    ways = sorted({_of(row) for row in rows})
-    groups = [
-        {**dict(zip(WAYS, way, strict=True)), **_summed([row for row in rows if _of(row) == way])}
-        for way in ways
-    ]
-    families = sorted({row["family"] for row in rows})
     broken = sorted((row for row in judged if not row["kept"]), key=_ratio, reverse=True)
     summary = {
         "runs": len(rows),
@@ -129,22 +124,24 @@ def summarise_dwells(rows: Iterable[Row]) -> dict[str, Any]:
         "rigs": len({row["seed"] for row in rows}),
         "kept": sum(row["kept"] for row in judged),
         "duration": max((row["duration"] for row in rows), default=0.0),
-        "groups": groups,
+        "groups": [
+            {**dict(zip(WAYS, way, strict=True)), **_summed(group)}
+            for way, group in parted(rows, *WAYS).items()
+        ],
         "by_family": [
-            {"family": family, **_summed([row for row in rows if row["family"] == family])}
-            for family in families
+            {"family": family, **_summed(group)} for (family,), group in parted(rows, "family").items()
         ],
         "worst": [
-            {"seed": row["seed"], "feedback": row["feedback"] > 0.0, "ratio": _ratio(row)}
-            for row in broken[:10]
+            {"seed": row["seed"], "feedback": row["feedback"], "ratio": _ratio(row)} for row in broken[:10]
         ],
     }
     return dict(json_safe(summary))
 
 
-def _of(row: Row) -> tuple[bool, ...]:
+def _way(row: Row) -> dict[str, bool]:
     """Whether the stage creeps, and there is feedback, and noise in the reference."""
-    return row["creep"] > 0.0, row["feedback"] > 0.0, row["setpoint_noise"] > 0.0
+    given = (row["creep"], row["feedback"], row["setpoint_noise"])
+    return {name: size > 0.0 for name, size in zip(WAYS, given, strict=True)}
 
 
 def _ratio(row: Row, period: str = "first") -> float:

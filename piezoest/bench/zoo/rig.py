@@ -6,16 +6,8 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.bench.zoo import faults
 from piezoest.bench.zoo.families import Reach
-from piezoest.bench.zoo.faults import (
-    TRANSIENT,
-    Around,
-    Fault,
-    changed_reference,
-    coordinates,
-    faulty_stage,
-    gain_schedule,
-)
 from piezoest.bench.zoo.faulty_stages import Drift, Hum
 from piezoest.bench.zoo.references import Reference
 from piezoest.compensators import VoltageLimits
@@ -73,7 +65,7 @@ class Rig:
     width: float  # of the loop, relative
     around: Surroundings  # mechanics and instruments
     plain: Reference  # without the fault
-    fault: Fault  # or none
+    fault: faults.Fault  # or none
     block: int  # samples that are handed over at a time; 1 is one by one, by `step`
 
     @property
@@ -87,24 +79,24 @@ class Rig:
         return 2.0 * self.reach.half * self.gain
 
     @property
-    def facts(self) -> Around:
+    def facts(self) -> faults.Around:
         """What a fault has to know."""
-        return Around(self.sample_rate, self.plain, self.around.noise, self.stroke, self.seed)
+        return faults.Around(self.sample_rate, self.plain, self.around.noise, self.stroke, self.seed)
 
     @property
     def reference(self) -> FloatArray:
         """What the controller is to follow, fault and all, shape (N,) [µm]."""
-        return changed_reference(self.fault, self.facts)
+        return faults.changed_reference(self.fault, self.facts)
 
     @property
     def coordinates(self) -> tuple[float, FloatArray]:
         """Factor and zero of the gauge that the reference is meant in, see `faults.coordinates`."""
-        return coordinates(self.fault, self.plain.values.size)
+        return faults.coordinates(self.fault, self.plain.values.size)
 
     @property
     def gain_factor(self) -> FloatArray:
         """By what the fault has changed the gain, shape (N,)."""
-        n, schedule = self.plain.values.size, gain_schedule(self.fault, self.sample_rate)
+        n, schedule = self.plain.values.size, faults.gain_schedule(self.fault, self.sample_rate)
         if schedule is None:
             return np.ones(n)
         times, factors = zip(*schedule, strict=True)
@@ -120,7 +112,7 @@ class Rig:
     def judged_from(self) -> int:
         """First sample that is judged: after the beginning, or a fault at the start, and time to learn."""
         plain, fault = self.plain, self.fault
-        ends = fault.stop if fault.mode == TRANSIENT and fault.start == 0 else 0
+        ends = fault.stop if fault.mode == faults.TRANSIENT and fault.start == 0 else 0
         return min(max(plain.begins, ends) + self.learning, plain.values.size)
 
     @property
@@ -145,7 +137,7 @@ class Rig:
                 self.reach.low, self.reach.high, resolution=own.volts, slew_rate=own.slew_rate
             ),
             gauge=Gauge() if healthy else Gauge(noise=own.noise, delay=own.delay, resolution=own.resolution),
-            gain_schedule=None if healthy else gain_schedule(self.fault, fs),
+            gain_schedule=None if healthy else faults.gain_schedule(self.fault, fs),
             seed=self.seed,
         )
         if healthy:
@@ -154,7 +146,7 @@ class Rig:
             stage = Drift(stage, own.drift)
         if own.hum:
             stage = Hum(stage, own.hum, seed=self.seed)
-        return faulty_stage(stage, self.fault, self.facts)
+        return faults.faulty_stage(stage, self.fault, self.facts)
 
     def _mechanics(self) -> MassSpringDamper | None:
         frequency, damping = self.around.resonance

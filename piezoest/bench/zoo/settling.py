@@ -103,15 +103,9 @@ def tidy_cells(rows: Iterable[Row]) -> Iterator[Row]:
             yield {**row, **segment}
 
 
-def cells(
-    seeds: Sequence[int] = range(20),
-    *,
-    amplitudes: Sequence[float] = AMPLITUDES,
-    frequencies: Sequence[float] = FREQUENCIES,
-    families: Sequence[str] = KINDS,
-) -> list[Cell]:
+def cells(seeds: Sequence[int], families: Sequence[str] = KINDS) -> list[Cell]:
     """All places of the map."""
-    return [Cell(*each) for each in itertools.product(families, amplitudes, frequencies, seeds)]
+    return [Cell(*each) for each in itertools.product(families, AMPLITUDES, FREQUENCIES, seeds)]
 
 
 def cell_rig(cell: Cell) -> Rig:

@@ -38,21 +38,18 @@ def summarise(rows: Iterable[Row], worst: int = 10) -> dict[str, Any]:
     ranked = sorted(rows, key=_badness, reverse=True)
     columns = ("seed", "family", "reference", "fault", "mode", "ratio", "last_ratio", "after_ratio", "rail",
                "driver", "failure")  # fmt: skip
-    return dict(
-        json_safe(
-            {
-                "runs": len(rows),
-                "violations": {name: sum(map(broken, rows)) for name, broken in CRITERIA.items()},
-                "healthy": {name: sum(map(broken, healthy)) for name, broken in CRITERIA.items()},
-                "healthy_runs": len(healthy),
-                "quantiles": {name: _quantiles(rows, name) for name in RATIOS},
-                "by_family": _groups(rows, "family", "reference"),
-                "by_fault": _groups(rows, "fault", "mode"),
-                "worst": [{name: row.get(name) for name in columns} for row in ranked[:worst]],
-                "microseconds": _median(row.get("microseconds") for row in rows),
-            }
-        )
-    )
+    summary = {
+        "runs": len(rows),
+        "violations": {name: sum(map(broken, rows)) for name, broken in CRITERIA.items()},
+        "healthy": {name: sum(map(broken, healthy)) for name, broken in CRITERIA.items()},
+        "healthy_runs": len(healthy),
+        "quantiles": {name: _quantiles(rows, name) for name in RATIOS},
+        "by_family": _groups(rows, "family", "reference"),
+        "by_fault": _groups(rows, "fault", "mode"),
+        "worst": [{name: row.get(name) for name in columns} for row in ranked[:worst]],
+        "microseconds": _median(row.get("microseconds") for row in rows),
+    }
+    return dict(json_safe(summary))
 
 
 def _badness(row: Row) -> float:
