@@ -12,21 +12,9 @@ from piezoest.estimators import rls_kernel, saved_state
 from piezoest.estimators.compiled import NO_ROWS, NONE, Freezable
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.recursive_least_squares import TimeBase, is_discrete
-from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain, Model
-from piezoest.policies import (
-    DeadZone,
-    Forgetting,
-    Normalisation,
-    NormBound,
-    OutlierRejection,
-    PeriodicForgetting,
-    Policy,
-    RandomWalk,
-    amplitude_memory,
-    check_policies,
-    policy_to_dict,
-)
-from piezoest.policies.base import Conditions, layouts
+from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain
+from piezoest.policies import Forgetting, amplitude_memory, check_policies, default_policies, policy_to_dict
+from piezoest.policies.base import Conditions, Policy, layouts
 
 # Seconds of memory where the paper's law is asked for without one.
 PAPER_MEMORY = 0.4
@@ -34,15 +22,6 @@ PAPER_MEMORY = 0.4
 LEAST_CUTOFF = 1e-9
 # The offset's scale: a centre that is off by so many volts.
 OFFSET_VOLTS = 10.0
-
-
-def default_policies(memory: Any, initial: Model) -> tuple[Policy, ...]:
-    """Policies that go with a memory: the paper's with a dead zone, or those counted in swings."""
-    if memory != "period":
-        return NormBound(), DeadZone(), Normalisation()
-    if isinstance(initial, LinearGain):
-        return PeriodicForgetting(), DeadZone()
-    return RandomWalk(), DeadZone(), OutlierRejection()
 
 
 class HysteresisRLS(Freezable):
@@ -153,7 +132,7 @@ class HysteresisRLS(Freezable):
             memory = PAPER_MEMORY
         has_loop = isinstance(initial, ColemanHodgdon)
         if policies is None:
-            policies = default_policies(memory, initial)
+            policies = default_policies(memory, has_loop)
         if offset is None:
             offset = memory == "period" and has_loop
         cutoff = min(moderate("cutoff", cutoff), 0.5 * sample_rate)

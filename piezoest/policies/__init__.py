@@ -27,6 +27,13 @@ from piezoest.policies.variable_forgetting import VariableForgetting as Variable
 __all__ = sorted(policy.__name__ for policy in REGISTERED.values())
 
 
+def default_policies(memory: Any, has_loop: bool) -> tuple[Policy, ...]:
+    """Policies that go with a memory: the paper's with a dead zone, or those counted in swings."""
+    if memory != "period":
+        return NormBound(), DeadZone(), Normalisation()
+    return (RandomWalk(), DeadZone(), OutlierRejection()) if has_loop else (PeriodicForgetting(), DeadZone())
+
+
 def check_policies(policies: tuple[Policy, ...], at: Conditions) -> tuple[Policy, ...]:
     """Return policies, if there is one of each, and one way to forget, and all go with their conditions."""
     for policy in instance("policies", policies, tuple | list, "a tuple of policies"):
