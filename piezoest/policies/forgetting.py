@@ -10,10 +10,9 @@ from piezoest.policies.base import Conditions, Policy
 
 Unit = Literal["period", "second"]
 
-# Least memory in periods, and least weight that the past keeps over a sample: nothing would be left below it.
+# Least memory in periods, and least weight that the past keeps over a sample, by which P is divided: nothing
+# would be left below it.
 SHORTEST, LEAST_WEIGHT = 1e-3, 1e-3
-# Least fraction of the past that a sample keeps: P is divided by it.
-LEAST_KEPT = 1e-6
 
 
 def check_memory(memory: float, unit: str = "period") -> None:
@@ -59,4 +58,4 @@ class Forgetting(Policy):
 
     def law(self, at: Conditions) -> dict[str, float]:
         """Factor over a step, and rate, of the law."""
-        return {"forgetting": max(self.factor(at.step), LEAST_KEPT), "rate": 1.0 / self.memory}
+        return {"forgetting": self.factor(at.step), "rate": 1.0 / self.memory}

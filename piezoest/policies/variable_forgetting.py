@@ -10,7 +10,7 @@ from piezoest.compile import inlined
 from piezoest.equations import innovation_energy, least_squares
 from piezoest.policies.base import Conditions, Policy
 from piezoest.policies.directional_forgetting import InUnits, forget_by_period
-from piezoest.policies.forgetting import LEAST_KEPT, LEAST_WEIGHT, Unit, check_memory
+from piezoest.policies.forgetting import LEAST_WEIGHT, Unit, check_memory
 from piezoest.policies.periodic_forgetting import weight
 
 
@@ -62,11 +62,7 @@ class VariableForgetting(InUnits, Policy):
     def numbers(self, at: Conditions) -> dict[str, float]:
         """Memories in periods, usual and shortest, zero where they are in time; and the least factor then."""
         periods = self.memory if self.unit == "period" else 0.0
-        return {
-            "periods": periods,
-            "shortest": self.shortest,
-            "least": max(self.least_factor(at.step), LEAST_KEPT),
-        }
+        return {"periods": periods, "shortest": self.shortest, "least": self.least_factor(at.step)}
 
 
 @inlined

@@ -9,31 +9,31 @@ import numpy as np
 import piezoest
 from piezoest._checks import FloatArray
 from piezoest.bench import origin
-from piezoest.bench.origin import imported
 from piezoest.bench.zoo.running import Factory
 from piezoest.compensators import InverseCompensator, VoltageLimits
 from piezoest.estimators.rls import HysteresisRLS
+
+PARTS = "parts"
+# The default controller, changed: with the line alone, with one estimator, and with all the room.
+CANDIDATES = ("HysteresisRLS", "OutputErrorRLS", "PrandtlIshlinskiiRLS")  # of the default one
+ALONE = (*CANDIDATES, "HysteresisEKF")
+CHANGED = ("line", "no-corridor", *ALONE)
+NEEDED = ("step", "run", "learn")
+DEFAULT = "AdaptiveFeedforward"
+UPDATE_INTERVAL = 50  # samples, of the parts wired by hand
 
 
 class Parts:
     """`InverseCompensator` and `HysteresisRLS` wired by hand, with all their defaults."""
 
-    def __init__(self, sample_rate: float, limits: VoltageLimits, *, update_interval: int = 50) -> None:
+    events: tuple[()] = ()  # there is nobody who watches
+
+    def __init__(self, sample_rate: float, limits: VoltageLimits) -> None:
         self._estimator = HysteresisRLS(sample_rate)
         self._compensator = InverseCompensator(self._estimator.model, limits)
-        self._interval = update_interval
+        self.status = {"model": "coleman-hodgdon"}
         self._u: list[FloatArray] = []
         self._x: list[FloatArray] = []
-
-    @property
-    def events(self) -> tuple[()]:
-        """None: there is nobody who watches."""
-        return ()
-
-    @property
-    def status(self) -> dict[str, Any]:
-        """Model in use."""
-        return {"model": "coleman-hodgdon"}
 
     def step(self, r: float) -> float:
         """Voltage for a reference."""
@@ -47,21 +47,12 @@ class Parts:
         """Take up voltages and readings, and now and then a model."""
         self._u.append(np.array(u, ndmin=1, dtype=float))
         self._x.append(np.array(x, ndmin=1, dtype=float))
-        if sum(part.size for part in self._u) < self._interval:
+        if sum(part.size for part in self._u) < UPDATE_INTERVAL:
             return
         u, x = (np.concatenate(parts) for parts in (self._u, self._x))
         self._u, self._x = [], []
         self._estimator.absorb(u, x)
         self._compensator.model = self._estimator.model
-
-
-PARTS = "parts"
-# The default controller, changed: with the line alone, with one estimator, and with all the room.
-CANDIDATES = ("HysteresisRLS", "OutputErrorRLS", "PrandtlIshlinskiiRLS")  # of the default one
-ALONE = (*CANDIDATES, "HysteresisEKF")
-CHANGED = ("line", "no-corridor", *ALONE)
-NEEDED = ("step", "run", "learn")
-DEFAULT = "AdaptiveFeedforward" if hasattr(piezoest, "AdaptiveFeedforward") else PARTS
 
 
 def contender(name: str) -> Factory:
@@ -88,7 +79,7 @@ def _found(name: str) -> Any:
     if name in CHANGED:
         return functools.partial(piezoest.AdaptiveFeedforward, **_change(name))
     if ":" in name:
-        return imported(name)
+        return origin.imported(name)
     if not hasattr(piezoest, name):
         known = ", ".join((PARTS, *CHANGED))
         raise ValueError(f"controller {name}: choose {known}, a class of piezoest, or module:name")
