@@ -23,6 +23,11 @@ REACH = Reach(-100.0, 100.0)  # V
 WIDTH = (0.10, 0.18)  # of the loop over the reach, relative to its stroke
 GAIN = 0.155  # µm/V, mean slope over the reach
 CREEP = 0.02  # share of the displacement for each decade of time
+# Table I, triangle of 5 µm at 5 Hz: what a start would be that is right.
+RIGHT_MODEL = ColemanHodgdon(alpha=2.10e-2, beta=1.47e-1, gamma=4.29e-3)
+RIGHT_GAIN = LinearGain(GAIN)
+COLD, WARM = 0.5, 0.1  # a start parameter is off by up to this fraction of its value
+AMPLITUDE = 5.0  # µm, of the scenarios with one amplitude
 
 
 def make_stage(
@@ -51,14 +56,6 @@ def make_stage(
         gain_schedule=gain_schedule,
         seed=seed,
     )
-
-
-# Table I, triangle of 5 µm at 5 Hz: what a start would be that is right.
-RIGHT_MODEL = ColemanHodgdon(alpha=2.10e-2, beta=1.47e-1, gamma=4.29e-3)
-RIGHT_GAIN = LinearGain(GAIN)
-COLD, WARM = 0.5, 0.1  # a start parameter is off by up to this fraction of its value
-
-AMPLITUDE = 5.0  # µm, of the scenarios with one amplitude
 
 
 @dataclass(frozen=True, slots=True)

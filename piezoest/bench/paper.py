@@ -67,6 +67,10 @@ class Reference:
 
 PRBS = Reference("prbs", 5.0)
 TRIANGLES = tuple(Reference("triangle", *row) for row in ((2.5, 5.0), (5.0, 2.5), (5.0, 5.0), (7.5, 5.0)))
+REFERENCES = (*TRIANGLES, PRBS)
+CROSSED = ((TRIANGLES[0], TRIANGLES[3]), (TRIANGLES[3], TRIANGLES[0]))  # applied, found for
+SWEPT = TRIANGLES[2]  # the row of Figs. 3 and 4
+MEMORIES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # s; its period is 0.2 s
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,12 +193,6 @@ def last_periods(record: TrackingRecord, periods: int) -> TrackingRecord:
     names = ("reference", "voltage", "measured", "displacement")
     last = {name: getattr(record, name)[-n:].copy() for name in names}
     return dataclasses.replace(record, **last, parameters=record.theta[-n:].copy(), update_interval=1)
-
-
-REFERENCES = (*TRIANGLES, PRBS)
-CROSSED = ((TRIANGLES[0], TRIANGLES[3]), (TRIANGLES[3], TRIANGLES[0]))  # applied, found for
-SWEPT = TRIANGLES[2]  # the row of Figs. 3 and 4
-MEMORIES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # s; its period is 0.2 s
 
 
 @dataclass(frozen=True, slots=True)
