@@ -1,4 +1,4 @@
-"""Where nobody knows what the hysteresis remembers: the line drives, and all models have to show again."""
+"""Where what is known may be of no use: the line drives, and all models have to show again."""
 
 from typing import Any
 
@@ -6,7 +6,9 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest.controller import candidate, driving, slots
+from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
+from piezoest.controller import travel as travels
 
 # A voltage that may not have been written does not matter below this fraction of a swing.
 NOTHING = 1.0 / 64.0
@@ -31,4 +33,17 @@ def lose_write(state: Any) -> None:
     if state.since > 0.0:
         # Once for all that are lost in a row.
         reading.notice(state, reading.UNKNOWN)
+    all_models(state)
+
+
+@register_jitable
+def narrow(state: Any) -> None:
+    """Behind a wide way the reference may go on small: what was known of the wide one is of no use there."""
+    reference, line = state.reference, state.line
+    if not travels.is_over(reference, np.sqrt(state.readings.noise)):
+        return
+    least, waits = max(reference.back, travels.LEAST * reference.swing), reference.waits
+    travels.narrow(reference, waits, least)
+    travels.narrow(state.travel, waits, least / np.abs(line.gain))
+    lines.begin(line, line.gain, state.u, lines.at(line, state.u), least / np.abs(line.gain))
     all_models(state)

@@ -34,8 +34,8 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         # Reference planned for, voltage planned, voltage written.
         r=MEASURED, planned=MEASURED, u=MEASURED,
         # Farthest way from the start's voltage that was answered; travel of the reference with the voltage at
-        # a limit, and with a voltage that stood still.
-        confirmed=AMOUNT, railed=AMOUNT, frozen=AMOUNT,
+        # a limit, and with a voltage that stood still; samples of it out of reach.
+        confirmed=AMOUNT, railed=AMOUNT, frozen=AMOUNT, beyond=COUNT,
         # The model that drives, 0 for the line; what changes of the line owe; swings since another one drove,
         # those that one drives at least, changes so far.
         driving=whole(0.0, slots.MOST + 1.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,
@@ -48,7 +48,7 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
-        noticed=COUNT, notice=whole(0.0, 11.0), shaken=COUNT,
+        noticed=COUNT, notice=whole(0.0, 12.0), shaken=COUNT,
         # What the line misses, the most of late, what it missed of a swing when it drove; what the stage
         # misses of the reference.
         score=candidate.SCORE, widest=AMOUNT, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,

@@ -6,7 +6,18 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import candidate, doubt, driving, feedback, given, homing, outside, redraw, slots
+from piezoest.controller import (
+    candidate,
+    doubt,
+    driving,
+    feedback,
+    given,
+    homing,
+    outside,
+    reach,
+    redraw,
+    slots,
+)
 from piezoest.controller import line as lines
 from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
@@ -22,9 +33,9 @@ NEAR, LONGEST = 0.05, 50.0
 # The gain on the way is that of readings whose mean has gone this fraction of it, and at least this fraction
 # of the gain that the start has found: in the dead zone behind a turn there is hardly any answer.
 LEAST_WAY, LEAST_GAIN = 0.4, 0.5
-# The voltage may rest at a limit for this travel of the reference, in swings, before all begins anew; where
-# the stage stands beyond the reference there, the line follows sooner.
-RESTED, BEYOND = 4.0, 0.1
+# Where the voltage rests at a limit and the stage stands beyond the reference, the line follows after this
+# travel of the reference, in swings.
+BEYOND = 0.1
 # The models begin where the voltage is farther from where all began than this fraction of half the range, in
 # a unit that is usual then.
 WIDE, USUAL = 0.12, 0.4
@@ -182,27 +193,6 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
 
 
 @register_jitable
-def _leave_limit(state: Any, settings: Any, moved: Any) -> None:
-    """Where the voltage rests at a limit for long, all that is known may be wrong: start again.
-
-    Not where the readings agree with the line, and the stage stands before the reference: that is out of
-    reach.
-    """
-    left = (state.r - state.readings.last) * state.line.gain
-    short = (state.u <= settings.minimum and left < 0.0) or (state.u >= settings.maximum and left > 0.0)
-    if short and state.readings.fault == reading.NONE and state.readings.spikes == 0.0:
-        return
-    rests = state.u <= settings.minimum or state.u >= settings.maximum
-    # Beside a line that was learnt from wrong readings, right ones look scaled or moved.
-    fault = state.readings.fault
-    doubted = fault == reading.NONE or fault == reading.SCALED or fault == reading.MOVED
-    state.railed = state.railed + moved if rests and doubted else 0.0
-    if state.railed > RESTED * state.reference.swing:
-        state.stage, state.driving, state.feedback = SEEK, 0.0, 0.0
-        starts.begin_again(state.start, settings.start, state.u)
-
-
-@register_jitable
 def _learn_from(state: Any, settings: Any, x: Any, moved: Any) -> None:
     """Take a reading, NaN where it cannot be believed, after the voltage has been followed."""
     z = (x - state.zero) / state.unit
@@ -298,7 +288,7 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
             redraw.hold(state)
     # At a limit with the stage beyond the reference what is known is wrong.
     beyond = is_held(settings, u, (raw - state.r) * line.gain)
-    _leave_limit(state, settings, moved)
+    reach.watch(state, settings, moved)
     far = (beyond and state.railed > BEYOND * state.reference.swing) or redraw.is_young(state)
     if far and state.readings.fault == reading.NONE:
         redraw.follow(state)
@@ -376,6 +366,8 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     gone = travels.follow(state.travel, u)
     if state.stage == RUN and state.readings.fault == reading.NONE:
         redraw.draw(state)
+    if state.stage == RUN:
+        doubt.narrow(state)
     state.gone += gone
     state.handed += gone
     if state.scale > 0.0:

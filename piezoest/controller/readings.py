@@ -12,7 +12,7 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.controller import line as lines
-from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, record, whole
+from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, NUMBER, record, whole
 
 # Faults: none; no response; response the wrong way round; far too large or too small; the reading stops at a
 # level; the reading's zero has moved.
@@ -24,6 +24,8 @@ OTHER_GAIN, UNKNOWN, SHAKEN = 6.0, 7.0, 8.0
 FAST, LATE = 9.0, 10.0
 # Reference or voltage are outside what the user's model was learnt on.
 OUTSIDE = 11.0
+# The stage does not go as far as the reference.
+OUT_OF_REACH = 12.0
 FAULTS = (
     "",
     "no response",
@@ -37,12 +39,16 @@ FAULTS = (
     "resonance",
     "lag",
     "outside",
+    "out of reach",
 )
 
 READINGS = record(
     fault=whole(0.0, 5.0),
     # The last two finite readings, how many came, the voltage's travel since the last one changed.
     before=MEASURED, last=MEASURED, count=COUNT, still=AMOUNT,
+    # How far the last two were from the line, and the last one that was not alone; those alone in a row;
+    # mean square of what changes from one to the next [µm²].
+    beside_before=NUMBER, beside_last=NUMBER, beside_kept=NUMBER, alone=COUNT, changes=AMOUNT,
     # Mean square of the noise [µm²].
     noise=AMOUNT,
     # The widest swing of the voltage of late, the most legs of late that had agreed with the line.
@@ -88,6 +94,11 @@ OVER, OVER_STOPPED = 0.6, 1.6
 # Farthest from the line that a reading can be, in swings of the last legs, and in the widest of late: half a
 # loop and what a minor loop's slope adds; spikes in a row that are spikes.
 FAR, FAR_WITHIN, IN_A_ROW = 1.0, 0.4, 5.0
+# A reading is alone that is this fraction of a swing farther beside the line than those before it, and so
+# many times what is usual from one to the next; legs of the line before.
+ALONE, UNUSUAL, SEEN = 0.05, 6.0, 2.0
+# After so many readings, one adds no more to the noise than so many times its mean square.
+FIRST_NOISE, MOST_NOISE = 20.0, 4.0
 
 
 @register_jitable
@@ -97,15 +108,21 @@ def median(a: Any, b: Any, c: Any) -> float:
 
 
 @register_jitable
+def _mean_square(readings: Any, before: Any, square: Any) -> float:
+    """A mean of squares with the next one; rare readings that are wrong count for little."""
+    if readings.count > FIRST_NOISE:
+        square = min(square, MOST_NOISE * before + readings.step * readings.step)
+    return before + max(1.0 / readings.count, 2e-3) * (square - before)
+
+
+@register_jitable
 def _follow(readings: Any, x: Any, gone: Any) -> float:
     """Take a finite reading; the middle one of the last three."""
     if readings.count == 0.0:
         readings.before = readings.last = x
     readings.count += 1.0
     bend = x - 2.0 * readings.last + readings.before
-    share = max(1.0 / readings.count, 2e-3)
-    square = min(bend * bend / 6.0, 9.0 * readings.noise + 1e-3 * bend * bend)
-    readings.noise += share * (square - readings.noise)
+    readings.noise = _mean_square(readings, readings.noise, bend * bend / 6.0)
     change = np.abs(x - readings.last)
     if change > 0.0:
         readings.step = min(readings.step, change) if readings.step > 0.0 else change
@@ -214,6 +231,25 @@ def middle(readings: Any, x: Any) -> float:
 
 
 @register_jitable
+def _is_alone(readings: Any, line: Any, beside: Any) -> bool:
+    """Whether a reading is much farther beside the line than others: than the last good one, or the last two.
+
+    Not so many in a row: they show something. Nor where the line itself still moves.
+    """
+    change = beside - readings.beside_last
+    apart = max(np.abs(change), np.abs(beside - readings.beside_before))
+    near = max(UNUSUAL * np.sqrt(readings.changes), ALONE * np.abs(line.gain) * readings.swing)
+    fits = np.abs(beside - readings.beside_kept) < near or apart < near
+    readings.alone = 0.0 if fits else readings.alone + 1.0
+    alone = 0.0 < readings.alone <= IN_A_ROW and line.legs >= SEEN
+    readings.changes = _mean_square(readings, readings.changes, change * change)
+    readings.beside_before, readings.beside_last = readings.beside_last, beside
+    if not alone:
+        readings.beside_kept = beside
+    return alone
+
+
+@register_jitable
 def believed(
     readings: Any, line: Any, travel: Any, memory: Any, u: Any, x: Any, gone: Any, wanted: Any
 ) -> float:
@@ -232,7 +268,9 @@ def believed(
     noise = np.sqrt(readings.noise)
     farthest = max(FAR * travel.swing, FAR_WITHIN * readings.swing)
     bound = np.abs(line.gain) * farthest + 8.0 * noise
-    far = np.abs(x - lines.at(line, u)) > bound
+    beside = x - lines.at(line, u)
+    far = np.abs(beside) > bound
+    alone = _is_alone(readings, line, beside)
     readings.spikes = readings.spikes + 1.0 if far else 0.0
     off = readings.spikes > IN_A_ROW
     if readings.spikes == IN_A_ROW + 1.0:
@@ -248,4 +286,4 @@ def believed(
         readings.outliers += 1.0
     still = _stands_still(readings, line, travel, STANDS_STILL, 1.5)
     doubtful = readings.fault != NONE or readings.weak > DOUBT or readings.wrong > 0.0
-    return np.nan if doubtful or still or (far and (is_sure(readings) or not off)) else x
+    return np.nan if doubtful or still or alone or (far and (is_sure(readings) or not off)) else x

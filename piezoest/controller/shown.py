@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from piezoest.controller import candidate, slots
 from piezoest.controller.pace import WAVE
-from piezoest.controller.readings import FAST, FAULTS, LATE, OUTSIDE
+from piezoest.controller.readings import FAST, FAULTS, LATE, OUT_OF_REACH, OUTSIDE
 from piezoest.equations import loop_inverse, play_inverse
 from piezoest.layout import Named
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
@@ -34,9 +34,11 @@ MEANINGS = {
     "outside": "the reference is at {r} µm and the voltage at {u} V, the model that you gave was learnt from "
     "{displacement} and from {voltage}: the controller learns on, but a model that is to hold there must be "
     "identified from a log that goes as far",
+    "out of reach": "the reference asks for {wanted:.4g} µm, and the stage is at {there:.4g} µm with the "
+    "voltage at its limit of {limit:.4g} V: keep the reference within what the stage reaches",
 }
 # Of what is noted beside faults, that which the user is to change.
-WARNINGS = (FAST, LATE, OUTSIDE)
+WARNINGS = (FAST, LATE, OUTSIDE, OUT_OF_REACH)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +92,8 @@ def event(state: Any, sample_rate: float, learnt_on: Any) -> Event:
         return Event(time, "resumed", "the readings follow the voltage again")
     action = "fell back" if number == state["readings"]["fault"] else "went on"
     start = {each: float(state["start"][each]) + 0.0 for each in ("gain", "gain_before")}
-    figures = start | _pace(state, sample_rate) | _outside(state, learnt_on)
+    here = {"wanted": state["r"], "there": state["readings"]["last"], "limit": state["u"]}
+    figures = start | here | _pace(state, sample_rate) | _outside(state, learnt_on)
     return Event(time, action, f"{name}: {MEANINGS[name].format_map(figures)}")
 
 

@@ -52,8 +52,8 @@ SETTINGS = record(
 )  # fmt: skip
 
 # An answer is clear above so many times the noise at rest, the scatter within a window, and the step of the
-# converter; two are alike within this factor.
-CLEAR, SCATTERS, STEPS, ALIKE = 6.0, 3.0, 10.0, 1.6
+# converter, on the longest way fewer; two are alike within this factor.
+CLEAR, SCATTERS, STEPS, FEW_STEPS, ALIKE = 6.0, 3.0, 10.0, 4.0, 1.6
 # An answer so many times as clear is sure by itself, if it came to rest within so many windows, for hum rests
 # only for a moment, and the last two are this close to it, for a slow amplifier is still on its way.
 SURE, AT_ONCE, CLOSE = 3.0, 4.0, 0.02
@@ -190,14 +190,14 @@ def _rests(start: Any, settings: Any) -> bool:
     still = np.abs(start.mean - start.mean_before) < most
     still = still and (not slow or np.abs(start.mean - start.oldest_mean) < most)
     # Where nothing is seen yet, it may be late.
-    least = 1.0 if np.abs(start.now - start.from_x) > _clear(start) else LATE
+    least = 1.0 if np.abs(start.now - start.from_x) > _clear(start, STEPS) else LATE
     return start.windows > least and (still or start.windows >= MOST_WINDOWS)
 
 
 @register_jitable
-def _clear(start: Any) -> float:
-    """What an answer must exceed to be one: noise, scatter and the step of the converter."""
-    return max(CLEAR * start.noise, STEPS * start.step, SCATTERS * start.scatter)
+def _clear(start: Any, steps: Any) -> float:
+    """What an answer must exceed to be one: noise, scatter and steps of the converter."""
+    return max(CLEAR * start.noise, steps * start.step, SCATTERS * start.scatter)
 
 
 @register_jitable
@@ -205,7 +205,10 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     """What the way has shown: done if two were answered alike, else another, twice as long."""
     answer = start.now - start.from_x
     start.gain_before, start.gain = start.gain, answer / (u - start.from_u) if u != start.from_u else 0.0
-    bound = _clear(start)
+    # A sensor that has not changed by a bit on all ways is asked again by the shortest one alone.
+    dead = start.step == 0.0 and start.tries >= 1.0
+    longest = np.abs(start.way) >= settings.longest or dead
+    bound = _clear(start, FEW_STEPS if longest else STEPS)
     clear = u != start.from_u and np.abs(answer) > bound
     rests = start.windows <= AT_ONCE and np.abs(start.mean - start.now) < CLOSE * np.abs(answer)
     # Who comes more slowly than the voltage went may still be on the way: a slow amplifier, or a lag.
@@ -213,9 +216,6 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     start.fastest = change if change < SLOW * np.abs(u - start.from_u) / settings.ramp else 0.0
     sure = rests and np.abs(answer) > SURE * bound and start.told == 0.0 and start.fastest == 0.0
     alike = sure or (start.ways > 0.0 and 1.0 / ALIKE < start.gain / start.gain_before < ALIKE)
-    # A sensor that has not changed by a bit on all ways is asked again by the shortest one alone.
-    dead = start.step == 0.0 and start.tries >= 1.0
-    longest = np.abs(start.way) >= settings.longest or dead
     start.from_x = start.now
     if start.target == start.origin and start.ways == 0.0 and start.tries > 0.0:
         start.stage, start.samples = SILENT, 0.0

@@ -12,12 +12,13 @@ from piezoest.layout import COUNT, DISTANCE, FLAG, MEASURED, SIGN, record
 
 # Direction of travel, furthest value in it, where this leg began, length of the last leg; size of a usual
 # swing, least one before two turns were seen; turns so far, the last value, whether it has just turned;
-# samples of this leg and of the last one; the extremes of late; whether each of the last two legs, this
-# one and the last, is no longer than the one before it.
+# samples of this leg, those since the furthest value, and those of the last leg; the farthest way back since
+# then; the extremes of late; whether each of the last two legs, this one and the last, is no longer than the
+# one before it.
 TRAVEL = record(
     direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE, swing=DISTANCE, least=DISTANCE,
-    turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, usual=COUNT,
-    highest=MEASURED, lowest=MEASURED, nested=FLAG,
+    turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, waits=COUNT, usual=COUNT,
+    back=DISTANCE, highest=MEASURED, lowest=MEASURED, nested=FLAG,
 )  # fmt: skip
 
 # A way back of this fraction of a swing is a turn; so many turns show a swing. Before, a smaller one is: the
@@ -27,6 +28,9 @@ TURN, SHOWN, FIRST_TURN = 0.05, 2.0, 0.02
 LONGER = 0.1
 # A leg is long that has taken so many times the last one.
 LONG = 2.0
+# What was wide is over where the signal stays back for long, and moves to and fro there by this fraction of
+# the swing, and by so many times the noise of a reading.
+SMALL, NOISE = 1e-3, 10.0
 # No swing counts for less than this fraction of the one before: noise at rest would.
 LEAST = 0.02
 # At each turn the extremes come nearer to the present leg by this fraction of the way there.
@@ -37,7 +41,8 @@ FADES = 0.1
 def begin(travel: Any, value: Any, least: Any) -> None:
     """Begin, or start again, at a value; no swing is smaller than `least` until two turns were seen."""
     travel.furthest = travel.turned = travel.last = travel.highest = travel.lowest = value
-    travel.direction = travel.leg = travel.turns = travel.count = travel.usual = 0.0
+    travel.direction = travel.leg = travel.turns = travel.back = 0.0
+    travel.count = travel.waits = travel.usual = 0.0
     travel.swing = travel.least = least
 
 
@@ -48,17 +53,21 @@ def follow(travel: Any, value: Any) -> float:
     travel.last = value
     travel.turned_now = 0.0
     travel.count += 1.0
+    travel.waits += 1.0
     way = value - travel.furthest
     if travel.direction * way >= 0.0:
         if travel.direction == 0.0:
             travel.direction = np.sign(way)
+        if way != 0.0:
+            travel.waits = travel.back = 0.0
         travel.furthest = value
     elif np.abs(way) > (TURN if travel.turns >= SHOWN else FIRST_TURN) * travel.swing:
         leg = np.abs(travel.furthest - travel.turned)
         travel.turns += 1.0
         swing = max(leg, travel.leg, LEAST * travel.swing, travel.least if travel.turns < SHOWN else 0.0)
         travel.turned_now = 1.0
-        travel.usual, travel.count = travel.count, 0.0
+        travel.usual = travel.count
+        travel.count = travel.waits = travel.back = 0.0
         travel.nested = 1.0 if leg <= (1.0 + LONGER) * travel.leg else 0.0
         travel.swing, travel.leg = swing, leg
         travel.turned = travel.furthest
@@ -66,11 +75,28 @@ def follow(travel: Any, value: Any) -> float:
         travel.direction = -travel.direction
         travel.highest += FADES * (max(travel.turned, value) - travel.highest)
         travel.lowest += FADES * (min(travel.turned, value) - travel.lowest)
+    travel.back = max(travel.back, np.abs(value - travel.furthest))
     if np.abs(value - travel.turned) > (1.0 + LONGER) * travel.leg:
         travel.nested = 0.0
     travel.highest, travel.lowest = max(travel.highest, value), min(travel.lowest, value)
     travel.swing = max(travel.swing, np.abs(value - travel.turned))
     return gone
+
+
+@register_jitable
+def is_over(travel: Any, noise: Any) -> bool:
+    """Whether what goes on behind a wide leg is too small for a turn; `noise` is that of a reading."""
+    if travel.waits <= LONG * max(travel.usual, travel.count - travel.waits, 8.0):
+        return False
+    fro = travel.back - np.abs(travel.last - travel.furthest)
+    return fro > max(SMALL * travel.swing, NOISE * noise)
+
+
+@register_jitable
+def narrow(travel: Any, waits: Any, least: Any) -> None:
+    """Start again with a small swing, at the last value; a leg may take as long as the signal has waited."""
+    begin(travel, travel.last, least)
+    travel.usual = waits
 
 
 @register_jitable

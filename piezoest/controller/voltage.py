@@ -33,21 +33,29 @@ def is_held(settings: Any, u: Any, way: Any) -> bool:
 
 
 @register_jitable
-def _feed_forward(state: Any, settings: Any, r: Any) -> float:
-    """Voltage of the model that drives, in the corridor around the line, for reference and feedback."""
+def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
+    """Voltage of the model that drives, in the corridor around the line, for reference and feedback.
+
+    `before` is the reference planned for last.
+    """
     line = state.line
     swing = max(state.reference.swing, np.abs(r - state.reference.turned))
     kept = redraw.kept(state, settings, np.abs(r - state.reference.last), swing)
+    onward = (r - before) / line.gain
     r += state.feedback
     straight = wanted = lines.voltage(line, r - state.owed * kept * state.unit)
-    if state.pending <= 1.0 and state.readings.fault == reading.NONE and state.driving > 0.0:
+    drives = state.readings.fault == reading.NONE and state.driving > 0.0
+    if drives and state.pending > 1.0:
+        # Nobody has said yet what became of the last voltage: go on from there, along the line.
+        wanted = state.planned + onward
+    elif drives:
         owed = slots.owed(state.candidates, state.driving, 0.0)
         z = (r - state.zero) / state.unit - owed * kept
         wanted = slots.voltage(state.candidates, settings.candidates, state.driving, z, straight)
         # Near a turn the inverse of a wide loop leaps, which would shake a resonance.
-        before = state.reference.last + state.back
+        learnt = state.reference.last + state.back
         ahead = lines.voltage(line, r - owed * kept * state.unit)
-        ahead -= lines.voltage(line, before - owed * state.unit)
+        ahead -= lines.voltage(line, learnt - owed * state.unit)
         most = (RATE - 1.0) * np.abs(ahead)
         wanted = min(max(wanted, state.u + ahead - most), state.u + ahead + most)
     if not np.abs(wanted) < WILDEST:
@@ -82,7 +90,7 @@ def plan(state: Any, settings: Any, r: Any) -> float:
     if not np.abs(r) < WILDEST:
         r = state.r
         state.missing += 1.0
-    state.r = r
+    before, state.r = state.r, r
     if state.stage == SEEK:
         wanted = state.start.voltage
     elif state.stage == APPROACH:
@@ -95,7 +103,7 @@ def plan(state: Any, settings: Any, r: Any) -> float:
     elif state.stage == HOME:
         wanted = homing.voltage(state.homing, state.u)
     else:
-        wanted = _feed_forward(state, settings, r)
+        wanted = _feed_forward(state, settings, r, before)
     if not np.abs(wanted) < WILDEST:
         wanted = state.u
     step = settings.largest_step
