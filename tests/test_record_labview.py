@@ -111,6 +111,6 @@ def test_write_tdms(tmp_path: Path) -> None:
     assert record.notes[0] == "sample rate of 100 Hz as the file states it"
     with pytest.raises(ValueError, match="there are the columns run/drive, run/gauge"):
         read_record(file, columns={"voltage": "nope"})
-    with pytest.raises(ValueError, match="no column for time"):
+    with pytest.raises(ValueError, match="different sample rates, 2 Hz and 100 Hz"):
         read_record(write_tdms(file, wf_increment=0.5))
     assert read_record(file, sample_rate=50.0).sample_rate == 50.0

@@ -120,6 +120,11 @@ def _guess(source: Source, quantity: str) -> int:
         raise LogError(
             f"{source.path}: the columns {titles} could all be the {quantity}: name the one that is"
         )
+    if quantity == "time" and source.no_rate:
+        raise LogError(
+            f"{source.path}: {source.no_rate}; save voltage and displacement at one rate, or give the rate "
+            "of both"
+        )
     hint = " or give the sample rate" if quantity == "time" else ""
     raise LogError(f"{source.path}: no column for {quantity} found; there {_listed(source)}: name it{hint}")
 

@@ -253,10 +253,22 @@ def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
 # ---------------------------------------------------------------- TDMS
 
 
-def open_tdms(path: Path) -> Table:
+def open_tdms(path: Path) -> Source:
     """Open a TDMS file: each channel a column, by ``group/channel``; waveforms state the sample rate."""
     nptdms = _extras.load("nptdms", EXTRA, "reading TDMS")
-    return Table(path, "TDMS", lambda: _opened_tdms(nptdms, path), _in_tdms, separator="/")
+    return Tdms(path, nptdms)
+
+
+class Tdms(Table):
+    """A TDMS file, which may have channels of several sample rates."""
+
+    def __init__(self, path: Path, nptdms: Any) -> None:
+        super().__init__(path, "TDMS", lambda: _opened_tdms(nptdms, path), _in_tdms, separator="/")
+        with damaged(path, "TDMS"), self._opened() as file:
+            steps = {_step(channel) for group in file.groups() for channel in group.channels()} - {None}
+        if len(steps) > 1:
+            rates = " and ".join(f"{rate:.6g} Hz" for rate in sorted(1.0 / step for step in steps if step))
+            self.no_rate = f"its channels have different sample rates, {rates}"
 
 
 @contextlib.contextmanager
@@ -288,9 +300,14 @@ def _in_tdms(file: Any) -> Iterator[Named]:
             )
             yield f"{group.name}/{channel.name}", channel, "s" if stamped else unit
             if not stamped:
-                rates.add(stated_rate(channel.properties.get(INCREMENT)))
+                rates.add(_step(channel))
     if len(rates) == 1 and (increment := rates.pop()):
         yield "fs", np.asarray(1.0 / increment), ""
+
+
+def _step(channel: Any) -> float | None:
+    """Time from one sample of a channel to the next [s], if it is stated."""
+    return stated_rate(channel.properties.get(INCREMENT))
 
 
 class Parquet(Source):

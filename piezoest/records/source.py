@@ -46,6 +46,7 @@ class Source(abc.ABC):
     size = 0
     whole = ""
     sample_rate: float | None = None  # [Hz], if the file states it beside the columns
+    no_rate = ""  # why what it states is no rate for all of them
 
     def __init__(self, path: Path, names: list[str], titles: list[str], width: int) -> None:
         self.path, self.names, self.titles, self.width = path, names, titles, width
