@@ -259,7 +259,7 @@ class EstimatorBase(Copied, ABC):
         """
         u, x = self._records(u, x)
         if record and (unknown := sorted(set(record) - {"y", "S", "P"})):
-            raise ValueError(f"record holds unknown names {unknown}: choose of 'y', 'S', 'P'")
+            raise ValueError(f"record holds unknown names {unknown}: choose from 'y', 'S', 'P'")
         every = integer("every", every, 1)
         return self._run(u, x, every, frozenset(record))
 

@@ -134,7 +134,7 @@ class BatchFit(Hopping):
             self._fixed.setdefault("offset", self._initial.offset)
         varied = self._coordinates
         if unknown := sorted(set(self._fixed) - set(varied.parameters)):
-            raise ValueError(f"fixed holds unknown names {unknown}: choose of {varied.parameters}")
+            raise ValueError(f"fixed holds unknown names {unknown}: choose from {varied.parameters}")
         if not varied.free:
             raise ValueError("fixed leaves nothing to fit: hold fewer parameters")
         varied.model.check_fixed(self._fixed)

@@ -25,7 +25,10 @@ MOST_PASSES, TOLERANCE = 40, 1e-6
 
 
 class Polished(NamedTuple):
-    """Columns of another alpha, coefficients, delay, what is missed, standard errors by name, SciPy's gap."""
+    """Columns of another alpha, coefficients, delay, what is missed, standard errors by name, SciPy's gap.
+
+    `parameters` is how many were fitted.
+    """
 
     basis: LoopColumns
     w: FloatArray
@@ -33,6 +36,7 @@ class Polished(NamedTuple):
     cost: float
     standard_errors: dict[str, float]
     gap: float
+    parameters: int
 
 
 def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Polished:
@@ -60,5 +64,6 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     w[: offset + 1] = found.c - 2.0 * found.b, found.b, value["initial_state"], found.offset
     errors = dict(zip(end.parameter_names, end.standard_errors.tolist(), strict=True))
     return Polished(
-        LoopColumns(found.alpha), w, value["delay"], problem.cost(solution.q), errors, problem.gap(solution.q)
-    )
+        LoopColumns(found.alpha), w, value["delay"], problem.cost(solution.q), errors,
+        problem.gap(solution.q), len(varied.free),
+    )  # fmt: skip
