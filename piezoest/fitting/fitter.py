@@ -12,7 +12,7 @@ from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.design import Design
 from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.fitting.forms import FORMS, Form
-from piezoest.fitting.gaps import forgotten
+from piezoest.fitting.gaps import remembered
 from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.outliers import lonely, unsettled
 from piezoest.fitting.play_columns import PlayColumns, Start
@@ -25,8 +25,6 @@ from piezoest.symbolic import quadratic_solver
 FEWEST_SAMPLES = 50
 # A displacement that rises by no more than this fraction of its size over the record stands still.
 ROUNDING = 1e-9
-# Samples behind gaps of the voltage are only left out if this part of all remains.
-ENOUGH = 0.5
 # Times that a start which has not settled is looked for, each without what was found before.
 PASSES = 3
 SOLVER = "{} through CasADi; SciPy's bounded least squares agrees to {:.0e}"
@@ -130,21 +128,23 @@ class Fitter:
                 f"u and x have {np.count_nonzero(counts)} samples in common, at least {FEWEST_SAMPLES} are "
                 "needed"
             )
-        self._given = bridged(u)
-        if np.ptp(self._given) == 0.0:
-            raise ValueError(f"u must move, it stays at {self._given[0]:g} V")
         delay = search.checked_delay(delay)
         flaws = flawed(u, x) if flaws is None else flaws
         if flaws.unusable.size != u.size:
             raise ValueError(f"flaws must be those of u and x: {u.size} samples, got {flaws.unusable.size}")
+        u = flaws.without(u)
+        self._given = bridged(u)
+        if np.ptp(self._given) == 0.0:
+            raise ValueError(f"u must move, it stays at {self._given[0]:g} V")
         counts &= ~flaws.unusable
-        remembered = counts & ~forgotten(u, self._given)
-        counts = remembered if np.count_nonzero(remembered) > ENOUGH * np.count_nonzero(counts) else counts
+        counts = remembered(u, self._given, counts)
         self.delay_estimated = delay == "auto"
         self._log = Log(
             self._given, np.where(counts, x, 0.0), counts, self._rate, flaws.jumps.astype(np.float64)
         )
         gain = search.line_gain(self._log)
+        if np.ptp(x[counts]) == 0.0:
+            raise ValueError(f"x must move with u, it stays at {x[counts][0]:g} µm")
         if gain * np.ptp(self._given) <= ROUNDING * np.max(np.abs(self._log.x)):
             raise ValueError(
                 f"x must rise with u, a straight line has {gain:.4g} µm/V: change the sign of one of them"
@@ -283,7 +283,7 @@ class Fitter:
             delay, errors, gap = found.delay, found.standard_errors, found.gap
             log = replace(log, u=late(self._given, delay))
             fitted = replace(search.regression(log, found.basis).best(), w=found.w)
-            parameters = 5 + self.delay_estimated
+            parameters = found.parameters
         else:
             gap = fitted.regression.gap(fitted)
             # Creep gains are no columns of the last linear program, but they were fitted as well.

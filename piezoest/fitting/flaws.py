@@ -9,6 +9,7 @@ import numpy as np
 from piezoest._checks import FloatArray, array_1d
 from piezoest.compile import Vector, compiled
 from piezoest.fitting.coordinates import bridged
+from piezoest.fitting.lost_voltage import delay_of, lost_voltage
 from piezoest.fitting.rests import rests_of
 from piezoest.fitting.rows import dot
 from piezoest.fitting.runs import BoolArray, IntArray, runs
@@ -21,8 +22,7 @@ UNUSUAL = 6.0
 SMALLEST_SPIKE, SMALLEST_JUMP = 1e-3, 5e-3
 LONGEST_SPIKE = 3
 PASSES = 4
-# Steps of the voltage explain what happens up to so many samples later, and this much more than their size.
-LONGEST_DELAY = 30
+# Steps of the voltage explain what happens for some samples, and this much more than their size.
 FORGOTTEN_PER_SAMPLE = 0.98
 EXPLAINED_BY_STEP = 3.0
 # Part of the displacement that the voltage moves in a sample which a kink of the hysteresis may take or give.
@@ -60,6 +60,9 @@ class Flaws(NamedTuple):
         [µm].
     rests : ndarray, shape (R, 2), int
         Stretches [start, end) in which the voltage stands still.
+    voltage : ndarray, shape (N,), bool
+        Samples of the voltage that the displacement does not answer: spikes, zeros, and those at which the
+        column stands still while the stage moves.
     """
 
     spikes: BoolArray
@@ -67,11 +70,22 @@ class Flaws(NamedTuple):
     jumps: IntArray
     jump_sizes: FloatArray
     rests: IntArray
+    voltage: BoolArray
 
     @property
     def unusable(self) -> BoolArray:
         """Samples that a fit should leave out, shape (N,)."""
-        return self.spikes | self.dropouts
+        return self.spikes | self.dropouts | self.voltage
+
+    def without(self, u: FloatArray) -> FloatArray:
+        """The voltage with NaN where it is wrong.
+
+        Parameters
+        ----------
+        u : ndarray, shape (N,)
+            [V].
+        """
+        return np.where(self.voltage, np.nan, u)
 
     def before(self, end: int) -> Flaws:
         """Those of the first samples.
@@ -88,6 +102,7 @@ class Flaws(NamedTuple):
             self.jumps[jumps],
             self.jump_sizes[jumps],
             self.rests[rests],
+            self.voltage[:end],
         )
 
     @property
@@ -130,11 +145,14 @@ def flawed(u: Any, x: Any) -> Flaws:
     if u.size != x.size:
         raise ValueError(f"x must have shape ({u.size},) as u has, got ({x.size},)")
     known = np.isfinite(u) & np.isfinite(x)
-    nothing = np.zeros(u.size, dtype=np.bool_)
-    empty = Flaws(nothing, nothing.copy(), np.empty(0, np.int64), np.empty(0), np.empty((0, 2), np.int64))
+    spikes, dropouts, wrong = np.zeros((3, u.size), dtype=np.bool_)
+    nowhere = np.empty(0, np.int64)
+    empty = Flaws(spikes, dropouts, nowhere, np.empty(0), nowhere.reshape(0, 2), wrong)
     if np.sum(known) < FEWEST_SAMPLES or np.ptp(u[known]) == 0.0:
         return empty
-    u = bridged(u)
+    wrong = lost_voltage(u, x) if np.ptp(x[known]) > 0.0 else empty.voltage
+    known &= ~wrong
+    u = bridged(np.where(wrong, np.nan, u))
     rests = rests_of(u)
     if np.ptp(x[known]) == 0.0:
         return empty._replace(rests=rests)
@@ -142,7 +160,7 @@ def flawed(u: Any, x: Any) -> Flaws:
     dropouts = _dropouts(log, known)
     spikes, clean = _spikes(log, dropouts)
     jumps, sizes = _jumps(log, clean, spikes | dropouts)
-    return Flaws(spikes & known, dropouts, jumps, sizes, rests)
+    return Flaws(spikes & known, dropouts, jumps, sizes, rests, wrong)
 
 
 class _Log:
@@ -152,7 +170,7 @@ class _Log:
         self.u, self.x = u, x
         low, high = np.quantile(x, [0.001, 0.999])
         self.range = float(high - low) or float(np.ptp(x))
-        self.delay = _delay(u, x)
+        self.delay = delay_of(u, x)
         self.late = u[np.maximum(np.arange(u.size) - self.delay, 0)]
         self.gain = _gain(self.late, x)
         moved = np.abs(np.diff(x))
@@ -173,19 +191,6 @@ def _gain(u: FloatArray, x: FloatArray) -> float:
     """Size of the slope of the displacement over the voltage [µm/V]; jumps and spikes do little to it."""
     about = u - np.mean(u)
     return abs(dot(about, x)) / dot(about, about)
-
-
-def _delay(u: FloatArray, x: FloatArray) -> int:
-    """Samples by which bends of the displacement come after those of the voltage; 0 if that does not show."""
-    size = min(u.size, 200_000)
-    bent_u, bent_x = np.diff(u[:size], 2), np.diff(x[:size], 2)
-    # A spike must not decide.
-    bent_x = np.clip(bent_x, *np.quantile(bent_x, [0.01, 0.99]))
-    longest = min(LONGEST_DELAY, bent_u.size // 4)
-    match = [dot(bent_u[: bent_u.size - d], bent_x[d:]) for d in range(longest + 1)]
-    chance = float(np.linalg.norm(bent_u)) * float(np.std(bent_x))
-    best = int(np.argmax(match))
-    return best if match[best] - match[0] > UNUSUAL * chance else 0
 
 
 @compiled

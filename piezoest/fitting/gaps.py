@@ -11,6 +11,21 @@ FAST = 0.99
 SMALL, NEAR = 0.1, 0.02
 # After a travel of so many ranges a stage is known well enough in any case.
 LONGEST = 4.0
+# Samples behind gaps are only left out if this part of all remains.
+ENOUGH = 0.5
+
+
+def remembered(u: FloatArray, bridged: FloatArray, counts: BoolArray) -> BoolArray:
+    """Of the samples that count, those at which no turn in a gap is remembered; all of them if those are few.
+
+    Parameters
+    ----------
+    u, bridged : ndarray, shape (N,)
+        Voltage, NaN where it is missing, and with straight lines there [V].
+    counts : ndarray, shape (N,), bool
+    """
+    known = counts & ~forgotten(u, bridged)
+    return known if np.count_nonzero(known) > ENOUGH * np.count_nonzero(counts) else counts
 
 
 def forgotten(u: FloatArray, bridged: FloatArray) -> BoolArray:

@@ -7,9 +7,13 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.fitting.coordinates import bridged, late
+from piezoest.fitting.flaws import Flaws
+from piezoest.fitting.gaps import remembered
+from piezoest.fitting.runs import BoolArray
 from piezoest.identification.examined import FEWEST_TURNS
 from piezoest.identification.sense import Finding
 from piezoest.models import ColemanHodgdon, LinearGain
+from piezoest.records import Record
 from piezoest.records.source import counted
 from piezoest.signals.turns import TURN, turns
 
@@ -58,6 +62,13 @@ def prepare(voltage: FloatArray, displacement: FloatArray) -> Data:
     return Data(bridged(voltage), displacement, np.isfinite(voltage) & np.isfinite(displacement))
 
 
+def judged(record: Record, flaws: Flaws, trained: int = 0) -> BoolArray:
+    """Samples without flaw at which no turn in a gap is remembered, in the fitted part and behind it."""
+    u, counts = flaws.without(record.voltage), record.usable & ~flaws.unusable
+    whole, later = bridged(u), np.arange(counts.size) >= trained
+    return remembered(u, whole, counts & ~later) | remembered(u, whole, counts & later)
+
+
 def noise_of(data: Data) -> float:
     """Standard deviation of the displacement's noise [µm], from its third differences, robustly.
 
@@ -87,6 +98,11 @@ def check_excitation(data: Data, noise: float, found: Iterable[Finding]) -> None
             "turns"
         )
     extent = float(np.ptp(data.x[data.counts]))
+    if extent == 0.0:
+        raise ValueError(
+            f"the displacement stays at {data.x[data.counts][0]:.6g} µm over the fitted part: check that the "
+            "right column was taken and the sensor was on"
+        )
     if extent < SMALLEST_SIGNAL_TO_NOISE * noise:
         raise ValueError(
             f"too little excitation: the displacement moves by {extent:.3g} µm in noise of {noise:.3g} µm "

@@ -23,7 +23,7 @@ class Examined:
         self.record, self.rate = record, record.sample_rate
         self.counts = record.usable
         self.flaws: Flaws = flawed(record.voltage, record.displacement)
-        self.u = bridged(record.voltage)
+        self.u = bridged(self.flaws.without(record.voltage))
         self.x = bridged(np.where(self.flaws.unusable, np.nan, record.displacement))
         self.swing = float(np.ptp(self.u))
         self.turns = turns(self.u, TURN * self.swing)

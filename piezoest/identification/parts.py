@@ -55,8 +55,9 @@ def parts(log: RecordStream, delay: float, progress: Progress | None) -> Iterato
             before = np.full(int(np.ceil(delay)) + 2, first)
             for k in range(0, seen, PART):
                 yield Part(k, np.full(PART, first), np.zeros(PART), np.zeros(PART, np.bool_))
-        counts = known & np.isfinite(x)
-        counts &= ~flawed(np.where(known, u, np.nan), x).unusable
+        flaws = flawed(np.where(known, u, np.nan), x)
+        counts = known & np.isfinite(x) & ~flaws.unusable
+        u = flaws.without(u)
         path = np.concatenate([before, u])
         path = path[np.maximum.accumulate(np.where(np.isfinite(path), np.arange(path.size), 0))]
         now = np.arange(before.size, path.size) - int(whole)

@@ -10,10 +10,11 @@ import numpy as np
 from piezoest._checks import FloatArray, fraction, instance
 from piezoest.fitting import FORMS, Fitter
 from piezoest.fitting.flaws import Flaws, flawed
+from piezoest.fitting.runs import BoolArray
 from piezoest.fitting.search import checked_delay
 from piezoest.identification.advice import advice_of
 from piezoest.identification.choice import best_of, reason_for
-from piezoest.identification.data import Data, check_excitation, noise_of, prepare
+from piezoest.identification.data import Data, check_excitation, judged, noise_of, prepare
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.repeats import noise_floor
 from piezoest.identification.residual import Misfit, Whiteness
@@ -113,11 +114,16 @@ def identify(
     record = as_record(data, displacement, sample_rate=sample_rate, columns=columns, units=units)
     logs = instance("validate", validate, (list, tuple), "a list of logs: validate=[log]")
     others = [as_record(each) for each in logs]
-    for each in others:
-        _enough("part to validate", each, slice(None))
+    validated = [(each, flawed(each.voltage, each.displacement)) for each in others]
+    for each, its in validated:
+        _enough("part to validate", each, judged(each, its))
     say("looking at the log")
     trained = round(train * len(record))
-    first = _checked(record, trained)
+    flaws = flawed(record.voltage, record.displacement)
+    counts = judged(record, flaws, trained)
+    _enough("fitted part", record, counts[:trained])
+    _enough("held-out part", record, counts[trained:])
+    first = prepare(flaws.without(record.voltage)[:trained], record.displacement[:trained])
     noise = noise_of(first)
     found = findings(record)
     check_excitation(first, noise, found)
@@ -126,7 +132,7 @@ def identify(
     ]
     if strict and (doubts := [*_doubts(found), *of_others]):
         raise ValueError(" ".join(doubts))
-    flaws = flawed(record.voltage, record.displacement)
+    record = dataclasses.replace(record, voltage=flaws.without(record.voltage))
     wanted = checked_delay(delay)
     told = wanted != "auto" or tells_lag(first.u)
     fitter = Fitter(
@@ -141,7 +147,7 @@ def identify(
     candidates = []
     for name in FORMS if model == "auto" else dict.fromkeys(("line", model)):
         say(f"fitting {FORMS[name].label}")
-        candidates.append(_candidate(fitter, name, record, flaws, trained))
+        candidates.append(_candidate(fitter, name, record, flaws, counts))
     unknown = {each.name: said for each in candidates if (said := _unknown(each, first))}
     if model in unknown:
         raise ValueError(unknown[model])
@@ -161,7 +167,7 @@ def identify(
         findings=found,
         flaws=flaws,
         learnt_on=LearntOn.of(record.voltage[:trained], record.displacement[:trained], record.sample_rate),
-        validations=tuple(Validation.of(best.fit, each) for each in others),
+        validations=tuple(Validation.of(best.fit, *each) for each in validated),
     )
     return dataclasses.replace(result, advice=(*advice_of(result, first), *of_others))
 
@@ -170,15 +176,8 @@ def _doubts(found: Sequence[Finding]) -> list[str]:
     return [each.sentence for each in found if each.severity == "doubt"]
 
 
-def _checked(record: Record, trained: int) -> Data:
-    """Data of the fitted part, if there is enough in both parts."""
-    _enough("fitted part", record, slice(0, trained))
-    _enough("held-out part", record, slice(trained, None))
-    return prepare(record.voltage[:trained], record.displacement[:trained])
-
-
-def _enough(name: str, record: Record, part: slice) -> None:
-    usable = int(np.sum(record.usable[part]))
+def _enough(name: str, record: Record, counts: BoolArray) -> None:
+    usable = int(np.count_nonzero(counts))
     if usable < FEWEST_SAMPLES:
         raise ValueError(
             f"the {name} of {record.source} has {counted(usable, 'usable sample')}, at least "
@@ -186,13 +185,13 @@ def _enough(name: str, record: Record, part: slice) -> None:
         )
 
 
-def _candidate(fitter: Fitter, name: str, record: Record, flaws: Flaws, trained: int) -> Candidate:
+def _candidate(fitter: Fitter, name: str, record: Record, flaws: Flaws, counts: BoolArray) -> Candidate:
     """One kind fitted, and what it misses: jumps behind the fitted part are the sensor's, not the model's."""
     fit = fitter.form(name)
     prediction = fit.continued(record.voltage)
-    error = np.where(flaws.unusable, np.nan, record.displacement) - prediction.x
-    error[~np.isfinite(record.voltage)] = np.nan
-    error[fit.left_out : trained][~fit.counts[fit.left_out :]] = np.nan
+    counts, trained = counts.copy(), fit.counts.size
+    counts[fit.left_out : trained] = fit.counts[fit.left_out :]
+    error = np.where(counts, record.displacement, np.nan) - prediction.x
     later = flaws.jumps >= trained
     for place, size in zip(flaws.jumps[later], flaws.jump_sizes[later], strict=True):
         error[place:] -= size

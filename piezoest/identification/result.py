@@ -14,6 +14,7 @@ from piezoest.fitting import Fit, Prediction
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
 from piezoest.fitting.regression import Fitted
+from piezoest.identification.data import judged
 from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.sense import Finding
 from piezoest.identification.told import Kind, Row, figures_of, parameter_rows
@@ -108,10 +109,10 @@ class Validation(NamedTuple):
     without_mean: Misfit
 
     @classmethod
-    def of(cls, fit: Fit, other: Record) -> Validation:
-        """Judge a fit on another record."""
-        error = other.displacement - fit.elsewhere(other.voltage, sample_rate=other.sample_rate)
-        error[~np.isfinite(other.voltage)] = np.nan
+    def of(cls, fit: Fit, other: Record, flaws: Flaws) -> Validation:
+        """Judge a fit on another record with these flaws."""
+        expected = fit.elsewhere(flaws.without(other.voltage), sample_rate=other.sample_rate)
+        error = np.where(judged(other, flaws), other.displacement, np.nan) - expected
         error[: unsettled(error - np.nanmedian(error))] = np.nan
         return cls(other.source, Misfit.of(error), Misfit.of(error - np.nanmean(error)))
 

@@ -294,6 +294,15 @@ def _flaws(log: Examined) -> Iterator[Finding]:
             f"{int(np.sum(flaws.dropouts))} samples from {first:.6g} s on: the sensor was lost, leave them "
             "out, as identify does.",
         )
+    if count := int(np.sum(flaws.voltage)):
+        first = float(log.record.time[np.argmax(flaws.voltage)])
+        say = doubt if count > MANY_SPIKES * log.x.size else note
+        yield say(
+            "wrong voltage",
+            f"{counted(count, 'sample')} of the voltage, the first at {first:.6g} s, "
+            f"{'is' if count == 1 else 'are'} not what drove the stage (a spike, a zero, or a column that "
+            "stands still), for the displacement does not follow: leave them out, as identify does.",
+        )
     if len(flaws.rests):
         rested = int(np.sum(np.diff(flaws.rests, axis=1))) / log.rate
         yield note(

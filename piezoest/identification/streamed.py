@@ -10,6 +10,7 @@ import numpy as np
 from piezoest._checks import FloatArray, fraction
 from piezoest.fitting import FORMS, Fitter
 from piezoest.fitting.design import CHUNK, Design
+from piezoest.fitting.flaws import flawed
 from piezoest.fitting.program import Sums
 from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression, add
 from piezoest.fitting.rows import dot, times
@@ -195,14 +196,16 @@ def identify_stream(
             f"the first {len(head)} samples of {log.path} have {int(np.sum(head.usable))} usable ones, "
             f"at least {FEWEST_SAMPLES} are needed"
         )
-    data = prepare(head.voltage, head.displacement)
+    flaws = flawed(head.voltage, head.displacement)
+    data = prepare(flaws.without(head.voltage), head.displacement)
     odd = findings(head)
     check_excitation(data, noise_of(data), odd)
     wanted = checked_delay(delay)
-    told = wanted != "auto" or tells_lag(head.voltage)
+    told = wanted != "auto" or tells_lag(data.u)
     fitter = Fitter(
-        head.voltage, head.displacement, sample_rate=log.sample_rate, delay=wanted, tells_lag=told
-    )
+        head.voltage, head.displacement, sample_rate=log.sample_rate, delay=wanted, flaws=flaws,
+        tells_lag=told,
+    )  # fmt: skip
     say("fitting plays")
     fits = _fits(log, survey, fitter, trained, progress)
     missed = {name: left_out_error(fit) for name, fit in fits.items()}
@@ -265,6 +268,7 @@ class _Survey:
                 break
             if seen == 0:
                 voltage, displacement = u, x
+            u = flawed(u, x).without(u)
             self.usable += int(np.sum(np.isfinite(u) & np.isfinite(x)))
             if np.any(np.isfinite(u)) and np.any(np.isfinite(x)):
                 here = LearntOn.of(u, x, log.sample_rate)

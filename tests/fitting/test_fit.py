@@ -34,7 +34,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "no voltage": ({"u": np.full(N, np.nan)}, "0 samples in common"),
     "constant voltage": ({"u": np.full(N, 5.0)}, "u must move, it stays at 5 V"),
     "falling": ({"x": -Y}, "x must rise with u.* change the sign"),
-    "constant displacement": ({"x": np.full(N, 2.0)}, "x must rise with u"),
+    "constant displacement": ({"x": np.full(N, 2.0)}, "x must move with u, it stays at 2 µm"),
     "model": ({"model": "spline"}, "model must be one of line, .*, got 'spline'"),
     "delay too long": ({"delay": 10.5}, "delay must"),
     "delay below zero": ({"delay": -1.0}, "delay must"),
@@ -75,6 +75,15 @@ def test_the_same_record_gives_the_same_bits(model: str) -> None:
     one, other = fit(model=model), fit(model=model)
     np.testing.assert_array_equal(one.predict().x, other.predict().x)
     assert one.standard_errors == other.standard_errors
+
+
+def test_a_delay_counts_as_a_parameter_where_it_is_fitted() -> None:
+    def parameters(**options: Any) -> int:
+        return Fitter(U, Y, sample_rate=RATE, **options).form("coleman-hodgdon").parameters
+
+    assert parameters(delay=0.0) == 5
+    assert parameters(delay="auto") == 6
+    assert parameters(delay="auto", tells_lag=False) == 5
 
 
 def test_lists_are_taken_and_nothing_is_changed() -> None:

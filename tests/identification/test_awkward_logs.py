@@ -51,6 +51,13 @@ def spiky(count: int, size: float) -> Log:
     return changed(change)
 
 
+def voltage_wrong(start: int, end: int, value: float | None) -> Log:
+    u, x, rate = log()
+    u = u.copy()
+    u[start:end] = u[start] if value is None else value
+    return u, x, rate
+
+
 def stepped(*at: int) -> Log:
     def change(x: FloatArray) -> None:
         for k in at:
@@ -202,11 +209,20 @@ FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "two jumps": (lambda: stepped(2000, 6100), "jumps", "jumps 2 times"),
     "sensor frozen": (lambda: frozen(1800, 1880, None), "dropouts", "80 samples"),
     "sensor lost": (lambda: frozen(1800, 1860, 11.0), "dropouts", "60 samples"),
+    "a spike of the voltage": (lambda: voltage_wrong(1570, 1571, 90.0), "wrong voltage", "1 sample "),
+    "a voltage of zero": (lambda: voltage_wrong(3600, 3630, 0.0), "wrong voltage", "30 samples"),
+    "a voltage that stands still": (lambda: voltage_wrong(2900, 3100, None), "wrong voltage", "at 2.9 s"),
     "a long rest": (with_rest, "rests", "rests once"),
     "a strong drift": (drifting, "drift", "drifts by +3"),
 }
 NOTES = ("small stroke", "repeated", "rests", "drift")
-NOTED = (*(name for name, case in FOUND.items() if case[1] in NOTES), "six bits", "some spikes")
+VOLTAGE_SPIKES = ("a spike of the voltage", "a voltage of zero")
+NOTED = (
+    *(name for name, case in FOUND.items() if case[1] in NOTES),
+    "six bits",
+    "some spikes",
+    *VOLTAGE_SPIKES,
+)
 
 
 @pytest.mark.parametrize("name", FOUND)

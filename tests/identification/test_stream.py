@@ -67,6 +67,16 @@ def test_gaps_and_a_late_start_do_no_harm(tmp_path: Path) -> None:
     assert len(found.thinned) == COUNT
 
 
+def test_wrong_voltages_are_left_out(tmp_path: Path) -> None:
+    u, x = drawn(2)
+    whole = pz.identify_stream(saved(tmp_path, u, x), delay=0.0)
+    u[[1500, 3210, 7000]] = 1e4, 0.0, -300.0
+    found = pz.identify_stream(saved(tmp_path, u, x), delay=0.0)
+    assert found.skipped == 3
+    assert found.held_out.rms < 1.1 * whole.held_out.rms
+    assert any(each.name == "wrong voltage" for each in found.findings)
+
+
 def test_where_half_of_the_fitted_part_is_missing_it_is_as_good_as_in_memory(tmp_path: Path) -> None:
     u, x = drawn(2)
     x[2000:5000] = np.nan

@@ -1,0 +1,136 @@
+"""Samples at which the recorded voltage is not what drove the stage: found, and nothing else."""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import pytest
+
+from piezoest._checks import FloatArray
+from piezoest.fitting import fit
+from piezoest.fitting.flaws import flawed
+from piezoest.models import ColemanHodgdon
+
+N = 6000
+T = np.arange(N) / 1000.0
+MODEL = ColemanHodgdon.from_loop(0.03, 0.04, 0.1)
+
+
+def simulated(u: FloatArray, seed: int = 0, noise: float = 2e-3) -> FloatArray:
+    x = MODEL.simulate(u, allow_jumps=True)
+    return np.asarray(x + noise * np.random.default_rng(seed).standard_normal(N))
+
+
+def swings() -> FloatArray:
+    """Voltages about 40 V, of amplitudes that change."""
+    return np.asarray(40.0 + (20.0 + 15.0 * np.cos(2.0 * T)) * np.sin(2.0 * np.pi * 3.0 * T))
+
+
+def telegraph(hold: int) -> FloatArray:
+    bits = np.random.default_rng(hold).choice([-30.0, 30.0], N // hold + 1)
+    return np.repeat(bits, hold)[:N]
+
+
+EXCITATIONS: dict[str, Callable[[], FloatArray]] = {
+    "swings": swings,
+    "square": lambda: np.asarray(30.0 * np.sign(np.sin(2.0 * np.pi * 4.1 * T))),
+    "sawtooth": lambda: 60.0 * (7.3 * T % 1.0),
+    "short pulses": lambda: np.asarray(30.0 * (np.arange(N) % 400 < 6)),
+    "levels": lambda: np.asarray(np.repeat(np.random.default_rng(1).uniform(-30.0, 30.0, N // 100), 100)),
+    "one step": lambda: np.asarray(30.0 * (T > 2.0) * np.sin(2.0 * np.pi * 3.0 * T + 1.0)),
+    "white": lambda: np.random.default_rng(2).uniform(-30.0, 30.0, N),
+    "dying away": lambda: 30.0 * np.sin(2.0 * np.pi * 5.0 * T) * np.exp(-0.5 * T),
+    **{f"telegraph {hold}": partial(telegraph, hold) for hold in (1, 2, 5, 50)},
+}
+RECORDED: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "exact": lambda u: u,
+    "noisy": lambda u: u + 0.3 * np.random.default_rng(3).standard_normal(N),
+    "in steps": lambda u: np.round(4.0 * u) / 4.0,
+}
+
+
+def slow(x: FloatArray, samples: float) -> FloatArray:
+    """The displacement behind a low-pass filter."""
+    y, keep = x.copy(), float(np.exp(-1.0 / samples))
+    for k in range(1, N):
+        y[k] = keep * y[k - 1] + (1.0 - keep) * x[k]
+    return y
+
+
+@pytest.mark.parametrize("recorded", RECORDED)
+@pytest.mark.parametrize("name", EXCITATIONS)
+def test_no_sample_of_a_healthy_voltage_is_wrong(name: str, recorded: str) -> None:
+    u = EXCITATIONS[name]()
+    for x in (simulated(u), np.roll(simulated(u), 4), slow(simulated(u), 3.0), slow(simulated(u), 30.0)):
+        assert not flawed(RECORDED[recorded](u), x).voltage.any()
+
+
+def spikes(u: FloatArray, x: FloatArray) -> list[int]:
+    u[[700, 2111, 4321]] += [25.0, -30.0, 8.0]
+    return [700, 2111, 4321]
+
+
+def zeros(u: FloatArray, x: FloatArray) -> list[int]:
+    places = [900, 2500, 2501, *range(4000, 4025)]
+    u[places] = 0.0
+    return places
+
+
+def rows_of_zeros(u: FloatArray, x: FloatArray) -> list[int]:
+    places = [900, 2500, 2501, 4100]
+    u[places] = x[places] = 0.0
+    return places
+
+
+def overflow(u: FloatArray, x: FloatArray) -> list[int]:
+    u[[1500, 3000]] = 9.9e37, -1e4
+    return [1500, 3000]
+
+
+def garbage(u: FloatArray, x: FloatArray) -> list[int]:
+    u[1500:1503], u[3333:3335] = (80.0, 5.0, 90.0), (-20.0, 99.0)
+    return [1500, 1501, 1502, 3333, 3334]
+
+
+def stuck(u: FloatArray, x: FloatArray) -> list[int]:
+    u[2900:3100] = u[2900]
+    return list(range(2900, 3100))
+
+
+WRONG = (spikes, zeros, rows_of_zeros, overflow, garbage, stuck)
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_wrong_voltages_are_found_and_left_out(wrong: Callable[[FloatArray, FloatArray], list[int]]) -> None:
+    u = swings()
+    x = simulated(u)
+    truth, places = MODEL.simulate(u, allow_jumps=True), wrong(u, x)
+    flaws = flawed(u, x)
+    np.testing.assert_array_equal(np.flatnonzero(flaws.voltage), places)
+    assert flaws.jumps.size == 0
+    found = fit(u, x, sample_rate=1000.0, model="coleman-hodgdon")
+    assert not found.counts[places].any()
+    missed = (found.predict().x - truth)[found.counts]
+    assert np.std(missed) < 2e-3
+
+
+def test_spikes_in_steps_are_told_from_them() -> None:
+    u = EXCITATIONS["square"]()
+    x = simulated(u)
+    u[[1300, 3210]] = 0.0
+    np.testing.assert_array_equal(np.flatnonzero(flawed(u, x).voltage), [1300, 3210])
+
+
+def test_gaps_are_no_wrong_voltages_but_what_is_beside_them_may_be() -> None:
+    u = swings()
+    x = simulated(u)
+    u[1000:1040], u[3000:3003] = np.nan, np.nan
+    assert not flawed(u, x).voltage.any()
+    u[[1020, 3003]] = -50.0, 99.0
+    np.testing.assert_array_equal(np.flatnonzero(flawed(u, x).voltage), [1020, 3003])
+
+
+def test_a_displacement_that_does_not_follow_tells_nothing() -> None:
+    u = swings()
+    u[700] = 0.0
+    assert not flawed(u, np.random.default_rng(4).standard_normal(N)).voltage.any()
