@@ -15,8 +15,8 @@ from piezoest.fitting.rows import dot
 from piezoest.fitting.runs import BoolArray, IntArray, runs
 from piezoest.fitting.surprise import scale_of
 
-# A voltage beyond this part of the samples at either end says nothing of the range.
-RARE = 0.005
+# A voltage beyond this part of the samples at either end, and so many of them, says nothing of the range.
+RARE, FEWEST = 0.005, 3
 # Part of the displacement's variance that a line in the voltage explains, where an answer can be asked for.
 RELATED = 0.5
 # The displacement may answer up to so many samples late.
@@ -63,17 +63,20 @@ def lost_voltage(u: FloatArray, x: FloatArray) -> BoolArray:
 def _lost(u: FloatArray, x: FloatArray, unseen: BoolArray) -> BoolArray:
     """The same without gaps; where the displacement was not seen, it does not tell."""
     nothing = np.zeros(u.size, dtype=np.bool_)
-    low, high = np.quantile(u, [RARE, 1.0 - RARE])
+    rare = max(RARE, FEWEST / u.size)
+    low, high = np.quantile(u, [rare, 1.0 - rare])
     clipped = np.clip(u, low, high)
-    about = clipped - clipped.mean()
-    gain = dot(about, x) / max(dot(about, about), 1e-300)
+    seen = ~unseen
+    about = clipped[seen] - clipped[seen].mean()
+    gain = dot(about, x[seen]) / max(dot(about, about), 1e-300)
     steps, still = _steps(u, high - low), _still(u)
-    suspect = 0 < steps.places.size <= MANY * u.size or still
-    if not suspect or gain * np.std(about) <= np.sqrt(RELATED) * np.std(x):
+    wild = np.abs(u - clipped) > WILD * (high - low)
+    suspect = 0 < steps.places.size <= MANY * u.size or still or wild.any()
+    if not suspect or gain * np.std(about) <= np.sqrt(RELATED) * np.std(x[seen]):
         return nothing
     delay = delay_of(clipped, x)
     answer = np.where(unseen, np.inf, _off(x)[0])
-    found = _excursions(u, steps, answer, gain, high - low, delay)
+    found = _excursions(u, steps, answer, gain, high - low, delay) | wild
     late = np.interp(np.arange(u.size) - delay, np.flatnonzero(~found), u[~found])
     left = np.where(unseen, np.nan, x - gain * late)
     return found | _frozen(still, left, gain * (high - low))
@@ -157,7 +160,7 @@ def _excursions(
         expected = ANSWERED * gain * far
         unanswered = clear[start] < expected and np.max(answer[seen]) < expected
         unanswered &= bool(back.size) or far > SMALLEST_STEP * extent
-        if unanswered or (far > WILD * extent and back.size):
+        if unanswered:
             found[start:stop], end, count = True, stop, count + 1
     return found if count < FEW * u.size and np.mean(found) < MOST_LOST else np.zeros_like(found)
 

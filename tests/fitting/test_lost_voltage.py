@@ -134,3 +134,12 @@ def test_a_displacement_that_does_not_follow_tells_nothing() -> None:
     u = swings()
     u[700] = 0.0
     assert not flawed(u, np.random.default_rng(4).standard_normal(N)).voltage.any()
+
+
+@pytest.mark.parametrize("place", [0, 1, 150, 299])
+def test_an_overflow_is_found_anywhere_in_a_short_log(place: int) -> None:
+    u = swings()
+    x = simulated(u)
+    v = u[:300].copy()
+    v[place] = 1e5
+    np.testing.assert_array_equal(np.flatnonzero(flawed(v, x[:300]).voltage), [place])
