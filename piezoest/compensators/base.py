@@ -162,7 +162,8 @@ class Compensator(Copied):
         """Model whose inverse is used. It can be set; the voltage then changes without a jump.
 
         A new model takes effect when the reference has moved by 1/64 of its last stroke since the last change
-        of the model. Movements of less than 1e-4 of the range do not count. Until then the old model is used,
+        of the model, or has moved for as long as that stroke took without going further: then small movements
+        are the strokes. Movements of less than 1e-4 of the range do not count. Until then the old model is used,
         and the last one that was set waits. When models are set often, the voltage stays in a corridor around
         linear feed-forward, whose gain is at least half the first model's (`piezoest.compensators.corridor`).
 
@@ -194,6 +195,7 @@ class Compensator(Copied):
             # Out of range its inverse gives no number.
             nearest = getattr(model, "nearest_admissible", None)
             if nearest is None or not model.is_in_range:
+                kernel.keep(self._named()[0])
                 return
             model = nearest()
         before, self._model = self._model, model

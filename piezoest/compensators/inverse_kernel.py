@@ -101,6 +101,9 @@ def set_model(state: Any, settings: Any, model: Any, hysteretic: bool) -> bool:
     found = state.inverse.proposed(model, hysteretic, new)
     if found:
         change_model(state, settings, new)
+    else:
+        # Who proposes, learns: the corridor stays, also around the model before.
+        corridor.hand_over(state.corridor)
     return bool(found)
 
 
@@ -135,6 +138,11 @@ def begin(state: Any, settings: Any, u: float, slope: float, x: float | None) ->
     expected = state.inverse.expected(state, settings)
     state.owed = 0.0 if x is None else x - expected
     corridor.begin(state.corridor, settings, u, expected + state.owed, slope)
+
+
+def keep(state: Any) -> None:
+    """Go on with the model before, as the one proposed is none: the corridor stays."""
+    corridor.hand_over(state.corridor)
 
 
 def go_on(state: Any, settings: Any, expected: float, stays: bool) -> None:

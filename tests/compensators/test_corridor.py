@@ -169,3 +169,52 @@ def test_a_voltage_is_finite_and_within_its_limits_for_every_model(
                     if models:
                         with np.errstate(all="ignore"):
                             compensator.model = models[k % len(models)]
+
+
+SLOW = 2000.0
+
+
+def small_scan(amplitude: float, r: Any = None) -> Any:
+    """Error per period of a loop that learns, in a scan of 25 periods after a move to 15 µm [amplitudes]."""
+    periods = 25
+    if r is None:
+        r = 15.0 + np.asarray(pz.signals.triangle(amplitude, 10.0, periods, SLOW))
+        r = np.concatenate([np.linspace(0.0, 15.0, 800), r])
+    stage = pz.SimulatedStage(SLOW, pz.PaperStage(SLOW).hysteresis, gauge=Gauge(noise=1e-3), seed=0)
+    compensator = pz.InverseCompensator(START, pz.VoltageLimits(-60.0, 150.0))
+    errors, _ = hand_wired(r, stage, pz.HysteresisRLS(SLOW), compensator)
+    return per_period(errors[-round(periods * SLOW / 10.0) :], periods) / amplitude
+
+
+@pytest.mark.parametrize("amplitude", [0.2, 0.3])
+def test_a_small_scan_after_a_large_move_learns(amplitude: float) -> None:
+    errors = small_scan(amplitude)
+    assert errors[-3:].max() < 1.0
+    assert errors[1:].max() < 8.0
+
+
+@pytest.mark.parametrize("wrong", [100.0, 1e6])
+def test_a_wrong_sample_of_the_reference_ends_no_learning(wrong: float) -> None:
+    r = np.asarray(pz.signals.triangle(5.0, 10.0, 25, SLOW)).copy()
+    r[250] += wrong
+    assert small_scan(5.0, r)[-3:].max() < 0.02
+
+
+def test_models_without_an_inverse_leave_the_corridor_on() -> None:
+    compensator = pz.InverseCompensator(pz.LinearGain(0.1))
+    r = np.asarray(pz.signals.triangle(1.0, 10.0, 6, SLOW))
+    for k, r_k in enumerate(r.tolist()):
+        compensator.step(r_k)
+        compensator.model = pz.LinearGain(0.1, 0.0 if k < 400 else 1e12)
+    assert compensator.state["corridor"]["soon"]
+    assert compensator.model == pz.LinearGain(0.1)
+
+
+def test_a_model_that_is_absurd_leads_the_corridor_nowhere() -> None:
+    compensator = pz.InverseCompensator(pz.LinearGain(0.1))
+    r = np.asarray(pz.signals.triangle(1.0, 10.0, 40, SLOW))
+    u = np.empty(r.size)
+    for k, r_k in enumerate(r.tolist()):
+        u[k] = compensator.step(r_k)
+        compensator.model = pz.LinearGain(0.1, 1e-9 * (k % 2) + (0.0 if k < 800 else 1e6))
+    assert np.abs(u).max() < 20.0
