@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, integer, number_or_nan
+from piezoest.compensators.limits import VoltageLimits, check_rate
 from piezoest.estimators.base import EstimatorBase
 from piezoest.estimators.compiled import NONE
 from piezoest.signals import check_continuity
@@ -216,8 +218,8 @@ def track(
     Raises
     ------
     ValueError
-        If r is not a finite 1-D array or jumps, no sample rate is known or two of them differ,
-        or there is a controller beside a compensator, or neither.
+        If r is not a finite 1-D array or jumps, no sample rate is known or two of them differ, that of
+        the compensator's limits among them, or there is a controller beside a compensator, or neither.
 
     Notes
     -----
@@ -242,6 +244,8 @@ def track(
     if not allow_jumps:
         check_continuity(reference, rate, "r")
     interval = integer("update_interval", update_interval, 1)
+    if isinstance(limits := getattr(compensator, "limits", None), VoltageLimits):
+        check_rate(limits, rate)
     period = getattr(r, "period", None)
     period = None if period is None else round(period)
     N = reference.size
@@ -293,7 +297,7 @@ def _turn(
         return
     for k in range(part.start, part.stop):
         if feeds_back:
-            u[k] = compensator.step(float(r[k]), float(x[k - 1]) if k > 0 else None)
+            u[k] = compensator.step(float(r[k]), _reading(x[k - 1]) if k > 0 else None)
         else:
             u[k] = compensator.step(float(r[k]))
         x[k] = number_or_nan(stage.step(float(u[k])))
@@ -306,10 +310,14 @@ def _drive(
     """One interval of the reference through a controller, which learns from each sample."""
     for k in range(part.start, part.stop):
         u[k] = controller.step(float(r[k]))
-        measured = stage.step(float(u[k]))
-        x[k] = number_or_nan(measured)
-        controller.learn(float(u[k]), measured)
+        x[k] = number_or_nan(stage.step(float(u[k])))
+        controller.learn(float(u[k]), _reading(x[k]))
         true[k] = getattr(stage, "displacement", x[k])
+
+
+def _reading(x: float) -> float | None:
+    """A measurement, or None if there is none, as `piezoest.Estimator` says."""
+    return float(x) if math.isfinite(x) else None
 
 
 def _of_one_kind(history: list[FloatArray]) -> FloatArray:
@@ -333,7 +341,7 @@ def feed(estimator: Any, u: FloatArray, x: FloatArray) -> None:
         estimator.run(u, x)
         return
     for k in range(u.size):
-        estimator.step(float(u[k]), float(x[k]))
+        estimator.step(float(u[k]), _reading(x[k]))
 
 
 def _sample_rate(given: float | None, **parts: Any) -> float:

@@ -40,6 +40,34 @@ def test_plain_arrays_need_a_rate() -> None:
         pz.track(r, stage=pz.PaperStage(sample_rate=FS), compensator=compensator, sample_rate=100.0)
 
 
+def test_ones_own_parts_are_told_of_no_measurement_by_none() -> None:
+    class Deaf:
+        sample_rate = 100.0
+
+        def step(self, u: float) -> Any:
+            return float("nan") if u > 0.0 else None
+
+    class Learner:
+        model = pz.LinearGain(1.0)
+
+        def __init__(self) -> None:
+            self.seen: list[Any] = []
+
+        def step(self, r: float, x: float | None = None) -> float:
+            self.seen.append(x)
+            return r
+
+        def learn(self, u: float, x: float | None) -> None:
+            self.seen.append((u, x))
+
+    r = np.sin(np.linspace(0.0, 6.0, 100))
+    estimator, controller = Learner(), Learner()
+    pz.track(r, stage=Deaf(), compensator=pz.LinearCompensator(pz.LinearGain(1.0)), estimator=estimator)
+    assert estimator.seen == [None] * r.size
+    pz.track(r, stage=Deaf(), controller=controller)
+    assert controller.seen[1::2] == [(u, None) for u in r]
+
+
 def test_wrong_references() -> None:
     def follow(r: Any) -> None:
         pz.track(r, stage=pz.PaperStage(), compensator=pz.InverseCompensator(START))

@@ -3,7 +3,9 @@
 import math
 
 from piezoest._checks import number_or_nan, positive
+from piezoest.compensators import corridor
 from piezoest.compensators.base import AroundCompensator, Compensator
+from piezoest.compensators.limits import check_rate
 
 
 class IntegralFeedback(AroundCompensator):
@@ -24,12 +26,14 @@ class IntegralFeedback(AroundCompensator):
     Raises
     ------
     ValueError
-        If the compensator is none, or the gain or the sample rate is not above zero.
+        If the compensator is none, its limits are for another sample rate, or the gain or the sample rate is
+        not above zero.
 
     Notes
     -----
     The integral does not grow while the voltage is limited in that direction, and stays constant in samples
-    without a measurement.
+    without a measurement. No reading counts for more than an error of the whole range of the voltage, or of
+    100 V if that is less, times the slope of the first model.
     Source: K. J. Åström, R. M. Murray, Feedback Systems, Princeton 2008, sec. 10.4.
 
     Examples
@@ -40,15 +44,18 @@ class IntegralFeedback(AroundCompensator):
     >>> u = feedback.step(1.5, None)  # reference and last reading [µm]; None: no reading yet
     """
 
-    __slots__ = ("_integral", "_step_gain")
+    __slots__ = ("_integral", "_reach", "_step_gain")
 
     #: The loop must hand each measurement back: `piezoest.track` steps sample by sample.
     needs_measurement = True
 
     def __init__(self, compensator: Compensator, *, gain: float, sample_rate: float) -> None:
         super().__init__(compensator)
+        check_rate(self.limits, sample_rate)
         self._step_gain = positive("gain", gain) / positive("sample_rate", sample_rate)
         self._integral = 0.0
+        # One wild reading winds nothing up.
+        self._reach = float(compensator.state["corridor"]["least"]) / corridor.LEAST
 
     @property
     def integral(self) -> float:
@@ -74,7 +81,7 @@ class IntegralFeedback(AroundCompensator):
         """
         r, x = number_or_nan(r), number_or_nan(x)
         if math.isfinite(x) and math.isfinite(r):
-            growth = self._step_gain * (r - x)
+            growth = self._step_gain * min(max(r - x, -self._reach), self._reach)
             if growth * self._compensator.limited <= 0.0:
                 self._integral += growth
         return self._compensator.step(r + self._integral)

@@ -66,6 +66,14 @@ class VoltageLimits:
         return finite("rest", min(max(0.0, self.minimum), self.maximum))
 
 
+def check_rate(limits: VoltageLimits, sample_rate: float) -> None:
+    """Refuse limits for another sample rate: the slew rate would be another."""
+    if limits.sample_rate is not None and limits.sample_rate != sample_rate:
+        raise ValueError(
+            f"limits are for {limits.sample_rate:g} Hz, sample_rate is {sample_rate:g} Hz: give both the same"
+        )
+
+
 def resting(limits: VoltageLimits, voltage: Any) -> float:
     """Return a voltage at which a stage rests [V]; None for the one nearest to 0 V."""
     u = limits.rest if voltage is None else finite("voltage", voltage)

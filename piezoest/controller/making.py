@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from piezoest._checks import finite, fraction, instance, integer, moderate, non_negative, positive
-from piezoest.compensators.limits import VoltageLimits
+from piezoest.compensators.limits import VoltageLimits, check_rate
 from piezoest.controller import candidate, homing, kernel, pace, recorded_loop, recorder, slots
 from piezoest.controller.feedback import FASTEST
 from piezoest.estimators.compiled import CompiledEstimator
@@ -31,10 +31,7 @@ def checked_limits(limits: Any, sample_rate: float) -> Any:
             f"limits must lie within ±{LARGEST_VOLTAGE:g} V and {LEAST_RANGE:g} V apart, got {low:g} V to "
             f"{high:g} V: check the unit"
         )
-    if limits.sample_rate is not None and limits.sample_rate != sample_rate:
-        raise ValueError(
-            f"limits are for {limits.sample_rate:g} Hz, sample_rate is {sample_rate:g} Hz: give both the same"
-        )
+    check_rate(limits, sample_rate)
     return limits
 
 

@@ -68,8 +68,8 @@ def c(
     Raises
     ------
     ValueError
-        If an object is of a kind that cannot be exported, the name is no identifier, or the
-        precision is unknown.
+        If an object is of a kind that cannot be exported, limits are for another sample rate than the
+        estimator, the name is no identifier, or the precision is unknown.
 
     Examples
     --------
@@ -100,6 +100,7 @@ def c(
         raise ValueError(
             f"estimator must be one such as HysteresisRLS, got {type(estimator).__name__}: {hint}"
         )
+    ring.check_limits(estimator, compensator)
     return _Generator(estimator, compensator, name, precision, interval).code()
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from piezoest._checks import WILDEST, FloatArray, array_1d, instance, integer
 from piezoest.compensators import Compensator
+from piezoest.compensators.limits import check_rate
 from piezoest.compile import local
 from piezoest.layout import COUNT, FLAG, MEASURED, Record, numbers, record
 from piezoest.models import Model
@@ -55,6 +56,13 @@ def give(state: Any, compensator: Any, r: Any) -> Any:
         state.ring.voltage = u
         state.ring.started = 1.0
     return state.ring.voltage
+
+
+def check_limits(estimator: Any, compensator: Compensator) -> None:
+    """Refuse limits for another sample rate than the estimator's."""
+    rate = getattr(estimator, "sample_rate", None)
+    if rate is not None:
+        check_rate(compensator.limits, rate)
 
 
 class Ring:
@@ -121,7 +129,8 @@ class Controller(Ring):
     Raises
     ------
     ValueError
-        If the compensator is none, or the interval is no whole number above zero.
+        If the compensator is none, its limits are for another sample rate than the estimator's, or the
+        interval is no whole number above zero.
 
     Notes
     -----
@@ -134,6 +143,7 @@ class Controller(Ring):
         self._estimator = estimator
         expected = "a LinearCompensator or an InverseCompensator"
         self._compensator: Compensator = instance("compensator", compensator, Compensator, expected)
+        check_limits(estimator, compensator)
         self._interval = integer("update_interval", update_interval, 1)
         self._voltage: float | None = None
         self._waited = 0

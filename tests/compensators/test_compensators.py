@@ -231,3 +231,28 @@ def test_a_reset_that_is_refused_changes_nothing() -> None:
     with pytest.raises(ValueError, match="displacement"):
         feedback.reset(displacement=float("nan"))
     assert (feedback.integral, feedback.compensator.voltage) == before
+
+
+@pytest.mark.parametrize("wrong", [2.1e6, 1e12, -1.7e308])
+def test_a_wrong_reading_does_not_wind_feedback_up(wrong: float) -> None:
+    compensator = pz.LinearCompensator(pz.LinearGain(0.15), pz.VoltageLimits(-50.0, 100.0))
+    feedback = pz.IntegralFeedback(compensator, gain=5.0, sample_rate=1000.0)
+    feedback.step(1.0, wrong)
+    assert abs(feedback.integral) < 0.2
+    for _ in range(2000):
+        u = feedback.step(1.0, 0.15 * feedback.compensator.voltage)
+    assert u == pytest.approx(1.0 / 0.15, rel=1e-3)
+
+
+def test_limits_for_another_rate_are_refused() -> None:
+    limits = pz.VoltageLimits(-50.0, 100.0, slew_rate=100.0, sample_rate=1000.0)
+    compensator = pz.LinearCompensator(pz.LinearGain(0.15), limits)
+    with pytest.raises(ValueError, match="sample_rate"):
+        pz.IntegralFeedback(compensator, gain=5.0, sample_rate=5000.0)
+    with pytest.raises(ValueError, match="sample_rate"):
+        pz.export.Controller(pz.HysteresisRLS(5000.0), compensator)
+    with pytest.raises(ValueError, match="sample_rate"):
+        pz.export.c(pz.HysteresisRLS(5000.0), compensator)
+    r = pz.signals.triangle(1.0, 5.0, 1, 5000.0)
+    with pytest.raises(ValueError, match="sample_rate"):
+        pz.track(r, stage=pz.PaperStage(5000.0), compensator=compensator)
