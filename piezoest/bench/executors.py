@@ -48,10 +48,18 @@ def in_processes(
         suspects = yield from _until_death(work, queue, processes, 2 * processes)
         if suspects and crashed is None:
             raise BrokenProcessPool("a process died at its work")
-        alone = deque(suspects)
-        while crashed is not None and alone:
-            guilty = yield from _until_death(work, alone, 1, 1)
-            yield from map(crashed, guilty)
+        if crashed is not None:
+            yield from one_by_one(work, suspects, crashed)
+
+
+def one_by_one(
+    work: Callable[[Item], Result], items: Iterable[Item], crashed: Callable[[Item], Result]
+) -> Iterator[Result]:
+    """Work on one item after the other, in another process. `crashed`: see `in_processes`."""
+    queue = deque(items)
+    while queue:
+        guilty = yield from _until_death(work, queue, 1, 1)
+        yield from map(crashed, guilty)
 
 
 def _until_death(

@@ -51,6 +51,8 @@ def code_of(source: str | Path | None) -> str:
 def imported(path: str) -> Any:
     """What ``module:name`` stands for; the module may lie in the working directory."""
     module, _, name = path.partition(":")
+    if module.startswith(".") or module.endswith(".py"):
+        raise ValueError(f"{path}: name the module as in import, such as {Path(module).stem}:{name}")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
     try:

@@ -13,7 +13,7 @@ import pandas as pd
 from piezoest.bench import cost, tables
 from piezoest.bench.cases import PAPER, STAGES, STRANGERS, Conditions
 from piezoest.bench.estimators import KNOWN, LINEAR, PAPERS, candidate, is_slow, module_of, name_of
-from piezoest.bench.executors import in_processes, on_dask
+from piezoest.bench.executors import in_processes, on_dask, one_by_one
 from piezoest.bench.origin import fingerprint, json_safe
 from piezoest.bench.recorded import digest, file_of
 from piezoest.bench.run import COLUMNS, Task, code_of, crashed, follow, play
@@ -131,16 +131,18 @@ def write(rows: Sequence[Row], folder: Path, format: str | None = None) -> pd.Da
 
 
 def costs(estimators: Iterable[str], given: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Times of each estimator per sample on a recorded cold start; empty for one that fails."""
+    """Times of each estimator per sample on a recorded cold start; empty for one that fails or dies."""
+    return dict(one_by_one(partial(_cost, given), estimators, lambda text: (text, {})))
+
+
+def _cost(given: dict[str, Any], text: str) -> tuple[str, dict[str, Any]]:
+    """Name and times of one estimator."""
     case = SCENARIOS["cold-start"].build(0, **given)
-    record = follow(case, LINEAR)
-    found: dict[str, dict[str, Any]] = {}
-    for text in estimators:
-        try:
-            found[text] = cost.cost(partial(candidate(text), case.sample_rate, case.start), record)
-        except Exception:
-            found[text] = {}
-    return found
+    try:
+        made = partial(candidate(text), case.sample_rate, case.start)
+        return text, cost.cost(made, follow(case, LINEAR))
+    except Exception:
+        return text, {}
 
 
 def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) -> dict[str, Any]:
@@ -190,9 +192,16 @@ def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) 
             for row in rows
             if row["failure"] is not None
         ],
+        "all_failed": [text for text in names if _failed(frame, text)],
         "tracebacks": list(dict.fromkeys(row["traceback"] for row in rows if row.get("traceback")))[:5],
     }
     return dict(json_safe(document, DIGITS))
+
+
+def _failed(frame: pd.DataFrame, text: str) -> bool:
+    """Whether an estimator was run, and no run of it came to its end."""
+    failure = frame.loc[frame["estimator"] == text, "failure"]
+    return bool(failure.size and failure.notna().all())
 
 
 def _cell(key: Any, group: pd.DataFrame, errors: Sequence[Sequence[float]]) -> Row:

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from piezoest._errors import USER_ERROR
 from piezoest._files import read_json, write_text
 from piezoest._options import grouped
 from piezoest.bench import shared
@@ -144,6 +145,8 @@ def table(
 
     tables = partial(print_table, scenarios=shown.scenarios)
     shared.show(document, json_to, tables, f"Tables and table.json: {folder}")
+    if document["all_failed"]:
+        raise typer.Exit(USER_ERROR)
 
 
 def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: float) -> dict[str, Any]:

@@ -22,6 +22,11 @@ EPILOG = (
     "piezoest compensate reference.csv --alpha 0.017 --beta 0.148 --gamma 0.0038 --maximum 150 -o voltage.csv"
 )
 
+# The first step from rest is a jump if it is so many times the largest that follows.
+JUMP = 3.0
+# ... and more than this fraction of the whole swing.
+MUCH = 0.1
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stated:
@@ -77,6 +82,8 @@ def compensate(
             output, keep=(reference,) if stated.parameters is None else (reference, stated.parameters)
         )
         with progress("loading (compiles once after the installation)"):
+            import numpy as np
+
             from piezoest.compensators import InverseCompensator, VoltageLimits
             from piezoest.records import read_reference, write_columns, writer_for
             from piezoest.signals import check_continuity
@@ -101,6 +108,14 @@ def compensate(
             typer.echo(
                 f"warning: {limited} samples ({100.0 * limited / voltage.size:.1f} %) are at a limit of the "
                 "voltage: there the stage will not follow the reference",
+                err=True,
+            )
+        rest = voltage_limits.rest
+        usual = max(JUMP * np.abs(np.diff(voltage)).max(initial=0.0), MUCH * np.ptp(voltage))
+        if abs(voltage[0] - rest) > usual:
+            typer.echo(
+                f"warning: the voltage jumps from {rest:g} V to {voltage[0]:.4g} V at its start: take the "
+                "stage there slowly before, or let the reference begin at rest (Signal.with_lead_in)",
                 err=True,
             )
         for left in _leaves(learnt, voltage, signal):

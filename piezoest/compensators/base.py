@@ -163,9 +163,10 @@ class Compensator(Copied):
 
         A new model takes effect when the reference has moved by 1/64 of its last stroke since the last change
         of the model, or has moved for as long as that stroke took without going further: then small movements
-        are the strokes. Movements of less than 1e-4 of the range do not count. Until then the old model is used,
-        and the last one that was set waits. When models are set often, the voltage stays in a corridor around
-        linear feed-forward, whose gain is at least half the first model's (`piezoest.compensators.corridor`).
+        are the strokes. Movements of less than 1e-4 of the range do not count. Until then the old model is
+        used, and the last one that was set waits. When models are set often, the voltage stays in a corridor
+        around linear feed-forward, whose gain is at least half the first model's
+        (`piezoest.compensators.corridor`).
 
         The state w_h of the new model follows from `hand_over`, and its plays from the turning points of the
         voltage. The difference between the two models at the present voltage decays exponentially over

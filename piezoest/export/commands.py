@@ -29,7 +29,7 @@ Source = Annotated[
     typer.Argument(
         metavar="MODEL_OR_PROFILE",
         help="JSON: a model, what identify --output wrote, an estimator's to_dict(), or both under "
-        "model and estimator, with limits.",
+        "model and estimator, with limits; for c also an AdaptiveFeedforward's to_dict().",
     ),
 ]
 
@@ -90,7 +90,13 @@ def c(
     """Write a controller in C99: one header, one source, no allocation."""
     from piezoest.export.c_code import c as generate
 
-    for path in generate(*_pair(source, stated), **asdict(code)).write(output):
+    if (controller := _controller(source)) is not None:
+        if any(value is not None for value in asdict(stated).values()):
+            raise ValueError(f"{source} holds an AdaptiveFeedforward, with all that: give no limits, no rate")
+        made = generate(controller, **asdict(code))
+    else:
+        made = generate(*_pair(source, stated), **asdict(code))
+    for path in made.write(output):
         typer.echo(path)
 
 
@@ -167,6 +173,14 @@ def table(
         typer.echo(path)
 
 
+def _controller(path: Path) -> Any:
+    """The AdaptiveFeedforward of a JSON file; None if it holds something else."""
+    from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
+
+    data = read_object(path, "model: write it with identify --output")
+    return AdaptiveFeedforward.from_dict(data) if "controller" in data else None
+
+
 def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
     """Model, estimator or None, and limits of a JSON file."""
     from piezoest._checks import class_named
@@ -176,6 +190,8 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
     from piezoest.models import model_from_dict
 
     data = read_object(path, "model: write it with identify --output")
+    if "controller" in data:
+        raise ValueError(f"{path} holds an AdaptiveFeedforward: only export c takes it")
     limits = data.pop("limits", None) or {}
     if not isinstance(limits, dict):
         raise ValueError(f'{path}: limits must be names with numbers, such as {{"maximum": 150}}')

@@ -207,6 +207,8 @@ def test_a_process_that_dies_is_a_failure_and_the_rest_goes_on(own: str, tmp_pat
     assert cells["noise", f"{own}:Still"]["failures"] == 0
     assert len(document["failures"]) == 4
     assert len(document["tracebacks"]) == 1
+    assert document["all_failed"] == [f"{own}:Dies", f"{own}:Broken"]
+    assert table.costs([f"{own}:Dies"], asked.given) == {f"{own}:Dies": {}}
 
 
 def test_a_document_sums_up(own: str, tmp_path: Path) -> None:
@@ -286,7 +288,7 @@ SHORT = ("--scenario", "cold-start", "--scenario", "noise", "--quick", "--only",
 def test_command_end_to_end(own: str, tmp_path: Path) -> None:
     asked = (*SHORT, "-e", f"{own}:Broken", "--seeds", 2, "--table", "csv")
     result = bench(*asked, "--by-scenario", "--json", "a.json", "--figures", "figures")
-    assert result.exit_code == 0, result.output
+    assert result.exit_code == 1, result.output  # one estimator has failed in all its runs
     assert "12 of 12 runs" in result.stderr
     assert all(
         len(line) <= 80 for line in result.stdout.splitlines() if "─" in line or "HysteresisEKF" in line
@@ -306,7 +308,7 @@ def test_command_end_to_end(own: str, tmp_path: Path) -> None:
     figures.cost(document).savefig("cost.png")
 
     again = bench(*asked, "--json", "-")
-    assert again.exit_code == 0
+    assert again.exit_code == 1
     assert "12 of 12 runs" in again.stderr.splitlines()[1]  # nothing was run again
     assert json.loads(again.stdout)["cells"] == document["cells"]
 
@@ -327,6 +329,7 @@ def test_compare_with_itself_finds_no_change(own: str) -> None:
     ("arguments", "words"),
     [
         (("-e", "NoSuch"), "choose one of"),
+        (("-e", "./mine.py:Mine"), "mine:Mine"),
         (("--stage", "best"), "choose one of"),
         (("--json", "nowhere/a.json"), "no file that can be written"),
         (("--quick", "paper"), "--quick belong to the table"),

@@ -88,6 +88,16 @@ def test_profile_is_the_same_as_the_objects(model: Path, kind: type) -> None:
     assert Path("out/stage.c").read_text() == code.source
 
 
+def test_a_saved_adaptive_feedforward_becomes_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    controller = pz.AdaptiveFeedforward(5000.0, limits=pz.VoltageLimits(-10.0, 10.0), estimators=())
+    Path("controller.json").write_text(json.dumps(controller.to_dict()))
+    assert run("c", "controller.json", "-o", "firmware").exit_code == 0
+    assert Path("firmware/piezoest_controller.c").read_text() == pz.export.c(controller).source
+    refused(run("c", "controller.json", "-o", "firmware", "--maximum", 3), "AdaptiveFeedforward")
+    refused(run("fmu", "controller.json", "-o", "x.fmu"), "AdaptiveFeedforward")
+
+
 def test_tables_are_written(model: Path) -> None:
     r = pz.signals.triangle(2.0, 5.0, 1, 1000.0)
     write_columns("r.csv", {"time_s": r.time, "reference_um": r.values})

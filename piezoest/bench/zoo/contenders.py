@@ -65,7 +65,9 @@ def contender(name: str) -> Factory:
     """
     found = _found(name)
     if inspect.isclass(found) and (missing := [each for each in NEEDED if not hasattr(found, each)]):
-        raise ValueError(f"{name} has no {' and no '.join(missing)}: it is no controller")
+        raise ValueError(
+            f"{name} has no {' and no '.join(missing)}: a controller of the zoo has {', '.join(NEEDED)}"
+        )
     return functools.partial(_made, found)
 
 
