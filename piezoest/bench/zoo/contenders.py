@@ -65,8 +65,9 @@ def contender(name: str) -> Factory:
     """
     found = _found(name)
     if inspect.isclass(found) and (missing := [each for each in NEEDED if not hasattr(found, each)]):
+        lacks = " and no ".join(missing)
         raise ValueError(
-            f"{name} has no {' and no '.join(missing)}: a controller of the zoo has {', '.join(NEEDED)}"
+            f"{name} has no {lacks}: it is no controller of the zoo, which has {', '.join(NEEDED)}"
         )
     return functools.partial(_made, found)
 
