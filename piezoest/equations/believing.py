@@ -8,8 +8,7 @@ from typing import Any
 from piezoest.compile import inlined
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, record
 
-# Readings seen since what is usual was learnt again, their usual change [µm], how far the voltage has
-# travelled since the reading last changed [V].
+# Readings seen, their usual change [µm], the voltage's travel since the reading last changed [V].
 BELIEF = record(seen=COUNT, usual_step=DISTANCE, same=AMOUNT)
 
 # A change is believed up to so many usual ones, plus what so many times the slope explains.
@@ -31,7 +30,13 @@ def believable(belief: Any, dx: Any, slope: Any, travel: Any, warm_up: Any) -> A
     limit = BELIEVED_STEPS * belief.usual_step + BELIEVED_SLOPES * slope * travel
     if abs(dx) > limit and belief.seen >= warm_up:
         return False
+    believe(belief, dx, travel, warm_up)
+    return True
+
+
+@inlined
+def believe(belief: Any, dx: Any, travel: Any, warm_up: Any) -> None:
+    """Learn from a change that is plausible, or that lasts: a single one makes no other of its size usual."""
     belief.same = (belief.same + travel) * (dx == 0.0)
     belief.seen += 1.0
     belief.usual_step += (abs(dx) - belief.usual_step) / min(belief.seen, warm_up)
-    return True

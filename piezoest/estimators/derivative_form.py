@@ -104,31 +104,42 @@ def x_from_centre(centre: Any, x: Any) -> Any:
 
 
 @inlined
-def learn_anew(belief: Any) -> None:
-    """Learn again which changes of a reading are usual."""
+def believe_level(belief: Any, rejection: Any, state: Any, x: Any) -> None:
+    """Take x for a new level.
+
+    What is usual stays known: the way back from a wrong level must not pass for a reading like any other.
+    """
     if belief is None:
         return
-    belief.seen = 0.0
+    dx = x_from_centre(state.centre, x) - state.x_last
+    believing.believe(belief, dx, state.travel, rejection.warm_up)
 
 
 @inlined
-def is_believable(belief: Any, rejection: Any, state: Any, estimate: Any, unit: Any, x: Any) -> Any:
-    """Whether x is a reading that the stage can have made, after the last good one."""
+def is_believable(
+    belief: Any, rejection: Any, state: Any, estimate: Any, unit: Any, x: Any, jumped: Any
+) -> Any:
+    """Whether x is a reading that the stage can have made, after the last good one, or may have `jumped`."""
     if belief is None:
         return True
     dx = x_from_centre(state.centre, x) - state.x_last
     if believing.stands_still(belief, dx, state.travel, state.swing.size):
         return False
     slope = abs(estimate[1]) * unit
-    return believing.believable(belief, dx, slope, state.travel, rejection.warm_up)
+    if believing.believable(belief, dx, slope, state.travel, rejection.warm_up):
+        return True
+    if jumped:
+        believe_level(belief, rejection, state, x)
+    return jumped
 
 
 @inlined
-def prime(state: Any, u: Any, x: Any) -> None:
-    """Start from (u, x) as the last good sample; what is usual is learnt again."""
-    learn_anew(state.belief)
+def prime(state: Any, rejection: Any, u: Any, x: Any) -> None:
+    """Start from (u, x) as the last good sample."""
     if state.primed == 0.0:
         _centre(state.centre, u, x)
+    else:
+        believe_level(state.belief, rejection, state, x)
     state.primed = 1.0
     state.u_last = u_from_centre(state.centre, u)
     state.x_last = x_from_centre(state.centre, x)

@@ -7,9 +7,11 @@ import numpy as np
 
 from piezoest._checks import FloatArray, moderate
 from piezoest.equations import coleman_hodgdon as equations
+from piezoest.equations import swing
 from piezoest.estimators import ekf_kernel
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.estimators.delay_line import delay_line
+from piezoest.estimators.derivative_form import LONGEST_GAP
 from piezoest.estimators.saved_state import Rule, no_more_than
 from piezoest.models import ColemanHodgdon, LinearGain
 
@@ -42,7 +44,8 @@ class HysteresisEKF(CompiledEstimator):
         memory of the filter; 0 for constant parameters.
     mismatch : float
         Random walk of w_h [µm per root second]: how far the stage deviates from the model within a second; 0
-        for an exact model. For a `LinearGain`, which has no w_h: its error averaged over a second [µm].
+        for an exact model. For a `LinearGain`, which has no w_h: its error averaged over a second [µm]. The
+        default suits a stroke of some 10 µm: scale it with the stroke.
     offset : bool
         Also estimate an offset of the displacement, with the random walk `mismatch`. A larger loop
         leaves such an offset after a change of amplitude.
@@ -58,6 +61,11 @@ class HysteresisEKF(CompiledEstimator):
 
     Notes
     -----
+    Impossible readings are left out as by `policies.OutlierRejection`, but only where the filter too is
+    surprised, by more than ten standard deviations, or where the voltage has travelled a tenth of a swing on
+    a constant reading. A level that stays for 2 ms is accepted; the offset, or else w_h, follows it.
+    A projected a is at most 40 over a swing of the voltage.
+
     The update has Joseph's form. Process noise is given per second, so it need not be changed with the
     sample rate. `theta` is (alpha, beta, gamma) from (4), and `P` its covariance to first order. `s` and
     `state_covariance` belong to the filter itself.
@@ -110,6 +118,7 @@ class HysteresisEKF(CompiledEstimator):
         self._configure(
             ekf_kernel.settings_layout(start.size, hysteretic=hysteretic),
             {
+                "longest_gap": max(1, int(LONGEST_GAP * sample_rate)),
                 "noise": moderate("noise", noise) ** 2 + stray,
                 "offset": initial.offset,
                 "walk": walk**2 / sample_rate,
@@ -136,7 +145,8 @@ class HysteresisEKF(CompiledEstimator):
         )
 
     def _rules(self, state: Any) -> Iterable[Rule]:
-        yield no_more_than(state["samples"], state["missing"], state["updates"])
+        yield no_more_than(state["samples"], state["missing"], state["outliers"], state["updates"])
+        yield swing.has_a_size(state["swing"])
         if isinstance(self._initial, ColemanHodgdon):
             words = "the filter's parameters must be admissible, or near it where it does not project"
             yield words, self._parameters_fit(state)

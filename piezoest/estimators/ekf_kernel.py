@@ -10,16 +10,17 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.compile import inlined, like, local
-from piezoest.equations import admissible, kalman
+from piezoest.equations import admissible, believing, kalman, swing
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators.delay_line import delayed
 from piezoest.estimators.model_writing import write_loop
-from piezoest.estimators.samples import HELD, MISSING, OUTCOME, UPDATED, keep_outcome
+from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED, keep_outcome
 from piezoest.layout import (
     ABSENT,
     AMOUNT,
     COUNT,
     COVARIANCE,
+    FIXED,
     FLAG,
     MEASURED,
     NUMBER,
@@ -39,14 +40,24 @@ BOUNDS = record(a=NUMBER, b=NUMBER, margin=NUMBER)
 
 # Least a, b or gain of a model handed out, relative to the start's; least c - 2b, relative to its c.
 LEAST, LEAST_MARGIN = 1e-2, 1e-3
+# Greatest a, times a swing of the voltage: the loop of a larger one is a step at each turn, of which the
+# filter would not find back. The start's own is always allowed.
+GREATEST = 40.0
+# Readings from which a usual change is learnt; standard deviations that an innovation may have, whatever the
+# change: no filter that fits its stage gets there.
+WARM_UP, EXPECTED = 100.0, 10.0
+# The filter takes so many times the travel on a constant reading that least squares takes: it starts from a
+# model, and coarse converters are to leave it as it is.
+STILL = 20.0
 
 
 def state_layout(n: int, line: Field, *, offset: bool, project: bool) -> Layout:
     """Layout of the state of a filter of n states; `line` is the storage of the delay."""
     return record(
         __name__,
-        samples=COUNT, missing=COUNT, updates=COUNT, held=COUNT, resets=COUNT, last=OUTCOME,
-        primed=FLAG, u_last=MEASURED, y=NUMBER, S=AMOUNT,
+        samples=COUNT, missing=COUNT, outliers=COUNT, updates=COUNT, held=COUNT, resets=COUNT, last=OUTCOME,
+        primed=FLAG, u_last=MEASURED, x_last=MEASURED, travel=AMOUNT, gap=COUNT, y=NUMBER, S=AMOUNT,
+        belief=believing.BELIEF, swing=swing.SWING,
         centre=CENTRE if offset else ABSENT, projection=PROJECTION if project else ABSENT,
         filter=record(s=numbers(n, kind=PARAMETER), P=numbers(n, n, kind=COVARIANCE), K=numbers(n)),
         line=line,
@@ -56,7 +67,7 @@ def state_layout(n: int, line: Field, *, offset: bool, project: bool) -> Layout:
 def settings_layout(n: int, *, hysteretic: bool) -> Layout:
     """Layout of the settings: noise and random walk (variances), and of the start offset and variances."""
     return record(
-        noise=AMOUNT, offset=NUMBER, gain=ABSENT if hysteretic else NUMBER,
+        longest_gap=FIXED, noise=AMOUNT, offset=NUMBER, gain=ABSENT if hysteretic else NUMBER,
         least=BOUNDS if hysteretic else ABSENT, walk=numbers(n), variances=numbers(n),
     )  # fmt: skip
 
@@ -141,26 +152,54 @@ def _onto_face(s: Any, P: Any, by_a: float, by_b: float, by_c: float, least: Any
 
 
 @register_jitable
-def _onto_admissible(s: Any, P: Any, least: Any) -> Any:
-    """Project onto a, b and c - 2b of at least their bounds: flat faces in this form. 1.0 if that moves s."""
-    moved = _onto_face(s, P, 1.0, 0.0, 0.0, least.a)
+def _onto_admissible(s: Any, P: Any, least: Any, greatest: Any) -> Any:
+    """Project onto a, b and c - 2b within their bounds: flat faces in this form. 1.0 if that moves s."""
+    moved = max((s[1] > greatest) * 1.0, _onto_face(s, P, 1.0, 0.0, 0.0, least.a))
     moved = max(moved, _onto_face(s, P, 0.0, 1.0, 0.0, least.b))
     moved = max(moved, _onto_face(s, P, 0.0, -2.0, 1.0, least.margin))
     # The faces meet at an angle: whatever is left over is clamped.
-    s[1] = max(s[1], least.a)
+    s[1] = min(max(s[1], least.a), greatest)
     s[2] = max(s[2], least.b)
     s[3] = max(s[3], 2.0 * s[2] + least.margin)
     return moved
 
 
 @inlined
-def _project(projection: Any, s: Any, P: Any, least: Any) -> None:
+def _project(projection: Any, s: Any, P: Any, least: Any, swing_size: Any) -> None:
     """Keep the estimate in the admissible set, where it is to be."""
     if projection is None:
         return
     projection.moved = 0.0
-    if not (s[1] >= least.a and s[2] >= least.b and s[3] - 2.0 * s[2] >= least.margin):
-        projection.moved = _onto_admissible(s, P, least)
+    greatest = max(GREATEST / max(swing_size, swing.SMALLEST), least.a / LEAST)
+    within = s[1] >= least.a and s[1] <= greatest
+    if not (within and s[2] >= least.b and s[3] - 2.0 * s[2] >= least.margin):
+        projection.moved = _onto_admissible(s, P, least, greatest)
+
+
+@inlined
+def _slope(s: Any, least: Any) -> Any:
+    """Greatest slope of the model as estimated."""
+    if least is None:
+        return abs(s[0])
+    return abs(s[3])
+
+
+@inlined
+def _free_level(P: Any, y: Any, least: Any, centre: Any) -> None:
+    """Let what can follow a jump of the displacement follow it: the offset, or else w_h."""
+    if centre is not None:
+        P[len(P) - 1, len(P) - 1] += y * y
+    elif least is not None:
+        P[0, 0] += y * y
+
+
+@inlined
+def _is_surprising(state: Any, settings: Any, dx: Any, y: Any, S: Any) -> Any:
+    """Whether neither its size nor the filter, with innovation y of variance S, explains a change by dx."""
+    slope = _slope(state.filter.s, settings.least)
+    if believing.believable(state.belief, dx, slope, state.travel, WARM_UP):
+        return False
+    return y * y > EXPECTED * EXPECTED * S
 
 
 @inlined
@@ -174,6 +213,8 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
             state.primed = 1.0
             state.u_last = u
         _time_update(s, P, u - state.u_last, settings.walk, settings.least)
+        state.travel += abs(u - state.u_last)
+        swing.follow(state.swing, u)
         state.u_last = u
         if not (np.abs(s[0]) < kalman.LARGEST_TRACE and kalman.is_covariance(P)):
             _restart(state, settings, settings.least)
@@ -181,6 +222,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         x = np.nan
     if not np.abs(x) < WILDEST:
         state.missing += 1.0
+        state.gap += 1.0
         state.last = MISSING
         return
     x = from_first_displacement(state.centre, x)
@@ -188,13 +230,31 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     measurement_row(h, u, settings.least, state.centre)
     y = x - kalman.measure(s, h)
     S = kalman.innovation_variance(P, h, settings.noise, product)
+    belief, travel = state.belief, state.travel
+    if belief.seen == 0.0:
+        state.x_last = x
+        travel = 0.0
+    dx = x - state.x_last
+    still = state.swing.usual > 0.0 and believing.stands_still(belief, dx, travel, STILL * state.swing.size)
+    surprising = not still and _is_surprising(state, settings, dx, y, S)
+    if still or (surprising and state.gap < settings.longest_gap):
+        state.outliers += 1.0
+        state.gap += 1.0
+        state.last = REJECTED
+        return
+    if surprising:  # a reading that stays there is a new level
+        believing.believe(belief, dx, travel, WARM_UP)
+        _free_level(P, y, settings.least, state.centre)
+        S = kalman.innovation_variance(P, h, settings.noise, product)
+    state.x_last = x
+    state.travel = state.gap = 0.0
     if not kalman.is_safe(y, S):
         _restart(state, settings, settings.least)
         state.held += 1.0
         state.last = HELD
         return
     kalman.correct(s, P, h, y, settings.noise, S, state.filter.K, product)
-    _project(state.projection, s, P, settings.least)
+    _project(state.projection, s, P, settings.least, state.swing.size)
     state.y = y
     state.S = S
     state.updates += 1.0

@@ -14,7 +14,7 @@ from piezoest.compile import inlined, like, local, local_rows
 from piezoest.equations import believing, kalman, least_squares, sensor_noise, swing
 from piezoest.equations import output_error as equations
 from piezoest.estimators.delay_line import delayed
-from piezoest.estimators.derivative_form import is_believable, learn_anew
+from piezoest.estimators.derivative_form import is_believable
 from piezoest.estimators.model_writing import write_loop
 from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED, WAITING, keep_outcome
 from piezoest.layout import (
@@ -246,10 +246,8 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         u -= state.centre.u
         _move(state, settings, u)
     jumped = state.gap > settings.longest_gap
-    if jumped:
-        learn_anew(state.belief)
-    rejection = settings.policies.outlier_rejection
-    if measured and not is_believable(state.belief, rejection, state, law.s, settings.unit, x):
+    belief, rejection = state.belief, settings.policies.outlier_rejection
+    if measured and not is_believable(belief, rejection, state, law.s, settings.unit, x, jumped):
         state.outliers += 1.0
         law.last = REJECTED
         measured = False

@@ -7,7 +7,7 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.compile import inlined
-from piezoest.equations.believing import BELIEF, believable, stands_still
+from piezoest.equations.believing import BELIEF, believable, believe, stands_still
 from piezoest.equations.least_squares import restore_covariance
 from piezoest.equations.mechanics import mechanics_step
 from piezoest.equations.swing import SWING, follow, half_period
@@ -271,7 +271,8 @@ def _is_outlier(state: Any, settings: Any, x: Any) -> Any:
     if state.gap <= settings.longest_gap:
         return True
     _shift(state, x)
-    state.belief.seen = 0.0
+    # What is usual stays known: the way back from a wrong level must not pass for a reading like any other.
+    believe(state.belief, dx, travel, WARM_UP)
     return False
 
 

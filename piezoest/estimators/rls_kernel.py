@@ -184,7 +184,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         outcome.last = MISSING
     if waiting:
         if measured:
-            form.prime(state, u, x)
+            form.prime(state, settings.policies.outlier_rejection, u, x)
             outcome.last = WAITING
         return
     if known:
@@ -193,7 +193,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         u = form.u_from_centre(state.centre, u)
         _move(state, settings, u)
     rejection, theta = settings.policies.outlier_rejection, state.law.theta
-    if measured and not form.is_believable(state.belief, rejection, state, theta, settings.slope, x):
+    if measured and not form.is_believable(state.belief, rejection, state, theta, settings.slope, x, False):
         state.outliers += 1.0
         outcome.last = REJECTED
         measured = False
