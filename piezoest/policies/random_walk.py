@@ -5,7 +5,7 @@ from typing import Any
 
 from piezoest._checks import moderate
 from piezoest.compile import inlined
-from piezoest.equations import least_squares, sensor_noise
+from piezoest.equations import admissible, least_squares, sensor_noise
 from piezoest.equations.swing import half_period
 from piezoest.policies.base import Conditions, Policy
 from piezoest.policies.excitation_gate import growth
@@ -16,8 +16,11 @@ from piezoest.policies.forgetting import check_memory
 SLOWEST, SLOW = 1e-12, 0.2
 # Positions in theta; the offset may be off by this fraction of a swing, a parameter walks at least so much
 # (squared), and no variance grows beyond so many times its start.
-BETA, GAMMA, OFFSET_SLOPE = 1, 2, 3
+ALPHA, BETA, GAMMA, OFFSET_SLOPE = 0, 1, 2, 3
 OFF_CENTRE, LEAST_STEP, CEILING = 0.3, 1e-6, 1e4
+# ... and so much (squared) where the estimate is no stage's: a fault that took it there may have taken it
+# near zero, from where it would not come back by fractions of itself.
+LOST_STEP = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +79,23 @@ def _noise_memory(noise: Any, swing: Any, theta: Any, settings: Any) -> Any:
 
 
 @inlined
-def _square_step(state: Any, settings: Any, walk: Any, i: int) -> Any:
+def _least_step(loop: Any, theta: Any, scale: Any) -> Any:
+    """Square of what a parameter of the loop walks at least."""
+    if loop is None:
+        return LEAST_STEP
+    alpha, beta, gamma = theta[ALPHA] * scale[ALPHA], theta[BETA] * scale[BETA], theta[GAMMA] * scale[GAMMA]
+    return LEAST_STEP if admissible.is_admissible(alpha, beta, gamma, 0.0, 0.0, 0.0) != 0.0 else LOST_STEP
+
+
+@inlined
+def _square_step(state: Any, settings: Any, walk: Any, i: int, least: Any) -> Any:
     """Square of what a parameter walks in a swing: a fraction of itself; the offset, one of the swing."""
     theta = state.law.theta
-    step = theta[i]
     if i == OFFSET_SLOPE:
         swing_in_offset = state.swing.size * settings.scale[GAMMA] / settings.scale[OFFSET_SLOPE]
         step = OFF_CENTRE * theta[GAMMA] * swing_in_offset
-    return walk * max(step * step, LEAST_STEP)
+        return walk * max(step * step, LEAST_STEP)
+    return walk * max(theta[i] * theta[i], least)
 
 
 @inlined
@@ -100,9 +112,9 @@ def prepare(own: Any, fixed: Any, state: Any, settings: Any) -> None:
     if excitation.swings < SLOWEST:
         return
     fraction = excitation.motion
-    rho = 0.0
+    rho, least = 0.0, _least_step(settings.loop, law.theta, settings.parameter_scale)
     for i in range(len(law.theta)):
-        q = _square_step(state, settings, fixed.walk, i)
+        q = _square_step(state, settings, fixed.walk, i, least)
         rho += q * excitation.squares[i]
         q *= growth(state.policies.excitation_gate)
         ceiling = CEILING * max(q, settings.law.P_0[i, i])
