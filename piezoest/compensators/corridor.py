@@ -63,6 +63,8 @@ FADES, MEMORY = 0.95, 2.0
 NEAR = 2.0
 # No travel is less than this fraction of the range, of which so many volts count at most: a setpoint's noise.
 LEAST, USUAL_RANGE = 1e-4, 100.0
+# Legs are small below this fraction of the widest swing.
+SMALL = 0.1
 # Beyond this a gain is no number.
 LARGEST = 1e100
 
@@ -164,9 +166,11 @@ def _follow_line(corridor: Any, u: Any, r: Any) -> None:
     corridor.known = min(corridor.known + weight, 1.0)
     share = min(weight / corridor.known, 1.0)
     du, dr = u - corridor.mean_u, r - corridor.mean_r
-    # The centre follows legs that are smaller than the widest swing the sooner.
+    # Legs that are much smaller than the widest swing are no loops within it: the centre follows them soon.
     leg = max(corridor.leg, np.abs(r - corridor.turned), corridor.travel)
-    near = max(share, corridor.travel / (MEMORY * leg))
+    near = share
+    if leg < SMALL * 2.0 * corridor.half_swing:
+        near = max(share, corridor.travel / (MEMORY * leg))
     corridor.mean_u += near * du
     corridor.mean_r += near * dr
     corridor.square = (1.0 - share) * (corridor.square + share * du * du)
