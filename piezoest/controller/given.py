@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
+from piezoest.controller import reach
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
-from piezoest.controller.voltage import SEEK
 
 # An answer confirms the gain within this factor.
 ALIKE = 3.0
@@ -73,9 +73,7 @@ def compare(state: Any, settings: Any) -> None:
 @register_jitable
 def _forget(state: Any, settings: Any, answered: Any) -> None:
     """Seek the gain."""
-    start = state.start
-    start.gain_before = answered
-    state.unit = state.scale = state.line.gain = 0.0
-    state.stage = SEEK
-    starts.begin_again(start, settings.start, state.u)
+    state.start.gain_before = answered
+    state.unit = state.line.gain = 0.0
+    reach.seek_again(state, settings)
     reading.notice(state, reading.OTHER_GAIN)

@@ -57,8 +57,8 @@ FARTHEST = 3.0
 def _begin_learning(state: Any, settings: Any) -> None:
     """The gain is known: all models begin with the line through the present point."""
     start = state.start
-    if state.unit == 0.0:
-        state.unit = start.gain
+    if state.unit * start.gain <= 0.0:
+        state.scale, state.unit = 0.0, start.gain
         state.zero = start.now - start.gain * start.voltage
     least = np.abs(start.target - start.from_u)
     lines.begin(state.line, start.gain, start.voltage, start.now, least)
@@ -219,6 +219,8 @@ def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
     way = np.abs(u - start.origin)
     if start.given != 0.0:
         given.compare(state, settings)
+    elif reach.is_refuted(state, recent.mean_u - start.origin, recent.mean_x - start.zero):
+        reach.seek_again(state, settings)
     elif way >= state.confirmed and way > 0.0:
         # Only on new ground: on the way back hysteresis would pass for gain.
         state.confirmed = way

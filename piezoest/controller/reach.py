@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 from numba.extending import register_jitable
 
 from piezoest.controller import readings as reading
@@ -10,8 +11,40 @@ from piezoest.controller.voltage import SEEK
 
 # The voltage may rest at a limit for this travel of the reference, in swings, before all begins anew.
 RESTED = 4.0
+# An answer to a way that is so many times as long as the ways of the start says more than theirs.
+LONGER = 2.0
+# Before the line is sure, the stage must have gone this fraction of the way that the line says.
+ANSWERED = 0.2
 # A reference is said to be out of reach when it was for so many times what a doubling takes.
 SAID = 25.0
+
+
+@register_jitable
+def seek_again(state: Any, settings: Any) -> None:
+    """Seek the gain again, on longer ways."""
+    state.stage, state.driving, state.feedback = SEEK, 0.0, 0.0
+    state.start.least = np.abs(state.u - state.start.origin)
+    starts.begin_again(state.start, settings.start, state.u)
+
+
+@register_jitable
+def is_refuted(state: Any, gone: Any, answer: Any) -> bool:
+    """Whether the answer to a way from where all began speaks against the sign of the gain.
+
+    Hum or drift may have passed for the answer to the short ways of the start, but less so for that to a
+    longer one.
+    """
+    start = state.start
+    ways = max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
+    clear = np.abs(answer) > starts.CLEAR * max(start.noise, np.sqrt(state.readings.noise))
+    return clear and np.abs(gone) > LONGER * ways and answer * gone * start.gain < 0.0
+
+
+@register_jitable
+def _has_answered(state: Any) -> bool:
+    """Whether the stage has gone from where all began about as the line says, if much less far."""
+    gone, answer = state.u - state.start.origin, state.readings.last - state.start.zero
+    return answer * gone * state.line.gain > ANSWERED * (state.line.gain * gone) ** 2
 
 
 @register_jitable
@@ -23,17 +56,17 @@ def watch(state: Any, settings: Any, moved: Any) -> None:
     """
     left = (state.r - state.readings.last) * state.line.gain
     short = (state.u <= settings.minimum and left < 0.0) or (state.u >= settings.maximum and left > 0.0)
-    if short and state.readings.fault == reading.NONE and state.readings.spikes == 0.0:
+    fine = state.readings.fault == reading.NONE and state.readings.spikes == 0.0
+    if short and fine and (reading.is_sure(state.readings) or _has_answered(state)):
         state.railed = 0.0
         state.beyond += 1.0
         if state.beyond - 1.0 < SAID * settings.doubling <= state.beyond:
             reading.notice(state, reading.OUT_OF_REACH)
         return
     rests = state.u <= settings.minimum or state.u >= settings.maximum
-    # Beside a line that was learnt from wrong readings, right ones look scaled or moved.
+    # Beside a line that was learnt from wrong readings, right ones look reversed, scaled or moved.
     fault = state.readings.fault
-    doubted = fault == reading.NONE or fault == reading.SCALED or fault == reading.MOVED
+    doubted = fault == reading.NONE or (reading.REVERSED <= fault and fault != reading.SATURATED)
     state.railed = state.railed + moved if rests and doubted else 0.0
     if state.railed > RESTED * state.reference.swing:
-        state.stage, state.driving, state.feedback = SEEK, 0.0, 0.0
-        starts.begin_again(state.start, settings.start, state.u)
+        seek_again(state, settings)

@@ -43,8 +43,9 @@ START = record(
     gain=NUMBER, gain_before=NUMBER, tries=AMOUNT, stuck=COUNT, first=numbers(FIRST, kind=MEASURED),
     # Whether the gain is the user's, and not confirmed yet; readings in a row that spoke for it, all against.
     given=FLAG, agreed=COUNT, doubted=COUNT,
-    # Whether the voltage is planned before there are readings; whether where it stands was said, not read.
-    ahead=FLAG, told=FLAG,
+    # Whether the voltage is planned before there are readings; whether where it stands was said, not read; the
+    # first way that may be gone, zero for any [V].
+    ahead=FLAG, told=FLAG, least=AMOUNT,
 )  # fmt: skip
 # First and longest way [V], samples of a way, of a window; the limits; the user's gain, zero for none.
 SETTINGS = record(
@@ -113,7 +114,8 @@ def _go(start: Any, settings: Any, u: Any) -> None:
 def rest_at(start: Any, settings: Any, u: Any, x: Any, gain: Any) -> None:
     """The stage rests, and reads x: go the first way, or none where the gain is known and not zero."""
     start.from_x = start.zero = start.now = x
-    start.way = settings.way if settings.highest - u >= u - settings.lowest else -settings.way
+    way = min(max(settings.way, start.least), settings.longest)
+    start.way = way if settings.highest - u >= u - settings.lowest else -way
     _go(start, settings, u)
     if gain != 0.0:
         start.stage, start.gain = DONE, gain
