@@ -49,6 +49,8 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
         noticed=COUNT, notice=whole(0.0, 12.0), shaken=COUNT,
+        # When the last one was noted; reference, reading and voltage then.
+        seen=record(samples=COUNT, r=MEASURED, x=MEASURED, u=MEASURED),
         # What the line misses, the most of late, what it missed of a swing when it drove; what the stage
         # misses of the reference.
         score=candidate.SCORE, widest=AMOUNT, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,

@@ -7,12 +7,15 @@ from numba.extending import register_jitable
 
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
+from piezoest.controller import travel as travels
 from piezoest.controller.voltage import SEEK
 
 # The voltage may rest at a limit for this travel of the reference, in swings, before all begins anew.
-RESTED = 4.0
+# Sooner if the line is not sure, once the reference has shown its swing.
+RESTED, SOON_RESTED = 4.0, 1.5
 # An answer to a way that is so many times as long as the ways of the start says more than theirs.
-LONGER = 2.0
+# It speaks against them from this fraction of their answer on.
+LONGER, AGAINST = 2.0, 0.5
 # Before the line is sure, the stage must have gone this fraction of the way that the line says.
 ANSWERED = 0.2
 # A reference is said to be out of reach when it was for so many times what a doubling takes.
@@ -36,7 +39,8 @@ def is_refuted(state: Any, gone: Any, answer: Any) -> bool:
     """
     start = state.start
     ways = max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
-    clear = np.abs(answer) > starts.CLEAR * max(start.noise, np.sqrt(state.readings.noise))
+    noise = starts.CLEAR * max(start.noise, np.sqrt(state.readings.noise))
+    clear = np.abs(answer) > max(noise, AGAINST * np.abs(start.gain) * ways)
     return clear and np.abs(gone) > LONGER * ways and answer * gone * start.gain < 0.0
 
 
@@ -48,16 +52,21 @@ def _has_answered(state: Any) -> bool:
 
 
 @register_jitable
-def watch(state: Any, settings: Any, moved: Any) -> None:
-    """Where the voltage rests at a limit for long, all that is known may be wrong: start again.
-
-    Not where the readings agree with the line, and the stage stands before the reference: that is out of
-    reach.
-    """
+def _is_out_of_reach(state: Any, settings: Any) -> bool:
+    """Whether the stage stands before the reference at a limit, where the readings agree with the line."""
     left = (state.r - state.readings.last) * state.line.gain
     short = (state.u <= settings.minimum and left < 0.0) or (state.u >= settings.maximum and left > 0.0)
     fine = state.readings.fault == reading.NONE and state.readings.spikes == 0.0
-    if short and fine and (reading.is_sure(state.readings) or _has_answered(state)):
+    return short and fine and (reading.is_sure(state.readings) or _has_answered(state))
+
+
+@register_jitable
+def watch(state: Any, settings: Any, moved: Any) -> None:
+    """Start again where what is known is wrong: the voltage rests at a limit for long, or goes the wrong way.
+
+    A reference that is out of reach is no reason.
+    """
+    if _is_out_of_reach(state, settings):
         state.railed = 0.0
         state.beyond += 1.0
         if state.beyond - 1.0 < SAID * settings.doubling <= state.beyond:
@@ -66,7 +75,9 @@ def watch(state: Any, settings: Any, moved: Any) -> None:
     rests = state.u <= settings.minimum or state.u >= settings.maximum
     # Beside a line that was learnt from wrong readings, right ones look reversed, scaled or moved.
     fault = state.readings.fault
-    doubted = fault == reading.NONE or (reading.REVERSED <= fault and fault != reading.SATURATED)
-    state.railed = state.railed + moved if rests and doubted else 0.0
-    if state.railed > RESTED * state.reference.swing:
+    doubted = fault == reading.NONE or (fault >= reading.REVERSED and fault != reading.SATURATED)
+    state.railed = state.railed + moved if rests and doubted else max(state.railed - moved, 0.0)
+    sure = reading.is_sure(state.readings)
+    most = RESTED if sure or state.reference.turns < travels.SHOWN else SOON_RESTED
+    if state.railed > most * state.reference.swing or (reading.go_wrong(state.readings) and not sure):
         seek_again(state, settings)

@@ -84,7 +84,7 @@ WEAK_FOR, WRONG_FOR, LARGE_FOR, STOPPED_FOR, OFF_FOR = 0.35, 0.15, 0.15, 0.04, 0
 # followed after so many, if the reference has not moved with it.
 MOVED_FOR, HELD_FOR = 0.5, 24.0
 # For so many swings of a line that has not held.
-SILENT_FOR = 2.0
+SILENT_FOR, REFUTED_FOR = 2.0, 2.0
 # A reading that is the same to the last bit is believed for this travel, in swings.
 STANDS_STILL = 5e-3
 # ... and for so many before nobody learns any more.
@@ -177,8 +177,9 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> N
     weakest = WEAK if sure or not straight else (1.0 / HUGE if line.legs >= TRUSTED else 0.0)
     if known:
         readings.weak = readings.weak + share * swings if answer < weakest else 0.0
-    wrong = sure and known and explained > SIGNED and slope < WRONG
-    readings.wrong = readings.wrong + swings if wrong else 0.0
+    wrong = known and explained > SIGNED and slope < WRONG
+    share = 1.0 if sure else WRONG_FOR / REFUTED_FOR
+    readings.wrong = readings.wrong + share * swings if wrong else 0.0
     # What is far too large passes for noise.
     plain = straight or (sure and clear and off)
     large = (answer > LARGE if sure else slope > HUGE and line.legs >= TRUSTED) and moved and plain
@@ -191,9 +192,15 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> N
 
 
 @register_jitable
+def go_wrong(readings: Any) -> bool:
+    """Whether readings have gone the wrong way for long: they lie, or the line does if it is not sure."""
+    return readings.wrong > WRONG_FOR
+
+
+@register_jitable
 def _name(readings: Any) -> float:
     """The fault that the evidence shows; the present one until it is over."""
-    if readings.wrong > WRONG_FOR:
+    if go_wrong(readings) and is_sure(readings):
         return REVERSED
     if readings.large > LARGE_FOR:
         return SCALED
@@ -211,9 +218,11 @@ def _name(readings: Any) -> float:
 
 @register_jitable
 def notice(state: Any, number: Any) -> None:
-    """Note a fault, its end, or what else was noticed, for the log."""
+    """Note a fault, its end, or what else was noticed, and where it was, for the log."""
     state.noticed += 1.0
     state.notice = number
+    state.seen.samples, state.seen.r = state.samples, state.r
+    state.seen.x, state.seen.u = state.readings.last, state.u
 
 
 @register_jitable
@@ -285,5 +294,6 @@ def believed(
     if far:
         readings.outliers += 1.0
     still = _stands_still(readings, line, travel, STANDS_STILL, 1.5)
-    doubtful = readings.fault != NONE or readings.weak > DOUBT or readings.wrong > 0.0
+    wrong = readings.wrong > 0.0 and is_sure(readings)
+    doubtful = readings.fault != NONE or readings.weak > DOUBT or wrong
     return np.nan if doubtful or still or alone or (far and (is_sure(readings) or not off)) else x

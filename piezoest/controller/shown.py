@@ -86,13 +86,14 @@ class Candidate:
 
 def event(state: Any, sample_rate: float, learnt_on: Any) -> Event:
     """Return what was noticed last."""
-    number, time = state["notice"], float(state["samples"]) / sample_rate
+    number, seen = state["notice"], state["seen"]
+    time = float(seen["samples"]) / sample_rate
     name = FAULTS[int(number)]
     if not name:
         return Event(time, "resumed", "the readings follow the voltage again")
     action = "fell back" if number == state["readings"]["fault"] else "went on"
     start = {each: float(state["start"][each]) + 0.0 for each in ("gain", "gain_before")}
-    here = {"wanted": state["r"], "there": state["readings"]["last"], "limit": state["u"]}
+    here = {"wanted": seen["r"], "there": seen["x"], "limit": seen["u"]}
     figures = start | here | _pace(state, sample_rate) | _outside(state, learnt_on)
     return Event(time, action, f"{name}: {MEANINGS[name].format_map(figures)}")
 

@@ -43,8 +43,8 @@ START = record(
     gain=NUMBER, gain_before=NUMBER, tries=AMOUNT, stuck=COUNT, first=numbers(FIRST, kind=MEASURED),
     # Whether the gain is the user's, and not confirmed yet; readings in a row that spoke for it, all against.
     given=FLAG, agreed=COUNT, doubted=COUNT,
-    # Whether the voltage is planned before there are readings; whether where it stands was said, not read; the
-    # first way that may be gone, zero for any [V].
+    # Whether the voltage is planned before there are readings; whether where it stands was said, not read;
+    # shortest first way, zero for the usual one [V].
     ahead=FLAG, told=FLAG, least=AMOUNT,
 )  # fmt: skip
 # First and longest way [V], samples of a way, of a window; the limits; the user's gain, zero for none.
