@@ -57,7 +57,7 @@ def pieces(document: Document) -> dict[str, str]:
         "by_often": by(document, "often", "called often"),
         "crossed": crossed(mine),
         "worst": worst(mine["worst"]),
-        "told": told(mine["told"]),
+        "told": told(mine["by_mode"]),
         **settling(document),
         "singles": singles(document["singles"]),
         "dwell": dwell(document.get("dwell")),
@@ -120,7 +120,7 @@ def quantiles(document: Document) -> str:
 
 def cell(row: Document | None) -> str:
     """Median of the ratio, and runs above 1."""
-    return f"{short(row['median'])}; {row['over']}/{row['judged']}" if row and row["judged"] else "—"
+    return f"{short(row['ratio'])}; {row['over']}/{row['judged']}" if row and row["judged"] else "—"
 
 
 def by(document: Document, column: str, name: str, more: dict[str, Any] | None = None) -> str:
@@ -164,7 +164,7 @@ def worst(rows: list[Document]) -> str:
 
 def found(document: Document) -> str:
     """One line for each of the other questions."""
-    rows = document["controller"]["told"]
+    rows = document["controller"]["by_mode"]
     asked, named, left, recovered = (
         sum(row[name] for row in rows) for name in ("to_name", "named", "to_recover", "recovered_soon")
     )

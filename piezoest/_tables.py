@@ -1,7 +1,10 @@
 """What commands print: tables of figures, and sentences as they are."""
 
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from typing import Any
+
+# What a table shows of a row under each heading: its value of that name, or what a function makes of it.
+Columns = Mapping[str, str | Callable[[Any], Any]]
 
 
 def say(console: Any, *sentences: str, style: str | None = None) -> None:
@@ -34,3 +37,28 @@ def print_cells(
         shown = (Text(str(cell), style(str(cell))) for cell in cells)
         table.add_row(*shown, end_section=group > 0 and k % group == 0)
     console.print(table)
+
+
+def cells_of(rows: Iterable[Any], columns: Columns | None = None) -> tuple[list[str], list[list[Any]]]:
+    """Heading and body of rows that are dictionaries; without columns, their names are the headings."""
+    rows = list(rows)
+    if columns is None:
+        columns = {name: name for name in rows[0]} if rows else {}
+    body = [[row[what] if isinstance(what, str) else what(row) for what in columns.values()] for row in rows]
+    return list(columns), body
+
+
+def print_rows(console: Any, title: str, rows: Iterable[Any], columns: Columns | None = None) -> None:
+    """Print rows that are dictionaries; columns whose cells are all words are flush left."""
+    heading, body = cells_of(rows, columns)
+    texts = [k for k in range(len(heading)) if all(isinstance(row[k], str) for row in body)]
+    print_cells(console, title, heading, [list(map(shown, row)) for row in body], texts=(0, *texts))
+
+
+def shown(value: Any) -> str:
+    """A number with three digits; a dash for none, yes and no."""
+    if value is None:
+        return "—"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -156,7 +156,7 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
             say("loading (compiles once after the installation)")
             from piezoest.bench import table, tables
             from piezoest.bench.executors import quiet
-            from piezoest.bench.store import carry_out, store_in
+            from piezoest.bench.store import played
             from piezoest.bench.tuning import tune
 
             tables.checked_format(format)
@@ -166,18 +166,16 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
             if where.dask or where.scheduler is not None
             else table.over_cores(where.jobs)
         )
+        play = partial(played, folder=folder, execute=execute)
         tuned: list[dict[str, Any]] = []
-        with store_in(folder) as store:
-            if runs.tune is not None:
-                with shared.counting("runs to tune by") as count:
-                    tuned = tune(plan.estimators, runs.tune, plan.given, store, execute, count)
-                # Beside the others, where these are not the defaults.
-                chosen = (each["chosen"] for each in tuned if each["chosen"] != each["default"])
-                plan = dataclasses.replace(plan, tuned=tuple(dict.fromkeys(chosen)))
-            tasks = plan.tasks()
-            with shared.counting("runs") as count:
-                carry_out(tasks, store, execute, count)
-            rows = list(store.rows(task.key for task in tasks))
+        if runs.tune is not None:
+            with shared.counting("runs to tune by") as count:
+                tuned = tune(plan.estimators, runs.tune, plan.given, partial(play, progress=count))
+            # Beside the others, where these are not the defaults.
+            chosen = (each["chosen"] for each in tuned if each["chosen"] != each["default"])
+            plan = dataclasses.replace(plan, tuned=tuple(dict.fromkeys(chosen)))
+        with shared.counting("runs") as count:
+            rows = play(plan.tasks(), progress=count)
         table.write(rows, folder, format)
         with shared.progress() as say, quiet():
             say("timing each estimator alone")

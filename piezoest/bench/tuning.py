@@ -19,7 +19,7 @@ from piezoest.bench.cases import PAPER
 from piezoest.bench.estimators import KNOWN, class_of, is_slow, name_of
 from piezoest.bench.run import COLUMNS, Task, code_of
 from piezoest.bench.statistics import over_scenarios, relative
-from piezoest.bench.store import Store, carry_out
+from piezoest.bench.store import Row
 from piezoest.bench.tables import table_of
 
 TRAINING = ("cold-start", "amplitude-drop", "gain-step", "two-tone")
@@ -134,14 +134,12 @@ def tune(
     estimators: Sequence[str],
     number: int,
     given: dict[str, Any],
-    store: Store,
-    execute: Any,
-    progress: Callable[[int, int], None],
+    play: Callable[[Sequence[Task]], list[Row]],
 ) -> list[dict[str, Any]]:
     """Find the best settings of each estimator, by the same budget, on seeds that nothing is judged on.
 
-    Slow ones are left out. Returns trials with their scores, geometric means of the typical errors relative
-    to the amplitude, and the ``chosen`` one.
+    `play`: rows of tasks. Slow ones are left out. Returns trials with their scores, geometric means of the
+    typical errors relative to the amplitude, and the ``chosen`` one.
     """
     spaces = [each for text in estimators if not is_slow(text) and (each := tunable(text)).space]
     # The same points for all: two with the same space get the same settings.
@@ -152,8 +150,7 @@ def tune(
         for scenario in TRAINING
         for text in dict.fromkeys(text for some in trials.values() for text in some)
     ]
-    carry_out(tasks, store, execute, progress)
-    runs = relative(table_of(store.rows(task.key for task in tasks), COLUMNS))
+    runs = relative(table_of(play(tasks), COLUMNS))
     scores = {str(text): over_scenarios(group, "typical") for text, group in runs.groupby("estimator")}
     found = []
     for each in spaces:

@@ -20,7 +20,7 @@ from piezoest.bench.zoo.faults import NONE
 from piezoest.bench.zoo.judging import BACK, COLUMNS, NEGLIGIBLE, NOISES, settled
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Factory, run_controller
-from piezoest.bench.zoo.summary import parted
+from piezoest.bench.zoo.summary import failures, grouped, median, values
 
 DURATION = 60.0  # s
 SHAPES = ("triangle", "sine", "raster")
@@ -114,34 +114,24 @@ def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
 
 
 def summarise_dwells(rows: Iterable[Row]) -> dict[str, Any]:
-    """Sum up rests."""
-    rows = [{**row, **_way(row)} for row in rows]
+    """Sum up rests: by whether the stage creeps, and there is feedback, and noise in the reference."""
+    given = dict(zip(WAYS, ("creep", "feedback", "setpoint_noise"), strict=True))
+    rows = [{**row, **{name: row[column] > 0.0 for name, column in given.items()}} for row in rows]
     judged = [row for row in rows if row["failure"] is None]
     broken = sorted((row for row in judged if not row["kept"]), key=_ratio, reverse=True)
     summary = {
         "runs": len(rows),
-        "failures": len(rows) - len(judged),
+        "failures": failures(rows),
         "rigs": len({row["seed"] for row in rows}),
         "kept": sum(row["kept"] for row in judged),
         "duration": max((row["duration"] for row in rows), default=0.0),
-        "groups": [
-            {**dict(zip(WAYS, way, strict=True)), **_summed(group)}
-            for way, group in parted(rows, *WAYS).items()
-        ],
-        "by_family": [
-            {"family": family, **_summed(group)} for (family,), group in parted(rows, "family").items()
-        ],
+        "groups": grouped(rows, *WAYS, of=_summed),
+        "by_family": grouped(rows, "family", of=_summed),
         "worst": [
             {"seed": row["seed"], "feedback": row["feedback"], "ratio": _ratio(row)} for row in broken[:10]
         ],
     }
     return dict(json_safe(summary))
-
-
-def _way(row: Row) -> dict[str, bool]:
-    """Whether the stage creeps, and there is feedback, and noise in the reference."""
-    given = (row["creep"], row["feedback"], row["setpoint_noise"])
-    return {name: size > 0.0 for name, size in zip(WAYS, given, strict=True)}
 
 
 def _ratio(row: Row, period: str = "first") -> float:
@@ -152,13 +142,12 @@ def _ratio(row: Row, period: str = "first") -> float:
 
 def _summed(rows: Sequence[Row]) -> dict[str, Any]:
     judged = [row for row in rows if row["failure"] is None]
-    found: Row = {"runs": len(rows), "kept": sum(row["kept"] for row in judged)}
-    for period in PERIODS:
-        found[period] = float(np.median([_ratio(row, period) for row in judged])) if judged else None
-    found["largest"] = max(map(_ratio, judged), default=None)
-    gone = [row["excursion"] for row in judged if row["excursion"] is not None]
+    gone = values(judged, "excursion")
     return {
-        **found,
-        "excursion": float(np.median(gone)) if gone else None,
+        "runs": len(rows),
+        "kept": sum(row["kept"] for row in judged),
+        **{period: median([_ratio(row, period) for row in judged]) for period in PERIODS},
+        "largest": max(map(_ratio, judged), default=None),
+        "excursion": median(gone),
         "farthest": max(gone, default=None),
     }

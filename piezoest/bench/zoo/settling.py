@@ -9,6 +9,7 @@ is slow beside it, and large beside the noise.
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from piezoest.bench.zoo.faults import Fault
 from piezoest.bench.zoo.references import Reference
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Factory, run_controller
+from piezoest.bench.zoo.summary import failures, grouped
 
 AMPLITUDES = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # µm
 FREQUENCIES = (1.0, 3.0, 10.0, 30.0)  # Hz
@@ -33,6 +35,7 @@ NOISE = (2e-4, 2e-3)  # µm
 STEPS = 2.0**16  # of both converters
 RESONANCES = (400.0, 780.0)  # Hz
 SLOW, LARGE = 0.025, 100.0  # frequency over the resonance at most, amplitude over the noise at least
+SOON, ENOUGH = 2, 0.95  # periods in which all is to settle, in so many of the runs of a cell
 # Kinds of stages, of which the first and the last are of the families that some estimators learn.
 KINDS = ("paper", "relays", "bouc-wen", "duhem", "coleman-hodgdon")
 
@@ -144,3 +147,34 @@ def asked(rig: Rig) -> bool:
     """Whether it is asked for that all settles soon."""
     slow = rig.plain.frequency <= SLOW * rig.around.resonance[0]
     return bool(slow and rig.plain.amplitude >= LARGE * rig.noise)
+
+
+def summarise_cells(rows: Iterable[Row]) -> dict[str, Any]:
+    """Sum up the map: shares of runs that settled soon."""
+    rows = list(rows)
+    asked = [row for row in rows if row["asked"]]
+    others = [row for row in rows if not row["asked"]]
+    found = grouped(asked, "family", "amplitude", "frequency", of=_shares)
+    return {
+        "runs": len(rows),
+        "failures": failures(rows),
+        "others": len(others),
+        "cells": {
+            "asked": len(found),
+            "kept": {name: sum(cell[name] >= ENOUGH for cell in found) for name, _, _ in SEGMENTS},
+        },
+        "by_family": grouped(asked, "family", of=_shares),
+        "by_place": grouped(asked, "amplitude", "frequency", of=_shares),
+        "other_places": grouped(others, "amplitude", "frequency", of=_shares),
+    }
+
+
+def _shares(rows: Sequence[Row]) -> dict[str, Any]:
+    """Share of runs that settled soon after each change, and median of the periods."""
+    found: dict[str, Any] = {"runs": len(rows)}
+    for k, (name, _, _) in enumerate(SEGMENTS):
+        periods = [row["segments"][k]["periods"] if row["segments"] else None for row in rows]
+        found[name] = float(np.mean([each is not None and each <= SOON for each in periods]))
+        median = float(np.median([np.inf if each is None else each for each in periods]))
+        found[f"{name} periods"] = None if np.isinf(median) else median
+    return found
