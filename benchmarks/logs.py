@@ -21,9 +21,9 @@ import numpy as np
 from log_judging import NEGLIGIBLE, PLAYS, TRAIN, clean_scores, judge
 
 from piezoest._files import write_text
+from piezoest._progress import progress
 from piezoest.bench.executors import in_processes
 from piezoest.bench.origin import json_safe, origin, put
-from piezoest.bench.shared import counting
 from piezoest.bench.table import DIGITS
 from piezoest.bench.zoo.logs import ADDED
 from piezoest.models import ColemanHodgdon
@@ -174,10 +174,10 @@ def summarise(rows: Sequence[Row], clean: Sequence[Row] = ()) -> Row:
 def played(what: str, work: Callable[[int], Row], seeds: Sequence[int], workers: int | None) -> list[Row]:
     """Rows of some logs, in the order of their seeds."""
     rows: list[Row] = []
-    with counting(what) as count:
+    with progress(what, lines=True) as say:
         for row in in_processes(work, seeds, workers):
             rows.append(row)
-            count(len(rows), len(seeds))
+            say.done(len(rows), len(seeds))
     return sorted(rows, key=lambda row: row["seed"])
 
 

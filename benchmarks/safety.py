@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from piezoest._files import save_figure
+from piezoest._progress import progress
 from piezoest.bench.origin import json_safe, origin, put
-from piezoest.bench.shared import counting
 from piezoest.bench.store import played
 from piezoest.bench.table import DIGITS
 from piezoest.bench.zoo import contenders, dwelling, judging, settling
@@ -152,8 +152,8 @@ def main(given: Sequence[str] | None = None) -> int:
     execute = over_cores(arguments.workers)
 
     def play(what: str, planned: Sequence[Task]) -> list[Row]:
-        with counting(f"runs of {what}") as count:
-            return played(planned, arguments.out, execute, count)
+        with progress(f"runs of {what}", lines=True) as say:
+            return played(planned, arguments.out, execute, say.done)
 
     first = arguments.seed
     rows = {}

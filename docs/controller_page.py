@@ -1,22 +1,15 @@
-"""Tables, numbers and figure of the page `controller`, from docs/data/controller.json and target.json.
+"""Tables and numbers of the page `controller`, from docs/data/controller.json and target.json.
 
-Tables and numbers are written at every Sphinx build; the figure by python docs/controller_page.py --figure
+The figure is drawn by python docs/controller_page.py
 """
 
-import sys
-from typing import Any
-
-from page_parts import DOCS, Document, of_all, percent, read, replacements, table_of, write_pieces
+from page_parts import DOCS, Document, of_all, percent, read, replacements, table_of
 
 from piezoest._files import save_figure
 
 FIGURE = DOCS / "figures" / "controller" / "load.png"
 NEAR = 0.01  # relative difference of settled errors
-
-
-def write(app: Any = None) -> None:
-    """Write what the page includes."""
-    write_pieces(DOCS / "generated" / "controller", pieces(read("controller"), read("target")))
+SOURCES = ("controller", "target")
 
 
 def pieces(parity: Document, target: Document) -> dict[str, str]:
@@ -27,13 +20,14 @@ def pieces(parity: Document, target: Document) -> dict[str, str]:
     least = min(row["load_mean"] for row in loads if row["precision"] == "double")
     return {
         "numbers": replacements(
+            "controller",
             {
-                "controller exact": of_all(exact, len(runs)),
-                "controller near": of_all(near, len(runs)),
-                "controller limit": percent(NEAR),
-                "controller double": f"{least:.0f}",
-                "controller tools": "; ".join(target["tools"]),
-            }
+                "exact": of_all(exact, len(runs)),
+                "near": of_all(near, len(runs)),
+                "limit": percent(NEAR),
+                "double": f"{least:.0f}",
+                "tools": "; ".join(target["tools"]),
+            },
         ),
         "parity": table_of(
             "Generated C compared with the library",
@@ -87,6 +81,4 @@ def draw() -> None:
 
 
 if __name__ == "__main__":
-    write()
-    if "--figure" in sys.argv:
-        draw()
+    draw()

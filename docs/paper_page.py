@@ -1,17 +1,11 @@
-"""Tables and numbers of the page `paper`, from docs/data/paper.json; written at every Sphinx build."""
+"""Tables and numbers of the page `paper`, from docs/data/paper.json."""
 
 import json
 from importlib import resources
-from typing import Any
 
-from page_parts import DOCS, Document, made, read, replacements, table, write_pieces
+from page_parts import Document, replacements, table
 
 from piezoest.bench import paper_report as report
-
-
-def write(app: Any = None) -> None:
-    """Write what the page includes."""
-    write_pieces(DOCS / "generated" / "paper", pieces(read("paper")))
 
 
 def pieces(document: Document) -> dict[str, str]:
@@ -41,14 +35,12 @@ def numbers(document: Document) -> str:
     """Substitutions for numbers that stand in sentences."""
     conditions = document["conditions"]
     start = conditions["start"]
-    return replacements(
-        {
-            **made("paper", document),
-            "paper library": document["versions"]["piezoest"],
-            "paper seconds": f"{document['seconds']:.0f} s",
-            "paper memory": f"{conditions['memory_s']:g} s",
-            "paper seed": conditions["seed"],
-            "paper start": f"α = {start['alpha']:g}, β = {start['beta']:g}, γ = {start['gamma']:g}",
-            "paper start gain": f"{conditions['linear_start']['gain']:g} µm/V",
-        }
-    )
+    values = {
+        "library": document["versions"]["piezoest"],
+        "seconds": f"{document['seconds']:.0f} s",
+        "memory": f"{conditions['memory_s']:g} s",
+        "seed": conditions["seed"],
+        "start": f"α = {start['alpha']:g}, β = {start['beta']:g}, γ = {start['gamma']:g}",
+        "start gain": f"{conditions['linear_start']['gain']:g} µm/V",
+    }
+    return replacements("paper", values, document)

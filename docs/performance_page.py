@@ -1,16 +1,8 @@
-"""Tables and numbers of the page `performance`, from docs/data/speed.json; no number is typed by hand.
+"""Tables and numbers of the page `performance`, from docs/data/speed.json; no number is typed by hand."""
 
-Runs at the start of every Sphinx build.
-"""
+from page_parts import Document, replacements, table
 
-from typing import Any
-
-from page_parts import DOCS, Document, made, read, replacements, table, write_pieces
-
-
-def write(app: Any = None) -> None:
-    """Write what the page includes."""
-    write_pieces(DOCS / "generated" / "performance", pieces(read("speed")))
+SOURCES = ("speed",)
 
 
 def pieces(document: Document) -> dict[str, str]:
@@ -79,4 +71,4 @@ def numbers(document: Document) -> str:
         "warmup": f"{once['warmup']:.1f} s",
         "track": f"{1.0 / once['one second of track()']:.0f}",
     }
-    return replacements(made("speed", document) | {f"speed {name}": value for name, value in values.items()})
+    return replacements("speed", values, document)

@@ -1,10 +1,9 @@
-"""Tables and numbers of the page `safety`, from docs/data/safety.json; written at every Sphinx build."""
+"""Tables and numbers of the page `safety`, from docs/data/safety.json."""
 
 from functools import partial
 from typing import Any
 
-import page_parts
-from page_parts import Document, of_all, percent, short, table, table_of
+from page_parts import Document, of_all, percent, replacements, short, table, table_of
 
 GROUPS = {"all": "all", "healthy": "healthy", "often": "called often"}
 WHO = {
@@ -35,12 +34,6 @@ CHANGES = {
     "cold start": "cold-start", "60 % of the amplitude": "switch", "20 %": "drop", "100 %": "switch-back",
     "gain changes by 30 %": "gain-step",
 }  # fmt: skip
-
-
-def write(app: Any = None) -> None:
-    """Write what the page includes."""
-    target = page_parts.DOCS / "generated" / "safety"
-    page_parts.write_pieces(target, pieces(page_parts.read("safety")))
 
 
 def pieces(document: Document) -> dict[str, str]:
@@ -76,8 +69,7 @@ def numbers(document: Document) -> str:
         **{name: percent(criteria[name]) for name in ("swing", "settled", "slow", "enough")},
         **{name: f"{criteria[name]:g}" for name in ("line", "noise", "calls", "back", "soon", "large")},
     }
-    named = {f"safety {name}": value for name, value in values.items()}
-    return page_parts.replacements(page_parts.made("safety", document) | named)
+    return replacements("safety", values, document)
 
 
 def drawn(of: Document) -> str:

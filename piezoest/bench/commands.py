@@ -8,6 +8,7 @@ import typer
 
 from piezoest._errors import Group
 from piezoest._options import grouped
+from piezoest._progress import progress
 from piezoest.bench import safety_command, shared, table_command
 from piezoest.bench.origin import origin
 
@@ -50,13 +51,12 @@ def paper(
     The paper's procedure at 50 kHz: each row adapts while it runs, until it is stationary. The stage was
     calibrated to the rows marked calibration; it has never seen those marked held out.
     """
-    shared.json_target(json_to)
-    shared.check_html(html)
+    shared.check(json_to, html)
     if figures is not None and (figures.exists() and not figures.is_dir()):
         raise typer.BadParameter(f"{figures} is not a folder", param_hint="--figures")
     began = time.perf_counter()
-    with shared.usage(), shared.progress() as say:
-        say("loading (compiles once after the installation)")
+    with shared.usage(), progress("", lines=True) as say:
+        say(shared.LOADING)
         from piezoest.bench.paper import MEMORIES, MEMORY, run_paper
 
         result = run_paper(

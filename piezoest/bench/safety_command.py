@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from piezoest._files import write_text
 from piezoest._options import grouped
+from piezoest._progress import progress
 from piezoest._tables import shown
-from piezoest.bench.origin import origin
-from piezoest.bench.shared import Json, counting, json_target, json_text, progress, show, usage
+from piezoest.bench.origin import origin, put
+from piezoest.bench.shared import LOADING, Json, check, show, usage
 
 if TYPE_CHECKING:
     from piezoest.bench.store import Row
@@ -107,11 +107,11 @@ def safety(
     none of them without need, and the error stays below 1.5 times that of the best straight line. Stopped and
     started again, it goes on where it was.
     """
-    json_target(json_to)
+    check(json_to)
     began = time.perf_counter()
     with usage():
-        with progress() as say:
-            say("loading (compiles once after the installation)")
+        with progress("", lines=True) as say:
+            say(LOADING)
             from piezoest.bench import tables
             from piezoest.bench.store import played
             from piezoest.bench.zoo import contenders, tasks
@@ -122,19 +122,19 @@ def safety(
         if which.show is not None:
             _show(name, which.show, given, written.output)
             return
-        with progress() as say:
+        with progress("", lines=True) as say:
             say("drawing")
             campaign = _campaign(which, name, given)
             format = tables.checked_format(written.table)
-        with usage(written.output), counting("runs") as count:
-            rows = played(campaign.tasks, written.output, tasks.over_cores(workers), count)
+        with usage(written.output), progress("runs", lines=True) as say:
+            rows = played(campaign.tasks, written.output, tasks.over_cores(workers), say.done)
     document = {"suite": "safety", **origin(began), "controller": name, "given": given}
     tables.write_table(
         tables.table_of(campaign.rows(rows), campaign.columns),
         written.output / f"{which.title.replace('safety', 'runs')}.{format}",
     )
     document |= campaign.summarise(rows)
-    write_text(written.output / f"{which.title}.json", json_text(document))
+    put(document, written.output / f"{which.title}.json")
     show(document, json_to, campaign.print, f"Results: {written.output}")
 
 

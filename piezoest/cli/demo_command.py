@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from piezoest._errors import errors
-from piezoest._files import save_figure
+from piezoest._errors import Debug, errors
+from piezoest._files import check_targets, save_figure
 from piezoest._options import grouped
+from piezoest._progress import progress
 from piezoest._tables import print_cells
-from piezoest.cli.shared import Debug, check_figure, progress
 
 if TYPE_CHECKING:
     from piezoest.demo import Demo
@@ -35,7 +35,7 @@ def demo(
     AdaptiveFeedforward, which is told the limits of the voltage and nothing else.
     """
     with errors(debug):
-        check_figure(output)
+        check_targets(figure=output)
         with progress("loading (compiles once after the installation)") as say:
             from piezoest.demo import run_demo
 

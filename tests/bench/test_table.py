@@ -327,7 +327,7 @@ def test_compare_with_itself_finds_no_change(own: str) -> None:
         (("-e", "NoSuch"), "choose one of"),
         (("-e", "./mine.py:Mine"), "mine:Mine"),
         (("--stage", "best"), "choose one of"),
-        (("--json", "nowhere/a.json"), "no file that can be written"),
+        (("--json", "nowhere/a.json"), "there is no folder"),
         (("--quick", "paper"), "--quick belong to the table"),
     ],
 )
