@@ -18,7 +18,7 @@ def pieces(document: Document) -> dict[str, str]:
     return tables | {
         "adaptation": table(report.TRANSIENTS, *report.transients(document["adaptation"])),
         "memory": table(document["memory"][0]["row"], *report.memories(document["memory"])),
-        "verdict": "".join(f"- {sentence}\n" for sentence in report.verdict(entries)),
+        "verdict": table(report.WITHIN, *report.verdict(entries)),
         "stage": table("Where the numbers of the stage come from", ["part", "source"], origins()),
         "numbers": numbers(document),
     }
