@@ -63,7 +63,6 @@ def quantiles(values: Sequence[float]) -> dict[str, float]:
 
 
 def share(hits: Iterable[bool], of: int) -> float | None:
-    """Of something."""
     return sum(map(bool, hits)) / of if of else None
 
 

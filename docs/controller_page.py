@@ -13,7 +13,6 @@ SOURCES = ("controller", "target")
 
 
 def pieces(parity: Document, target: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     runs, loads = parity["rows"], target["rows"]
     exact = sum(row["double_difference"] == 0.0 for row in runs)
     near = sum(row["float_difference"] <= NEAR for row in runs)
@@ -62,7 +61,6 @@ def pieces(parity: Document, target: Document) -> dict[str, str]:
 
 
 def draw() -> None:
-    """Draw the load of each controller."""
     from matplotlib.figure import Figure
 
     rows = [row for row in read("target")["rows"] if row["precision"] == "float"]

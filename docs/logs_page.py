@@ -41,7 +41,6 @@ GROUPS = {"clean": "nothing that the model lacks", "all": "anything"}
 
 
 def pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     families = [{"name": "all", **document["all"]}, *document["by_family"]]
     added = [
         {**part, "name": name}
@@ -80,7 +79,6 @@ def pieces(document: Document) -> dict[str, str]:
 
 
 def numbers(document: Document) -> str:
-    """Numbers that stand in sentences."""
     criteria, first = document["criteria"], document["seed"]
     # Of the clean logs, whose parameters are within two standard errors: of the worst parameter.
     within = [row["within_2"] or 0.0 for row in document["scores"] if row["logs_with"] == "clean"]
@@ -98,7 +96,6 @@ def numbers(document: Document) -> str:
 
 
 def grouped(title: str, of: str, rows: Sequence[Document]) -> str:
-    """A line for each group."""
     return table_of(title, rows, {of: "name", **PART})
 
 
@@ -112,7 +109,6 @@ def quantiles(document: Document) -> str:
 
 
 def worst(rows: Sequence[Document]) -> str:
-    """The worst logs, with their seeds."""
     columns: dict[str, Any] = {
         "seed": "seed",
         "family": "family",

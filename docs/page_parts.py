@@ -1,4 +1,7 @@
-"""What the programs of the pages share: reading docs/data, tables, and numbers that stand in sentences."""
+"""What the programs of the pages share: reading docs/data, tables, and numbers that stand in sentences.
+
+Each page has a module NAME_page whose `pieces` gives the texts that it includes, by the name of their file.
+"""
 
 import csv
 import io
@@ -88,7 +91,6 @@ def replacements(prefix: str, values: dict[str, Any], document: Document | None 
 
 
 def percent(share: float | None) -> str:
-    """A share in per cent."""
     return "—" if share is None else f"{100.0 * share:.3g} %"
 
 

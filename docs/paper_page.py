@@ -9,7 +9,6 @@ from piezoest.bench import paper_report as report
 
 
 def pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     entries = document["tables"]
     tables = {
         f"table{k}": table(report.TITLES[number], *report.table(entries, number))
@@ -32,7 +31,6 @@ def origins() -> list[list[str]]:
 
 
 def numbers(document: Document) -> str:
-    """Substitutions for numbers that stand in sentences."""
     conditions = document["conditions"]
     start = conditions["start"]
     values = {

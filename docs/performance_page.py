@@ -6,7 +6,6 @@ SOURCES = ("speed",)
 
 
 def pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     bank = document["bank"]
     calls = [
         [
@@ -55,7 +54,6 @@ def against(rows: list[Document], *, faster: bool) -> tuple[list[str], list[list
 
 
 def numbers(document: Document) -> str:
-    """Substitutions for numbers that stand in sentences."""
     once = document["once"]
     rows = document["against_c"] + document["against_python"]
     values = {

@@ -4,7 +4,6 @@ from page_parts import Document, percent, replacements, table_of
 
 
 def pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     found = document["identify"]
     return {
         "numbers": numbers(document),
@@ -36,7 +35,6 @@ def pieces(document: Document) -> dict[str, str]:
 
 
 def numbers(document: Document) -> str:
-    """Substitutions for numbers that stand in sentences."""
     found, other = document["identify"], document["other"]
     lengths = {
         "held": found["held_out"], "line": found["line_held_out"], "stream": document["stream"]["held_out"],

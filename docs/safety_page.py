@@ -37,7 +37,6 @@ CHANGES = {
 
 
 def pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     mine = document["controller"]
     return {
         "numbers": numbers(document),
@@ -58,7 +57,6 @@ def pieces(document: Document) -> dict[str, str]:
 
 
 def numbers(document: Document) -> str:
-    """Numbers that stand in sentences."""
     criteria, first, runs = document["criteria"], document["seed"], document["runs"]
     values = {
         "runs": runs,
@@ -145,7 +143,6 @@ def crossed(mine: Document) -> str:
 
 
 def worst(rows: list[Document]) -> str:
-    """The worst runs, with their seeds."""
     names = {
         "family": "family", "reference": "reference", "fault": "fault", "time": "mode", "ratio": "ratio",
         "last cycle": "last_ratio", "at a limit [quarter swings]": "rail", "drove last": "driver",
@@ -227,7 +224,6 @@ def singles(alone: Document | None) -> str:
 
 
 def dwell(rested: Document | None) -> str:
-    """Errors after a long rest."""
     columns = {
         "creep": "creep", "feedback": "feedback", "noise": "noise",
         "as before in the first period": lambda row: of_all(row["kept"], row["runs"]),

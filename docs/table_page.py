@@ -11,7 +11,6 @@ SOURCES = ("table", "policies")
 
 
 def pieces(runs: Document, policies: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     return {
         "numbers": substitutions("table", runs) + substitutions("policies", policies),
         "overview": linked(report.overview_table(runs)),
@@ -105,7 +104,6 @@ def tuned(document: Document) -> report.Table:
 
 
 def substitutions(prefix: str, document: Document) -> str:
-    """Numbers that stand in sentences."""
     plan, conditions = document["plan"], document["conditions"]
     values = {
         "minutes": f"{document['seconds'] / 60.0:.0f} minutes",

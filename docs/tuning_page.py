@@ -11,7 +11,6 @@ TITLES = {
 
 
 def pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     conditions = document["conditions"]
     numbers = {
         "signal": f"{conditions['amplitude_um']:g} µm at {conditions['frequency_Hz']:g} Hz",

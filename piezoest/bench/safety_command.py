@@ -130,7 +130,7 @@ def safety(
             rows = played(campaign.tasks, written.output, tasks.over_cores(workers), say.done)
     document = {"suite": "safety", **origin(began), "controller": name, "given": given}
     tables.write_table(
-        tables.table_of(campaign.rows(rows), campaign.columns),
+        tables.table_of(campaign.rows(rows)),
         written.output / f"{which.title.replace('safety', 'runs')}.{format}",
     )
     document |= campaign.summarise(rows)
@@ -156,7 +156,6 @@ class Campaign(NamedTuple):
     """What is run, and what becomes of its rows."""
 
     tasks: list[Task]
-    columns: dict[str, type]  # of the table
     summarise: Callable[[list[Row]], dict[str, Any]]
     print: Callable[[dict[str, Any], Any], None]  # a summary
     rows: Callable[[list[Row]], Iterable[Row]] = list  # of the table, from those of the runs
@@ -164,7 +163,7 @@ class Campaign(NamedTuple):
 
 def _campaign(which: Which, name: str, given: dict[str, Any]) -> Campaign:
     """What is asked for, by a controller."""
-    from piezoest.bench.zoo import contest, draw, dwelling, judging, report, settling, summary, tasks
+    from piezoest.bench.zoo import contest, draw, dwelling, report, settling, summary, tasks
 
     seeds = range(which.seed, which.seed + (which.dwell or which.runs))
     if which.asked and (given or len(which.asked) > 1):
@@ -175,16 +174,15 @@ def _campaign(which: Which, name: str, given: dict[str, Any]) -> Campaign:
         case "map":
             cells = tasks.tasks(name, settling.cells(seeds))
             summarise = settling.summarise_cells
-            return Campaign(cells, settling.CELL_COLUMNS, summarise, report.print_map, settling.tidy_cells)
+            return Campaign(cells, summarise, report.print_map, settling.tidy_cells)
         case "dwell":
             rests = tasks.tasks(name, dwelling.dwells(seeds))
-            return Campaign(rests, dwelling.DWELL_COLUMNS, dwelling.summarise_dwells, report.print_dwells)
+            return Campaign(rests, dwelling.summarise_dwells, report.print_dwells)
         case "singles":
             compared = partial(contest.summarise_contest, controller=name)
-            return Campaign(contest.contest(name, seeds), judging.COLUMNS, compared, report.print_contest)
+            return Campaign(contest.contest(name, seeds), compared, report.print_contest)
     draw(which.seed, **given)  # a wrong name is told now
-    runs = tasks.runs(name, seeds, given)
-    return Campaign(runs, judging.COLUMNS, summary.summarise, report.print_summary)
+    return Campaign(tasks.runs(name, seeds, given), summary.summarise, report.print_summary)
 
 
 def _show(controller: str, seed: int, given: dict[str, Any], folder: Path) -> None:

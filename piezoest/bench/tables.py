@@ -32,8 +32,10 @@ def checked_format(format: str | None) -> str:
     return format
 
 
-def table_of(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, type]) -> pd.DataFrame:
-    """Table of rows."""
+def table_of(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, type] | None = None) -> pd.DataFrame:
+    """Table of rows; without columns, of all that is in them."""
+    if columns is None:
+        return pd.DataFrame(list(rows)).convert_dtypes()
     cells = [[row.get(name) for name in columns] for row in rows]
     return pd.DataFrame(cells, columns=list(columns)).astype(_types(columns))
 

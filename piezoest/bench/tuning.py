@@ -1,11 +1,4 @@
-"""What may be tuned of each estimator: declared here, beside its name, and searched alike for all.
-
-An estimator of one's own declares its space as an attribute of the class, the bounds of a value that
-may be anything between them, evenly in its logarithm, a range of whole numbers, or a list to choose from::
-
-    class MyEstimator:
-        tuning_space = {"memory": (0.05, 2.0), "members": range(5, 50), "order": [1, 2, 3]}
-"""
+"""What may be tuned of each estimator of the package, beside its name, and searched alike for all."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -14,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from piezoest._checks import integer, positive
+from piezoest._checks import integer
 from piezoest.bench.cases import PAPER
-from piezoest.bench.estimators import KNOWN, class_of, is_slow, name_of
+from piezoest.bench.estimators import KNOWN, is_slow, name_of
 from piezoest.bench.run import COLUMNS, Task, code_of
 from piezoest.bench.statistics import over_scenarios, relative
 from piezoest.bench.store import Row
@@ -88,32 +81,15 @@ SPACES: dict[str, tuple[str, Space]] = {
 
 
 def tunable(text: str) -> Tunable:
-    """What may be tuned of an estimator; what is written with arguments is taken as it stands."""
+    """What may be tuned of an estimator; one of one's own, or with arguments, is taken as it stands."""
     name = name_of(text)
-    if "(" in text and text != KNOWN.get(name):
+    if ":" in name or ("(" in text and text != KNOWN.get(name)):
         return Tunable(text)
-    if ":" not in name:
-        template, space = SPACES.get(name, ("", {}))
-        given = ", offset=True" if "offset=True" in text else ""
-        return Tunable(text, template or _call(name, space, given), space)
-    own: Space = getattr(class_of(name), "tuning_space", {})
-    for key, values in own.items():
-        match values:
-            case tuple((low, high)) if positive("high", high) > positive("low", low):
-                continue
-            case list([_, *_]):
-                continue
-            case range(start=low, stop=high, step=1) if positive("stop", high) > positive("start", low):
-                continue
-        raise ValueError(
-            f"{text}: tuning_space[{key!r}] must be (low, high), a range without a step or a list, "
-            f"got {values!r}"
-        )
-    return Tunable(text, _call(name, own), own)
-
-
-def _call(name: str, space: Space, given: str = "") -> str:
-    return f"{name}({', '.join(f'{value}={{{value}}}' for value in space)}{given})" if space else name
+    template, space = SPACES.get(name, ("", {}))
+    arguments = [f"{value}={{{value}}}" for value in space]
+    if "offset=True" in text:
+        arguments.append("offset=True")
+    return Tunable(text, template or f"{name}({', '.join(arguments)})", space)
 
 
 def draws(tunable: Tunable, number: int, seed: int) -> list[str]:

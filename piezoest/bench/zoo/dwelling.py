@@ -17,7 +17,7 @@ from piezoest.bench.store import Row
 from piezoest.bench.zoo.drawing import draw
 from piezoest.bench.zoo.families import FAMILIES
 from piezoest.bench.zoo.faults import NONE
-from piezoest.bench.zoo.judging import BACK, COLUMNS, NEGLIGIBLE, NOISES, settled
+from piezoest.bench.zoo.judging import BACK, NEGLIGIBLE, NOISES, settled
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Factory, run_controller
 from piezoest.bench.zoo.summary import failures, grouped, median, values
@@ -32,12 +32,6 @@ NOISE = (1e-4, 1e-3)  # µm, of the reference that rests
 FEEDBACK = (0.5, 5.0)  # 1/s
 PERIODS = ("first", "second", "third")
 WAYS = ("creep", "feedback", "noise")
-DWELL_COLUMNS: dict[str, type] = {
-    **dict(list(COLUMNS.items())[: list(COLUMNS).index("block") + 1]),
-    "setpoint_noise": float, "feedback": float, "duration": float, "failure": str, "settled": float,
-    "allowed": float, "first": float, "second": float, "third": float, "kept": bool, "excursion": float,
-    "events": str,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

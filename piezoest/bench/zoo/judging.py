@@ -18,20 +18,6 @@ BACK = 1.2  # of the settled error
 ALLOWED, NOISES, NEGLIGIBLE = 1.5, 3.0, 0.002  # of the line's error, of the noise, of the swing
 AT_LIMIT, WITHIN = 1e-6, 0.01  # of the voltage's range: on a limit, and clearly within both
 ERRORS = ("worst", "rms", "line_worst", "line_rms", "learnt_worst", "learnt_rms", "ratio", "ratio_rms")
-# Of the table of runs.
-COLUMNS: dict[str, type] = {
-    "key": str, "controller": str, "seed": int, "family": str, "gain": float, "width": float, "low": float,
-    "high": float, "sample_rate": float, "mechanics": str, "lag": float, "delay": int, "sensor_noise": float,
-    "resolution": float, "volts": float, "slew_rate": float, "creep": float, "hum": float, "drift": float,
-    "reference": str, "amplitude": float, "centre": float, "frequency": float, "samples": int, "block": int,
-    "fault": str, "mode": str, "fault_size": float, "fault_start": float, "fault_stop": float,
-    "line_gain": float, "line_centre": float, "failure": str, "finite": bool, "within_limits": bool,
-    "rail": float, "rests_at_rail": bool, "swing": float, "noise": float, "floor": float,
-    "judged_from": float, **{f"{part}{name}": float for part in ("", "last_", "after_") for name in ERRORS},
-    "cycle_ratio": float, "settled": float, "events": int, "named": str, "named_first": str,
-    "named_after": float, "named_right": bool, "named_periods": float,
-    "recovery": bool, "recovered": int, "driver": str, "status": str, "microseconds": float,
-}  # fmt: skip
 
 
 def named(rig: Rig, controller: Any) -> dict[str, Any]:

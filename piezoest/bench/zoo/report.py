@@ -47,8 +47,8 @@ def print_summary(summary: dict[str, Any], console: Any) -> None:
     )  # fmt: skip
     print_rows(
         console, "The worst", summary["worst"],
-        {"seed": lambda row: str(row["seed"]), "family": "family", "reference": "reference", "fault": _fault,
-         "ratio": "ratio", "last": "last_ratio", "after": "after_ratio", "limit": "rail",
+        {"seed": lambda row: str(row["seed"]), "rig": lambda row: f"{row['family']}, {row['reference']}",
+         "fault": _fault, "ratio": "ratio", "last": "last_ratio", "limit": "rail",
          "drove": lambda row: row["failure"] or row["driver"] or "nobody"},
     )  # fmt: skip
     say(console, KEY, f"Controller: {shown(summary['microseconds'])} µs per sample, median.")

@@ -44,11 +44,6 @@ SEGMENTS = (
     ("cold-start", 1.0, 6), ("switch", 0.6, 4), ("drop", 0.2, 4), ("switch-back", 1.0, 4),
     ("gain-step", 1.0, 6),
 )  # fmt: skip
-CELL_COLUMNS: dict[str, type] = {
-    "key": str, "controller": str, "family": str, "amplitude": float, "frequency": float, "seed": int,
-    "gain": float, "width": float, "block": int, "noise": float, "mechanics": str, "asked": bool,
-    "failure": str, "change": str, "periods": int, "error": float, "allowed": float,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +97,9 @@ class Cell:
 def tidy_cells(rows: Iterable[Row]) -> Iterator[Row]:
     """A row for each change of each run of the map. `rows`: from `Cell.play`."""
     for row in rows:
+        place = {name: value for name, value in row.items() if name != "segments"}
         for segment in row["segments"] or [{}]:
-            yield {**row, **segment}
+            yield {**place, **segment}
 
 
 def cells(seeds: Sequence[int], families: Sequence[str] = KINDS) -> list[Cell]:
