@@ -55,7 +55,7 @@ def paper(
     if figures is not None and (figures.exists() and not figures.is_dir()):
         raise typer.BadParameter(f"{figures} is not a folder", param_hint="--figures")
     began = time.perf_counter()
-    with shared.usage(), progress("", lines=True) as say:
+    with shared.usage(), progress("runs", lines=True) as say:
         say(shared.LOADING)
         from piezoest.bench.paper import MEMORIES, MEMORY, run_paper
 
@@ -64,15 +64,15 @@ def paper(
             memories=() if quick else MEMORIES,
             seed=seed,
             workers=workers,
-            progress=say,
+            progress=say.done,
         )
     document = {"suite": "paper", **origin(began), **result.to_dict()}
     shared.write_html(document, html)
     if figures is not None:
-        from piezoest.bench.paper_figures import write_figures
+        from piezoest.bench.figures import write_figures
+        from piezoest.bench.paper_figures import drawings
 
-        for path in write_figures(result, figures):
-            typer.echo(f"Figure: {path}", err=json_to == "-")
+        write_figures(drawings(result), figures, quiet=json_to == "-")
     from piezoest.bench.paper_report import print_report
 
     shared.show(document, json_to, print_report)

@@ -90,13 +90,6 @@ class Experiment:
         return "linear" if isinstance(self.model, LinearGain) else "inverse"
 
     @property
-    def name(self) -> str:
-        """For progress."""
-        memory = "fixed parameters" if self.memory is None else f"memory {self.memory:g} s"
-        way = "linear feed-forward" if self.compensation == "linear" else "inverse"
-        return f"{self.reference.name}, {way}, {memory}"
-
-    @property
     def seconds(self) -> float:
         """Least length of the run [s]."""
         return max(SECONDS, MEMORIES_TO_SETTLE * (self.memory or 0.0))
@@ -258,7 +251,7 @@ def run_paper(
     memories: Iterable[float] = MEMORIES,
     seed: int = 0,
     workers: int | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> PaperResult:
     """Run the paper's experiment on the simulated stage, and one row with further memories.
 
@@ -277,8 +270,7 @@ def run_paper(
     def make(experiments: Sequence[Experiment]) -> None:
         for run in in_processes(Experiment.run, experiments, workers):
             runs[run.experiment] = run
-            if progress is not None:
-                progress(f"{len(runs)} of {len(first) + len(CROSSED)}: {run.experiment.name}")
+            progress(len(runs), len(first) + len(CROSSED))
 
     make(first)
     crossed = {

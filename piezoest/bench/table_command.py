@@ -137,10 +137,9 @@ def table(
     put(document, folder / "table.json")
     shared.write_html(document, shown.html)
     if shown.figures is not None:
-        from piezoest.bench.figures import write_figures
+        from piezoest.bench.figures import drawings, write_figures
 
-        for path in write_figures(document, shown.figures):
-            typer.echo(f"Figure: {path}", err=json_to == "-")
+        write_figures(drawings(document), shown.figures, quiet=json_to == "-")
     from piezoest.bench.report import print_table
 
     tables = partial(print_table, scenarios=shown.scenarios)

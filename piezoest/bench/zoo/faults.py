@@ -68,7 +68,7 @@ class Kind:
     modes: tuple[str, ...] = (TRANSIENT, PERMANENT)
     # Draws the size from (random numbers, rig).
     size: Callable[[Any, Rig], float] = lambda rng, rig: 0.0
-    # Class of the faulty stage, and what it is given beside size, start, duration and seed.
+    # Maker of the faulty stage, and what it is given beside size, start, duration and seed.
     stage: Callable[..., Any] | None = None
     more: Callable[[Rig], dict[str, float]] = lambda rig: {}
     # Whether nothing can be learnt meanwhile: readings say nothing or lie, or the stage stands still.
@@ -112,33 +112,33 @@ FAULTS: dict[str, Kind] = {
         ALL, stage=faulty.StuckStage, more=lambda rig: {"noise": rig.around.noise}, hides=True,
         names=STILL,
     ),
-    "sensor-constant": Kind(ALL, stage=faulty.Stuck, hides=True, names=STILL),
+    "sensor-constant": Kind(ALL, stage=faulty.StuckGauge, hides=True, names=STILL),
     "sensor-noise": Kind(
         ALL, size=lambda rng, rig: rig.plain.centre + rng.uniform(-1.0, 1.0) * rig.stroke,
-        stage=faulty.Dead, more=lambda rig: {"noise": 0.002 * _swing(rig)}, hides=True,
+        stage=faulty.reads("dead"), more=lambda rig: {"noise": 0.002 * _swing(rig)}, hides=True,
         names=ANY,
     ),
     "sensor-saturated": Kind(
-        ALL, size=lambda rng, rig: 0.6 * rig.plain.amplitude, stage=faulty.Saturation,
+        ALL, size=lambda rng, rig: 0.6 * rig.plain.amplitude, stage=faulty.reads("saturated"),
         more=lambda rig: {"centre": rig.plain.centre}, partly=True, names=("saturated",),
     ),
     "sensor-factor": Kind(
-        ALL, size=lambda rng, rig: float(rng.choice([-1.0, 1e-3, 1e3])), stage=faulty.Factor, hides=True,
-        names=FACTORS,
+        ALL, size=lambda rng, rig: float(rng.choice([-1.0, 1e-3, 1e3])), stage=faulty.reads("scaled"),
+        hides=True, names=FACTORS,
     ),
-    "zero-off": Kind(ALL, size=_zero, stage=faulty.Offset, hides=True, names=("zero moved",)),
-    "zero-off-shifted": Kind(ALL, size=_zero, stage=faulty.Offset),
+    "zero-off": Kind(ALL, size=_zero, stage=faulty.reads("moved"), hides=True, names=("zero moved",)),
+    "zero-off-shifted": Kind(ALL, size=_zero, stage=faulty.reads("moved")),
     "spikes": Kind(
-        ALL, size=lambda rng, rig: _swing(rig) * rng.choice([0.3, 1.0, 5.0]), stage=faulty.Spikes,
+        ALL, size=lambda rng, rig: _swing(rig) * rng.choice([0.3, 1.0, 5.0]), stage=faulty.reads("spikes"),
         partly=True,
     ),
     "dropouts": Kind(
-        ALL, size=lambda rng, rig: float(rng.choice([0.01, 0.2, 0.5])), stage=faulty.Missing
+        ALL, size=lambda rng, rig: float(rng.choice([0.01, 0.2, 0.5])), stage=faulty.reads("missing")
     ),
-    "gap": Kind(ALL, stage=faulty.Gap, hides=True),
+    "gap": Kind(ALL, stage=faulty.reads("gap"), hides=True),
     "hum": Kind(
         ALL, size=lambda rng, rig: _usual(0.2, rig) if rng.random() < 0.5 else 0.05 * _swing(rig),
-        stage=faulty.Hum,
+        stage=faulty.reads("hum"),
     ),
     "drift": Kind(
         ALL, size=lambda rng, rig: _swing(rig) * rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.3),
@@ -151,7 +151,7 @@ FAULTS: dict[str, Kind] = {
     "amplitude-drop": Kind(size=lambda rng, rig: rng.uniform(0.1, 0.4)),
     "glitch": Kind(
         (TRANSIENT,), size=lambda rng, rig: _usual(rng.choice([1.0, 2.0, 10.0]), rig),
-        stage=faulty.Offset, hides=True,
+        stage=faulty.reads("moved"), hides=True,
     ),
     "dwell": Kind((TRANSIENT,)),
 }  # fmt: skip

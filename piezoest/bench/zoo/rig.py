@@ -8,7 +8,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo import faults
 from piezoest.bench.zoo.families import Reach
-from piezoest.bench.zoo.faulty_stages import Drift, Hum
+from piezoest.bench.zoo.faulty_stages import Drift, FaultyStage, hum
 from piezoest.bench.zoo.references import Reference
 from piezoest.compensators import VoltageLimits
 from piezoest.models import Creep, MassSpringDamper
@@ -140,7 +140,7 @@ class Rig:
         if own.drift:
             stage = Drift(stage, own.drift)
         if own.hum:
-            stage = Hum(stage, own.hum, seed=self.seed)
+            stage = FaultyStage(stage, own.hum, seed=self.seed, reading=hum)
         return faults.faulty_stage(stage, self)
 
     def _mechanics(self) -> MassSpringDamper | None:
