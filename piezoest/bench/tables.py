@@ -29,7 +29,7 @@ def checked_format(format: str | None) -> str:
 def table_of(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, type] | None = None) -> pd.DataFrame:
     """Table of rows; without columns, of all that is in them."""
     if columns is None:
-        return pd.DataFrame(list(rows)).convert_dtypes()
+        return pd.DataFrame(list(rows))
     cells = [[row.get(name) for name in columns] for row in rows]
     return pd.DataFrame(cells, columns=list(columns)).astype(_types(columns))
 
