@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from page_parts import Document, percent, replacements, short, table, table_of
+from page_parts import Document, percent, replacements, shown, table, table_of
 
 ADDED = {
     "noise": "noise",
@@ -32,10 +32,10 @@ PART: dict[str, Any] = {
     "near the best": lambda row: percent(row["near_best"]),
     "no worse than NNLS": lambda row: percent(row["beats_nnls"]),
     "no worse than a line": lambda row: percent(row["beats_line"]),
-    "median error / NNLS's": lambda row: short(row["median_nnls"]),
+    "median error / NNLS's": lambda row: shown(row["median_nnls"]),
     "median error / stroke": lambda row: percent(row["median_stroke"]),
     "median coverage": lambda row: percent(row["covered"]),
-    "median time [s]": lambda row: short(row["seconds"]),
+    "median time [s]": lambda row: shown(row["seconds"]),
 }
 GROUPS = {"clean": "nothing that the model lacks", "all": "anything"}
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from piezoest._files import write_text
-from piezoest._tables import Columns, cells_of
+from piezoest._tables import Columns, cells_of, shown
 from piezoest.bench.report import Table
 
 DOCS = Path(__file__).resolve().parent
@@ -74,13 +74,6 @@ def part_of(of: Table, columns: Mapping[str, str]) -> Table:
     return list(columns.values()), rows
 
 
-def shown(cell: Any) -> str:
-    """A cell of a table."""
-    if isinstance(cell, bool):
-        return "yes" if cell else "no"
-    return str(cell) if isinstance(cell, str | int) else short(cell)
-
-
 def replacements(prefix: str, values: dict[str, Any], document: Document | None = None) -> str:
     """Substitutions for numbers that stand in sentences; with a document, when and where it was made, too."""
     if document is not None:
@@ -92,11 +85,6 @@ def replacements(prefix: str, values: dict[str, Any], document: Document | None 
 
 def percent(share: float | None) -> str:
     return "—" if share is None else f"{100.0 * share:.3g} %"
-
-
-def short(value: float | None) -> str:
-    """About three significant digits; a dash for what is infinite or not known."""
-    return "—" if value is None else f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
 def of_all(count: int, total: int) -> str:

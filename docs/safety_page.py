@@ -3,7 +3,7 @@
 from functools import partial
 from typing import Any
 
-from page_parts import Document, of_all, percent, replacements, short, table, table_of
+from page_parts import Document, of_all, percent, replacements, shown, table, table_of
 
 GROUPS = {"all": "all", "healthy": "healthy", "often": "called often"}
 WHO = {
@@ -76,7 +76,7 @@ def drawn(of: Document) -> str:
         [title, "; ".join(f"{each} {runs}" for each, runs in of[name].items())]
         for name, title in DRAWN.items()
     ]
-    body += [[title, " to ".join(map(short, of["spans"][name]))] for name, title in SPANS.items()]
+    body += [[title, " to ".join(map(shown, of["spans"][name]))] for name, title in SPANS.items()]
     return table(
         "What is drawn: names with their runs, or smallest and largest number", ["quantity", "drawn"], body
     )
@@ -110,7 +110,7 @@ def quantiles(document: Document) -> str:
 
 def cell(row: Document | None) -> str:
     """Median of the ratio, and runs above 1."""
-    return f"{short(row['ratio'])}; {row['over']}/{row['judged']}" if row and row["judged"] else "—"
+    return f"{shown(row['ratio'])}; {row['over']}/{row['judged']}" if row and row["judged"] else "—"
 
 
 def by(document: Document, column: str, name: str, more: dict[str, Any] | None = None) -> str:
@@ -213,7 +213,7 @@ def singles(alone: Document | None) -> str:
     """Settled errors, and their ratios to those of the best single estimator."""
     rows = alone["cells"] if alone else []
     cells = {
-        (row["family"], row["reference"]): f"{share(row, 'settled')}; {short(row['ratio'])}" for row in rows
+        (row["family"], row["reference"]): f"{share(row, 'settled')}; {shown(row['ratio'])}" for row in rows
     }
     families, references = (
         (list(dict.fromkeys(names)) for names in zip(*cells, strict=True)) if rows else ([], [])

@@ -1,5 +1,6 @@
 """What commands print: tables of figures, and sentences as they are."""
 
+import math
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -55,10 +56,19 @@ def print_rows(console: Any, title: str, rows: Iterable[Any], columns: Columns |
     print_cells(console, title, heading, [list(map(shown, row)) for row in body], texts=(0, *texts))
 
 
+def number(value: float | None, digits: int = 3) -> str:
+    """Significant digits as a plain number; a dash for what is not known or infinite."""
+    if value is None or not math.isfinite(value):
+        return "—"
+    if value == 0.0:
+        return "0"
+    places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    text = f"{value:.{places}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
 def shown(value: Any) -> str:
     """A number with three digits; a dash for none, yes and no."""
-    if value is None:
-        return "—"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    return number(value) if value is None or isinstance(value, float) else str(value)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from piezoest._tables import Columns, cells_of, print_cells, say
+from piezoest._tables import Columns, cells_of, number, print_cells, say
 from piezoest.bench.recorded import LEARNT
 from piezoest.records.source import counted
 
@@ -24,17 +24,6 @@ LOGS_KEY = (
     "the amplitude. first: in the first tenth of it; largest: in all of it. Geometric means over the logs."
 )
 SURE = 0.05
-
-
-def number(value: float | None, digits: int = 3) -> str:
-    """Significant digits as a plain number; a dash for what is not known or infinite."""
-    if value is None or not math.isfinite(value):
-        return "—"
-    if value == 0.0:
-        return "0"
-    places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
-    text = f"{value:.{places}f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def percent(share: float | None, digits: int = 2) -> str:
