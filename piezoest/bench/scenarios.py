@@ -109,8 +109,7 @@ def _dwell(draft: Draft) -> Case:
     silence = signals.dwell(0.0, given.rest, given.sample_rate)
     values: FloatArray = np.concatenate([before.values, silence.values, after.values])
     reference = Signal(values, given.sample_rate, given.period, "triangle with a dwell")
-    first, end = len(before), len(before) + len(silence)
-    return draft.case(reference, change=end, rest=(first, end))
+    return draft.case(reference, change=len(before) + len(silence))
 
 
 @scenario("prbs", "Filtered pseudo-random binary signal from a cold start.")
