@@ -8,6 +8,7 @@ from typing import Any
 
 from rich.console import Console
 
+LOADING = "loading (compiles once after the installation)"
 LINES = 20  # about as many for a step whose length is known, where stderr is a file
 
 

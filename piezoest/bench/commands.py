@@ -8,7 +8,7 @@ import typer
 
 from piezoest._errors import Group
 from piezoest._options import grouped
-from piezoest._progress import progress
+from piezoest._progress import LOADING, progress
 from piezoest.bench import safety_command, shared, table_command
 from piezoest.bench.origin import origin
 
@@ -56,7 +56,7 @@ def paper(
         raise typer.BadParameter(f"{figures} is not a folder", param_hint="--figures")
     began = time.perf_counter()
     with shared.usage(), progress("runs", lines=True) as say:
-        say(shared.LOADING)
+        say(LOADING)
         from piezoest.bench.paper import MEMORIES, MEMORY, run_paper
 
         result = run_paper(

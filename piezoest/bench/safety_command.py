@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from piezoest._options import grouped
-from piezoest._progress import progress
+from piezoest._progress import LOADING, progress
 from piezoest._tables import shown
 from piezoest.bench.origin import origin, put
-from piezoest.bench.shared import LOADING, Json, check, show, usage
+from piezoest.bench.shared import Json, check, show, usage
 
 if TYPE_CHECKING:
     from piezoest.bench.store import Row

@@ -17,7 +17,6 @@ Html = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="Write
 Json = Annotated[
     str | None, typer.Option("--json", metavar="FILE", help="Write JSON; - prints it instead of the tables.")
 ]
-LOADING = "loading (compiles once after the installation)"
 
 
 def check(json_to: str | None, html: Path | None = None) -> None:

@@ -12,7 +12,7 @@ import typer
 from piezoest._errors import USER_ERROR
 from piezoest._files import read_json
 from piezoest._options import grouped
-from piezoest._progress import progress
+from piezoest._progress import LOADING, progress
 from piezoest.bench import shared
 from piezoest.bench.origin import json_safe, origin, put
 
@@ -152,7 +152,7 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
     """Run what is missing, write the tables, and sum them up."""
     with shared.usage(folder):
         with progress("", lines=True) as say:
-            say(shared.LOADING)
+            say(LOADING)
             from piezoest.bench import table, tables
             from piezoest.bench.executors import quiet
             from piezoest.bench.store import played

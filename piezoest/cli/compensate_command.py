@@ -11,7 +11,7 @@ import typer
 from piezoest._errors import Debug, errors
 from piezoest._files import check_targets
 from piezoest._options import grouped
-from piezoest._progress import progress
+from piezoest._progress import LOADING, progress
 
 if TYPE_CHECKING:
     from piezoest._checks import FloatArray
@@ -80,7 +80,7 @@ def compensate(
     """
     with errors(debug):
         check_targets(filter(None, (reference, stated.parameters)), output=output)
-        with progress("loading (compiles once after the installation)"):
+        with progress(LOADING):
             import numpy as np
 
             from piezoest.compensators import InverseCompensator, VoltageLimits

@@ -11,7 +11,7 @@ from rich.console import Console
 from piezoest._errors import Debug, errors
 from piezoest._files import check_targets, save_figure
 from piezoest._options import grouped
-from piezoest._progress import progress
+from piezoest._progress import LOADING, progress
 from piezoest._tables import print_cells, say
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def demo(
     """
     with errors(debug):
         check_targets(figure=output)
-        with progress("loading (compiles once after the installation)") as shown:
+        with progress(LOADING) as shown:
             from piezoest.demo import run_demo
 
             result = run_demo(periods, seed, shown)

@@ -13,7 +13,7 @@ from rich.console import Console
 from piezoest._errors import Debug, errors
 from piezoest._files import check_targets, save_figure, write_text
 from piezoest._options import grouped
-from piezoest._progress import Shown, progress
+from piezoest._progress import LOADING, Shown, progress
 
 if TYPE_CHECKING:
     from piezoest.identification import Identification, StreamedIdentification
@@ -126,7 +126,7 @@ def identify(
         figure = None if out.no_plot or reading.stream else out.plot or Path(f"{file.stem}_identified.png")
         read = (file, *(fitting.validate or ()))
         check_targets(read, figure=figure, output=out.output, report=out.html)
-        with progress("loading (compiles once after the installation)") as say:
+        with progress(LOADING) as say:
             found: Any = (_streamed if reading.stream else _identified)(file, reading, fitting, say)
             say("drawing")
             if figure is not None:
