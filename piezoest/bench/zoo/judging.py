@@ -24,7 +24,8 @@ def named(rig: Rig, controller: Any) -> dict[str, Any]:
     """What a controller said: names of faults, how soon after the fault, and what drove at last."""
     events = list(getattr(controller, "events", ()))
     status = getattr(controller, "status", {})
-    status = status if isinstance(status, dict) else _public(status)
+    if not isinstance(status, dict):
+        status = {name: getattr(status, name) for name in getattr(status, "__dataclass_fields__", {})}
     fault, start = rig.fault, rig.fault.start / rig.sample_rate
     said = [(float(event.time), _name(event)) for event in events]
     later = [(time - start, name) for time, name in said if time >= start] if fault.kind != NONE else []
@@ -73,12 +74,6 @@ def _name(event: Any) -> str:
     """The fault's name where a reason begins with it, else what was done."""
     head = str(getattr(event, "reason", "")).partition(":")
     return head[0] if head[1] else str(getattr(event, "name", None) or getattr(event, "action", ""))
-
-
-def _public(status: Any) -> dict[str, Any]:
-    """Fields of a record."""
-    names = getattr(status, "__dataclass_fields__", {})
-    return {name: getattr(status, name) for name in names}
 
 
 def _short(value: Any) -> str:
