@@ -68,12 +68,6 @@ class Which:
     ] = None  # fmt: skip
 
     @property
-    def title(self) -> str:
-        """What its files are called."""
-        found = self.asked
-        return found[0] if found else "safety"
-
-    @property
     def asked(self) -> list[str]:
         """What is asked for beside the zoo itself: one of them, or none."""
         given = {"map": self.settling, "singles": self.singles, "dwell": self.dwell is not None}
@@ -108,7 +102,7 @@ def safety(
     started again, it goes on where it was.
     """
     check(json_to)
-    began = time.perf_counter()
+    began, asked = time.perf_counter(), which.asked
     with usage():
         with progress("", lines=True) as say:
             say(LOADING)
@@ -131,10 +125,10 @@ def safety(
     document = {"suite": "safety", **origin(began), "controller": name, "given": given}
     tables.write_table(
         tables.table_of(campaign.rows(rows)),
-        written.output / f"{which.title.replace('safety', 'runs')}.{format}",
+        written.output / f"{asked[0] if asked else 'runs'}.{format}",
     )
     document |= campaign.summarise(rows)
-    put(document, written.output / f"{which.title}.json")
+    put(document, written.output / f"{asked[0] if asked else 'safety'}.json")
     show(document, json_to, campaign.print, f"Results: {written.output}")
 
 
@@ -166,19 +160,18 @@ def _campaign(which: Which, name: str, given: dict[str, Any]) -> Campaign:
     from piezoest.bench.zoo import contest, draw, dwelling, report, settling, summary, tasks
 
     seeds = range(which.seed, which.seed + (which.dwell or which.runs))
-    if which.asked and (given or len(which.asked) > 1):
-        raise ValueError(
-            f"--{which.title} draws its rigs itself: leave out --set, and all but one of the maps"
-        )
-    match which.title:
-        case "map":
+    asked = which.asked
+    if asked and (given or len(asked) > 1):
+        raise ValueError(f"--{asked[0]} draws its rigs itself: leave out --set, and all but one of the maps")
+    match asked:
+        case ["map"]:
             cells = tasks.tasks(name, settling.cells(seeds))
             summarise = settling.summarise_cells
             return Campaign(cells, summarise, report.print_map, settling.tidy_cells)
-        case "dwell":
+        case ["dwell"]:
             rests = tasks.tasks(name, dwelling.dwells(seeds))
             return Campaign(rests, dwelling.summarise_dwells, report.print_dwells)
-        case "singles":
+        case ["singles"]:
             compared = partial(contest.summarise_contest, controller=name)
             return Campaign(contest.contest(name, seeds), compared, report.print_contest)
     draw(which.seed, **given)  # a wrong name is told now
