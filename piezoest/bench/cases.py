@@ -99,11 +99,9 @@ class Case:
     start: ColemanHodgdon  # model to start from
     linear_start: LinearGain  # the same for linear feed-forward
     update_interval: int  # samples between two updates of the compensator's model
-    noise: float | None = None  # standard deviation of the gauge's noise [µm]; None for the stage's own
+    conditions: Conditions = Conditions()
     # Time [s] and factor of the stage's hysteresis, see `PaperStage`.
     gain_schedule: tuple[tuple[float, float], ...] | None = None
-    creep: bool = True  # whether the stage creeps
-    stage: str = PAPER  # name in `STAGES`
 
     @property
     def sample_rate(self) -> float:
@@ -112,14 +110,11 @@ class Case:
 
     def new_stage(self) -> SimulatedStage:
         """Stage at rest; every one of the same case is identical, its noise included."""
+        given, schedule = self.conditions, self.gain_schedule
         return make_stage(
-            self.stage,
-            self.sample_rate,
-            seed=self.seed,
-            noise=self.noise,
-            gain_schedule=self.gain_schedule,
-            creep=self.creep,
-        )
+            given.stage, self.sample_rate, seed=self.seed, noise=given.noise, gain_schedule=schedule,
+            creep=given.creep,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,14 +142,7 @@ class Draft:
         """Make the case from a drawn start, off by up to `spread`; `rest` are other fields of `Case`."""
         instance("reference", reference, Signal, "a Signal: make one of values, sample rate and period")
         given = self.conditions
-        options = {
-            "change": 0,
-            "amplitude": self.amplitude,
-            "noise": given.noise,
-            "creep": given.creep,
-            "stage": given.stage,
-            **rest,
-        }
+        options = {"change": 0, "amplitude": self.amplitude, "conditions": given, **rest}
         return Case(
             scenario=self.scenario,
             seed=self.seed,

@@ -4,7 +4,7 @@ A scenario is a function from a `Draft` to a `Case`, entered into `SCENARIOS` by
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -149,5 +149,5 @@ def _two_tone(draft: Draft) -> Case:
 def _noise(draft: Draft) -> Case:
     given = draft.conditions
     drawn = float(np.exp(draft.rng.uniform(*np.log(NOISE))))
-    noise = drawn if given.noise is None else given.noise
-    return draft.case(draft.triangle(given.after), spread=COLD, noise=noise)
+    noisy = replace(given, noise=drawn if given.noise is None else given.noise)
+    return draft.case(draft.triangle(given.after), spread=COLD, conditions=noisy)
