@@ -12,6 +12,7 @@ import numpy as np
 from piezoest import signals
 from piezoest._checks import FloatArray, integer
 from piezoest.bench.cases import COLD, Case, Conditions, Draft
+from piezoest.bench.zoo.families import log_uniform
 from piezoest.signals import Signal
 
 LARGE = 7.5  # µm, the larger of two amplitudes; the smaller is a third of it (Table III)
@@ -148,6 +149,6 @@ def _two_tone(draft: Draft) -> Case:
 @scenario("noise", "Gauge noise of 0.1 to 30 nm, drawn evenly in its logarithm; cold start.")
 def _noise(draft: Draft) -> Case:
     given = draft.conditions
-    drawn = float(np.exp(draft.rng.uniform(*np.log(NOISE))))
+    drawn = log_uniform(draft.rng, *NOISE)
     noisy = replace(given, noise=drawn if given.noise is None else given.noise)
     return draft.case(draft.triangle(given.after), spread=COLD, conditions=noisy)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import integer
-from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
+from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family, log_uniform
 from piezoest.bench.zoo.faults import FAULTS, NONE, draw_fault
 from piezoest.bench.zoo.references import SHAPES, Reference, build, cycle_of
 from piezoest.bench.zoo.rig import MECHANICS, Rig, Surroundings
@@ -42,7 +42,7 @@ class _Draw:
 
     def log(self, low: float, high: float) -> float:
         """Log-uniform."""
-        return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
+        return log_uniform(self.rng, low, high)
 
     def one(self, **chances: float) -> str:
         """A name, by its chance."""

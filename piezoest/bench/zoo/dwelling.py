@@ -15,7 +15,7 @@ import numpy as np
 from piezoest.bench.origin import json_safe
 from piezoest.bench.store import Row
 from piezoest.bench.zoo.drawing import draw
-from piezoest.bench.zoo.families import FAMILIES
+from piezoest.bench.zoo.families import FAMILIES, log_uniform
 from piezoest.bench.zoo.faults import NONE
 from piezoest.bench.zoo.judging import BACK, NEGLIGIBLE, NOISES, settled
 from piezoest.bench.zoo.rig import Rig
@@ -91,7 +91,7 @@ def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
     """Rig of a dwell, the samples in which its reference rests, and what is drawn beside."""
     rng = np.random.default_rng([dwell.seed, 25])
     sample_rate = float(rng.choice(SAMPLE_RATES))
-    period = round(sample_rate / float(np.exp(rng.uniform(*np.log(FREQUENCIES)))))
+    period = round(sample_rate / log_uniform(rng, *FREQUENCIES))
     rig = draw(
         dwell.seed, family=list(FAMILIES)[dwell.seed % len(FAMILIES)], sample_rate=sample_rate,
         reference=str(rng.choice(SHAPES)), frequency=sample_rate / period, waves=float(BEFORE + AFTER + 1),
@@ -99,8 +99,8 @@ def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
     )  # fmt: skip
     plain = rig.plain
     start = plain.begins + BEFORE * period + int(rng.integers(period))
-    noise = float(np.exp(rng.uniform(*np.log(NOISE)))) if rng.random() < 0.5 else 0.0
-    gain = float(np.exp(rng.uniform(*np.log(FEEDBACK))))
+    noise = log_uniform(rng, *NOISE) if rng.random() < 0.5 else 0.0
+    gain = log_uniform(rng, *FEEDBACK)
     rest = plain.values[start - 1] + noise * rng.normal(size=round(dwell.duration * sample_rate))
     values = np.concatenate((plain.values[:start], rest, plain.values[start : start + AFTER * period]))
     drawn = {"setpoint_noise": noise, "feedback": gain if dwell.feedback else 0.0}

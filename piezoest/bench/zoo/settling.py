@@ -18,6 +18,7 @@ from piezoest._checks import FloatArray
 from piezoest.bench.origin import json_safe
 from piezoest.bench.store import Row
 from piezoest.bench.zoo.drawing import draw
+from piezoest.bench.zoo.families import log_uniform
 from piezoest.bench.zoo.faults import Fault
 from piezoest.bench.zoo.references import Reference
 from piezoest.bench.zoo.rig import Rig
@@ -110,13 +111,13 @@ def cells(seeds: Sequence[int], families: Sequence[str] = KINDS) -> list[Cell]:
 def cell_rig(cell: Cell) -> Rig:
     """Rig of a cell: an ideal one but for noise and steps, and for the gain that changes in the end."""
     rng = np.random.default_rng([cell.seed, 24])
-    gain = float(np.exp(rng.uniform(*np.log([max(GAINS[0], FREE * cell.amplitude / REACH), GAINS[1]]))))
+    gain = log_uniform(rng, max(GAINS[0], FREE * cell.amplitude / REACH), GAINS[1])
     period = max(PERIOD, round(SLOWEST / cell.frequency))
     rig = draw(
         cell.seed, family=cell.family, limits="±100", gain=gain, sample_rate=period * cell.frequency,
         reference="triangle", amplitude=cell.amplitude, frequency=cell.frequency, waves=12,
         mechanics=f"{rng.uniform(*RESONANCES):.0f} Hz", delay=0, slew=np.inf,
-        noise=float(np.exp(rng.uniform(*np.log(NOISE)))),
+        noise=log_uniform(rng, *NOISE),
         resolution=2.0 * REACH * gain / STEPS, volts=2.0 * REACH / STEPS, creep=0.0,
         hum=0.0, drift=0.0, fault="none",
         block=int(rng.choice([10, 50])) * period // PERIOD,
