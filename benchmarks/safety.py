@@ -124,7 +124,6 @@ def draw(document: Row, path: Path) -> None:
         xlabel="ratio of the errors", ylabel="part of the runs above it",
     )  # fmt: skip
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
-    path.parent.mkdir(parents=True, exist_ok=True)
     save_figure(figure, path, dpi=130, metadata={"Software": None})
 
 

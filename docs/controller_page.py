@@ -74,7 +74,6 @@ def draw() -> None:
     axes.set(xlabel="time of a step [% of a sample at 50 kHz]", xlim=(0, None))
     axes.invert_yaxis()
     axes.legend(loc="lower right")
-    FIGURE.parent.mkdir(parents=True, exist_ok=True)
     save_figure(figure, FIGURE, dpi=130)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from piezoest._files import write_text
 from piezoest._tables import Columns, cells_of, shown
+from piezoest.bench.origin import machine_of
 from piezoest.bench.report import Table
 
 DOCS = Path(__file__).resolve().parent
@@ -77,9 +78,7 @@ def part_of(of: Table, columns: Mapping[str, str]) -> Table:
 def replacements(prefix: str, values: dict[str, Any], document: Document | None = None) -> str:
     """Substitutions for numbers that stand in sentences; with a document, when and where it was made, too."""
     if document is not None:
-        machine = document["machine"]
-        made = f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}"
-        values = {"date": document["date"][:10], "machine": made, **values}
+        values = {"date": document["date"][:10], "machine": machine_of(document), **values}
     return "".join(f".. |{prefix} {name}| replace:: {value}\n" for name, value in values.items())
 
 

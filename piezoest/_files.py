@@ -72,7 +72,8 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def save_figure(figure: Any, path: str | Path, **options: Any) -> None:
-    """Write a figure of Matplotlib by `replacing`, with options of its ``savefig``."""
+    """Write a figure of Matplotlib by `replacing`, with options of its ``savefig``; makes its folder."""
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
         figure.savefig(temporary, **options)
 

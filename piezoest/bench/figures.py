@@ -51,7 +51,6 @@ def drawings(document: Document) -> dict[str, Figure]:
 
 def write_figures(drawn: dict[str, Figure], folder: Path, *, quiet: bool) -> None:
     """Write figures as PNG, and say where; `quiet`: on stderr. `folder`: made if it is not there."""
-    folder.mkdir(parents=True, exist_ok=True)
     for name, figure in drawn.items():
         path = folder / f"{name}.png"
         # No date nor version within, so that the same numbers give the same file.

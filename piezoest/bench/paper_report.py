@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from piezoest._tables import Columns, cells_of, print_cells, say
+from piezoest.bench.origin import machine_of
 from piezoest.bench.report import Table
 
 Entry = dict[str, Any]  # an entry of "tables" in the JSON
@@ -102,12 +103,11 @@ def print_report(document: dict[str, Any], console: Any) -> None:
         title = f"Memory of the estimator: {document['memory'][0]['row']}, hysteresis compensation"
         print_cells(console, title, *memories(document["memory"]), texts=(0, 1))
     print_cells(console, WITHIN, *verdict(document["tables"]))
-    conditions, machine = document["conditions"], document["machine"]
+    conditions = document["conditions"]
     say(
         console,
         f"Memory {conditions['memory_s']:g} s, {conditions['sample_rate_hz']:g} Hz, "
-        f"seed {conditions['seed']}; {machine['cpu']}, {machine['cores']} cores, {machine['python']}; "
-        f"{document['seconds']:.0f} s.",
+        f"seed {conditions['seed']}; {machine_of(document)}; {document['seconds']:.0f} s.",
     )
 
 

@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any
 
 from piezoest._tables import Columns, cells_of, number, print_cells, say
+from piezoest.bench.origin import machine_of
 from piezoest.bench.recorded import LEARNT
 from piezoest.records.source import counted
 
@@ -132,13 +133,11 @@ def print_table(document: Document, console: Any, *, scenarios: bool = False) ->
         title = f"{counted(count, 'scenario')}, {counted(plan['seeds'], 'seed')}, stage {plan['stages'][0]}"
         rate = f" at {document['conditions']['sample_rate']:g} Hz"
     print_cells(console, title, *overview_table(document))
-    machine = document["machine"]
     names = document["estimators"]
     say(
         console,
         key(document),
-        f"{counted(document['runs'], 'run')}{rate}; {machine['cpu']}, {machine['cores']} cores, "
-        f"{machine['python']}.",
+        f"{counted(document['runs'], 'run')}{rate}; {machine_of(document)}.",
         *(
             f"{names[row['estimator']]['name']}: {row['diverged']} of {row['runs']} runs diverge."
             for row in document["overview"]

@@ -58,7 +58,6 @@ def write_figure(rig: Rig, row: Row, both: Both, path: Path) -> None:
     figure.suptitle(
         f"seed {rig.seed}: {rig.family}, {rig.plain.kind}, fault {rig.fault.kind} {rig.fault.mode}; {said}"
     )
-    path.parent.mkdir(parents=True, exist_ok=True)
     save_figure(figure, path, dpi=100, metadata={"Software": None})
 
 
