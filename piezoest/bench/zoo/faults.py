@@ -1,19 +1,15 @@
 """What goes wrong on a rig of the zoo: which fault, from when to when, and what it does to the run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo import faulty_stages as faulty
 
-if TYPE_CHECKING:
-    from piezoest.bench.zoo.rig import Rig
-
+Rig = Any  # `piezoest.bench.zoo.rig.Rig`, whose module imports this one
 NONE, START, TRANSIENT, PERMANENT = "none", "from-start", "transient", "permanent"
 SETPOINT_NOISE = 1e-4  # µm, of a reference that rests
 
