@@ -116,7 +116,7 @@ figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the docume
 	$(BIN)/python benchmarks/logs.py --logs 200 --seed 5000 --json docs/data/logs.json
 	$(BIN)/python benchmarks/controller.py --json docs/data/controller.json
 	$(BIN)/python benchmarks/target/target.py --json docs/data/target.json
-	$(BIN)/python docs/controller_page.py --figure
+	$(BIN)/python docs/controller_page.py
 	$(BIN)/python benchmarks/speed.py --json docs/data/speed.json --figure docs/figures/speed.png
 	$(BIN)/python docs/tuning.py
 	$(BIN)/python docs/real_data.py

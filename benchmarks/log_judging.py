@@ -109,7 +109,6 @@ def expected(log: Log, trained: int) -> np.ndarray:
 
 
 def rms(error: np.ndarray) -> float:
-    """Root mean square."""
     return float(np.sqrt(np.mean(error**2)))
 
 

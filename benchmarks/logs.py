@@ -13,7 +13,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +21,12 @@ import numpy as np
 from log_judging import NEGLIGIBLE, PLAYS, TRAIN, clean_scores, judge
 
 from piezoest._files import write_text
+from piezoest._progress import progress
 from piezoest.bench.executors import in_processes
 from piezoest.bench.origin import json_safe, origin, put
-from piezoest.bench.shared import counting
 from piezoest.bench.table import DIGITS
 from piezoest.bench.zoo.logs import ADDED
+from piezoest.bench.zoo.summary import grouped, median, values
 from piezoest.models import ColemanHodgdon
 
 Row = dict[str, Any]
@@ -61,38 +62,28 @@ def quantiles(values: Sequence[float]) -> dict[str, float]:
     return {f"{100.0 * level:g} %": float(np.quantile(values, level)) for level in LEVELS}
 
 
-def share(hits: int, of: int) -> float | None:
-    """Of something."""
-    return hits / of if of else None
+def share(hits: Iterable[bool], of: int) -> float | None:
+    return sum(map(bool, hits)) / of if of else None
 
 
 def part(rows: Sequence[Row]) -> Row:
     """What is said of a group of logs; one that was refused counts as neither near the best nor better."""
-    fitted = [row for row in rows if row["failure"] is None]
-    covered = [row["coverage"] for row in fitted if row.get("coverage") is not None]
-    near = sum(row["ratio"]["best"] <= NEAR for row in fitted)
-    better = sum(row["ratio"]["nnls"] <= 1.0 for row in fitted)
+    ratios = values(rows, "ratio")
     return {
         "logs": len(rows),
-        "failed": len(rows) - len(fitted),
-        "near_best": share(near, len(rows)),
-        "beats_nnls": share(better, len(rows)),
-        "beats_line": share(sum(row["ratio"]["line"] <= 1.0 for row in fitted), len(rows)),
-        **{
-            f"median_{name}": float(np.median([row["ratio"][name] for row in fitted])) if fitted else None
-            for name in RATIOS
-        },
-        "covered": float(np.median(covered)) if covered else None,
-        "seconds": float(np.median([row["seconds"] for row in rows])) if rows else None,
+        "failed": len(rows) - len(ratios),
+        "near_best": share((ratio["best"] <= NEAR for ratio in ratios), len(rows)),
+        "beats_nnls": share((ratio["nnls"] <= 1.0 for ratio in ratios), len(rows)),
+        "beats_line": share((ratio["line"] <= 1.0 for ratio in ratios), len(rows)),
+        **{f"median_{name}": median([ratio[name] for ratio in ratios]) for name in RATIOS},
+        "covered": median(values(rows, "coverage")),
+        "seconds": median(values(rows, "seconds")),
     }
 
 
 def parts(rows: Sequence[Row], column: str) -> list[Row]:
     """`part` for each value of a column."""
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(str(row[column]), []).append(row)
-    return [{"name": name, **part(group)} for name, group in sorted(groups.items())]
+    return grouped(({**row, "name": row[column]} for row in rows), "name", of=part)
 
 
 def by_added(rows: Sequence[Row]) -> list[Row]:
@@ -107,14 +98,13 @@ def by_added(rows: Sequence[Row]) -> list[Row]:
     return found
 
 
-def coverages(rows: Sequence[Row]) -> Row | None:
+def coverages(known: Sequence[float]) -> Row | None:
     """How often the interval of 95 % held what."""
-    values = [row["coverage"] for row in rows if row.get("coverage") is not None]
-    if not values:
+    if not known:
         return None
-    places = np.digitize(values, COVERED_AT, right=False)
+    places = np.digitize(known, COVERED_AT, right=False)
     counts = {name: int(np.sum(places == i)) for i, name in enumerate(COVERED)}
-    return {"logs": len(values), "counts": counts, "quantiles": quantiles(values)}
+    return {"logs": len(known), "counts": counts, "quantiles": quantiles(known)}
 
 
 def scores(rows: Sequence[Row], clean: Sequence[Row]) -> list[Row]:
@@ -124,17 +114,16 @@ def scores(rows: Sequence[Row], clean: Sequence[Row]) -> list[Row]:
     """
     found = []
     for group, mine in (("clean", clean), ("all", rows)):
-        known = [row["z"] for row in mine if row.get("z") is not None]
         for i, name in enumerate(ColemanHodgdon.parameter_names):
-            z = np.abs([each[i] for each in known if each[i] is not None])
+            z = [abs(each[i]) for each in values(mine, "z") if each[i] is not None]
             found.append(
                 {
                     "logs_with": group,
                     "parameter": name,
-                    "logs": int(z.size),
-                    "within_2": share(int(np.sum(z <= 2.0)), z.size),
-                    "median": float(np.median(z)) if z.size else None,
-                    "largest": float(np.max(z)) if z.size else None,
+                    "logs": len(z),
+                    "within_2": share((each <= 2.0 for each in z), len(z)),
+                    "median": median(z),
+                    "largest": max(z, default=None),
                 }
             )
     return found
@@ -142,26 +131,20 @@ def scores(rows: Sequence[Row], clean: Sequence[Row]) -> list[Row]:
 
 def summarise(rows: Sequence[Row], clean: Sequence[Row] = ()) -> Row:
     """All that the page shows, as small for many logs as for few."""
-    rows = [ratios(row) for row in rows]
+    rows = [{**ratios(row), "size": size(row["samples"])} for row in rows]
     fitted = [row for row in rows if row["failure"] is None]
     failed = [row for row in rows if row["failure"] is not None]
-    sized = [
-        {**row, "size": name}
-        for row in rows
-        for name, (low, high) in SIZES.items()
-        if low <= row["samples"] < high
-    ]
     worst = sorted(fitted, key=lambda row: row["regret"], reverse=True)[:WORST]
     return {
         "all": part(rows),
         "by_family": parts(rows, "family"),
         "by_voltage": parts(rows, "voltage"),
-        "by_added": by_added(rows),
-        "by_size": parts(sized, "size"),
+        "by_size": parts(rows, "size"),
         "by_chosen": parts(fitted, "chosen_name"),
+        "by_added": by_added(rows),
         "quantiles": {name: quantiles([row["ratio"][name] for row in fitted]) for name in RATIOS},
         "seconds": quantiles([row["seconds"] for row in rows]),
-        "coverage": coverages(fitted),
+        "coverage": coverages(values(fitted, "coverage")),
         "scores": scores(fitted, clean),
         "worst": [
             {**{name: row[name] for name in SHOWN}, **row["ratio"], "level": row["level"] / row["chosen"]}
@@ -171,13 +154,18 @@ def summarise(rows: Sequence[Row], clean: Sequence[Row] = ()) -> Row:
     }
 
 
+def size(samples: int) -> str:
+    """Short, middle or long."""
+    return next(name for name, (low, high) in SIZES.items() if low <= samples < high)
+
+
 def played(what: str, work: Callable[[int], Row], seeds: Sequence[int], workers: int | None) -> list[Row]:
     """Rows of some logs, in the order of their seeds."""
     rows: list[Row] = []
-    with counting(what) as count:
+    with progress(what, lines=True) as say:
         for row in in_processes(work, seeds, workers):
             rows.append(row)
-            count(len(rows), len(seeds))
+            say.done(len(rows), len(seeds))
     return sorted(rows, key=lambda row: row["seed"])
 
 

@@ -10,7 +10,6 @@ A run takes about half a second.
 """
 
 import argparse
-import functools
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -20,13 +19,13 @@ from typing import Any
 import numpy as np
 
 from piezoest._files import save_figure
+from piezoest._progress import progress
 from piezoest.bench.origin import json_safe, origin, put
-from piezoest.bench.shared import counting
-from piezoest.bench.store import carry_out, store_in
+from piezoest.bench.store import played
 from piezoest.bench.table import DIGITS
-from piezoest.bench.zoo import contenders, dwelling, judging, settling, summary
+from piezoest.bench.zoo import contenders, dwelling, judging, settling
 from piezoest.bench.zoo.contest import contest, summarise_contest
-from piezoest.bench.zoo.summary import CRITERIA, summarise
+from piezoest.bench.zoo.summary import counts, grouped, summarise, values
 from piezoest.bench.zoo.tasks import Task, over_cores, runs, tasks
 
 Row = dict[str, Any]
@@ -41,22 +40,23 @@ FEATURES = ("family", "reference", "fault", "mode", "mechanics")
 SPANS = ("amplitude", "frequency", "gain", "width", "sample_rate", "delay", "block", "sensor_noise", "creep")
 # Levels of the curve of a distribution; many where it ends, which is what matters.
 LEVELS = (*np.linspace(0.0, 0.9, 46), *np.linspace(0.9, 0.99, 19)[1:], *np.linspace(0.99, 1.0, 21)[1:])
-# How a fault was named, and how soon it was forgotten.
-TOLD = (
-    "fault", "mode", "to_name", "named", "named_periods", "to_recover", "recovered_first", "recovered_soon",
-)  # fmt: skip
-# Columns of the tables about controller and line.
+# Columns of the tables about each contender.
 CROSSED = {
-    "by_fault": ("fault",), "by_family_and_reference": ("family", "reference"), "by_family": ("family",),
-    "by_reference": ("reference",), "by_mechanics": ("mechanics",), "by_often": ("often",),
+    "by_fault": ("fault",), "by_mode": ("fault", "mode"), "by_family_and_reference": ("family", "reference"),
+    "by_family": ("family",), "by_reference": ("reference",), "by_mechanics": ("mechanics",),
+    "by_often": ("often",),
 }  # fmt: skip
 COLOURS = {"controller": "#D55E00", "no_corridor": "#CC79A7", "line": "#0072B2", "parts": "#888888"}
 NAMES = {
     "controller": "AdaptiveFeedforward", "no_corridor": "without corridor",
     "line": "without candidates", "parts": "by hand",
 }  # fmt: skip
-STYLES = {"all": "-", "healthy": "--", "often": ":"}
 GROUPS = {"all": "all runs", "healthy": "healthy rigs", "often": "called often"}
+# Which are drawn, and how.
+CURVES = [
+    ("controller", "all", "-"), ("controller", "healthy", "--"), ("controller", "often", ":"),
+    ("no_corridor", "all", "-"), ("line", "all", "-"), ("parts", "all", "-"),
+]  # fmt: skip
 
 
 def often(row: Row) -> bool:
@@ -73,66 +73,26 @@ PARTS: dict[str, Callable[[Row], bool]] = {
 }
 
 
-def judged(rows: Sequence[Row]) -> list[float]:
-    """Ratios that count."""
-    return [row["ratio"] for row in rows if row.get("ratio") is not None]
-
-
-def part(rows: Sequence[Row], *, curve: bool = True) -> Row:
-    """Violations, quantiles and, if it is drawn, the curve of a group."""
-    found = summarise(rows)
-    ratios = judged(rows)
+def part(rows: Sequence[Row]) -> Row:
+    """Violations, quantiles and the curve of a group."""
+    found, ratios = summarise(rows), values(rows, "ratio")
     return {
         "runs": len(rows),
         "judged": len(ratios),
         "violations": found["violations"],
         "quantiles": {name: found["quantiles"][name] for name in ("ratio", "cycle_ratio", "last_ratio")},
-        "curve": np.quantile(ratios, LEVELS).tolist() if ratios and curve else [],
+        "curve": np.quantile(ratios, LEVELS).tolist() if ratios else [],
     }
-
-
-def table(rows: Sequence[Row], *names: str) -> list[Row]:
-    """Median of the ratio and count above 1, for each value of some columns."""
-    found = []
-    for key, group in summary.parted(rows, *names).items():
-        ratios = judged(group)
-        found.append(
-            {
-                **dict(zip(names, key, strict=True)),
-                "runs": len(group),
-                "judged": len(ratios),
-                "median": float(np.median(ratios)) if ratios else None,
-                "over": sum(map(CRITERIA["ratio"], group)),
-                "over_last": sum(map(CRITERIA["last_ratio"], group)),
-            }
-        )
-    return found
-
-
-def groups(rows: Sequence[Row]) -> Row:
-    """What the page shows of each contender; of all runs together the curve is drawn."""
-    found = {name: part(list(filter(belongs, rows)), curve=name == "all") for name, belongs in PARTS.items()}
-    return {**found, "worst": summarise(rows)["worst"]}
-
-
-def tables(rows: Sequence[Row]) -> Row:
-    """What it shows of the line, too."""
-    marked = [{**row, "often": often(row)} for row in rows]
-    return {**groups(rows), **{name: table(marked, *columns) for name, columns in CROSSED.items()}}
 
 
 def summed_up(rows: Sequence[Row]) -> Row:
-    """All that it shows of the controller."""
-    told = [row for row in summarise(rows)["by_fault"] if row["fault"] != "none"]
+    """What the page shows of a contender."""
+    marked = [{**row, "often": often(row)} for row in rows]
     return {
-        **tables(rows),
         **{name: part(list(filter(belongs, rows))) for name, belongs in PARTS.items()},
-        "by_mode": table(rows, "fault", "mode"),
-        "told": [{name: row[name] for name in TOLD} for row in told],
+        **{name: grouped(marked, *columns, of=counts) for name, columns in CROSSED.items()},
+        "worst": summarise(rows)["worst"],
     }
-
-
-SHOWN = {"controller": summed_up, "no_corridor": groups, "line": tables, "parts": groups}
 
 
 def drawn(rows: Sequence[Row]) -> Row:
@@ -146,13 +106,6 @@ def drawn(rows: Sequence[Row]) -> Row:
     }
 
 
-def played(what: str, planned: Sequence[Task], folder: Path, workers: int | None) -> list[Row]:
-    """Rows of some runs, of which those that are known are not made again."""
-    with store_in(folder) as store, counting(f"runs of {what}") as count:
-        carry_out(planned, store, over_cores(workers), count)
-        return list(store.rows(task.key for task in planned))
-
-
 def draw(document: Row, path: Path) -> None:
     """Draw how large a part of the runs has a ratio above any value."""
     from matplotlib.figure import Figure
@@ -161,19 +114,16 @@ def draw(document: Row, path: Path) -> None:
     axes = figure.subplots()
     above = 1.0 - np.array(document["levels"])
     least = 1.0 / document["runs"]
-    for name, colour in COLOURS.items():
-        for group, style in STYLES.items():
-            curve = document[name][group]["curve"]
-            if curve:
-                label = f"{NAMES[name]}, {GROUPS[group]}"
-                axes.plot(curve, np.maximum(above, least), style, color=colour, lw=1.3, label=label)
+    for name, group, style in CURVES:
+        if curve := document[name][group]["curve"]:
+            label = f"{NAMES[name]}, {GROUPS[group]}"
+            axes.plot(curve, np.maximum(above, least), style, color=COLOURS[name], lw=1.3, label=label)
     axes.axvline(1.0, color="0.4", lw=0.8)
     axes.set(
         xscale="log", yscale="log", ylim=(0.8 * least, 1.1),
         xlabel="ratio of the errors", ylabel="part of the runs above it",
     )  # fmt: skip
     figure.legend(loc="outside lower center", ncols=2, frameon=False)
-    path.parent.mkdir(parents=True, exist_ok=True)
     save_figure(figure, path, dpi=130, metadata={"Software": None})
 
 
@@ -198,7 +148,12 @@ def main(given: Sequence[str] | None = None) -> int:
 
     began = time.perf_counter()
     others = min(arguments.runs, arguments.others or arguments.runs)
-    play = functools.partial(played, folder=arguments.out, workers=arguments.workers)
+    execute = over_cores(arguments.workers)
+
+    def play(what: str, planned: Sequence[Task]) -> list[Row]:
+        with progress(f"runs of {what}", lines=True) as say:
+            return played(planned, arguments.out, execute, say.done)
+
     first = arguments.seed
     rows = {}
     for name, controller in CONTROLLERS.items():
@@ -216,14 +171,14 @@ def main(given: Sequence[str] | None = None) -> int:
         "controllers": CONTROLLERS,
         "criteria": {
             "line": judging.ALLOWED, "noise": judging.NOISES, "swing": judging.NEGLIGIBLE,
-            "calls": CALLS, "late": LATE, "back": judging.BACK, "soon": summary.SOON,
-            "enough": summary.ENOUGH, "settled": settling.SETTLED, "slow": settling.SLOW,
+            "calls": CALLS, "late": LATE, "back": judging.BACK, "soon": settling.SOON,
+            "enough": settling.ENOUGH, "settled": settling.SETTLED, "slow": settling.SLOW,
             "large": settling.LARGE,
         },
         "drawn": drawn(rows["controller"]),
         "levels": [round(float(level), 6) for level in LEVELS],
-        **{name: SHOWN[name](each) for name, each in rows.items()},
-        "map": {"seeds": arguments.map, **summary.summarise_cells(on_map)} if on_map else None,
+        **{name: summed_up(each) for name, each in rows.items()},
+        "map": {"seeds": arguments.map, **settling.summarise_cells(on_map)} if on_map else None,
         "singles": summarise_contest(alone, DEFAULT) if alone else None,
         "dwell": dwelling.summarise_dwells(rested) if rested else None,
     }  # fmt: skip

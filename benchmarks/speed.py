@@ -316,7 +316,6 @@ def draw(rows: list[Row], path: Path) -> None:
     axes = figure.subplots()
     axes.barh(names, [times[name][0] for name in names], color=[times[name][1] for name in names])
     axes.set(xscale="log", xlabel="ns per sample; of this library in colour")
-    path.parent.mkdir(parents=True, exist_ok=True)
     save_figure(figure, path, dpi=130)
 
 

@@ -2,6 +2,7 @@
 
 import re
 import sys
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -97,7 +98,8 @@ def process_docstring(app: Any, what: str, name: str, obj: Any, options: Any, li
 
 
 def setup(app: Any) -> None:
+    write = import_module("page_parts").write_page
     for page in sorted(HERE.glob("*_page.py")):
-        app.connect("builder-inited", import_module(page.stem).write)
+        app.connect("builder-inited", partial(write, import_module(page.stem)))
     # After numpydoc (500), which makes sections of the docstring.
     app.connect("autodoc-process-docstring", process_docstring, priority=600)

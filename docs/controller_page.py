@@ -1,39 +1,32 @@
-"""Tables, numbers and figure of the page `controller`, from docs/data/controller.json and target.json.
+"""Tables and numbers of the page `controller`, from docs/data/controller.json and target.json.
 
-Tables and numbers are written at every Sphinx build; the figure by python docs/controller_page.py --figure
+The figure is drawn by python docs/controller_page.py
 """
 
-import sys
-from typing import Any
-
-from page_parts import DOCS, Document, of_all, percent, read, replacements, table_of, write_pieces
+from page_parts import DOCS, Document, of_all, percent, read, replacements, table_of
 
 from piezoest._files import save_figure
 
 FIGURE = DOCS / "figures" / "controller" / "load.png"
 NEAR = 0.01  # relative difference of settled errors
-
-
-def write(app: Any = None) -> None:
-    """Write what the page includes."""
-    write_pieces(DOCS / "generated" / "controller", pieces(read("controller"), read("target")))
+SOURCES = ("controller", "target")
 
 
 def pieces(parity: Document, target: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     runs, loads = parity["rows"], target["rows"]
     exact = sum(row["double_difference"] == 0.0 for row in runs)
     near = sum(row["float_difference"] <= NEAR for row in runs)
     least = min(row["load_mean"] for row in loads if row["precision"] == "double")
     return {
         "numbers": replacements(
+            "controller",
             {
-                "controller exact": of_all(exact, len(runs)),
-                "controller near": of_all(near, len(runs)),
-                "controller limit": percent(NEAR),
-                "controller double": f"{least:.0f}",
-                "controller tools": "; ".join(target["tools"]),
-            }
+                "exact": of_all(exact, len(runs)),
+                "near": of_all(near, len(runs)),
+                "limit": percent(NEAR),
+                "double": f"{least:.0f}",
+                "tools": "; ".join(target["tools"]),
+            },
         ),
         "parity": table_of(
             "Generated C compared with the library",
@@ -68,7 +61,6 @@ def pieces(parity: Document, target: Document) -> dict[str, str]:
 
 
 def draw() -> None:
-    """Draw the load of each controller."""
     from matplotlib.figure import Figure
 
     rows = [row for row in read("target")["rows"] if row["precision"] == "float"]
@@ -82,11 +74,8 @@ def draw() -> None:
     axes.set(xlabel="time of a step [% of a sample at 50 kHz]", xlim=(0, None))
     axes.invert_yaxis()
     axes.legend(loc="lower right")
-    FIGURE.parent.mkdir(parents=True, exist_ok=True)
     save_figure(figure, FIGURE, dpi=130)
 
 
 if __name__ == "__main__":
-    write()
-    if "--figure" in sys.argv:
-        draw()
+    draw()

@@ -1,13 +1,18 @@
-"""What the programs of the pages share: reading docs/data, tables, and numbers that stand in sentences."""
+"""What the programs of the pages share: reading docs/data, tables, and numbers that stand in sentences.
+
+Each page has a module NAME_page whose `pieces` gives the texts that it includes, by the name of their file.
+"""
 
 import csv
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from piezoest._files import write_text
+from piezoest._tables import Columns, cells_of, shown
+from piezoest.bench.origin import machine_of
 from piezoest.bench.report import Table
 
 DOCS = Path(__file__).resolve().parent
@@ -26,11 +31,15 @@ def read(name: str) -> Document:
     return dict(json.loads((DOCS / "data" / f"{name}.json").read_text(encoding="utf-8")))
 
 
-def write_pieces(target: Path, texts: dict[str, str]) -> None:
-    """Write texts by the name of their file; untouched where nothing changed, so that no rebuild follows.
+def write_page(page: Any, app: Any = None) -> None:
+    """Write what a page includes, from the pieces that its module makes of docs/data at every Sphinx build.
 
-    No line ends before a per cent sign.
+    `page`: module NAME_page; it may name its `SOURCES`, else docs/data/NAME.json is. Files stay untouched
+    where nothing changed, so that no rebuild follows. No line ends before a per cent sign.
     """
+    name = page.__name__.removesuffix("_page")
+    texts = page.pieces(*map(read, getattr(page, "SOURCES", (name,))))
+    target = DOCS / "generated" / name
     target.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         path, text = target / f"{name}.inc", text.replace(" %", "\N{NO-BREAK SPACE}%")
@@ -54,17 +63,9 @@ def table(title: str, heading: Iterable[str], body: Iterable[Iterable[Any]]) -> 
     return f".. csv-table:: {title}\n   :header: {header}\n   :widths: auto\n\n{rows}"
 
 
-def table_of(
-    title: str, rows: Iterable[Any], columns: Mapping[str, str | Callable[[Any], Any]] | None = None
-) -> str:
-    """A csv-table with a line for each row; for each heading, the row's key or what to show of the row.
-
-    Without columns, the keys of the rows are the headings.
-    """
-    rows = list(rows)
-    columns = {key: key for key in rows[0]} if columns is None else columns
-    body = [[row[what] if isinstance(what, str) else what(row) for what in columns.values()] for row in rows]
-    return table(title, columns, body)
+def table_of(title: str, rows: Iterable[Any], columns: Columns | None = None) -> str:
+    """A csv-table with a line for each row; without columns, the keys of the rows are the headings."""
+    return table(title, *cells_of(rows, columns))
 
 
 def part_of(of: Table, columns: Mapping[str, str]) -> Table:
@@ -74,35 +75,15 @@ def part_of(of: Table, columns: Mapping[str, str]) -> Table:
     return list(columns.values()), rows
 
 
-def shown(cell: Any) -> str:
-    """A cell of a table."""
-    if isinstance(cell, bool):
-        return "yes" if cell else "no"
-    return str(cell) if isinstance(cell, str | int) else short(cell)
-
-
-def replacements(values: dict[str, Any]) -> str:
-    """Substitutions for numbers that stand in sentences."""
-    return "".join(f".. |{name}| replace:: {value}\n" for name, value in values.items())
-
-
-def made(name: str, document: Document) -> dict[str, str]:
-    """When and where the numbers of a page were made."""
-    machine = document["machine"]
-    return {
-        f"{name} date": document["date"][:10],
-        f"{name} machine": f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}",
-    }
+def replacements(prefix: str, values: dict[str, Any], document: Document | None = None) -> str:
+    """Substitutions for numbers that stand in sentences; with a document, when and where it was made, too."""
+    if document is not None:
+        values = {"date": document["date"][:10], "machine": machine_of(document), **values}
+    return "".join(f".. |{prefix} {name}| replace:: {value}\n" for name, value in values.items())
 
 
 def percent(share: float | None) -> str:
-    """A share in per cent."""
     return "—" if share is None else f"{100.0 * share:.3g} %"
-
-
-def short(value: float | None) -> str:
-    """About three significant digits; a dash for what is infinite or not known."""
-    return "—" if value is None else f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
 def of_all(count: int, total: int) -> str:

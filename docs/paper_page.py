@@ -1,21 +1,14 @@
-"""Tables and numbers of the page `paper`, from docs/data/paper.json; written at every Sphinx build."""
+"""Tables and numbers of the page `paper`, from docs/data/paper.json."""
 
 import json
 from importlib import resources
-from typing import Any
 
-from page_parts import DOCS, Document, made, read, replacements, table, write_pieces
+from page_parts import Document, replacements, table
 
 from piezoest.bench import paper_report as report
 
 
-def write(app: Any = None) -> None:
-    """Write what the page includes."""
-    write_pieces(DOCS / "generated" / "paper", pieces(read("paper")))
-
-
 def pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     entries = document["tables"]
     tables = {
         f"table{k}": table(report.TITLES[number], *report.table(entries, number))
@@ -24,7 +17,7 @@ def pieces(document: Document) -> dict[str, str]:
     return tables | {
         "adaptation": table(report.TRANSIENTS, *report.transients(document["adaptation"])),
         "memory": table(document["memory"][0]["row"], *report.memories(document["memory"])),
-        "verdict": "".join(f"- {sentence}\n" for sentence in report.verdict(entries)),
+        "verdict": table(report.WITHIN, *report.verdict(entries)),
         "stage": table("Where the numbers of the stage come from", ["part", "source"], origins()),
         "numbers": numbers(document),
     }
@@ -38,17 +31,14 @@ def origins() -> list[list[str]]:
 
 
 def numbers(document: Document) -> str:
-    """Substitutions for numbers that stand in sentences."""
     conditions = document["conditions"]
     start = conditions["start"]
-    return replacements(
-        {
-            **made("paper", document),
-            "paper library": document["versions"]["piezoest"],
-            "paper seconds": f"{document['seconds']:.0f} s",
-            "paper memory": f"{conditions['memory_s']:g} s",
-            "paper seed": conditions["seed"],
-            "paper start": f"α = {start['alpha']:g}, β = {start['beta']:g}, γ = {start['gamma']:g}",
-            "paper start gain": f"{conditions['linear_start']['gain']:g} µm/V",
-        }
-    )
+    values = {
+        "library": document["versions"]["piezoest"],
+        "seconds": f"{document['seconds']:.0f} s",
+        "memory": f"{conditions['memory_s']:g} s",
+        "seed": conditions["seed"],
+        "start": f"α = {start['alpha']:g}, β = {start['beta']:g}, γ = {start['gamma']:g}",
+        "start gain": f"{conditions['linear_start']['gain']:g} µm/V",
+    }
+    return replacements("paper", values, document)

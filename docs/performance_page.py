@@ -1,20 +1,11 @@
-"""Tables and numbers of the page `performance`, from docs/data/speed.json; no number is typed by hand.
+"""Tables and numbers of the page `performance`, from docs/data/speed.json; no number is typed by hand."""
 
-Runs at the start of every Sphinx build.
-"""
+from page_parts import Document, replacements, table
 
-from typing import Any
-
-from page_parts import DOCS, Document, made, read, replacements, table, write_pieces
-
-
-def write(app: Any = None) -> None:
-    """Write what the page includes."""
-    write_pieces(DOCS / "generated" / "performance", pieces(read("speed")))
+SOURCES = ("speed",)
 
 
 def pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     bank = document["bank"]
     calls = [
         [
@@ -63,7 +54,6 @@ def against(rows: list[Document], *, faster: bool) -> tuple[list[str], list[list
 
 
 def numbers(document: Document) -> str:
-    """Substitutions for numbers that stand in sentences."""
     once = document["once"]
     rows = document["against_c"] + document["against_python"]
     values = {
@@ -79,4 +69,4 @@ def numbers(document: Document) -> str:
         "warmup": f"{once['warmup']:.1f} s",
         "track": f"{1.0 / once['one second of track()']:.0f}",
     }
-    return replacements(made("speed", document) | {f"speed {name}": value for name, value in values.items()})
+    return replacements("speed", values, document)

@@ -116,7 +116,6 @@ def draw(path: Path) -> None:
     figure.legend(loc="outside lower center", frameon=False)
     for axes in (loop, series):
         axes.grid(alpha=0.3)
-    path.parent.mkdir(parents=True, exist_ok=True)
     save_figure(figure, path, dpi=130)
 
 

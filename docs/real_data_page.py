@@ -1,17 +1,9 @@
-"""Tables and numbers of the page `real_data`, from its JSON in docs/data; written at every Sphinx build."""
+"""Tables and numbers of the page `real_data`, from its JSON in docs/data."""
 
-from typing import Any
-
-from page_parts import DOCS, Document, made, percent, read, replacements, table_of, write_pieces
-
-
-def write(app: Any = None) -> None:
-    """Write what the page includes."""
-    write_pieces(DOCS / "generated" / "real_data", pieces(read("real_data")))
+from page_parts import Document, percent, replacements, table_of
 
 
 def pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     found = document["identify"]
     return {
         "numbers": numbers(document),
@@ -43,7 +35,6 @@ def pieces(document: Document) -> dict[str, str]:
 
 
 def numbers(document: Document) -> str:
-    """Substitutions for numbers that stand in sentences."""
     found, other = document["identify"], document["other"]
     lengths = {
         "held": found["held_out"], "line": found["line_held_out"], "stream": document["stream"]["held_out"],
@@ -60,5 +51,4 @@ def numbers(document: Document) -> str:
         "other file": f"``{other['source']}``",
         **{name: f"{each['rms_um']:.2f} µm" for name, each in lengths.items()},
     }
-    named = {f"recording {name}": value for name, value in values.items()}
-    return replacements(made("recording", document) | named)
+    return replacements("recording", values, document)

@@ -1,10 +1,9 @@
-"""Tables and numbers of the page `safety`, from docs/data/safety.json; written at every Sphinx build."""
+"""Tables and numbers of the page `safety`, from docs/data/safety.json."""
 
 from functools import partial
 from typing import Any
 
-import page_parts
-from page_parts import Document, of_all, percent, short, table, table_of
+from page_parts import Document, of_all, percent, replacements, shown, table, table_of
 
 GROUPS = {"all": "all", "healthy": "healthy", "often": "called often"}
 WHO = {
@@ -37,14 +36,7 @@ CHANGES = {
 }  # fmt: skip
 
 
-def write(app: Any = None) -> None:
-    """Write what the page includes."""
-    target = page_parts.DOCS / "generated" / "safety"
-    page_parts.write_pieces(target, pieces(page_parts.read("safety")))
-
-
 def pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     mine = document["controller"]
     return {
         "numbers": numbers(document),
@@ -57,7 +49,7 @@ def pieces(document: Document) -> dict[str, str]:
         "by_often": by(document, "often", "called often"),
         "crossed": crossed(mine),
         "worst": worst(mine["worst"]),
-        "told": told(mine["told"]),
+        "told": told(mine["by_mode"]),
         **settling(document),
         "singles": singles(document["singles"]),
         "dwell": dwell(document.get("dwell")),
@@ -65,7 +57,6 @@ def pieces(document: Document) -> dict[str, str]:
 
 
 def numbers(document: Document) -> str:
-    """Numbers that stand in sentences."""
     criteria, first, runs = document["criteria"], document["seed"], document["runs"]
     values = {
         "runs": runs,
@@ -76,8 +67,7 @@ def numbers(document: Document) -> str:
         **{name: percent(criteria[name]) for name in ("swing", "settled", "slow", "enough")},
         **{name: f"{criteria[name]:g}" for name in ("line", "noise", "calls", "back", "soon", "large")},
     }
-    named = {f"safety {name}": value for name, value in values.items()}
-    return page_parts.replacements(page_parts.made("safety", document) | named)
+    return replacements("safety", values, document)
 
 
 def drawn(of: Document) -> str:
@@ -86,7 +76,7 @@ def drawn(of: Document) -> str:
         [title, "; ".join(f"{each} {runs}" for each, runs in of[name].items())]
         for name, title in DRAWN.items()
     ]
-    body += [[title, " to ".join(map(short, of["spans"][name]))] for name, title in SPANS.items()]
+    body += [[title, " to ".join(map(shown, of["spans"][name]))] for name, title in SPANS.items()]
     return table(
         "What is drawn: names with their runs, or smallest and largest number", ["quantity", "drawn"], body
     )
@@ -120,7 +110,7 @@ def quantiles(document: Document) -> str:
 
 def cell(row: Document | None) -> str:
     """Median of the ratio, and runs above 1."""
-    return f"{short(row['median'])}; {row['over']}/{row['judged']}" if row and row["judged"] else "—"
+    return f"{shown(row['ratio'])}; {row['over']}/{row['judged']}" if row and row["judged"] else "—"
 
 
 def by(document: Document, column: str, name: str, more: dict[str, Any] | None = None) -> str:
@@ -153,7 +143,6 @@ def crossed(mine: Document) -> str:
 
 
 def worst(rows: list[Document]) -> str:
-    """The worst runs, with their seeds."""
     names = {
         "family": "family", "reference": "reference", "fault": "fault", "time": "mode", "ratio": "ratio",
         "last cycle": "last_ratio", "at a limit [quarter swings]": "rail", "drove last": "driver",
@@ -164,7 +153,7 @@ def worst(rows: list[Document]) -> str:
 
 def found(document: Document) -> str:
     """One line for each of the other questions."""
-    rows = document["controller"]["told"]
+    rows = document["controller"]["by_mode"]
     asked, named, left, recovered = (
         sum(row[name] for row in rows) for name in ("to_name", "named", "to_recover", "recovered_soon")
     )
@@ -224,7 +213,7 @@ def singles(alone: Document | None) -> str:
     """Settled errors, and their ratios to those of the best single estimator."""
     rows = alone["cells"] if alone else []
     cells = {
-        (row["family"], row["reference"]): f"{share(row, 'settled')}; {short(row['ratio'])}" for row in rows
+        (row["family"], row["reference"]): f"{share(row, 'settled')}; {shown(row['ratio'])}" for row in rows
     }
     families, references = (
         (list(dict.fromkeys(names)) for names in zip(*cells, strict=True)) if rows else ([], [])
@@ -235,7 +224,6 @@ def singles(alone: Document | None) -> str:
 
 
 def dwell(rested: Document | None) -> str:
-    """Errors after a long rest."""
     columns = {
         "creep": "creep", "feedback": "feedback", "noise": "noise",
         "as before in the first period": lambda row: of_all(row["kept"], row["runs"]),

@@ -7,20 +7,16 @@ import tempfile
 import textwrap
 from typing import Any
 
-from page_parts import DOCS, write_pieces
+from page_parts import DOCS
 
 CODE = re.compile(r"^\.\. code-block:: python\n\n(.*?)(?=^\S|\Z)", re.S | re.M)
+SOURCES = ()
 MARGIN = {"initial_indent": "   ", "subsequent_indent": "       "}
 
 
-def write(app: Any = None) -> None:
-    """Write what the page includes."""
-    page = (DOCS / "start.rst").read_text(encoding="utf-8")
-    write_pieces(DOCS / "generated" / "start", pieces(page))
-
-
-def pieces(page: str) -> dict[str, str]:
+def pieces() -> dict[str, str]:
     """For the number of each block of code, what it prints."""
+    page = (DOCS / "start.rst").read_text(encoding="utf-8")
     texts, names = {}, dict[str, Any]()
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for number, block in enumerate(CODE.findall(page), 1):

@@ -1,35 +1,28 @@
-"""Tables of the pages about estimators, from docs/data; no number is typed by hand.
-
-Runs at the start of every Sphinx build.
-"""
+"""Tables of the pages about estimators, from docs/data; no number is typed by hand."""
 
 import re
-from typing import Any
 
-from page_parts import DOCS, NEEDS, SPEED, Document, made, part_of, read, replacements, table, write_pieces
+from page_parts import NEEDS, SPEED, Document, part_of, replacements, table
 
 from piezoest.bench import report
 from piezoest.bench.scenarios import UNREPEATED
 
-TARGET = DOCS / "generated" / "table"
+SOURCES = ("table", "policies")
 
 
-def write(app: Any = None) -> None:
-    """Write what the pages include."""
-    runs, policies = read("table"), read("policies")
-    pieces = {
+def pieces(runs: Document, policies: Document) -> dict[str, str]:
+    return {
         "numbers": substitutions("table", runs) + substitutions("policies", policies),
         "overview": linked(report.overview_table(runs)),
         "speed": linked(part_of(report.overview_table(runs), SPEED)),
         "needs": linked(part_of(report.needs_table(runs), NEEDS)),
         "margins": linked(report.needs_table(runs)),
         "settles": linked(settles(runs)),
-        "scenarios": table("", ["scenario", "what happens"], list(map(list, runs["scenarios"].items()))),
+        "scenarios": table("", ["scenario", "what happens"], runs["scenarios"].items()),
         "stages": linked(stages(runs)),
         "tuned": linked(tuned(runs)),
         "policies": linked(settles(policies)),
     }
-    write_pieces(TARGET, pieces)
 
 
 def linked(of: report.Table) -> str:
@@ -111,7 +104,6 @@ def tuned(document: Document) -> report.Table:
 
 
 def substitutions(prefix: str, document: Document) -> str:
-    """Numbers that stand in sentences."""
     plan, conditions = document["plan"], document["conditions"]
     values = {
         "minutes": f"{document['seconds'] / 60.0:.0f} minutes",
@@ -123,6 +115,4 @@ def substitutions(prefix: str, document: Document) -> str:
         "rest": f"{conditions['rest']:g} s",
         "drift": f"{conditions['drift']:g} s",
     }
-    return replacements(
-        made(prefix, document) | {f"{prefix} {name}": value for name, value in values.items()}
-    )
+    return replacements(prefix, values, document)

@@ -148,7 +148,6 @@ def excitation() -> list[Document]:
 
 
 def draw(document: Document) -> None:
-    """Memory, noise and delay."""
     import matplotlib.pyplot as plt
 
     figure, (first, middle, last) = plt.subplots(3, 1, figsize=(6, 9.5), layout="constrained")

@@ -1,8 +1,6 @@
-"""Tables and numbers of the page `tuning`, from docs/data/tuning.json; written at every Sphinx build."""
+"""Tables and numbers of the page `tuning`, from docs/data/tuning.json."""
 
-from typing import Any
-
-from page_parts import DOCS, Document, made, read, replacements, table_of, write_pieces
+from page_parts import Document, replacements, table_of
 
 TITLES = {
     "memories": "Errors after the gain has fallen by 20 %",
@@ -12,17 +10,11 @@ TITLES = {
 }
 
 
-def write(app: Any = None) -> None:
-    """Write what the page includes."""
-    write_pieces(DOCS / "generated" / "tuning", pieces(read("tuning")))
-
-
 def pieces(document: Document) -> dict[str, str]:
-    """Texts by the name of their file."""
     conditions = document["conditions"]
     numbers = {
-        "tuning signal": f"{conditions['amplitude_um']:g} µm at {conditions['frequency_Hz']:g} Hz",
-        "tuning rate": f"{conditions['sample_rate_Hz']:g} Hz",
+        "signal": f"{conditions['amplitude_um']:g} µm at {conditions['frequency_Hz']:g} Hz",
+        "rate": f"{conditions['sample_rate_Hz']:g} Hz",
     }
     tables = {name: table_of(title, document[name]) for name, title in TITLES.items()}
-    return tables | {"numbers": replacements(made("tuning", document) | numbers)}
+    return tables | {"numbers": replacements("tuning", numbers, document)}

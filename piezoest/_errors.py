@@ -4,7 +4,7 @@ import contextlib
 import os
 import sys
 from collections.abc import Iterator
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from piezoest._extras import MissingExtraError
 
 USER_ERROR, INTERRUPTED = 1, 130
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 
 
 @contextlib.contextmanager

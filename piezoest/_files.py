@@ -5,9 +5,34 @@ import errno
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
+
+FIGURES, REPORTS = (".png", ".pdf", ".svg", ".jpg", ".jpeg"), (".html", ".htm")  # endings
+
+
+def check_targets(
+    keep: Iterable[Path] = (),
+    *,
+    figure: Path | None = None,
+    output: Path | None = None,
+    report: Path | None = None,
+) -> None:
+    """Refuse what cannot be written before the work is done; files to keep are not written over."""
+    kept = {path.resolve() for path in keep}
+    for path, endings in ((figure, FIGURES), (output, ()), (report, REPORTS)):
+        if path is None:
+            continue
+        if endings and path.suffix.lower() not in endings:
+            raise ValueError(f"{path}: its name must end in one of {' '.join(endings)}")
+        if path.resolve() in kept:
+            raise ValueError(f"{path} is named twice: give what is written a file of its own")
+        if path.is_dir():
+            raise ValueError(f"{path} is a folder: name a file in it")
+        if not path.resolve().parent.is_dir():
+            raise ValueError(f"{path}: there is no folder {path.resolve().parent}")
+        kept.add(path.resolve())
 
 
 @contextlib.contextmanager
@@ -47,7 +72,8 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def save_figure(figure: Any, path: str | Path, **options: Any) -> None:
-    """Write a figure of Matplotlib by `replacing`, with options of its ``savefig``."""
+    """Write a figure of Matplotlib by `replacing`, with options of its ``savefig``; makes its folder."""
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
         figure.savefig(temporary, **options)
 

@@ -254,10 +254,7 @@ def track(
     known, theta, names = None, NONE, ()
     for start in range(0, N, interval):
         part = slice(start, min(start + interval, N))
-        if controller is not None:
-            _drive(part, stage, controller, reference, voltage, measured, displacement)
-            continue
-        _turn(part, stage, compensator, reference, voltage, measured, displacement)
+        _turn(part, stage, compensator, controller, reference, voltage, measured, displacement)
         if estimator is not None:
             present = compensator.model
             if present is not known:
@@ -286,33 +283,24 @@ def _check_driver(compensator: Any, estimator: Any, controller: Any) -> None:
 
 
 def _turn(
-    part: slice, stage: Any, compensator: Any, r: FloatArray, u: FloatArray, x: FloatArray, true: FloatArray
-) -> None:
-    """One interval of the reference through compensator and stage, into u, x and the true x."""
+    part: slice, stage: Any, compensator: Any, controller: Any, r: FloatArray, u: FloatArray, x: FloatArray,
+    true: FloatArray,
+) -> None:  # fmt: skip
+    """One interval of the reference through compensator or controller and stage, into u, x and the true x."""
     feeds_back = getattr(compensator, "needs_measurement", False)
-    if not feeds_back and hasattr(compensator, "run") and hasattr(stage, "run"):
+    if controller is None and not feeds_back and hasattr(compensator, "run") and hasattr(stage, "run"):
         u[part] = compensator.run(r[part])
         x[part] = stage.run(u[part])
         true[part] = getattr(stage, "displacement", x[part])
         return
+    driver = compensator if controller is None else controller
     for k in range(part.start, part.stop):
-        if feeds_back:
-            u[k] = compensator.step(float(r[k]), _reading(x[k - 1]) if k > 0 else None)
-        else:
-            u[k] = compensator.step(float(r[k]))
+        before = (_reading(x[k - 1]) if k > 0 else None,) if feeds_back else ()
+        u[k] = driver.step(float(r[k]), *before)
         x[k] = number_or_nan(stage.step(float(u[k])))
         true[k] = getattr(stage, "displacement", x[k])
-
-
-def _drive(
-    part: slice, stage: Any, controller: Any, r: FloatArray, u: FloatArray, x: FloatArray, true: FloatArray
-) -> None:
-    """One interval of the reference through a controller, which learns from each sample."""
-    for k in range(part.start, part.stop):
-        u[k] = controller.step(float(r[k]))
-        x[k] = number_or_nan(stage.step(float(u[k])))
-        controller.learn(float(u[k]), _reading(x[k]))
-        true[k] = getattr(stage, "displacement", x[k])
+        if controller is not None:
+            controller.learn(float(u[k]), _reading(x[k]))
 
 
 def _reading(x: float) -> float | None:

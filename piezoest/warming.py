@@ -1,6 +1,5 @@
 """Compile and load everything that a live loop will call, before it runs."""
 
-import functools
 import time
 from typing import Any
 
@@ -86,38 +85,23 @@ def warmup(*used: Any) -> float:
     return time.perf_counter() - began
 
 
-@functools.singledispatch
-def _use(learner: Any, u: FloatArray, x: FloatArray) -> None:
+def _use(used: Any, u: FloatArray, x: FloatArray) -> None:
     """Do with a copy what a loop may do."""
-    copy = learner.copy()
-    copy.step(0.0, 0.0)
-    copy.run(u, x)
-    _ = copy.model
-
-
-@_use.register
-def _(learner: Compensator, u: FloatArray, x: FloatArray) -> None:
-    compensator = learner.copy()
-    compensator.step(0.0)
-    compensator.run(x)
-    compensator.model = compensator.model
-
-
-@_use.register
-def _(learner: EstimatorBank, u: FloatArray, x: FloatArray) -> None:
-    bank = EstimatorBank(learner.channel(0), 2)
-    bank.step(u[:2], x[:2])
-    bank.run(np.column_stack([u, u]), np.column_stack([x, x]))
-
-
-@_use.register
-def _(learner: AdaptiveFeedforward, u: FloatArray, x: FloatArray) -> None:
-    controller = learner.copy()
-    controller.learn(controller.step(0.0), 0.0)
-    controller.learn(controller.run(x), x)
-
-
-@_use.register(type)
-def _(learner: Any, u: FloatArray, x: FloatArray) -> None:
+    if isinstance(used, EstimatorBank):
+        bank = EstimatorBank(used.channel(0), 2)
+        bank.step(u[:2], x[:2])
+        bank.run(np.column_stack([u, u]), np.column_stack([x, x]))
+        return
     # What is compiled goes neither by sample rate nor by limits.
-    _use(learner(50_000.0, limits=VoltageLimits(0.0, 100.0)), u, x)
+    copy = used(50_000.0, limits=VoltageLimits(0.0, 100.0)) if used is AdaptiveFeedforward else used.copy()
+    if isinstance(copy, AdaptiveFeedforward):
+        copy.learn(copy.step(0.0), 0.0)
+        copy.learn(copy.run(x), x)
+    elif isinstance(copy, Compensator):
+        copy.step(0.0)
+        copy.run(x)
+        copy.model = copy.model
+    else:
+        copy.step(0.0, 0.0)
+        copy.run(u, x)
+        _ = copy.model

@@ -56,23 +56,24 @@ THETA = ("--alpha", 0.02, "--beta", 0.12, "--gamma", 0.0036)
 
 
 def test_demo_reduces_the_error_by_ninety_percent(tmp_path: Path) -> None:
-    from piezoest.demo import LIMITS, run_demo
+    from piezoest.demo import ADAPTIVE, CONTROLLER, FIXED, LIMITS, LINEAR, run_demo
 
     said: list[str] = []
     result = run_demo(progress=said.append)
     assert result.seconds < 10.0
-    assert result.reduction >= 0.9
+    assert result.reduction(ADAPTIVE) >= 0.9
     assert len(said) == 5
-    errors = result.adaptive.max_error_per_period()
+    linear, fixed, adaptive, controller = (
+        result.records[name] for name in (LINEAR, FIXED, ADAPTIVE, CONTROLLER)
+    )
+    errors = adaptive.max_error_per_period()
     assert errors[0] > 5.0 * errors[-1]
     # The start is wrong: without adaptation it is worse than the straight line.
-    assert result.fixed.max_error(2) > result.linear.max_error(2)
+    assert fixed.max_error(2) > linear.max_error(2)
     # The controller starts from nothing, and finds what the other one finds.
-    assert result.controller_reduction >= 0.89
-    assert result.learnt["beta"] == pytest.approx(result.adaptive.theta[-1, 1], rel=0.05)
-    assert (
-        LIMITS.minimum <= result.controller.voltage.min() < result.controller.voltage.max() <= LIMITS.maximum
-    )
+    assert result.reduction(CONTROLLER) >= 0.89
+    assert result.learnt["beta"] == pytest.approx(adaptive.theta[-1, 1], rel=0.05)
+    assert LIMITS.minimum <= controller.voltage.min() < controller.voltage.max() <= LIMITS.maximum
     result.plot().savefig(tmp_path / "figure.png")
 
 

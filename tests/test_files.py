@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from piezoest.bench import origin, shared, table, tables
+from piezoest.bench import origin, table, tables
 from piezoest.export.generated import CCode
 from piezoest.export.tables import Table
 from piezoest.models import AmplitudeProfile
@@ -84,7 +84,6 @@ OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
         "controller", f"{seed}" * SIZE, f"{seed}" * SIZE, "double", False
     ).write(path.parent),
     "waveform.csv": waveform,
-    "table.json": lambda path, seed: shared.write_json(columns(seed)["voltage_V"].tolist(), path),
     "put.json": lambda path, seed: origin.put(columns(seed)["voltage_V"].tolist(), path),
     "periods.csv": lambda path, seed: rows(path, seed, "csv"),
     "periods.parquet": lambda path, seed: rows(path, seed, "parquet"),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from piezoest import signals
-from piezoest._checks import instance, integer, non_negative, positive
+from piezoest._checks import instance
 from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
 from piezoest.models import ColemanHodgdon, Creep, LinearGain
 from piezoest.signals import Signal
@@ -80,19 +80,6 @@ class Conditions:
     creep: bool = True  # whether the stage creeps
     stage: str = PAPER  # name in `STAGES`
 
-    def __post_init__(self) -> None:
-        for name in ("sample_rate", "frequency", "rest", "drift"):
-            positive(name, getattr(self, name))
-        if self.amplitude is not None:
-            positive("amplitude", self.amplitude)
-        if self.noise is not None:
-            non_negative("noise", self.noise)
-        integer("before", self.before, 1)
-        integer("after", self.after, 1)
-        if self.stage not in STAGES:
-            raise ValueError(f"stage must be one of {', '.join(STAGES)}, got {self.stage!r}")
-        integer("updates", self.updates, 1)
-
     @property
     def period(self) -> float:
         """Of the wave, in samples."""
@@ -112,12 +99,9 @@ class Case:
     start: ColemanHodgdon  # model to start from
     linear_start: LinearGain  # the same for linear feed-forward
     update_interval: int  # samples between two updates of the compensator's model
-    rest: tuple[int, int] | None = None  # first sample of a dwell and the first after it
-    noise: float | None = None  # standard deviation of the gauge's noise [µm]; None for the stage's own
+    conditions: Conditions = Conditions()
     # Time [s] and factor of the stage's hysteresis, see `PaperStage`.
     gain_schedule: tuple[tuple[float, float], ...] | None = None
-    creep: bool = True  # whether the stage creeps
-    stage: str = PAPER  # name in `STAGES`
 
     @property
     def sample_rate(self) -> float:
@@ -126,14 +110,11 @@ class Case:
 
     def new_stage(self) -> SimulatedStage:
         """Stage at rest; every one of the same case is identical, its noise included."""
+        given, schedule = self.conditions, self.gain_schedule
         return make_stage(
-            self.stage,
-            self.sample_rate,
-            seed=self.seed,
-            noise=self.noise,
-            gain_schedule=self.gain_schedule,
-            creep=self.creep,
-        )
+            given.stage, self.sample_rate, seed=self.seed, noise=given.noise, gain_schedule=schedule,
+            creep=given.creep,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,14 +142,7 @@ class Draft:
         """Make the case from a drawn start, off by up to `spread`; `rest` are other fields of `Case`."""
         instance("reference", reference, Signal, "a Signal: make one of values, sample rate and period")
         given = self.conditions
-        options = {
-            "change": 0,
-            "amplitude": self.amplitude,
-            "noise": given.noise,
-            "creep": given.creep,
-            "stage": given.stage,
-            **rest,
-        }
+        options = {"change": 0, "amplitude": self.amplitude, "conditions": given, **rest}
         return Case(
             scenario=self.scenario,
             seed=self.seed,

@@ -8,6 +8,7 @@ import typer
 
 from piezoest._errors import Group
 from piezoest._options import grouped
+from piezoest._progress import LOADING, progress
 from piezoest.bench import safety_command, shared, table_command
 from piezoest.bench.origin import origin
 
@@ -50,13 +51,12 @@ def paper(
     The paper's procedure at 50 kHz: each row adapts while it runs, until it is stationary. The stage was
     calibrated to the rows marked calibration; it has never seen those marked held out.
     """
-    shared.json_target(json_to)
-    shared.check_html(html)
+    shared.check(json_to, html)
     if figures is not None and (figures.exists() and not figures.is_dir()):
         raise typer.BadParameter(f"{figures} is not a folder", param_hint="--figures")
     began = time.perf_counter()
-    with shared.usage(), shared.progress() as say:
-        say("loading (compiles once after the installation)")
+    with shared.usage(), progress("runs", lines=True) as say:
+        say(LOADING)
         from piezoest.bench.paper import MEMORIES, MEMORY, run_paper
 
         result = run_paper(
@@ -64,15 +64,15 @@ def paper(
             memories=() if quick else MEMORIES,
             seed=seed,
             workers=workers,
-            progress=say,
+            progress=say.done,
         )
     document = {"suite": "paper", **origin(began), **result.to_dict()}
     shared.write_html(document, html)
     if figures is not None:
-        from piezoest.bench.paper_figures import write_figures
+        from piezoest.bench.figures import write_figures
+        from piezoest.bench.paper_figures import drawings
 
-        for path in write_figures(result, figures):
-            typer.echo(f"Figure: {path}", err=json_to == "-")
+        write_figures(drawings(result), figures, quiet=json_to == "-")
     from piezoest.bench.paper_report import print_report
 
     shared.show(document, json_to, print_report)

@@ -121,36 +121,29 @@ def _arguments(text: str) -> dict[str, Any]:
     try:
         # What comes before the parenthesis may be module:Class, which is no Python.
         call = ast.parse("_" + text[text.index("(") :].strip(), mode="eval").body
-    except SyntaxError as error:
-        raise ValueError(f"{text}: {error.msg}") from None
-    match call:
-        case ast.Call(func=ast.Name()):
-            return _keywords(call, text)
-    raise ValueError(f"{text}: write it as Name(argument=value, ...)")
+        match call:
+            case ast.Call(func=ast.Name()):
+                return _keywords(call)
+        raise ValueError("write it as Name(argument=value, ...)")
+    except (SyntaxError, TypeError, ValueError) as error:
+        raise ValueError(f"{text}: {error.msg if isinstance(error, SyntaxError) else error}") from None
 
 
-def _keywords(call: ast.Call, text: str) -> dict[str, Any]:
+def _keywords(call: ast.Call) -> dict[str, Any]:
     if call.args or any(keyword.arg is None for keyword in call.keywords):
-        raise ValueError(f"{text}: every argument needs its name, as in memory=0.4")
-    return {str(keyword.arg): _value(keyword.value, text) for keyword in call.keywords}
+        raise ValueError("every argument needs its name, as in memory=0.4")
+    return {str(keyword.arg): _value(keyword.value) for keyword in call.keywords}
 
 
-def _value(node: ast.expr, text: str) -> Any:
+def _value(node: ast.expr) -> Any:
     match node:
         case ast.Tuple(elts=items) | ast.List(elts=items):
-            return tuple(_value(item, text) for item in items)
+            return tuple(map(_value, items))
+        case ast.Call(func=ast.Name(id=name)) if name in policies.__all__:
+            return getattr(policies, name)(**_keywords(node))
         case ast.Call(func=ast.Name(id=name)):
-            return _policy(name, _keywords(node, text), text)
+            raise ValueError(f"{name} is no policy: choose one of {', '.join(policies.__all__)}")
     try:
         return ast.literal_eval(node)
     except ValueError:
-        raise ValueError(f"{text}: {ast.unparse(node)} is no number, string, tuple or policy") from None
-
-
-def _policy(name: str, arguments: dict[str, Any], text: str) -> Any:
-    if name not in policies.__all__:
-        raise ValueError(f"{text}: {name} is no policy: choose one of {', '.join(policies.__all__)}")
-    try:
-        return getattr(policies, name)(**arguments)
-    except TypeError as error:
-        raise ValueError(f"{text}: {error}") from None
+        raise ValueError(f"{ast.unparse(node)} is no number, string, tuple or policy") from None

@@ -165,23 +165,17 @@ def on_dask(
             yield result
 
 
-@contextlib.contextmanager
-def _client(scheduler: str | None, processes: int | None) -> Iterator[Any]:
+def _client(scheduler: str | None, processes: int | None) -> Any:
     """Client of a cluster, or of one made for it on this machine."""
     import distributed
 
-    with contextlib.ExitStack() as stack:
-        if scheduler is None:
-            workers = integer("processes", os.cpu_count() or 1 if processes is None else processes, 1)
-            cluster = distributed.LocalCluster(
-                n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
-            )
-            scheduler = stack.enter_context(cluster).scheduler_address
-        try:
-            client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise ValueError(f"scheduler {scheduler} does not answer: {error}") from None
-        yield stack.enter_context(client)
+    workers = integer("processes", os.cpu_count() or 1 if processes is None else processes, 1)
+    local = {"n_workers": workers, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
+    given = local if scheduler is None else {"address": scheduler}
+    try:
+        return distributed.Client(**given, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ValueError(f"scheduler {scheduler} does not answer: {error}") from None
 
 
 @contextlib.contextmanager

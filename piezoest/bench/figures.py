@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+import typer
 
 from piezoest._files import save_figure
 from piezoest.bench.estimators import LINEAR
@@ -48,15 +49,13 @@ def drawings(document: Document) -> dict[str, Figure]:
     return found
 
 
-def write_figures(document: Document, folder: Path) -> list[Path]:
-    """Draw a campaign as PNG. `folder`: to write to; made if it is not there."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for name, figure in drawings(document).items():
-        paths.append(folder / f"{name}.png")
+def write_figures(drawn: dict[str, Figure], folder: Path, *, quiet: bool) -> None:
+    """Write figures as PNG, and say where; `quiet`: on stderr. `folder`: made if it is not there."""
+    for name, figure in drawn.items():
+        path = folder / f"{name}.png"
         # No date nor version within, so that the same numbers give the same file.
-        save_figure(figure, paths[-1], dpi=DPI, metadata={"Software": None})
-    return paths
+        save_figure(figure, path, dpi=DPI, metadata={"Software": None})
+        typer.echo(f"Figure: {path}", err=quiet)
 
 
 def _styles(document: Document) -> dict[str, dict[str, Any]]:

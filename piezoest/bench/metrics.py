@@ -1,6 +1,6 @@
 """What a run of a scenario comes down to: how soon it settles, its errors, and whether it diverged."""
 
-from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -15,30 +15,17 @@ DIVERGED = 1.5  # times linear feed-forward's error
 IntArray = np.ndarray[tuple[int], np.dtype[np.int64]]
 
 
-@dataclass(frozen=True, slots=True)
-class Metrics:
-    """Numbers of one run; errors in µm."""
+def measure(record: TrackingRecord, linear: TrackingRecord, case: Case) -> dict[str, Any]:
+    """Numbers of a run beside linear feed-forward's; errors in µm.
 
-    # Periods after the change until the largest error of every further one is below 1.2 % of the amplitude: 0
-    # if the first one is, None if the last one is not.
-    settles: int | None
-    first: float  # largest error of the first period after the change
-    worst: float  # largest error after the change
-    # Geometric mean of the largest errors of all periods after the change: it counts how soon an estimator
-    # adapts and where it ends alike.
-    typical: float
-    settled: float  # largest error of the last half of the periods, of at least five
-    settled_rms: float  # root mean square error of the same
-    linear_settled: float  # `settled` of linear feed-forward in the same run
-    linear_worst: float  # `worst` of linear feed-forward in the same run
-    # Whether the largest error after the run's first period exceeds one and a half times that of linear
-    # feed-forward.
-    diverged: bool
-    errors: tuple[float, ...] = field(repr=False)  # largest error of each period after the change
-
-
-def measure(record: TrackingRecord, linear: TrackingRecord, case: Case) -> Metrics:
-    """Take the numbers of a run."""
+    ``settles``: periods after the change until the largest error of every further one is below 1.2 % of the
+    amplitude, None if the last one is not. ``first``, ``worst``: largest error of the first period after the
+    change, and of all. ``typical``: geometric mean of the largest errors of all periods after the change,
+    which counts how soon an estimator adapts and where it ends alike. ``settled``: largest error of the last
+    half of the periods, of at least five. ``diverged``: whether the largest error after the run's first
+    period exceeds one and a half times that of linear feed-forward. ``errors``: largest error of each period
+    after the change.
+    """
     error, linear_error = np.abs(record.error), np.abs(linear.error)
     edges = period_edges(case.change, case.period, error.size)
     periods = edges.size - 1
@@ -53,19 +40,18 @@ def measure(record: TrackingRecord, linear: TrackingRecord, case: Case) -> Metri
     ours, theirs = float(np.max(error[begins:])), float(np.max(linear_error[begins:]))
     with np.errstate(divide="ignore"):
         typical = float(np.exp(np.mean(np.log(errors))))
-    return Metrics(
-        settles=settles(errors, SETTLED * case.amplitude),
-        first=float(errors[0]),
-        worst=float(np.max(error[case.change :])),
-        typical=typical,
-        settled=float(np.max(error[tail])),
-        settled_rms=float(np.sqrt(np.mean(error[tail] ** 2))),
-        linear_settled=float(np.max(linear_error[tail])),
-        linear_worst=float(np.max(linear_error[case.change :])),
-        # Written so that NaN diverges.
-        diverged=not ours <= DIVERGED * theirs,
-        errors=tuple(errors.tolist()),
-    )
+    return {
+        "settles": settles(errors, SETTLED * case.amplitude),
+        "first": float(errors[0]),
+        "worst": float(np.max(error[case.change :])),
+        "typical": typical,
+        "settled": float(np.max(error[tail])),
+        "settled_rms": float(np.sqrt(np.mean(error[tail] ** 2))),
+        "linear_settled": float(np.max(linear_error[tail])),
+        "linear_worst": float(np.max(linear_error[case.change :])),
+        "diverged": not ours <= DIVERGED * theirs,  # written so that NaN diverges
+        "errors": errors.tolist(),
+    }
 
 
 def settles(errors: FloatArray, level: float) -> int | None:

@@ -76,17 +76,19 @@ def origin(began: float | None = None) -> dict[str, Any]:
     return head if began is None else {**head, "seconds": round(time.perf_counter() - began, 1)}
 
 
-def json_text(document: dict[str, Any]) -> str:
-    """Text of a document."""
-    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+def machine_of(document: dict[str, Any]) -> str:
+    """Machine and Python of a document, in words."""
+    machine = document["machine"]
+    return f"{machine['cpu']}, {machine['cores']} cores, {machine['python']}"
 
 
 def put(document: dict[str, Any], path: Path | None) -> None:
     """Write results to a file, or print them where there is none."""
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     if path is None:
-        print(json_text(document), end="")
+        print(text, end="")
     else:
-        write_text(path, json_text(document))
+        write_text(path, text)
 
 
 def json_safe(value: Any, digits: int | None = None) -> Any:

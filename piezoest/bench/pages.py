@@ -43,8 +43,7 @@ def _table(page: Page, document: Document) -> None:
 
 
 def _paper(page: Page, document: Document) -> None:
-    for sentence in paper_report.verdict(document["tables"]):
-        page.text(sentence)
+    page.table(*paper_report.verdict(document["tables"]), paper_report.WITHIN)
     for number, title in paper_report.TITLES.items():
         page.heading(title)
         page.table(*paper_report.table(document["tables"], number))

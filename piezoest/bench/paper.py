@@ -90,13 +90,6 @@ class Experiment:
         return "linear" if isinstance(self.model, LinearGain) else "inverse"
 
     @property
-    def name(self) -> str:
-        """For progress."""
-        memory = "fixed parameters" if self.memory is None else f"memory {self.memory:g} s"
-        way = "linear feed-forward" if self.compensation == "linear" else "inverse"
-        return f"{self.reference.name}, {way}, {memory}"
-
-    @property
     def seconds(self) -> float:
         """Least length of the run [s]."""
         return max(SECONDS, MEMORIES_TO_SETTLE * (self.memory or 0.0))
@@ -195,6 +188,23 @@ def last_periods(record: TrackingRecord, periods: int) -> TrackingRecord:
     return dataclasses.replace(record, **last, parameters=record.theta[-n:].copy(), update_interval=1)
 
 
+def quantities(inverse: Run, linear: Run | None = None) -> dict[str, float]:
+    """Numbers of a row of the tables, by the names that they have there."""
+    found = dict(zip(("alpha", "beta", "gamma"), inverse.parameters, strict=True))
+    found |= {
+        "compensated_max_error": inverse.max_error,
+        "compensated_relative_error": inverse.relative_error,
+    }
+    if linear is None:
+        return found
+    return found | {
+        "K": linear.parameters[0],
+        "linear_max_error": linear.max_error,
+        "linear_relative_error": linear.relative_error,
+        "error_reduction": 100.0 * (1.0 - inverse.max_error / linear.max_error),
+    }
+
+
 @dataclass(frozen=True, slots=True)
 class PaperResult:
     """The paper's experiment, run again."""
@@ -209,7 +219,8 @@ class PaperResult:
 
     def _beside(self, number: Published) -> dict[str, Any]:
         """A number of the paper beside ours, and whether the deviation is within its bound, if it has one."""
-        ours, bound = self._ours(number), number.bound
+        runs = (self.crossed,) if number.table == "III" else (self.inverse, self.linear)
+        ours, bound = quantities(*(each[number.row] for each in runs))[number.quantity], number.bound
         deviation = number.deviation(ours)
         return {
             **dataclasses.asdict(number),
@@ -219,18 +230,6 @@ class PaperResult:
             "bound": bound,
             "within": None if bound is None else bool(abs(deviation) <= bound),
         }
-
-    def _ours(self, number: Published) -> float:
-        if number.table == "III":
-            return _error(self.crossed[number.row], number.quantity)
-        linear, inverse = self.linear[number.row], self.inverse[number.row]
-        if number.quantity == "K":
-            return linear.parameters[0]
-        if number.quantity in ("alpha", "beta", "gamma"):
-            return inverse.parameters[("alpha", "beta", "gamma").index(number.quantity)]
-        if number.quantity == "error_reduction":
-            return 100.0 * (1.0 - inverse.max_error / linear.max_error)
-        return _error(linear if number.quantity.startswith("linear") else inverse, number.quantity)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-safe dictionary: the tables, the transients, the sweep, and what was chosen."""
@@ -258,7 +257,7 @@ def run_paper(
     memories: Iterable[float] = MEMORIES,
     seed: int = 0,
     workers: int | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> PaperResult:
     """Run the paper's experiment on the simulated stage, and one row with further memories.
 
@@ -277,8 +276,7 @@ def run_paper(
     def make(experiments: Sequence[Experiment]) -> None:
         for run in in_processes(Experiment.run, experiments, workers):
             runs[run.experiment] = run
-            if progress is not None:
-                progress(f"{len(runs)} of {len(first) + len(CROSSED)}: {run.experiment.name}")
+            progress(len(runs), len(first) + len(CROSSED))
 
     make(first)
     crossed = {
@@ -304,7 +302,3 @@ def run_paper(
 def _model(run: Run) -> ColemanHodgdon:
     # A mean of admissible parameters is admissible unless they wander.
     return ColemanHodgdon(*run.parameters).nearest_admissible()
-
-
-def _error(run: Run, quantity: str) -> float:
-    return run.relative_error if quantity.endswith("relative_error") else run.max_error

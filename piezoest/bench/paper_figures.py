@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from piezoest._files import save_figure
-from piezoest.bench.figures import DPI, WIDTH, new_figure
+from piezoest.bench.figures import WIDTH, new_figure
 from piezoest.bench.paper import PRBS, SETTLED, SWEPT, PaperResult, Run, last_periods
 from piezoest.models import ColemanHodgdon
 from piezoest.tracking import draw_map, draw_series
@@ -20,25 +17,16 @@ if TYPE_CHECKING:
 WAYS = {"linear": "linear feed-forward", "inverse": "hysteresis compensation"}
 
 
-def write_figures(result: PaperResult, folder: Path) -> list[Path]:
-    """Write all figures as PNG. `folder`: to write to; made if it is not there."""
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, figure in _figures(result):
-        path = folder / f"{name}.png"
-        save_figure(figure, path, dpi=DPI)
-        written.append(path)
-    return written
-
-
-def _figures(result: PaperResult) -> Iterator[tuple[str, Figure]]:
+def drawings(result: PaperResult) -> dict[str, Figure]:
+    """Draw all figures, by name."""
     triangle, prbs = SWEPT.name, PRBS.name
-    yield "figure3", input_output_map(result.inverse[triangle])
-    yield "figure4", triangle_tracking(result.linear[triangle], result.inverse[triangle])
-    yield "figure5", prbs_tracking(result.linear[prbs], result.inverse[prbs])
-    yield "adaptation", adaptation(result)
-    if result.sweep:
-        yield "memory", error_against_memory(result)
+    found = {
+        "figure3": input_output_map(result.inverse[triangle]),
+        "figure4": triangle_tracking(result.linear[triangle], result.inverse[triangle]),
+        "figure5": prbs_tracking(result.linear[prbs], result.inverse[prbs]),
+        "adaptation": adaptation(result),
+    }
+    return found | {"memory": error_against_memory(result)} if result.sweep else found
 
 
 def input_output_map(run: Run) -> Figure:

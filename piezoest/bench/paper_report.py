@@ -1,10 +1,11 @@
 """The paper's tables beside ours, for the terminal and as rows of text for the documentation."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-from piezoest._tables import print_cells, say
-from piezoest.bench.report import Cells
+from piezoest._tables import Columns, cells_of, print_cells, say
+from piezoest.bench.origin import machine_of
+from piezoest.bench.report import Table
 
 Entry = dict[str, Any]  # an entry of "tables" in the JSON
 
@@ -13,6 +14,7 @@ TITLES = {
     "II": "Table II: largest stationary error, linear feed-forward and hysteresis compensation",
     "III": "Table III: largest stationary error with the parameters of another amplitude",
 }
+WITHIN = "Numbers within their bounds"
 TRANSIENTS = "Adaptation: largest error [µm] of each period, and periods until it is settled"
 HEADINGS = {
     "alpha": "α\n[1/V]", "beta": "β\n[µm/V]", "gamma": "γ\n[µm/V²]", "K": "K\n[µm/V]",
@@ -29,7 +31,7 @@ def use_of(entry: Entry) -> str:
     return HELD_OUT if entry["held_out"] else CALIBRATION
 
 
-def table(entries: Iterable[Entry], number: str) -> tuple[Cells, list[Cells]]:
+def table(entries: Iterable[Entry], number: str) -> Table:
     """Heading and body of Table I, II or III: for each row a line of the paper, of ours, of the ratios.
 
     `number`: ``"I"``, ``"II"`` or ``"III"``.
@@ -49,47 +51,40 @@ def table(entries: Iterable[Entry], number: str) -> tuple[Cells, list[Cells]]:
     return ["reference", "", *(HEADINGS[quantity] for quantity in quantities)], body
 
 
-def verdict(entries: list[Entry]) -> list[str]:
-    """How many numbers are within their bounds, and which are not, as sentences."""
-    sentences = []
-    for name in (CALIBRATION, HELD_OUT):
-        bounded = [entry for entry in entries if entry["within"] is not None and use_of(entry) == name]
-        met = sum(entry["within"] for entry in bounded)
-        sentences.append(f"{name.capitalize()}: {met} of {len(bounded)} numbers within their bounds.")
-    sentences += [_miss(entry) for entry in entries if entry["within"] is False]
-    return sentences
-
-
-def transients(adaptation: Iterable[dict[str, Any]]) -> tuple[Cells, list[Cells]]:
-    """Heading and body: largest error of the first periods, and when a row has settled."""
-    heading = ["reference", "", "first", "second", "third", "stationary", "settled\nafter"]
+def verdict(entries: Sequence[Entry]) -> Table:
+    """How many numbers are within their bounds."""
+    uses = [(use_of(entry), entry["within"]) for entry in entries if entry["within"] is not None]
     body = [
-        [
-            run["row"],
-            run["compensation"],
-            *(f"{error:.3f}" for error in run["max_error_um"][:3]),
-            f"{run['stationary_max_error_um']:.3f}",
-            _settling(run),
-        ]
-        for run in adaptation
+        [use, str(sum(each == use for each, _ in uses)), str(sum(each == use and met for each, met in uses))]
+        for use in (CALIBRATION, HELD_OUT)
     ]
-    return heading, body
+    return ["rows", "numbers with a bound", "within it"], body
 
 
-def memories(runs: Iterable[dict[str, Any]]) -> tuple[Cells, list[Cells]]:
-    """Heading and body: what the memory of the estimator does to error and settling."""
-    heading = ["memory\n[s]", "in\nperiods", "largest\nerror [µm]", "settled\nafter", "α", "β", "γ"]
-    body = [
-        [
-            f"{run['memory_s']:g}",
-            f"{run['memory_s'] / run['period_s']:g}",
-            _digits(run["stationary_max_error_um"]),
-            _settling(run),
-            *(_digits(value) for value in run["parameters"]),
-        ]
-        for run in runs
-    ]
-    return heading, body
+def transients(adaptation: Iterable[dict[str, Any]]) -> Table:
+    """Largest error of the first periods, and when a row has settled."""
+    first: Columns = {
+        name: lambda run, k=k: f"{run['max_error_um'][k]:.3f}"  # type: ignore[misc]
+        for k, name in enumerate(("first", "second", "third"))
+    }
+    stationary: Columns = {"stationary": lambda run: f"{run['stationary_max_error_um']:.3f}"}
+    ends: Columns = {"reference": "row", "": "compensation"}
+    return cells_of(adaptation, {**ends, **first, **stationary, "settled\nafter": _settling})
+
+
+def memories(runs: Iterable[dict[str, Any]]) -> Table:
+    """What the memory of the estimator does to error and settling."""
+    parameters: Columns = {
+        name: lambda run, k=k: _digits(run["parameters"][k])  # type: ignore[misc]
+        for k, name in enumerate("αβγ")
+    }
+    columns: Columns = {
+        "memory\n[s]": lambda run: f"{run['memory_s']:g}",
+        "in\nperiods": lambda run: f"{run['memory_s'] / run['period_s']:g}",
+        "largest\nerror [µm]": lambda run: _digits(run["stationary_max_error_um"]),
+        "settled\nafter": _settling,
+    }
+    return cells_of(runs, {**columns, **parameters})
 
 
 def _settling(run: dict[str, Any]) -> str:
@@ -98,7 +93,7 @@ def _settling(run: dict[str, Any]) -> str:
 
 
 def print_report(document: dict[str, Any], console: Any) -> None:
-    """Print the tables, the transients, the sweep and the verdict."""
+    """Print the tables, the transients, the sweep and how many numbers are within their bounds."""
     for number, title in TITLES.items():
         heading, body = table(document["tables"], number)
         print_cells(console, title, heading, body, texts=(0, 1), group=3, style=_style)
@@ -107,13 +102,12 @@ def print_report(document: dict[str, Any], console: Any) -> None:
     if document["memory"]:
         title = f"Memory of the estimator: {document['memory'][0]['row']}, hysteresis compensation"
         print_cells(console, title, *memories(document["memory"]), texts=(0, 1))
-    conditions, machine = document["conditions"], document["machine"]
+    print_cells(console, WITHIN, *verdict(document["tables"]))
+    conditions = document["conditions"]
     say(
         console,
-        *verdict(document["tables"]),
         f"Memory {conditions['memory_s']:g} s, {conditions['sample_rate_hz']:g} Hz, "
-        f"seed {conditions['seed']}; {machine['cpu']}, {machine['cores']} cores, {machine['python']}; "
-        f"{document['seconds']:.0f} s.",
+        f"seed {conditions['seed']}; {machine_of(document)}; {document['seconds']:.0f} s.",
     )
 
 
@@ -130,13 +124,3 @@ def _digits(value: float) -> str:
 def _ratio(entry: Entry) -> str:
     mark = {None: "", True: " ✓", False: " ✗"}[entry["within"]]
     return f"{entry['ratio']:.2f}{mark}"
-
-
-def _miss(entry: Entry) -> str:
-    bound, deviation = entry["bound"], entry["deviation"]
-    if entry["quantity"] == "error_reduction":
-        size = f"{deviation:+.1f} points, bound {bound:g}"
-    else:
-        size = f"{100.0 * deviation:+.0f} %, bound {100.0 * bound:g} %"
-    heading = HEADINGS[entry["quantity"]].split("\n")[0]
-    return f"Outside ({use_of(entry)}): {entry['row']}, {heading}: {size}."

@@ -2,9 +2,11 @@
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
-from piezoest._tables import print_cells, say
+from piezoest._tables import Columns, cells_of, number, print_cells, say
+from piezoest.bench.origin import machine_of
 from piezoest.bench.recorded import LEARNT
 from piezoest.records.source import counted
 
@@ -23,17 +25,6 @@ LOGS_KEY = (
     "the amplitude. first: in the first tenth of it; largest: in all of it. Geometric means over the logs."
 )
 SURE = 0.05
-
-
-def number(value: float | None, digits: int = 3) -> str:
-    """Significant digits as a plain number; a dash for what is not known or infinite."""
-    if value is None or not math.isfinite(value):
-        return "—"
-    if value == 0.0:
-        return "0"
-    places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
-    text = f"{value:.{places}f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def percent(share: float | None, digits: int = 2) -> str:
@@ -58,22 +49,29 @@ def best_first(document: Document) -> list[Document]:
 
 def overview_table(document: Document) -> Table:
     """Heading and a row for each estimator, the one that adapts best first."""
+    rows = best_first(document)
     if on_logs(document):
-        return _predicted(document, best_first(document))
-    heading = ["estimator", "settles", "first", "settled", "not\nrepeated", "other\nstages", "step\n[µs]"]
-    body = []
-    for row in best_first(document):
-        about = document["estimators"][row["estimator"]]
-        errors = (row[name] for name in ("first", "settled", "unrepeated", "others"))
-        body.append(
-            [
-                about["name"],
-                settles(row["settles"], row["settled_runs"], row["first_runs"]),
-                *(percent(None if error is None else error[0]) for error in errors),
-                number(about.get("step_us"), 2),
-            ]
-        )
-    return heading, body
+        return _predicted(document, rows)
+    return cells_of(
+        rows,
+        {
+            "estimator": partial(_name, document),
+            "settles": lambda row: settles(row["settles"], row["settled_runs"], row["first_runs"]),
+            "first": partial(_percent, "first"),
+            "settled": partial(_percent, "settled"),
+            "not\nrepeated": partial(_percent, "unrepeated"),
+            "other\nstages": partial(_percent, "others"),
+            "step\n[µs]": lambda row: number(document["estimators"][row["estimator"]].get("step_us"), 2),
+        },
+    )
+
+
+def _name(document: Document, row: Document) -> str:
+    return str(document["estimators"][row["estimator"]]["name"])
+
+
+def _percent(quantity: str, row: Document) -> str:
+    return percent(row[quantity][0] if row[quantity] else None)
 
 
 def settles(quantiles: Sequence[float | None] | None, settled: int, runs: int) -> str:
@@ -84,32 +82,19 @@ def settles(quantiles: Sequence[float | None] | None, settled: int, runs: int) -
 
 def scenario_table(document: Document, scenario: str, stage: str) -> Table:
     """Heading and a row for each estimator in one scenario on one stage."""
-    heading = ["estimator", "settles", "first", "settled", "worst"]
     cells = [cell for cell in document["cells"] if cell["scenario"] == scenario and cell["stage"] == stage]
     cells.sort(key=lambda cell: cell["typical"][0])
     if not stage:
         return _predicted(document, cells)
-    body = [
-        [
-            document["estimators"][cell["estimator"]]["name"],
-            settles(cell["settles"], cell["settled_runs"], cell["runs"]),
-            *(percent(cell[name][0]) for name in ("first", "settled", "worst")),
-        ]
-        for cell in cells
-    ]
-    return heading, body
+    numbers = {name: partial(_percent, name) for name in ("first", "settled", "worst")}
+    when = {"settles": lambda cell: settles(cell["settles"], cell["settled_runs"], cell["runs"])}
+    return cells_of(cells, {"estimator": partial(_name, document), **when, **numbers})
 
 
 def _predicted(document: Document, rows: Sequence[Document]) -> Table:
     """Heading and a row for each estimator, on one log or on all."""
-    body = [
-        [
-            document["estimators"][row["estimator"]]["name"],
-            *(percent(row[name][0] if row[name] else None) for name in ("first", "settled")),
-        ]
-        for row in rows
-    ]
-    return ["estimator", "first", "largest"], body
+    errors = {"first": partial(_percent, "first"), "largest": partial(_percent, "settled")}
+    return cells_of(rows, {"estimator": partial(_name, document), **errors})
 
 
 def needs_table(document: Document) -> Table:
@@ -148,13 +133,11 @@ def print_table(document: Document, console: Any, *, scenarios: bool = False) ->
         title = f"{counted(count, 'scenario')}, {counted(plan['seeds'], 'seed')}, stage {plan['stages'][0]}"
         rate = f" at {document['conditions']['sample_rate']:g} Hz"
     print_cells(console, title, *overview_table(document))
-    machine = document["machine"]
     names = document["estimators"]
     say(
         console,
         key(document),
-        f"{counted(document['runs'], 'run')}{rate}; {machine['cpu']}, {machine['cores']} cores, "
-        f"{machine['python']}.",
+        f"{counted(document['runs'], 'run')}{rate}; {machine_of(document)}.",
         *(
             f"{names[row['estimator']]['name']}: {row['diverged']} of {row['runs']} runs diverge."
             for row in document["overview"]
@@ -169,15 +152,15 @@ def print_changes(document: Document, console: Any, *, everything: bool = False)
     """Print what `piezoest bench compare` found. `document`: from `piezoest.bench.compare.compare`."""
     shown = [row for row in document["rows"] if everything or row["verdict"] in ("better", "worse")]
     if shown:
-        heading = ["scenario, estimator", "number", "changed", "B/A", "q", "verdict"]
-        body = [
-            [
-                f"{row['scenario']}, {row['estimator']}", row["quantity"], f"{row['changed']}/{row['pairs']}",
-                number(row["ratio"]), number(row["q"], 2), row["verdict"],
-            ]
-            for row in shown
-        ]  # fmt: skip
-        print_cells(console, "B against A", heading, body)
+        columns: Columns = {
+            "scenario, estimator": lambda row: f"{row['scenario']}, {row['estimator']}",
+            "number": "quantity",
+            "changed": lambda row: f"{row['changed']}/{row['pairs']}",
+            "B/A": lambda row: number(row["ratio"]),
+            "q": lambda row: number(row["q"], 2),
+            "verdict": "verdict",
+        }
+        print_cells(console, "B against A", *cells_of(shown, columns))
     counts = ", ".join(f"{count} {verdict}" for verdict, count in document["counts"].items())
     pairs = f"{document['pairs']} pairs of runs; of {len(document['rows'])} comparisons {counts or 'none'}."
     say(console, pairs, *document["notes"])

@@ -5,7 +5,7 @@
 
 import functools
 import traceback
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 from piezoest.bench import origin, recorded
@@ -62,7 +62,7 @@ def play(task: Task) -> Row:
             case, linear = _linear(task.scenario, task.seed, tuple(sorted(task.given.items())))
             row |= {"amplitude": case.amplitude, "period": case.period / case.sample_rate}
             record = linear if task.estimator == LINEAR else follow(case, task.estimator)
-            row |= asdict(measure(record, linear, case))
+            row |= measure(record, linear, case)
     except (Exception, SystemExit) as error:
         row["failure"] = f"{type(error).__name__}: {error}"
         row["traceback"] = traceback.format_exc()

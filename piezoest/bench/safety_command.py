@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import ast
 import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from piezoest._files import write_text
 from piezoest._options import grouped
-from piezoest.bench.origin import origin
-from piezoest.bench.shared import Json, counting, json_target, json_text, progress, show, usage
+from piezoest._progress import LOADING, progress
+from piezoest._tables import shown
+from piezoest.bench.origin import origin, put
+from piezoest.bench.shared import Json, check, show, usage
 
 if TYPE_CHECKING:
+    from piezoest.bench.store import Row
     from piezoest.bench.zoo.tasks import Task
 
 FOLDER = Path("bench-results-safety")
@@ -65,12 +68,6 @@ class Which:
     ] = None  # fmt: skip
 
     @property
-    def title(self) -> str:
-        """What its files are called."""
-        found = self.asked
-        return found[0] if found else "safety"
-
-    @property
     def asked(self) -> list[str]:
         """What is asked for beside the zoo itself: one of them, or none."""
         given = {"map": self.settling, "singles": self.singles, "dwell": self.dwell is not None}
@@ -104,13 +101,13 @@ def safety(
     none of them without need, and the error stays below 1.5 times that of the best straight line. Stopped and
     started again, it goes on where it was.
     """
-    json_target(json_to)
-    began = time.perf_counter()
+    check(json_to)
+    began, asked = time.perf_counter(), which.asked
     with usage():
-        with progress() as say:
-            say("loading (compiles once after the installation)")
+        with progress("", lines=True) as say:
+            say(LOADING)
             from piezoest.bench import tables
-            from piezoest.bench.store import carry_out, store_in
+            from piezoest.bench.store import played
             from piezoest.bench.zoo import contenders, tasks
 
             name = which.controller or contenders.DEFAULT
@@ -119,22 +116,20 @@ def safety(
         if which.show is not None:
             _show(name, which.show, given, written.output)
             return
-        with progress() as say:
+        with progress("", lines=True) as say:
             say("drawing")
-            planned = _plan(which, name, given)
+            campaign = _campaign(which, name, given)
             format = tables.checked_format(written.table)
-        with usage(written.output), store_in(written.output) as store, counting("runs") as count:
-            carry_out(planned, store, tasks.over_cores(workers), count)
-            rows = list(store.rows(task.key for task in planned))
+        with usage(written.output), progress("runs", lines=True) as say:
+            rows = played(campaign.tasks, written.output, tasks.over_cores(workers), say.done)
     document = {"suite": "safety", **origin(began), "controller": name, "given": given}
-    rows_of, kept, summarise, printed = _kind(which, name)
     tables.write_table(
-        tables.table_of(rows_of(rows), kept),
-        written.output / f"{which.title.replace('safety', 'runs')}.{format}",
+        tables.table_of(campaign.rows(rows)),
+        written.output / f"{asked[0] if asked else 'runs'}.{format}",
     )
-    document |= summarise(rows)
-    write_text(written.output / f"{which.title}.json", json_text(document))
-    show(document, json_to, printed, f"Results: {written.output}")
+    document |= campaign.summarise(rows)
+    put(document, written.output / f"{asked[0] if asked else 'safety'}.json")
+    show(document, json_to, campaign.print, f"Results: {written.output}")
 
 
 def _given(pairs: list[str]) -> dict[str, Any]:
@@ -151,36 +146,36 @@ def _given(pairs: list[str]) -> dict[str, Any]:
     return found
 
 
-def _plan(which: Which, controller: str, given: dict[str, Any]) -> list[Task]:
-    from piezoest.bench.zoo import contest, draw, dwelling, settling, tasks
+class Campaign(NamedTuple):
+    """What is run, and what becomes of its rows."""
+
+    tasks: list[Task]
+    summarise: Callable[[list[Row]], dict[str, Any]]
+    print: Callable[[dict[str, Any], Any], None]  # a summary
+    rows: Callable[[list[Row]], Iterable[Row]] = list  # of the table, from those of the runs
+
+
+def _campaign(which: Which, name: str, given: dict[str, Any]) -> Campaign:
+    """What is asked for, by a controller."""
+    from piezoest.bench.zoo import contest, draw, dwelling, report, settling, summary, tasks
 
     seeds = range(which.seed, which.seed + (which.dwell or which.runs))
-    if which.asked and (given or len(which.asked) > 1):
-        raise ValueError(
-            f"--{which.title} draws its rigs itself: leave out --set, and all but one of the maps"
-        )
-    if which.dwell is not None:
-        return tasks.tasks(controller, dwelling.dwells(seeds))
-    if which.singles:
-        return contest.contest(controller, seeds)
-    if which.settling:
-        return tasks.tasks(controller, settling.cells(seeds))
+    asked = which.asked
+    if asked and (given or len(asked) > 1):
+        raise ValueError(f"--{asked[0]} draws its rigs itself: leave out --set, and all but one of the maps")
+    match asked:
+        case ["map"]:
+            cells = tasks.tasks(name, settling.cells(seeds))
+            summarise = settling.summarise_cells
+            return Campaign(cells, summarise, report.print_map, settling.tidy_cells)
+        case ["dwell"]:
+            rests = tasks.tasks(name, dwelling.dwells(seeds))
+            return Campaign(rests, dwelling.summarise_dwells, report.print_dwells)
+        case ["singles"]:
+            compared = partial(contest.summarise_contest, controller=name)
+            return Campaign(contest.contest(name, seeds), compared, report.print_contest)
     draw(which.seed, **given)  # a wrong name is told now
-    return tasks.runs(controller, seeds, given)
-
-
-def _kind(which: Which, controller: str) -> tuple[Any, dict[str, type], Any, Any]:
-    """Rows of the table from those of the runs, its columns, and what sums runs up and prints that."""
-    from piezoest.bench.zoo import contest, dwelling, judging, report, settling, summary
-
-    if which.settling:
-        return settling.tidy_cells, settling.CELL_COLUMNS, summary.summarise_cells, report.print_map
-    if which.dwell is not None:
-        return list, dwelling.DWELL_COLUMNS, dwelling.summarise_dwells, report.print_dwells
-    if which.singles:
-        compared = partial(contest.summarise_contest, controller=controller)
-        return list, judging.COLUMNS, compared, report.print_contest
-    return list, judging.COLUMNS, summary.summarise, report.print_summary
+    return Campaign(tasks.runs(name, seeds, given), summary.summarise, report.print_summary)
 
 
 def _show(controller: str, seed: int, given: dict[str, Any], folder: Path) -> None:
@@ -189,13 +184,12 @@ def _show(controller: str, seed: int, given: dict[str, Any], folder: Path) -> No
     from piezoest.bench.zoo import draw, traced
     from piezoest.bench.zoo.contenders import contender
     from piezoest.bench.zoo.figure import write_figure
-    from piezoest.bench.zoo.report import number
 
     rig = draw(seed, **given)
     with quiet():  # its events are printed
         row, both = traced(rig, contender(controller))
     for name, value in row.items():
-        typer.echo(f"{name:>16} {number(value)}")
+        typer.echo(f"{name:>16} {shown(value)}")
     for event in both.events:
         said = ("name", "action", "reason")
         parts = [str(getattr(event, name)) for name in said if getattr(event, name, None)]

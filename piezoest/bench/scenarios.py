@@ -4,7 +4,7 @@ A scenario is a function from a `Draft` to a `Case`, entered into `SCENARIOS` by
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from piezoest import signals
 from piezoest._checks import FloatArray, integer
 from piezoest.bench.cases import COLD, Case, Conditions, Draft
+from piezoest.bench.zoo.families import log_uniform
 from piezoest.signals import Signal
 
 LARGE = 7.5  # µm, the larger of two amplitudes; the smaller is a third of it (Table III)
@@ -109,8 +110,7 @@ def _dwell(draft: Draft) -> Case:
     silence = signals.dwell(0.0, given.rest, given.sample_rate)
     values: FloatArray = np.concatenate([before.values, silence.values, after.values])
     reference = Signal(values, given.sample_rate, given.period, "triangle with a dwell")
-    first, end = len(before), len(before) + len(silence)
-    return draft.case(reference, change=end, rest=(first, end))
+    return draft.case(reference, change=len(before) + len(silence))
 
 
 @scenario("prbs", "Filtered pseudo-random binary signal from a cold start.")
@@ -149,6 +149,6 @@ def _two_tone(draft: Draft) -> Case:
 @scenario("noise", "Gauge noise of 0.1 to 30 nm, drawn evenly in its logarithm; cold start.")
 def _noise(draft: Draft) -> Case:
     given = draft.conditions
-    drawn = float(np.exp(draft.rng.uniform(*np.log(NOISE))))
-    noise = drawn if given.noise is None else given.noise
-    return draft.case(draft.triangle(given.after), spread=COLD, noise=noise)
+    drawn = log_uniform(draft.rng, *NOISE)
+    noisy = replace(given, noise=drawn if given.noise is None else given.noise)
+    return draft.case(draft.triangle(given.after), spread=COLD, conditions=noisy)

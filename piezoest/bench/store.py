@@ -7,13 +7,13 @@ import contextlib
 import hashlib
 import json
 import sqlite3
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
 Row = dict[str, Any]
+FILE = "runs.sqlite"  # in the folder of a campaign
 PATIENCE = 60.0  # s until another process has to be done with its row
 
 
@@ -42,26 +42,11 @@ class Store:
         with self._named():
             self._rows = sqlite3.connect(self._path, timeout=PATIENCE, isolation_level=None)
         try:
-            self._write_ahead()
-            self._execute("PRAGMA synchronous = NORMAL")
             self._execute("CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, row TEXT)")
         except OSError:
             self._rows.close()
             raise
         return self
-
-    def _write_ahead(self) -> None:
-        """Let a log be written ahead, with which a row costs no wait for the disk."""
-        end = time.monotonic() + PATIENCE
-        while True:
-            try:
-                self._execute("PRAGMA journal_mode = WAL")
-                return
-            except OSError as error:
-                # This alone does not wait for a process that is doing the same.
-                if "locked" not in str(error) or time.monotonic() > end:
-                    raise
-                time.sleep(0.01)
 
     def __exit__(self, *error: object) -> None:
         self._rows.close()
@@ -98,22 +83,22 @@ class Store:
         return found[0] if found else None
 
 
-def store_in(folder: Path) -> Store:
-    """Where the runs of a campaign with this folder are kept."""
-    return Store(folder / "runs.sqlite")
-
-
-def carry_out(
+def played(
     tasks: Sequence[Task],
-    store: Store,
+    folder: Path,
     execute: Callable[[Iterable[Task]], Iterator[Row]],
     progress: Callable[[int, int], None] = lambda done, of: None,
-) -> None:
-    """Run what the store does not hold yet; `progress` is called with the runs done, and with all."""
-    todo = [task for task in tasks if task.key not in store]
-    done = len(tasks) - len(todo)
-    progress(done, len(tasks))
-    for row in execute(todo):
-        if store.append(row):
-            done += 1
-            progress(done, len(tasks))
+) -> list[Row]:
+    """Rows of tasks, in their order; those that the folder keeps are not run again.
+
+    `progress` is called with the runs done, and with all.
+    """
+    with Store(folder / FILE) as store:
+        todo = [task for task in tasks if task.key not in store]
+        done = len(tasks) - len(todo)
+        progress(done, len(tasks))
+        for row in execute(todo):
+            if store.append(row):
+                done += 1
+                progress(done, len(tasks))
+        return list(store.rows(task.key for task in tasks))

@@ -10,10 +10,11 @@ from typing import Annotated, Any
 import typer
 
 from piezoest._errors import USER_ERROR
-from piezoest._files import read_json, write_text
+from piezoest._files import read_json
 from piezoest._options import grouped
+from piezoest._progress import LOADING, progress
 from piezoest.bench import shared
-from piezoest.bench.origin import json_safe, origin
+from piezoest.bench.origin import json_safe, origin, put
 
 FOLDER, QUICK_FOLDER = Path("bench-results"), Path("bench-results-quick")
 SEEDS, SLOW_SEEDS = 30, 10
@@ -129,18 +130,16 @@ def table(
             )
         return
 
-    shared.json_target(json_to)
-    shared.check_html(shown.html)
+    shared.check(json_to, shown.html)
     folder = shown.output or (QUICK_FOLDER if runs.quick else FOLDER)
     began = time.perf_counter()
     document = _run(runs, where, folder, shown.table, began)
-    write_text(folder / "table.json", shared.json_text(document))
+    put(document, folder / "table.json")
     shared.write_html(document, shown.html)
     if shown.figures is not None:
-        from piezoest.bench.figures import write_figures
+        from piezoest.bench.figures import drawings, write_figures
 
-        for path in write_figures(document, shown.figures):
-            typer.echo(f"Figure: {path}", err=json_to == "-")
+        write_figures(drawings(document), shown.figures, quiet=json_to == "-")
     from piezoest.bench.report import print_table
 
     tables = partial(print_table, scenarios=shown.scenarios)
@@ -152,11 +151,11 @@ def table(
 def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: float) -> dict[str, Any]:
     """Run what is missing, write the tables, and sum them up."""
     with shared.usage(folder):
-        with shared.progress() as say:
-            say("loading (compiles once after the installation)")
+        with progress("", lines=True) as say:
+            say(LOADING)
             from piezoest.bench import table, tables
             from piezoest.bench.executors import quiet
-            from piezoest.bench.store import carry_out, store_in
+            from piezoest.bench.store import played
             from piezoest.bench.tuning import tune
 
             tables.checked_format(format)
@@ -166,20 +165,18 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
             if where.dask or where.scheduler is not None
             else table.over_cores(where.jobs)
         )
+        play = partial(played, folder=folder, execute=execute)
         tuned: list[dict[str, Any]] = []
-        with store_in(folder) as store:
-            if runs.tune is not None:
-                with shared.counting("runs to tune by") as count:
-                    tuned = tune(plan.estimators, runs.tune, plan.given, store, execute, count)
-                # Beside the others, where these are not the defaults.
-                chosen = (each["chosen"] for each in tuned if each["chosen"] != each["default"])
-                plan = dataclasses.replace(plan, tuned=tuple(dict.fromkeys(chosen)))
-            tasks = plan.tasks()
-            with shared.counting("runs") as count:
-                carry_out(tasks, store, execute, count)
-            rows = list(store.rows(task.key for task in tasks))
+        if runs.tune is not None:
+            with progress("runs to tune by", lines=True) as say:
+                tuned = tune(plan.estimators, runs.tune, plan.given, partial(play, progress=say.done))
+            # Beside the others, where these are not the defaults.
+            chosen = (each["chosen"] for each in tuned if each["chosen"] != each["default"])
+            plan = dataclasses.replace(plan, tuned=tuple(dict.fromkeys(chosen)))
+        with progress("runs", lines=True) as say:
+            rows = play(plan.tasks(), progress=say.done)
         table.write(rows, folder, format)
-        with shared.progress() as say, quiet():
+        with progress("", lines=True) as say, quiet():
             say("timing each estimator alone")
             times = {} if runs.logs else table.costs(plan.everything[1:], plan.given)
             say("summing up")
@@ -229,7 +226,7 @@ def compare(
     Runs are paired by scenario, stage, estimator and seed; each number is put to Wilcoxon's signed-rank test,
     and the number of comparisons is allowed for by the false discovery rate.
     """
-    shared.json_target(json_to)
+    shared.check(json_to)
     from piezoest.bench import compare as comparison
     from piezoest.bench import tables
     from piezoest.bench.run import COLUMNS

@@ -1,6 +1,7 @@
 """Tables of runs in memory and as files: Parquet where pyarrow is installed, else CSV."""
 
 from collections.abc import Iterable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -13,27 +14,22 @@ FORMATS = ("parquet", "csv")
 TYPES: dict[type, str] = {str: "string", int: "Int64", float: "Float64", bool: "boolean"}
 
 
-def default_format() -> str:
-    """Parquet where pyarrow is installed, CSV elsewhere."""
-    try:
-        import pyarrow.parquet  # noqa: F401
-    except ImportError:
-        return "csv"
-    return "parquet"
-
-
 def checked_format(format: str | None) -> str:
     """Format that can be written here. `format`: default Parquet where pyarrow is installed."""
-    format = default_format() if format is None else format
+    has_parquet = find_spec("pyarrow") is not None
+    if format is None:
+        return "parquet" if has_parquet else "csv"
     if format not in FORMATS:
         raise ValueError(f"table format must be one of {', '.join(FORMATS)}, got {format!r}")
-    if format == "parquet" and default_format() == "csv":
+    if format == "parquet" and not has_parquet:
         raise ValueError("pyarrow is not installed: pip install 'piezoest[formats]', or take format csv")
     return format
 
 
-def table_of(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, type]) -> pd.DataFrame:
-    """Table of rows."""
+def table_of(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, type] | None = None) -> pd.DataFrame:
+    """Table of rows; without columns, of all that is in them."""
+    if columns is None:
+        return pd.DataFrame(list(rows))
     cells = [[row.get(name) for name in columns] for row in rows]
     return pd.DataFrame(cells, columns=list(columns)).astype(_types(columns))
 

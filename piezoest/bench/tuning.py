@@ -1,11 +1,4 @@
-"""What may be tuned of each estimator: declared here, beside its name, and searched alike for all.
-
-An estimator of one's own declares its space as an attribute of the class, the bounds of a value that
-may be anything between them, evenly in its logarithm, a range of whole numbers, or a list to choose from::
-
-    class MyEstimator:
-        tuning_space = {"memory": (0.05, 2.0), "members": range(5, 50), "order": [1, 2, 3]}
-"""
+"""What may be tuned of each estimator of the package, beside its name, and searched alike for all."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -14,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from piezoest._checks import integer, positive
+from piezoest._checks import integer
 from piezoest.bench.cases import PAPER
-from piezoest.bench.estimators import KNOWN, class_of, is_slow, name_of
+from piezoest.bench.estimators import KNOWN, is_slow, name_of
 from piezoest.bench.run import COLUMNS, Task, code_of
 from piezoest.bench.statistics import over_scenarios, relative
-from piezoest.bench.store import Store, carry_out
+from piezoest.bench.store import Row
 from piezoest.bench.tables import table_of
 
 TRAINING = ("cold-start", "amplitude-drop", "gain-step", "two-tone")
@@ -88,32 +81,15 @@ SPACES: dict[str, tuple[str, Space]] = {
 
 
 def tunable(text: str) -> Tunable:
-    """What may be tuned of an estimator; what is written with arguments is taken as it stands."""
+    """What may be tuned of an estimator; one of one's own, or with arguments, is taken as it stands."""
     name = name_of(text)
-    if "(" in text and text != KNOWN.get(name):
+    if ":" in name or ("(" in text and text != KNOWN.get(name)):
         return Tunable(text)
-    if ":" not in name:
-        template, space = SPACES.get(name, ("", {}))
-        given = ", offset=True" if "offset=True" in text else ""
-        return Tunable(text, template or _call(name, space, given), space)
-    own: Space = getattr(class_of(name), "tuning_space", {})
-    for key, values in own.items():
-        match values:
-            case tuple((low, high)) if positive("high", high) > positive("low", low):
-                continue
-            case list([_, *_]):
-                continue
-            case range(start=low, stop=high, step=1) if positive("stop", high) > positive("start", low):
-                continue
-        raise ValueError(
-            f"{text}: tuning_space[{key!r}] must be (low, high), a range without a step or a list, "
-            f"got {values!r}"
-        )
-    return Tunable(text, _call(name, own), own)
-
-
-def _call(name: str, space: Space, given: str = "") -> str:
-    return f"{name}({', '.join(f'{value}={{{value}}}' for value in space)}{given})" if space else name
+    template, space = SPACES.get(name, ("", {}))
+    arguments = [f"{value}={{{value}}}" for value in space]
+    if "offset=True" in text:
+        arguments.append("offset=True")
+    return Tunable(text, template or f"{name}({', '.join(arguments)})", space)
 
 
 def draws(tunable: Tunable, number: int, seed: int) -> list[str]:
@@ -134,14 +110,12 @@ def tune(
     estimators: Sequence[str],
     number: int,
     given: dict[str, Any],
-    store: Store,
-    execute: Any,
-    progress: Callable[[int, int], None],
+    play: Callable[[Sequence[Task]], list[Row]],
 ) -> list[dict[str, Any]]:
     """Find the best settings of each estimator, by the same budget, on seeds that nothing is judged on.
 
-    Slow ones are left out. Returns trials with their scores, geometric means of the typical errors relative
-    to the amplitude, and the ``chosen`` one.
+    `play`: rows of tasks. Slow ones are left out. Returns trials with their scores, geometric means of the
+    typical errors relative to the amplitude, and the ``chosen`` one.
     """
     spaces = [each for text in estimators if not is_slow(text) and (each := tunable(text)).space]
     # The same points for all: two with the same space get the same settings.
@@ -152,8 +126,7 @@ def tune(
         for scenario in TRAINING
         for text in dict.fromkeys(text for some in trials.values() for text in some)
     ]
-    carry_out(tasks, store, execute, progress)
-    runs = relative(table_of(store.rows(task.key for task in tasks), COLUMNS))
+    runs = relative(table_of(play(tasks), COLUMNS))
     scores = {str(text): over_scenarios(group, "typical") for text, group in runs.groupby("estimator")}
     found = []
     for each in spaces:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from piezoest._errors import errors
+from piezoest._errors import Debug, errors
+from piezoest._files import check_targets
 from piezoest._options import grouped
-from piezoest.cli.shared import Debug, check_writable, progress
+from piezoest._progress import LOADING, progress
 
 if TYPE_CHECKING:
     from piezoest._checks import FloatArray
@@ -78,10 +79,8 @@ def compensate(
     way: on a stage with a sensor, piezoest.AdaptiveFeedforward does, in a script.
     """
     with errors(debug):
-        check_writable(
-            output, keep=(reference,) if stated.parameters is None else (reference, stated.parameters)
-        )
-        with progress("loading (compiles once after the installation)"):
+        check_targets(filter(None, (reference, stated.parameters)), output=output)
+        with progress(LOADING):
             import numpy as np
 
             from piezoest.compensators import InverseCompensator, VoltageLimits

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from piezoest._errors import errors
-from piezoest._files import save_figure
+from piezoest._errors import Debug, errors
+from piezoest._files import check_targets, save_figure
 from piezoest._options import grouped
-from piezoest._tables import print_cells
-from piezoest.cli.shared import Debug, check_figure, progress
+from piezoest._progress import LOADING, progress
+from piezoest._tables import print_cells, say
 
 if TYPE_CHECKING:
     from piezoest.demo import Demo
@@ -35,47 +35,38 @@ def demo(
     AdaptiveFeedforward, which is told the limits of the voltage and nothing else.
     """
     with errors(debug):
-        check_figure(output)
-        with progress("loading (compiles once after the installation)") as say:
+        check_targets(figure=output)
+        with progress(LOADING) as shown:
             from piezoest.demo import run_demo
 
-            result = run_demo(periods, seed, say)
-            say("drawing")
+            result = run_demo(periods, seed, shown)
+            shown("drawing")
             save_figure(result.plot(), output, dpi=130)
         _print_demo(result)
         typer.echo(f"Figure: {output}")
 
 
 def _print_demo(result: Demo) -> None:
-    from piezoest.demo import AMPLITUDE, ESTIMATOR, FREQUENCY, LIMITS, SETTLED_PERIODS
+    from piezoest.demo import ADAPTIVE, AMPLITUDE, CONTROLLER, ESTIMATOR, FREQUENCY, LIMITS, SETTLED_PERIODS
 
-    ways = (
-        ("linear, gain estimated", result.linear),
-        ("inverse, not adapted", result.fixed),
-        ("inverse, adaptive", result.adaptive),
-        ("AdaptiveFeedforward", result.controller),
-    )
     console = Console()
     body = []
-    for name, record in ways:
-        errors = record.max_error_per_period()
-        body.append((name, *(f"{e:.3f}" for e in errors[:4]), f"{record.max_error(SETTLED_PERIODS):.4f}"))
+    for name, record in result.records.items():
+        first = (f"{e:.3f}" for e in record.max_error_per_period()[:4])
+        body.append((name, *first, f"{record.max_error(SETTLED_PERIODS):.4f}"))
     title = f"Largest error [µm]: {AMPLITUDE:g} µm at {FREQUENCY:g} Hz, simulated stage"
     heading = ("compensation", *(f"period {period}" for period in range(1, 5)), "settled")
     print_cells(console, title, heading, body)
-    names = result.adaptive.parameter_names
-    first, last = result.adaptive.theta[0], result.adaptive.theta[-1]
-    from_wrong = ", ".join(f"{name} {a:.4g} → {b:.4g}" for name, a, b in zip(names, first, last, strict=True))
-    from_nothing = ", ".join(f"{name} {value:.4g}" for name, value in result.learnt.items())
-    for said in (
-        f"Learnt from a wrong start: {from_wrong}",
-        f"Learnt from nothing: {from_nothing}",
+    adaptive = result.records[ADAPTIVE]
+    changes = zip(adaptive.parameter_names, adaptive.theta[0], adaptive.theta[-1], strict=True)
+    say(
+        console,
+        f"Learnt from a wrong start: {', '.join(f'{name} {a:.4g} → {b:.4g}' for name, a, b in changes)}",
+        f"Learnt from nothing: {', '.join(f'{name} {value:.4g}' for name, value in result.learnt.items())}",
         "Adaptive compensation reduces the settled error of linear feed-forward by "
-        f"[bold]{100.0 * result.reduction:.1f} %[/bold], AdaptiveFeedforward by "
-        f"[bold]{100.0 * result.controller_reduction:.1f} %[/bold] "
-        f"({result.seconds:.1f} s for the four runs).",
+        f"{100.0 * result.reduction(ADAPTIVE):.1f} %, AdaptiveFeedforward by "
+        f"{100.0 * result.reduction(CONTROLLER):.1f} % ({result.seconds:.1f} s for the four runs).",
         f"AdaptiveFeedforward is told nothing but the limits of the voltage, {LIMITS.minimum:g} V to "
         f"{LIMITS.maximum:g} V. Here {ESTIMATOR.__name__} is its only estimator, which compiles sooner than "
         "those that it has by default.",
-    ):
-        console.print(said, highlight=False, soft_wrap=True)
+    )

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from rich.console import Console
 
-from piezoest._errors import errors
-from piezoest._files import save_figure, write_text
+from piezoest._errors import Debug, errors
+from piezoest._files import check_targets, save_figure, write_text
 from piezoest._options import grouped
-from piezoest.cli.shared import Debug, Shown, check_figure, check_outputs, progress
+from piezoest._progress import LOADING, Shown, progress
 
 if TYPE_CHECKING:
     from piezoest.identification import Identification, StreamedIdentification
@@ -125,10 +125,8 @@ def identify(
             _check_streamed(fitting, out)
         figure = None if out.no_plot or reading.stream else out.plot or Path(f"{file.stem}_identified.png")
         read = (file, *(fitting.validate or ()))
-        if figure is not None:
-            check_figure(figure, keep=read)
-        check_outputs(out.output, out.html, keep=read if figure is None else (*read, figure))
-        with progress("loading (compiles once after the installation)", bar=reading.stream) as say:
+        check_targets(read, figure=figure, output=out.output, report=out.html)
+        with progress(LOADING) as say:
             found: Any = (_streamed if reading.stream else _identified)(file, reading, fitting, say)
             say("drawing")
             if figure is not None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from piezoest.bench import executors, table
-from piezoest.bench.store import carry_out, store_in
+from piezoest.bench.store import played
 from tests.bench.shared import SMALL
 
 distributed = pytest.importorskip("distributed")
@@ -68,10 +68,8 @@ def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
             killed.append(int(notes.read_text().split()[-1]))
             os.kill(killed[0], signal.SIGKILL)
 
-    with store_in(home) as store:
-        execute = table.over_dask(cluster.scheduler_address, estimators=estimators)
-        carry_out(tasks, store, execute, kill_one_half_way)
-        rows = list(store.rows(task.key for task in tasks))
+    execute = table.over_dask(cluster.scheduler_address, estimators=estimators)
+    rows = played(tasks, home, execute, kill_one_half_way)
 
     assert said == [(k, len(tasks)) for k in range(len(tasks) + 1)]
     assert [row["key"] for row in rows] == [task.key for task in tasks]
@@ -79,9 +77,7 @@ def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
     # Others have worked after it, or all along.
     assert {int(line) for line in notes.read_text().split()} > set(killed)
 
-    with store_in(tmp_path / "here") as store:
-        carry_out(tasks, store, table.over_cores(1))
-        assert rows == list(store.rows(task.key for task in tasks))
+    assert rows == played(tasks, tmp_path / "here", table.over_cores(1))
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ from pathlib import Path
 from piezoest.bench.store import Store
 
 path, name = Path(sys.argv[1]), sys.argv[2]
-keys = [f"{name}{k}" for k in range(4000)]
+keys = [f"{name}{k}" for k in range(500)]
 with Store(path) as store:
     print("open", flush=True)
     sys.stdin.readline()
@@ -60,4 +60,4 @@ def test_two_processes_append_to_one_store(tmp_path: Path) -> None:
         worker.stdin.flush()
     assert [worker.communicate() and worker.returncode for worker in workers] == [0, 0]
     with Store(path) as store:
-        assert len(store) == 8000
+        assert len(store) == 1000

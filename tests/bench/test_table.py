@@ -20,7 +20,7 @@ from piezoest.bench.estimators import KNOWN, PAPERS, candidate, defaults, found
 from piezoest.bench.origin import fingerprint
 from piezoest.bench.pages import write_html
 from piezoest.bench.run import COLUMNS, Task, code_of, crashed, play
-from piezoest.bench.store import Store, carry_out, store_in
+from piezoest.bench.store import FILE, Store, played
 from piezoest.records import Record
 from tests.bench.shared import SMALL, bench, own_module, said
 
@@ -28,8 +28,6 @@ OWN = """
 import os
 
 class Still:
-    tuning_space = {"size": (0.1, 1.0)}
-
     def __init__(self, sample_rate, initial_model, size=1.0):
         self.model = initial_model
 
@@ -186,9 +184,8 @@ def test_processes_give_the_same_rows(tmp_path: Path) -> None:
     rows = []
     for processes in (1, 2):
         said: list[tuple[int, int]] = []
-        with Store(tmp_path / f"{processes}") as store:
-            carry_out(tasks, store, table.over_cores(processes), lambda *done: said.append(done))  # noqa: B023
-            rows.append(list(store.rows(each.key for each in tasks)))
+        execute, note = table.over_cores(processes), lambda *done: said.append(done)  # noqa: B023
+        rows.append(played(tasks, tmp_path / f"{processes}", execute, note))
         assert said == [(k, 8) for k in range(9)]
     assert rows[0] == rows[1]
 
@@ -196,10 +193,7 @@ def test_processes_give_the_same_rows(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_process_that_dies_is_a_failure_and_the_rest_goes_on(own: str, tmp_path: Path) -> None:
     asked = plan(f"{own}:Still", f"{own}:Dies", f"{own}:Broken", seeds=1)
-    tasks = asked.tasks()
-    with store_in(tmp_path) as store:
-        carry_out(tasks, store, table.over_cores(2))
-        rows = list(store.rows(each.key for each in tasks))
+    rows = played(asked.tasks(), tmp_path, table.over_cores(2))
     assert [row["failure"] for row in rows] == 2 * [None, None, "the process died", "RuntimeError: no idea"]
     document = table.describe(rows, asked, {})
     cells = {(cell["scenario"], cell["estimator"]): cell for cell in document["cells"]}
@@ -331,7 +325,7 @@ def test_compare_with_itself_finds_no_change(own: str) -> None:
         (("-e", "NoSuch"), "choose one of"),
         (("-e", "./mine.py:Mine"), "mine:Mine"),
         (("--stage", "best"), "choose one of"),
-        (("--json", "nowhere/a.json"), "no file that can be written"),
+        (("--json", "nowhere/a.json"), "there is no folder"),
         (("--quick", "paper"), "--quick belong to the table"),
     ],
 )
@@ -354,7 +348,7 @@ def test_a_killed_campaign_goes_on(tmp_path: Path) -> None:
             break
     killed.communicate()
     assert killed.returncode == -signal.SIGKILL
-    with store_in(tmp_path) as store:
+    with Store(tmp_path / FILE) as store:
         kept = len(store)
     assert 10 <= kept < 40
 
@@ -376,14 +370,14 @@ def test_slow_estimators_run_on_fewer_seeds_and_the_first_stage() -> None:
 
 
 def test_tuning_finds_settings_on_other_seeds(own: str, tmp_path: Path) -> None:
-    texts = ["HysteresisEKF(offset=True)", "HysteresisRLS(memory=0.4)", f"{own}:Still"]
-    with store_in(tmp_path) as store:
-        chosen = tuning.tune(texts, 2, SMALL, store, table.over_cores(1), lambda done, of: None)
+    texts = ["HysteresisEKF(offset=True)", "HysteresisRLS(memory=0.4)", f"{own}:Still", "HysteresisRLS"]
+    chosen = tuning.tune(texts, 2, SMALL, lambda tasks: played(tasks, tmp_path, table.over_cores(1)))
+    with Store(tmp_path / FILE) as store:
         assert len(store) == 2 * 4 * (3 + 3)
-    ekf, still = chosen
+    ekf, rls = chosen
     assert ekf["default"] == texts[0] == ekf["trials"][0]["estimator"]
     assert all("offset=True" in trial["estimator"] for trial in ekf["trials"])
     assert min(ekf["trials"], key=lambda trial: trial["score"])["estimator"] == ekf["chosen"]
-    assert {trial["score"] for trial in still["trials"]} == {still["trials"][0]["score"]}
+    assert rls["default"] == "HysteresisRLS" == rls["trials"][0]["estimator"]
     with pytest.raises(ValueError, match="power of two"):
         tuning.draws(tuning.tunable(texts[0]), 3, 0)

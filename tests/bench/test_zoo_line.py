@@ -77,9 +77,9 @@ def test_single_wrong_readings_are_left_out() -> None:
         learnt(rig_with(kind, mode))[0] for kind, mode in (("spikes", "from-start"), ("none", None))
     )
     assert np.max(np.abs(spikes.voltage - sound.voltage)) < 0.5
-    fault = rig_with("sensor-saturated", "from-start").fault
+    rig = rig_with("sensor-saturated", "from-start")
     x: FloatArray = np.array([1.0, np.nan, 6.0, 6.0])
-    told = truthful(fault, 0, x, np.array([1.0, 2.0, 6.0, 8.0]), 0.1)
+    told = truthful(rig, 0, x, np.array([1.0, 2.0, 6.0, 8.0]), 0.1)
     assert told.tolist() == [True, False, True, False]
 
 

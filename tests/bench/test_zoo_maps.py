@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from piezoest.bench.zoo import draw, settling, summary
+from piezoest.bench.zoo import draw, settling
 from piezoest.bench.zoo.contenders import CANDIDATES, DEFAULT
 from piezoest.bench.zoo.contest import FLOOR, IDEAL, contest, summarise_contest
 from piezoest.bench.zoo.families import FAMILIES
@@ -23,7 +23,7 @@ def on_map(seed: int, *periods: int | None, amplitude: float = 1.0, asked: bool 
 def test_shares_count_what_is_asked_for() -> None:
     rows = [on_map(seed, 2, 2, 3, None, 0 if seed else 3) for seed in range(20)]
     rows += [on_map(0, *[None] * 5, amplitude=2.0), on_map(1, *[0] * 5, amplitude=2.0, asked=False)]
-    found = summary.summarise_cells(rows)
+    found = settling.summarise_cells(rows)
     assert found["cells"]["asked"] == 2
     assert found["cells"]["kept"] == dict(zip(CHANGES, (1, 1, 0, 0, 1), strict=True))
     assert found["others"] == 1

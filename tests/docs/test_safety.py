@@ -80,12 +80,13 @@ def test_faults_that_were_named_and_forgotten_are_counted(program: Any, page: An
         row(2, **stuck, named_right=False, named_periods=None, recovery=True, recovered=None),
         row(3, fault="hum", mode="permanent"),
     ]
-    found = program.summed_up(rows)["told"]
+    found = program.summed_up(rows)["by_mode"]
     assert [each["fault"] for each in found] == ["hum", "stage-stuck"]
-    assert found[1] == {
+    expected = {
         **stuck, "to_name": 3, "named": 2, "named_periods": 3.0, "to_recover": 3, "recovered_first": 1,
         "recovered_soon": 2,
     }  # fmt: skip
+    assert expected.items() <= found[1].items()
     told = page.told(found)
     assert '"stage-stuck","transient","2 of 3 (66.7 %)","3","1 of 3 (33.3 %)","2 of 3 (66.7 %)"' in told
     assert "hum" not in told
@@ -95,7 +96,6 @@ def test_the_others_are_the_default_controller_without_its_parts(program: Any, p
     from piezoest.bench.zoo.contenders import contender
 
     assert list(program.CONTROLLERS) == list(program.COLOURS) == list(program.NAMES) == list(page.WHO)
-    assert set(program.SHOWN) == set(page.WHO)
     assert all(callable(contender(name)) for name in program.CONTROLLERS.values())
 
 
@@ -117,7 +117,7 @@ def test_the_tables_show_the_data(page: Any, document: dict[str, Any]) -> None:
     changed = copy.deepcopy(document)
     changed["controller"]["healthy"]["violations"]["ratio"] = 7
     changed["controller"]["healthy"]["judged"] = 1234
-    changed["controller"]["by_fault"][0].update(median=0.125, over=3, judged=21)
+    changed["controller"]["by_fault"][0].update(ratio=0.125, over=3, judged=21)
     made = page.pieces(changed)
     assert '"7/1234"' in made["violations"]
     assert '"0.125; 3/21"' in made["by_fault"]
@@ -126,7 +126,7 @@ def test_the_tables_show_the_data(page: Any, document: dict[str, Any]) -> None:
 def test_pieces_hold_for_few_runs(page: Any, program: Any, document: dict[str, Any]) -> None:
     """Also where most of the kinds have not been drawn, and a run raised."""
     rows = [row(0), row(1, None, failure="ValueError: no", finite=None, within_limits=None)]
-    summed = {name: shown(rows) for name, shown in program.SHOWN.items()}
+    summed = dict.fromkeys(program.CONTROLLERS, program.summed_up(rows))
     unplayed = {"map": None, "singles": None, "dwell": None}
     texts = page.pieces({**document, "runs": 2, "drawn": program.drawn(rows), **summed, **unplayed})
     assert "ValueError: no" in texts["worst"]

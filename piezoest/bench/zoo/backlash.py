@@ -24,24 +24,17 @@ class Backlash(Loop):
     place: float = 0.0  # its middle [V]
 
     state: ClassVar[dict[str, Kind]] = {"y": MEASURED}  # the play's output [V]
-    wipes_out: ClassVar[bool] = True
 
-    def stage_settings(self) -> dict[str, Any]:
-        """Numbers by name."""
-        return {
-            "gain": self.gain,
-            "share": self.share,
-            "width": self.width,
-            "dead": self.dead,
-            "place": self.place,
-            "at_rest": max(-self.place - self.dead, 0.0) + min(-self.place + self.dead, 0.0),
-        }
+
+@register_jitable
+def _pulled(v: Any, dead: Any) -> Any:
+    """What lies outside of the dead zone."""
+    return max(v - dead, 0.0) + min(v + dead, 0.0)
 
 
 @register_jitable
 def deform(own: Any, settings: Any, u: Any) -> Any:
-    """Displacement without offset after the next voltage."""
+    """Displacement without offset after the next voltage; zero at rest."""
     own.y = play(own.y, u, settings.width)
-    v = own.y - settings.place
-    pulled = max(v - settings.dead, 0.0) + min(v + settings.dead, 0.0)
-    return settings.gain * (u + settings.share * (pulled - settings.at_rest))
+    pulled = _pulled(own.y - settings.place, settings.dead) - _pulled(-settings.place, settings.dead)
+    return settings.gain * (u + settings.share * pulled)

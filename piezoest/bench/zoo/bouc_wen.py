@@ -28,28 +28,18 @@ class BoucWen(Loop):
 
     state: ClassVar[dict[str, Kind]] = {"u": MEASURED, "q": NUMBER}  # last voltage and h/width
 
-    def stage_settings(self) -> dict[str, Any]:
-        """Numbers by name; a loop that lags is subtracted from the line."""
-        return {
-            "gain": self.gain,
-            "share": -self.share,
-            "width": self.width,
-            "power": self.power,
-            "beta": 0.5 * (1.0 + self.fullness),
-            "gamma": 0.5 * (1.0 - self.fullness),
-        }
-
 
 @register_jitable
 def _slope(p: Any, settings: Any) -> Any:
     """Slope of p = h sign(du)/width over the travel."""
     sign = 1.0 if p > 0.0 else -1.0
-    return 1.0 - abs(p) ** settings.power * (settings.beta * sign + settings.gamma)
+    beta, gamma = 0.5 * (1.0 + settings.fullness), 0.5 * (1.0 - settings.fullness)
+    return 1.0 - abs(p) ** settings.power * (beta * sign + gamma)
 
 
 @register_jitable
 def deform(own: Any, settings: Any, u: Any) -> Any:
-    """Displacement without offset after the next voltage."""
+    """Displacement without offset after the next voltage; a loop that lags is subtracted from the line."""
     travel = abs(u - own.u) / settings.width
     if travel > 0.0:
         sign = 1.0 if u > own.u else -1.0
@@ -64,4 +54,4 @@ def deform(own: Any, settings: Any, u: Any) -> Any:
             p = p + d * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4) / 6.0
         own.q = p * sign
         own.u = u
-    return settings.gain * (u + settings.share * settings.width * own.q)
+    return settings.gain * (u - settings.share * settings.width * own.q)

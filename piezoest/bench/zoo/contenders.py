@@ -14,10 +14,13 @@ from piezoest.compensators import InverseCompensator, VoltageLimits
 from piezoest.estimators.rls import HysteresisRLS
 
 PARTS = "parts"
-# The default controller, changed: with the line alone, with one estimator, and with all the room.
-CANDIDATES = ("HysteresisRLS", "OutputErrorRLS", "PrandtlIshlinskiiRLS")  # of the default one
-ALONE = (*CANDIDATES, "HysteresisEKF")
-CHANGED = ("line", "no-corridor", *ALONE)
+CANDIDATES = ("HysteresisRLS", "OutputErrorRLS", "PrandtlIshlinskiiRLS")  # of the default controller
+# The default controller, changed: with the line alone, with all the room, and with one estimator.
+CHANGED: dict[str, dict[str, Any]] = {
+    "line": {"estimators": ()},
+    "no-corridor": {"corridor": 1.0},
+    **{name: {"estimators": (getattr(piezoest, name),)} for name in (*CANDIDATES, "HysteresisEKF")},
+}
 NEEDED = ("step", "run", "learn")
 DEFAULT = "AdaptiveFeedforward"
 UPDATE_INTERVAL = 50  # samples, of the parts wired by hand
@@ -80,20 +83,13 @@ def _found(name: str) -> Any:
     if name == PARTS:
         return Parts
     if name in CHANGED:
-        return functools.partial(piezoest.AdaptiveFeedforward, **_change(name))
+        return functools.partial(piezoest.AdaptiveFeedforward, **CHANGED[name])
     if ":" in name:
         return origin.imported(name)
     if not hasattr(piezoest, name):
         known = ", ".join((PARTS, *CHANGED))
         raise ValueError(f"controller {name}: choose {known}, a class of piezoest, or module:name")
     return getattr(piezoest, name)
-
-
-def _change(name: str) -> dict[str, Any]:
-    """What a controller of this name is given beside sample rate and limits."""
-    if name == "no-corridor":
-        return {"corridor": 1.0}
-    return {"estimators": (getattr(piezoest, name),) if name in ALONE else ()}
 
 
 def code_of(name: str) -> str:

@@ -4,6 +4,7 @@ The rigs are healthy and ideal: what is left of the error is what a model does n
 """
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from piezoest.bench.store import Row
 from piezoest.bench.zoo.contenders import CANDIDATES
 from piezoest.bench.zoo.families import FAMILIES
 from piezoest.bench.zoo.references import SHAPES
-from piezoest.bench.zoo.summary import parted
+from piezoest.bench.zoo.summary import failures, grouped
 from piezoest.bench.zoo.tasks import Task, runs
 
 FLOOR, ALLOWED = 0.001, 1.3  # of the amplitude; settled error over that of the best single estimator
@@ -39,14 +40,11 @@ def contest(controller: str, seeds: range) -> list[Task]:
 def summarise_contest(rows: Iterable[Row], controller: str) -> dict[str, Any]:
     """Compare settled errors in each cell with those of the best single estimator."""
     rows = list(rows)
-    cells = [
-        {"family": family, "reference": reference, **_compared(group, controller)}
-        for (family, reference), group in parted(rows, "family", "reference").items()
-    ]
+    cells = grouped(rows, "family", "reference", of=partial(_compared, controller))
     ratios = [cell["ratio"] for cell in cells]
     return {
         "runs": len(rows),
-        "failures": sum(row["failure"] is not None for row in rows),
+        "failures": failures(rows),
         "seeds": len({row["seed"] for row in rows}),
         "allowed": ALLOWED,
         "floor": FLOOR,
@@ -61,9 +59,11 @@ def _relative(row: Row) -> float:
     return np.inf if settled is None else max(settled / row["amplitude"], FLOOR)
 
 
-def _compared(rows: Sequence[Row], controller: str) -> dict[str, Any]:
-    played = parted(rows, "controller").items()
-    medians = {name: float(np.median([_relative(row) for row in each])) for (name,), each in played}
+def _compared(controller: str, rows: Sequence[Row]) -> dict[str, Any]:
+    errors: dict[str, list[float]] = {}
+    for row in rows:
+        errors.setdefault(row["controller"], []).append(_relative(row))
+    medians = {name: float(np.median(each)) for name, each in errors.items()}
     own = medians[controller]
     best = min((name for name in CANDIDATES if name in medians), key=medians.__getitem__)
     ratio = own / medians[best] if np.isfinite(own) else np.inf

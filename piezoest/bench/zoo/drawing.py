@@ -1,12 +1,13 @@
 """A rig from a seed."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from piezoest._checks import integer
-from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
-from piezoest.bench.zoo.faults import FAULTS, NONE, Around, draw_fault
+from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family, log_uniform
+from piezoest.bench.zoo.faults import FAULTS, NONE, draw_fault
 from piezoest.bench.zoo.references import SHAPES, Reference, build, cycle_of
 from piezoest.bench.zoo.rig import MECHANICS, Rig, Surroundings
 
@@ -41,7 +42,7 @@ class _Draw:
 
     def log(self, low: float, high: float) -> float:
         """Log-uniform."""
-        return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
+        return log_uniform(self.rng, low, high)
 
     def one(self, **chances: float) -> str:
         """A name, by its chance."""
@@ -73,21 +74,20 @@ def draw(seed: int, **given: Any) -> Rig:
     model = draw_family(family, np.random.default_rng([seed, 21]), reach, width=width, gain=gain)
     sample_rate = float(pick("sample_rate", float(rng.choice([1e3, 1e4, 5e4], p=[0.3, 0.5, 0.2]))))
     plain = _reference(pick, seed, reach, model, gain, sample_rate)
-    stroke = 2.0 * reach.half * gain
-    around = _surroundings(pick, reach, stroke, gain, plain, sample_rate)
-    facts = Around(sample_rate, plain, around.noise, stroke, seed)
+    around = _surroundings(pick, reach, 2.0 * reach.half * gain, gain, plain, sample_rate)
+    rig = Rig(
+        seed=seed, family=family, model=model, reach=reach, sample_rate=sample_rate, gain=gain, width=width,
+        around=around, plain=plain,
+    )  # fmt: skip
     kind = pick("fault", NONE if rng.random() < 0.5 else str(rng.choice(list(FAULTS))))
-    fault = draw_fault(kind, pick("mode", None), np.random.default_rng([seed, 22]), facts)
+    fault = draw_fault(kind, pick("mode", None), np.random.default_rng([seed, 22]), rig)
     block = 1 if rng.random() < ONE_BY_ONE else round(pick.log(1.0, 500.0))
     block = block if plain.values.size <= BY_SAMPLE else max(block, 10)
     # Of a run that is one block nothing can be learnt.
     block = min(block, plain.values.size // BLOCKS)
     block = integer("block", pick("block", block), 1)
     pick.check()
-    return Rig(
-        seed=seed, family=family, model=model, reach=reach, sample_rate=sample_rate, gain=gain, width=width,
-        around=around, plain=plain, fault=fault, block=block,
-    )  # fmt: skip
+    return replace(rig, fault=fault, block=block)
 
 
 def _reference(

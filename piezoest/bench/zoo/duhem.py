@@ -31,22 +31,6 @@ class Duhem(Loop):
 
     state: ClassVar[dict[str, Kind]] = {"u": MEASURED, "h": NUMBER}  # last voltage and h
 
-    def stage_settings(self) -> dict[str, Any]:
-        """Numbers by name; a loop that lags is subtracted from the line."""
-        slope_up, slope_down = self.top * self.tilt / self.scale, self.bottom * self.tilt / self.scale
-        return {
-            "gain": self.gain,
-            "share": -self.share,
-            "centre": self.centre,
-            "half_bend": 0.5 * self.bend / self.scale,
-            "rate_up": self.rate_up,
-            "rate_down": self.rate_down,
-            "top": self.top - slope_up * self.centre,
-            "slope_up": slope_up,
-            "bottom": -self.bottom - slope_down * self.centre,
-            "slope_down": slope_down,
-        }
-
 
 @register_jitable
 def _towards(h: Any, u_0: Any, u: Any, level: Any, slope: Any, rate: Any) -> Any:
@@ -57,12 +41,14 @@ def _towards(h: Any, u_0: Any, u: Any, level: Any, slope: Any, rate: Any) -> Any
 
 @register_jitable
 def deform(own: Any, settings: Any, u: Any) -> Any:
-    """Displacement without offset after the next voltage."""
-    if u > own.u:
-        own.h = _towards(own.h, own.u, u, settings.top, settings.slope_up, settings.rate_up)
-    elif u < own.u:
-        own.h = _towards(own.h, own.u, u, settings.bottom, settings.slope_down, settings.rate_down)
+    """Displacement without offset after the next voltage; a loop that lags is subtracted from the line."""
+    rises = u > own.u
+    if rises or u < own.u:
+        size = settings.top if rises else settings.bottom
+        slope = size * settings.tilt / settings.scale
+        level = (size if rises else -size) - slope * settings.centre
+        own.h = _towards(own.h, own.u, u, level, slope, settings.rate_up if rises else settings.rate_down)
     own.u = u
     v = u - settings.centre
-    bent = settings.half_bend * (v * v - settings.centre * settings.centre)
-    return settings.gain * (u + bent + settings.share * own.h)
+    bent = 0.5 * settings.bend / settings.scale * (v * v - settings.centre * settings.centre)
+    return settings.gain * (u + bent - settings.share * own.h)

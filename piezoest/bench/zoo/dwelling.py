@@ -15,12 +15,12 @@ import numpy as np
 from piezoest.bench.origin import json_safe
 from piezoest.bench.store import Row
 from piezoest.bench.zoo.drawing import draw
-from piezoest.bench.zoo.families import FAMILIES
+from piezoest.bench.zoo.families import FAMILIES, log_uniform
 from piezoest.bench.zoo.faults import NONE
-from piezoest.bench.zoo.judging import BACK, COLUMNS, NEGLIGIBLE, NOISES, settled
+from piezoest.bench.zoo.judging import BACK, NEGLIGIBLE, NOISES, settled
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Factory, run_controller
-from piezoest.bench.zoo.summary import parted
+from piezoest.bench.zoo.summary import failures, grouped, median, values
 
 DURATION = 60.0  # s
 SHAPES = ("triangle", "sine", "raster")
@@ -32,12 +32,6 @@ NOISE = (1e-4, 1e-3)  # µm, of the reference that rests
 FEEDBACK = (0.5, 5.0)  # 1/s
 PERIODS = ("first", "second", "third")
 WAYS = ("creep", "feedback", "noise")
-DWELL_COLUMNS: dict[str, type] = {
-    **dict(list(COLUMNS.items())[: list(COLUMNS).index("block") + 1]),
-    "setpoint_noise": float, "feedback": float, "duration": float, "failure": str, "settled": float,
-    "allowed": float, "first": float, "second": float, "third": float, "kept": bool, "excursion": float,
-    "events": str,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +91,7 @@ def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
     """Rig of a dwell, the samples in which its reference rests, and what is drawn beside."""
     rng = np.random.default_rng([dwell.seed, 25])
     sample_rate = float(rng.choice(SAMPLE_RATES))
-    period = round(sample_rate / float(np.exp(rng.uniform(*np.log(FREQUENCIES)))))
+    period = round(sample_rate / log_uniform(rng, *FREQUENCIES))
     rig = draw(
         dwell.seed, family=list(FAMILIES)[dwell.seed % len(FAMILIES)], sample_rate=sample_rate,
         reference=str(rng.choice(SHAPES)), frequency=sample_rate / period, waves=float(BEFORE + AFTER + 1),
@@ -105,8 +99,8 @@ def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
     )  # fmt: skip
     plain = rig.plain
     start = plain.begins + BEFORE * period + int(rng.integers(period))
-    noise = float(np.exp(rng.uniform(*np.log(NOISE)))) if rng.random() < 0.5 else 0.0
-    gain = float(np.exp(rng.uniform(*np.log(FEEDBACK))))
+    noise = log_uniform(rng, *NOISE) if rng.random() < 0.5 else 0.0
+    gain = log_uniform(rng, *FEEDBACK)
     rest = plain.values[start - 1] + noise * rng.normal(size=round(dwell.duration * sample_rate))
     values = np.concatenate((plain.values[:start], rest, plain.values[start : start + AFTER * period]))
     drawn = {"setpoint_noise": noise, "feedback": gain if dwell.feedback else 0.0}
@@ -114,34 +108,24 @@ def dwell_rig(dwell: Dwell) -> tuple[Rig, slice, dict[str, float]]:
 
 
 def summarise_dwells(rows: Iterable[Row]) -> dict[str, Any]:
-    """Sum up rests."""
-    rows = [{**row, **_way(row)} for row in rows]
+    """Sum up rests: by whether the stage creeps, and there is feedback, and noise in the reference."""
+    given = dict(zip(WAYS, ("creep", "feedback", "setpoint_noise"), strict=True))
+    rows = [{**row, **{name: row[column] > 0.0 for name, column in given.items()}} for row in rows]
     judged = [row for row in rows if row["failure"] is None]
     broken = sorted((row for row in judged if not row["kept"]), key=_ratio, reverse=True)
     summary = {
         "runs": len(rows),
-        "failures": len(rows) - len(judged),
+        "failures": failures(rows),
         "rigs": len({row["seed"] for row in rows}),
         "kept": sum(row["kept"] for row in judged),
         "duration": max((row["duration"] for row in rows), default=0.0),
-        "groups": [
-            {**dict(zip(WAYS, way, strict=True)), **_summed(group)}
-            for way, group in parted(rows, *WAYS).items()
-        ],
-        "by_family": [
-            {"family": family, **_summed(group)} for (family,), group in parted(rows, "family").items()
-        ],
+        "groups": grouped(rows, *WAYS, of=_summed),
+        "by_family": grouped(rows, "family", of=_summed),
         "worst": [
             {"seed": row["seed"], "feedback": row["feedback"], "ratio": _ratio(row)} for row in broken[:10]
         ],
     }
     return dict(json_safe(summary))
-
-
-def _way(row: Row) -> dict[str, bool]:
-    """Whether the stage creeps, and there is feedback, and noise in the reference."""
-    given = (row["creep"], row["feedback"], row["setpoint_noise"])
-    return {name: size > 0.0 for name, size in zip(WAYS, given, strict=True)}
 
 
 def _ratio(row: Row, period: str = "first") -> float:
@@ -152,13 +136,12 @@ def _ratio(row: Row, period: str = "first") -> float:
 
 def _summed(rows: Sequence[Row]) -> dict[str, Any]:
     judged = [row for row in rows if row["failure"] is None]
-    found: Row = {"runs": len(rows), "kept": sum(row["kept"] for row in judged)}
-    for period in PERIODS:
-        found[period] = float(np.median([_ratio(row, period) for row in judged])) if judged else None
-    found["largest"] = max(map(_ratio, judged), default=None)
-    gone = [row["excursion"] for row in judged if row["excursion"] is not None]
+    gone = values(judged, "excursion")
     return {
-        **found,
-        "excursion": float(np.median(gone)) if gone else None,
+        "runs": len(rows),
+        "kept": sum(row["kept"] for row in judged),
+        **{period: median([_ratio(row, period) for row in judged]) for period in PERIODS},
+        "largest": max(map(_ratio, judged), default=None),
+        "excursion": median(gone),
         "farthest": max(gone, default=None),
     }

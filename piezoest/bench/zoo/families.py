@@ -52,6 +52,11 @@ class Reach:
 Make = Callable[..., Any]  # make(gain=, share=) is a model
 
 
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """Draw evenly in the logarithm."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
 def _bouc_wen(rng: Any, reach: Reach) -> Make:
     return partial(
         BoucWen,

@@ -8,8 +8,8 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo import faulty_stages as faulty
-from piezoest.bench.zoo.references import Reference
 
+Rig = Any  # `piezoest.bench.zoo.rig.Rig`, whose module imports this one
 NONE, START, TRANSIENT, PERMANENT = "none", "from-start", "transient", "permanent"
 SETPOINT_NOISE = 1e-4  # µm, of a reference that rests
 
@@ -57,54 +57,44 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
-class Around:
-    """What a fault has to know of its rig."""
-
-    sample_rate: float  # [Hz]
-    reference: Reference  # as it would be without the fault
-    noise: float  # standard deviation of the gauge's noise [µm]
-    stroke: float  # of the stage over the whole reach [µm]
-    seed: int  # start of the random numbers
-
-
-@dataclass(frozen=True, slots=True)
 class Kind:
     """A kind of fault."""
 
     # Of "from-start" (and it stays), "transient" and "permanent" (from a moment on).
     modes: tuple[str, ...] = (TRANSIENT, PERMANENT)
-    # Draws the size from (random numbers, `Around`).
-    size: Callable[[Any, Around], float] = lambda rng, around: 0.0
-    # Class of the faulty stage, and what it is given beside size, start, duration and seed.
+    # Draws the size from (random numbers, rig).
+    size: Callable[[Any, Rig], float] = lambda rng, rig: 0.0
+    # Maker of the faulty stage, and what it is given beside size, start, duration and seed.
     stage: Callable[..., Any] | None = None
-    more: Callable[[Fault, Around], dict[str, float]] = lambda fault, around: {}
+    more: Callable[[Rig], dict[str, float]] = lambda rig: {}
     # Whether nothing can be learnt meanwhile: readings say nothing or lie, or the stage stands still.
     hides: bool = False
     partly: bool = False  # whether some readings are wrong and the others right
     names: tuple[str, ...] = ()  # what a controller may call it; empty if it need not be noticed
 
 
-def faulty_stage(stage: Any, fault: Fault, around: Around) -> Any:
-    """Put a fault around a stage."""
+def faulty_stage(stage: Any, rig: Rig) -> Any:
+    """Put the fault of a rig around its stage."""
+    fault = rig.fault
     kind = FAULTS.get(fault.kind, Kind())
     if kind.stage is None:
         return stage
     # Half a sample early: whatever rounding does, the sample is the one meant.
-    start = max(fault.start - 0.5, 0.0) / around.sample_rate
-    lasts = (fault.stop - max(fault.start, 0.5)) / around.sample_rate
+    start = max(fault.start - 0.5, 0.0) / rig.sample_rate
+    lasts = (fault.stop - max(fault.start, 0.5)) / rig.sample_rate
     duration = faulty.FOREVER if fault.lasting else lasts
-    given = {"size": fault.size, **kind.more(fault, around)}
-    return kind.stage(stage, start=start, duration=duration, seed=around.seed, **given)
+    given = {"size": fault.size, **kind.more(rig)}
+    return kind.stage(stage, start=start, duration=duration, seed=rig.seed, **given)
 
 
-def _swing(around: Around) -> float:
-    return 2.0 * around.reference.amplitude
+def _swing(rig: Rig) -> float:
+    return 2.0 * rig.plain.amplitude
 
 
-def _zero(rng: Any, around: Around) -> float:
+def _zero(rng: Any, rig: Rig) -> float:
     """20 µm, or the whole stroke where that is no size for the stage."""
-    usual = around.stroke > 10.0 and rng.random() < 0.6
-    return float((20.0 if usual else around.stroke) * rng.choice([-1.0, 1.0]))
+    usual = rig.stroke > 10.0 and rng.random() < 0.6
+    return float((20.0 if usual else rig.stroke) * rng.choice([-1.0, 1.0]))
 
 
 ALL = (START, TRANSIENT, PERMANENT)
@@ -115,60 +105,60 @@ ANY = (*STILL, *FACTORS, "zero moved")
 FAULTS: dict[str, Kind] = {
     "amplifier-frozen": Kind(ALL, stage=faulty.FrozenAmplifier, hides=True, names=STILL),
     "stage-stuck": Kind(
-        ALL, stage=faulty.StuckStage, more=lambda fault, around: {"noise": around.noise}, hides=True,
+        ALL, stage=faulty.StuckStage, more=lambda rig: {"noise": rig.around.noise}, hides=True,
         names=STILL,
     ),
-    "sensor-constant": Kind(ALL, stage=faulty.Stuck, hides=True, names=STILL),
+    "sensor-constant": Kind(ALL, stage=faulty.StuckGauge, hides=True, names=STILL),
     "sensor-noise": Kind(
-        ALL, size=lambda rng, around: around.reference.centre + rng.uniform(-1.0, 1.0) * around.stroke,
-        stage=faulty.Dead, more=lambda fault, around: {"noise": 0.002 * _swing(around)}, hides=True,
+        ALL, size=lambda rng, rig: rig.plain.centre + rng.uniform(-1.0, 1.0) * rig.stroke,
+        stage=faulty.reads("dead"), more=lambda rig: {"noise": 0.002 * _swing(rig)}, hides=True,
         names=ANY,
     ),
     "sensor-saturated": Kind(
-        ALL, size=lambda rng, around: 0.6 * around.reference.amplitude, stage=faulty.Saturation,
-        more=lambda fault, around: {"centre": around.reference.centre}, partly=True, names=("saturated",),
+        ALL, size=lambda rng, rig: 0.6 * rig.plain.amplitude, stage=faulty.reads("saturated"),
+        more=lambda rig: {"centre": rig.plain.centre}, partly=True, names=("saturated",),
     ),
     "sensor-factor": Kind(
-        ALL, size=lambda rng, around: float(rng.choice([-1.0, 1e-3, 1e3])), stage=faulty.Factor, hides=True,
-        names=FACTORS,
+        ALL, size=lambda rng, rig: float(rng.choice([-1.0, 1e-3, 1e3])), stage=faulty.reads("scaled"),
+        hides=True, names=FACTORS,
     ),
-    "zero-off": Kind(ALL, size=_zero, stage=faulty.Offset, hides=True, names=("zero moved",)),
-    "zero-off-shifted": Kind(ALL, size=_zero, stage=faulty.Offset),
+    "zero-off": Kind(ALL, size=_zero, stage=faulty.reads("moved"), hides=True, names=("zero moved",)),
+    "zero-off-shifted": Kind(ALL, size=_zero, stage=faulty.reads("moved")),
     "spikes": Kind(
-        ALL, size=lambda rng, around: _swing(around) * rng.choice([0.3, 1.0, 5.0]), stage=faulty.Spikes,
+        ALL, size=lambda rng, rig: _swing(rig) * rng.choice([0.3, 1.0, 5.0]), stage=faulty.reads("spikes"),
         partly=True,
     ),
     "dropouts": Kind(
-        ALL, size=lambda rng, around: float(rng.choice([0.01, 0.2, 0.5])), stage=faulty.Missing
+        ALL, size=lambda rng, rig: float(rng.choice([0.01, 0.2, 0.5])), stage=faulty.reads("missing")
     ),
-    "gap": Kind(ALL, stage=faulty.Gap, hides=True),
+    "gap": Kind(ALL, stage=faulty.reads("gap"), hides=True),
     "hum": Kind(
-        ALL, size=lambda rng, around: _usual(0.2, around) if rng.random() < 0.5 else 0.05 * _swing(around),
-        stage=faulty.Hum,
+        ALL, size=lambda rng, rig: _usual(0.2, rig) if rng.random() < 0.5 else 0.05 * _swing(rig),
+        stage=faulty.reads("hum"),
     ),
     "drift": Kind(
-        ALL, size=lambda rng, around: _swing(around) * rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.3),
+        ALL, size=lambda rng, rig: _swing(rig) * rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.3),
         stage=faulty.Drift,
-        more=lambda fault, around: {
-            "size": fault.size * around.sample_rate / max(fault.stop - fault.start, 1)
+        more=lambda rig: {
+            "size": rig.fault.size * rig.sample_rate / max(rig.fault.stop - rig.fault.start, 1)
         },
     ),
-    "gain-step": Kind(size=lambda rng, around: float(rng.choice([0.7, 1.3]))),
-    "amplitude-drop": Kind(size=lambda rng, around: rng.uniform(0.1, 0.4)),
+    "gain-step": Kind(size=lambda rng, rig: float(rng.choice([0.7, 1.3]))),
+    "amplitude-drop": Kind(size=lambda rng, rig: rng.uniform(0.1, 0.4)),
     "glitch": Kind(
-        (TRANSIENT,), size=lambda rng, around: _usual(rng.choice([1.0, 2.0, 10.0]), around),
-        stage=faulty.Offset, hides=True,
+        (TRANSIENT,), size=lambda rng, rig: _usual(rng.choice([1.0, 2.0, 10.0]), rig),
+        stage=faulty.reads("moved"), hides=True,
     ),
     "dwell": Kind((TRANSIENT,)),
 }  # fmt: skip
 
 
-def _usual(size: float, around: Around) -> float:
+def _usual(size: float, rig: Rig) -> float:
     """A size [µm] for a stroke of about 30 µm, in proportion where the stroke is far from that."""
-    return float(size) if 3.0 < around.stroke < 300.0 else float(size) * around.stroke / 30.0
+    return float(size) if 3.0 < rig.stroke < 300.0 else float(size) * rig.stroke / 30.0
 
 
-def draw_fault(kind: str, mode: str | None, rng: Any, around: Around) -> Fault:
+def draw_fault(kind: str, mode: str | None, rng: Any, rig: Rig) -> Fault:
     """Draw when a fault is there and how large it is."""
     if kind == NONE:
         return Fault()
@@ -179,9 +169,9 @@ def draw_fault(kind: str, mode: str | None, rng: Any, around: Around) -> Fault:
     mode = drawn if mode is None else mode
     if mode not in modes:
         raise ValueError(f"{kind} is {', '.join(modes)}, got {mode!r}")
-    reference = around.reference
+    reference = rig.plain
     n = reference.values.size
-    size = FAULTS[kind].size(rng, around)
+    size = FAULTS[kind].size(rng, rig)
     moment = reference.begins + round(rng.uniform(0.35, 0.5) * (n - reference.begins))
     lasts = round(rng.uniform(1.5, 4.0) * reference.cycle)
     early = rng.random() < 0.2
@@ -195,14 +185,14 @@ def draw_fault(kind: str, mode: str | None, rng: Any, around: Around) -> Fault:
     return Fault(kind, start, min(start + lasts, start + (n - moment) // 2), size)
 
 
-def changed_reference(fault: Fault, around: Around) -> FloatArray:
+def changed_reference(rig: Rig) -> FloatArray:
     """Reference of the run with its fault, shape (N,) [µm]."""
-    reference = around.reference
-    r, within = reference.values, fault.within(reference.values.size)
+    fault, reference = rig.fault, rig.plain
+    r = reference.values
     if fault.kind == "zero-off-shifted":
-        return r + fault.size * within
+        return r + fault.size * fault.within(r.size)
     if fault.kind == "dwell":
-        rng = np.random.default_rng(around.seed)
+        rng = np.random.default_rng(rig.seed)
         held = r[fault.start] + SETPOINT_NOISE * rng.standard_normal(fault.stop - fault.start)
         return np.concatenate((r[: fault.start], held, r[fault.start :]))[: r.size]
     if fault.kind == "amplitude-drop":
@@ -216,8 +206,9 @@ def changed_reference(fault: Fault, around: Around) -> FloatArray:
     return r
 
 
-def gain_schedule(fault: Fault, sample_rate: float) -> list[list[float]] | None:
+def gain_schedule(rig: Rig) -> list[list[float]] | None:
     """Factor of the gain over time, for a `SimulatedStage`; None without."""
+    fault, sample_rate = rig.fault, rig.sample_rate
     if fault.kind != "gain-step":
         return None
     rows = [[0.0, 1.0], [(fault.start - 1) / sample_rate, 1.0], [fault.start / sample_rate, fault.size]]
@@ -226,21 +217,22 @@ def gain_schedule(fault: Fault, sample_rate: float) -> list[list[float]] | None:
     return rows
 
 
-def coordinates(fault: Fault, n: int) -> tuple[float, FloatArray]:
+def coordinates(rig: Rig) -> tuple[float, FloatArray]:
     """Factor and zero (N,) [µm] of the gauge, where it alone says where the reference is.
 
     A reference is in the coordinates of the gauge. A gauge that has been wrong from the start, or whose zero
     has moved for good, is right by definition; one that was right and goes wrong is not.
     """
+    fault, n = rig.fault, rig.plain.values.size
     zero = np.zeros(n)
     if fault.kind == "zero-off-shifted" or (fault.kind == "zero-off" and fault.right):
         zero = fault.size * fault.within(n)
     return (fault.size if fault.kind == "sensor-factor" and fault.right else 1.0), zero
 
 
-def truthful(fault: Fault, first: int, x: FloatArray, seen: FloatArray, tolerance: float) -> Any:
+def truthful(rig: Rig, first: int, x: FloatArray, seen: FloatArray, tolerance: float) -> Any:
     """Which readings say something true, as an oracle knows: it has `seen` them as a sound gauge would."""
-    told = np.isfinite(x)
+    fault, told = rig.fault, np.isfinite(x)
     kind = FAULTS.get(fault.kind, Kind())
     if kind.hides and not fault.right:
         told &= ~fault.within(first + x.size)[first:]

@@ -3,7 +3,11 @@
 Every fault is seeded, and `step` and `run` give the same bits.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +15,7 @@ import numpy as np
 from piezoest._checks import FloatArray, array_1d
 
 FOREVER = 1e9  # s
+HUM = 50.0  # Hz, of the mains
 
 
 @dataclass(eq=False)
@@ -22,12 +27,16 @@ class FaultyStage:
     start: float = 0.0  # [s]
     duration: float = FOREVER  # [s]
     seed: int = 0  # start of the random numbers of the fault
+    noise: float = 0.0  # standard deviation of a reading of its own [µm]
+    centre: float = 0.0  # middle of the range of readings [µm]
+    # What is read where the fault is, from a sound gauge's readings (N,) [µm].
+    reading: Callable[[FaultyStage, FloatArray], Any] = lambda own, x: x
 
     def __post_init__(self) -> None:
         self._begin()
 
     def _begin(self) -> None:
-        self._generator = np.random.default_rng(self.seed)
+        self.random = np.random.default_rng(self.seed)
         self._count = 0  # index of the next sample
         self._held: Any = None  # what stands still meanwhile
 
@@ -35,9 +44,9 @@ class FaultyStage:
         """What reaches the stage [V]; `on` (N,) is where the fault is there."""
         return u
 
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
+    def _read(self, x: FloatArray, on: Any) -> FloatArray:
         """What the ring gets for the stage's reading [µm]."""
-        return x
+        return np.where(on, self.reading(self, x), x)
 
     @property
     def sample_rate(self) -> float:
@@ -46,12 +55,12 @@ class FaultyStage:
 
     @property
     def displacement(self) -> Any:
-        """True displacement [µm]."""
+        """True displacement [µm] of the last samples, shape (N,)."""
         return self.stage.displacement
 
-    def _time(self, size: int) -> FloatArray:
-        """Of the next samples [s]."""
-        return np.asarray((self._count + np.arange(size)) / self.sample_rate)
+    def index(self, size: int) -> Any:
+        """Of the next samples, since the start."""
+        return self._count + np.arange(size)
 
     def step(self, u: float) -> float:
         """Apply a voltage [V] for one sample; reading [µm], NaN where there is none."""
@@ -60,9 +69,9 @@ class FaultyStage:
     def run(self, u: Any) -> FloatArray:
         """Apply a voltage record; the same as a loop of `step`."""
         u = array_1d("u", u, allow_nan=True)
-        time = self._time(u.size)
+        time = self.index(u.size) / self.sample_rate
         on = (time >= self.start) & (time < self.start + self.duration)
-        read = self._reading(self.stage.run(self._voltage(u, on)), on)
+        read = self._read(self.stage.run(self._voltage(u, on)), on)
         self._count += u.size
         return read
 
@@ -72,91 +81,32 @@ class FaultyStage:
         self._begin()
 
 
-class Missing(FaultyStage):
-    """Single samples without a reading, at random; `size` is the share of them."""
+class FrozenAmplifier(FaultyStage):
+    """The voltage stands still."""
 
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
-        return np.where((self._generator.random(x.size) < self.size) & on, np.nan, x)
-
-
-class Gap(FaultyStage):
-    """No reading."""
-
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
-        return np.where(on, np.nan, x)
+    def _voltage(self, u: FloatArray, on: Any) -> FloatArray:
+        before = u[: int(np.argmax(on))][-1:] if on.any() else u[-1:]
+        if before.size and np.isfinite(before[0]):
+            self._held = float(before[0])
+        return np.where(on, self._held or 0.0, u)
 
 
-class Spikes(FaultyStage):
-    """One reading in a hundred is off by `size` [µm], up or down at random."""
-
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
-        drawn = self._generator.random(x.size)
-        sign = np.where(drawn < 0.005, 1.0, -1.0)
-        return np.where((drawn < 0.01) & on, x + sign * self.size, x)
-
-
-class Stuck(FaultyStage):
+class StuckGauge(FaultyStage):
     """The reading stands still."""
 
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
+    def _read(self, x: FloatArray, on: Any) -> FloatArray:
         if self._held is None and on.any():
             self._held = float(x[np.argmax(on)])
         return np.where(on, self._held, x) if on.any() else x
 
 
-@dataclass(eq=False)
-class Saturation(FaultyStage):
-    """A converter whose range the displacement leaves; it reaches `size` to either side [µm]."""
-
-    centre: float = 0.0  # middle of its range [µm]
-
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
-        return np.where(on, np.clip(x, self.centre - self.size, self.centre + self.size), x)
-
-
-class Factor(FaultyStage):
-    """Readings times `size`: -1 for a gauge wired the wrong way round, 1000 for nm taken for µm."""
-
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
-        return np.where(on, self.size * x, x)
-
-
-class Offset(FaultyStage):
-    """The gauge's zero has moved: readings are off by `size` [µm]."""
-
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
-        return np.where(on, x + self.size, x)
-
-
-class FrozenAmplifier(FaultyStage):
-    """The voltage stands still."""
-
-    def _begin(self) -> None:
-        super()._begin()
-        self._last = 0.0
-
-    def _voltage(self, u: FloatArray, on: Any) -> FloatArray:
-        before = u[: int(np.argmax(on))][-1:] if on.any() else u[-1:]
-        if before.size and np.isfinite(before[0]):
-            self._last = float(before[0])
-        return np.where(on, self._last, u)
-
-
-@dataclass(eq=False)
-class StuckStage(FaultyStage):
+class StuckStage(StuckGauge):
     """The stage itself stands still, and its gauge shows it with some noise."""
 
-    noise: float = 0.0  # standard deviation of the reading meanwhile [µm]
-
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
-        self._true: Any = np.array(self.stage.displacement, ndmin=1)
-        shown = self.noise * self._generator.standard_normal(x.size)
-        if not on.any():
-            return x
-        if self._held is None:
-            self._held = float(self._true[np.argmax(on)])
-        self._true[on] = self._held
-        return np.where(on, self._held + shown, x)
+    def _read(self, x: FloatArray, on: Any) -> FloatArray:
+        self._true = super()._read(np.array(self.stage.displacement, ndmin=1), on)
+        noise = self.noise * self.random.standard_normal(x.size)
+        return np.where(on, self._true + noise, x)
 
     @property
     def displacement(self) -> Any:
@@ -164,36 +114,51 @@ class StuckStage(FaultyStage):
         return self._true
 
 
-@dataclass(eq=False)
-class Dead(FaultyStage):
-    """The gauge shows a level of its own, `size` [µm], with noise, whatever the stage does."""
-
-    noise: float = 0.0  # standard deviation [µm]
-
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
-        return np.where(on, self.size + self.noise * self._generator.standard_normal(x.size), x)
-
-
-class Hum(FaultyStage):
-    """A sine of 50 Hz on the reading, from the mains, of amplitude `size` [µm]; the seed draws its phase."""
-
-    def _begin(self) -> None:
-        super()._begin()
-        self._phase = self._generator.random()
-
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
-        turns = 50.0 * (self._count + np.arange(x.size)) / self.sample_rate
-        return np.where(on, x + self.size * np.sin(2.0 * np.pi * (turns + self._phase)), x)
-
-
 class Drift(FaultyStage):
     """The stage itself moves by `size` [µm/s] as its mount warms up, and stays there; the gauge sees it."""
 
-    def _reading(self, x: FloatArray, on: Any) -> FloatArray:
-        self._way: FloatArray = self.size * np.clip(self._time(x.size) - self.start, 0.0, self.duration)
+    def _read(self, x: FloatArray, on: Any) -> FloatArray:
+        time = self.index(x.size) / self.sample_rate
+        self._way: FloatArray = self.size * np.clip(time - self.start, 0.0, self.duration)
         return x + self._way
 
     @property
     def displacement(self) -> Any:
         """True displacement [µm] of the last samples, shape (N,)."""
         return self.stage.displacement + self._way
+
+
+def spikes(own: FaultyStage, x: FloatArray) -> FloatArray:
+    """One reading in a hundred is off by `size` [µm], up or down at random."""
+    drawn = own.random.random(x.size)
+    sign = np.where(drawn < 0.005, 1.0, -1.0)
+    return np.where(drawn < 0.01, x + sign * own.size, x)
+
+
+def hum(own: FaultyStage, x: FloatArray) -> FloatArray:
+    """A sine of 50 Hz on the reading, from the mains, of amplitude `size` [µm]; the seed draws its phase."""
+    turns, phase = HUM * own.index(x.size) / own.sample_rate, np.random.default_rng(own.seed).random()
+    return x + own.size * np.sin(2.0 * np.pi * (turns + phase))
+
+
+# Readings while the fault is there, by what is wrong.
+READINGS: dict[str, Callable[[FaultyStage, FloatArray], Any]] = {
+    "spikes": spikes,
+    "hum": hum,
+    # `size` is the share of the samples without a reading, at random.
+    "missing": lambda own, x: np.where(own.random.random(x.size) < own.size, np.nan, x),
+    "gap": lambda own, x: np.nan,
+    # A converter whose range the displacement leaves; it reaches `size` to either side.
+    "saturated": lambda own, x: np.clip(x, own.centre - own.size, own.centre + own.size),
+    # -1 for a gauge wired the wrong way round, 1000 for nm taken for µm.
+    "scaled": lambda own, x: own.size * x,
+    # The gauge's zero has moved.
+    "moved": lambda own, x: x + own.size,
+    # A level of its own, with noise, whatever the stage does.
+    "dead": lambda own, x: own.size + own.noise * own.random.standard_normal(x.size),
+}
+
+
+def reads(what: str) -> Callable[..., FaultyStage]:
+    """Maker of a stage with one of `READINGS`."""
+    return partial(FaultyStage, reading=READINGS[what])

@@ -54,8 +54,10 @@ def write_figure(rig: Rig, row: Row, both: Both, path: Path) -> None:
     panels["loop"].set(xlabel="voltage [V]", ylabel="displacement [µm]")
     panels["last"].set(xlabel="time [s]", title="error of the last two cycles", ylabel="[µm]")
     _zoom(error, row, both)
-    figure.suptitle(_title(rig, row), fontsize=10)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    said = row.get("failure") or row.get("named") or "nothing said"
+    figure.suptitle(
+        f"seed {rig.seed}: {rig.family}, {rig.plain.kind}, fault {rig.fault.kind} {rig.fault.mode}; {said}"
+    )
     save_figure(figure, path, dpi=100, metadata={"Software": None})
 
 
@@ -65,18 +67,3 @@ def _zoom(axes: Any, row: Row, both: Both) -> None:
     largest = max([each for each in judged if each] or [0.0])
     if both.run is not None and largest > 0.0:
         axes.set_ylim(-1.2 * largest, 1.2 * largest)
-
-
-def _title(rig: Rig, row: Row) -> str:
-    def number(name: str) -> str:
-        return "—" if row.get(name) is None else f"{row[name]:.3g}"
-
-    return (
-        f"seed {rig.seed}: {rig.family}, {rig.plain.kind} of {rig.plain.amplitude:.3g} µm at "
-        f"{rig.plain.frequency:.3g} Hz, {rig.sample_rate:g} Hz in blocks of {rig.block}, "
-        f"{rig.gain:.3g} µm/V, {rig.reach.low:g} to {rig.reach.high:g} V, mechanics {rig.around.mechanics}, "
-        f"delay {rig.around.delay}\nfault {rig.fault.kind} {rig.fault.mode} {rig.fault.size:.3g}; ratio "
-        f"{number('ratio')}, rms {number('ratio_rms')}, last {number('last_ratio')}, after "
-        f"{number('after_ratio')}, rest at a limit {number('rail')} quarter swings; "
-        f"{row.get('failure') or row.get('named') or 'nothing said'}"
-    )

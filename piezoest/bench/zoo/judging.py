@@ -18,27 +18,14 @@ BACK = 1.2  # of the settled error
 ALLOWED, NOISES, NEGLIGIBLE = 1.5, 3.0, 0.002  # of the line's error, of the noise, of the swing
 AT_LIMIT, WITHIN = 1e-6, 0.01  # of the voltage's range: on a limit, and clearly within both
 ERRORS = ("worst", "rms", "line_worst", "line_rms", "learnt_worst", "learnt_rms", "ratio", "ratio_rms")
-# Of the table of runs.
-COLUMNS: dict[str, type] = {
-    "key": str, "controller": str, "seed": int, "family": str, "gain": float, "width": float, "low": float,
-    "high": float, "sample_rate": float, "mechanics": str, "lag": float, "delay": int, "sensor_noise": float,
-    "resolution": float, "volts": float, "slew_rate": float, "creep": float, "hum": float, "drift": float,
-    "reference": str, "amplitude": float, "centre": float, "frequency": float, "samples": int, "block": int,
-    "fault": str, "mode": str, "fault_size": float, "fault_start": float, "fault_stop": float,
-    "line_gain": float, "line_centre": float, "failure": str, "finite": bool, "within_limits": bool,
-    "rail": float, "rests_at_rail": bool, "swing": float, "noise": float, "floor": float,
-    "judged_from": float, **{f"{part}{name}": float for part in ("", "last_", "after_") for name in ERRORS},
-    "cycle_ratio": float, "settled": float, "events": int, "named": str, "named_first": str,
-    "named_after": float, "named_right": bool, "named_periods": float,
-    "recovery": bool, "recovered": int, "driver": str, "status": str, "microseconds": float,
-}  # fmt: skip
 
 
 def named(rig: Rig, controller: Any) -> dict[str, Any]:
     """What a controller said: names of faults, how soon after the fault, and what drove at last."""
     events = list(getattr(controller, "events", ()))
     status = getattr(controller, "status", {})
-    status = status if isinstance(status, dict) else _public(status)
+    if not isinstance(status, dict):
+        status = {name: getattr(status, name) for name in getattr(status, "__dataclass_fields__", {})}
     fault, start = rig.fault, rig.fault.start / rig.sample_rate
     said = [(float(event.time), _name(event)) for event in events]
     later = [(time - start, name) for time, name in said if time >= start] if fault.kind != NONE else []
@@ -87,12 +74,6 @@ def _name(event: Any) -> str:
     """The fault's name where a reason begins with it, else what was done."""
     head = str(getattr(event, "reason", "")).partition(":")
     return head[0] if head[1] else str(getattr(event, "name", None) or getattr(event, "action", ""))
-
-
-def _public(status: Any) -> dict[str, Any]:
-    """Fields of a record."""
-    names = getattr(status, "__dataclass_fields__", {})
-    return {name: getattr(status, name) for name in names}
 
 
 def _short(value: Any) -> str:

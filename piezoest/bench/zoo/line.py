@@ -162,7 +162,7 @@ def _oracle(rig: Rig) -> Callable[[slice, FloatArray, FloatArray], tuple[Any, An
     def told(part: slice, x: FloatArray, true: FloatArray) -> tuple[Any, Any]:
         k = np.arange(part.start, part.stop)
         past = np.maximum(k - late, 0)
-        good = truthful(rig.fault, part.start, x[part], factor * true[past] + zero[part], tolerance)
+        good = truthful(rig, part.start, x[part], factor * true[past] + zero[part], tolerance)
         return k[good], past[good]
 
     return told

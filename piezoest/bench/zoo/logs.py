@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray, integer
-from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
+from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family, log_uniform
 from piezoest.bench.zoo.voltages import SHAPES, draw_voltage
 from piezoest.models import Creep
 
@@ -73,11 +73,11 @@ def draw(seed: int, *, family: str | None = None, clean: bool = False) -> Log:
     """Draw a stage and a recording of it."""
     rng = np.random.default_rng(integer("seed", seed))
     reach = REACHES[int(rng.integers(len(REACHES)))]
-    gain = _log(rng, *STROKE) / (2.0 * reach.half)
+    gain = log_uniform(rng, *STROKE) / (2.0 * reach.half)
     drawn = str(rng.choice(list(FAMILIES)))
     family = drawn if family is None else family
     model = draw_family(family, rng, reach, width=rng.uniform(*WIDTH), gain=gain)
-    n, sample_rate = round(_log(rng, *SAMPLES)), float(rng.choice(SAMPLE_RATES))
+    n, sample_rate = round(log_uniform(rng, *SAMPLES)), float(rng.choice(SAMPLE_RATES))
     kind = str(rng.choice(list(SHAPES)))
     added: dict[str, float] = {}
 
@@ -98,7 +98,7 @@ def draw(seed: int, *, family: str | None = None, clean: bool = False) -> Log:
     drift = 0.0 if clean else _drifted(rng, truth)
     stroke = float(np.ptp(truth))
 
-    noise = _log(rng, *NOISE)
+    noise = log_uniform(rng, *NOISE)
     x = truth + noise * stroke * rng.standard_normal(n)
     jumps = np.zeros(n) if clean else _jumps(rng, n, stroke)
     x += jumps
@@ -125,20 +125,15 @@ def draw(seed: int, *, family: str | None = None, clean: bool = False) -> Log:
     )  # fmt: skip
 
 
-def _log(rng: np.random.Generator, low: float, high: float) -> float:
-    """Log-uniform."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
 def _maybe(rng: np.random.Generator, chance: float, low: float, high: float) -> float:
     """Log-uniform, or zero."""
-    size = _log(rng, low, high)
+    size = log_uniform(rng, low, high)
     return size if rng.random() < chance else 0.0
 
 
 def _voltage(rng: np.random.Generator, kind: str, reach: Reach, n: int, rest: int) -> FloatArray:
     """Voltage on the fine grid, shape (FINER n,) [V]; it rests first."""
-    waves = _log(rng, FEWEST_WAVES, min(MOST_WAVES, (n - rest) / POINTS_IN_WAVE))
+    waves = log_uniform(rng, FEWEST_WAVES, min(MOST_WAVES, (n - rest) / POINTS_IN_WAVE))
     shape = draw_voltage(kind, FINER * (n - rest), waves, rng)
     half = reach.half * rng.uniform(*SPAN)
     # From the end that is 0 V, as most do with a unipolar amplifier, or anywhere.
@@ -171,7 +166,7 @@ def _jumps(rng: np.random.Generator, n: int, stroke: float) -> FloatArray:
     count = int(rng.integers(1, 3)) if rng.random() < JUMPS[0] else 0
     for _ in range(count):
         jumps[round(n * rng.uniform(0.05, 0.95)) :] += (
-            stroke * _log(rng, *JUMPS[1:]) * rng.choice((-1.0, 1.0))
+            stroke * log_uniform(rng, *JUMPS[1:]) * rng.choice((-1.0, 1.0))
         )
     return jumps
 
@@ -181,6 +176,6 @@ def _missing(rng: np.random.Generator, n: int) -> Any:
     missing = np.zeros(n, bool)
     part = _maybe(rng, *DROPOUTS)
     while missing.sum() < part * n:
-        start, length = int(rng.integers(n)), round(_log(rng, 1.0, LONGEST_GAP * n))
+        start, length = int(rng.integers(n)), round(log_uniform(rng, 1.0, LONGEST_GAP * n))
         missing[start : start + length] = True
     return missing

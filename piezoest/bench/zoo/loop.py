@@ -4,7 +4,7 @@ x = gain (u + share h) + offset, with h [V] the part that depends on the voltage
 module: a class that holds its numbers and, beside it, the compiled ``deform`` of one sample.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 from piezoest._checks import FloatArray
@@ -21,11 +21,10 @@ class Loop:
     offset: float = 0.0  # displacement where both are zero [µm]
 
     state: ClassVar[dict[str, Kind]] = {}  # what the module's ``deform`` keeps
-    wipes_out: ClassVar[bool] = False  # whether a larger swing deletes what smaller ones left behind
 
     def stage_settings(self) -> dict[str, Any]:
-        """Numbers by name, see `piezoest.stage.kernel`."""
-        raise NotImplementedError
+        """Numbers by name, see `piezoest.stage.kernel`: all fields but the offset, which the stage adds."""
+        return {each.name: getattr(self, each.name) for each in fields(self) if each.name != "offset"}
 
     def stage_layouts(self, settings: dict[str, Any]) -> tuple[Record, Record]:
         """Layouts of state and settings of the hysteresis in a stage."""

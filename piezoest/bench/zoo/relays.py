@@ -32,8 +32,6 @@ class Relays(Loop):
     levels: int = 300  # cells of the grid along each side
     weights: FloatArray = field(init=False, repr=False, compare=False)
 
-    wipes_out = True
-
     def __post_init__(self) -> None:
         lines = np.linspace(self.low, self.high, self.levels + 1)
         v = 0.5 * (lines[1:] + lines[:-1])

@@ -1,6 +1,6 @@
 """A rig of the zoo: a stage of some family, what is around it, a reference and at most one fault."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo import faults
 from piezoest.bench.zoo.families import Reach
-from piezoest.bench.zoo.faulty_stages import Drift, Hum
+from piezoest.bench.zoo.faulty_stages import Drift, FaultyStage, hum
 from piezoest.bench.zoo.references import Reference
 from piezoest.compensators import VoltageLimits
 from piezoest.models import Creep, MassSpringDamper
@@ -65,8 +65,8 @@ class Rig:
     width: float  # of the loop, relative
     around: Surroundings  # mechanics and instruments
     plain: Reference  # without the fault
-    fault: faults.Fault  # or none
-    block: int  # samples that are handed over at a time; 1 is one by one, by `step`
+    fault: faults.Fault = field(default_factory=faults.Fault)  # or none
+    block: int = 1  # samples that are handed over at a time; 1 is one by one, by `step`
 
     @property
     def limits(self) -> VoltageLimits:
@@ -79,24 +79,19 @@ class Rig:
         return 2.0 * self.reach.half * self.gain
 
     @property
-    def facts(self) -> faults.Around:
-        """What a fault has to know."""
-        return faults.Around(self.sample_rate, self.plain, self.around.noise, self.stroke, self.seed)
-
-    @property
     def reference(self) -> FloatArray:
         """What the controller is to follow, fault and all, shape (N,) [µm]."""
-        return faults.changed_reference(self.fault, self.facts)
+        return faults.changed_reference(self)
 
     @property
     def coordinates(self) -> tuple[float, FloatArray]:
         """Factor and zero of the gauge that the reference is meant in, see `faults.coordinates`."""
-        return faults.coordinates(self.fault, self.plain.values.size)
+        return faults.coordinates(self)
 
     @property
     def gain_factor(self) -> FloatArray:
         """By what the fault has changed the gain, shape (N,)."""
-        n, schedule = self.plain.values.size, faults.gain_schedule(self.fault, self.sample_rate)
+        n, schedule = self.plain.values.size, faults.gain_schedule(self)
         if schedule is None:
             return np.ones(n)
         times, factors = zip(*schedule, strict=True)
@@ -137,7 +132,7 @@ class Rig:
                 self.reach.low, self.reach.high, resolution=own.volts, slew_rate=own.slew_rate
             ),
             gauge=Gauge() if healthy else Gauge(noise=own.noise, delay=own.delay, resolution=own.resolution),
-            gain_schedule=None if healthy else faults.gain_schedule(self.fault, fs),
+            gain_schedule=None if healthy else faults.gain_schedule(self),
             seed=self.seed,
         )
         if healthy:
@@ -145,8 +140,8 @@ class Rig:
         if own.drift:
             stage = Drift(stage, own.drift)
         if own.hum:
-            stage = Hum(stage, own.hum, seed=self.seed)
-        return faults.faulty_stage(stage, self.fault, self.facts)
+            stage = FaultyStage(stage, own.hum, seed=self.seed, reading=hum)
+        return faults.faulty_stage(stage, self)
 
     def _mechanics(self) -> MassSpringDamper | None:
         frequency, damping = self.around.resonance

@@ -9,6 +9,7 @@ is slow beside it, and large beside the noise.
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +18,12 @@ from piezoest._checks import FloatArray
 from piezoest.bench.origin import json_safe
 from piezoest.bench.store import Row
 from piezoest.bench.zoo.drawing import draw
+from piezoest.bench.zoo.families import log_uniform
 from piezoest.bench.zoo.faults import Fault
 from piezoest.bench.zoo.references import Reference
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Factory, run_controller
+from piezoest.bench.zoo.summary import failures, grouped
 
 AMPLITUDES = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # µm
 FREQUENCIES = (1.0, 3.0, 10.0, 30.0)  # Hz
@@ -33,6 +36,7 @@ NOISE = (2e-4, 2e-3)  # µm
 STEPS = 2.0**16  # of both converters
 RESONANCES = (400.0, 780.0)  # Hz
 SLOW, LARGE = 0.025, 100.0  # frequency over the resonance at most, amplitude over the noise at least
+SOON, ENOUGH = 2, 0.95  # periods in which all is to settle, in so many of the runs of a cell
 # Kinds of stages, of which the first and the last are of the families that some estimators learn.
 KINDS = ("paper", "relays", "bouc-wen", "duhem", "coleman-hodgdon")
 
@@ -41,11 +45,6 @@ SEGMENTS = (
     ("cold-start", 1.0, 6), ("switch", 0.6, 4), ("drop", 0.2, 4), ("switch-back", 1.0, 4),
     ("gain-step", 1.0, 6),
 )  # fmt: skip
-CELL_COLUMNS: dict[str, type] = {
-    "key": str, "controller": str, "family": str, "amplitude": float, "frequency": float, "seed": int,
-    "gain": float, "width": float, "block": int, "noise": float, "mechanics": str, "asked": bool,
-    "failure": str, "change": str, "periods": int, "error": float, "allowed": float,
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +98,9 @@ class Cell:
 def tidy_cells(rows: Iterable[Row]) -> Iterator[Row]:
     """A row for each change of each run of the map. `rows`: from `Cell.play`."""
     for row in rows:
+        place = {name: value for name, value in row.items() if name != "segments"}
         for segment in row["segments"] or [{}]:
-            yield {**row, **segment}
+            yield {**place, **segment}
 
 
 def cells(seeds: Sequence[int], families: Sequence[str] = KINDS) -> list[Cell]:
@@ -111,13 +111,13 @@ def cells(seeds: Sequence[int], families: Sequence[str] = KINDS) -> list[Cell]:
 def cell_rig(cell: Cell) -> Rig:
     """Rig of a cell: an ideal one but for noise and steps, and for the gain that changes in the end."""
     rng = np.random.default_rng([cell.seed, 24])
-    gain = float(np.exp(rng.uniform(*np.log([max(GAINS[0], FREE * cell.amplitude / REACH), GAINS[1]]))))
+    gain = log_uniform(rng, max(GAINS[0], FREE * cell.amplitude / REACH), GAINS[1])
     period = max(PERIOD, round(SLOWEST / cell.frequency))
     rig = draw(
         cell.seed, family=cell.family, limits="±100", gain=gain, sample_rate=period * cell.frequency,
         reference="triangle", amplitude=cell.amplitude, frequency=cell.frequency, waves=12,
         mechanics=f"{rng.uniform(*RESONANCES):.0f} Hz", delay=0, slew=np.inf,
-        noise=float(np.exp(rng.uniform(*np.log(NOISE)))),
+        noise=log_uniform(rng, *NOISE),
         resolution=2.0 * REACH * gain / STEPS, volts=2.0 * REACH / STEPS, creep=0.0,
         hum=0.0, drift=0.0, fault="none",
         block=int(rng.choice([10, 50])) * period // PERIOD,
@@ -144,3 +144,34 @@ def asked(rig: Rig) -> bool:
     """Whether it is asked for that all settles soon."""
     slow = rig.plain.frequency <= SLOW * rig.around.resonance[0]
     return bool(slow and rig.plain.amplitude >= LARGE * rig.noise)
+
+
+def summarise_cells(rows: Iterable[Row]) -> dict[str, Any]:
+    """Sum up the map: shares of runs that settled soon."""
+    rows = list(rows)
+    asked = [row for row in rows if row["asked"]]
+    others = [row for row in rows if not row["asked"]]
+    found = grouped(asked, "family", "amplitude", "frequency", of=_shares)
+    return {
+        "runs": len(rows),
+        "failures": failures(rows),
+        "others": len(others),
+        "cells": {
+            "asked": len(found),
+            "kept": {name: sum(cell[name] >= ENOUGH for cell in found) for name, _, _ in SEGMENTS},
+        },
+        "by_family": grouped(asked, "family", of=_shares),
+        "by_place": grouped(asked, "amplitude", "frequency", of=_shares),
+        "other_places": grouped(others, "amplitude", "frequency", of=_shares),
+    }
+
+
+def _shares(rows: Sequence[Row]) -> dict[str, Any]:
+    """Share of runs that settled soon after each change, and median of the periods."""
+    found: dict[str, Any] = {"runs": len(rows)}
+    for k, (name, _, _) in enumerate(SEGMENTS):
+        periods = [row["segments"][k]["periods"] if row["segments"] else None for row in rows]
+        found[name] = float(np.mean([each is not None and each <= SOON for each in periods]))
+        median = float(np.median([np.inf if each is None else each for each in periods]))
+        found[f"{name} periods"] = None if np.isinf(median) else median
+    return found

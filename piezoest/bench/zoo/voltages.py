@@ -33,14 +33,6 @@ def _sine_at(phase: FloatArray) -> FloatArray:
     return np.sin(2.0 * np.pi * phase)
 
 
-def _triangle(n: int, waves: float, rng: Any) -> FloatArray:
-    return _triangle_at(_phase(n, waves, rng))
-
-
-def _sine(n: int, waves: float, rng: Any) -> FloatArray:
-    return _sine_at(_phase(n, waves, rng))
-
-
 def _envelope(n: int, waves: float, sweeps: int, rng: Any) -> FloatArray:
     """Amplitude that grows to 1, once or several times: evenly, or by steps between waves."""
     turn = sweeps * np.arange(n) / n % 1.0
@@ -62,10 +54,6 @@ def _growing(n: int, waves: float, rng: Any) -> FloatArray:
         phase = waves * np.arange(n) / n + 0.75
         return _envelope(n, waves, sweeps, rng) * (1.0 + wave(phase)) - 1.0
     return _envelope(n, waves, sweeps, rng) * wave(waves * np.arange(n) / n)
-
-
-def _decaying(n: int, waves: float, rng: Any) -> FloatArray:
-    return np.ascontiguousarray(_growing(n, waves, rng)[::-1])
 
 
 def _sines(n: int, waves: float, rng: Any) -> FloatArray:
@@ -107,9 +95,15 @@ def _chirp(n: int, waves: float, rng: Any) -> FloatArray:
 
 
 SHAPES: dict[str, Callable[[int, float, Any], FloatArray]] = {
-    "triangle": _triangle, "sine": _sine, "growing": _growing, "decaying": _decaying, "sum-of-sines": _sines,
-    "walk": _walk, "staircase": _staircase, "chirp": _chirp,
-}  # fmt: skip
+    "triangle": lambda n, waves, rng: _triangle_at(_phase(n, waves, rng)),
+    "sine": lambda n, waves, rng: _sine_at(_phase(n, waves, rng)),
+    "growing": _growing,
+    "decaying": lambda n, waves, rng: np.ascontiguousarray(_growing(n, waves, rng)[::-1]),
+    "sum-of-sines": _sines,
+    "walk": _walk,
+    "staircase": _staircase,
+    "chirp": _chirp,
+}
 
 
 def draw_voltage(kind: str, n: int, waves: float, rng: np.random.Generator) -> FloatArray:
