@@ -47,11 +47,16 @@ class EstimatorBase(Copied, ABC):
     _start: Any
     _state: Any
 
-    def _start_from(self, initial_model: Any, kinds: Any, expected: str) -> Any:
+    def _start_from(self, initial_model: Any, *kinds: Any, admissible: bool = True) -> Any:
         """Keep and return the model to start from, the user's or the default one."""
         model = DEFAULT_MODEL if initial_model is None else initial_model
-        self._initial = instance("initial_model", model, kinds, expected)
+        names = " or ".join(f"a {kind.__name__}" for kind in kinds)
+        self._initial = instance("initial_model", model, kinds, names)
         check_start(model)
+        if admissible and not model.is_admissible:
+            raise ValueError(
+                f"initial_model must be admissible, but {model} is not admissible: use nearest_admissible()"
+            )
         return model
 
     def _begin(self, arguments: dict[str, Any], layout: Record, values: dict[str, Any]) -> None:
@@ -84,15 +89,38 @@ class EstimatorBase(Copied, ABC):
     def _sample(self, u: float, x: float) -> None:
         """Go through one sample; NaN in either is a missing measurement."""
 
+    @property
+    def _left(self) -> int | None:
+        """Samples until `theta` changes next; None where it does so when it is read."""
+        return 1
+
+    def _collect(self, u: FloatArray, x: FloatArray) -> FloatArray | None:
+        """Go through checked records, of `_left` samples at most; their innovations, if they differ."""
+        for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+            self._sample(u_k, x_k)
+        return None
+
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        """Go through checked records, here sample by sample in Python."""
-        rows, names = u.size // every, ("theta", *want)
-        kept = {name: np.empty((rows, *np.shape(getattr(self, name)))) for name in names}
-        for k in range(u.size):
-            self._sample(float(u[k]), float(x[k]))
-            if (k + 1) % every == 0:
-                for name in names:
-                    kept[name][k // every] = getattr(self, name)
+        """Go through checked records."""
+        rows, n = u.size // every, len(self.parameter_names)
+        shapes = {"theta": (n,), "P": (n, n), "y": (), "S": ()}
+        kept = {name: np.empty((rows, *shapes[name])) for name in ("theta", *want)}
+
+        def keep(first: int, last: int) -> None:
+            for name, values in kept.items():
+                if first // every < last // every:
+                    values[first // every : last // every] = getattr(self, name)
+
+        done = 0
+        while done < u.size:
+            end = min(done + (self._left or u.size), u.size)
+            # Until the last sample is there, the rows hold what was known before it.
+            keep(done, end - 1)
+            innovations = self._collect(u[done:end], x[done:end])
+            keep(end - 1, end)
+            if innovations is not None and "y" in want:
+                kept["y"][done // every : end // every] = innovations[every - 1 - done % every :: every]
+            done = end
         index = np.arange(every - 1, rows * every, every)
         return Trace(index=index, parameter_names=self.parameter_names, **kept)
 

@@ -118,9 +118,8 @@ class BatchFit(Hopping):
         hop: float | None = None,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        self._start_from(
-            initial_model, FreeRunning, "a ColemanHodgdon or a LinearGain"
-        ).coordinate_values()  # refuses what has no admissible model near it
+        initial = self._start_from(initial_model, FreeRunning, admissible=False)
+        initial.coordinate_values()  # refuses what has no admissible model near it
         self._creep = instance("creep", creep, Creep | None, "a Creep: its time constants are kept")
         for name, given, known in (("method", method, METHODS), ("loss", loss, TUNING)):
             if given not in tuple(known):

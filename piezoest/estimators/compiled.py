@@ -7,7 +7,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.estimators import loops
 from piezoest.estimators.base import EstimatorBase, Trace
-from piezoest.layout import Record, new
+from piezoest.layout import Named, Record, new
 
 # Histories that a compiled loop does not write.
 NONE, NO_ROWS = np.empty(0), np.empty((0, 0))
@@ -17,10 +17,10 @@ class CompiledEstimator(EstimatorBase):
     """An estimator whose samples go through compiled functions on named numbers.
 
     Its `kernel` is a module, named by the layout of the state, with functions that compiled code can call:
-    ``sample(state, settings, u, x)``, what becomes of one sample; ``write_row(state, settings, row)`` and
-    ``write_outcome(state, row, y, S, P)``, what a `run` keeps of it; ``proposed(state, settings, model)``,
-    the admissible model as known now: gain, or alpha, beta and gamma, and fourth the offset. A class that has
-    `model` itself does without the last, and cannot be exported to C.
+    ``sample(state, settings, u, x)``, what becomes of one sample; ``write_row(state, settings, row)``, what a
+    `run` keeps of the estimate after it, and ``outcome(state)``, innovation, its variance and covariance;
+    ``proposed(state, settings, model)``, the admissible model as known now: gain, or alpha, beta and gamma,
+    and fourth the offset. A class that has `model` itself does without the last, and cannot be exported to C.
     """
 
     __slots__ = ("_run_loop", "_settings", "_settings_layout", "_step_loop")
@@ -85,9 +85,39 @@ class CompiledEstimator(EstimatorBase):
             **{name: self._shown(name, kept[name], theta) for name in want},
         )
 
-    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
-        """What `run` shows of a history, y, S or P, that the loop wrote beside its rows of the estimate."""
-        return history
+    def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
+        """What is shown of y (…), S (…) or P (…, n, n), as the kernel has it, beside rows of the estimate."""
+        return values
+
+    def _outcome(self, name: str) -> Any:
+        """What is shown of the present y, S or P."""
+        kept = self.kernel.outcome(Named(self._state, self._layout))
+        return self._shown(name, np.array(kept[("y", "S", "P").index(name)]), self._row)
+
+    @property
+    def _row(self) -> FloatArray:
+        """What ``kernel.write_row`` writes now."""
+        raise NotImplementedError
+
+    @property
+    def theta(self) -> FloatArray:
+        """Parameters as estimated, shape (n,), by `parameter_names`; they need not be admissible."""
+        return self.theta_of(self._row)
+
+    @property
+    def P(self) -> FloatArray:
+        """Covariance of `theta` as the law sees it, shape (n, n); to first order, where it sees others."""
+        return np.asarray(self._outcome("P"))
+
+    @property
+    def y(self) -> float:
+        """Last innovation [µm]."""
+        return float(self._outcome("y"))
+
+    @property
+    def S(self) -> float:
+        """Variance of the last innovation as the law saw it [µm²]."""
+        return float(self._outcome("S"))
 
     @property
     def covariance_size(self) -> int:

@@ -102,11 +102,7 @@ class HysteresisEKF(CompiledEstimator):
         project: bool = True,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = self._start_from(
-            initial_model, ColemanHodgdon | LinearGain, "a ColemanHodgdon or a LinearGain"
-        )
-        if not initial.is_admissible:
-            raise ValueError(f"initial_model {initial} is not admissible: use nearest_admissible()")
+        initial = self._start_from(initial_model, ColemanHodgdon, LinearGain)
         uncertainty = moderate("uncertainty", uncertainty)
         drift = moderate("drift", drift, or_zero=True)
         mismatch = moderate("mismatch", mismatch, or_zero=True)
@@ -159,9 +155,8 @@ class HysteresisEKF(CompiledEstimator):
         # Without projection a decay below zero is an exponential that grows: not without end.
         return bool(-GROWING * least["a"] <= a and abs(c) <= GREATEST * least["margin"])
 
-    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
-        s = rows[:, len(self.parameter_names) :]
-        return parameter_covariance(s, history) if name == "P" else history
+    def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
+        return parameter_covariance(rows, values) if name == "P" else values
 
     @property
     def covariance_size(self) -> int:
@@ -170,17 +165,19 @@ class HysteresisEKF(CompiledEstimator):
 
     @property
     def row_size(self) -> int:
-        """Parameters, and behind them the filter's state."""
-        return len(self.parameter_names) + self.covariance_size
+        """Of the filter's state."""
+        return self.covariance_size
 
     def theta_of(self, rows: FloatArray) -> FloatArray:
-        """Parameters (…, n) of rows (…, row_size)."""
-        return rows[..., : len(self.parameter_names)]
+        """Parameters (…, n) of rows of the filter's state."""
+        return parameters(rows)
 
     @property
     def s(self) -> FloatArray:
         """The filter's own state: (w_h, a, b, c[, offset]) or (gain[, offset])."""
         return np.array(self._state["filter"]["s"])
+
+    _row = s
 
     @property
     def state_covariance(self) -> FloatArray:
@@ -192,16 +189,6 @@ class HysteresisEKF(CompiledEstimator):
         """Names of the entries of `theta`."""
         names = self._initial.parameter_names
         return (*names, "offset") if self._arguments["offset"] else names
-
-    @property
-    def theta(self) -> FloatArray:
-        """Parameters, shape (n,), in the order of `parameter_names`."""
-        return parameters(self.s)
-
-    @property
-    def P(self) -> FloatArray:
-        """Covariance of `theta` to first order, shape (n, n)."""
-        return parameter_covariance(self.s, self.state_covariance)
 
     @property
     def K(self) -> FloatArray:

@@ -114,9 +114,7 @@ class MovingHorizon(Hopping):
             raise ValueError(f"window must be at most {LONGEST:g} samples long, got {window:g} s")
         if round(hop * sample_rate) >= round(window * sample_rate):
             raise ValueError(f"hop must be shorter than the window of {window:g} s, got {hop:g} s")
-        initial = self._start_from(initial_model, FreeRunning, "a ColemanHodgdon or a LinearGain")
-        if not initial.is_admissible:
-            raise ValueError(f"initial_model must be admissible, got {initial}: use nearest_admissible()")
+        initial = self._start_from(initial_model, FreeRunning)
         self._window, self._hop = max(2, round(window * sample_rate)), max(1, round(hop * sample_rate))
         if decimation is None:
             decimation = max(1, self._window // POINTS)

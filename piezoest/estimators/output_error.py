@@ -105,9 +105,7 @@ class OutputErrorRLS(Freezable):
         policies: tuple[Policy, ...] = POLICIES,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = self._start_from(initial_model, ColemanHodgdon, "a ColemanHodgdon")
-        if not initial.is_admissible:
-            raise ValueError(f"initial_model {initial} is not admissible: use nearest_admissible()")
+        initial = self._start_from(initial_model, ColemanHodgdon)
         if moderate("span", span) <= 1.0:
             raise ValueError(f"span must be above 1, got {span:g}")
         members = integer("members", members, 3, MOST_MEMBERS)
@@ -171,11 +169,12 @@ class OutputErrorRLS(Freezable):
         )
         yield swing.has_a_size(state["swing"])
 
-    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
-        if name == "P":
-            return self._theta_covariance(rows, history)
-        unit = self._initial.c
-        return history * (unit if name == "y" else unit**2)
+    def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
+        if name != "P":
+            return values * self._initial.c ** (1 if name == "y" else 2)
+        jacobian = self._jacobian(rows)
+        covariance = jacobian @ values @ np.swapaxes(jacobian, -1, -2)
+        return 0.5 * (covariance + np.swapaxes(covariance, -1, -2))
 
     @property
     def covariance_size(self) -> int:
@@ -219,12 +218,6 @@ class OutputErrorRLS(Freezable):
         jacobian[..., 3, 3:] = unit
         return jacobian
 
-    def _theta_covariance(self, s: FloatArray, P: FloatArray) -> FloatArray:
-        """Covariances (…, 4, 4) of the parameters, to first order."""
-        jacobian = self._jacobian(s)
-        covariance = jacobian @ P @ np.swapaxes(jacobian, -1, -2)
-        return 0.5 * (covariance + np.swapaxes(covariance, -1, -2))
-
     @property
     def _row(self) -> FloatArray:
         """The filter's state and the member in use, shape (6,)."""
@@ -239,26 +232,6 @@ class OutputErrorRLS(Freezable):
     def decays(self) -> FloatArray:
         """Decays of the bank [1/V], shape (members,)."""
         return np.array(self._settings["decays"])
-
-    @property
-    def theta(self) -> FloatArray:
-        """Parameters as estimated, shape (4,), possibly outside the admissible set."""
-        return self.theta_of(self._row)
-
-    @property
-    def P(self) -> FloatArray:
-        """Covariance of `theta` to first order as the law sees it, shape (4, 4)."""
-        return self._theta_covariance(self._row, self._state["law"]["P"])
-
-    @property
-    def y(self) -> float:
-        """Last innovation [µm]."""
-        return float(self._state["law"]["innovation"] * self._initial.c)
-
-    @property
-    def S(self) -> float:
-        """Variance of the last innovation as the law saw it [µm²]."""
-        return float(self._state["law"]["innovation_variance"] * self._initial.c**2)
 
     @property
     def K(self) -> FloatArray:

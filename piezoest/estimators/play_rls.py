@@ -117,11 +117,7 @@ class PrandtlIshlinskiiRLS(Freezable):
         mechanics: MassSpringDamper | None = None,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = self._start_from(
-            initial_model,
-            PrandtlIshlinskii | ColemanHodgdon | LinearGain,
-            "a PrandtlIshlinskii, a ColemanHodgdon or a LinearGain",
-        )
+        initial = self._start_from(initial_model, PrandtlIshlinskii, ColemanHodgdon, LinearGain)
         plan = play_grid.plan(
             initial,
             voltage_range,
@@ -206,9 +202,9 @@ class PrandtlIshlinskiiRLS(Freezable):
             ("the parameters in use must be zero or more", usable),
         )
 
-    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
+    def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
         n = self._scale.size
-        return history[:, :n, :n] * np.outer(self._scale, self._scale) if name == "P" else history
+        return values[..., :n, :n] * np.outer(self._scale, self._scale) if name == "P" else values
 
     @property
     def covariance_size(self) -> int:
@@ -238,14 +234,8 @@ class PrandtlIshlinskiiRLS(Freezable):
         return self._state["plays"]["reach"][self._columns :: self._columns].copy()
 
     @property
-    def theta(self) -> FloatArray:
-        """Slopes [µm/V] and creep gains [1] as estimated, shape (n,), in the order of `parameter_names`."""
+    def _row(self) -> FloatArray:
         return self._state["law"]["theta"][:-1] * self._scale
-
-    @property
-    def P(self) -> FloatArray:
-        """Covariance of `theta` as the law sees it, shape (n, n)."""
-        return self._state["law"]["P"][:-1, :-1] * np.outer(self._scale, self._scale)
 
     @property
     def K(self) -> FloatArray:

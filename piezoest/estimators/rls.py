@@ -118,9 +118,7 @@ class HysteresisRLS(Freezable):
         policies: tuple[Policy, ...] | None = None,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = self._start_from(
-            initial_model, ColemanHodgdon | LinearGain, "a ColemanHodgdon or a LinearGain"
-        )
+        initial = self._start_from(initial_model, ColemanHodgdon, LinearGain, admissible=False)
         if np.any(initial.theta == 0.0):
             raise ValueError(f"initial_model must have no parameter at zero, got {initial}")
         if memory is not None and memory != "period":
@@ -211,38 +209,16 @@ class HysteresisRLS(Freezable):
         u, x = self._records(u, x)
         self._through(u, x, u.size + 1, (NO_ROWS, NONE, NONE, NO_ROWS))
 
-    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
+    def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
         if name == "P":
-            return history * np.outer(self._scale, self._scale)
+            return values * np.outer(self._scale, self._scale)
         unit = float(self._settings["output_scale"])
-        return history / (unit if name == "y" else unit**2)
+        return values / (unit if name == "y" else unit**2)
 
     def reset_covariance(self) -> None:
         """Set P to its initial value (covariance resetting)."""
         own = self._state["law"]
         own["P"] = self._settings["law"]["P_0"]
-        own["resets"] += 1.0
-
-    def announce_change(self, amplitude: float | None = None) -> None:
-        """Announce a change of the stage or the reference: adds the initial covariance to P.
-
-        Parameters
-        ----------
-        amplitude : float, optional
-            New amplitude of the reference [µm]. If `profile` contains it, the estimate is set to what was
-            learnt there, and P grows only by its uncertainty. Needs `policies.AmplitudeMemory`.
-
-        Raises
-        ------
-        ValueError
-            If amplitude is not above zero, or given without `policies.AmplitudeMemory`.
-        """
-        if amplitude is not None and amplitude_memory.announce(
-            self._layout, self._state, self._settings, amplitude
-        ):
-            return
-        own = self._state["law"]
-        own["P"] += self._settings["law"]["P_0"]
         own["resets"] += 1.0
 
     @property
@@ -279,14 +255,8 @@ class HysteresisRLS(Freezable):
         return (*names, *last) if self._scale.size > len(names) else names
 
     @property
-    def theta(self) -> FloatArray:
-        """Parameters as estimated, shape (n,), possibly outside the admissible set."""
+    def _row(self) -> FloatArray:
         return np.asarray(self._state["law"]["theta"] * self._scale)
-
-    @property
-    def P(self) -> FloatArray:
-        """Covariance of `theta` as the law sees it, shape (n, n)."""
-        return np.asarray(self._state["law"]["P"] * np.outer(self._scale, self._scale))
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -308,16 +278,6 @@ class HysteresisRLS(Freezable):
             energy = (1.0 - pole) / (1.0 + pole) * float(self._settings["noise_ratio"]) ** 2
             C = C + np.outer(gain, gain) * energy
         return np.sqrt(np.fmax(np.diag(C), 0.0)) * self._scale
-
-    @property
-    def y(self) -> float:
-        """Last innovation: filtered change of displacement a sample, or displacement [µm]."""
-        return float(self._state["law"]["innovation"] / self._settings["output_scale"])
-
-    @property
-    def S(self) -> float:
-        """Variance of the last innovation as the law saw it [µm²]."""
-        return float(self._state["law"]["innovation_variance"] / self._settings["output_scale"] ** 2)
 
     @property
     def K(self) -> FloatArray:
