@@ -13,10 +13,14 @@ from piezoest.estimators.outcome import Estimator as Estimator
 from piezoest.estimators.outcome import Status as Status
 from piezoest.estimators.outcome import Trace as Trace
 from piezoest.layout import Copied, Record, by_name, from_bytes, new, write
-from piezoest.models import ColemanHodgdon, Model, model_from_dict
+from piezoest.models import ColemanHodgdon, Creep, MassSpringDamper, Model, model_from_dict
 from piezoest.policies import policy_from_dict
 
 _FORMAT = 1
+# What reads arguments that are saved as dictionaries.
+_READ: dict[str, Any] = {
+    "initial_model": model_from_dict, "creep": Creep.from_dict, "mechanics": MassSpringDamper.from_dict
+}  # fmt: skip
 # Starts from here where the user gives no model: a common stack actuator.
 DEFAULT_MODEL = ColemanHodgdon(0.02, 0.12, 0.0036)
 
@@ -33,6 +37,9 @@ class EstimatorBase(Copied, ABC):
 
     #: Tests of estimators that this class does not pass: name of the test, and the reason.
     conformance_exceptions: ClassVar[dict[str, str]] = {}
+
+    #: Fields of the state that lead to theta, P, y, S or K, where that is not a field of this name.
+    _places: ClassVar[dict[str, tuple[str, ...]]] = {}
 
     #: What the class saves beside its state.
     _saved_too: ClassVar[tuple[str, ...]] = ()
@@ -150,28 +157,35 @@ class EstimatorBase(Copied, ABC):
 
     @property
     def theta(self) -> FloatArray:
-        """Estimated parameters, shape (n,), in the order of `parameter_names`."""
-        return np.array(self._state["theta"])
+        """Parameters as estimated, shape (n,), in the order of `parameter_names`."""
+        return np.asarray(self._now("theta"))
 
     @property
     def P(self) -> FloatArray:
-        """Covariance of `theta`, shape (n, n)."""
-        return np.array(self._state["P"])
+        """Covariance of `theta` as the law sees it, shape (n, n), or follows from it to first order."""
+        return np.asarray(self._now("P"))
 
     @property
     def K(self) -> FloatArray:
-        """Last gain."""
-        return np.array(self._state["K"])
+        """Last gain, of what the law estimates."""
+        return np.asarray(self._now("K"))
 
     @property
     def y(self) -> float:
-        """Last innovation."""
-        return float(self._state["y"])
+        """Last innovation [µm]."""
+        return float(self._now("y"))
 
     @property
     def S(self) -> float:
-        """Variance of the last innovation."""
-        return float(self._state["S"])
+        """Variance of the last innovation as the law saw it [µm²]."""
+        return float(self._now("S"))
+
+    def _now(self, name: str) -> Any:
+        """Present value of a result, from its place in the state."""
+        value = self._state
+        for field in self._places.get(name, (name,)):
+            value = value[field]
+        return np.array(value)
 
     @property
     @abstractmethod
@@ -186,16 +200,19 @@ class EstimatorBase(Copied, ABC):
     @property
     def status(self) -> Status:
         """How many samples were used, missing or left out; counts that an estimator does not have are 0."""
-        state, fields, law = self._state, self._layout.by_name, self._layout.by_name.get("law")
-        own, kept = (law.by_name, state["law"]) if isinstance(law, Record) else ({}, state)
-        found = dict.fromkeys(("samples", "updates", "missing", "held", "resets", "outliers", "last"), 0)
-        for name in found:
-            if name in fields:
-                found[name] = int(state[name])
-            elif name in own:
-                found[name] = int(kept[name])
+        found = self._counts(self._state)
         last = samples.NAMES[found.pop("last")]
         return Status(**found, projected=self._is_projected(), last=last)
+
+    def _counts(self, state: Any) -> dict[str, int]:
+        """Counts of a state, or of its law."""
+        places, law = [(state, self._layout.by_name)], self._layout.by_name.get("law")
+        if isinstance(law, Record):
+            places.append((state["law"], law.by_name))
+        names = ("samples", "updates", "missing", "held", "resets", "outliers", "last")
+        return {
+            name: int(next((place[name] for place, known in places if name in known), 0)) for name in names
+        }
 
     def _is_projected(self) -> bool:
         """Whether `model` is not `theta` itself."""
@@ -347,10 +364,11 @@ class EstimatorBase(Copied, ABC):
 
     @classmethod
     def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        """Constructor's arguments from their JSON-safe form: the initial model and the policies, if any."""
+        """Constructor's arguments from their JSON-safe form."""
         revived = dict(arguments)
-        if revived.get("initial_model") is not None:
-            revived["initial_model"] = model_from_dict(revived["initial_model"])
+        for name, read in _READ.items():
+            if isinstance(revived.get(name), dict):
+                revived[name] = read(revived[name])
         if "policies" in revived:
             if not isinstance(revived["policies"], list | tuple):
                 raise ValueError(f"policies must be a list, got {revived['policies']!r}")

@@ -358,11 +358,6 @@ class BatchFit(Hopping):
         given = ([value if np.isfinite(value) else None for value in row] for row in rows)
         return super().to_dict() | dict(zip(self._saved_too, given, strict=True))
 
-    @classmethod
-    def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        creep = arguments["creep"]
-        return {**super()._revive(arguments), "creep": None if creep is None else Creep.from_dict(creep)}
-
     def _restore(self, data: dict[str, Any]) -> None:
         super()._restore(data)
         n, self._state["samples"] = self._count, 0.0

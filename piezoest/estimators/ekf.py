@@ -7,12 +7,11 @@ import numpy as np
 
 from piezoest._checks import FloatArray, moderate
 from piezoest.equations import coleman_hodgdon as equations
-from piezoest.equations import swing
 from piezoest.estimators import ekf_kernel
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.derivative_form import LONGEST_GAP
-from piezoest.estimators.saved_state import Rule, no_more_than
+from piezoest.estimators.saved_state import Rule
 from piezoest.models import ColemanHodgdon, LinearGain
 
 # How far the parameters of a filter that does not project may be outside of the admissible set: a relative to
@@ -87,6 +86,7 @@ class HysteresisEKF(CompiledEstimator):
     __slots__ = ()
 
     kernel: ClassVar[Any] = ekf_kernel
+    _places: ClassVar[dict[str, tuple[str, ...]]] = {"P": ("filter", "P"), "K": ("filter", "K")}
 
     def __init__(
         self,
@@ -141,8 +141,7 @@ class HysteresisEKF(CompiledEstimator):
         )
 
     def _rules(self, state: Any) -> Iterable[Rule]:
-        yield no_more_than(state["samples"], state["missing"], state["outliers"], state["updates"])
-        yield swing.has_a_size(state["swing"])
+        yield from super()._rules(state)
         if isinstance(self._initial, ColemanHodgdon):
             words = "the filter's parameters must be admissible, or near it where it does not project"
             yield words, self._parameters_fit(state)
@@ -157,16 +156,6 @@ class HysteresisEKF(CompiledEstimator):
 
     def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
         return parameter_covariance(rows, values) if name == "P" else values
-
-    @property
-    def covariance_size(self) -> int:
-        """Of the filter's state."""
-        return int(self._state["filter"]["s"].size)
-
-    @property
-    def row_size(self) -> int:
-        """Of the filter's state."""
-        return self.covariance_size
 
     def theta_of(self, rows: FloatArray) -> FloatArray:
         """Parameters (…, n) of rows of the filter's state."""
@@ -189,11 +178,6 @@ class HysteresisEKF(CompiledEstimator):
         """Names of the entries of `theta`."""
         names = self._initial.parameter_names
         return (*names, "offset") if self._arguments["offset"] else names
-
-    @property
-    def K(self) -> FloatArray:
-        """Last gain, of `s`."""
-        return np.array(self._state["filter"]["K"])
 
     def _is_projected(self) -> bool:
         projection = self._state["projection"]

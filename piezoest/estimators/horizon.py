@@ -8,9 +8,8 @@ import numpy as np
 
 from piezoest._checks import WILDEST, FloatArray, integer, moderate, positive
 from piezoest.estimators import horizon_kernel as kernel
-from piezoest.estimators.base import Status
 from piezoest.estimators.hopping import LEAST_HANDED_OUT, Hopping
-from piezoest.estimators.samples import HELD, NAMES, UPDATED
+from piezoest.estimators.samples import HELD, UPDATED
 from piezoest.estimators.saved_state import Rule, no_more_than
 from piezoest.estimators.thinning import thinned
 from piezoest.fitting.coordinates import Coordinates, coordinates
@@ -293,15 +292,9 @@ class MovingHorizon(Hopping):
         """Admissible model as held: of the last good solve, its slope at least 1 % of the start's."""
         return self._model_of(self._state["theta"]).lifted(self._initial, LEAST_HANDED_OUT)
 
-    @property
-    def status(self) -> Status:
-        """What happened to the samples so far.
-
-        ``updates`` counts the good solves, ``held`` the measured samples between them.
-        """
-        samples, missing, updates = (int(self._state[name]) for name in ("samples", "missing", "updates"))
-        last = NAMES[int(self._state["last"])]
-        return Status(samples, updates, missing, samples - missing - updates, 0, False, last)
+    def _counts(self, state: Any) -> dict[str, int]:
+        found = super()._counts(state)  # updates are the good solves, held the measured samples between them
+        return found | {"held": found["samples"] - found["missing"] - found["updates"]}
 
     @property
     def solves(self) -> int:

@@ -5,10 +5,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from piezoest._checks import FloatArray, integer, moderate, non_negative
-from piezoest.equations import coleman_hodgdon, output_error, sensor_noise, swing
+from piezoest.equations import coleman_hodgdon, output_error, sensor_noise
 from piezoest.estimators import output_error_kernel as kernel
-from piezoest.estimators import saved_state
-from piezoest.estimators.compiled import Freezable
+from piezoest.estimators.compiled import IN_LAW, Freezable
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.derivative_form import FIRST_HALF_PERIOD, LONGEST_GAP
 from piezoest.models import ColemanHodgdon
@@ -87,6 +86,7 @@ class OutputErrorRLS(Freezable):
     __slots__ = ()
 
     kernel: ClassVar[Any] = kernel
+    _places = IN_LAW
 
     conformance_exceptions: ClassVar[dict[str, str]] = {
         "learns_a_linear_gain": "A linear gain has no loop, and nothing that an output-error form would add."
@@ -162,13 +162,6 @@ class OutputErrorRLS(Freezable):
             {"member": nearest, "member_before": nearest, "law": {"s": s, "P": P}, "line": empty},
         )
 
-    def _rules(self, state: Any) -> Any:
-        law = state["law"]
-        yield saved_state.no_more_than(
-            state["samples"], state["missing"], state["outliers"], law["updates"], law["held"]
-        )
-        yield swing.has_a_size(state["swing"])
-
     def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
         if name != "P":
             return values * self._initial.c ** (1 if name == "y" else 2)
@@ -176,20 +169,10 @@ class OutputErrorRLS(Freezable):
         covariance = jacobian @ values @ np.swapaxes(jacobian, -1, -2)
         return 0.5 * (covariance + np.swapaxes(covariance, -1, -2))
 
-    @property
-    def covariance_size(self) -> int:
-        """Of the filter's vector."""
-        return kernel.SIZE
-
     def _decay_of(self, s: FloatArray) -> FloatArray:
         """Decay a of rows (…, 6) of the filter's state and the member in use, shape (…)."""
         correction = output_error.log_ratio(s[..., 0], s[..., 2], float(self._settings["step"]))
         return self._settings["decays"][s[..., -1].astype(int)] * np.exp(correction)
-
-    @property
-    def row_size(self) -> int:
-        """The filter's vector and the member in use."""
-        return kernel.SIZE + 1
 
     def theta_of(self, s: FloatArray) -> FloatArray:
         """Parameters (…, 4) of rows (…, 6)."""

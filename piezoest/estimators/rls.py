@@ -5,11 +5,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from piezoest._checks import FloatArray, moderate
-from piezoest.equations import admissible, swing
+from piezoest.equations import admissible
 from piezoest.estimators import derivative_form as form
 from piezoest.estimators import recursive_least_squares_kernel as law
-from piezoest.estimators import rls_kernel, saved_state
-from piezoest.estimators.compiled import NO_ROWS, NONE, Freezable
+from piezoest.estimators import rls_kernel
+from piezoest.estimators.compiled import IN_LAW, Freezable
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.recursive_least_squares import TimeBase, is_discrete
 from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain
@@ -99,6 +99,7 @@ class HysteresisRLS(Freezable):
     __slots__ = ("_followed", "_scale")
 
     kernel: ClassVar[Any] = rls_kernel
+    _places = IN_LAW
     unneeded: ClassVar[tuple[Any, ...]] = (rls_kernel.propagate_error,)
 
     def __init__(
@@ -190,36 +191,11 @@ class HysteresisRLS(Freezable):
             {"law": {"theta": start, "P": at.P_0}, "line": empty},
         )
 
-    def _rules(self, state: Any) -> Any:
-        own = state["law"]
-        yield saved_state.no_more_than(
-            state["samples"], state["missing"], state["outliers"], own["updates"], own["held"]
-        )
-        if state["swing"].size:
-            yield swing.has_a_size(state["swing"])
-
-    def absorb(self, u: FloatArray, x: FloatArray) -> None:
-        """Do as `run`, but keep nothing.
-
-        Parameters
-        ----------
-        u, x : array_like, shape (N,)
-            Voltage [V] and measured displacement [µm].
-        """
-        u, x = self._records(u, x)
-        self._through(u, x, u.size + 1, (NO_ROWS, NONE, NONE, NO_ROWS))
-
     def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
         if name == "P":
             return values * np.outer(self._scale, self._scale)
         unit = float(self._settings["output_scale"])
         return values / (unit if name == "y" else unit**2)
-
-    def reset_covariance(self) -> None:
-        """Set P to its initial value (covariance resetting)."""
-        own = self._state["law"]
-        own["P"] = self._settings["law"]["P_0"]
-        own["resets"] += 1.0
 
     @property
     def profile(self) -> AmplitudeProfile:

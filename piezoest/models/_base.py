@@ -17,15 +17,11 @@ def _field_names(model: Any) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(model))
 
 
-def _is_needed(field: Any) -> bool:
-    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-
-
 def _field_kinds(cls: Any) -> tuple[list[str], list[str]]:
     """Names of the fields that a dataclass must be given, and of those that it may be."""
-    every = dataclasses.fields(cls)
-    needed = [field.name for field in every if _is_needed(field)]
-    return needed, [field.name for field in every if field.name not in needed]
+    every, missing = dataclasses.fields(cls), dataclasses.MISSING
+    needed = [each.name for each in every if each.default is each.default_factory is missing]
+    return needed, [each.name for each in every if each.name not in needed]
 
 
 def _plain(value: Any) -> Any:
@@ -102,7 +98,7 @@ def finite_voltage(model: Model, u: FloatArray) -> FloatArray:
 
 
 def rising_pair(thresholds: Any, weights: Any) -> tuple[FloatArray, FloatArray]:
-    """Rising thresholds and as many weights, as arrays of their own."""
+    """Rising thresholds above zero and as many weights, as arrays of their own."""
     thresholds = array_1d("thresholds", thresholds).copy()
     weights = array_1d("weights", weights).copy()
     if thresholds.size != weights.size:
@@ -114,6 +110,11 @@ def rising_pair(thresholds: Any, weights: Any) -> tuple[FloatArray, FloatArray]:
         raise ValueError(
             f"thresholds must rise from entry to entry, got {thresholds}: "
             "sort them together with the weights and merge equal ones"
+        )
+    if thresholds.size and thresholds[0] <= 0.0:
+        raise ValueError(
+            f"thresholds must be above zero, got {thresholds[0]:g} first: "
+            "add the weight of a threshold of zero to the gain"
         )
     return thresholds, weights
 

@@ -95,11 +95,6 @@ class PrandtlIshlinskii(Model):
         sample_rate: float | None = None,
     ) -> None:
         thresholds, weights = rising_pair(thresholds, weights)
-        if thresholds.size and thresholds[0] <= 0.0:
-            raise ValueError(
-                f"thresholds must be above zero, got {thresholds[0]:g} first: "
-                "add the weight of a threshold of zero to the gain"
-            )
         instance("creep", creep, Creep | None, "a Creep or None")
         bends, changes = _bends(bends, bend_weights, weights.size)
         self._keep(

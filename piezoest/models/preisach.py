@@ -70,8 +70,6 @@ class Preisach(Model):
         offset: float = 0.0,
     ) -> None:
         thresholds, weights = rising_pair(thresholds, weights)
-        if thresholds.size and thresholds[0] <= 0.0:
-            raise ValueError(f"thresholds must be above zero, got {thresholds[0]:g} first: leave it out")
         if np.any(weights < 0.0):
             raise ValueError(f"weights must be zero or more, got {weights.min():g}")
         self._keep(
