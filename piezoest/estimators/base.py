@@ -210,9 +210,7 @@ class EstimatorBase(Copied, ABC):
         if isinstance(law, Record):
             places.append((state["law"], law.by_name))
         names = ("samples", "updates", "missing", "held", "resets", "outliers", "last")
-        return {
-            name: int(next((place[name] for place, known in places if name in known), 0)) for name in names
-        }
+        return {n: int(next((place[n] for place, known in places if n in known), 0)) for n in names}
 
     def _is_projected(self) -> bool:
         """Whether `model` is not `theta` itself."""
@@ -351,15 +349,14 @@ class EstimatorBase(Copied, ABC):
 
     def to_dict(self) -> dict[str, Any]:
         """Return arguments and state as a JSON-safe dictionary, from which `from_dict` continues exactly."""
+        pending = self._pending
         return {
             "estimator": type(self).__name__,
             "format": _FORMAT,
             "arguments": copy.deepcopy(self._arguments),
             "state": by_name(self._layout, self._state),
             # JSON has no NaN.
-            "pending": "missing"
-            if self._pending is not None and not np.isfinite(self._pending)
-            else self._pending,
+            "pending": pending if pending is None or np.isfinite(pending) else "missing",
         }
 
     @classmethod
