@@ -4,8 +4,8 @@ A record is a pointer to float64 numbers. Its type, made from the layout, knows 
 reading a field is one load from a constant place, a nested record is the same pointer further on, an array
 (`Numbers`) is a pointer whose shape is in its type, so that ``range(len(theta))`` has constant ends and
 nothing is counted or checked at run time. A field that is not in the layout does not compile; one that is
-absent is None, and Numba leaves out branches on ``is None`` for arguments of functions. A `Length` is read
-from the record itself: places behind such arrays are computed, and one machine code serves all lengths.
+absent is None, and what is behind ``if state.level is not None:`` is left out (`AbsentFields`). A `Length` is
+read from the record itself: places behind such arrays are computed, and one machine code serves all lengths.
 
 Numba learns of each type how it is passed (a data model), what an operation on it gives (a template), and
 the LLVM instructions of that operation (a lowering).
@@ -23,10 +23,14 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core import ir as numba_ir
+from numba.core.consts import ConstantInference
 from numba.core.datamodel import register_default
 from numba.core.datamodel.models import PrimitiveModel
 from numba.core.errors import NumbaTypeError
 from numba.core.imputils import lower_getattr_generic, lower_setattr_generic
+from numba.core.ir_utils import get_definition, guard
+from numba.core.rewrites import Rewrite, register_rewrite
 from numba.core.typing.templates import (
     AbstractTemplate,
     AttributeTemplate,
@@ -206,6 +210,46 @@ def _set_field(context: Any, builder: Any, sig: Any, arguments: Any, name: str) 
     if kind.fields[name] is not types.float64:
         raise NumbaTypeError(f"{name} cannot be assigned whole: assign its numbers one by one")
     builder.store(arguments[1], _place(builder, kind, arguments[0], name))
+
+
+@register_rewrite("before-inference")
+class AbsentFields(Rewrite):
+    """Answer ``field is None`` by the layout, before Numba looks which branches are not taken.
+
+    The field may have a name, which is assigned nothing else. Of arguments Numba itself knows the answer.
+    """
+
+    def __init__(self, state: Any = None) -> None:
+        self._kinds = state.args
+
+    def match(self, func_ir: Any, block: Any, typemap: Any, calltypes: Any) -> bool:
+        """Find the questions of a block."""
+        self._function, self._block = func_ir, block
+        self._asked = [
+            each
+            for each in block.find_insts(numba_ir.Assign)
+            if getattr(each.value, "op", "") == "binop" and each.value.fn in (operator.is_, operator.is_not)
+            if self._kind(guard(get_definition, func_ir, each.value.lhs)) is not None
+        ]
+        return bool(self._asked)
+
+    def _kind(self, value: Any) -> Any:
+        """Type of a field of a record that is an argument, or within one; None if it is something else."""
+        if getattr(value, "op", "") != "getattr":
+            return None
+        owner = guard(get_definition, self._function, value.value)
+        kind = self._kinds[owner.index] if isinstance(owner, numba_ir.Arg) else self._kind(owner)
+        return kind.fields.get(value.attr) if isinstance(kind, Fields) else None
+
+    def apply(self) -> Any:
+        """Write the answers into the block."""
+        for each in self._asked:
+            is_absent = self._kind(get_definition(self._function, each.value.lhs)) is types.none
+            answer = numba_ir.Const(is_absent == (each.value.fn is operator.is_), each.loc)
+            definitions = self._function._definitions[each.target.name]
+            definitions[definitions.index(each.value)] = each.value = answer
+        self._function._consts = ConstantInference(self._function)
+        return self._block
 
 
 # ---------------------------------------------------------------- arrays within a record

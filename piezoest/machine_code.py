@@ -38,7 +38,7 @@ _PACKAGE = Path(__file__).resolve().parent
 # A file with functions for compiled loops, and what a file imports from this package.
 _COMPILES = re.compile(
     r"^@(?:register_jitable|inlined|compiled|in_the_caller|njit)\b|^def inlined"
-    r"|^\s+@overload\(",
+    r"|^    return inlined\(",
     re.MULTILINE,
 )
 # Folders of Python's own library and of installed packages.

@@ -38,7 +38,7 @@ def test_signals_are_finite_continuous_and_deterministic(name: str) -> None:
     assert signal.values.dtype == np.float64
     assert signal.values.ndim == 1
     assert np.all(np.isfinite(signal.values))
-    assert signal.require_continuous() is signal
+    check_continuity(signal)
     np.testing.assert_array_equal(signal.values, EXAMPLES[name]().values)
 
 
@@ -267,7 +267,7 @@ def test_a_lead_in_goes_smoothly_from_rest_to_the_first_value(start: float) -> N
     assert np.all(steps[[0, -1]] <= 1e-4 * abs(45.0 - start)), "at rest at both ends"
     # The steepest of all ways that are at rest at both ends, and whose acceleration is zero there, is 15/8.
     assert steps.max() <= 1.875 * abs(45.0 - start) / 300
-    assert led.require_continuous() is led
+    check_continuity(led)
 
 
 # --- jumps ------------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ kept exactly symmetric.
 import numpy as np
 
 from piezoest.compile import inlined, like
+from piezoest.equations.least_squares import covariance_times, predicted_output
 
 # The square of an innovation and its variance must stay below the first; beyond the second a variance has
 # wound up.
@@ -49,15 +50,6 @@ def predict_covariance(P, row, m, q):
     P[0, 0] = corner
     for i in range(n):
         P[i, i] = P[i, i] + q[i]
-
-
-@inlined
-def measure(s, h):
-    """h . s: the predicted measurement of a linear measurement."""
-    x = h[0] * s[0]
-    for i in range(1, len(s)):
-        x = x + h[i] * s[i]
-    return x
 
 
 @inlined
@@ -135,19 +127,12 @@ def project(s, P, g, least):
 
     D. Simon, IET Control Theory Appl. 4 (2010) 1303-1318, sec. 2.3. Returns 1.0 if it moved.
     """
-    n = len(s)
     product = like(s)
-    lack = least - measure(s, g)
+    lack = least - predicted_output(s, g)
     outside = (lack > 0.0) * 1.0
-    norm = 0.0
-    for i in range(n):
-        total = 0.0
-        for j in range(n):
-            total = total + P[i, j] * g[j]
-        product[i] = total
-        norm = norm + g[i] * total
+    norm = covariance_times(P, g, product)
     # A norm that has underflown has no direction to go in: whoever asks clamps what is left over.
     reached = (norm * LARGEST_TRACE > np.abs(lack)) * outside
-    for i in range(n):
+    for i in range(len(s)):
         s[i] = s[i] + reached * product[i] * lack / (norm + (norm == 0.0))
     return outside

@@ -68,12 +68,3 @@ def prandtl_ishlinskii_inverse(y, w, gain, thresholds, weights):
         beyond = np.fmax(u - (y[i] + thresholds[i]), 0.0) + np.fmin(u - (y[i] - thresholds[i]), 0.0)
         u = u - beyond * (weights[i] / slope)
     return u
-
-
-@inlined
-def prandtl_ishlinskii_inverse_step(y, w, gain, thresholds, weights):
-    """The u of `prandtl_ishlinskii_inverse`; the states `y` (n,) follow it in place."""
-    u = prandtl_ishlinskii_inverse(y, w, gain, thresholds, weights)
-    for i in range(len(y)):
-        y[i] = play(y[i], u, thresholds[i])
-    return u

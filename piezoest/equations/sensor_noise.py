@@ -21,8 +21,6 @@ NOISE = record(variance=AMOUNT, change=MEASURED, change_before=MEASURED, seen=wh
 @inlined
 def measure(noise, change):
     """Learn from the third differences of x, in which the smooth motion of a stage is small."""
-    if noise is None:
-        return
     third = change - 2.0 * noise.change + noise.change_before
     noise.change_before = noise.change
     noise.change = change
@@ -38,8 +36,6 @@ def memory_squared(noise, swing, slope, unit, factor):
     Over a swing of the displacement noise behind W_p leaves the slope (`slope`, in the start's, which is
     `unit`) uncertain by sqrt(2) times its relative size; `factor` says how much of it passes the filter.
     """
-    if noise is None:
-        return 0.0
     if swing.usual == 0.0:
         return 0.0  # nobody knows yet how far a swing goes
     swing_of_x = swing.size * max(abs(slope), LEAST_SLOPE) * unit

@@ -13,10 +13,14 @@ from piezoest.estimators.outcome import Estimator as Estimator
 from piezoest.estimators.outcome import Status as Status
 from piezoest.estimators.outcome import Trace as Trace
 from piezoest.layout import Copied, Record, by_name, from_bytes, new, write
-from piezoest.models import ColemanHodgdon, Model, model_from_dict
+from piezoest.models import ColemanHodgdon, Creep, MassSpringDamper, Model, model_from_dict
 from piezoest.policies import policy_from_dict
 
 _FORMAT = 1
+# What reads arguments that are saved as dictionaries.
+_READ: dict[str, Any] = {
+    "initial_model": model_from_dict, "creep": Creep.from_dict, "mechanics": MassSpringDamper.from_dict
+}  # fmt: skip
 # Starts from here where the user gives no model: a common stack actuator.
 DEFAULT_MODEL = ColemanHodgdon(0.02, 0.12, 0.0036)
 
@@ -34,6 +38,9 @@ class EstimatorBase(Copied, ABC):
     #: Tests of estimators that this class does not pass: name of the test, and the reason.
     conformance_exceptions: ClassVar[dict[str, str]] = {}
 
+    #: Fields of the state that lead to theta, P, y, S or K, where that is not a field of this name.
+    _places: ClassVar[dict[str, tuple[str, ...]]] = {}
+
     #: What the class saves beside its state.
     _saved_too: ClassVar[tuple[str, ...]] = ()
 
@@ -47,11 +54,16 @@ class EstimatorBase(Copied, ABC):
     _start: Any
     _state: Any
 
-    def _start_from(self, initial_model: Any, kinds: Any, expected: str) -> Any:
+    def _start_from(self, initial_model: Any, *kinds: Any, admissible: bool = True) -> Any:
         """Keep and return the model to start from, the user's or the default one."""
         model = DEFAULT_MODEL if initial_model is None else initial_model
-        self._initial = instance("initial_model", model, kinds, expected)
+        names = " or ".join(f"a {kind.__name__}" for kind in kinds)
+        self._initial = instance("initial_model", model, kinds, names)
         check_start(model)
+        if admissible and not model.is_admissible:
+            raise ValueError(
+                f"initial_model must be admissible, but {model} is not admissible: use nearest_admissible()"
+            )
         return model
 
     def _begin(self, arguments: dict[str, Any], layout: Record, values: dict[str, Any]) -> None:
@@ -84,15 +96,38 @@ class EstimatorBase(Copied, ABC):
     def _sample(self, u: float, x: float) -> None:
         """Go through one sample; NaN in either is a missing measurement."""
 
+    @property
+    def _left(self) -> int | None:
+        """Samples until `theta` changes next; None where it does so when it is read."""
+        return 1
+
+    def _collect(self, u: FloatArray, x: FloatArray) -> FloatArray | None:
+        """Go through checked records, of `_left` samples at most; their innovations, if they differ."""
+        for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
+            self._sample(u_k, x_k)
+        return None
+
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        """Go through checked records, here sample by sample in Python."""
-        rows, names = u.size // every, ("theta", *want)
-        kept = {name: np.empty((rows, *np.shape(getattr(self, name)))) for name in names}
-        for k in range(u.size):
-            self._sample(float(u[k]), float(x[k]))
-            if (k + 1) % every == 0:
-                for name in names:
-                    kept[name][k // every] = getattr(self, name)
+        """Go through checked records."""
+        rows, n = u.size // every, len(self.parameter_names)
+        shapes = {"theta": (n,), "P": (n, n), "y": (), "S": ()}
+        kept = {name: np.empty((rows, *shapes[name])) for name in ("theta", *want)}
+
+        def keep(first: int, last: int) -> None:
+            for name, values in kept.items():
+                if first // every < last // every:
+                    values[first // every : last // every] = getattr(self, name)
+
+        done = 0
+        while done < u.size:
+            end = min(done + (self._left or u.size), u.size)
+            # Until the last sample is there, the rows hold what was known before it.
+            keep(done, end - 1)
+            innovations = self._collect(u[done:end], x[done:end])
+            keep(end - 1, end)
+            if innovations is not None and "y" in want:
+                kept["y"][done // every : end // every] = innovations[every - 1 - done % every :: every]
+            done = end
         index = np.arange(every - 1, rows * every, every)
         return Trace(index=index, parameter_names=self.parameter_names, **kept)
 
@@ -122,28 +157,35 @@ class EstimatorBase(Copied, ABC):
 
     @property
     def theta(self) -> FloatArray:
-        """Estimated parameters, shape (n,), in the order of `parameter_names`."""
-        return np.array(self._state["theta"])
+        """Parameters as estimated, shape (n,), in the order of `parameter_names`."""
+        return np.asarray(self._now("theta"))
 
     @property
     def P(self) -> FloatArray:
-        """Covariance of `theta`, shape (n, n)."""
-        return np.array(self._state["P"])
+        """Covariance of `theta` as the law sees it, shape (n, n), or follows from it to first order."""
+        return np.asarray(self._now("P"))
 
     @property
     def K(self) -> FloatArray:
-        """Last gain."""
-        return np.array(self._state["K"])
+        """Last gain, of what the law estimates."""
+        return np.asarray(self._now("K"))
 
     @property
     def y(self) -> float:
-        """Last innovation."""
-        return float(self._state["y"])
+        """Last innovation [µm]."""
+        return float(self._now("y"))
 
     @property
     def S(self) -> float:
-        """Variance of the last innovation."""
-        return float(self._state["S"])
+        """Variance of the last innovation as the law saw it [µm²]."""
+        return float(self._now("S"))
+
+    def _now(self, name: str) -> Any:
+        """Present value of a result, from its place in the state."""
+        value = self._state
+        for field in self._places.get(name, (name,)):
+            value = value[field]
+        return np.array(value)
 
     @property
     @abstractmethod
@@ -158,16 +200,17 @@ class EstimatorBase(Copied, ABC):
     @property
     def status(self) -> Status:
         """How many samples were used, missing or left out; counts that an estimator does not have are 0."""
-        state, fields, law = self._state, self._layout.by_name, self._layout.by_name.get("law")
-        own, kept = (law.by_name, state["law"]) if isinstance(law, Record) else ({}, state)
-        found = dict.fromkeys(("samples", "updates", "missing", "held", "resets", "outliers", "last"), 0)
-        for name in found:
-            if name in fields:
-                found[name] = int(state[name])
-            elif name in own:
-                found[name] = int(kept[name])
+        found = self._counts(self._state)
         last = samples.NAMES[found.pop("last")]
         return Status(**found, projected=self._is_projected(), last=last)
+
+    def _counts(self, state: Any) -> dict[str, int]:
+        """Counts of a state, or of its law."""
+        places, law = [(state, self._layout.by_name)], self._layout.by_name.get("law")
+        if isinstance(law, Record):
+            places.append((state["law"], law.by_name))
+        names = ("samples", "updates", "missing", "held", "resets", "outliers", "last")
+        return {n: int(next((place[n] for place, known in places if n in known), 0)) for n in names}
 
     def _is_projected(self) -> bool:
         """Whether `model` is not `theta` itself."""
@@ -306,23 +349,23 @@ class EstimatorBase(Copied, ABC):
 
     def to_dict(self) -> dict[str, Any]:
         """Return arguments and state as a JSON-safe dictionary, from which `from_dict` continues exactly."""
+        pending = self._pending
         return {
             "estimator": type(self).__name__,
             "format": _FORMAT,
             "arguments": copy.deepcopy(self._arguments),
             "state": by_name(self._layout, self._state),
             # JSON has no NaN.
-            "pending": "missing"
-            if self._pending is not None and not np.isfinite(self._pending)
-            else self._pending,
+            "pending": pending if pending is None or np.isfinite(pending) else "missing",
         }
 
     @classmethod
     def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        """Constructor's arguments from their JSON-safe form: the initial model and the policies, if any."""
+        """Constructor's arguments from their JSON-safe form."""
         revived = dict(arguments)
-        if revived.get("initial_model") is not None:
-            revived["initial_model"] = model_from_dict(revived["initial_model"])
+        for name, read in _READ.items():
+            if isinstance(revived.get(name), dict):
+                revived[name] = read(revived[name])
         if "policies" in revived:
             if not isinstance(revived["policies"], list | tuple):
                 raise ValueError(f"policies must be a list, got {revived['policies']!r}")

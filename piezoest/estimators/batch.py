@@ -118,9 +118,8 @@ class BatchFit(Hopping):
         hop: float | None = None,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        self._start_from(
-            initial_model, FreeRunning, "a ColemanHodgdon or a LinearGain"
-        ).coordinate_values()  # refuses what has no admissible model near it
+        initial = self._start_from(initial_model, FreeRunning, admissible=False)
+        initial.coordinate_values()  # refuses what has no admissible model near it
         self._creep = instance("creep", creep, Creep | None, "a Creep: its time constants are kept")
         for name, given, known in (("method", method, METHODS), ("loss", loss, TUNING)):
             if given not in tuple(known):
@@ -358,11 +357,6 @@ class BatchFit(Hopping):
         rows = self._record[:, : self._count].tolist()
         given = ([value if np.isfinite(value) else None for value in row] for row in rows)
         return super().to_dict() | dict(zip(self._saved_too, given, strict=True))
-
-    @classmethod
-    def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        creep = arguments["creep"]
-        return {**super()._revive(arguments), "creep": None if creep is None else Creep.from_dict(creep)}
 
     def _restore(self, data: dict[str, Any]) -> None:
         super()._restore(data)

@@ -1,14 +1,23 @@
 """What estimators whose samples go through compiled functions share."""
 
+from collections.abc import Iterable
 from typing import Any, ClassVar, cast
 
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.estimators import loops
+from piezoest.equations import swing
+from piezoest.estimators import loops, saved_state
 from piezoest.estimators.base import EstimatorBase, Trace
-from piezoest.layout import Record, new
+from piezoest.estimators.saved_state import Rule
+from piezoest.layout import ABSENT, Named, Record, new
 
+# Where a law keeps its outcome.
+IN_LAW: dict[str, tuple[str, ...]] = {
+    "y": ("law", "innovation"),
+    "S": ("law", "innovation_variance"),
+    "P": ("law", "P"),
+}
 # Histories that a compiled loop does not write.
 NONE, NO_ROWS = np.empty(0), np.empty((0, 0))
 
@@ -17,10 +26,10 @@ class CompiledEstimator(EstimatorBase):
     """An estimator whose samples go through compiled functions on named numbers.
 
     Its `kernel` is a module, named by the layout of the state, with functions that compiled code can call:
-    ``sample(state, settings, u, x)``, what becomes of one sample; ``write_row(state, settings, row)`` and
-    ``write_outcome(state, row, y, S, P)``, what a `run` keeps of it; ``proposed(state, settings, model)``,
-    the admissible model as known now: gain, or alpha, beta and gamma, and fourth the offset. A class that has
-    `model` itself does without the last, and cannot be exported to C.
+    ``sample(state, settings, u, x)``, what becomes of one sample; ``write_row(state, settings, row)``, what a
+    `run` keeps of the estimate after it, and ``outcome(state)``, innovation, its variance and covariance;
+    ``proposed(state, settings, model)``, the admissible model as known now: gain, or alpha, beta and gamma,
+    and fourth the offset. A class that has `model` itself does without the last, and cannot be exported to C.
     """
 
     __slots__ = ("_run_loop", "_settings", "_settings_layout", "_step_loop")
@@ -29,6 +38,8 @@ class CompiledEstimator(EstimatorBase):
     kernel: ClassVar[Any]
     #: Functions within ``kernel.sample`` that no model depends on: a controller leaves them out.
     unneeded: ClassVar[tuple[Any, ...]] = ()
+
+    _places: ClassVar[dict[str, tuple[str, ...]]] = {"P": ("law", "P")}
 
     _layouts_of: ClassVar[dict[str, str]] = {
         "_state": "_layout", "_start": "_layout", "_settings": "_settings_layout"
@@ -60,6 +71,13 @@ class CompiledEstimator(EstimatorBase):
         """Layouts of `state` and `settings`, for which the compiled functions are made."""
         return self._layout, self._settings_layout
 
+    def _rules(self, state: Any) -> Iterable[Rule]:
+        counts = self._counts(state)
+        skipped = (counts[name] for name in ("missing", "outliers", "updates", "held"))
+        yield saved_state.no_more_than(counts["samples"], *skipped)
+        if self._layout.by_name.get("swing", ABSENT) != ABSENT:
+            yield swing.has_a_size(state["swing"])
+
     def _sample(self, u: float, x: float) -> None:
         if self._step_loop is None:
             self._step_loop = loops.step.of(*self.layouts)
@@ -72,7 +90,7 @@ class CompiledEstimator(EstimatorBase):
         self._run_loop(self._state, self._settings, u, x, every, *histories)
 
     def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        rows, n = u.size // every, self.covariance_size
+        rows, n = u.size // every, len(super()._now("P"))
         theta = np.empty((rows, self.row_size))
         sizes = {name: rows if name in want else 0 for name in ("y", "S", "P")}
         y, S, P = np.empty(sizes["y"]), np.empty(sizes["S"]), np.empty((sizes["P"], n * n))
@@ -85,19 +103,32 @@ class CompiledEstimator(EstimatorBase):
             **{name: self._shown(name, kept[name], theta) for name in want},
         )
 
-    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
-        """What `run` shows of a history, y, S or P, that the loop wrote beside its rows of the estimate."""
-        return history
+    def absorb(self, u: FloatArray, x: FloatArray) -> None:
+        """Do the same as `run`, but keep nothing."""
+        u, x = self._records(u, x)
+        self._through(u, x, u.size + 1, (NO_ROWS, NONE, NONE, NO_ROWS))
+
+    def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
+        """What is shown of y (…), S (…) or P (…, n, n), as the kernel has it, beside rows of the estimate."""
+        return values
+
+    def _now(self, name: str) -> Any:
+        if name == "theta":
+            return self.theta_of(self._row)
+        return self._shown(name, super()._now(name), self._row if name == "P" else NONE)
 
     @property
-    def covariance_size(self) -> int:
-        """Rows of the covariance that compiled loops keep."""
-        return len(self.parameter_names)
+    def _row(self) -> FloatArray:
+        """What ``kernel.write_row`` writes now: so many numbers as there are parameters, if not said else."""
+        row = np.empty(len(self.parameter_names))
+        state, settings = Named(self._state, self._layout), Named(self._settings, self._settings_layout)
+        self.kernel.write_row(state, settings, row)
+        return row
 
     @property
     def row_size(self) -> int:
         """Numbers that compiled loops write into a row of their history of the estimate."""
-        return len(self.parameter_names)
+        return int(self._row.size)
 
     def theta_of(self, rows: FloatArray) -> FloatArray:
         """Parameters (…, n) of rows of that history.

@@ -73,106 +73,69 @@ def followed(options: dict[str, Any], policies: tuple[Policy, ...], at: Conditio
     if not at.has_loop:
         found.discard("noise")
     swings = {"level", "products", "noise", "belief", "energy"} & found
-    if swings or any(policy.needs_swings or policy.counts_periods for policy in policies):
+    if swings or any(policy.needs_swings for policy in policies):
         found.add("swings")
     return found
 
 
 @inlined
-def _centre(centre: Any, u: Any, x: Any) -> None:
-    """Count from the first good sample, where an offset is estimated."""
-    if centre is None:
-        return
-    centre.u = u
-    centre.x = x
-
-
-@inlined
-def u_from_centre(centre: Any, u: Any) -> Any:
+def u_from_centre(state: Any, u: Any) -> Any:
     """Voltage from the first one on, where an offset is estimated."""
-    if centre is None:
-        return u
-    return u - centre.u
+    return u if state.centre is None else u - state.centre.u
 
 
 @inlined
-def x_from_centre(centre: Any, x: Any) -> Any:
+def x_from_centre(state: Any, x: Any) -> Any:
     """Displacement from the first one on, where an offset is estimated."""
-    if centre is None:
-        return x
-    return x - centre.x
+    return x if state.centre is None else x - state.centre.x
 
 
 @inlined
-def believe_level(belief: Any, rejection: Any, state: Any, x: Any) -> None:
-    """Take x for a new level.
+def is_believable(state: Any, settings: Any, slope: Any, x: Any, jumped: Any) -> Any:
+    """Whether x is a reading that the stage can have made, after the last good one, or may have `jumped`.
 
-    What is usual stays known: the way back from a wrong level must not pass for a reading like any other.
+    What is usual then stays known: the way back from a wrong level must not pass for a usual reading.
     """
-    if belief is None:
-        return
-    dx = x_from_centre(state.centre, x) - state.x_last
-    believing.believe(belief, dx, state.travel, rejection.warm_up)
-
-
-@inlined
-def is_believable(
-    belief: Any, rejection: Any, state: Any, estimate: Any, unit: Any, x: Any, jumped: Any
-) -> Any:
-    """Whether x is a reading that the stage can have made, after the last good one, or may have `jumped`."""
-    if belief is None:
+    if state.belief is None:
         return True
-    dx = x_from_centre(state.centre, x) - state.x_last
-    if believing.stands_still(belief, dx, state.travel, state.swing.size):
+    dx, warm_up = x_from_centre(state, x) - state.x_last, settings.policies.outlier_rejection.warm_up
+    if believing.stands_still(state.belief, dx, state.travel, state.swing.size):
         return False
-    slope = abs(estimate[1]) * unit
-    if believing.believable(belief, dx, slope, state.travel, rejection.warm_up):
+    if believing.believable(state.belief, dx, slope, state.travel, warm_up):
         return True
     if jumped:
-        believe_level(belief, rejection, state, x)
+        believing.believe(state.belief, dx, state.travel, warm_up)
     return jumped
 
 
 @inlined
-def prime(state: Any, rejection: Any, u: Any, x: Any) -> None:
+def prime(state: Any, settings: Any, u: Any, x: Any) -> None:
     """Start from (u, x) as the last good sample."""
-    if state.primed == 0.0:
-        _centre(state.centre, u, x)
-    else:
-        believe_level(state.belief, rejection, state, x)
+    if state.primed != 0.0:
+        if state.belief is not None:  # x is a new level
+            dx, warm_up = x_from_centre(state, x) - state.x_last, settings.policies.outlier_rejection.warm_up
+            believing.believe(state.belief, dx, state.travel, warm_up)
+    elif state.centre is not None:
+        state.centre.u = u
+        state.centre.x = x
     state.primed = 1.0
-    state.u_last = u_from_centre(state.centre, u)
-    state.x_last = x_from_centre(state.centre, x)
+    state.u_last = u_from_centre(state, u)
+    state.x_last = x_from_centre(state, x)
     state.travel = state.moment = state.rise = state.gap = 0.0
 
 
 @inlined
-def _high_passed(memory: Any, pole: Any, i: int, value: Any) -> Any:
-    if memory is None:
-        return value
-    memory.phi[i], value = filters.high_pass_step(memory.phi[i], value, pole)
-    return value
-
-
-@inlined
-def _output_high_passed(memory: Any, pole: Any, value: Any) -> Any:
-    if memory is None:
-        return value
-    memory.z, value = filters.high_pass_step(memory.z, value, pole)
-    return value
-
-
-@inlined
-def _regression(loop: Any, state: Any, settings: Any, x: Any) -> Any:
+def _regression(state: Any, settings: Any, x: Any) -> Any:
     """Regressor and output from the last good sample to this one, not yet filtered; returns the output."""
     phi = state.phi
-    if loop is None:
+    if settings.loop is None:
         phi[0] = state.u_last
         if len(phi) == 2:
             phi[1] = 1.0
         return x
     z = x - state.x_last
-    sensor_noise.measure(state.noise, z)
+    if state.noise is not None:
+        sensor_noise.measure(state.noise, z)
     phi[0] = -0.5 * (x + state.x_last) * state.travel
     phi[1] = state.rise
     phi[2] = state.moment
@@ -184,23 +147,24 @@ def _regression(loop: Any, state: Any, settings: Any, x: Any) -> Any:
 @inlined
 def filtered_regression(state: Any, settings: Any, x: Any) -> Any:
     """Regressor behind W_p of App. A and the optional high-pass; returns the output, and starts the next."""
-    z = _regression(settings.loop, state, settings, x)
+    z = _regression(state, settings, x)
     state.x_last = x
     state.travel = state.moment = state.rise = state.gap = 0.0
-    phi, low = state.phi, state.low_pass
+    phi, low, high = state.phi, state.low_pass, state.high_pass
     for i in range(len(phi)):
-        low.phi[i] = filters.low_pass_step(low.phi[i], phi[i] * settings.scale[i], settings.low_pole)
-        phi[i] = _high_passed(state.high_pass, settings.high_pole, i, low.phi[i])
-    low.z = filters.low_pass_step(low.z, z * settings.output_scale, settings.low_pole)
-    return _output_high_passed(state.high_pass, settings.high_pole, low.z)
+        phi[i] = low.phi[i] = filters.low_pass_step(low.phi[i], phi[i] * settings.scale[i], settings.low_pole)
+        if high is not None:
+            high.phi[i], phi[i] = filters.high_pass_step(high.phi[i], phi[i], settings.high_pole)
+    z = low.z = filters.low_pass_step(low.z, z * settings.output_scale, settings.low_pole)
+    if high is not None:
+        high.z, z = filters.high_pass_step(high.z, z, settings.high_pole)
+    return z
 
 
 @inlined
-def excite(excitation: Any, state: Any, settings: Any) -> None:
+def excite(state: Any, settings: Any) -> None:
     """Mean square of the regressor over a swing, in unit of motion."""
-    if excitation is None:
-        return
-    phi = state.phi
+    phi, excitation = state.phi, state.excitation
     fraction = filters.low_pass_step(excitation.motion, state.fraction, settings.low_pole)
     excitation.motion = fraction
     swings = excitation.swings + fraction
@@ -212,15 +176,11 @@ def excite(excitation: Any, state: Any, settings: Any) -> None:
     for i in range(len(phi)):
         mean = excitation.squares[i]
         excitation.squares[i] = mean + (fresh * phi[i] * phi[i] - old * mean)
-    _excite_jointly(excitation.products, excitation.squares, phi, fresh, old)
-
-
-@inlined
-def _excite_jointly(products: Any, squares: Any, phi: Any, fresh: Any, old: Any) -> None:
+    products = excitation.products
     if products is None:
         return
     for i in range(len(phi)):
-        products[i, i] = squares[i]
+        products[i, i] = excitation.squares[i]
         for j in range(i + 1, len(phi)):
             mean = products[i, j]
             mean += fresh * phi[i] * phi[j] - old * mean

@@ -7,12 +7,11 @@ import numpy as np
 
 from piezoest._checks import FloatArray, moderate
 from piezoest.equations import coleman_hodgdon as equations
-from piezoest.equations import swing
 from piezoest.estimators import ekf_kernel
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.derivative_form import LONGEST_GAP
-from piezoest.estimators.saved_state import Rule, no_more_than
+from piezoest.estimators.saved_state import Rule
 from piezoest.models import ColemanHodgdon, LinearGain
 
 # How far the parameters of a filter that does not project may be outside of the admissible set: a relative to
@@ -30,11 +29,8 @@ class HysteresisEKF(CompiledEstimator):
 
     Parameters
     ----------
-    sample_rate : float
-        [Hz].
-    initial_model : ColemanHodgdon or LinearGain, optional
-        Initial model; a model of the same kind is estimated. Default
-        ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack actuator.
+    sample_rate, initial_model, delay
+        As in `HysteresisRLS`.
     uncertainty : float
         Standard deviation of each initial parameter (a, b, c or the gain), relative to its value.
     noise : float
@@ -49,8 +45,6 @@ class HysteresisEKF(CompiledEstimator):
     offset : bool
         Also estimate an offset of the displacement, with the random walk `mismatch`. A larger loop
         leaves such an offset after a change of amplitude.
-    delay : float
-        Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     project : bool
         Keep the estimate in the admissible set by a projection in the metric of P.
 
@@ -87,6 +81,7 @@ class HysteresisEKF(CompiledEstimator):
     __slots__ = ()
 
     kernel: ClassVar[Any] = ekf_kernel
+    _places: ClassVar[dict[str, tuple[str, ...]]] = {"P": ("filter", "P"), "K": ("filter", "K")}
 
     def __init__(
         self,
@@ -102,11 +97,7 @@ class HysteresisEKF(CompiledEstimator):
         project: bool = True,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = self._start_from(
-            initial_model, ColemanHodgdon | LinearGain, "a ColemanHodgdon or a LinearGain"
-        )
-        if not initial.is_admissible:
-            raise ValueError(f"initial_model {initial} is not admissible: use nearest_admissible()")
+        initial = self._start_from(initial_model, ColemanHodgdon, LinearGain)
         uncertainty = moderate("uncertainty", uncertainty)
         drift = moderate("drift", drift, or_zero=True)
         mismatch = moderate("mismatch", mismatch, or_zero=True)
@@ -145,8 +136,7 @@ class HysteresisEKF(CompiledEstimator):
         )
 
     def _rules(self, state: Any) -> Iterable[Rule]:
-        yield no_more_than(state["samples"], state["missing"], state["outliers"], state["updates"])
-        yield swing.has_a_size(state["swing"])
+        yield from super()._rules(state)
         if isinstance(self._initial, ColemanHodgdon):
             words = "the filter's parameters must be admissible, or near it where it does not project"
             yield words, self._parameters_fit(state)
@@ -159,28 +149,19 @@ class HysteresisEKF(CompiledEstimator):
         # Without projection a decay below zero is an exponential that grows: not without end.
         return bool(-GROWING * least["a"] <= a and abs(c) <= GREATEST * least["margin"])
 
-    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
-        s = rows[:, len(self.parameter_names) :]
-        return parameter_covariance(s, history) if name == "P" else history
-
-    @property
-    def covariance_size(self) -> int:
-        """Of the filter's state."""
-        return int(self._state["filter"]["s"].size)
-
-    @property
-    def row_size(self) -> int:
-        """Parameters, and behind them the filter's state."""
-        return len(self.parameter_names) + self.covariance_size
+    def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
+        return parameter_covariance(rows, values) if name == "P" else values
 
     def theta_of(self, rows: FloatArray) -> FloatArray:
-        """Parameters (…, n) of rows (…, row_size)."""
-        return rows[..., : len(self.parameter_names)]
+        """Parameters (…, n) of rows of the filter's state."""
+        return parameters(rows)
 
     @property
     def s(self) -> FloatArray:
         """The filter's own state: (w_h, a, b, c[, offset]) or (gain[, offset])."""
         return np.array(self._state["filter"]["s"])
+
+    _row = s
 
     @property
     def state_covariance(self) -> FloatArray:
@@ -192,21 +173,6 @@ class HysteresisEKF(CompiledEstimator):
         """Names of the entries of `theta`."""
         names = self._initial.parameter_names
         return (*names, "offset") if self._arguments["offset"] else names
-
-    @property
-    def theta(self) -> FloatArray:
-        """Parameters, shape (n,), in the order of `parameter_names`."""
-        return parameters(self.s)
-
-    @property
-    def P(self) -> FloatArray:
-        """Covariance of `theta` to first order, shape (n, n)."""
-        return parameter_covariance(self.s, self.state_covariance)
-
-    @property
-    def K(self) -> FloatArray:
-        """Last gain, of `s`."""
-        return np.array(self._state["filter"]["K"])
 
     def _is_projected(self) -> bool:
         projection = self._state["projection"]

@@ -9,12 +9,12 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.compile import inlined, like, local
-from piezoest.equations import admissible, believing, kalman, swing
+from piezoest.compile import inlined, like
+from piezoest.equations import admissible, believing, kalman, least_squares, swing
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.estimators.delay_line import delayed
 from piezoest.estimators.model_writing import write_loop
-from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED, keep_outcome
+from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED
 from piezoest.layout import (
     ABSENT,
     AMOUNT,
@@ -76,18 +76,19 @@ def settings_layout(n: int, *, hysteretic: bool) -> Layout:
 
 
 @inlined
-def from_first_voltage(centre: Any, primed: Any, u: Any) -> Any:
-    """Voltage less the first one, where there is an offset; `primed` says whether that was seen."""
-    if centre is None:
+def from_first_voltage(state: Any, u: Any) -> Any:
+    """Voltage less the first one, where there is an offset."""
+    if state.centre is None:
         return u
-    if primed == 0.0:
-        centre.u = u
-    return u - centre.u
+    if state.primed == 0.0:
+        state.centre.u = u
+    return u - state.centre.u
 
 
 @inlined
-def from_first_displacement(centre: Any, x: Any) -> Any:
+def from_first_displacement(state: Any, x: Any) -> Any:
     """Displacement less the first one, where there is an offset."""
+    centre = state.centre
     if centre is None:
         return x
     if centre.known == 0.0:
@@ -97,13 +98,14 @@ def from_first_displacement(centre: Any, x: Any) -> Any:
 
 
 @inlined
-def _time_update(s: Any, P: Any, du: Any, walk: Any, least: Any) -> None:
+def _time_update(state: Any, settings: Any, du: Any) -> None:
     """Exact sample map of the state, its Jacobian for the covariance, process noise."""
+    s, P = state.filter.s, state.filter.P
     row, q = like(s), like(s)
     for i in range(len(s)):
         row[i] = 0.0
-        q[i] = walk[i]
-    if least is None:
+        q[i] = settings.walk[i]
+    if settings.least is None:
         row[0] = 1.0
         kalman.predict_covariance(P, row, 1, q)
     else:
@@ -115,28 +117,28 @@ def _time_update(s: Any, P: Any, du: Any, walk: Any, least: Any) -> None:
 
 
 @inlined
-def measurement_row(h: Any, u: Any, least: Any, centre: Any) -> None:
-    """dx/ds: x = w_h + c u (+ offset), or x = K u (+ offset)."""
+def measurement_row(state: Any, settings: Any, u: Any, h: Any) -> None:
+    """dx/ds into `h`: x = w_h + c u (+ offset), or x = K u (+ offset)."""
     for i in range(len(h)):
         h[i] = 0.0
-    if least is None:
+    if settings.least is None:
         h[0] = u
     else:
         h[0] = 1.0
         h[3] = u
-    if centre is not None:
+    if state.centre is not None:
         h[len(h) - 1] = 1.0
 
 
 @register_jitable
-def _restart(state: Any, settings: Any, least: Any) -> None:
+def _restart(state: Any, settings: Any) -> None:
     """Let P start again, and with it the hysteresis w_h; the parameters stay."""
     P = state.filter.P
     for i in range(len(P)):
         for j in range(len(P)):
             P[i, j] = 0.0
         P[i, i] = settings.variances[i]
-    if least is not None:
+    if settings.least is not None:
         state.filter.s[0] = 0.0
     state.resets += 1.0
 
@@ -165,38 +167,21 @@ def _onto_admissible(s: Any, P: Any, least: Any, greatest: Any) -> Any:
 
 
 @inlined
-def _project(projection: Any, s: Any, P: Any, least: Any, swing_size: Any) -> None:
-    """Keep the estimate in the admissible set, where it is to be."""
-    if projection is None:
-        return
-    projection.moved = 0.0
-    greatest = max(GREATEST / max(swing_size, swing.SMALLEST), least.a / LEAST)
+def _project(state: Any, settings: Any) -> None:
+    """Keep the estimate in the admissible set."""
+    s, least = state.filter.s, settings.least
+    state.projection.moved = 0.0
+    greatest = max(GREATEST / max(state.swing.size, swing.SMALLEST), least.a / LEAST)
     within = s[1] >= least.a and s[1] <= greatest
     if not (within and s[2] >= least.b and s[3] - 2.0 * s[2] >= least.margin):
-        projection.moved = _onto_admissible(s, P, least, greatest)
-
-
-@inlined
-def _slope(s: Any, least: Any) -> Any:
-    """Greatest slope of the model as estimated."""
-    if least is None:
-        return abs(s[0])
-    return abs(s[3])
-
-
-@inlined
-def _free_level(P: Any, y: Any, least: Any, centre: Any) -> None:
-    """Let what can follow a jump of the displacement follow it: the offset, or else w_h."""
-    if centre is not None:
-        P[len(P) - 1, len(P) - 1] += y * y
-    elif least is not None:
-        P[0, 0] += y * y
+        state.projection.moved = _onto_admissible(s, state.filter.P, least, greatest)
 
 
 @inlined
 def _is_surprising(state: Any, settings: Any, dx: Any, y: Any, S: Any) -> Any:
     """Whether neither its size nor the filter, with innovation y of variance S, explains a change by dx."""
-    slope = _slope(state.filter.s, settings.least)
+    s = state.filter.s
+    slope = abs(s[0] if settings.least is None else s[3])
     if believing.believable(state.belief, dx, slope, state.travel, WARM_UP):
         return False
     return y * y > EXPECTED * EXPECTED * S
@@ -208,16 +193,16 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     s, P = state.filter.s, state.filter.P
     state.samples += 1.0
     if np.abs(u) < WILDEST:
-        u = from_first_voltage(state.centre, state.primed, delayed(state.line, u))
+        u = from_first_voltage(state, delayed(state.line, u))
         if state.primed == 0.0:
             state.primed = 1.0
             state.u_last = u
-        _time_update(s, P, u - state.u_last, settings.walk, settings.least)
+        _time_update(state, settings, u - state.u_last)
         state.travel += abs(u - state.u_last)
         swing.follow(state.swing, u)
         state.u_last = u
         if not (np.abs(s[0]) < kalman.LARGEST_TRACE and kalman.is_covariance(P)):
-            _restart(state, settings, settings.least)
+            _restart(state, settings)
     else:
         x = np.nan
     if not np.abs(x) < WILDEST:
@@ -225,10 +210,10 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         state.gap += 1.0
         state.last = MISSING
         return
-    x = from_first_displacement(state.centre, x)
+    x = from_first_displacement(state, x)
     h, product = like(s), like(s)
-    measurement_row(h, u, settings.least, state.centre)
-    y = x - kalman.measure(s, h)
+    measurement_row(state, settings, u, h)
+    y = x - least_squares.predicted_output(s, h)
     S = kalman.innovation_variance(P, h, settings.noise, product)
     belief, travel = state.belief, state.travel
     if belief.seen == 0.0:
@@ -244,17 +229,21 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         return
     if surprising:  # a reading that stays there is a new level
         believing.believe(belief, dx, travel, WARM_UP)
-        _free_level(P, y, settings.least, state.centre)
+        if state.centre is not None:  # what can follow a jump follows it
+            P[len(P) - 1, len(P) - 1] += y * y
+        elif settings.least is not None:
+            P[0, 0] += y * y
         S = kalman.innovation_variance(P, h, settings.noise, product)
     state.x_last = x
     state.travel = state.gap = 0.0
     if not kalman.is_safe(y, S):
-        _restart(state, settings, settings.least)
+        _restart(state, settings)
         state.held += 1.0
         state.last = HELD
         return
     kalman.correct(s, P, h, y, settings.noise, S, state.filter.K, product)
-    _project(state.projection, s, P, settings.least, state.swing.size)
+    if state.projection is not None:
+        _project(state, settings)
     state.y = y
     state.S = S
     state.updates += 1.0
@@ -265,35 +254,22 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
 
 
 @inlined
-def _offset(centre: Any, s: Any, slope: Any, otherwise: Any) -> Any:
-    """Offset of the loop of this slope [µm]; `otherwise` where it is not estimated."""
-    if centre is None:
-        return otherwise
-    return s[len(s) - 1] + centre.x - slope * centre.u
+def _offset(state: Any, settings: Any, slope: Any) -> Any:
+    """Offset of the loop of this slope [µm]; the start's where it is not estimated."""
+    s, centre = state.filter.s, state.centre
+    return settings.offset if centre is None else s[len(s) - 1] + centre.x - slope * centre.u
 
 
 @register_jitable
-def _propose_line(state: Any, settings: Any, gain: Any, model: Any) -> None:
-    """(gain, -, -, offset) into `model`, where a gain is estimated."""
-    if gain is None:
-        return
-    s = state.filter.s
-    model[0] = admissible.kept_gain(s[0], gain, LEAST)
-    model[3] = _offset(state.centre, s, model[0], settings.offset)
-
-
-@register_jitable
-def _propose_loop(state: Any, settings: Any, least: Any, model: Any) -> None:
-    """(alpha, beta, gamma, offset) into `model`, where a hysteresis is estimated."""
-    if least is None:
-        return
-    s = state.filter.s
+def _propose_loop(state: Any, settings: Any, model: Any) -> None:
+    """(alpha, beta, gamma, offset) into `model`."""
+    s, least = state.filter.s, settings.least
     a = s[1] if s[1] != 0.0 else least.a
     alpha, beta, gamma = equations.rate_parameters(a, s[2], s[3])
     model[0] = alpha
     model[1] = beta
     model[2] = gamma
-    model[3] = _offset(state.centre, s, s[3], settings.offset)
+    model[3] = _offset(state, settings, s[3])
     known = True
     if not admissible.has_inverse(alpha, beta, gamma):
         known = admissible.nearest_admissible(model, admissible.NEAREST_MARGIN)
@@ -327,43 +303,30 @@ def _lift(model: Any, least: Any, known: Any) -> None:
 @register_jitable
 def proposed(state: Any, settings: Any, model: Any) -> None:
     """(alpha, beta, gamma, offset) or (gain, -, -, offset) into `model`, admissible."""
-    _propose_line(state, settings, settings.gain, model)
-    _propose_loop(state, settings, settings.least, model)
+    if settings.least is not None:
+        _propose_loop(state, settings, model)
+    else:
+        model[0] = admissible.kept_gain(state.filter.s[0], settings.gain, LEAST)
+        model[3] = _offset(state, settings, model[0])
 
 
 @register_jitable
 def write_model(state: Any, settings: Any, model: Any) -> float:
     """Write the model as known now into settings of its inverse; what became of them, see `model_writing`."""
-    found = local(4)
-    proposed(state, settings, found)
-    return write_loop(found, settings.least is not None, model)
+    return write_loop(state, settings, settings.least is not None, model)
 
 
 # ---------------------------------------------------------------- what loops keep of a sample
 
 
 @inlined
-def _write_parameters(s: Any, least: Any, row: Any) -> None:
-    if least is None:
-        for i in range(len(s)):
-            row[i] = s[i]
-    else:
-        row[0], row[1], row[2] = equations.rate_parameters(s[1], s[2], s[3])
-        for i in range(4, len(s)):
-            row[i - 1] = s[i]
-
-
-@inlined
 def write_row(state: Any, settings: Any, row: Any) -> None:
-    """The parameters, and behind them the filter's state."""
-    s = state.filter.s
-    _write_parameters(s, settings.least, row)
-    first = len(row) - len(s)
-    for i in range(len(s)):
-        row[first + i] = s[i]
+    """The filter's state."""
+    for i in range(len(row)):
+        row[i] = state.filter.s[i]
 
 
 @inlined
-def write_outcome(state: Any, row: Any, y: Any, S: Any, P: Any) -> None:
+def outcome(state: Any) -> Any:
     """Innovation, its variance and the state's covariance."""
-    keep_outcome(row, state.y, state.S, state.filter.P, y, S, P)
+    return state.y, state.S, state.filter.P

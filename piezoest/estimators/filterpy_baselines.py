@@ -125,10 +125,10 @@ class _FilterPyBaseline(EstimatorBase):
 
     def _sample(self, u: float, x: float) -> None:
         state = Named(self._state, self._layout)
-        least = Named(self._ekf.settings, self._ekf.layouts[1]).least
+        settings = Named(self._ekf.settings, self._ekf.layouts[1])
         state.samples += 1.0
         if abs(u) < WILDEST:
-            u = kernel.from_first_voltage(state.centre, state.primed, delayed(state.line, u))
+            u = kernel.from_first_voltage(state, delayed(state.line, u))
             if state.primed == 0.0:
                 state.primed, state.u_last = 1.0, u
             if not self._guarded(self._predict, u - state.u_last):
@@ -141,8 +141,8 @@ class _FilterPyBaseline(EstimatorBase):
             state.last = MISSING
             return
         h = np.zeros(self._filter.x.size)
-        x = kernel.from_first_displacement(state.centre, x)
-        kernel.measurement_row(h, u, least, state.centre)
+        x = kernel.from_first_displacement(state, x)
+        kernel.measurement_row(state, settings, u, h)
         if not self._guarded(self._update, x, h):
             state.resets, state.held, state.last = state.resets + 1.0, state.held + 1.0, HELD
             return

@@ -2,10 +2,8 @@
 
 from abc import abstractmethod
 
-import numpy as np
-
 from piezoest._checks import FloatArray
-from piezoest.estimators.base import EstimatorBase, Trace
+from piezoest.estimators.base import EstimatorBase
 from piezoest.fitting.coordinates import Coordinates
 from piezoest.models import FreeRunning
 
@@ -24,38 +22,6 @@ class Hopping(EstimatorBase):
     @abstractmethod
     def _coordinates(self) -> Coordinates:
         """What is fitted."""
-
-    @property
-    @abstractmethod
-    def _left(self) -> int | None:
-        """Samples to the end of this hop; None if there are no hops."""
-
-    @abstractmethod
-    def _collect(self, u: FloatArray, x: FloatArray) -> FloatArray | None:
-        """Keep samples up to the end of the hop at most; their innovations, if they differ within it."""
-
-    def _run(self, u: FloatArray, x: FloatArray, every: int, want: frozenset[str]) -> Trace:
-        rows, n = u.size // every, len(self.parameter_names)
-        shapes = {"theta": (n,), "P": (n, n), "y": (), "S": ()}
-        kept = {name: np.empty((rows, *shapes[name])) for name in ("theta", *want)}
-
-        def keep(first: int, last: int) -> None:
-            for name, values in kept.items():
-                if first // every < last // every:
-                    values[first // every : last // every] = getattr(self, name)
-
-        done = 0
-        while done < u.size:
-            end = min(done + (self._left or u.size), u.size)
-            # Until the last sample is there, the rows hold the fit before it.
-            keep(done, end - 1)
-            innovations = self._collect(u[done:end], x[done:end])
-            keep(end - 1, end)
-            if innovations is not None and "y" in want:
-                kept["y"][done // every : end // every] = innovations[every - 1 - done % every :: every]
-            done = end
-        index = np.arange(every - 1, rows * every, every)
-        return Trace(index=index, parameter_names=self.parameter_names, **kept)
 
     @property
     def parameter_names(self) -> tuple[str, ...]:

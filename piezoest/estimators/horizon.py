@@ -8,9 +8,8 @@ import numpy as np
 
 from piezoest._checks import WILDEST, FloatArray, integer, moderate, positive
 from piezoest.estimators import horizon_kernel as kernel
-from piezoest.estimators.base import Status
 from piezoest.estimators.hopping import LEAST_HANDED_OUT, Hopping
-from piezoest.estimators.samples import HELD, NAMES, UPDATED
+from piezoest.estimators.samples import HELD, UPDATED
 from piezoest.estimators.saved_state import Rule, no_more_than
 from piezoest.estimators.thinning import thinned
 from piezoest.fitting.coordinates import Coordinates, coordinates
@@ -114,9 +113,7 @@ class MovingHorizon(Hopping):
             raise ValueError(f"window must be at most {LONGEST:g} samples long, got {window:g} s")
         if round(hop * sample_rate) >= round(window * sample_rate):
             raise ValueError(f"hop must be shorter than the window of {window:g} s, got {hop:g} s")
-        initial = self._start_from(initial_model, FreeRunning, "a ColemanHodgdon or a LinearGain")
-        if not initial.is_admissible:
-            raise ValueError(f"initial_model must be admissible, got {initial}: use nearest_admissible()")
+        initial = self._start_from(initial_model, FreeRunning)
         self._window, self._hop = max(2, round(window * sample_rate)), max(1, round(hop * sample_rate))
         if decimation is None:
             decimation = max(1, self._window // POINTS)
@@ -295,15 +292,9 @@ class MovingHorizon(Hopping):
         """Admissible model as held: of the last good solve, its slope at least 1 % of the start's."""
         return self._model_of(self._state["theta"]).lifted(self._initial, LEAST_HANDED_OUT)
 
-    @property
-    def status(self) -> Status:
-        """What happened to the samples so far.
-
-        ``updates`` counts the good solves, ``held`` the measured samples between them.
-        """
-        samples, missing, updates = (int(self._state[name]) for name in ("samples", "missing", "updates"))
-        last = NAMES[int(self._state["last"])]
-        return Status(samples, updates, missing, samples - missing - updates, 0, False, last)
+    def _counts(self, state: Any) -> dict[str, int]:
+        found = super()._counts(state)  # updates are the good solves, held the measured samples between them
+        return found | {"held": found["samples"] - found["missing"] - found["updates"]}
 
     @property
     def solves(self) -> int:

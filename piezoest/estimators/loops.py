@@ -4,6 +4,7 @@ The state's layout names the kernel, see `piezoest.estimators.compiled`.
 """
 
 from piezoest.compile import Cube, Matrix, Record, Vector, compiled, nth
+from piezoest.estimators.samples import keep_outcome
 
 
 @compiled
@@ -24,7 +25,8 @@ def run(
         due -= 1
         if due == 0:
             state.write_row(state, settings, rows[row])
-            state.write_outcome(state, row, y, S, P)
+            innovation, variance, covariance = state.outcome(state)
+            keep_outcome(row, innovation, variance, covariance, y, S, P)
             row, due = row + 1, every
 
 

@@ -16,9 +16,10 @@ NO_MODEL, CHANGED, TO_BE_PLACED = 0.0, 1.0, 2.0
 
 
 @register_jitable
-def write_loop(proposed: Any, hysteretic: bool, model: Any) -> float:
-    """Write (alpha, beta, gamma, offset) or (gain, -, -, offset) into settings of a loop's inverse."""
-    new = local(4)
+def write_loop(state: Any, settings: Any, hysteretic: bool, model: Any) -> float:
+    """Write what the kernel proposes now, of a loop or of a line, into settings of a loop's inverse."""
+    proposed, new = local(4), local(4)
+    state.proposed(state, settings, proposed)
     if not loop_inverse.proposed(proposed, hysteretic, new):
         return NO_MODEL
     if not np.abs(new[1] / new[0]) + np.abs(1.0 / new[2]) < loop_inverse.BEYOND:

@@ -5,10 +5,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from piezoest._checks import FloatArray, integer, moderate, non_negative
-from piezoest.equations import coleman_hodgdon, output_error, sensor_noise, swing
+from piezoest.equations import coleman_hodgdon, output_error, sensor_noise
 from piezoest.estimators import output_error_kernel as kernel
-from piezoest.estimators import saved_state
-from piezoest.estimators.compiled import Freezable
+from piezoest.estimators.compiled import IN_LAW, Freezable
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.derivative_form import FIRST_HALF_PERIOD, LONGEST_GAP
 from piezoest.models import ColemanHodgdon
@@ -36,8 +35,8 @@ class OutputErrorRLS(Freezable):
 
     Parameters
     ----------
-    sample_rate : float
-        [Hz].
+    sample_rate, delay
+        As in `HysteresisRLS`.
     initial_model : ColemanHodgdon, optional
         Initial model. Default ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack actuator.
     uncertainty : float
@@ -48,8 +47,6 @@ class OutputErrorRLS(Freezable):
         Factor: the bank covers the initial decay divided by `span` to the initial decay times `span`.
     members : int
         Number of decays in the bank, 3 to 1000.
-    delay : float
-        Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     policies : tuple of policies, optional
         `policies.RandomWalk`, which sets the memory, and optionally `policies.OutlierRejection`.
         Default: both.
@@ -87,6 +84,7 @@ class OutputErrorRLS(Freezable):
     __slots__ = ()
 
     kernel: ClassVar[Any] = kernel
+    _places = IN_LAW
 
     conformance_exceptions: ClassVar[dict[str, str]] = {
         "learns_a_linear_gain": "A linear gain has no loop, and nothing that an output-error form would add."
@@ -105,9 +103,7 @@ class OutputErrorRLS(Freezable):
         policies: tuple[Policy, ...] = POLICIES,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = self._start_from(initial_model, ColemanHodgdon, "a ColemanHodgdon")
-        if not initial.is_admissible:
-            raise ValueError(f"initial_model {initial} is not admissible: use nearest_admissible()")
+        initial = self._start_from(initial_model, ColemanHodgdon)
         if moderate("span", span) <= 1.0:
             raise ValueError(f"span must be above 1, got {span:g}")
         members = integer("members", members, 3, MOST_MEMBERS)
@@ -164,33 +160,17 @@ class OutputErrorRLS(Freezable):
             {"member": nearest, "member_before": nearest, "law": {"s": s, "P": P}, "line": empty},
         )
 
-    def _rules(self, state: Any) -> Any:
-        law = state["law"]
-        yield saved_state.no_more_than(
-            state["samples"], state["missing"], state["outliers"], law["updates"], law["held"]
-        )
-        yield swing.has_a_size(state["swing"])
-
-    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
-        if name == "P":
-            return self._theta_covariance(rows, history)
-        unit = self._initial.c
-        return history * (unit if name == "y" else unit**2)
-
-    @property
-    def covariance_size(self) -> int:
-        """Of the filter's vector."""
-        return kernel.SIZE
+    def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
+        if name != "P":
+            return values * self._initial.c ** (1 if name == "y" else 2)
+        jacobian = self._jacobian(rows)
+        covariance = jacobian @ values @ np.swapaxes(jacobian, -1, -2)
+        return 0.5 * (covariance + np.swapaxes(covariance, -1, -2))
 
     def _decay_of(self, s: FloatArray) -> FloatArray:
         """Decay a of rows (…, 6) of the filter's state and the member in use, shape (…)."""
         correction = output_error.log_ratio(s[..., 0], s[..., 2], float(self._settings["step"]))
         return self._settings["decays"][s[..., -1].astype(int)] * np.exp(correction)
-
-    @property
-    def row_size(self) -> int:
-        """The filter's vector and the member in use."""
-        return kernel.SIZE + 1
 
     def theta_of(self, s: FloatArray) -> FloatArray:
         """Parameters (…, 4) of rows (…, 6)."""
@@ -219,12 +199,6 @@ class OutputErrorRLS(Freezable):
         jacobian[..., 3, 3:] = unit
         return jacobian
 
-    def _theta_covariance(self, s: FloatArray, P: FloatArray) -> FloatArray:
-        """Covariances (…, 4, 4) of the parameters, to first order."""
-        jacobian = self._jacobian(s)
-        covariance = jacobian @ P @ np.swapaxes(jacobian, -1, -2)
-        return 0.5 * (covariance + np.swapaxes(covariance, -1, -2))
-
     @property
     def _row(self) -> FloatArray:
         """The filter's state and the member in use, shape (6,)."""
@@ -239,26 +213,6 @@ class OutputErrorRLS(Freezable):
     def decays(self) -> FloatArray:
         """Decays of the bank [1/V], shape (members,)."""
         return np.array(self._settings["decays"])
-
-    @property
-    def theta(self) -> FloatArray:
-        """Parameters as estimated, shape (4,), possibly outside the admissible set."""
-        return self.theta_of(self._row)
-
-    @property
-    def P(self) -> FloatArray:
-        """Covariance of `theta` to first order as the law sees it, shape (4, 4)."""
-        return self._theta_covariance(self._row, self._state["law"]["P"])
-
-    @property
-    def y(self) -> float:
-        """Last innovation [µm]."""
-        return float(self._state["law"]["innovation"] * self._initial.c)
-
-    @property
-    def S(self) -> float:
-        """Variance of the last innovation as the law saw it [µm²]."""
-        return float(self._state["law"]["innovation_variance"] * self._initial.c**2)
 
     @property
     def K(self) -> FloatArray:

@@ -10,13 +10,13 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.compile import inlined, like, local, local_rows
+from piezoest.compile import inlined, like, local_rows
 from piezoest.equations import believing, kalman, least_squares, sensor_noise, swing
 from piezoest.equations import output_error as equations
 from piezoest.estimators.delay_line import delayed
 from piezoest.estimators.derivative_form import is_believable
 from piezoest.estimators.model_writing import write_loop
-from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED, WAITING, keep_outcome
+from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED, WAITING
 from piezoest.layout import (
     ABSENT,
     AMOUNT,
@@ -199,7 +199,7 @@ def _adapt(state: Any, settings: Any, u: Any, x: Any, fraction: Any, jumped: Any
     _excite(state, fraction)
     pace = max(fraction, SLOW / swing.half_period(state.swing, settings.first_half_period))
     R = _walk(state, settings, fraction, pace)
-    y = x / settings.unit - kalman.measure(s, phi)
+    y = x / settings.unit - least_squares.predicted_output(s, phi)
     if jumped:
         P[3, 3] += y * y
     product = like(s)
@@ -246,8 +246,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         u -= state.centre.u
         _move(state, settings, u)
     jumped = state.gap > settings.longest_gap
-    belief, rejection = state.belief, settings.policies.outlier_rejection
-    if measured and not is_believable(belief, rejection, state, law.s, settings.unit, x, jumped):
+    if measured and not is_believable(state, settings, abs(law.s[1]) * settings.unit, x, jumped):
         state.outliers += 1.0
         law.last = REJECTED
         measured = False
@@ -300,9 +299,7 @@ def proposed(state: Any, settings: Any, model: Any) -> None:
 @register_jitable
 def write_model(state: Any, settings: Any, model: Any) -> float:
     """Write the model as known now into settings of its inverse; what became of them, see `model_writing`."""
-    found = local(4)
-    proposed(state, settings, found)
-    return write_loop(found, True, model)
+    return write_loop(state, settings, True, model)
 
 
 @inlined
@@ -314,6 +311,6 @@ def write_row(state: Any, settings: Any, row: Any) -> None:
 
 
 @inlined
-def write_outcome(state: Any, row: Any, y: Any, S: Any, P: Any) -> None:
+def outcome(state: Any) -> Any:
     """Innovation, its variance and P."""
-    keep_outcome(row, state.law.innovation, state.law.innovation_variance, state.law.P, y, S, P)
+    return state.law.innovation, state.law.innovation_variance, state.law.P

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest._checks import FloatArray, check_start, finite
+from piezoest._checks import FloatArray, finite
 from piezoest.equations.bent_plays import between
 from piezoest.equations.creep import unit_creep_step
 from piezoest.equations.play import play, sum_of_first
@@ -61,28 +61,30 @@ class Plan(NamedTuple):
     offset: float
 
 
-@functools.singledispatch
 def plan(initial: Any, voltage_range: Any, thresholds: int, bends: int, times: FloatArray) -> Plan:
     """Grid and start that the arguments ask for."""
-    raise ValueError(
-        f"initial_model must be a PrandtlIshlinskii, a ColemanHodgdon or a LinearGain, got {initial!r}"
-    )
+    if np.any(times <= 0.0):
+        raise ValueError(f"creep must hold time constants above zero, got {times.min():g} s")
+    return _plan(initial, None if voltage_range is None else _middle(voltage_range), thresholds, bends, times)
 
 
-@plan.register
-def _of_line(initial: LinearGain, voltage_range: Any, thresholds: int, bends: int, times: FloatArray) -> Plan:
-    centre, half_width = _checked(initial, voltage_range, times)
+@functools.singledispatch
+def _plan(initial: Any, given: Any, thresholds: int, bends: int, times: FloatArray) -> Plan:
+    """Plan for a model; `given` are middle and half-width of the range of voltage, where one is."""
+    raise NotImplementedError
+
+
+@_plan.register
+def _of_line(initial: LinearGain, given: Any, thresholds: int, bends: int, times: FloatArray) -> Plan:
     if initial.gain <= 0.0:
         raise ValueError(f"initial_model must have a gain above zero, got {initial.gain:g} µm/V")
     slopes, none = np.array([[initial.gain]]), np.empty(0)
-    return Plan(none, none, none, centre, half_width or 1.0, True, initial.gain, slopes, none, initial.offset)
+    centre, half_width = given or (0.0, 1.0)
+    return Plan(none, none, none, centre, half_width, True, initial.gain, slopes, none, initial.offset)
 
 
-@plan.register
-def _of_plays(
-    initial: PrandtlIshlinskii, voltage_range: Any, thresholds: int, bends: int, times: FloatArray
-) -> Plan:
-    _checked(initial, voltage_range, times)
+@_plan.register
+def _of_plays(initial: PrandtlIshlinskii, given: Any, thresholds: int, bends: int, times: FloatArray) -> Plan:
     n, k = initial.thresholds.size, initial.bends.size
     half_width = float(initial.thresholds[-1]) if n else 1.0
     centre = float(np.mean(initial.bends)) if k else 0.0
@@ -94,14 +96,10 @@ def _of_plays(
     return Plan(relative, edges, times, centre, half_width, True, initial.gain, slopes, gains, initial.offset)
 
 
-@plan.register
-def _of_loop(
-    initial: ColemanHodgdon, voltage_range: Any, thresholds: int, bends: int, times: FloatArray
-) -> Plan:
-    centre, half_width = _checked(initial, voltage_range, times)
-    fixed = voltage_range is not None
-    if not fixed:
-        half_width = FIRST_RANGE / initial.alpha
+@_plan.register
+def _of_loop(initial: ColemanHodgdon, given: Any, thresholds: int, bends: int, times: FloatArray) -> Plan:
+    centre, half_width = given or (0.0, FIRST_RANGE / initial.alpha)
+    fixed = given is not None
     relative = np.arange(1, thresholds + 1) / max(1, thresholds)
     edges = np.linspace(-1.0, 1.0, bends + 2)[1:-1]
     loop = _with_the_loop_of(initial, half_width * relative, half_width)
@@ -112,15 +110,8 @@ def _of_loop(
     )
 
 
-def _checked(initial: Any, voltage_range: Any, times: FloatArray) -> tuple[float, float]:
-    """Check what all starts share; middle and half-width of a range of voltage, zeros if none is given."""
-    if not initial.is_admissible:
-        raise ValueError(f"initial_model must be admissible, got {initial}")
-    check_start(initial)
-    if np.any(times <= 0.0):
-        raise ValueError(f"creep must hold time constants above zero, got {times.min():g} s")
-    if voltage_range is None:
-        return 0.0, 0.0
+def _middle(voltage_range: Any) -> tuple[float, float]:
+    """Middle and half-width of a range of voltage."""
     values = np.asarray(voltage_range, dtype=np.float64)
     if values.shape != (2,) or not values[0] < values[1]:
         raise ValueError(f"voltage_range must be (least, largest) in V, got {voltage_range!r}")
@@ -234,16 +225,6 @@ def advance(plays: Any, settings: Any, theta: Any, u: Any) -> None:
     unit_creep_step(creep, sum_of_first(slopes, theta, phi), settings.decays)
     for i in range(len(creep)):
         phi[slopes + i] = creep[i]
-
-
-@register_jitable
-def output(theta: Any, plays: Any) -> Any:
-    """theta . phi for the last regressor."""
-    phi = plays.phi
-    total = 0.0
-    for i in range(len(theta)):
-        total += theta[i] * phi[i]
-    return total
 
 
 @register_jitable

@@ -1,18 +1,17 @@
 """Recursive least squares of a Prandtl-Ishlinskii model with creep and asymmetry."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, instance, integer, moderate
-from piezoest.equations import swing
 from piezoest.estimators import play_grid
 from piezoest.estimators import play_rls_kernel as kernel
 from piezoest.estimators.compiled import Freezable
 from piezoest.estimators.delay_line import delay_line
-from piezoest.estimators.saved_state import Rule, no_more_than
+from piezoest.estimators.saved_state import Rule
 from piezoest.layout import ABSENT, Named
 from piezoest.models import ColemanHodgdon, Creep, LinearGain, MassSpringDamper, Model, PrandtlIshlinskii
 
@@ -31,8 +30,8 @@ class PrandtlIshlinskiiRLS(Freezable):
 
     Parameters
     ----------
-    sample_rate : float
-        [Hz].
+    sample_rate, delay
+        As in `HysteresisRLS`.
     initial_model : PrandtlIshlinskii, ColemanHodgdon or LinearGain, optional
         Initial model. The thresholds, bends and time constants of creep of a `PrandtlIshlinskii` are
         kept. A `ColemanHodgdon` (default ``ColemanHodgdon(0.02, 0.12, 0.0036)``) is converted to
@@ -51,8 +50,6 @@ class PrandtlIshlinskiiRLS(Freezable):
         Relative standard deviation of the initial model's scale and of the shape of its loop.
     noise : float
         Standard deviation of the displacement's noise [µm].
-    delay : float
-        Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     mechanics : MassSpringDamper, optional
         Resonance through which the voltage is filtered first, so that it is not learnt as hysteresis.
         Use it with a `LeadFilter`, for references close to the resonance.
@@ -117,11 +114,7 @@ class PrandtlIshlinskiiRLS(Freezable):
         mechanics: MassSpringDamper | None = None,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = self._start_from(
-            initial_model,
-            PrandtlIshlinskii | ColemanHodgdon | LinearGain,
-            "a PrandtlIshlinskii, a ColemanHodgdon or a LinearGain",
-        )
+        initial = self._start_from(initial_model, PrandtlIshlinskii, ColemanHodgdon, LinearGain)
         plan = play_grid.plan(
             initial,
             voltage_range,
@@ -180,40 +173,24 @@ class PrandtlIshlinskiiRLS(Freezable):
         kernel.start(Named(self._state, self._layout), self._named_settings)
         self._start = self._state.copy()
 
-    @classmethod
-    def _revive(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        given = super()._revive(arguments)
-        if given.get("mechanics") is not None:
-            given["mechanics"] = MassSpringDamper.from_dict(given["mechanics"])
-        return given
-
     @property
     def _named_settings(self) -> Named:
         return Named(self._settings, self._settings_layout)
 
-    def _rules(self, state: Any) -> tuple[Rule, ...]:
+    def _rules(self, state: Any) -> Iterable[Rule]:
+        yield from super()._rules(state)
         plays, used = state["plays"], state["law"]["used"][:-1]
         anew = state.copy()
         play_grid.lay(Named(anew, self._layout).plays, self._named_settings)
         laid = anew["plays"]
         as_laid = all(np.array_equal(laid[name], plays[name]) for name in ("reach", "lower", "upper", "zero"))
         usable = np.all(used >= 0.0) and np.all(used[: self._columns] >= kernel.LEAST_GAIN)
-        counters = (state[name] for name in ("missing", "outliers", "updates", "held"))
-        return (
-            swing.has_a_size(state["swing"]),
-            no_more_than(state["samples"], *counters),
-            ("the grid must be as its middle and half-width lay it", as_laid),
-            ("the parameters in use must be zero or more", usable),
-        )
+        yield "the grid must be as its middle and half-width lay it", as_laid
+        yield "the parameters in use must be zero or more", usable
 
-    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
+    def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
         n = self._scale.size
-        return history[:, :n, :n] * np.outer(self._scale, self._scale) if name == "P" else history
-
-    @property
-    def covariance_size(self) -> int:
-        """Those of the parameters, and of the level."""
-        return int(self._scale.size) + 1
+        return values[..., :n, :n] * np.outer(self._scale, self._scale) if name == "P" else values
 
     @property
     def _columns(self) -> int:
@@ -238,14 +215,8 @@ class PrandtlIshlinskiiRLS(Freezable):
         return self._state["plays"]["reach"][self._columns :: self._columns].copy()
 
     @property
-    def theta(self) -> FloatArray:
-        """Slopes [µm/V] and creep gains [1] as estimated, shape (n,), in the order of `parameter_names`."""
+    def _row(self) -> FloatArray:
         return self._state["law"]["theta"][:-1] * self._scale
-
-    @property
-    def P(self) -> FloatArray:
-        """Covariance of `theta` as the law sees it, shape (n, n)."""
-        return self._state["law"]["P"][:-1, :-1] * np.outer(self._scale, self._scale)
 
     @property
     def K(self) -> FloatArray:

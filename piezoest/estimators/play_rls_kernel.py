@@ -8,15 +8,15 @@ from numba.extending import register_jitable
 from piezoest._checks import WILDEST
 from piezoest.compile import inlined
 from piezoest.equations.believing import BELIEF, believable, believe, stands_still
-from piezoest.equations.least_squares import restore_covariance
+from piezoest.equations.least_squares import predicted_output, restore_covariance
 from piezoest.equations.mechanics import mechanics_step
 from piezoest.equations.swing import SWING, follow, half_period
 from piezoest.equations.turning_points import remember
 from piezoest.estimators import play_grid
 from piezoest.estimators.delay_line import delayed
 from piezoest.estimators.model_writing import write_plays
-from piezoest.estimators.play_grid import ENOUGH_TURNS, LEVEL_START, begin_window, output, regressor
-from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED, WAITING, keep_outcome
+from piezoest.estimators.play_grid import ENOUGH_TURNS, LEVEL_START, begin_window, regressor
+from piezoest.estimators.samples import HELD, MISSING, OUTCOME, REJECTED, UPDATED, WAITING
 from piezoest.layout import (
     AMOUNT,
     COUNT,
@@ -195,12 +195,12 @@ def _update(law: Any, plays: Any, window: Any, settings: Any, half_period: Any, 
 def _regrid(law: Any, plays: Any, window: Any, settings: Any, half_width: Any) -> None:
     """Move to a grid about the middle of the range seen; what is new is unknown: P is the start's."""
     level = len(law.theta) - 1
-    expected = output(law.theta, plays)
+    expected = predicted_output(law.theta, plays.phi)
     play_grid.move(plays, settings, law.theta, half_width)
     restore_covariance(law.P, settings.prior)
     law.P[level, level] = (LEVEL_START * settings.unit * half_width) ** 2
     regressor(plays, settings.unit, 0.0)
-    law.theta[level] += expected - output(law.theta, plays)
+    law.theta[level] += expected - predicted_output(law.theta, plays.phi)
     begin_window(window, plays)
     for i in range(len(law.force)):
         law.force[i] = 0.0
@@ -216,14 +216,6 @@ def start(state: Any, settings: Any) -> None:
     play_grid.lay(state.plays, settings)
     regressor(state.plays, settings.unit, 0.0)
     _constrain(state.law, len(settings.relative_bends) + 1)
-
-
-@register_jitable
-def _through_resonance(resonance: Any, u: Any) -> Any:
-    """Voltage behind the mechanics' resonance, where there is one."""
-    if resonance is None:
-        return u
-    return mechanics_step(resonance.motion, u, resonance.coefficients)
 
 
 @register_jitable
@@ -253,7 +245,7 @@ def _shift(state: Any, x: Any) -> None:
     """Let the level be where x says."""
     law = state.law
     level = len(law.theta) - 1
-    jump = x - output(law.theta, state.plays)
+    jump = x - predicted_output(law.theta, state.plays.phi)
     law.theta[level] += jump
     law.used[level] += jump
     state.offset += jump
@@ -315,8 +307,8 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     if known:
         u = delayed(state.line, u)
         known = np.abs(u) < WILDEST
-    if known:
-        u = _through_resonance(state.resonance, u)
+    if known and state.resonance is not None:
+        u = mechanics_step(state.resonance.motion, u, state.resonance.coefficients)
     measured = known and np.abs(x) < WILDEST
     if not measured:
         state.missing += 1.0
@@ -359,6 +351,6 @@ def write_row(state: Any, settings: Any, row: Any) -> None:
 
 
 @inlined
-def write_outcome(state: Any, row: Any, y: Any, S: Any, P: Any) -> None:
+def outcome(state: Any) -> Any:
     """Innovation, its variance and P."""
-    keep_outcome(row, state.y, state.S, state.law.P, y, S, P)
+    return state.y, state.S, state.law.P

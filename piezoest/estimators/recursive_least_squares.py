@@ -117,12 +117,6 @@ class RecursiveLeastSquares(Copied):
         own[:] = phi
         kernel.update.of(*self._layouts)(self._state, self._settings, z)
 
-    def reset_covariance(self) -> None:
-        """Put P back to its initial value (covariance resetting on call)."""
-        law = self._state["law"]
-        law["P"] = self._settings["law"]["P_0"]
-        law["resets"] += 1.0
-
     @property
     def theta(self) -> FloatArray:
         """Parameters, shape (n,)."""

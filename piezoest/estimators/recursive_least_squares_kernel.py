@@ -86,23 +86,6 @@ def _settle(law: Any, settings: Any, safe: Any, y: Any, S: Any) -> None:
 
 
 @inlined
-def _update(rates: Any, directional: Any, law: Any, settings: Any, phi: Any) -> None:
-    """The update of the time base, or the directional one."""
-    if rates is not None:
-        _continuously(law, settings, phi, rates)
-    else:
-        _discretely(directional, law, settings, phi)
-
-
-@inlined
-def _discretely(directional: Any, law: Any, settings: Any, phi: Any) -> None:
-    if directional is not None:
-        _by_direction(law, settings, phi)
-    else:
-        _exponentially(law, settings, phi)
-
-
-@inlined
 def _exponentially(law: Any, settings: Any, phi: Any) -> None:
     theta, P, product, forgetting, R = law.theta, law.P, law.product, law.forgetting, law.noise
     y, quadratic = equations.innovation(theta, P, phi, law.z, product)
@@ -126,8 +109,8 @@ def _by_direction(law: Any, settings: Any, phi: Any) -> None:
 
 
 @inlined
-def _continuously(law: Any, settings: Any, phi: Any, rates: Any) -> None:
-    theta, P, h = law.theta, law.P, settings.step
+def _continuously(law: Any, settings: Any, phi: Any) -> None:
+    theta, P, h, rates = law.theta, law.P, settings.step, law.rates
     y, S = equations.continuous_step(theta, P, phi, law.z, h, settings.rate, settings.normalised, rates)
     safe = equations.continuous_is_safe(P, phi, y, S, h, rates)
     if safe:
@@ -154,18 +137,16 @@ def adapt(state: Any, settings: Any) -> None:
         law.held += 1.0
         return
     before_update(state, settings)
-    directional = settings.policies.directional_forgetting
-    _update(law.rates, directional, law, settings.law, state.phi)
+    if law.rates is not None:
+        _continuously(law, settings.law, state.phi)
+    elif settings.policies.directional_forgetting is not None:
+        _by_direction(law, settings.law, state.phi)
+    else:
+        _exponentially(law, settings.law, state.phi)
     if law.last == UPDATED:
         after_update(state, settings)
-        _learn_energy(state.energy, law, state.fraction)
-
-
-@inlined
-def _learn_energy(energy: Any, law: Any, fraction: Any) -> None:
-    if energy is None:
-        return
-    innovation_energy.learn(energy, law.innovation, law.innovation_variance, fraction)
+        if state.energy is not None:
+            innovation_energy.learn(state.energy, law.innovation, law.innovation_variance, state.fraction)
 
 
 def layout(n: int, policies: Field, *, discrete: bool) -> Any:

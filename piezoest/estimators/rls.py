@@ -5,11 +5,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from piezoest._checks import FloatArray, moderate
-from piezoest.equations import admissible, swing
+from piezoest.equations import admissible
 from piezoest.estimators import derivative_form as form
 from piezoest.estimators import recursive_least_squares_kernel as law
-from piezoest.estimators import rls_kernel, saved_state
-from piezoest.estimators.compiled import NO_ROWS, NONE, Freezable
+from piezoest.estimators import rls_kernel
+from piezoest.estimators.compiled import IN_LAW, Freezable
 from piezoest.estimators.delay_line import delay_line
 from piezoest.estimators.recursive_least_squares import TimeBase, is_discrete
 from piezoest.models import AmplitudeProfile, ColemanHodgdon, LinearGain
@@ -99,6 +99,7 @@ class HysteresisRLS(Freezable):
     __slots__ = ("_followed", "_scale")
 
     kernel: ClassVar[Any] = rls_kernel
+    _places = IN_LAW
     unneeded: ClassVar[tuple[Any, ...]] = (rls_kernel.propagate_error,)
 
     def __init__(
@@ -118,9 +119,7 @@ class HysteresisRLS(Freezable):
         policies: tuple[Policy, ...] | None = None,
     ) -> None:
         sample_rate = moderate("sample_rate", sample_rate)
-        initial = self._start_from(
-            initial_model, ColemanHodgdon | LinearGain, "a ColemanHodgdon or a LinearGain"
-        )
+        initial = self._start_from(initial_model, ColemanHodgdon, LinearGain, admissible=False)
         if np.any(initial.theta == 0.0):
             raise ValueError(f"initial_model must have no parameter at zero, got {initial}")
         if memory is not None and memory != "period":
@@ -192,58 +191,11 @@ class HysteresisRLS(Freezable):
             {"law": {"theta": start, "P": at.P_0}, "line": empty},
         )
 
-    def _rules(self, state: Any) -> Any:
-        own = state["law"]
-        yield saved_state.no_more_than(
-            state["samples"], state["missing"], state["outliers"], own["updates"], own["held"]
-        )
-        if state["swing"].size:
-            yield swing.has_a_size(state["swing"])
-
-    def absorb(self, u: FloatArray, x: FloatArray) -> None:
-        """Do as `run`, but keep nothing.
-
-        Parameters
-        ----------
-        u, x : array_like, shape (N,)
-            Voltage [V] and measured displacement [µm].
-        """
-        u, x = self._records(u, x)
-        self._through(u, x, u.size + 1, (NO_ROWS, NONE, NONE, NO_ROWS))
-
-    def _shown(self, name: str, history: FloatArray, rows: FloatArray) -> FloatArray:
+    def _shown(self, name: str, values: FloatArray, rows: FloatArray) -> Any:
         if name == "P":
-            return history * np.outer(self._scale, self._scale)
+            return values * np.outer(self._scale, self._scale)
         unit = float(self._settings["output_scale"])
-        return history / (unit if name == "y" else unit**2)
-
-    def reset_covariance(self) -> None:
-        """Set P to its initial value (covariance resetting)."""
-        own = self._state["law"]
-        own["P"] = self._settings["law"]["P_0"]
-        own["resets"] += 1.0
-
-    def announce_change(self, amplitude: float | None = None) -> None:
-        """Announce a change of the stage or the reference: adds the initial covariance to P.
-
-        Parameters
-        ----------
-        amplitude : float, optional
-            New amplitude of the reference [µm]. If `profile` contains it, the estimate is set to what was
-            learnt there, and P grows only by its uncertainty. Needs `policies.AmplitudeMemory`.
-
-        Raises
-        ------
-        ValueError
-            If amplitude is not above zero, or given without `policies.AmplitudeMemory`.
-        """
-        if amplitude is not None and amplitude_memory.announce(
-            self._layout, self._state, self._settings, amplitude
-        ):
-            return
-        own = self._state["law"]
-        own["P"] += self._settings["law"]["P_0"]
-        own["resets"] += 1.0
+        return values / (unit if name == "y" else unit**2)
 
     @property
     def profile(self) -> AmplitudeProfile:
@@ -279,14 +231,8 @@ class HysteresisRLS(Freezable):
         return (*names, *last) if self._scale.size > len(names) else names
 
     @property
-    def theta(self) -> FloatArray:
-        """Parameters as estimated, shape (n,), possibly outside the admissible set."""
+    def _row(self) -> FloatArray:
         return np.asarray(self._state["law"]["theta"] * self._scale)
-
-    @property
-    def P(self) -> FloatArray:
-        """Covariance of `theta` as the law sees it, shape (n, n)."""
-        return np.asarray(self._state["law"]["P"] * np.outer(self._scale, self._scale))
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -308,16 +254,6 @@ class HysteresisRLS(Freezable):
             energy = (1.0 - pole) / (1.0 + pole) * float(self._settings["noise_ratio"]) ** 2
             C = C + np.outer(gain, gain) * energy
         return np.sqrt(np.fmax(np.diag(C), 0.0)) * self._scale
-
-    @property
-    def y(self) -> float:
-        """Last innovation: filtered change of displacement a sample, or displacement [µm]."""
-        return float(self._state["law"]["innovation"] / self._settings["output_scale"])
-
-    @property
-    def S(self) -> float:
-        """Variance of the last innovation as the law saw it [µm²]."""
-        return float(self._state["law"]["innovation_variance"] / self._settings["output_scale"] ** 2)
 
     @property
     def K(self) -> FloatArray:

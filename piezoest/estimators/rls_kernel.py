@@ -6,7 +6,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.compile import inlined, like, local
+from piezoest.compile import inlined, like
 from piezoest.equations import admissible, believing, least_squares, sensor_noise, swing
 from piezoest.equations import coleman_hodgdon as equations
 from piezoest.equations.innovation_energy import ENERGY
@@ -15,7 +15,7 @@ from piezoest.estimators import level
 from piezoest.estimators import recursive_least_squares_kernel as law
 from piezoest.estimators.delay_line import delayed
 from piezoest.estimators.model_writing import write_loop
-from piezoest.estimators.samples import HELD, MISSING, REJECTED, UPDATED, WAITING, keep_outcome
+from piezoest.estimators.samples import HELD, MISSING, REJECTED, UPDATED, WAITING
 from piezoest.layout import (
     ABSENT,
     AMOUNT,
@@ -95,30 +95,6 @@ def _decay(state: Any, settings: Any) -> Any:
 
 
 @inlined
-def _follow_swings(voltage_swing: Any, state: Any, settings: Any, u: Any, du: Any) -> None:
-    if voltage_swing is None:
-        return
-    swing.follow(voltage_swing, u)
-    _follow_level(state.level, state, settings, du)
-
-
-@inlined
-def _follow_level(loop_level: Any, state: Any, settings: Any, du: Any) -> None:
-    if loop_level is None:
-        return
-    level.move(loop_level, du, _decay(state, settings))
-    if state.swing.since == 0.0:
-        level.turn(loop_level)
-
-
-@inlined
-def _measure_level(loop_level: Any, u: Any, x: Any) -> None:
-    if loop_level is None:
-        return
-    level.measure(loop_level, u, x)
-
-
-@inlined
 def _move(state: Any, settings: Any, u: Any) -> None:
     """Follow the voltage: the regressor's integrals, and its swings where anybody asks for them."""
     du = u - state.u_last
@@ -127,23 +103,20 @@ def _move(state: Any, settings: Any, u: Any) -> None:
     state.moment += moment
     state.travel += travel
     state.u_last = u
-    if rise != 0.0:
-        _follow_swings(state.swing, state, settings, u, du)
+    if rise != 0.0 and state.swing is not None:
+        swing.follow(state.swing, u)
+        if state.level is not None:
+            level.move(state.level, du, _decay(state, settings))
+            if state.swing.since == 0.0:
+                level.turn(state.level)
 
 
 @inlined
-def _measure_fraction(voltage_swing: Any, state: Any, settings: Any) -> None:
-    if voltage_swing is None:
-        return
-    state.fraction = swing.fraction_of_swing(voltage_swing, state.travel, settings.first_half_period)
-
-
-@inlined
-def propagate_error(C: Any, state: Any, settings: Any, restart: bool) -> None:
+def propagate_error(state: Any, settings: Any, restart: bool) -> None:
     """Covariance of the estimate's error under the sensor's noise, coloured by W_p and difference."""
-    if C is None:
+    if state.error_covariance is None:
         return
-    P_0, phi, product = settings.law.P_0, state.phi, state.law.product
+    C, P_0, phi, product = state.error_covariance, settings.law.P_0, state.phi, state.law.product
     if restart:
         least_squares.restore_covariance(C, P_0)
     gain = like(phi)
@@ -165,7 +138,7 @@ def _adapt(state: Any, settings: Any, z: Any) -> None:
     resets, first = own.resets, own.updates == 0.0
     law.adapt(state, settings)
     if own.last == UPDATED:
-        propagate_error(state.error_covariance, state, settings, first or own.resets != resets)
+        propagate_error(state, settings, first or own.resets != resets)
 
 
 @register_jitable
@@ -184,30 +157,33 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
         outcome.last = MISSING
     if waiting:
         if measured:
-            form.prime(state, settings.policies.outlier_rejection, u, x)
+            form.prime(state, settings, u, x)
             outcome.last = WAITING
         return
     if known:
         # A short gap is bridged: the voltage's integrals go on, the displacement's mean
         # is taken between the good samples on its two sides.
-        u = form.u_from_centre(state.centre, u)
+        u = form.u_from_centre(state, u)
         _move(state, settings, u)
-    rejection, theta = settings.policies.outlier_rejection, state.law.theta
-    if measured and not form.is_believable(state.belief, rejection, state, theta, settings.slope, x, False):
+    slope = abs(state.law.theta[1]) * settings.slope if state.belief is not None else 0.0
+    if measured and not form.is_believable(state, settings, slope, x, False):
         state.outliers += 1.0
         outcome.last = REJECTED
         measured = False
     if not measured:
         state.gap += 1.0
         return
-    x = form.x_from_centre(state.centre, x)
-    _measure_level(state.level, u, x)
-    _measure_fraction(state.swing, state, settings)
+    x = form.x_from_centre(state, x)
+    if state.level is not None:
+        level.measure(state.level, u, x)
+    if state.swing is not None:
+        state.fraction = swing.fraction_of_swing(state.swing, state.travel, settings.first_half_period)
     z = form.filtered_regression(state, settings, x)
     if state.frozen != 0.0:
         outcome.last = HELD
         return
-    form.excite(state.excitation, state, settings)
+    if state.excitation is not None:
+        form.excite(state, settings)
     _adapt(state, settings, z)
 
 
@@ -232,12 +208,13 @@ def _start(theta: Any, scale: Any) -> None:
 
 
 @register_jitable
-def trust_in_levels(walk: Any, state: Any, settings: Any) -> Any:
+def trust_in_levels(state: Any, settings: Any) -> Any:
     """Fraction of the offset that levels give: 0 where the derivative shows it well, 1 where it cannot.
 
     It cannot where noise covers the changes of x, nor where the swing is small: the offset then comes from a
     difference of the slopes up and down that is smaller than what the loop's shape differs from the model's.
     """
+    walk = settings.policies.random_walk
     if walk is None:
         return 0.0
     memory_squared = walk.memory * walk.memory
@@ -249,14 +226,14 @@ def trust_in_levels(walk: Any, state: Any, settings: Any) -> Any:
 
 
 @register_jitable
-def _offset(centre: Any, state: Any, settings: Any, theta: Any) -> Any:
+def _offset(state: Any, settings: Any, theta: Any) -> Any:
     """Offset of the loop: from the slopes, from levels, or the start's."""
-    if centre is None:
+    if state.centre is None:
         return settings.start.offset
     c = theta[2] / theta[0]
-    origin = centre.x - c * centre.u
+    origin = state.centre.x - c * state.centre.u
     offset = equations.offset_from_rate_parameters(theta[0], theta[3])
-    trust = trust_in_levels(settings.policies.random_walk, state, settings)
+    trust = trust_in_levels(state, settings)
     if trust > 0.0:
         levels = 0.0  # the start's, until a whole period is known
         if level.is_known(state.level):
@@ -266,17 +243,12 @@ def _offset(centre: Any, state: Any, settings: Any, theta: Any) -> Any:
 
 
 @register_jitable
-def _line_offset(centre: Any, settings: Any, theta: Any, gain: Any) -> Any:
-    if centre is None:
-        return settings.start.offset
-    return theta[1] + centre.x - gain * centre.u
-
-
-@register_jitable
 def _proposed_line(state: Any, settings: Any, theta: Any, model: Any) -> None:
     gain = admissible.kept_gain(theta[0], settings.start.gain, LEAST)
     model[0] = gain
-    model[3] = _line_offset(state.centre, settings, theta, gain)
+    model[3] = settings.start.offset
+    if state.centre is not None:
+        model[3] = theta[1] + state.centre.x - gain * state.centre.u
 
 
 @register_jitable
@@ -291,15 +263,7 @@ def _proposed_loop(state: Any, settings: Any, theta: Any, model: Any) -> None:
             _start(theta, scale)
     for i in range(3):
         model[i] = theta[i]
-    model[3] = _offset(state.centre, state, settings, theta)
-
-
-@register_jitable
-def _proposed(loop: Any, state: Any, settings: Any, theta: Any, model: Any) -> None:
-    if loop is None:
-        _proposed_line(state, settings, theta, model)
-    else:
-        _proposed_loop(state, settings, theta, model)
+    model[3] = _offset(state, settings, theta)
 
 
 @register_jitable
@@ -308,15 +272,16 @@ def proposed(state: Any, settings: Any, model: Any) -> None:
     theta = like(state.law.theta)
     for i in range(len(theta)):
         theta[i] = state.law.theta[i] * settings.parameter_scale[i]
-    _proposed(settings.loop, state, settings, theta, model)
+    if settings.loop is None:
+        _proposed_line(state, settings, theta, model)
+    else:
+        _proposed_loop(state, settings, theta, model)
 
 
 @register_jitable
 def write_model(state: Any, settings: Any, model: Any) -> float:
     """Write the model as known now into settings of its inverse; what became of them, see `model_writing`."""
-    found = local(4)
-    proposed(state, settings, found)
-    return write_loop(found, settings.loop is not None, model)
+    return write_loop(state, settings, settings.loop is not None, model)
 
 
 # ---------------------------------------------------------------- what loops keep of a sample
@@ -330,6 +295,6 @@ def write_row(state: Any, settings: Any, row: Any) -> None:
 
 
 @inlined
-def write_outcome(state: Any, row: Any, y: Any, S: Any, P: Any) -> None:
+def outcome(state: Any) -> Any:
     """Innovation, its variance and P."""
-    keep_outcome(row, state.law.innovation, state.law.innovation_variance, state.law.P, y, S, P)
+    return state.law.innovation, state.law.innovation_variance, state.law.P

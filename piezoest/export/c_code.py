@@ -11,7 +11,7 @@ from piezoest.equations import turning_points
 from piezoest.estimators.compiled import CompiledEstimator
 from piezoest.export import feedforward, ring
 from piezoest.export.c_translator import call
-from piezoest.export.c_values import Array, Known, Number, Root, Struct, Value, literal
+from piezoest.export.c_values import Array, Known, Number, Root, Struct, literal
 from piezoest.export.generated import CCode, Precision, estimator_lines, file_of, rendered
 from piezoest.layout import new, record
 from piezoest.models import ColemanHodgdon, Model, PrandtlIshlinskii
@@ -101,7 +101,7 @@ def c(
             f"estimator must be one such as HysteresisRLS, got {type(estimator).__name__}: {hint}"
         )
     ring.check_limits(estimator, compensator)
-    return _Generator(estimator, compensator, name, precision, interval).code()
+    return _generate(estimator, compensator, name, precision, interval)
 
 
 def _described(model: Model) -> str:
@@ -115,98 +115,84 @@ def _described(model: Model) -> str:
     )
 
 
-class _Generator:
-    """A controller of these two objects, translated."""
-
-    def __init__(self, estimator: Any, compensator: Compensator, name: str, precision: str, interval: int):
-        self.estimator, self.compensator, self.interval = estimator, compensator, interval
-        changes = hasattr(compensator.model.inverse, "change")
-        unneeded = () if estimator is None else estimator.unneeded
-        if not changes:
-            # Only another model's plays would be set from it.
-            unneeded = (*unneeded, turning_points.remember)
-        self.file = file_of(name, precision, unneeded)
-        model = compensator.model if estimator is None else estimator.model
-        self.hysteretic = isinstance(model, ColemanHodgdon)
-        if estimator is not None and not changes:
-            raise ValueError(
-                f"the code for a {type(compensator.model).__name__} takes no other model: leave out the "
-                "estimator, or start the compensator with a ColemanHodgdon or LinearGain"
-            )
-        if estimator is not None:
-            kind: Any = type(compensator)
-            kind(model, compensator.limits)  # which refuses what it cannot invert
-        self.state, settings, kernel = self._state(), self._settings(), Known(inverse_kernel)
-        self.file.struct(self.state.layout, "state")
-        self.give = self._call(ring.give, kernel, Number("r", "real"))
-        self.adopt = self.learn = ""
-        if changes:
-            self.adopt = self._call(ring.adopt, settings, kernel, Array("model", (4,), Root("model")))
-        if estimator is not None:
-            arguments = settings, Known(estimator.kernel), kernel, Number("x", "real")
-            self.learn = self._call(ring.learn, *arguments)
-
-    def _state(self) -> Struct:
-        """All that changes."""
-        compensator, model, estimator = self.compensator, self.compensator.model, self.estimator
-        parameters = np.zeros(4)
-        first = [model.gain] if hasattr(model, "gain") else model.theta
-        parameters[: len(first)] = first
-        parameters[3] = model.offset
-        layouts = compensator.layouts
-        fields = {"ring": ring.RING, "compensator": layouts[0], "settings": layouts[1]}
-        values = {"compensator": compensator.state, "settings": compensator.settings}
-        if estimator is not None:
-            fields["estimator"], values["estimator"] = estimator.layouts[0], estimator.state
-        layout = record(**fields)
-        start = new(layout, ring={"voltage": compensator.voltage, "model": parameters}, **values)
-        return Struct("state->", layout, start, Root("state"), "state")
-
-    def _settings(self) -> Struct:
-        """What never changes."""
-        state, own = (record(), record()) if self.estimator is None else self.estimator.layouts
-        layout = ring.settings_layout(own)
-        freezable, hysteretic = "frozen" in state.by_name, self.hysteretic
-        values = new(layout, interval=self.interval, freezable=freezable, hysteretic=hysteretic)
-        if self.estimator is not None:
-            values["estimator"] = self.estimator.settings
-        return Struct("", layout, values, Root(""), "settings", constant=True)
-
-    def _call(self, function: Any, *arguments: Value) -> str:
-        return call(self.file, function, [self.state, *arguments])
-
-    def code(self) -> CCode:
-        """Put the pieces together."""
-        file, give, adopt, learn = self.file, self.give, self.adopt, self.learn
-        zero, one = literal(0.0, file.single), literal(1.0, file.single)
-        model = "alpha [1/V], beta [um/V], gamma [um/V^2]" if self.hysteretic else "gain [um/V], 0, 0"
-        return rendered(
-            file,
-            "controller",
-            self._provenance(),
-            {"model": model, "change": _CHANGE if adopt else _NO_CHANGE},
-            {
-                "start": file.start(self.state.layout, self.state.values),
-                "functions": file.text(f"{give} {adopt} {learn}"),
-                "learn": _LEARN.format(zero=zero, learn=learn) if learn else "(void)x;",
-                "give": give,
-                "adopt": _ADOPT.format(real=file.real, adopt=adopt) if adopt else _NO_ADOPT,
-                "zero": zero,
-                "one": one,
-            },
-            learns=self.estimator is not None,
+def _generate(estimator: Any, compensator: Compensator, name: str, precision: str, interval: int) -> CCode:
+    """Translate a controller of these two objects."""
+    changes = hasattr(compensator.model.inverse, "change")
+    if estimator is not None and not changes:
+        raise ValueError(
+            f"the code for a {type(compensator.model).__name__} takes no other model: leave out the "
+            "estimator, or start the compensator with a ColemanHodgdon or LinearGain"
         )
+    unneeded = () if estimator is None else estimator.unneeded
+    if not changes:
+        # Only another model's plays would be set from it.
+        unneeded = (*unneeded, turning_points.remember)
+    file = file_of(name, precision, unneeded)
+    model = compensator.model if estimator is None else estimator.model
+    if estimator is not None:
+        kind: Any = type(compensator)
+        kind(model, compensator.limits)  # which refuses what it cannot invert
+    hysteretic, kernel = isinstance(model, ColemanHodgdon), Known(inverse_kernel)
+    state, settings = _state(estimator, compensator), _settings(estimator, interval, hysteretic)
+    file.struct(state.layout, "state")
+    give = call(file, ring.give, [state, kernel, Number("r", "real")])
+    adopt = learn = ""
+    if changes:
+        adopt = call(file, ring.adopt, [state, settings, kernel, Array("model", (4,), Root("model"))])
+    if estimator is not None:
+        learn = call(
+            file, ring.learn, [state, settings, Known(estimator.kernel), kernel, Number("x", "real")]
+        )
+    zero, one = literal(0.0, file.single), literal(1.0, file.single)
+    parameters = "alpha [1/V], beta [um/V], gamma [um/V^2]" if hysteretic else "gain [um/V], 0, 0"
+    return rendered(
+        file,
+        "controller",
+        _provenance(estimator, compensator, interval),
+        {"model": parameters, "change": _CHANGE if adopt else _NO_CHANGE},
+        {
+            "start": file.start(state.layout, state.values),
+            "functions": file.text(f"{give} {adopt} {learn}"),
+            "learn": _LEARN.format(zero=zero, learn=learn) if learn else "(void)x;",
+            "give": give,
+            "adopt": _ADOPT.format(real=file.real, adopt=adopt) if adopt else _NO_ADOPT,
+            "zero": zero,
+            "one": one,
+        },
+        learns=estimator is not None,
+    )
 
-    def _provenance(self) -> list[str]:
-        """What the code was made from."""
-        lines = [
-            f"Compensator: {type(self.compensator).__name__}, {_described(self.compensator.model)}.",
-            f"Limits: {self.compensator.limits}.",
-        ]
-        if self.estimator is None:
-            return [*lines, "Estimator: none."]
-        return [
-            *lines,
-            *estimator_lines(self.estimator.to_dict()),
-            f"Model handed over every {self.interval} samples.",
-        ]
+
+def _state(estimator: Any, compensator: Compensator) -> Struct:
+    """All that changes."""
+    model, parameters, layouts = compensator.model, np.zeros(4), compensator.layouts
+    first = [model.gain] if hasattr(model, "gain") else model.theta
+    parameters[: len(first)] = first
+    parameters[3] = model.offset
+    fields = {"ring": ring.RING, "compensator": layouts[0], "settings": layouts[1]}
+    values = {"compensator": compensator.state, "settings": compensator.settings}
+    if estimator is not None:
+        fields["estimator"], values["estimator"] = estimator.layouts[0], estimator.state
+    layout = record(**fields)
+    start = new(layout, ring={"voltage": compensator.voltage, "model": parameters}, **values)
+    return Struct("state->", layout, start, Root("state"), "state")
+
+
+def _settings(estimator: Any, interval: int, hysteretic: bool) -> Struct:
+    """What never changes."""
+    state, own = (record(), record()) if estimator is None else estimator.layouts
+    layout = ring.settings_layout(own)
+    values = new(layout, interval=interval, freezable="frozen" in state.by_name, hysteretic=hysteretic)
+    if estimator is not None:
+        values["estimator"] = estimator.settings
+    return Struct("", layout, values, Root(""), "settings", constant=True)
+
+
+def _provenance(estimator: Any, compensator: Compensator, interval: int) -> list[str]:
+    """What the code was made from."""
+    made_of = f"{type(compensator).__name__}, {_described(compensator.model)}"
+    lines = [f"Compensator: {made_of}.", f"Limits: {compensator.limits}."]
+    if estimator is None:
+        return [*lines, "Estimator: none."]
+    handed_over = f"Model handed over every {interval} samples."
+    return [*lines, *estimator_lines(estimator.to_dict()), handed_over]

@@ -266,7 +266,7 @@ class Expressions(ast.NodeVisitor):
                 raise Refused("a call behind `and` or `or` that needs statements: put it into a name first")
             if test.is_known and test.value != stops:
                 continue
-            if test.is_known and not parts:
+            if test.is_known and not any(part.impure for part in parts):
                 return test
             parts.append(self.number(test))
             if test.is_known:

@@ -17,15 +17,11 @@ def _field_names(model: Any) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(model))
 
 
-def _is_needed(field: Any) -> bool:
-    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-
-
 def _field_kinds(cls: Any) -> tuple[list[str], list[str]]:
     """Names of the fields that a dataclass must be given, and of those that it may be."""
-    every = dataclasses.fields(cls)
-    needed = [field.name for field in every if _is_needed(field)]
-    return needed, [field.name for field in every if field.name not in needed]
+    every, missing = dataclasses.fields(cls), dataclasses.MISSING
+    needed = [each.name for each in every if each.default is each.default_factory is missing]
+    return needed, [each.name for each in every if each.name not in needed]
 
 
 def _plain(value: Any) -> Any:
@@ -34,17 +30,27 @@ def _plain(value: Any) -> Any:
 
 
 class AsFields:
-    """A dataclass that is saved as its fields."""
+    """A frozen dataclass that is saved as its fields; with arrays in it, equal by what is saved."""
 
     __slots__ = ()
 
-    #: What messages call its dictionary.
-    called: ClassVar[str]
+    #: What messages call its dictionary, if not by its class.
+    called: ClassVar[str] = ""
+    #: Name under which its dictionary has the name of the class; empty if it has not.
+    named_under: ClassVar[str] = ""
+
+    def _keep(self, **values: Any) -> None:
+        """Set the fields, once; arrays are then nobody's to write to."""
+        for name, value in values.items():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+            object.__setattr__(self, name, value)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary of the fields."""
+        """Return a JSON-safe dictionary of the fields; that of a model names its class under ``"model"``."""
         kind: Any = type(self)
-        return {name: _plain(getattr(self, name)) for name in _field_names(kind)}
+        head = {self.named_under: kind.__name__} if self.named_under else {}
+        return head | {name: _plain(getattr(self, name)) for name in _field_names(kind)}
 
     @classmethod
     def from_dict(cls, data: Any) -> Self:
@@ -53,14 +59,31 @@ class AsFields:
         Parameters
         ----------
         data : dict
-            The dictionary.
+            The dictionary; a name of a class in it must be that of this one.
 
         Raises
         ------
         ValueError
-            If a field is missing, unknown or refused.
+            If a field is missing, unknown or refused, or the dictionary is of another class.
         """
-        return cls(**fields(cls.called, data, *_field_kinds(cls)))
+        needed, optional = _field_kinds(cls)
+        values = dict(fields(cls.called or cls.__name__, data, needed, [cls.named_under, *optional]))
+        if (name := values.pop(cls.named_under, cls.__name__)) != cls.__name__:
+            raise ValueError(f"data is of a {name}, not of a {cls.__name__}")
+        return cls(**cls._read(values))
+
+    @classmethod
+    def _read(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """Arguments of the constructor from the fields of a dictionary."""
+        return values
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        return self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash(repr(self.to_dict()))
 
 
 def finite_voltage(model: Model, u: FloatArray) -> FloatArray:
@@ -74,33 +97,8 @@ def finite_voltage(model: Model, u: FloatArray) -> FloatArray:
     return u
 
 
-class EqualByContent:
-    """Frozen values that hold arrays: they are equal if of one class, with one `to_dict`."""
-
-    __slots__ = ()
-
-    def _keep(self, **values: Any) -> None:
-        """Set the fields, once; arrays are then nobody's to write to."""
-        for name, value in values.items():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
-            object.__setattr__(self, name, value)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary."""
-        raise NotImplementedError
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, type(self)):
-            return NotImplemented
-        return self.to_dict() == other.to_dict()
-
-    def __hash__(self) -> int:
-        return hash(repr(self.to_dict()))
-
-
 def rising_pair(thresholds: Any, weights: Any) -> tuple[FloatArray, FloatArray]:
-    """Rising thresholds and as many weights, as arrays of their own."""
+    """Rising thresholds above zero and as many weights, as arrays of their own."""
     thresholds = array_1d("thresholds", thresholds).copy()
     weights = array_1d("weights", weights).copy()
     if thresholds.size != weights.size:
@@ -113,6 +111,11 @@ def rising_pair(thresholds: Any, weights: Any) -> tuple[FloatArray, FloatArray]:
             f"thresholds must rise from entry to entry, got {thresholds}: "
             "sort them together with the weights and merge equal ones"
         )
+    if thresholds.size and thresholds[0] <= 0.0:
+        raise ValueError(
+            f"thresholds must be above zero, got {thresholds[0]:g} first: "
+            "add the weight of a threshold of zero to the gain"
+        )
     return thresholds, weights
 
 
@@ -120,7 +123,7 @@ def rising_pair(thresholds: Any, weights: Any) -> tuple[FloatArray, FloatArray]:
 REGISTERED: dict[str, type[Model]] = {}
 
 
-class Model(ABC):
+class Model(AsFields, ABC):
     """Base of the models of a stage: voltage u [V] to displacement x [µm].
 
     A model is a frozen dataclass; the fields named in `parameter_names` make up `theta`, and ``offset`` is
@@ -134,6 +137,7 @@ class Model(ABC):
         super().__init_subclass__(**options)
         REGISTERED[cls.__name__] = cls
 
+    named_under = "model"
     parameter_names: ClassVar[tuple[str, ...]] = ()
     parameter_units: ClassVar[tuple[str, ...]] = ()
 
@@ -215,33 +219,3 @@ class Model(ABC):
             value = finite(name, given)
             if value is not given:  # a live loop makes a model now and then, of plain numbers
                 object.__setattr__(self, name, value)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary with the class name under ``"model"``."""
-        plain = {name: _plain(getattr(self, name)) for name in _field_names(type(self))}
-        return {"model": type(self).__name__, **plain}
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Make the model from what `to_dict` gave.
-
-        Parameters
-        ----------
-        data : dict
-            The dictionary; ``"model"``, if there, must name this class.
-
-        Raises
-        ------
-        ValueError
-            If a field is missing or unknown, or the dictionary is of another model.
-        """
-        needed, optional = _field_kinds(cls)
-        values = dict(fields(cls.__name__, data, needed, ["model", *optional]))
-        if (name := values.pop("model", cls.__name__)) != cls.__name__:
-            raise ValueError(f"data is of a {name}, not of a {cls.__name__}")
-        return cls(**cls._read(values))
-
-    @classmethod
-    def _read(cls, values: dict[str, Any]) -> dict[str, Any]:
-        """Arguments of the constructor from the fields of a dictionary."""
-        return values

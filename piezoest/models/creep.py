@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 from piezoest._checks import FloatArray, array_1d, finite, integer, positive
 from piezoest.compile import Vector, compiled
 from piezoest.equations.creep import creep_step
-from piezoest.models._base import AsFields, EqualByContent
+from piezoest.models._base import AsFields
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
-class Creep(AsFields, EqualByContent):
+class Creep(AsFields):
     """Logarithmic creep as first-order terms: x_creep = sum_i z_i, tau_i z_i' = gains[i] w - z_i.
 
     Parameters

@@ -144,6 +144,41 @@ class FreeRunning(Model):
             The part.
         """
 
+    def simulate(self, u: FloatArray) -> FloatArray:
+        """Displacement for a voltage record, from rest at 0 V.
+
+        Parameters
+        ----------
+        u : array_like, shape (N,)
+            Voltage [V].
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Displacement [µm].
+        """
+        raise NotImplementedError
+
+    def invert(self, r: FloatArray) -> FloatArray:
+        """Voltage under which the model follows a reference exactly, from rest at 0 V.
+
+        Parameters
+        ----------
+        r : array_like, shape (N,)
+            Reference displacement [µm].
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Voltage [V].
+
+        Raises
+        ------
+        ValueError
+            If the model is not admissible, or the voltage is too large for a number.
+        """
+        raise NotImplementedError
+
     @property
     def loop(self) -> tuple[float, float, float]:
         """(a, b, c) of x = c u + w_h + offset (2), (3), by which a live sample is predicted.

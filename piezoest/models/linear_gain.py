@@ -70,38 +70,11 @@ class LinearGain(FreeRunning):
         return {"gain": self.gain}
 
     def simulate(self, u: FloatArray) -> FloatArray:
-        """Displacement for a voltage record.
-
-        Parameters
-        ----------
-        u : array_like, shape (N,)
-            Voltage [V].
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Displacement [µm].
-        """
+        """Displacement for a voltage record: x = K u + offset (8)."""
         return self.gain * array_1d("u", u) + self.offset
 
     def invert(self, r: FloatArray) -> FloatArray:
-        """Voltage that gives a displacement: u = (r - offset)/K (11).
-
-        Parameters
-        ----------
-        r : array_like, shape (N,)
-            Reference displacement [µm].
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Voltage [V].
-
-        Raises
-        ------
-        ValueError
-            If the gain is zero or next to it, or the voltage is too large for a number.
-        """
+        """Voltage that gives a displacement: u = (r - offset)/K (11)."""
         if not self.is_admissible:
             raise ValueError(f"gain is {self.gain:g} µm/V, which has no inverse: identify the gain first")
         with np.errstate(over="ignore", invalid="ignore"):

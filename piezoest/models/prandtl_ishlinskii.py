@@ -13,7 +13,7 @@ from piezoest.equations import admissible, play_inverse
 from piezoest.equations.bent_plays import bent_plays_step, prandtl_ishlinskii_voltage
 from piezoest.equations.creep import creep_to_come, unit_creep_step
 from piezoest.layout import new
-from piezoest.models._base import EqualByContent, Model, finite_voltage, rising_pair
+from piezoest.models._base import Model, finite_voltage, rising_pair
 from piezoest.models.creep import Creep
 
 # Rounding allowed for in a given initial state, relative to the largest threshold.
@@ -21,7 +21,7 @@ _STATE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
-class PrandtlIshlinskii(Model, EqualByContent):
+class PrandtlIshlinskii(Model):
     """Prandtl-Ishlinskii hysteresis with optional creep and asymmetry.
 
     w = gain u + sum_i weights[i] play_i[u], x = w + creep of w + offset. For asymmetric loops
@@ -95,11 +95,6 @@ class PrandtlIshlinskii(Model, EqualByContent):
         sample_rate: float | None = None,
     ) -> None:
         thresholds, weights = rising_pair(thresholds, weights)
-        if thresholds.size and thresholds[0] <= 0.0:
-            raise ValueError(
-                f"thresholds must be above zero, got {thresholds[0]:g} first: "
-                "add the weight of a threshold of zero to the gain"
-            )
         instance("creep", creep, Creep | None, "a Creep or None")
         bends, changes = _bends(bends, bend_weights, weights.size)
         self._keep(

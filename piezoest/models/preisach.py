@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike
 from piezoest._checks import FloatArray, array_1d, finite, positive
 from piezoest.compile import Vector, compiled
 from piezoest.equations.preisach import preisach_step
-from piezoest.models._base import EqualByContent, Model, rising_pair
+from piezoest.models._base import Model, rising_pair
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
-class Preisach(Model, EqualByContent):
+class Preisach(Model):
     """Preisach hysteresis: x = gain u + sum_i weights[i] relays(play_i[u]) + offset.
 
     The relays of half-width thresholds[i] are spread over the voltage with the density sech²((s -
@@ -70,8 +70,6 @@ class Preisach(Model, EqualByContent):
         offset: float = 0.0,
     ) -> None:
         thresholds, weights = rising_pair(thresholds, weights)
-        if thresholds.size and thresholds[0] <= 0.0:
-            raise ValueError(f"thresholds must be above zero, got {thresholds[0]:g} first: leave it out")
         if np.any(weights < 0.0):
             raise ValueError(f"weights must be zero or more, got {weights.min():g}")
         self._keep(

@@ -142,38 +142,11 @@ class StepModel(FreeRunning):
         return self.inverse.layouts(settings)
 
     def simulate(self, u: FloatArray) -> FloatArray:
-        """Displacement for a voltage record, from rest at 0 V.
-
-        Parameters
-        ----------
-        u : array_like, shape (N,)
-            Voltage [V].
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Displacement [µm].
-        """
+        """Displacement for a voltage record, from rest at 0 V."""
         return self._through(_simulate, array_1d("u", u)) + self.offset
 
     def invert(self, r: FloatArray) -> FloatArray:
-        """Voltage under which the model follows a reference exactly, from rest at 0 V.
-
-        Parameters
-        ----------
-        r : array_like, shape (N,)
-            Reference displacement [µm].
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Voltage [V].
-
-        Raises
-        ------
-        ValueError
-            If the model is not admissible, or the voltage is too large for a number.
-        """
+        """Voltage under which the model follows a reference exactly, from rest at 0 V."""
         if not self.is_admissible:
             raise ValueError(f"{self} is not admissible and has no inverse: {self.remedy}")
         return finite_voltage(self, self._through(_invert, array_1d("r", r) - self.offset))

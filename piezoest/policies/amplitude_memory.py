@@ -1,14 +1,14 @@
 """Remembers what was learnt at each size of the swing, and uses it again."""
 
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import FloatArray, fraction, instance, integer, moderate, positive
 from piezoest.compile import inlined
-from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, Field, Length, Named, Record, numbers, record
+from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, Field, Length, numbers, record
 from piezoest.models import AmplitudeProfile
 from piezoest.policies.base import Conditions, Policy
 
@@ -18,8 +18,6 @@ ALIKE, UNLIKE = 2.0, 2.0
 ALPHA, OFFSET_SLOPE, SHAPE = 0, 3, 3
 # With an alpha below this, relative to the start's, there is no offset to keep.
 LEAST_ALPHA = 1e-9
-# Turns until the voltage swings as announced: the swing at hand may be a mixture of the old and the new.
-MIXED = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,19 +63,18 @@ class AmplitudeMemory(Policy):
         """Sizes stored (0: none) and their theta, and what leads to the next.
 
         Size of swing at which theta stands, voltage in its middle, where the last swing began, swings of that
-        size in a row, swings of another one, turns for which an announcement holds; the travel in the sums of
-        theta, and these.
+        size in a row, swings of another one; the travel in the sums of theta, and these.
         """
         places = Length("places", self.places)
         return record(
-            size=DISTANCE, middle=MEASURED, began=MEASURED, steady=COUNT, odd=COUNT, announced=COUNT,
-            travelled=AMOUNT, sums=numbers(n),
+            size=DISTANCE, middle=MEASURED, began=MEASURED, steady=COUNT, odd=COUNT, travelled=AMOUNT,
+            sums=numbers(n),
             sizes=numbers(places, kind=DISTANCE), thetas=numbers(places, n),
         )  # fmt: skip
 
 
 @register_jitable
-def recall(own: Any, tolerance: Any, size: Any, theta: Any) -> bool:
+def _recall(own: Any, tolerance: Any, size: Any, theta: Any) -> bool:
     """Theta stored for a size of swing into `theta`, interpolated; False where it is not known."""
     below = above = -1
     low, high = 0.0, 0.0
@@ -130,7 +127,6 @@ def _size_after_turn(own: Any, swing: Any, tolerance: Any) -> Any:
     size = abs(swing.turned - own.began)
     middle = 0.5 * (swing.turned + own.began)
     own.began = swing.turned
-    own.announced = max(own.announced - 1.0, 0.0)
     expected = 0.0
     if abs(size - own.size) <= tolerance * own.size:
         own.steady += 1.0
@@ -138,7 +134,7 @@ def _size_after_turn(own: Any, swing: Any, tolerance: Any) -> Any:
         own.middle = middle
         if own.steady >= ALIKE and own.travelled > 0.0:
             _store(own, tolerance, size)
-    elif own.announced == 0.0:
+    else:
         own.steady = 0.0
         own.odd += 1.0
         expected = 2.0 * abs(swing.turned - own.middle)
@@ -146,16 +142,10 @@ def _size_after_turn(own: Any, swing: Any, tolerance: Any) -> Any:
             expected = size
             own.middle = middle
             own.odd = 0.0
-    clear_sums(own)
-    return expected
-
-
-@register_jitable
-def clear_sums(own: Any) -> None:
-    """Begin a new mean of theta."""
     own.travelled = 0.0
     for i in range(len(own.sums)):
         own.sums[i] = 0.0
+    return expected
 
 
 @register_jitable
@@ -177,14 +167,12 @@ def _visit(own: Any, swing: Any, theta: Any, fraction: Any, tolerance: Any) -> b
         return False
     own.size = new_size
     own.steady = 0.0
-    return recall(own, tolerance, new_size, theta)
+    return _recall(own, tolerance, new_size, theta)
 
 
 @register_jitable
-def enlarge(P: Any, variance: Any) -> None:
+def _enlarge(P: Any, variance: Any) -> None:
     """Let no variance of P be below `variance`."""
-    if P is None:
-        return
     for i in range(len(P)):
         P[i, i] = np.fmax(P[i, i], variance)
 
@@ -192,12 +180,11 @@ def enlarge(P: Any, variance: Any) -> None:
 @inlined
 def prepare(own: Any, fixed: Any, state: Any, settings: Any) -> None:
     """Look at the swing, and start from what is known of it."""
-    if fixed is None:
-        return
     law = state.law
     if _visit(own, state.swing, law.theta, state.fraction, fixed.tolerance):
-        enlarge(law.P, fixed.variance)
-        enlarge(state.error_covariance, fixed.variance)
+        _enlarge(law.P, fixed.variance)
+        if state.error_covariance is not None:
+            _enlarge(state.error_covariance, fixed.variance)
         law.resets += 1.0
 
 
@@ -219,28 +206,6 @@ def store_profile(own: Any, scale: FloatArray, profile: AmplitudeProfile) -> Non
     own["sizes"], own["thetas"] = 0.0, 0.0
     own["sizes"][:count] = profile.swings
     own["thetas"][:count, :SHAPE] = profile.theta / scale[:SHAPE]
-
-
-def announce(layout: Record, state: Any, settings: Any, amplitude: float) -> bool:
-    """Recall what is known of an amplitude [µm]; False if that is nothing."""
-    own, law = state["policies"]["amplitude_memory"], state["law"]
-    scale = settings["parameter_scale"]
-    profile = profile_of(own, scale)
-    if profile.swings.size == 0:
-        positive("amplitude", amplitude)
-        return False
-    fixed = settings["policies"]["amplitude_memory"]
-    size = profile.swing_for(amplitude)
-    memory = Named(own, cast(Any, layout.by_name["policies"]).by_name["amplitude_memory"])
-    if not recall(memory, float(fixed["tolerance"]), size, law["theta"]):
-        return False
-    for covariance in (law["P"], state["error_covariance"]):
-        enlarge(covariance if covariance.size else None, fixed["variance"])
-    own["size"], own["steady"], own["announced"] = size, 0.0, MIXED
-    clear_sums(memory)
-    own["began"] = state["swing"]["turned"]
-    law["resets"] += 1.0
-    return True
 
 
 def _check_is_on(own: Any) -> None:

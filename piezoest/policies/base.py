@@ -3,8 +3,7 @@
 A policy is a frozen dataclass in a file of its own, with those of these functions beside it that it has
 something to do in. Those of the policies that are on are called once for each sample, as
 ``hook(own, fixed, state, settings)``, with what the policy keeps (`Policy.keeps`), the numbers it was given
-(`Policy.numbers`), and state and settings of the whole estimator; ``fixed`` is None where the policy is off,
-which they ask first:
+(`Policy.numbers`), and state and settings of the whole estimator:
 
 ``prepare``
     Before a sample's update, in order: forgetting factor and noise of the sample (``state.law.forgetting``,
@@ -26,7 +25,6 @@ elsewhere. What it keeps is shown and saved by `field_name`: ``state["policies"]
 from __future__ import annotations
 
 import dataclasses
-import functools
 import inspect
 import linecache
 import re
@@ -35,10 +33,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import types
-from numba.extending import overload
 
 from piezoest._checks import FloatArray
+from piezoest.compile import inlined
 from piezoest.layout import ABSENT, FIXED, Field, Record, record
 from piezoest.machine_code import note_source
 
@@ -90,11 +87,6 @@ class Policy:
                     f"there is {policy.__module__}.{policy.__name__}"
                 )
         REGISTERED[name] = cls
-
-    @property
-    def counts_periods(self) -> bool:
-        """Whether its memory is counted in periods of the reference."""
-        return False
 
     def check(self, at: Conditions) -> None:
         """Refuse what the policy does not go with.
@@ -213,39 +205,22 @@ def layouts(policies: tuple[Policy, ...], at: Conditions) -> tuple[Record, Recor
 def chain(hook: str) -> Any:
     """``chain(state, settings)``: a hook of every registered policy, one after the other; for compiled code.
 
-    Machine code has the hooks of the policies that are on, and nothing of the others.
+    Machine code has the hooks of the policies that are on, and nothing of the others. It is written out, as
+    Numba compiles no loop over functions. ``permits`` is True where all are; all are asked.
     """
     called = {name: found for name, policy in REGISTERED.items() if (found := hooks_of(policy).get(hook))}
     for function in called.values():
         note_source(function)
     _chained[hook] = called
-    chained = _written_out(hook, tuple(called))
-
-    @overload(chained, jit_options={"forceinline": True}, strict=False)
-    def _of_those_that_are_on(state: Any, settings: Any) -> Any:
-        kinds = settings.fields["policies"].fields
-        return _written_out(hook, tuple(name for name in called if kinds[name] is not types.none))
-
-    return chained
-
-
-@functools.cache
-def _written_out(hook: str, names: tuple[str, ...]) -> Any:
-    """Function that calls a hook of these policies: Numba compiles no loop over functions.
-
-    ``permits`` is True where all are; all are asked.
-    """
-    calls = [
-        f"{name}_{hook}(state.policies.{name}, settings.policies.{name}, state, settings)" for name in names
-    ]
-    lines = calls or ["pass"]
-    if hook == "permits":
-        lines = [f"{name} = {call}" for name, call in zip(names, calls, strict=True)]
-        lines.append(f"return {' and '.join(names) or 'True'}")
-    text = f"def {hook}(state, settings):\n" + "".join(f"    {line}\n" for line in lines)
-    functions: dict[str, Any] = {f"{name}_{hook}": _chained[hook][name] for name in names}
-    place = f"<{hook} of {', '.join(names)}>"
+    text = f"def {hook}(state, settings):\n    permitted = True\n"
+    for name in called:
+        call = f"{name}_{hook}(state.policies.{name}, settings.policies.{name}, state, settings)"
+        result = f"permitted = {call} and permitted" if hook == "permits" else call
+        text += f"    if settings.policies.{name} is not None:\n        {result}\n"
+    text += "    return permitted\n"
+    functions: dict[str, Any] = {f"{name}_{hook}": function for name, function in called.items()}
+    place = f"<{hook} of {', '.join(called)}>"
     # Where tracebacks, and whoever translates functions, look for its text.
     linecache.cache[place] = (len(text), None, text.splitlines(True), place)
     exec(compile(text, place, "exec"), functions)
-    return functions[hook]
+    return inlined(functions[hook])

@@ -52,8 +52,6 @@ class ChangeDetection(Policy):
 @inlined
 def after_update(own: Any, fixed: Any, state: Any, settings: Any) -> None:
     """Add P_0 to P where the sum of what is unusual passes the threshold; what is usual is learnt again."""
-    if fixed is None:
-        return
     law, energy = state.law, state.energy
     if energy.swings < innovation_energy.ENOUGH:
         return

@@ -47,8 +47,6 @@ class CovarianceResetting(Policy):
 @inlined
 def before_update(own: Any, fixed: Any, state: Any, settings: Any) -> None:
     """Let P start again where an eigenvalue is not above the floor."""
-    if fixed is None:
-        return
     law = state.law
     if fixed.floor > 0.0 and least_squares.above_floor(law.P, fixed.floor, own.root) == 0.0:
         least_squares.restore_covariance(law.P, settings.law.P_0)

@@ -38,8 +38,6 @@ class DeadZone(Policy):
 @inlined
 def permits(own: Any, fixed: Any, state: Any, settings: Any) -> Any:
     """Whether the regressor is outside the dead zone."""
-    if fixed is None:
-        return True
     phi, P_0 = state.phi, settings.law.P_0
     information = 0.0
     for i in range(len(phi)):

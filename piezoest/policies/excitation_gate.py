@@ -47,18 +47,8 @@ class ExcitationGate(Policy):
 
 
 @inlined
-def growth(own: Any) -> Any:
-    """Factor on the growth of P: none while a gate is shut."""
-    if own is None:
-        return 1.0
-    return 1.0 - own.shut
-
-
-@inlined
 def permits(own: Any, fixed: Any, state: Any, settings: Any) -> Any:
     """Whether the least eigenvalue of the regressor's mean square is `least` of its mean one."""
-    if fixed is None:
-        return True
     own.wait -= 1.0
     if own.wait <= 0.0:
         own.wait = EVERY

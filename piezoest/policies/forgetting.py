@@ -59,3 +59,26 @@ class Forgetting(Policy):
     def law(self, at: Conditions) -> dict[str, float]:
         """Factor over a step, and rate, of the law."""
         return {"forgetting": self.factor(at.step), "rate": 1.0 / self.memory}
+
+
+class InUnits:
+    """What policies share whose `memory` is in periods or in seconds, as their `unit` says."""
+
+    __slots__ = ()
+
+    memory: float
+    unit: Unit
+
+    @property
+    def needs_swings(self) -> bool:
+        """Whether its memory is counted in periods of the reference."""
+        return self.unit == "period"
+
+    @property
+    def periods(self) -> float:
+        """Memory in periods; zero where it is one in time."""
+        return self.memory if self.needs_swings else 0.0
+
+    def law(self, at: Conditions) -> dict[str, float]:
+        """Factor over a step of the law; none for a memory in periods, which is set sample by sample."""
+        return {} if self.needs_swings else Forgetting(self.memory).law(at)

@@ -48,6 +48,4 @@ def weight(state: Any, settings: Any, periods: Any) -> Any:
 @inlined
 def prepare(own: Any, fixed: Any, state: Any, settings: Any) -> None:
     """Forget by the period at hand."""
-    if fixed is None:
-        return
     state.law.forgetting = weight(state, settings, fixed.memory)

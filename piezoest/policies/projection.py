@@ -64,6 +64,4 @@ def _project(theta: Any, P: Any, scale: Any, unit: Any, margin: Any) -> None:
 @inlined
 def after_update(own: Any, fixed: Any, state: Any, settings: Any) -> None:
     """Project theta."""
-    if fixed is None:
-        return
     _project(state.law.theta, state.law.P, settings.scale, settings.output_scale, fixed.margin)

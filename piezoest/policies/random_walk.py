@@ -8,7 +8,6 @@ from piezoest.compile import inlined
 from piezoest.equations import admissible, least_squares, sensor_noise
 from piezoest.equations.swing import half_period
 from piezoest.policies.base import Conditions, Policy
-from piezoest.policies.excitation_gate import growth
 from piezoest.policies.forgetting import check_memory
 
 # Slower than so many swings a sample the voltage is at rest; slower than this fraction of its usual pace it
@@ -67,22 +66,18 @@ class RandomWalk(Policy):
 @inlined
 def noise_memory(state: Any, settings: Any) -> Any:
     """Square of the memory in swings that keeps the sensor's noise out of the gain."""
-    theta = state.law.theta
-    return _noise_memory(state.noise, state.swing, theta, settings)
-
-
-@inlined
-def _noise_memory(noise: Any, swing: Any, theta: Any, settings: Any) -> Any:
-    if noise is None:
+    if state.noise is None:
         return 0.0
-    return sensor_noise.memory_squared(noise, swing, theta[BETA], settings.slope, settings.noise_factor)
+    slope = state.law.theta[BETA]
+    return sensor_noise.memory_squared(state.noise, state.swing, slope, settings.slope, settings.noise_factor)
 
 
 @inlined
-def _least_step(loop: Any, theta: Any, scale: Any) -> Any:
+def _least_step(state: Any, settings: Any) -> Any:
     """Square of what a parameter of the loop walks at least."""
-    if loop is None:
+    if settings.loop is None:
         return LEAST_STEP
+    theta, scale = state.law.theta, settings.parameter_scale
     alpha, beta, gamma = theta[ALPHA] * scale[ALPHA], theta[BETA] * scale[BETA], theta[GAMMA] * scale[GAMMA]
     return LEAST_STEP if admissible.is_admissible(alpha, beta, gamma, 0.0, 0.0, 0.0) != 0.0 else LOST_STEP
 
@@ -106,17 +101,16 @@ def prepare(own: Any, fixed: Any, state: Any, settings: Any) -> None:
     forgets within sqrt(rho/(q phi²)) swings, where phi is the regressor and rho the noise variance of a whole
     swing: rho follows from the memory wanted and the mean of phi².
     """
-    if fixed is None:
-        return
     law, excitation = state.law, state.excitation
     if excitation.swings < SLOWEST:
         return
     fraction = excitation.motion
-    rho, least = 0.0, _least_step(settings.loop, law.theta, settings.parameter_scale)
+    rho, least = 0.0, _least_step(state, settings)
     for i in range(len(law.theta)):
         q = _square_step(state, settings, fixed.walk, i, least)
         rho += q * excitation.squares[i]
-        q *= growth(state.policies.excitation_gate)
+        if state.policies.excitation_gate is not None:
+            q *= 1.0 - state.policies.excitation_gate.shut
         ceiling = CEILING * max(q, settings.law.P_0[i, i])
         law.P[i, i] = least_squares.random_walk(law.P[i, i], q * fraction, ceiling)
     # Near a standstill the mechanics still move, which says nothing of the hysteresis.

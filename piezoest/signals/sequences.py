@@ -56,7 +56,7 @@ def from_array(
     Returns
     -------
     Signal
-        Jumps are kept: `Signal.require_continuous` refuses them.
+        Jumps are kept: `check_continuity` refuses them.
 
     Raises
     ------

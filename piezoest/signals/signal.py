@@ -129,7 +129,7 @@ class Signal:
     def then(self, other: Signal) -> Signal:
         """Return this signal followed by `other`; the period is kept if both have the same one.
 
-        A difference between the last and the first value becomes a jump: `require_continuous` finds it.
+        A difference between the last and the first value becomes a jump: `check_continuity` finds it.
 
         Parameters
         ----------
@@ -233,22 +233,6 @@ class Signal:
             If `offset` is not a finite number.
         """
         return Signal(self.values + finite("offset", offset), self.sample_rate, self.period, self.name)
-
-    def require_continuous(self, *, allowed_step: float = 0.0) -> Signal:
-        """Return the signal itself if it has no jumps; see `check_continuity`.
-
-        Parameters
-        ----------
-        allowed_step : float
-            Steps up to this size, in the unit of the values, always pass.
-
-        Raises
-        ------
-        ValueError
-            If the signal jumps.
-        """
-        check_continuity(self.values, self.sample_rate, self.name, allowed_step=allowed_step)
-        return self
 
 
 def smooth_rise(n: int) -> FloatArray:

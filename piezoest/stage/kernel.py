@@ -61,12 +61,6 @@ def settings_layout(hysteresis: Layout, terms: int) -> Layout:
 
 
 @register_jitable
-def _amplify(x: Any, state: Any, settings: Any) -> None:
-    for k in range(len(x)):
-        x[k] = instruments.amplifier_step(state, settings, x[k])
-
-
-@register_jitable
 def deform(own: Any, settings: Any, u: Any) -> Any:
     """Displacement after the next voltage: the models are cases of gain u + plays + w_h.
 
@@ -99,38 +93,23 @@ def _deform(x: Any, factor: Any, shape: Any, state: Any, settings: Any) -> None:
 
 
 @register_jitable
-def _creep(x: Any, state: Any, settings: Any, offset: Any) -> None:
-    z, gains, decays = state.z, settings.gains, settings.decays
-    for k in range(len(x)):
-        x[k] = x[k] + creep_step(z, x[k], gains, decays) + offset
-
-
-@register_jitable
-def _move(x: Any, state: Any, coefficients: Any) -> None:
-    for k in range(len(x)):
-        x[k] = mechanics_step(state, x[k], coefficients)
-
-
-@register_jitable
-def _measure(x: Any, noise: Any, measured: Any, state: Any, settings: Any) -> None:
-    every = int(len(noise) > 1)
-    line = state.line
-    for k in range(len(x)):
-        measured[k] = instruments.gauge_step(state, line, settings, x[k], noise[k * every])
-
-
-@register_jitable
 def _through(state: Any, settings: Any, x: Any, noise: Any, factor: Any, shape: Any, measured: Any) -> None:
     """Run a record through the parts.
 
     `x` (N,) comes as voltage and goes as true displacement; `measured` (N,) is written; `noise`, `factor` and
     `shape` are of shape (N,), or (1,) for the same value throughout.
     """
-    _amplify(x, state.amplifier, settings.amplifier)
+    for k in range(len(x)):
+        x[k] = instruments.amplifier_step(state.amplifier, settings.amplifier, x[k])
     _deform(x, factor, shape, state.hysteresis, settings.hysteresis)
-    _creep(x, state.creep, settings.creep, settings.offset)
-    _move(x, state.mechanics, settings.mechanics)
-    _measure(x, noise, measured, state.gauge, settings.gauge)
+    z, creep = state.creep.z, settings.creep
+    for k in range(len(x)):
+        x[k] = x[k] + creep_step(z, x[k], creep.gains, creep.decays) + settings.offset
+    for k in range(len(x)):
+        x[k] = mechanics_step(state.mechanics, x[k], settings.mechanics)
+    every, line = int(len(noise) > 1), state.gauge.line
+    for k in range(len(x)):
+        measured[k] = instruments.gauge_step(state.gauge, line, settings.gauge, x[k], noise[k * every])
 
 
 @compiled

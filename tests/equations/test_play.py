@@ -52,7 +52,8 @@ def test_inverse_is_kuhnens_operator(u: list[float]) -> None:
     y, walk, closed = np.zeros(4), np.zeros(4), np.zeros(4)
     for value in u:
         w = equations.prandtl_ishlinskii_step(y, value, GAIN, THRESHOLDS, WEIGHTS)
-        by_walk = equations.prandtl_ishlinskii_inverse_step(walk, w, GAIN, THRESHOLDS, WEIGHTS)
+        by_walk = equations.prandtl_ishlinskii_inverse(walk, w, GAIN, THRESHOLDS, WEIGHTS)
+        equations.prandtl_ishlinskii_step(walk, by_walk, GAIN, THRESHOLDS, WEIGHTS)
         by_formula = equations.prandtl_ishlinskii_step(closed, w, 1.0 / GAIN, thresholds, weights)
         assert by_walk == pytest.approx(value, abs=1e-10)
         assert by_formula == pytest.approx(value, abs=1e-10)

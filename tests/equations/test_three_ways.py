@@ -34,7 +34,7 @@ PLAYS = (np.array([-0.2, 3.0, 0.0, -4.0]), 9.0, 0.1, THRESHOLDS, WEIGHTS)
         (creep_step, (np.array([0.1, -0.2, 0.3]), -3.0, GAINS, DECAYS)),
         (mechanics_step, (np.array([4.0, -30.0]), 2.5, RESONANCE)),
         (play.prandtl_ishlinskii_step, PLAYS),
-        (play.prandtl_ishlinskii_inverse_step, PLAYS),
+        (play.prandtl_ishlinskii_inverse, PLAYS),
     ],
 )
 def test_numpy_numba_and_casadi_agree(function: Any, arguments: tuple[Any, ...]) -> None:

@@ -51,13 +51,11 @@ def test_zero_regressor_for_good() -> None:
         assert np.trace(law.P) <= 20.0
 
 
-def test_covariance_resetting_below_the_floor_and_on_call() -> None:
+def test_covariance_resetting_below_the_floor() -> None:
     law = pz.RecursiveLeastSquares(1, P=1.0, policies=(pz.policies.CovarianceResetting(0.1),))
     for _ in range(100):
         law.update(1.0, [1.0])
     assert law.resets == pytest.approx(10, abs=2)
-    law.reset_covariance()
-    np.testing.assert_array_equal(law.P, [[1.0]])
 
 
 def law(n: int = 2, **options: Any) -> Any:

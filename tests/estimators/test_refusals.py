@@ -106,7 +106,6 @@ PROFILE: Any = pz.AmplitudeProfile
 CALLS: list[tuple[Any, str]] = [
     (lambda: pz.HysteresisRLS(RATE).profile, "needs policies"),
     (lambda: pz.HysteresisRLS(RATE, **REMEMBERING).profile.at(1.0), "empty"),
-    (lambda: pz.HysteresisRLS(RATE, **REMEMBERING).announce_change(amplitude=0.0), "amplitude must be"),
     (lambda: setattr(pz.HysteresisRLS(RATE, **REMEMBERING), "profile",
                      PROFILE([1.0, 2.0], [LOOP.theta] * 2)), "AmplitudeMemory has 1 places"),
     (lambda: PROFILE([2.0, 1.0], [LOOP.theta] * 2), "ascend"),
