@@ -3,7 +3,6 @@
 import itertools
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,7 +10,7 @@ from numba import TypingError
 from numba.core.errors import LoweringError
 from numba.extending import register_jitable
 
-from piezoest.compile import Cube, Matrix, Record, compiled, inlined, like, local, local_rows, nth
+from piezoest.compile import Record, compiled, inlined, like, local, local_rows
 from piezoest.compiled_records import record_type
 from piezoest.layout import (
     ABSENT,
@@ -90,22 +89,8 @@ def step(state: Record, given: Record, x: float) -> float:
 
 
 @compiled
-def step_channels(states: Record, given: Record, x: Matrix, first: int, stop: int, history: Cube) -> None:
-    for c in range(first, stop):
-        state = nth(states, c)
-        for k in range(x.shape[0]):
-            sample(state, given, x[k, c])
-            history[k, c, 0] = state.total
-
-
-@compiled
 def misspelt(state: Record) -> None:
     state.law.thetta[0] = 1.0
-
-
-@compiled
-def absent_used(state: Record) -> None:
-    state.law.count = state.rates[0]
 
 
 @compiled
@@ -141,23 +126,6 @@ def test_any_length_goes_through_one_machine_code(plays: int, places: int, x: fl
     assert step.of(layout, GAIN) is step.of(layout_of(4), GAIN)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
-def test_one_of_many_records(layout: Layout) -> None:
-    given, x = new(GAIN, **GAINS), np.arange(20.0).reshape(4, 5)
-    many, plain = (np.repeat(new(layout)[np.newaxis], 5) for _ in range(2))
-    histories = np.zeros((2, 4, 5, 1))
-    step_channels.of(layout, GAIN)(many, given, x, 1, 4, histories[0])
-    step_channels.function(Named(plain, layout), Named(given, GAIN), x, 1, 4, histories[1])
-    assert many.tobytes() == plain.tobytes()
-    assert np.array_equal(histories[0], histories[1])
-    for c in range(5):
-        alone = new(layout)
-        if 1 <= c < 4:
-            for k in range(4):
-                step.of(layout, GAIN)(alone, given, x[k, c])
-        assert many[c].tobytes() == alone.tobytes()
-
-
 # ---------------------------------------------------------------- what does not compile
 
 
@@ -165,7 +133,6 @@ def test_one_of_many_records(layout: Layout) -> None:
     ("function", "words"),
     [
         (misspelt, "thetta"),
-        (absent_used, "none"),
         (stack_of_unknown_size, "like"),
     ],
 )

@@ -60,9 +60,9 @@ def figure(path: Path, seed: int) -> None:
     save_figure(drawn, path)
 
 
-def rows(path: Path, seed: int, format: str) -> None:
+def rows(path: Path, seed: int) -> None:
     periods = [{"key": "run", "seed": seed, "period": k, "error": 0.1 * k} for k in range(SIZE)]
-    tables.write_table(tables.table_of(periods, table.PERIOD_COLUMNS), path.with_suffix(f".{format}"))
+    tables.write_table(tables.table_of(periods, table.PERIOD_COLUMNS), path)
 
 
 def waveform(path: Path, seed: int) -> None:
@@ -73,7 +73,7 @@ def waveform(path: Path, seed: int) -> None:
 OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
     **{
         f"log{ending}": lambda path, seed: write_columns(path, columns(seed))
-        for ending in ("", ".csv", ".tsv", ".parquet", ".h5", ".mat", ".npy", ".npz")
+        for ending in (".csv", ".parquet", ".h5", ".mat", ".npy")
     },
     "profile.json": lambda path, seed: AmplitudeProfile(
         np.arange(1.0, SIZE), np.full((SIZE - 1, 3), 0.1 * seed)
@@ -86,8 +86,8 @@ OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
     "waveform.csv": waveform,
     "table.json": lambda path, seed: shared.write_json(columns(seed)["voltage_V"].tolist(), path),
     "put.json": lambda path, seed: origin.put(columns(seed)["voltage_V"].tolist(), path),
-    "periods.csv": lambda path, seed: rows(path, seed, "csv"),
-    "periods.parquet": lambda path, seed: rows(path, seed, "parquet"),
+    "periods.csv": rows,
+    "periods.parquet": rows,
 }  # fmt: skip
 
 

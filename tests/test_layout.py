@@ -4,19 +4,16 @@ import copy
 import pickle
 from typing import Any
 
-import numpy as np
 import pytest
 
 from piezoest.layout import (
     ABSENT,
     COUNT,
-    FIXED,
     NUMBER,
     WORK,
     Length,
     Named,
     Record,
-    leaves,
     new,
     numbers,
     record,
@@ -31,19 +28,6 @@ def lengthy(plays: int) -> Record:
     return record(memory=memory, law=LAW, work=WORK, level=ABSENT)
 
 
-def test_numbers_stand_where_names_say() -> None:
-    layout = lengthy(4)
-    state = new(layout, law={"theta": [1.0, 2.0, 3.0]}, memory={"last": 7.0}, work=5.0)
-    assert state.shape == ()
-    assert state["law"]["theta"].tolist() == [1.0, 2.0, 3.0]
-    assert state["memory"]["last"] == 7.0
-    assert state["memory"]["plays"] == 4.0
-    assert not state["law"]["P"].any()
-    state["law"]["P"][1, 2] = 9.0
-    assert state["law"]["P"][1, 2] == 9.0
-    assert layout.dtype.itemsize // 8 == 1 + (1 + 3 + 9) + (1 + 1 + 4 + 8) == state.nbytes // 8
-
-
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(KeyError, match="thetta"):
         new(LAW, thetta=[1.0, 2.0, 3.0])
@@ -51,20 +35,6 @@ def test_unknown_names_are_refused() -> None:
         new(lengthy(2), law={"updatse": 1.0})
     with pytest.raises(ValueError, match=r"\['plays'\] are names of fields and of lengths"):
         record(plays=COUNT, u=numbers(Length("plays", 3)))
-
-
-def test_leaves_are_all_numbers_with_their_paths() -> None:
-    layout = lengthy(2)
-    first, second = new(layout, work=1.0), new(layout, work=2.0)
-    found = {name: (kind, arrays) for name, kind, arrays in leaves(layout, first, second)}
-    assert list(found) == [
-        "law.updates", "law.theta", "law.P", "work",
-        "memory.plays", "memory.last", "memory.u", "memory.thetas",
-    ]  # fmt: skip
-    assert found["law.updates"][0] == COUNT
-    assert found["memory.plays"][0] == FIXED
-    assert [float(array) for array in found["work"][1]] == [1.0, 2.0]
-    assert sum(np.size(arrays[0]) for _, arrays in found.values()) == layout.dtype.itemsize // 8
 
 
 def test_layouts_are_values() -> None:

@@ -33,21 +33,12 @@ def test_projection_is_the_nearest_point(seed: int) -> None:
         difference = np.asarray(parts) * THETA - theta
         return float(difference @ W @ difference)
 
+    def faces(parts: object) -> object:
+        alpha, beta, gamma = np.asarray(parts) * THETA
+        return np.array([gamma - alpha * beta, 2.0 * alpha * beta - gamma]) / THETA[2]
+
     best = minimize(
-        distance,
-        projected / THETA,
-        method="SLSQP",
-        constraints=[
-            {
-                "type": "ineq",
-                "fun": lambda q: (q[2] * THETA[2] - q[0] * THETA[0] * q[1] * THETA[1]) / THETA[2],
-            },
-            {
-                "type": "ineq",
-                "fun": lambda q: (2 * q[0] * THETA[0] * q[1] * THETA[1] - q[2] * THETA[2]) / THETA[2],
-            },
-        ],
-        bounds=[(1e-2, None)] * 3,
-        options={"ftol": 1e-14, "maxiter": 500},
-    )
+        distance, projected / THETA, method="SLSQP", constraints={"type": "ineq", "fun": faces},
+        bounds=[(1e-2, None)] * 3, options={"ftol": 1e-14, "maxiter": 500},
+    )  # fmt: skip
     assert distance(projected / THETA) <= best.fun * 1.02 + 1e-6

@@ -5,10 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from piezoest.compile import Record, compiled
 from piezoest.equations import least_squares as ls
-from piezoest.layout import NUMBER, Named, new, numbers, record
-from tests.equations.three_ways import three_ways
+from piezoest.layout import Named, new, numbers, record
 from tests.reference import least_squares as reference
 
 N = 3
@@ -92,31 +90,3 @@ def test_floor_is_the_least_eigenvalue(seed: int) -> None:
     least = np.linalg.eigvalsh(P)[0]
     assert ls.above_floor(P, 0.999 * least, np.zeros((4, 4))) == 1.0
     assert ls.above_floor(P, 1.001 * least, np.zeros((4, 4))) == 0.0
-
-
-CASE = record(z=NUMBER, S=NUMBER, theta=numbers(N), P=numbers(N, N), phi=numbers(N), rates=RATES)
-
-
-@compiled
-def discrete(case: Record) -> None:
-    _, case.S = ls.discrete_update(case.theta, case.P, case.phi, case.z, 0.98, 0.04, 50.0)
-
-
-@compiled
-def directional(case: Record) -> None:
-    _, case.S = ls.directional_update(case.theta, case.P, case.phi, case.z, 0.98, 0.04, 50.0)
-
-
-@compiled
-def continuous(case: Record) -> None:
-    _, case.S = ls.continuous_step(case.theta, case.P, case.phi, case.z, 0.02, 0.7, 1.0, case.rates)
-    ls.continuous_correction(case.theta, case.P, 0.02, 50.0, case.rates)
-
-
-@pytest.mark.parametrize("law", [discrete, directional, continuous])
-def test_numpy_numba_and_casadi_agree(law: Any) -> None:
-    phi, z, _ = problem(1)
-    theta, P = start()
-    plain, machine, symbolic = three_ways(law, CASE, theta=theta, P=P, phi=phi[0], z=z[0])
-    np.testing.assert_allclose(machine, plain, rtol=1e-13)
-    np.testing.assert_allclose(symbolic, plain, rtol=1e-13)

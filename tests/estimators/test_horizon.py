@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.estimators import horizon
 from piezoest.estimators.batch import BatchFit
 from piezoest.estimators.horizon import MovingHorizon
 from piezoest.estimators.thinning import thinned
-from piezoest.fitting import gauss_newton
 
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 RATE = 2000.0
@@ -22,33 +20,20 @@ def record(seconds: float = 1.0, noise: float = NOISE, seed: int = 0, model: Any
     return u, model.simulate(u) + noise * np.random.default_rng(seed).standard_normal(u.size)
 
 
-def test_solves_once_a_hop_and_holds_between(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls: list[int] = []
-    solve = gauss_newton.single_shooting
-
-    def counted(*arguments: Any) -> Any:
-        calls.append(estimator.status.samples)
-        return solve(*arguments)
-
-    monkeypatch.setattr(horizon, "single_shooting", counted)
+def test_solves_once_a_hop_and_holds_between() -> None:
     u, x = record(0.5)
     estimator = MovingHorizon(RATE, hop=0.05)
     assert (estimator.solves, estimator.solver_message) == (0, "")
-    changes, last = [], estimator.theta
-    for k in range(u.size):
-        before = len(calls)
-        estimator.step(u[k], x[k])
-        solved = len(calls) - before
-        assert solved == ((k + 1) % 100 == 0)
-        assert estimator.status.last == ("updated" if solved else "held")
-        if not np.array_equal(estimator.theta, last):
-            changes.append(k + 1)
-            last = estimator.theta
-    assert calls == changes == list(range(100, u.size + 1, 100))
-    assert estimator.solves == estimator.status.updates == 10
+    last = estimator.theta
+    for k in range(1, u.size + 1):
+        estimator.step(u[k - 1], x[k - 1])
+        due = k % 100 == 0
+        assert (estimator.solves, estimator.status.last) == (k // 100, "updated" if due else "held")
+        assert np.array_equal(estimator.theta, last) != due
+        last = estimator.theta
+    assert estimator.status.updates == 10
     assert estimator.status.held == u.size - 10
     assert estimator.failures == 0
-    assert estimator.last_solve_seconds > 0.0
     assert "satisfied" in estimator.solver_message
 
 
@@ -144,8 +129,7 @@ def test_thinning_loses_neither_path_nor_displacement(first: int) -> None:
     assert np.abs(error[counted]).max() < 1e-5
     assert np.sum(root_weight**2) > 0.97 * u.size
 
-
-def test_a_voltage_that_turns_all_the_time_is_taken_at_full_rate() -> None:
+    # A voltage that turns all the time is taken at full rate.
     u = np.random.default_rng(0).standard_normal(500)
     points, shift, _, root_weight = thinned(u, u, 0, 10, 0)
     np.testing.assert_array_equal(points, np.arange(500))

@@ -75,14 +75,10 @@ def test_delay(delay: float) -> None:
     estimator = pz.HysteresisRLS(FS, memory=0.4, delay=delay)
     estimator.run(u, late)
     np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=2e-3)
-    # At a tenth of the rate the same delay, left out, would show.
-    slow_u, slow_x = record(1.0, fs=2000.0)
-    late = np.interp(np.arange(slow_x.size) - delay, np.arange(slow_x.size), slow_x)
-    told, untold = pz.HysteresisRLS(2000.0, memory=0.4, delay=delay), pz.HysteresisRLS(2000.0, memory=0.4)
-    told.run(slow_u, late)
-    untold.run(slow_u, late)
-    error = np.abs(told.theta / TRUE.theta - 1.0).max()
-    assert error < 0.3 * np.abs(untold.theta / TRUE.theta - 1.0).max()
+    untold = pz.HysteresisRLS(FS, memory=0.4)
+    untold.run(u, late)
+    errors = [np.abs(each.theta / TRUE.theta - 1.0).max() for each in (estimator, untold)]
+    assert errors[0] < 0.5 * errors[1]
 
 
 def test_long_gap_starts_anew() -> None:
@@ -97,8 +93,7 @@ def test_long_gap_starts_anew() -> None:
     "options",
     [
         {},
-        {"errors": False, "delay": 1.5},
-        {"memory": 0.4, "errors": False},
+        {"memory": 0.4, "errors": False, "delay": 1.5},
         {"initial_model": pz.LinearGain(0.15), "offset": True},
         {"time_base": "continuous", "high_pass": 0.5},
     ],

@@ -3,7 +3,7 @@
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -203,22 +203,18 @@ def test_sanitizers_are_silent(tmp_path: Path) -> None:
 
 
 def test_what_does_not_go_together_is_refused() -> None:
-    library = controller("line")
-    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
-    inverse = pz.InverseCompensator(start, LIMITS)
-    with pytest.raises(ValueError, match="leave out"):
-        pz.export.c(library, inverse)
-    with pytest.raises(ValueError, match="leave out"):
-        pz.export.c(library, update_interval=20)
-    with pytest.raises(ValueError, match="AdaptiveFeedforward"):
-        pz.export.fmu(library, None, "stage.fmu")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="name"):
-        pz.export.c(library, name="double-u")
-    with pytest.raises(ValueError, match="precision"):
-        pz.export.c(library, precision="half")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="CompiledFeedforward"):
-        pz.export.CompiledController(pz.export.c(library))
-    with pytest.raises(ValueError, match="CompiledController"):
-        pz.export.CompiledFeedforward(pz.export.c(None, inverse))
-    with pytest.raises(ValueError, match="compensator"):
-        pz.export.c(pz.HysteresisRLS(FS))
+    library, c, odd = controller("line"), pz.export.c, cast("Any", None)
+    inverse = pz.InverseCompensator(pz.ColemanHodgdon(0.02, 0.12, 0.0036), LIMITS)
+    calls: list[tuple[Any, str]] = [
+        (lambda: c(library, inverse), "leave out"),
+        (lambda: c(library, update_interval=20), "leave out"),
+        (lambda: pz.export.fmu(library, odd, "stage.fmu"), "AdaptiveFeedforward"),
+        (lambda: c(library, name="double-u"), "name"),
+        (lambda: c(library, precision=odd), "precision"),
+        (lambda: pz.export.CompiledController(c(library)), "CompiledFeedforward"),
+        (lambda: pz.export.CompiledFeedforward(c(None, inverse)), "CompiledController"),
+        (lambda: c(pz.HysteresisRLS(FS)), "compensator"),
+    ]
+    for call, words in calls:
+        with pytest.raises(ValueError, match=words):
+            call()

@@ -32,11 +32,8 @@ def test_vector_and_dictionary_forms() -> None:
 
 
 MODEL = PrandtlIshlinskii(0.1, [1.0, 4.0], [0.02, 0.03])
-CREEP, MECHANICS, ONES = (
-    Creep.logarithmic(0.01, shortest=0.01, longest=10.0),
-    MassSpringDamper(780.0, 0.02),
-    np.ones(5),
-)
+CREEP, MECHANICS = Creep.logarithmic(0.01, shortest=0.01, longest=10.0), MassSpringDamper(780.0, 0.02)
+ONES = np.ones(5)
 
 
 def plays(*arguments: Any, **fields: Any) -> Any:
@@ -52,16 +49,10 @@ def plays(*arguments: Any, **fields: Any) -> Any:
         (plays(bends=[1.0]), "bend_weights"),
         (plays(creep=3.0), "creep"),
         (lambda: PrandtlIshlinskii.from_theta([0.1, 1.0]), "1 \\+ 2n values"),
-        (
-            lambda: MODEL.simulate(ONES, initial_state=np.array([0.0, 50.0])),
-            "cannot be reached by any voltage",
-        ),
+        (lambda: MODEL.simulate(ONES, initial_state=np.array([0.0, 50.0])), "cannot be reached"),
         (lambda: Creep([0.1], [0.0]), "time_constants must be above zero"),
         (lambda: Creep.logarithmic(0.01, shortest=1.0, longest=0.1), "longest must be above"),
-        (
-            lambda: CREEP.simulate(ONES, sample_rate=1e3, initial_state=np.zeros(3)),
-            "initial_state must hold 4",
-        ),
+        (lambda: CREEP.simulate(ONES, sample_rate=1e3, initial_state=np.zeros(3)), "initial_state must"),
         (lambda: MassSpringDamper.from_dict({}), "mechanics has no 'natural_frequency'"),
     ],
 )

@@ -1,0 +1,197 @@
+"""The programs that make the numbers of two pages: what they judge against, and what they count."""
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest.bench.zoo.logs import Log
+
+N, TRAINED = 4000, 2000
+
+
+@pytest.fixture(autouse=True)
+def _paths(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+
+@pytest.fixture
+def judging() -> Any:
+    return importlib.import_module("log_judging")
+
+
+@pytest.fixture
+def safety() -> Any:
+    return importlib.import_module("safety")
+
+
+# ---------------------------------------------------------------- fits to logs
+
+
+def voltage() -> Any:
+    t = np.arange(N) / N
+    return 5.0 + 5.0 * (0.6 * np.sin(80.0 * t) + 0.4 * np.sin(190.0 * t))
+
+
+def log(**given: Any) -> Log:
+    """A stage that is a line."""
+    truth = 2.0 * voltage()
+    nothing = {"truth": truth, "x": truth.copy(), "jumps": np.zeros(N), "spikes": np.zeros(N, bool)}
+    return Log(
+        **{
+            "seed": 1, "u": voltage(), "sample_rate": 1000.0, "family": "paper", "model": None,
+            "voltage": "sine", "stroke": 20.0, "added": {"noise": 1e-3}, **nothing, **given,
+        }
+    )  # fmt: skip
+
+
+def test_plays_by_least_squares_find_a_stage_made_of_plays(judging: Any) -> None:
+    u = voltage()
+    thresholds = 0.5 * np.ptp(u[:TRAINED]) * np.array([2, 5, 11]) / judging.PLAYS
+    # From plays that begin at the first voltage.
+    truth = pz.PrandtlIshlinskii(0.3, thresholds, [0.1, 0.05, 0.08], offset=-7.0).simulate(u - u[0])
+    x = truth + np.random.default_rng(0).normal(0.0, 0.02, N)
+    x[100:150] = np.nan
+    assert judging.rms((judging.by_plays(u, x, TRAINED) - truth)[TRAINED:]) < 0.2 * 0.02
+    assert judging.rms((judging.by_line(u, x, TRAINED) - truth)[TRAINED:]) > 1.0 * 0.02
+
+
+def test_jumps_count_up_to_the_end_of_the_fitted_part(judging: Any) -> None:
+    jumps = np.where(np.arange(N) < 500, 0.0, 1.5) + np.where(np.arange(N) < 3000, 0.0, 4.0)
+    one = log(jumps=jumps)
+    np.testing.assert_array_equal(judging.expected(one, TRAINED), one.truth[TRAINED:] + 1.5)
+
+
+def test_coverage_counts_readings_without_spikes_and_later_jumps(judging: Any) -> None:
+    one = log()
+    one.jumps[3000:] = 4.0
+    one.x[3000:] += 4.0
+    one.x[TRAINED : TRAINED + 500] = np.nan
+    one.spikes[3500:] = True
+    one.x[3500:] += 50.0
+    lower, upper = one.truth - 1.0, one.truth + 1.0
+    assert judging.coverage(one, TRAINED, lower, upper) == 1.0
+    # Of 1000 that count, 250 are below.
+    lower[3250:] += 3.0
+    assert judging.coverage(one, TRAINED, lower, upper) == 0.75
+
+
+def test_a_row_holds_the_chosen_the_best_and_scores_or_what_failed(
+    judging: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    one = log(family="coleman-hodgdon", model=model)
+    monkeypatch.setattr(judging, "draw", lambda seed: one)
+    found = judging.Found(
+        "a", {"a": one.truth + 0.3, "b": one.truth + 0.1, "c": one.truth + 9.0},
+        {"a": 0.5, "b": 0.2, "c": 0.9}, one.truth - 1.0, one.truth + 1.0,
+        errors={"alpha": 0.001, "beta": 0.01, "gamma": 0.0, "offset": 1.0},
+        theta=model.theta + np.array([0.002, -0.01, 0.1]),
+    )  # fmt: skip
+    monkeypatch.setattr(judging, "fitted", lambda log: found)
+    row = judging.judge(1)
+    assert row["failure"] is None
+    assert (row["chosen"], row["best"], row["own"], row["coverage"]) == pytest.approx((0.3, 0.1, 0.5, 1.0))
+    assert (row["chosen_name"], row["best_name"]) == ("a", "b")
+    assert row["z"] == [pytest.approx(2.0), pytest.approx(-1.0), None]
+    found.predictions["a"][:] = np.nan
+    assert judging.judge(1)["failure"]
+
+
+def test_the_adapter_predicts_what_the_stage_does(judging: Any) -> None:
+    u = pz.signals.multi_amplitude([10.0, 20.0, 30.0, 20.0, 30.0], 2.0, 3, 500.0).values
+    model = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    truth = model.simulate(u)
+    x = truth + np.random.default_rng(0).normal(0.0, 0.003, u.size)
+    one = log(
+        u=u, x=x, truth=truth, sample_rate=500.0, family="coleman-hodgdon", model=model,
+        jumps=np.zeros(u.size), spikes=np.zeros(u.size, bool),
+    )  # fmt: skip
+    found = judging.fitted(one)
+    row = judging.judged(one, u.size // 2, found)
+    assert row["best"] <= row["chosen"] < 0.02
+    assert len(row["z"]) == 3
+    assert set(found.held_out) == set(found.predictions)
+
+
+def row_of_a_log(seed: int, chosen: float = 1.0, **given: Any) -> dict[str, Any]:
+    return {
+        "seed": seed, "family": "duhem", "voltage": "sine", "samples": 5000, "sample_rate": 1000.0,
+        "stroke": 100.0, "noise": 0.1, "added": {"noise": 1e-3}, "nnls": 1.0, "line": 2.0, "failure": None,
+        "seconds": 3.0, "chosen": chosen, "best": 0.5, "chosen_name": "plays", "best_name": "line",
+        "level": 0.1, "own": 1.0, **given,
+    }  # fmt: skip
+
+
+def test_a_summary_of_logs_counts() -> None:
+    row = row_of_a_log
+    failed = row(3, failure="ValueError: no")
+    for name in ("chosen", "best", "chosen_name", "level", "own"):
+        del failed[name]
+    found = importlib.import_module("logs").summarise([
+        row(0, 0.5, coverage=0.95), row(1, 0.7, coverage=0.4),
+        row(2, 3.0, added={"noise": 1e-3, "creep": 0.01}), failed,
+        row(4, 0.004, best=0.001, nnls=0.002, samples=30_000, family="paper", coverage=0.98),
+    ])  # fmt: skip
+    every = found["all"]
+    # 0.5/0.5 and two that are far below the noise; 0.7/0.5 and 3/0.5 are not near.
+    assert (every["logs"], every["failed"], every["near_best"]) == (5, 1, 0.4)
+    assert (every["beats_nnls"], every["beats_line"], every["covered"]) == (0.6, 0.6, 0.95)
+    assert {each["name"]: each["logs"] for each in found["by_family"]} == {"duhem": 4, "paper": 1}
+    assert {each["name"]: each["logs"] for each in found["by_size"]} == {"short": 4, "long": 1}
+    assert [(each["name"], each["logs"]) for each in found["by_added"]] == [("creep", 1)]
+    assert [each["seed"] for each in found["worst"]] == [2, 1, 0, 4]
+    assert [each["seed"] for each in found["failures"]] == [3]
+
+
+# ---------------------------------------------------------------- controllers on rigs
+
+
+def row_of_a_rig(seed: int, ratio: float | None = 0.5, **given: Any) -> dict[str, Any]:
+    numbers = dict.fromkeys(("amplitude", "gain", "width", "sensor_noise", "creep"), 1.0)
+    return {
+        **numbers, "seed": seed, "family": "duhem", "reference": "sine", "fault": "none", "mode": "none",
+        "mechanics": "none", "sample_rate": 1000.0, "frequency": 5.0, "block": 1, "delay": 0, "low": 0.0,
+        "high": 100.0, "failure": None, "finite": True, "within_limits": True, "rail": 0.0,
+        "rests_at_rail": False, "ratio": ratio, "last_ratio": ratio, "cycle_ratio": ratio,
+        "named_right": None, "recovery": False, "recovered": None, **given,
+    }  # fmt: skip
+
+
+def test_often_counts_calls_in_half_a_wave_and_the_delay(safety: Any) -> None:
+    # 100 samples in a leg: 6 in a block are 16.7 calls, 7 are 14.3; 6 samples late is below a sixteenth.
+    assert safety.often(row_of_a_rig(0, block=6, delay=6))
+    assert not safety.often(row_of_a_rig(0, block=7))
+    assert not safety.often(row_of_a_rig(0, delay=7))
+
+
+def test_a_summary_of_rigs_counts_what_is_judged_only(safety: Any) -> None:
+    row = row_of_a_rig
+    rows = [
+        row(0), row(1, 2.0, fault="gap", mode="permanent"), row(2, None, fault="gap", mode="from-start"),
+        row(3, 3.0, block=50), row(4, None),
+    ]  # fmt: skip
+    found = safety.summed_up(rows)
+    assert (found["all"]["runs"], found["healthy"]["runs"], found["often"]["runs"]) == (5, 3, 4)
+    assert (found["all"]["judged"], found["all"]["violations"]["ratio"]) == (3, 2)
+    assert found["all"]["quantiles"]["ratio"]["100 %"] == 3.0
+    assert [(each["fault"], each["judged"], each["over"]) for each in found["by_fault"]] == [
+        ("gap", 1, 1), ("none", 2, 1),
+    ]  # fmt: skip
+    assert [each["seed"] for each in found["worst"]][:2] == [3, 1]
+    assert safety.drawn(rows)["fault"] == {"gap": 2, "none": 3}
+
+
+def test_faults_that_were_named_and_forgotten_are_counted(safety: Any) -> None:
+    stuck: dict[str, Any] = {"fault": "stage-stuck", "mode": "transient", "recovery": True}
+    rows = [
+        row_of_a_rig(0, **stuck, named_right=True, named_periods=2.0, recovered=1),
+        row_of_a_rig(1, **stuck, named_right=True, named_periods=4.0, recovered=3),
+        row_of_a_rig(2, **stuck, named_right=False, named_periods=None, recovered=None),
+    ]
+    (found,) = safety.summed_up(rows)["told"]
+    assert (found["to_name"], found["named"], found["named_periods"]) == (3, 2, 3.0)
+    assert (found["to_recover"], found["recovered_first"], found["recovered_soon"]) == (3, 1, 2)
