@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from piezoest.bench import origin, shared, table, tables
+from piezoest.bench import origin, table, tables
 from piezoest.export.generated import CCode
 from piezoest.export.tables import Table
 from piezoest.models import AmplitudeProfile
@@ -60,9 +60,9 @@ def figure(path: Path, seed: int) -> None:
     save_figure(drawn, path)
 
 
-def rows(path: Path, seed: int) -> None:
+def rows(path: Path, seed: int, format: str) -> None:
     periods = [{"key": "run", "seed": seed, "period": k, "error": 0.1 * k} for k in range(SIZE)]
-    tables.write_table(tables.table_of(periods, table.PERIOD_COLUMNS), path)
+    tables.write_table(tables.table_of(periods, table.PERIOD_COLUMNS), path.with_suffix(f".{format}"))
 
 
 def waveform(path: Path, seed: int) -> None:
@@ -84,10 +84,9 @@ OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
         "controller", f"{seed}" * SIZE, f"{seed}" * SIZE, "double", False
     ).write(path.parent),
     "waveform.csv": waveform,
-    "table.json": lambda path, seed: shared.write_json(columns(seed)["voltage_V"].tolist(), path),
     "put.json": lambda path, seed: origin.put(columns(seed)["voltage_V"].tolist(), path),
-    "periods.csv": rows,
-    "periods.parquet": rows,
+    "periods.csv": lambda path, seed: rows(path, seed, "csv"),
+    "periods.parquet": lambda path, seed: rows(path, seed, "parquet"),
 }  # fmt: skip
 
 

@@ -183,15 +183,3 @@ def test_a_summary_of_rigs_counts_what_is_judged_only(safety: Any) -> None:
     ]  # fmt: skip
     assert [each["seed"] for each in found["worst"]][:2] == [3, 1]
     assert safety.drawn(rows)["fault"] == {"gap": 2, "none": 3}
-
-
-def test_faults_that_were_named_and_forgotten_are_counted(safety: Any) -> None:
-    stuck: dict[str, Any] = {"fault": "stage-stuck", "mode": "transient", "recovery": True}
-    rows = [
-        row_of_a_rig(0, **stuck, named_right=True, named_periods=2.0, recovered=1),
-        row_of_a_rig(1, **stuck, named_right=True, named_periods=4.0, recovered=3),
-        row_of_a_rig(2, **stuck, named_right=False, named_periods=None, recovered=None),
-    ]
-    (found,) = safety.summed_up(rows)["told"]
-    assert (found["to_name"], found["named"], found["named_periods"]) == (3, 2, 3.0)
-    assert (found["to_recover"], found["recovered_first"], found["recovered_soon"]) == (3, 1, 2)

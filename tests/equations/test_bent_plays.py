@@ -4,7 +4,7 @@ import itertools
 from typing import Any
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import piezoest as pz
@@ -49,6 +49,7 @@ def test_segments_add_up_to_the_play() -> None:
     np.testing.assert_allclose(sum(parts), p, atol=1e-15)
 
 
+@settings(max_examples=30)
 @given(seed=st.integers(0, 10_000), scale=st.floats(0.1, 10.0))
 def test_turning_points_hold_all_the_memory_of_plays(seed: int, scale: float) -> None:
     u = np.round(scale * np.cumsum(np.random.default_rng(seed).standard_normal(150)), 1)

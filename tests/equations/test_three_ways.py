@@ -64,7 +64,7 @@ def test_functions_of_numbers(function: Any, arguments: tuple[Any, ...]) -> None
 # ---------------------------------------------------------------- functions that write into arrays
 
 RATES = record(theta=numbers(4), P=numbers(4, 4))
-MORE: Any = {name: numbers(4) for name in ("theta", "h", "gain")}
+MORE: Any = {name: numbers(4) for name in ("theta", "h", "gain", "product")}
 CASE = record(z=NUMBER, y=NUMBER, P=numbers(4, 4), rates=RATES, **MORE)
 ROOT = np.random.default_rng(0).normal(size=(4, 4))
 
@@ -76,7 +76,8 @@ def predicted(case: Record) -> None:
 
 @compiled
 def updated(case: Record) -> None:
-    case.y = kalman.update(case.theta, case.P, case.h, case.z, 0.04, case.gain)
+    case.y = kalman.innovation_variance(case.P, case.h, 0.04, case.product)
+    kalman.correct(case.theta, case.P, case.h, case.z, 0.04, case.y, case.gain, case.product)
 
 
 @compiled
@@ -91,12 +92,14 @@ def widened(case: Record) -> None:
 
 @compiled
 def discrete(case: Record) -> None:
-    _, case.y = ls.discrete_update(case.theta, case.P, case.h, case.z, 0.98, 0.04, 50.0)
+    y, q = ls.innovation(case.theta, case.P, case.h, case.z, case.product)
+    case.y = ls.discrete_correction(case.theta, case.P, y, q, 0.98, 0.04, 50.0, case.product)
 
 
 @compiled
 def directional(case: Record) -> None:
-    _, case.y = ls.directional_update(case.theta, case.P, case.h, case.z, 0.98, 0.04, 50.0)
+    y, q = ls.innovation(case.theta, case.P, case.h, case.z, case.product)
+    case.y = ls.directional_correction(case.theta, case.P, y, q, 0.98, 0.04, 50.0, case.product)
 
 
 @compiled

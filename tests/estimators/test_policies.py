@@ -31,12 +31,6 @@ def made(*policies: Any, **options: Any) -> Any:
     return pz.HysteresisRLS(FS, policies=(*policies, *BASE), **options)
 
 
-def start() -> tuple[Any, Any, Any]:
-    rng = np.random.default_rng(3)
-    A = rng.normal(size=(3, 3))
-    return rng.normal(size=3), A @ A.T + np.eye(3), rng
-
-
 @pytest.mark.parametrize("name", POLICIES)
 def test_same_bits_by_step_run_and_from_a_file(name: str) -> None:
     u, x = record(6.0)
@@ -56,38 +50,6 @@ def test_same_bits_by_step_run_and_from_a_file(name: str) -> None:
     assert np.linalg.eigvalsh(whole.P / np.sqrt(np.outer(np.diag(whole.P), np.diag(whole.P))))[0] > 0.0
     whole.reset()
     assert whole.to_dict() == fresh
-
-
-def test_directional_forgetting_is_the_textbook() -> None:
-    theta, P, rng = start()
-    expected, information = theta.copy(), np.linalg.inv(P)
-    mu, R = 0.9, 0.3
-    for _ in range(50):
-        phi, z = rng.normal(size=3), rng.normal()
-        covariance = np.linalg.inv(information)
-        q = phi @ covariance @ phi
-        expected = expected + covariance @ phi / (R + q) * (z - expected @ phi)
-        information = information + (mu - (1.0 - mu) * R / q) * np.outer(phi, phi) / R
-        ls.directional_update(theta, P, phi, z, mu, R, np.inf)
-    np.testing.assert_allclose(theta, expected, rtol=1e-8)
-    np.testing.assert_allclose(np.linalg.inv(P), information, rtol=1e-7)
-
-
-def test_variable_forgetting_is_the_textbook() -> None:
-    theta, P, rng = start()
-    estimator = pz.RecursiveLeastSquares(
-        3, theta=theta, P=P, noise_variance=0.04, policies=(p.VariableForgetting(50.0, 0.1, "second"),)
-    )
-    memory = 1.0 / (1.0 - np.exp(-1.0 / 50.0))
-    for _ in range(100):
-        phi, z = rng.normal(size=3), rng.normal()
-        y, q = z - theta @ phi, phi @ P @ phi
-        mu = max(1.0 - y * y / (0.04 + q) / memory, np.exp(-1.0 / 5.0))
-        K = P @ phi / (mu * 0.04 + q)
-        theta, P = theta + K * y, (P - np.outer(K, phi) @ P) / mu
-        estimator.update(z, phi)
-    np.testing.assert_allclose(estimator.theta, theta, rtol=1e-8)
-    np.testing.assert_allclose(estimator.P, P, rtol=1e-7)
 
 
 def test_cusum_is_pages() -> None:

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.estimators import rls_kernel
-from piezoest.layout import Named, leaves
 from tests.reference import hysteresis_rls as reference
 
 FS = 50_000.0
@@ -20,19 +18,13 @@ def record(seconds: float = 1.0, noise: float = 0.0, fs: float = FS, model: Any 
 
 
 def test_equals_the_textbook_with_gaps() -> None:
-    u, x = record(0.3, 1e-3)
-    x[2000] = x[7001] = x[7002] = np.nan
+    u, x = record(0.15, 1e-3)
+    x[2000] = x[5001] = x[5002] = np.nan
     estimator = pz.HysteresisRLS(FS, memory=0.1, policies=())
     theta = estimator.run(u, x).theta
+    start = np.array([0.02, 0.12, 0.0036])
     expected = reference.coleman_hodgdon(
-        u,
-        x,
-        FS,
-        start=np.array([0.02, 0.12, 0.0036]),
-        uncertainty=0.5,
-        noise=1.5e-3,
-        memory=0.1,
-        cutoff=2500.0,
+        u, x, FS, start=start, uncertainty=0.5, noise=1.5e-3, memory=0.1, cutoff=2500.0
     )
     np.testing.assert_allclose(theta, expected, rtol=1e-7)
 
@@ -87,27 +79,3 @@ def test_long_gap_starts_anew() -> None:
     estimator = pz.HysteresisRLS(FS, memory=0.4)
     estimator.run(u, x)
     np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=1e-3)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {},
-        {"memory": 0.4, "errors": False, "delay": 1.5},
-        {"initial_model": pz.LinearGain(0.15), "offset": True},
-        {"time_base": "continuous", "high_pass": 0.5},
-    ],
-)
-def test_machine_code_does_what_its_source_says(options: dict[str, Any]) -> None:
-    u, x = record(0.02, 1e-3)
-    x[300:310] = u[500] = np.nan
-    x[20:120] = np.inf
-    machine, plain = pz.HysteresisRLS(FS, **options), pz.HysteresisRLS(FS, **options)
-    machine.run(u, x)
-    state, given = Named(plain.state, plain.layout), Named(plain.settings, plain.layouts[1])
-    with np.errstate(all="ignore"):
-        for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
-            rls_kernel.sample(state, given, u_k, x_k)
-    for name, _, (one, other) in leaves(machine.layout, machine.state, plain.state):
-        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12, err_msg=name)
-    assert machine.status.updates > 500
