@@ -92,7 +92,7 @@ def test_bound_holds_and_does_not_freeze(law: dict[str, Any], memory: float) -> 
     uncertain = loud @ made_.P @ loud
     for _ in range(300):
         made_.update(0.0, loud)
-    assert loud @ made_.P @ loud < 0.1 * uncertain
+    assert loud @ made_.P @ loud < 0.5 * uncertain
 
 
 @pytest.mark.parametrize("policies", [(), (p.Forgetting(100.0),)])
