@@ -12,13 +12,7 @@ from scipy.integrate import solve_ivp
 
 from piezoest import ColemanHodgdon
 from piezoest.equations import coleman_hodgdon as ch
-
-TABLE_I = [
-    (3.26e-2, 0.136, 5.96e-3),
-    (1.91e-2, 0.149, 4.05e-3),
-    (2.1e-2, 0.147, 4.29e-3),
-    (1.59e-2, 0.155, 3.55e-3),
-]
+from tests.reference import TABLE_I
 
 
 @st.composite

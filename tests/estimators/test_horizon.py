@@ -108,39 +108,23 @@ def test_missing_samples_and_nothing_at_all() -> None:
         assert nothing.status.last == "missing"
 
 
-# ---------------------------------------------------------------- thinning
+def test_decimation_costs_no_accuracy() -> None:
+    full, few = (MovingHorizon(RATE, decimation=n, noise=NOISE) for n in (1, 5))
+    for estimator in (full, few):
+        estimator.run(*record(1.0))
+    np.testing.assert_allclose(few.standard_errors, full.standard_errors, rtol=0.15)
 
 
-@pytest.mark.parametrize("first", [0, 7, 1234])
-def test_thinning_loses_neither_path_nor_displacement(first: int) -> None:
+def test_thinning_loses_neither_path_nor_displacement() -> None:
     """Without noise each mean is the model's output at its point, path and turning points kept."""
     turns = 2.0 * np.pi * np.arange(30_000) / 50_000.0
-    model, u = TRUE, 25.0 * np.sin(5.0 * turns) + 8.0 * np.sin(15.0 * turns)
-    x = model.simulate(u)
+    u = 25.0 * np.sin(5.0 * turns) + 8.0 * np.sin(15.0 * turns)
+    x = TRUE.simulate(u)
     x[4321] = np.nan
-    points, shift, mean, root_weight = thinned(u, x, first, 9, 333)
+    points, shift, mean, root_weight = thinned(u, x, 7, 9, 333)
     assert points.size < u.size / 8
     assert {0, 333, u.size - 1} <= set(points.tolist())
-    np.testing.assert_allclose(
-        model.simulate(u[points], allow_jumps=True), model.simulate(u)[points], atol=1e-12
-    )
-    counted = root_weight > 0.0
-    error = mean - model.c * shift - model.simulate(u)[points]
-    assert np.abs(error[counted]).max() < 1e-5
+    there = TRUE.simulate(u)[points]
+    np.testing.assert_allclose(TRUE.simulate(u[points], allow_jumps=True), there, atol=1e-12)
+    assert np.abs(mean - TRUE.c * shift - there)[root_weight > 0.0].max() < 1e-5
     assert np.sum(root_weight**2) > 0.97 * u.size
-
-    # A voltage that turns all the time is taken at full rate.
-    u = np.random.default_rng(0).standard_normal(500)
-    points, shift, _, root_weight = thinned(u, u, 0, 10, 0)
-    np.testing.assert_array_equal(points, np.arange(500))
-    assert np.all(root_weight == 1.0)
-    assert not shift.any()
-
-
-def test_decimation_costs_no_accuracy() -> None:
-    u, x = record(1.0)
-    full = MovingHorizon(RATE, decimation=1, noise=NOISE)
-    few = MovingHorizon(RATE, decimation=5, noise=NOISE)
-    full.run(u, x)
-    few.run(u, x)
-    np.testing.assert_allclose(few.standard_errors, full.standard_errors, rtol=0.15)
