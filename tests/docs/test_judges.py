@@ -117,36 +117,6 @@ def test_the_adapter_predicts_what_the_stage_does(judging: Any) -> None:
     assert set(found.held_out) == set(found.predictions)
 
 
-def row_of_a_log(seed: int, chosen: float = 1.0, **given: Any) -> dict[str, Any]:
-    return {
-        "seed": seed, "family": "duhem", "voltage": "sine", "samples": 5000, "sample_rate": 1000.0,
-        "stroke": 100.0, "noise": 0.1, "added": {"noise": 1e-3}, "nnls": 1.0, "line": 2.0, "failure": None,
-        "seconds": 3.0, "chosen": chosen, "best": 0.5, "chosen_name": "plays", "best_name": "line",
-        "level": 0.1, "own": 1.0, **given,
-    }  # fmt: skip
-
-
-def test_a_summary_of_logs_counts() -> None:
-    row = row_of_a_log
-    failed = row(3, failure="ValueError: no")
-    for name in ("chosen", "best", "chosen_name", "level", "own"):
-        del failed[name]
-    found = importlib.import_module("logs").summarise([
-        row(0, 0.5, coverage=0.95), row(1, 0.7, coverage=0.4),
-        row(2, 3.0, added={"noise": 1e-3, "creep": 0.01}), failed,
-        row(4, 0.004, best=0.001, nnls=0.002, samples=30_000, family="paper", coverage=0.98),
-    ])  # fmt: skip
-    every = found["all"]
-    # 0.5/0.5 and two that are far below the noise; 0.7/0.5 and 3/0.5 are not near.
-    assert (every["logs"], every["failed"], every["near_best"]) == (5, 1, 0.4)
-    assert (every["beats_nnls"], every["beats_line"], every["covered"]) == (0.6, 0.6, 0.95)
-    assert {each["name"]: each["logs"] for each in found["by_family"]} == {"duhem": 4, "paper": 1}
-    assert {each["name"]: each["logs"] for each in found["by_size"]} == {"short": 4, "long": 1}
-    assert [(each["name"], each["logs"]) for each in found["by_added"]] == [("creep", 1)]
-    assert [each["seed"] for each in found["worst"]] == [2, 1, 0, 4]
-    assert [each["seed"] for each in found["failures"]] == [3]
-
-
 # ---------------------------------------------------------------- controllers on rigs
 
 

@@ -18,6 +18,8 @@ from piezoest import (
     TemperatureLaw,
 )
 from piezoest.equations.filters import biquad_step, butterworth_low_pass
+from piezoest.layout import Named
+from piezoest.stage import kernel
 
 FS = 10_000.0
 COLEMAN_HODGDON = ColemanHodgdon(0.021, 0.147, 4.29e-3, offset=0.3)
@@ -75,6 +77,17 @@ def test_step_run_and_split_run_give_the_same_bits(hysteresis: Any, temperature:
     assert isinstance(single.step(1.0), float)
     assert isinstance(single.displacement, float)
     assert single.time == pytest.approx((u.size + 1) / FS)
+
+
+@pytest.mark.parametrize("hysteresis", [COLEMAN_HODGDON, PLAYS])
+def test_machine_code_does_what_its_source_says(hysteresis: Any) -> None:
+    stage, u, measured, one = full_stage(hysteresis), U[:50].copy(), np.empty(50), np.ones(1)
+    state, settings = map(Named, (stage._state, stage._settings), stage._layouts)
+    kernel.run.function(state, settings, u, np.zeros(1), one, one, measured)
+    stage.reset()
+    stage._noisy = False
+    np.testing.assert_allclose(stage.run(U[:50]), measured, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(stage.displacement, u, rtol=0.0, atol=1e-12)
 
 
 def test_reset_repeats_and_seeds_differ() -> None:
