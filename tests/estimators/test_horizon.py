@@ -128,3 +128,9 @@ def test_thinning_loses_neither_path_nor_displacement() -> None:
     np.testing.assert_allclose(TRUE.simulate(u[points], allow_jumps=True), there, atol=1e-12)
     assert np.abs(mean - TRUE.c * shift - there)[root_weight > 0.0].max() < 1e-5
     assert np.sum(root_weight**2) > 0.97 * u.size
+    # A voltage that turns all the time is taken at full rate.
+    noise = np.random.default_rng(0).standard_normal(500)
+    points, shift, _, root_weight = thinned(noise, noise, 0, 10, 0)
+    np.testing.assert_array_equal(points, np.arange(500))
+    assert np.all(root_weight == 1.0)
+    assert not shift.any()

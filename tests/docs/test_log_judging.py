@@ -1,4 +1,4 @@
-"""The programs that make the numbers of two pages: what they judge against, and what they count."""
+"""The program that judges fits to logs: what it judges against, and what it counts."""
 
 import importlib
 from pathlib import Path
@@ -21,14 +21,6 @@ def _paths(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def judging() -> Any:
     return importlib.import_module("log_judging")
-
-
-@pytest.fixture
-def safety() -> Any:
-    return importlib.import_module("safety")
-
-
-# ---------------------------------------------------------------- fits to logs
 
 
 def voltage() -> Any:
@@ -115,41 +107,3 @@ def test_the_adapter_predicts_what_the_stage_does(judging: Any) -> None:
     assert row["best"] <= row["chosen"] < 0.02
     assert len(row["z"]) == 3
     assert set(found.held_out) == set(found.predictions)
-
-
-# ---------------------------------------------------------------- controllers on rigs
-
-
-def row_of_a_rig(seed: int, ratio: float | None = 0.5, **given: Any) -> dict[str, Any]:
-    numbers = dict.fromkeys(("amplitude", "gain", "width", "sensor_noise", "creep"), 1.0)
-    return {
-        **numbers, "seed": seed, "family": "duhem", "reference": "sine", "fault": "none", "mode": "none",
-        "mechanics": "none", "sample_rate": 1000.0, "frequency": 5.0, "block": 1, "delay": 0, "low": 0.0,
-        "high": 100.0, "failure": None, "finite": True, "within_limits": True, "rail": 0.0,
-        "rests_at_rail": False, "ratio": ratio, "last_ratio": ratio, "cycle_ratio": ratio,
-        "named_right": None, "recovery": False, "recovered": None, **given,
-    }  # fmt: skip
-
-
-def test_often_counts_calls_in_half_a_wave_and_the_delay(safety: Any) -> None:
-    # 100 samples in a leg: 6 in a block are 16.7 calls, 7 are 14.3; 6 samples late is below a sixteenth.
-    assert safety.often(row_of_a_rig(0, block=6, delay=6))
-    assert not safety.often(row_of_a_rig(0, block=7))
-    assert not safety.often(row_of_a_rig(0, delay=7))
-
-
-def test_a_summary_of_rigs_counts_what_is_judged_only(safety: Any) -> None:
-    row = row_of_a_rig
-    rows = [
-        row(0), row(1, 2.0, fault="gap", mode="permanent"), row(2, None, fault="gap", mode="from-start"),
-        row(3, 3.0, block=50), row(4, None),
-    ]  # fmt: skip
-    found = safety.summed_up(rows)
-    assert (found["all"]["runs"], found["healthy"]["runs"], found["often"]["runs"]) == (5, 3, 4)
-    assert (found["all"]["judged"], found["all"]["violations"]["ratio"]) == (3, 2)
-    assert found["all"]["quantiles"]["ratio"]["100 %"] == 3.0
-    assert [(each["fault"], each["judged"], each["over"]) for each in found["by_fault"]] == [
-        ("gap", 1, 1), ("none", 2, 1),
-    ]  # fmt: skip
-    assert [each["seed"] for each in found["worst"]][:2] == [3, 1]
-    assert safety.drawn(rows)["fault"] == {"gap": 2, "none": 3}
