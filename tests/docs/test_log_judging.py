@@ -91,19 +91,3 @@ def test_a_row_holds_the_chosen_the_best_and_scores_or_what_failed(
     assert row["z"] == [pytest.approx(2.0), pytest.approx(-1.0), None]
     found.predictions["a"][:] = np.nan
     assert judging.judge(1)["failure"]
-
-
-def test_the_adapter_predicts_what_the_stage_does(judging: Any) -> None:
-    u = pz.signals.multi_amplitude([10.0, 20.0, 30.0, 20.0, 30.0], 2.0, 3, 500.0).values
-    model = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
-    truth = model.simulate(u)
-    x = truth + np.random.default_rng(0).normal(0.0, 0.003, u.size)
-    one = log(
-        u=u, x=x, truth=truth, sample_rate=500.0, family="coleman-hodgdon", model=model,
-        jumps=np.zeros(u.size), spikes=np.zeros(u.size, bool),
-    )  # fmt: skip
-    found = judging.fitted(one)
-    row = judging.judged(one, u.size // 2, found)
-    assert row["best"] <= row["chosen"] < 0.02
-    assert len(row["z"]) == 3
-    assert set(found.held_out) == set(found.predictions)

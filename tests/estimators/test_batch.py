@@ -7,7 +7,6 @@ import pytest
 
 import piezoest as pz
 from piezoest.estimators.batch import BatchFit
-from piezoest.fitting.losses import bend
 
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 RATE = 1000.0
@@ -183,14 +182,6 @@ def test_outliers(loss: Any, method: Any) -> None:
     np.testing.assert_allclose(robust.theta[:3], TRUE.theta, rtol=5e-3)
     assert np.all(np.abs(robust.theta[:3] - TRUE.theta) < 4.0 * robust.standard_errors[:3])
     assert robust.noise < 1.5 * NOISE
-
-
-@pytest.mark.parametrize("loss", ["linear", "huber", "soft_l1", "cauchy"])
-def test_derivatives_of_the_losses(loss: str) -> None:
-    z = np.array([0.1, 0.7, 1.3, 9.0])
-    rho, above, below = bend(loss, z), bend(loss, z + 1e-6), bend(loss, z - 1e-6)
-    np.testing.assert_allclose(rho[1], (above[0] - below[0]) / 2e-6, rtol=1e-6)
-    np.testing.assert_allclose(rho[2], (above[1] - below[1]) / 2e-6, rtol=1e-6, atol=1e-12)
 
 
 def test_a_failure_is_told_in_the_solvers_words_with_the_best_iterate() -> None:

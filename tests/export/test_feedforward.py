@@ -110,10 +110,7 @@ def test_it_goes_on_from_where_it_was_exported() -> None:
 @pytest.mark.parametrize("gain", [0.2, -0.2])
 def test_a_gain_that_is_known_need_not_be_right(gain: float) -> None:
     library = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), gain=gain, feedback=5.0)
-    code = pz.export.c(library)
-    assert f"Gain: about {gain:g} um/V." in code.header
-    assert "Feedback: 5 1/s." in code.header
-    seen = drive(library, pz.export.CompiledFeedforward(code), rig("duhem", "lag"))
+    seen = drive(library, pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem", "lag"))
     assert {stage for stage, _, _ in seen} == {0, 1, 2}
     assert any(event.reason.startswith("gain") for event in library.events) == (gain < 0.0)
 
