@@ -23,6 +23,10 @@ def made(*policies: Any, **options: Any) -> pz.RecursiveLeastSquares:
     return pz.RecursiveLeastSquares(3, **{"theta": theta, "P": P, "policies": policies, **options})
 
 
+def forgetting(theta: Any, P: Any, phi: Any, z: float) -> tuple[Any, Any]:
+    return reference.discrete(theta, P, phi, z, MU, R)
+
+
 def directional(theta: Any, P: Any, phi: Any, z: float) -> tuple[Any, Any]:
     q = phi @ P @ phi
     information = np.linalg.inv(P) + (MU - (1.0 - MU) * R / q) * np.outer(phi, phi) / R
@@ -48,7 +52,7 @@ CONTINUOUS: dict[str, Any] = {"time_base": "continuous", "step": 0.01}
 @pytest.mark.parametrize(
     ("law", "textbook"),
     [
-        (made(p.Forgetting(50.0), noise_variance=R), lambda *each: reference.discrete(*each, MU, R)),
+        (made(p.Forgetting(50.0), noise_variance=R), forgetting),
         (made(p.DirectionalForgetting(50.0, "second"), noise_variance=R), directional),
         (made(p.VariableForgetting(50.0, 0.1, "second"), noise_variance=R), variable),
         (made(p.Forgetting(3.0), **CONTINUOUS), continuous(False)),

@@ -446,8 +446,9 @@ def test_refuses_a_save_that_is_not_its_own(kind: Any) -> None:
         (data | {"arguments": arguments | {"initial_model": [1.0]}}, "model"),
         *((data | {"arguments": {key: arguments[key] for key in arguments if key != name}},
            f"arguments has no '{name}'") for name in arguments),
-        *((data | {"state": state | {"samples": odd}}, "state") for odd in ("7", np.nan, 10**400, {})),
     ]  # fmt: skip
+    odd: tuple[Any, ...] = ("7", np.nan, 10**400, {})
+    wrong += [(data | {"state": state | {"samples": value}}, "state") for value in odd]
     for name in data:
         lacking = {key: value for key, value in data.items() if key != name}
         wrong += [

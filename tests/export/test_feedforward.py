@@ -26,7 +26,7 @@ def controller(estimators: str, limits: pz.VoltageLimits = LIMITS) -> Any:
 
 @pytest.fixture(
     scope="module",
-    params=["default", *(pytest.param(name, marks=pytest.mark.slow) for name in ("ekf", "line"))],
+    params=["ekf", *(pytest.param(name, marks=pytest.mark.slow) for name in ("default", "line"))],
 )
 def pair(request: pytest.FixtureRequest) -> tuple[Any, Any]:
     """A controller, and what is exported of it."""
@@ -36,7 +36,7 @@ def pair(request: pytest.FixtureRequest) -> tuple[Any, Any]:
 
 @pytest.fixture(scope="module")
 def single() -> Any:
-    return pz.export.CompiledFeedforward(pz.export.c(controller("default"), precision="float"))
+    return pz.export.CompiledFeedforward(pz.export.c(controller("ekf"), precision="float"))
 
 
 def rig(family: str, mechanics: str = "none") -> Any:

@@ -9,7 +9,8 @@ import numba
 import numpy as np
 import scipy
 
-from tests.oracle.cases import Array, Outcome
+from tests.oracle.cases import Outcome
+from tests.oracle.records import Array
 
 FILE = Path(__file__).with_name("oracle.npz")
 # Numbers that are kept of a case, shared by its arrays, and the least of each array.
