@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import piezoest as pz
-from piezoest.equations import bent_plays, turning_points
+from piezoest.equations import turning_points
 from piezoest.equations.play import play
 from piezoest.layout import Named, new
 
@@ -40,13 +40,6 @@ def test_inverse_is_exact(seed: int, bends: int, scale: float) -> None:
     np.testing.assert_allclose(model.simulate(u), r, atol=1e-9)
     np.testing.assert_allclose(model.invert(model.simulate(u)), u, atol=1e-9)
     assert pz.PrandtlIshlinskii.from_dict(model.to_dict()) == model
-
-
-def test_segments_add_up_to_the_play() -> None:
-    p = np.linspace(-5.0, 5.0, 101)
-    edges = [-1e30, -2.0, 1.0, 1e30]
-    parts = [bent_plays.segment(p, low, high) for low, high in itertools.pairwise(edges)]
-    np.testing.assert_allclose(sum(parts), p, atol=1e-15)
 
 
 @settings(max_examples=30)

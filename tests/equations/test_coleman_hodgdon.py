@@ -101,10 +101,8 @@ def test_increment_is_lambert_w(loop: tuple[float, float, float], place: float, 
 
 
 def test_no_branch_error_at_extreme_arguments() -> None:
-    for dr in (1e-300, 1e-12, 1e3, 1e6, 1e9):
-        for sign in (-1.0, 1.0):
-            du = ch.inverse_increment(0.1, sign * dr, 0.02, 0.06, 0.2)
-            assert np.isfinite(du)
-            assert np.sign(du) == sign
-    assert ch.inverse_increment(0.1, 0.0, 0.02, 0.06, 0.2) == 0.0
+    for dr in (0.0, 1e-300, -1e-12, 1e3, -1e6, 1e9):
+        du = ch.inverse_increment(0.1, dr, 0.02, 0.06, 0.2)
+        assert np.isfinite(du)
+        assert np.sign(du) == np.sign(dr)
     assert ch.inverse_increment(3.0, 0.0, 0.02, 0.06, 0.12) == 0.0

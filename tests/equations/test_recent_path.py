@@ -56,13 +56,3 @@ def test_steady_loop_is_known_however_long_it_went_on(amplitude: float, a: float
     u = np.concatenate([triangle([amplitude, -amplitude] * 200), np.linspace(-1.0, 0.4, 20)[1:] * amplitude])
     h = with_decay(followed(u, a=before), a)
     assert h == pytest.approx(simulated(u, a), abs=0.01 * amplitude)
-
-
-def test_model_in_use_goes_on_by_itself() -> None:
-    """However many turns are dropped, and taken up again it does not move."""
-    u = 20.0 + np.cumsum(np.random.default_rng(2).standard_normal(5000))
-    path = followed(u, a=0.002)
-    h = float(recent_path.hysteresis(path))
-    assert path.count > recent_path.MOST // 2
-    assert h == pytest.approx(simulated(u, 0.002), abs=0.2)
-    assert with_decay(path, 0.002) == pytest.approx(h, abs=1e-9)

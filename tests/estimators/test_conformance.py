@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 import piezoest as pz
 from piezoest.estimators.base import EstimatorBase
+from tests.wild import wild
 
 FloatArray = NDArray[np.float64]
 
@@ -317,6 +318,7 @@ HOSTILE: dict[str, tuple[FloatArray, FloatArray]] = {
     "spikes": (HELD, WAVE + 1e4 * (RNG.random(N) < 0.05)),
     "huge": (1e8 * RNG.standard_normal(N), 1e8 * RNG.standard_normal(N)),
     "tiny": (1e-12 * HELD, 1e-12 * WAVE),
+    "any bits": (wild(RNG, N), wild(RNG, N)),
     "holes": (np.where(RNG.random(N) < 0.5, HELD, np.nan), np.where(RNG.random(N) < 0.5, WAVE, np.inf)),
     "biased": (HELD + 80.0, WAVE - 100.0),
 }
