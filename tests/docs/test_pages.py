@@ -1,6 +1,6 @@
 """README and documentation: their numbers are those of docs/data, their links and tests are there."""
 
-import importlib.util
+import importlib
 import re
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,7 @@ DOCS = ROOT / "docs"
 def program(name: str, monkeypatch: pytest.MonkeyPatch) -> Any:
     """A program of docs/, as a module."""
     monkeypatch.syspath_prepend(str(DOCS))
-    specification = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+    return importlib.import_module(name)
 
 
 # ---------------------------------------------------------------- README

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numba import njit
 
+import piezoest as pz
 from piezoest import symbolic
 from piezoest.compile import Record, compiled
 from piezoest.equations import coleman_hodgdon as ch
@@ -157,3 +158,26 @@ def test_functions_that_write_into_arrays(function: Any, z: float) -> None:
     function.of(CASE)(machine)
     for found in (flat(machine), symbolic_):
         np.testing.assert_allclose(found, flat(plain), rtol=1e-13, atol=1e-15)
+
+
+# ---------------------------------------------------------------- whole records
+
+
+@pytest.mark.parametrize("samples", [1, 50, 1777])
+@pytest.mark.parametrize("sensitive", [True, False])
+def test_simulation_is_that_of_the_model(samples: int, sensitive: bool) -> None:
+    """Of blocks, parts of blocks and single samples, with a dwell."""
+    model = pz.ColemanHodgdon(0.021, 0.147, 0.00429, 0.3)
+    u = pz.signals.triangle(33.0, 5.0, 5.0, 2000.0).values[:samples].copy()
+    u[30:45] = u[30:31]
+    p, s = np.array([model.a, model.b, model.c, model.offset]), np.array([-0.4])
+    run = symbolic.simulation(pz.ColemanHodgdon, 3).run(u, p, s, np.empty(0), sensitive=sensitive)
+    x = model.simulate(u, initial_state=-0.4, allow_jumps=True)
+    np.testing.assert_allclose(run.x, x, rtol=0.0, atol=1e-12)
+    assert run.end[0] == pytest.approx(x[-1] - model.c * u[-1] - model.offset, abs=1e-12)
+
+
+@pytest.mark.parametrize("H", [np.diag([1.0, -1.0]), np.full((2, 2), np.nan)])
+def test_a_program_without_an_optimum_is_refused(H: Any) -> None:
+    with pytest.raises(np.linalg.LinAlgError, match="no solver ends"):
+        symbolic.quadratic_program(H, np.ones(2), np.zeros(2))

@@ -1,4 +1,6 @@
-"""All cases of the oracle: what each of them gives, by public names alone.
+"""All cases of the oracle, of estimators and compensators: what each of them gives, by public names alone.
+
+Models and stages have exact tests.
 
 A case is a function without arguments that returns named arrays of numbers. It makes all that it needs,
 so that no case depends on another.
@@ -164,53 +166,6 @@ def estimator_cases() -> Cases:
                     "batch/multiple-offset/sine": partial(batch, huber, "sine")}  # fmt: skip
 
 
-# ---------------------------------------------------------------- models and stages
-
-
-def model(name: str, wave: str) -> Outcome:
-    u, of = VOLTAGES[wave], MODELS[name]
-    return {"simulated": of.simulate(u), "inverted": of.invert(0.1 * u)}
-
-
-STAGE_OPTIONS: dict[str, dict[str, Any]] = {
-    "bare": {},
-    "creep": {"creep": pz.Creep([0.01, 0.02], [0.01, 0.1])},
-    "mechanics": {"mechanics": pz.MassSpringDamper(80.0, 0.1)},
-    "amplifier": {"amplifier": pz.Amplifier(-20.0, 25.0, resolution=0.01, slew_rate=1e3, cutoff=200.0)},
-    "gauge": {"gauge": pz.Gauge(1e-3, 0.1, 200.0, delay=2, resolution=1e-3, minimum=-4.0, maximum=4.0)},
-    "ageing": {"gain_schedule": np.array([[0.05, 1.0], [0.2, 1.2]])},
-    "warm": {
-        "temperature": np.array([[0.0, 20.0], [0.3, 60.0]]),
-        "temperature_law": pz.TemperatureLaw(25.0, 0.01, -0.01),
-    },
-}
-
-
-def stage(make: Any) -> Outcome:
-    made, u = make(), VOLTAGES["walk"]
-    outcome = {"step": flat([made.step(u_k) for u_k in u[:100].tolist()]), "run": made.run(u[100:])}
-    outcome |= {"true": made.displacement, "time": flat(made.time)}
-    made.reset()
-    return outcome | {"anew": made.run(VOLTAGES["dwell"])}
-
-
-def plant_cases() -> Cases:
-    cases: Cases = {
-        f"model/{name}/{wave}": partial(model, name, wave) for name in MODELS for wave in VOLTAGES
-    }
-    for name, options in STAGE_OPTIONS.items():
-        cases[f"stage/{name}"] = partial(stage, partial(pz.SimulatedStage, RATE, TRUE, **options))
-    whole = {key: value for options in STAGE_OPTIONS.values() for key, value in options.items()}
-    for name, hysteresis in (("coleman-hodgdon", OTHER), ("plays", PLAYS)):
-        made = partial(pz.SimulatedStage, RATE, hysteresis, **whole, seed=3)
-        cases[f"stage-whole/{name}"] = partial(stage, made)
-    warm: Any = {"temperature": 45.0, "gain_schedule": np.array([[0.0, 1.0], [0.2, 0.8]]), "noise": 0.01}
-    for group, make in {"paper": pz.PaperStage, "preisach": pz.PreisachStage}.items():
-        cases[f"stage-{group}/default"] = partial(stage, partial(make, 50_000.0, 5))
-        cases[f"stage-{group}/warm"] = partial(stage, partial(make, 5_000.0, 5, **warm))
-    return cases
-
-
 # ---------------------------------------------------------------- compensators
 
 LIMITS = pz.VoltageLimits(-60.0, 60.0)
@@ -271,7 +226,7 @@ def compensator_cases() -> Cases:
     return cases
 
 
-CASES = estimator_cases() | plant_cases() | compensator_cases()
+CASES = estimator_cases() | compensator_cases()
 
 # Relative tolerances by prefix of a case. What a solver ends at depends on its tolerance, and the scale of a
 # robust loss is sought to 2 %, from another start than the file's.
