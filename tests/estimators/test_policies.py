@@ -9,7 +9,6 @@ import pytest
 
 import piezoest as pz
 from piezoest import policies as p
-from piezoest.equations import least_squares as ls
 
 FS = 5000.0
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
@@ -50,15 +49,6 @@ def test_same_bits_by_step_run_and_from_a_file(name: str) -> None:
     assert np.linalg.eigvalsh(whole.P / np.sqrt(np.outer(np.diag(whole.P), np.diag(whole.P))))[0] > 0.0
     whole.reset()
     assert whole.to_dict() == fresh
-
-
-def test_cusum_is_pages() -> None:
-    values = np.random.default_rng(0).exponential(size=300) + (np.arange(300) > 200)
-    total, sums = 0.0, np.concatenate([[0.0], np.cumsum(values - 1.5)])
-    for k, value in enumerate(values):
-        total = ls.cusum(total, value, 1.5)
-        # Page: the walk's height above its lowest point so far.
-        assert total == pytest.approx(sums[k + 1] - sums[: k + 2].min(), abs=1e-9)
 
 
 @pytest.mark.parametrize("forgetting", [p.RandomWalk(), p.PeriodicForgetting(2.0)])

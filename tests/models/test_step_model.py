@@ -1,9 +1,8 @@
 """A model that two functions of one sample describe, compiled: simulated, inverted, in a stage, fitted."""
 
-import importlib
-import itertools
+import sys
 from dataclasses import dataclass
-from pathlib import Path
+from types import ModuleType
 from typing import Any
 from unittest.mock import patch
 
@@ -105,47 +104,25 @@ def test_gain_and_temperature_change_it_as_any_other() -> None:
 
 # ---------------------------------------------------------------- what is wrong with one is said
 
-GOOD = """
-from dataclasses import dataclass
-from piezoest.compile import inlined
-from piezoest.models import StepModel
-
-@dataclass(frozen=True, slots=True)
-class Mine(StepModel):
-    gain: float
-    offset: float = 0.0
-    parameter_names = ("gain",)
-    parameter_units = ("µm/V",)
-    state_names = ("last",)
-
-@inlined
-def displacement(state, u_0, u, constants):
-    return constants[0] * u
-
-@inlined
-def voltage(state, u_0, x, constants):
-    return x / constants[0]
-"""
-_numbers = itertools.count()
-
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    ("changes", "words"),
     [
-        ('parameter_names = ("gain",)', "", "Mine.parameter_names must be a tuple"),
-        ("state_names =", "state_names: tuple =", "Mine.state_names must be a tuple"),
-        ('("µm/V",)', '("µm/V", "V")', "one unit per parameter"),
-        ("gain: float", "gian: float", "must have the fields .'gain'.*"),
-        ("def voltage", "def volts", "has no function voltage"),
-        ("@inlined\ndef displacement", "def displacement", "mark it @inlined"),
+        ({"parameter_names": None}, "Mine.parameter_names must be a tuple"),
+        ({"fields": ("gain", "state_names")}, "Mine.state_names must be a tuple"),
+        ({"parameter_units": ("µm/V", "V")}, "one unit per parameter"),
+        ({"fields": ("gian",)}, "must have the fields .'gain'.*"),
+        ({"functions": {"displacement": displacement}}, "has no function voltage"),
+        ({"functions": {"displacement": lambda *_: 0.0, "voltage": voltage}}, "mark it @inlined"),
     ],
 )
-def test_says_what_is_wrong(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, old: str, new: str, words: str
-) -> None:
-    monkeypatch.syspath_prepend(tmp_path)
-    name = f"step_model_of_a_test_{next(_numbers)}"
-    assert old in GOOD
-    (tmp_path / f"{name}.py").write_text(GOOD.replace(old, new), encoding="utf-8")
+def test_says_what_is_wrong(monkeypatch: pytest.MonkeyPatch, changes: dict[str, Any], words: str) -> None:
+    changes = dict(changes)
+    module = ModuleType(f"step_model_of_a_test_{words.replace(' ', '_')}")
+    vars(module).update(changes.pop("functions", {"displacement": displacement, "voltage": voltage}))
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    fields = dict.fromkeys((*changes.pop("fields", ("gain",)), "offset"), float)
+    names = {"parameter_names": ("gain",), "parameter_units": ("µm/V",), "state_names": ("last",)}
+    body = {"__module__": module.__name__, "__annotations__": fields, "offset": 0.0, **names, **changes}
     with patch.dict(REGISTERED), pytest.raises(TypeError, match=words):
-        importlib.import_module(name).Mine(0.15).simulate(np.zeros(3))
+        dataclass(frozen=True, slots=True)(type("Mine", (StepModel,), body))(0.15).simulate(np.zeros(3))

@@ -2,11 +2,11 @@
 
 import contextlib
 import dataclasses
-import importlib
+import functools
 import itertools
 import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from types import ModuleType
 from typing import Any
 from unittest.mock import patch
 
@@ -91,52 +91,48 @@ Maker = Callable[..., Any]
 
 
 @pytest.fixture
-def policy_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Maker]:
-    """Makes a policy of one's own in a file of its own; all is forgotten afterwards."""
+def policy_of(monkeypatch: pytest.MonkeyPatch) -> Iterator[Maker]:
+    """Makes a policy of one's own, of the functions in its module; all is forgotten afterwards."""
     monkeypatch.setattr(base, "note_source", lambda function: None)
 
-    def make(name: str, functions: str) -> Any:
-        path = tmp_path / f"own_{name.lower()}.py"
-        path.write_text(
-            "from dataclasses import dataclass\nfrom piezoest.policies.base import Policy\n"
-            f"@dataclass(frozen=True)\nclass {name}(Policy):\n    gain: float = 2.0\n{functions}\n",
-            encoding="utf-8",
-        )
-        monkeypatch.syspath_prepend(tmp_path)
-        monkeypatch.delitem(sys.modules, path.stem, raising=False)
-        return getattr(importlib.import_module(path.stem), name)
+    def make(name: str, **functions: Any) -> Any:
+        module = ModuleType(f"own_{name.lower()}")
+        vars(module).update(functions)
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+        body = {"__module__": module.__name__, "__annotations__": {"gain": float}, "gain": 2.0}
+        return dataclasses.dataclass(frozen=True)(type(name, (base.Policy,), body))
 
     with patch.dict(base.REGISTERED), patch.dict(base._chained):
         yield make
 
 
-def hook(name: str, body: str, arguments: str = "own, fixed, state, settings") -> str:
-    return f"def {name}({arguments}):\n    {body}\n"
+def hook(own: Any, fixed: Any, state: Any, settings: Any) -> Any:
+    return True
 
 
-CALLED = "class Called:\n    def __call__(self, own, fixed, state, settings):\n        return True\n"
+def other_arguments(own: Any, numbers: Any, state: Any, settings: Any) -> Any:
+    return True
 
 
 @pytest.mark.parametrize(
     ("functions", "words"),
     [
-        ("", "Mine does nothing: its file has none of prepare, permits"),
-        (hook("prepair", "pass") + hook("permits", "return True"), "prepair are no hooks, these are prepare"),
-        (
-            hook("permits", "return True", "own, numbers, state, settings"),
-            "must have the arguments own, fixed",
-        ),
-        (CALLED + "permits = Called()\n", "permits must be a plain function, marked @inlined"),
+        ({}, "Mine does nothing: its file has none of prepare, permits"),
+        ({"prepair": hook, "permits": hook}, "prepair are no hooks, these are prepare"),
+        ({"permits": other_arguments}, "must have the arguments own, fixed"),
+        ({"permits": functools.partial(hook)}, "permits must be a plain function, marked @inlined"),
     ],
 )
-def test_what_cannot_be_carried_out_is_refused(policy_file: Maker, functions: str, words: str) -> None:
-    policy = policy_file("Mine", functions)
+def test_what_cannot_be_carried_out_is_refused(
+    policy_of: Maker, functions: dict[str, Any], words: str
+) -> None:
+    policy = policy_of("Mine", **functions)
     with pytest.raises(ValueError, match=words):
         base.layouts((policy(),), AT)
 
 
-def test_a_policy_defined_after_the_estimators_is_refused(policy_file: Maker) -> None:
-    policy = policy_file("Late", hook("prepare", "pass"))
+def test_a_policy_defined_after_the_estimators_is_refused(policy_of: Maker) -> None:
+    policy = policy_of("Late", prepare=hook)
     for make in (
         lambda: pz.HysteresisRLS(RATE, memory=None, policies=(policy(),)),
         lambda: pz.RecursiveLeastSquares(2, policies=(policy(),)),
