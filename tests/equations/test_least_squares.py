@@ -110,13 +110,11 @@ def test_a_covariance_spoilt_by_rounding_heals(policies: Any) -> None:
     np.testing.assert_allclose(law.theta, true, atol=1e-5)
 
 
-def test_covariance_resetting_below_the_floor_and_on_call() -> None:
+def test_covariance_resetting_below_the_floor() -> None:
     law = pz.RecursiveLeastSquares(1, P=1.0, policies=(p.CovarianceResetting(0.1),))
     for _ in range(100):
         law.update(1.0, [1.0])
     assert law.resets == pytest.approx(10, abs=2)
-    law.reset_covariance()
-    np.testing.assert_array_equal(law.P, [[1.0]])
 
 
 def test_floor_is_the_least_eigenvalue() -> None:
