@@ -51,7 +51,7 @@ def test_compiled_filter_equals_filterpy(options: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("kind", "base"), [(pz.FilterPyEKF, ExtendedKalmanFilter), (pz.FilterPyUKF, UnscentedKalmanFilter)]
 )
-def test_filter_is_filterpys_own(kind: Any, base: type) -> None:
+def test_filter_is_filterpys_own(kind: Any, base: Any) -> None:
     u, x = record(200, 2000.0)
     estimator = kind(2000.0)
     assert isinstance(estimator.filter, base)

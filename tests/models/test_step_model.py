@@ -125,4 +125,5 @@ def test_says_what_is_wrong(monkeypatch: pytest.MonkeyPatch, changes: dict[str, 
     names = {"parameter_names": ("gain",), "parameter_units": ("µm/V",), "state_names": ("last",)}
     body = {"__module__": module.__name__, "__annotations__": fields, "offset": 0.0, **names, **changes}
     with patch.dict(REGISTERED), pytest.raises(TypeError, match=words):
-        dataclass(frozen=True, slots=True)(type("Mine", (StepModel,), body))(0.15).simulate(np.zeros(3))
+        made: Any = dataclass(frozen=True, slots=True)(type("Mine", (StepModel,), body))
+        made(0.15).simulate(np.zeros(3))
