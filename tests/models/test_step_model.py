@@ -124,6 +124,7 @@ def test_says_what_is_wrong(monkeypatch: pytest.MonkeyPatch, changes: dict[str, 
     fields = dict.fromkeys((*changes.pop("fields", ("gain",)), "offset"), float)
     names = {"parameter_names": ("gain",), "parameter_units": ("µm/V",), "state_names": ("last",)}
     body = {"__module__": module.__name__, "__annotations__": fields, "offset": 0.0, **names, **changes}
-    with patch.dict(REGISTERED), pytest.raises(TypeError, match=words):
-        made: Any = dataclass(frozen=True, slots=True)(type("Mine", (StepModel,), body))
-        made(0.15).simulate(np.zeros(3))
+    with patch.dict(REGISTERED):
+        mine: Any = dataclass(frozen=True, slots=True)(type("Mine", (StepModel,), body))
+        with pytest.raises(TypeError, match=words):
+            mine(0.15).simulate(np.zeros(3))
