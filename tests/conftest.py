@@ -1,16 +1,27 @@
-"""What every test shares: reproducible hypothesis runs, and the folder of recorded data."""
+"""What every test shares: reproducible hypothesis runs, stored machine code, the folder of recorded data."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+from piezoest import machine_code
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
 settings.register_profile("deterministic", derandomize=True, deadline=None)
 settings.load_profile("deterministic")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _own_sources_end_with_their_file() -> Iterator[None]:
+    """A model in a test file is a source of what is compiled after it: not in the files that come next."""
+    noted = set(machine_code._noted)
+    yield
+    machine_code._noted.intersection_update(noted)
 
 
 @pytest.fixture(scope="session")

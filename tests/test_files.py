@@ -73,7 +73,7 @@ def waveform(path: Path, seed: int) -> None:
 OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
     **{
         f"log{ending}": lambda path, seed: write_columns(path, columns(seed))
-        for ending in ("", ".csv", ".tsv", ".parquet", ".h5", ".mat", ".npy", ".npz")
+        for ending in (".csv", ".parquet", ".h5", ".mat", ".npy")
     },
     "profile.json": lambda path, seed: AmplitudeProfile(
         np.arange(1.0, SIZE), np.full((SIZE - 1, 3), 0.1 * seed)

@@ -19,6 +19,7 @@ EXAMPLES: dict[str, Callable[[], Signal]] = {
     "sine": lambda: signals.sine(5.0, 5.0, 3, 10_000.0),
     "amplitude_modulated": lambda: signals.amplitude_modulated(5.0, 5.0, 0.5, 4.0, 10_000.0),
     "multi_amplitude": lambda: signals.multi_amplitude([2.5, 7.5, 0.0, 5.0], 5.0, 2, 10_000.0),
+    "multi_amplitude of sines": lambda: signals.multi_amplitude([1.0, 5.0], 7.0, 3, 1000.0, shape="sine"),
     "filtered_steps": lambda: signals.filtered_steps([1.0, -2.0, 3.0], 0.2, 10_000.0),
     "chirp": lambda: signals.chirp(5.0, 1.0, 20.0, 2.0, 10_000.0),
     "prbs": lambda: signals.prbs(periods=2, sample_rate=10_000.0, lead_in=0.1),
@@ -33,24 +34,20 @@ EXAMPLES: dict[str, Callable[[], Signal]] = {
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_signals_are_finite_continuous_and_deterministic(name: str) -> None:
+def test_signals_are_finite_continuous_deterministic_and_periodic(name: str) -> None:
     signal = EXAMPLES[name]()
     assert signal.values.dtype == np.float64
     assert signal.values.ndim == 1
     assert np.all(np.isfinite(signal.values))
     check_continuity(signal)
     np.testing.assert_array_equal(signal.values, EXAMPLES[name]().values)
-
-
-@pytest.mark.parametrize("name", sorted(set(EXAMPLES) - {"prbs", "multi_amplitude"}))
-def test_periods_are_periods(name: str) -> None:
-    signal = EXAMPLES[name]()
-    if signal.period is None or 2 * signal.period > len(signal):
-        signal = signal.repeat(2)
-    if signal.period is not None:
-        n = round(signal.period)
-        assert n == pytest.approx(signal.period)
-        np.testing.assert_allclose(signal.values[n:], signal.values[:-n], rtol=0.0, atol=1e-12)
+    if not name.startswith(("prbs", "multi_amplitude")):
+        whole = signal.period is None or 2 * signal.period <= len(signal)
+        again = signal if whole else signal.repeat(2)
+        if again.period is not None:
+            n = round(again.period)
+            assert n == pytest.approx(again.period)
+            np.testing.assert_allclose(again.values[n:], again.values[:-n], rtol=0.0, atol=1e-12)
 
 
 # --- triangle ---------------------------------------------------------------------------------------------
@@ -117,9 +114,6 @@ def test_multi_amplitude_changes_at_zero() -> None:
     assert np.max(np.abs(r.values[: 2 * n])) == pytest.approx(2.5 * 0.96875)
     assert np.max(np.abs(r.values[2 * n :])) == pytest.approx(7.5 * 0.96875)
     assert r.values[2 * n] == 0.0
-    np.testing.assert_allclose(r.values[:n], signals.triangle(2.5, 5.0, 1, FS).values)
-    odd = signals.multi_amplitude([1.0, 5.0, 2.0], 7.0, 3, 1000.0, shape="sine")
-    assert np.max(np.abs(np.diff(odd.values))) <= 5.0 * 2.0 * np.pi * 7.0 / 1000.0
 
 
 @pytest.mark.parametrize(
@@ -141,37 +135,21 @@ def test_maximal_length_sequence_autocorrelation(bits: int) -> None:
     assert sequence.sum() == 1.0
 
 
-def test_prbs_is_the_papers() -> None:
-    r = signals.prbs(periods=3, sample_rate=FS)
-    n = 38_750
-    assert len(r) == 3 * n
-    assert r.period == n
-    assert r.amplitude == pytest.approx(5.5, rel=0.02)
-    np.testing.assert_array_equal(r.values[n:], r.values[:-n])
-    assert abs(r.values[n] - r.values[n - 1]) < 0.01
-
-
 def test_prbs_is_the_steady_state_of_the_repeated_filtered_sequence() -> None:
     from scipy.signal import butter, sosfilt
 
+    n, r = 38_750, signals.prbs(periods=2, sample_rate=FS)
+    assert (len(r), r.period) == (2 * n, n)
     chips = np.repeat(5.0 * signals.maximal_length_sequence(5), 1250)
-    settled = sosfilt(butter(2, 10.0, fs=FS, output="sos"), np.tile(chips, 3))[-38_750:]
-    np.testing.assert_allclose(signals.prbs(sample_rate=FS).values, settled, atol=1e-8)
-
-
-def test_prbs_starts_at_zero_or_leads_in_from_rest() -> None:
+    settled = sosfilt(butter(2, 10.0, fs=FS, output="sos"), np.tile(chips, 3))[-n:]
+    np.testing.assert_allclose(r.values, np.tile(settled, 2), atol=1e-8)
     begun = signals.prbs(start="zero")
-    assert abs(begun.values[0]) < 0.01
-    assert begun.values[100] > 0.0
-    np.testing.assert_allclose(np.sort(begun.values), np.sort(signals.prbs().values))
-    led = signals.prbs(periods=2, lead_in=0.2)
-    n = 10_000
-    assert len(led) == n + 2 * 38_750
-    assert led.values[0] == 0.0
-    np.testing.assert_array_equal(led.values[n:], signals.prbs(periods=2).values)
-    np.testing.assert_allclose(led.values[n - 50 : n], begun_before := signals.prbs().values[-50:], atol=1e-5)
-    slope = np.diff(np.concatenate([begun_before, signals.prbs().values[:50]]))
-    np.testing.assert_allclose(np.diff(led.values[n - 50 : n + 50]), slope, atol=1e-6)
+    assert abs(begun.values[0]) < 0.01 < begun.values[100]
+    np.testing.assert_allclose(np.sort(begun.values), np.sort(r.values[:n]), atol=1e-12)
+    led = signals.prbs(periods=2, lead_in=0.2).values
+    assert led[0] == 0.0
+    np.testing.assert_array_equal(led[10_000:], r.values)
+    np.testing.assert_allclose(led[9_950:10_000], r.values[n - 50 : n], atol=1e-5)
 
 
 def test_random_walk_is_band_limited_and_reproducible() -> None:
@@ -193,52 +171,30 @@ def test_signal_is_an_array_where_one_is_wanted() -> None:
     given_values = np.array([1.0, -3.0, 2.0])
     r = signals.from_array(given_values, 10.0, period=3)
     given_values[0] = 99.0
-    assert r.values[0] == 1.0, "the samples are copied"
-    assert len(r) == 3
-    assert r.amplitude == 3.0
-    assert r.duration == 0.3
+    assert list(r) == [1.0, -3.0, 2.0], "the samples are copied"
+    assert (len(r), r.amplitude, r.duration, r[1], r[:2].shape) == (3, 3.0, 0.3, -3.0, (2,))
     np.testing.assert_allclose(r.time, [0.0, 0.1, 0.2])
-    np.testing.assert_array_equal(np.asarray(r), r.values)
     assert np.asarray(r, dtype=np.float32).dtype == np.float32
-    np.testing.assert_array_equal(r - r.values, np.zeros(3))
-    assert list(r) == [1.0, -3.0, 2.0]
-    assert all(type(value) is float for value in r)
-    assert r[1] == -3.0
-    assert r[:2].shape == (2,)
-    assert repr(r) == "Signal('array', 3 samples at 10 Hz, period 3 samples, amplitude 3)"
     with pytest.raises(AttributeError):
         r.sample_rate = 5.0  # type: ignore[misc]
 
 
 def test_signal_arithmetic() -> None:
     r = signals.sine(1.0, 5.0, 2, 1000.0)
-    for twice in (2 * r, r * 2, r * np.float64(2.0)):
-        np.testing.assert_array_equal(twice.values, 2.0 * r.values)
-        assert twice.period == r.period
-        assert twice.name == "sine"
-    np.testing.assert_array_equal((-r).values, -r.values)
-    np.testing.assert_array_equal(r.shifted(3.0).values, r.values + 3.0)
-    both = r + 3 * r
-    assert len(both) == 2 * len(r)
-    assert both.period == 200.0
-    assert (r + signals.dwell(0.0, 1.0, 1000.0)).period is None
-    np.testing.assert_array_equal(r.repeat(3).values, np.tile(r.values, 3))
-    assert r.repeat(3).period == 200.0
-    assert signals.sine(1.0, 7.0, 2, 1000.0).repeat(2).period is None, "the phase breaks at the joint"
-    with pytest.raises(ValueError, match="other must have the same sample rate, 1000 Hz, got 500 Hz"):
-        r.then(signals.dwell(0.0, 1.0, 500.0))
-
-
-def test_a_number_shifts_a_signal() -> None:
-    r = signals.sine(1.0, 5.0, 2, 1000.0)
-    for up in (r + 40.0, 40 + r, r - np.float64(-40.0), r + np.uint8(40)):
-        np.testing.assert_array_equal(up.values, r.shifted(40.0).values)
-        assert (up.period, up.sample_rate, up.name) == (200.0, 1000.0, "sine")
-    np.testing.assert_array_equal((r - np.uint8(3)).values, r.shifted(-3.0).values)
-    np.testing.assert_array_equal((3.0 - r).values, 3.0 - r.values)
-    assert (3.0 - r).period == 200.0
+    both, broken = r + 3 * r, signals.sine(1.0, 7.0, 2, 1000.0).repeat(2)
+    for result, values, period in (
+        (2 * r, 2.0 * r.values, 200.0), (r * np.float64(2.0), 2.0 * r.values, 200.0),
+        (-r, -r.values, 200.0), (r.shifted(3.0), r.values + 3.0, 200.0),
+        (r + 40.0, r.values + 40.0, 200.0), (40 + r, r.values + 40.0, 200.0),
+        (r - np.uint8(3), r.values - 3.0, 200.0), (3.0 - r, 3.0 - r.values, 200.0),
+        (r.repeat(3), np.tile(r.values, 3), 200.0), (both, [*r.values, *(3.0 * r.values)], 200.0),
+        (r + signals.dwell(0.0, 0.1, 1000.0), [*r.values, *np.zeros(100)], None),
+        (broken, broken.values, None),  # the phase breaks at the joint
+    ):  # fmt: skip
+        np.testing.assert_array_equal(result.values, values)
+        assert result.period == period
     kinds = {type(each).__name__ for each in (r + r.values, r.values + r, r - r.values, r.values - r)}
-    assert kinds == {"ndarray"}, "sample by sample, as ever"
+    assert kinds == {"ndarray"}, "sample by sample"
     for wrong in ("40", None, [40.0], 40j):
         for pair in ((r, wrong), (wrong, r)):
             for combine in (operator.add, operator.sub):
@@ -246,8 +202,6 @@ def test_a_number_shifts_a_signal() -> None:
                     combine(*pair)
     with pytest.raises(TypeError, match="operand"):
         r - r
-    with pytest.raises(ValueError, match="offset must be finite, got nan"):
-        r + float("nan")
 
 
 # --- the way to the first value ---------------------------------------------------------------------------
@@ -273,92 +227,62 @@ def test_a_lead_in_goes_smoothly_from_rest_to_the_first_value(start: float) -> N
 # --- jumps ------------------------------------------------------------------------------------------------
 
 T = np.arange(2000) / 1000.0
-SLOW = np.sin(2.0 * np.pi * T)
-STEP = np.where(T < 1.0, 0.0, 1.0)
+SLOW, STEP = np.sin(2.0 * np.pi * T), np.where(T < 1.0, 0.0, 1.0)
 JUMPY = {
     "square wave": np.sign(np.sin(2.0 * np.pi * T + 0.01)),
-    "one step": STEP,
     "step in three samples": np.interp(T, [0.0, 1.0, 1.003, 2.0], [0.0, 0.0, 1.0, 1.0]),
-    "staircase of 10 steps": np.floor(T * 5.0),
     "unfiltered PRBS": np.repeat(signals.maximal_length_sequence(5), 50),
-    "slow sine with a step": SLOW + STEP,
     "slow sine with a spike": SLOW + (np.arange(2000) == 700),
-    "sawtooth": T % 0.5,
     "joined signals": np.concatenate([SLOW[:250], SLOW]),
     "noisy steps": STEP + 0.001 * np.random.default_rng(0).standard_normal(2000),
-    "four samples": np.array([0.0, 0.0, 5.0, 5.0]),
     "three samples": np.array([0.0, 5.0, 5.0]),
 }
 LEGITIMATE = {
-    "1 Hz sine at 200 Hz": np.sin(2.0 * np.pi * np.arange(600) / 200.0),
-    "50 samples a period": np.sin(2.0 * np.pi * np.arange(200) / 50.0),
-    "5 samples a period": np.sin(2.0 * np.pi * np.arange(50) / 5.0),
     "coarse triangle": signals.triangle(5.0, 1.0, 5, 12.0, smoothing=0.0).values,
     "triangle with rests": signals.multi_amplitude([5.0, 0.0, 1.0], 1.0, 3, 40.0).values,
-    "white noise": np.random.default_rng(1).standard_normal(3000),
     "noise after a dwell": np.concatenate([np.zeros(100), np.random.default_rng(2).standard_normal(3000)]),
     "ramp of five samples": np.interp(np.arange(100), [0, 50, 55, 99], [0.0, 0.0, 1.0, 1.0]),
     "quantised slow sine": np.round(SLOW * 50.0) / 50.0,
-    "held constant": np.full(100, 5.0),
-    "one sample": np.array([5.0]),
     "two samples": np.array([0.0, 5.0]),
     "empty": np.array([]),
-    "steps filtered near the sample rate": signals.filtered_steps(
-        [1.0, -1.0, 1.0], 1.0, 100.0, cutoff=20.0
-    ).values,
+    "coarse steps": signals.filtered_steps([1.0, -1.0, 1.0], 1.0, 100.0, cutoff=20.0).values,
     "coarse PRBS": signals.prbs(sample_rate=40.0).values,
 }
 
 
-@pytest.mark.parametrize("name", JUMPY)
-def test_jumps_are_refused(name: str) -> None:
+@pytest.mark.parametrize("name", [*JUMPY, *LEGITIMATE])
+def test_jumps_are_refused_and_nothing_else(name: str) -> None:
+    if name in LEGITIMATE:
+        check_continuity(LEGITIMATE[name], 1000.0, "r")
+        return
     with pytest.raises(ValueError, match=r"^r jumps by .* use signals\.filtered_steps"):
         check_continuity(JUMPY[name], 1000.0, "r")
-
-
-@pytest.mark.parametrize("name", LEGITIMATE)
-def test_legitimate_signals_pass(name: str) -> None:
-    check_continuity(LEGITIMATE[name], 1000.0, "r")
 
 
 # --- bad arguments ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("call", "message"),
+    ("call", "argument"),
     [
-        (lambda: signals.sine(1.0, 600.0, 1, 1000.0), "frequency must be below half .* 500 Hz, got 600 Hz"),
-        (lambda: signals.triangle(float("nan"), 5.0, 1, FS), "amplitude must be finite, got nan"),
-        (lambda: signals.triangle(1.0, 5.0, 1e-9, FS), "periods must cover at least one sample"),
-        (lambda: signals.triangle(1.0, 5.0, 1, FS, smoothing=1.5), "smoothing must lie within"),
-        (lambda: signals.triangle(1.0, 5.0, 1, FS, continuity=9), "continuity must be at most 8, got 9"),
-        (lambda: signals.sine([1.0, 2.0], 5.0, 1, FS), "amplitude must be one number"),  # type: ignore[arg-type]
-        (
-            lambda: signals.multi_amplitude([1.0, 2.0], 5.0, [1], FS),
-            "periods must have one entry for each of the 2",
-        ),
-        (
-            lambda: signals.multi_amplitude([1.0], 5.0, 1, FS, shape="saw"),  # type: ignore[arg-type]
-            "shape must be 'triangle' or 'sine', got 'saw'",
-        ),
-        (lambda: signals.two_tone([1.0], [5.0, 6.0], 1.0, FS), "amplitudes must hold two numbers"),
-        (lambda: signals.chirp(1.0, 1.0, 6e4, 1.0, FS), "stop_frequency must be below half"),
-        (lambda: signals.dwell(1.0, 0.0, FS), "duration must be above zero"),
-        (
-            lambda: signals.filtered_steps([1.0, 2.0], [0.1, 0.0], FS),
-            "dwell_times must each be at least one sample",
-        ),
-        (lambda: signals.filtered_steps([1.0], 0.1, FS, cutoff=3e4), "cutoff must be below half"),
-        (lambda: signals.prbs(start="middle"), "start must be"),  # type: ignore[arg-type]
-        (lambda: signals.maximal_length_sequence(40), "bits must be at most 20"),
-        (lambda: signals.from_array([1.0, np.nan], FS), "values holds 1 values that are NaN"),
-        (lambda: signals.from_array([1.0], FS, period=0.0), "period must be above zero"),
-        (lambda: signals.dwell(1.0, 0.1, FS).with_lead_in(1e-6), "duration must cover at least one sample"),
+        (lambda: signals.sine(1.0, 600.0, 1, 1000.0), "frequency"),
+        (lambda: signals.triangle(1.0, 5.0, 1e-9, FS), "periods"),
+        (lambda: signals.triangle(1.0, 5.0, 1, FS, smoothing=1.5), "smoothing"),
+        (lambda: signals.triangle(1.0, 5.0, 1, FS, continuity=9), "continuity"),
+        (lambda: signals.multi_amplitude([1.0, 2.0], 5.0, [1], FS), "periods"),
+        (lambda: signals.multi_amplitude([1.0], 5.0, 1, FS, shape="saw"), "shape"),  # type: ignore[arg-type]
+        (lambda: signals.filtered_steps([1.0, 2.0], [0.1, 0.0], FS), "dwell_times"),
+        (lambda: signals.prbs(start="middle"), "start"),  # type: ignore[arg-type]
+        (lambda: signals.maximal_length_sequence(40), "bits"),
+        (lambda: signals.from_array([1.0, np.nan], FS), "values holds 1"),
+        (lambda: signals.dwell(1.0, 0.1, FS).with_lead_in(1e-6), "duration"),
+        (lambda: signals.dwell(1.0, 0.1, FS) + float("nan"), "offset"),
+        (lambda: signals.dwell(1.0, 0.1, FS).then(signals.dwell(0.0, 1.0, 500.0)), "same sample rate"),
         (lambda: check_continuity([0.0, np.inf], FS, "u"), "u holds 1 values"),
     ],
 )
-def test_bad_arguments_are_named(call: Callable[[], object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
+def test_bad_arguments_are_named(call: Callable[[], object], argument: str) -> None:
+    with pytest.raises(ValueError, match=argument):
         call()
 
 

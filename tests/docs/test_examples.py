@@ -1,4 +1,4 @@
-"""The examples in docstrings run and show what they print; classes and functions that users call have one."""
+"""The examples in docstrings run and show what they print."""
 
 import doctest
 import inspect
@@ -34,10 +34,3 @@ def test_example_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     case = doctest.DocTestParser().get_doctest(text, {}, name, None, 0)
     said: list[str] = []
     assert not doctest.DocTestRunner().run(case, out=said.append).failed, "".join(said)
-
-
-def test_what_has_a_step_has_an_example() -> None:
-    stepping = {name for name, value in OBJECTS.items() if hasattr(value, "step")}
-    assert len(stepping) > 15
-    assert stepping - set(EXAMPLES) <= {"Estimator", "export.Controller", "export.CompiledController",
-                                        "export.CompiledFeedforward"}  # fmt: skip

@@ -1,4 +1,4 @@
-"""The admissible set and its nearest point."""
+"""Projections: onto the admissible set, and of a Kalman filter onto a face of it."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
+from piezoest.equations import kalman
 from piezoest.equations.admissible import is_admissible, project_admissible
 
 THETA = np.array([0.021, 0.147, 0.0043])
@@ -33,21 +34,27 @@ def test_projection_is_the_nearest_point(seed: int) -> None:
         difference = np.asarray(parts) * THETA - theta
         return float(difference @ W @ difference)
 
+    def faces(parts: object) -> object:
+        alpha, beta, gamma = np.asarray(parts) * THETA
+        return np.array([gamma - alpha * beta, 2.0 * alpha * beta - gamma]) / THETA[2]
+
     best = minimize(
-        distance,
-        projected / THETA,
-        method="SLSQP",
-        constraints=[
-            {
-                "type": "ineq",
-                "fun": lambda q: (q[2] * THETA[2] - q[0] * THETA[0] * q[1] * THETA[1]) / THETA[2],
-            },
-            {
-                "type": "ineq",
-                "fun": lambda q: (2 * q[0] * THETA[0] * q[1] * THETA[1] - q[2] * THETA[2]) / THETA[2],
-            },
-        ],
-        bounds=[(1e-2, None)] * 3,
-        options={"ftol": 1e-14, "maxiter": 500},
-    )
+        distance, projected / THETA, method="SLSQP", constraints={"type": "ineq", "fun": faces},
+        bounds=[(1e-2, None)] * 3, options={"ftol": 1e-14, "maxiter": 500},
+    )  # fmt: skip
     assert distance(projected / THETA) <= best.fun * 1.02 + 1e-6
+
+
+@pytest.mark.parametrize("n", [4, 5])
+def test_a_filters_projection_is_the_nearest_point(n: int) -> None:
+    """The least (s' - s)' P^-1 (s' - s) under g s' >= least, from the stationarity conditions."""
+    root = np.random.default_rng(3).normal(size=(n, n))
+    P, s, g = root @ root.T + 0.1 * np.eye(n), np.array([0.4, 0.021, 0.057, 0.204, 0.1][:n]), np.zeros(n)
+    g[2], g[3] = -2.0, 1.0
+    for least in (0.5, float(g @ s) - 0.01):
+        system = np.block([[2.0 * np.linalg.inv(P), g[:, None]], [g, 0.0]])
+        nearest = np.linalg.solve(system, np.append(2.0 * np.linalg.solve(P, s), least))[:n]
+        outside, moved = g @ s < least, s.copy()
+        assert kalman.project(moved, P, g, least) == float(outside)
+        np.testing.assert_allclose(moved, nearest if outside else s, rtol=1e-9)
+        assert g @ moved >= least - 1e-12

@@ -4,11 +4,11 @@ import itertools
 from typing import Any
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import piezoest as pz
-from piezoest.equations import bent_plays, turning_points
+from piezoest.equations import turning_points
 from piezoest.equations.play import play
 from piezoest.layout import Named, new
 
@@ -42,13 +42,7 @@ def test_inverse_is_exact(seed: int, bends: int, scale: float) -> None:
     assert pz.PrandtlIshlinskii.from_dict(model.to_dict()) == model
 
 
-def test_segments_add_up_to_the_play() -> None:
-    p = np.linspace(-5.0, 5.0, 101)
-    edges = [-1e30, -2.0, 1.0, 1e30]
-    parts = [bent_plays.segment(p, low, high) for low, high in itertools.pairwise(edges)]
-    np.testing.assert_allclose(sum(parts), p, atol=1e-15)
-
-
+@settings(max_examples=30)
 @given(seed=st.integers(0, 10_000), scale=st.floats(0.1, 10.0))
 def test_turning_points_hold_all_the_memory_of_plays(seed: int, scale: float) -> None:
     u = np.round(scale * np.cumsum(np.random.default_rng(seed).standard_normal(150)), 1)

@@ -12,13 +12,7 @@ from scipy.integrate import solve_ivp
 
 from piezoest import ColemanHodgdon
 from piezoest.equations import coleman_hodgdon as ch
-
-TABLE_I = [
-    (3.26e-2, 0.136, 5.96e-3),
-    (1.91e-2, 0.149, 4.05e-3),
-    (2.1e-2, 0.147, 4.29e-3),
-    (1.59e-2, 0.155, 3.55e-3),
-]
+from tests.reference import TABLE_I
 
 
 @st.composite
@@ -107,10 +101,8 @@ def test_increment_is_lambert_w(loop: tuple[float, float, float], place: float, 
 
 
 def test_no_branch_error_at_extreme_arguments() -> None:
-    for dr in (1e-300, 1e-12, 1e3, 1e6, 1e9):
-        for sign in (-1.0, 1.0):
-            du = ch.inverse_increment(0.1, sign * dr, 0.02, 0.06, 0.2)
-            assert np.isfinite(du)
-            assert np.sign(du) == sign
-    assert ch.inverse_increment(0.1, 0.0, 0.02, 0.06, 0.2) == 0.0
+    for dr in (0.0, 1e-300, -1e-12, 1e3, -1e6, 1e9):
+        du = ch.inverse_increment(0.1, dr, 0.02, 0.06, 0.2)
+        assert np.isfinite(du)
+        assert np.sign(du) == np.sign(dr)
     assert ch.inverse_increment(3.0, 0.0, 0.02, 0.06, 0.12) == 0.0

@@ -9,14 +9,7 @@ from piezoest import ColemanHodgdon, HysteresisRLS, signals
 from piezoest.equations import coleman_hodgdon as ch
 from piezoest.equations import least_squares as ls
 from piezoest.layout import Named, new, numbers, record
-
-TABLE_I = [
-    (3.26e-2, 0.136, 5.96e-3),
-    (1.91e-2, 0.149, 4.05e-3),
-    (2.1e-2, 0.147, 4.29e-3),
-    (1.59e-2, 0.155, 3.55e-3),
-    (3.32e-2, 0.136, 6.15e-3),
-]
+from tests.reference import TABLE_I
 
 
 def test_slip_in_b1() -> None:

@@ -1,33 +1,16 @@
-"""The recursions of Appendix A against the textbook, and against each other."""
+"""The recursions of Appendix A, as `RecursiveLeastSquares` applies them: against textbooks and each other."""
 
 from typing import Any
 
 import numpy as np
 import pytest
 
-from piezoest.compile import Record, compiled
+import piezoest as pz
+from piezoest import policies as p
 from piezoest.equations import least_squares as ls
-from piezoest.layout import NUMBER, Named, new, numbers, record
-from tests.equations.three_ways import three_ways
 from tests.reference import least_squares as reference
 
-N = 3
-RATES = record(theta=numbers(N), P=numbers(N, N))
-
-
-def continuous_update(theta: Any, P: Any, phi: Any, z: Any, options: tuple[float, ...]) -> None:
-    """One sample of the continuous law; `options`: step, forgetting rate, whether normalised, bound."""
-    h, forgetting_rate, normalised, bound = options
-    rates = Named(new(RATES), RATES)
-    ls.continuous_step(theta, P, phi, z, h, forgetting_rate, normalised, rates)
-    ls.continuous_correction(theta, P, h, bound, rates)
-
-
-def problem(samples: int, seed: int = 0) -> tuple[Any, Any, Any]:
-    rng = np.random.default_rng(seed)
-    phi = rng.normal(size=(samples, N))
-    theta = np.array([0.5, -1.0, 2.0])
-    return phi, phi @ theta + 0.1 * rng.normal(size=samples), theta
+MU, R = float(np.exp(-1.0 / 50.0)), 0.04
 
 
 def start() -> tuple[Any, Any]:
@@ -35,88 +18,126 @@ def start() -> tuple[Any, Any]:
     return np.array([0.1, 0.2, -0.3]), L @ L.T
 
 
-def test_discrete_update_is_the_textbook() -> None:
-    phi, z, _ = problem(200)
+def made(*policies: Any, **options: Any) -> pz.RecursiveLeastSquares:
     theta, P = start()
-    expected_theta, expected_P = start()
+    return pz.RecursiveLeastSquares(3, **{"theta": theta, "P": P, "policies": policies, **options})
+
+
+def forgetting(theta: Any, P: Any, phi: Any, z: float) -> tuple[Any, Any]:
+    return reference.discrete(theta, P, phi, z, MU, R)
+
+
+def directional(theta: Any, P: Any, phi: Any, z: float) -> tuple[Any, Any]:
+    q = phi @ P @ phi
+    information = np.linalg.inv(P) + (MU - (1.0 - MU) * R / q) * np.outer(phi, phi) / R
+    return theta + P @ phi / (R + q) * (z - theta @ phi), np.linalg.inv(information)
+
+
+def variable(theta: Any, P: Any, phi: Any, z: float) -> tuple[Any, Any]:
+    y, q = z - theta @ phi, phi @ P @ phi
+    return reference.discrete(
+        theta, P, phi, z, max(1.0 - y * y / (R + q) * (1.0 - MU), np.exp(-1.0 / 5.0)), R
+    )
+
+
+def continuous(normalised: bool) -> Any:
+    return lambda theta, P, phi, z: reference.bogacki_shampine(
+        theta, P, 0.01, phi, z, 1.0 / 3.0, normalised
+    )  # fmt: skip
+
+
+CONTINUOUS: dict[str, Any] = {"time_base": "continuous", "step": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("law", "textbook"),
+    [
+        (made(p.Forgetting(50.0), noise_variance=R), forgetting),
+        (made(p.DirectionalForgetting(50.0, "second"), noise_variance=R), directional),
+        (made(p.VariableForgetting(50.0, 0.1, "second"), noise_variance=R), variable),
+        (made(p.Forgetting(3.0), **CONTINUOUS), continuous(False)),
+        (made(p.Forgetting(3.0), p.Normalisation(), **CONTINUOUS), continuous(True)),
+    ],
+    ids=["discrete", "directional", "variable", "continuous", "continuous, normalised"],
+)
+def test_laws_are_the_textbooks(law: pz.RecursiveLeastSquares, textbook: Any) -> None:
+    rng, (theta, P) = np.random.default_rng(3), start()
+    for _ in range(100):
+        phi, z = rng.normal(size=3), float(rng.normal())
+        y = z - theta @ phi
+        theta, P = textbook(theta, P, phi, z)
+        law.update(z, phi)
+        assert law.y == pytest.approx(y)
+    np.testing.assert_allclose(law.theta, theta, rtol=1e-8)
+    np.testing.assert_allclose(law.P, P, rtol=1e-7)
+    np.testing.assert_array_equal(law.P, law.P.T)
+
+
+def test_without_forgetting_is_lstsq() -> None:
+    rng = np.random.default_rng(0)
+    phi = rng.normal(size=(200, 3))
+    z = phi @ [1.0, -2.0, 0.5] + 0.1 * rng.normal(size=200)
+    law = made(P=1e8)
     for k in range(200):
-        before = expected_theta @ phi[k]
-        y, S = ls.discrete_update(theta, P, phi[k], z[k], 0.98, 0.04, np.inf)
-        assert y == pytest.approx(z[k] - before)
-        assert pytest.approx(phi[k] @ expected_P @ phi[k] / 0.98 + 0.04) == S
-        expected_theta, expected_P = reference.discrete(expected_theta, expected_P, phi[k], z[k], 0.98, 0.04)
-    np.testing.assert_allclose(theta, expected_theta, rtol=1e-10)
-    np.testing.assert_allclose(P, expected_P, rtol=1e-9)
-    assert np.array_equal(P, P.T)
+        law.update(z[k], phi[k])
+    np.testing.assert_allclose(law.theta, np.linalg.lstsq(phi, z)[0], rtol=1e-7)
 
 
-@pytest.mark.parametrize("law", ["discrete", "continuous"])
-def test_bound_holds_and_does_not_freeze(law: str) -> None:
-    theta, P = start()
-    bound = 1.5 * float(np.trace(P))
-    quiet, loud = np.array([1e-3, 0.0, 0.0]), np.array([1.0, 1.0, -1.0])
-
-    def update(phi: Any) -> None:
-        if law == "discrete":
-            ls.discrete_update(theta, P, phi, 0.0, 0.99, 1.0, bound)
-        else:
-            continuous_update(theta, P, phi, 0.0, (0.01, 0.05, 1.0, bound))
-
-    for _ in range(1000):
-        update(quiet)
-        assert ls.trace(P) <= bound * (1.0 + 1e-12)
-    full = ls.trace(P)
+@pytest.mark.parametrize(("law", "memory"), [({}, 100.0), (CONTINUOUS, 20.0)], ids=["discrete", "continuous"])
+def test_bound_holds_and_does_not_freeze(law: dict[str, Any], memory: float) -> None:
+    normalised = (p.Normalisation(),) if law else ()
+    made_ = made(p.Forgetting(memory), *normalised, p.NormBound(1.5), **law)
+    bound = 1.5 * float(np.trace(start()[1]))
+    for phi in ([1e-3, 0.0, 0.0], [0.0, 0.0, 0.0]):
+        for _ in range(1000):
+            made_.update(0.0, phi)
+            assert np.trace(made_.P) <= bound * (1.0 + 1e-12)
+    loud = np.array([1.0, 1.0, -1.0])
+    uncertain = loud @ made_.P @ loud
     for _ in range(300):
-        update(loud)
-    assert ls.trace(P) < full
+        made_.update(0.0, loud)
+    assert loud @ made_.P @ loud < 0.5 * uncertain
 
 
-@pytest.mark.parametrize("mu", [1.0, 0.99])
-def test_a_covariance_spoilt_by_rounding_heals(mu: float) -> None:
+@pytest.mark.parametrize("policies", [(), (p.Forgetting(100.0),)])
+def test_a_covariance_spoilt_by_rounding_heals(policies: Any) -> None:
     """A regressor far beyond the noise leaves P - K phi' P to rounding: phi' P phi may be negative."""
     rng = np.random.default_rng(3)
-    theta, P = np.zeros(N), 1e6 * np.eye(N)
-    true, negative = rng.normal(size=N), 0
+    law, true = made(*policies, P=1e6), rng.normal(size=3)
     for _ in range(3000):
-        phi = 1e5 * rng.normal(size=N)
-        _, S = ls.discrete_update(theta, P, phi, phi @ true, mu, 1.0, np.inf)
-        negative += S < 0.0
-    assert negative < 30
-    np.testing.assert_allclose(theta, true, atol=1e-5)
+        phi = 1e5 * rng.normal(size=3)
+        law.update(float(phi @ true), phi)
+    np.testing.assert_allclose(law.theta, true, atol=1e-5)
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_floor_is_the_least_eigenvalue(seed: int) -> None:
-    A = np.random.default_rng(seed).normal(size=(4, 4))
-    P = A @ A.T
-    least = np.linalg.eigvalsh(P)[0]
-    assert ls.above_floor(P, 0.999 * least, np.zeros((4, 4))) == 1.0
-    assert ls.above_floor(P, 1.001 * least, np.zeros((4, 4))) == 0.0
+def test_covariance_resetting_below_the_floor() -> None:
+    law = pz.RecursiveLeastSquares(1, P=1.0, policies=(p.CovarianceResetting(0.1),))
+    for _ in range(100):
+        law.update(1.0, [1.0])
+    assert law.resets == pytest.approx(10, abs=2)
 
 
-CASE = record(z=NUMBER, S=NUMBER, theta=numbers(N), P=numbers(N, N), phi=numbers(N), rates=RATES)
+def test_floor_is_the_least_eigenvalue() -> None:
+    for seed in range(10):
+        A = np.random.default_rng(seed).normal(size=(4, 4))
+        least = np.linalg.eigvalsh(A @ A.T)[0]
+        assert ls.above_floor(A @ A.T, 0.999 * least, np.zeros((4, 4))) == 1.0
+        assert ls.above_floor(A @ A.T, 1.001 * least, np.zeros((4, 4))) == 0.0
 
 
-@compiled
-def discrete(case: Record) -> None:
-    _, case.S = ls.discrete_update(case.theta, case.P, case.phi, case.z, 0.98, 0.04, 50.0)
-
-
-@compiled
-def directional(case: Record) -> None:
-    _, case.S = ls.directional_update(case.theta, case.P, case.phi, case.z, 0.98, 0.04, 50.0)
-
-
-@compiled
-def continuous(case: Record) -> None:
-    _, case.S = ls.continuous_step(case.theta, case.P, case.phi, case.z, 0.02, 0.7, 1.0, case.rates)
-    ls.continuous_correction(case.theta, case.P, 0.02, 50.0, case.rates)
-
-
-@pytest.mark.parametrize("law", [discrete, directional, continuous])
-def test_numpy_numba_and_casadi_agree(law: Any) -> None:
-    phi, z, _ = problem(1)
-    theta, P = start()
-    plain, machine, symbolic = three_ways(law, CASE, theta=theta, P=P, phi=phi[0], z=z[0])
-    np.testing.assert_allclose(machine, plain, rtol=1e-13)
-    np.testing.assert_allclose(symbolic, plain, rtol=1e-13)
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"n": 0}, "n must be a whole number"),
+        ({"P": [1.0, 2.0, 3.0]}, r"P must have shape \(2, 2\)"),
+        ({"P": [1.0, -1.0]}, "positive definite"),
+        ({"P": [[1.0, 0.5], [0.0, 1.0]]}, "symmetric"),
+        ({"time_base": "continuous", "noise_variance": 2.0}, "noise_variance must be 1"),
+        ({"policies": ("forgetting",)}, "must be made of policies"),
+        ({"policies": (p.RandomWalk(),)}, "needs the swings of a voltage"),
+        ({}, r"phi must have shape \(2,\)"),
+    ],
+)
+def test_wrong_arguments(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        pz.RecursiveLeastSquares(**{"n": 2, **options}).update(1.0, [1.0])

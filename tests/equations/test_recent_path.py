@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from piezoest.compile import Record, Vector, compiled
 from piezoest.equations import recent_path
 from piezoest.equations.coleman_hodgdon import hysteresis_step
 from piezoest.layout import Named, new
@@ -57,28 +56,3 @@ def test_steady_loop_is_known_however_long_it_went_on(amplitude: float, a: float
     u = np.concatenate([triangle([amplitude, -amplitude] * 200), np.linspace(-1.0, 0.4, 20)[1:] * amplitude])
     h = with_decay(followed(u, a=before), a)
     assert h == pytest.approx(simulated(u, a), abs=0.01 * amplitude)
-
-
-@compiled
-def compiled_with_decay(path: Record, u: Vector, a: float) -> float:
-    recent_path.begin(path, 0.0, 0.02)
-    for value in u:
-        recent_path.follow(path, value)
-    recent_path.use_decay(path, a)
-    return recent_path.hysteresis(path)
-
-
-def test_compiled_equals_plain() -> None:
-    u = np.cumsum(np.random.default_rng(1).standard_normal(3000))
-    found = compiled_with_decay.of(recent_path.PATH)(new(recent_path.PATH), u, 0.03)
-    assert found == pytest.approx(with_decay(followed(u), 0.03), rel=1e-12)
-
-
-def test_model_in_use_goes_on_by_itself() -> None:
-    """However many turns are dropped, and taken up again it does not move."""
-    u = 20.0 + np.cumsum(np.random.default_rng(2).standard_normal(5000))
-    path = followed(u, a=0.002)
-    h = float(recent_path.hysteresis(path))
-    assert path.count > recent_path.MOST // 2
-    assert h == pytest.approx(simulated(u, 0.002), abs=0.2)
-    assert with_decay(path, 0.002) == pytest.approx(h, abs=1e-9)

@@ -1,15 +1,12 @@
 """BatchFit: recovery, standard errors, bounds, masks, gaps, outliers, failure, saving."""
 
-from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any
 
 import numpy as np
 import pytest
 
 import piezoest as pz
 from piezoest.estimators.batch import BatchFit
-from piezoest.fitting.losses import bend
-from piezoest.models import FreeRunning
 
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 RATE = 1000.0
@@ -30,42 +27,24 @@ def record(
     return u, x + noise * np.random.default_rng(seed).standard_normal(u.size)
 
 
-def cramer_rao(u: Any, noise: float) -> Any:
-    """Bound of (alpha, beta, gamma), the start state unknown: sensitivities by finite differences."""
-    point = np.array([*TRUE.theta, 0.0])
-    columns = []
-    for i, h in enumerate((1e-7, 1e-7, 1e-9, 1e-5)):
-        x = []
-        for sign in (1.0, -1.0):
-            moved = point.copy()
-            moved[i] += sign * h
-            x.append(pz.ColemanHodgdon(*moved[:3]).simulate(u, initial_state=moved[3]))
-        columns.append((x[0] - x[1]) / (2.0 * h))
-    J = np.column_stack(columns) / np.linalg.norm(columns, axis=1)
-    scale = np.linalg.norm(columns, axis=1)
-    return (noise**2 * np.linalg.inv(J.T @ J) / np.outer(scale, scale))[:3, :3]
-
-
 # ---------------------------------------------------------------- what it finds
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_parameters_lie_within_three_standard_errors(seed: int) -> None:
-    u, x = record(2.0, seed=seed, rate=50_000.0)
-    fit = BatchFit(50_000.0).fit(u, x)
-    assert fit.success
-    assert np.all(np.abs(fit.theta[:3] - TRUE.theta) < 3.0 * fit.standard_errors[:3])
-    np.testing.assert_allclose(fit.theta[:3], TRUE.theta, rtol=5e-4)
-    assert fit.noise == pytest.approx(NOISE, rel=0.02)
-    assert abs(fit.initial_state) < 3.0 * fit.standard_errors[fit.parameter_names.index("initial_state")]
-
-
 def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
+    """Of alpha, beta and gamma, the start state unknown: sensitivities by finite differences."""
     u, _ = record()
-    bound = cramer_rao(u, NOISE)
-    fits = [BatchFit(RATE).fit(*record(seed=seed)) for seed in range(200)]
+    point, steps = np.array([*TRUE.theta, 0.0]), np.array([1e-7, 1e-7, 1e-9, 1e-5])
+
+    def simulated(p: Any) -> Any:
+        return pz.ColemanHodgdon(*p[:3]).simulate(u, initial_state=p[3])
+
+    J = np.column_stack(
+        [(simulated(point + h) - simulated(point - h)) / (2.0 * h.sum()) for h in np.diag(steps)]
+    )
+    scale = np.linalg.norm(J, axis=0)
+    bound = (NOISE**2 * np.linalg.inv((J / scale).T @ (J / scale)) / np.outer(scale, scale))[:3, :3]
+    fits = [BatchFit(RATE).fit(*record(seed=seed)) for seed in range(60)]
     errors = np.array([fit.theta[:3] - TRUE.theta for fit in fits])
-    assert np.all(errors.std(axis=0) < 1.3 * np.sqrt(np.diag(bound)))
     together = np.mean(np.einsum("ki,ij,kj->k", errors, np.linalg.inv(bound), errors)) / 3.0
     assert 0.9 < np.sqrt(together) < 1.1
     # What the fit says of itself is the bound too.
@@ -73,6 +52,7 @@ def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
     np.testing.assert_allclose(said / bound, 1.0, rtol=0.05)
     inside = np.abs(errors) < 3.0 * np.array([fit.standard_errors[:3] for fit in fits])
     assert np.all(inside, axis=1).mean() >= 0.95
+    assert np.mean([fit.noise for fit in fits]) == pytest.approx(NOISE, rel=0.01)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -136,47 +116,6 @@ def test_linear_gain(method: Any) -> None:
     assert fit.model == pz.LinearGain(*fit.theta)
 
 
-@dataclass(frozen=True, slots=True)
-class Cubic(FreeRunning):
-    """x = K u + q u³ + offset: a model of its own, which the fit has never seen."""
-
-    gain: float
-    cubic: float
-    offset: float = 0.0
-
-    parameter_names: ClassVar[tuple[str, ...]] = ("gain", "cubic")
-    parameter_units: ClassVar[tuple[str, ...]] = ("µm/V", "µm/V³")
-
-    @property
-    def is_admissible(self) -> bool:
-        return self.gain > 0.0
-
-    @classmethod
-    def guess(cls, u: Any, x: Any) -> Self:
-        return cls(pz.LinearGain.guess(u, x).gain, 0.0)
-
-    @classmethod
-    def free_step(cls, state: Any, u_0: Any, u_1: Any, constants: Any) -> tuple[tuple[Any, ...], Any]:
-        return (), constants[0] * u_1 + constants[1] * u_1**3
-
-    def lifted(self, start: Self, least: float) -> Self:
-        return type(self)(max(self.gain, least * start.gain), self.cubic, self.offset)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_another_model_is_fitted_by_its_face_alone(method: Any) -> None:
-    u, _ = record(1.0)
-    x = 0.15 * u + 2e-5 * u**3 + 3.0 + NOISE * np.random.default_rng(0).standard_normal(u.size)
-    fit = BatchFit(RATE, initial_model=Cubic(0.1, 1e-5), offset=True, method=method).fit(u, x)
-    assert fit.success
-    assert isinstance(fit.model, Cubic)
-    assert np.all(np.abs(fit.theta - [0.15, 2e-5, 3.0]) < 4.0 * fit.standard_errors)
-    columns = np.column_stack([u, u**3, np.ones_like(u)])
-    np.testing.assert_allclose(fit.theta, np.linalg.lstsq(columns, x, rcond=None)[0], rtol=1e-6)
-    with pytest.raises(ValueError, match="Cubic has no form"):
-        pz.MovingHorizon(RATE, initial_model=Cubic(0.1, 1e-5))
-
-
 # ---------------------------------------------------------------- bounds and masks
 
 
@@ -192,7 +131,7 @@ def test_model_is_admissible_where_the_plant_is_not(gamma: float) -> None:
 
 @pytest.mark.parametrize(
     "names",
-    [("alpha",), ("beta",), ("gamma",), ("alpha", "gamma"), ("beta", "gamma"), ("alpha", "beta", "gamma")],
+    [("alpha",), ("beta",), ("gamma",), ("alpha", "gamma"), ("alpha", "beta", "gamma")],
 )
 def test_fixed_parameters_stay(names: tuple[str, ...]) -> None:
     u, x = record()
@@ -243,14 +182,6 @@ def test_outliers(loss: Any, method: Any) -> None:
     np.testing.assert_allclose(robust.theta[:3], TRUE.theta, rtol=5e-3)
     assert np.all(np.abs(robust.theta[:3] - TRUE.theta) < 4.0 * robust.standard_errors[:3])
     assert robust.noise < 1.5 * NOISE
-
-
-@pytest.mark.parametrize("loss", ["linear", "huber", "soft_l1", "cauchy"])
-def test_derivatives_of_the_losses(loss: str) -> None:
-    z = np.array([0.1, 0.7, 1.3, 9.0])
-    rho, above, below = bend(loss, z), bend(loss, z + 1e-6), bend(loss, z - 1e-6)
-    np.testing.assert_allclose(rho[1], (above[0] - below[0]) / 2e-6, rtol=1e-6)
-    np.testing.assert_allclose(rho[2], (above[1] - below[1]) / 2e-6, rtol=1e-6, atol=1e-12)
 
 
 def test_a_failure_is_told_in_the_solvers_words_with_the_best_iterate() -> None:

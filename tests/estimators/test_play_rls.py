@@ -24,7 +24,7 @@ def ring(stage: Any, reference: pz.Signal, **options: Any) -> pz.TrackingRecord:
 
 @pytest.mark.parametrize("stage", [pz.PaperStage, pz.PreisachStage])
 def test_minor_loops_in_the_ring(stage: Any) -> None:
-    reference = pz.signals.two_tone([3.5, 1.5], [2.0, 7.0], 6.0, RATE)
+    reference = pz.signals.two_tone([3.5, 1.5], [2.0, 7.0], 4.0, RATE)
     record = ring(stage(RATE), reference)
     error = np.abs(record.error)
     assert error[-10_000:].max() < 0.03

@@ -9,27 +9,15 @@ import pytest
 
 import piezoest as pz
 from piezoest import policies as p
-from piezoest.equations import least_squares as ls
 
 FS = 5000.0
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 BASE = (p.DeadZone(), p.OutlierRejection())
+
+
 POLICIES: dict[str, tuple[Any, ...]] = {
-    "directional": (p.DirectionalForgetting(),),
-    "directional-seconds": (p.DirectionalForgetting(0.2, "second"),),
-    "variable": (p.VariableForgetting(),),
-    "variable-seconds": (p.VariableForgetting(0.2, 0.1, "second"),),
-    "projection": (p.RandomWalk(), p.Projection()),
-    "detection": (p.RandomWalk(), p.ChangeDetection()),
-    "gate": (p.RandomWalk(), p.ExcitationGate()),
-    "amplitudes": (p.RandomWalk(), p.AmplitudeMemory()),
-    "all": (
-        p.VariableForgetting(),
-        p.Projection(),
-        p.ChangeDetection(),
-        p.ExcitationGate(),
-        p.AmplitudeMemory(),
-    ),
+    "directional": (p.DirectionalForgetting(0.2, "second"), p.ExcitationGate()),
+    "variable": (p.VariableForgetting(), p.Projection(), p.ChangeDetection(), p.AmplitudeMemory()),
 }
 
 
@@ -40,12 +28,6 @@ def record(periods: float, volts: float = 33.0, model: Any = TRUE) -> tuple[Any,
 
 def made(*policies: Any, **options: Any) -> Any:
     return pz.HysteresisRLS(FS, policies=(*policies, *BASE), **options)
-
-
-def start() -> tuple[Any, Any, Any]:
-    rng = np.random.default_rng(3)
-    A = rng.normal(size=(3, 3))
-    return rng.normal(size=3), A @ A.T + np.eye(3), rng
 
 
 @pytest.mark.parametrize("name", POLICIES)
@@ -67,47 +49,6 @@ def test_same_bits_by_step_run_and_from_a_file(name: str) -> None:
     assert np.linalg.eigvalsh(whole.P / np.sqrt(np.outer(np.diag(whole.P), np.diag(whole.P))))[0] > 0.0
     whole.reset()
     assert whole.to_dict() == fresh
-
-
-def test_directional_forgetting_is_the_textbook() -> None:
-    theta, P, rng = start()
-    expected, information = theta.copy(), np.linalg.inv(P)
-    mu, R = 0.9, 0.3
-    for _ in range(50):
-        phi, z = rng.normal(size=3), rng.normal()
-        covariance = np.linalg.inv(information)
-        q = phi @ covariance @ phi
-        expected = expected + covariance @ phi / (R + q) * (z - expected @ phi)
-        information = information + (mu - (1.0 - mu) * R / q) * np.outer(phi, phi) / R
-        ls.directional_update(theta, P, phi, z, mu, R, np.inf)
-    np.testing.assert_allclose(theta, expected, rtol=1e-8)
-    np.testing.assert_allclose(np.linalg.inv(P), information, rtol=1e-7)
-
-
-def test_variable_forgetting_is_the_textbook() -> None:
-    theta, P, rng = start()
-    estimator = pz.RecursiveLeastSquares(
-        3, theta=theta, P=P, noise_variance=0.04, policies=(p.VariableForgetting(50.0, 0.1, "second"),)
-    )
-    memory = 1.0 / (1.0 - np.exp(-1.0 / 50.0))
-    for _ in range(100):
-        phi, z = rng.normal(size=3), rng.normal()
-        y, q = z - theta @ phi, phi @ P @ phi
-        mu = max(1.0 - y * y / (0.04 + q) / memory, np.exp(-1.0 / 5.0))
-        K = P @ phi / (mu * 0.04 + q)
-        theta, P = theta + K * y, (P - np.outer(K, phi) @ P) / mu
-        estimator.update(z, phi)
-    np.testing.assert_allclose(estimator.theta, theta, rtol=1e-8)
-    np.testing.assert_allclose(estimator.P, P, rtol=1e-7)
-
-
-def test_cusum_is_pages() -> None:
-    values = np.random.default_rng(0).exponential(size=300) + (np.arange(300) > 200)
-    total, sums = 0.0, np.concatenate([[0.0], np.cumsum(values - 1.5)])
-    for k, value in enumerate(values):
-        total = ls.cusum(total, value, 1.5)
-        # Page: the walk's height above its lowest point so far.
-        assert total == pytest.approx(sums[k + 1] - sums[: k + 2].min(), abs=1e-9)
 
 
 @pytest.mark.parametrize("forgetting", [p.RandomWalk(), p.PeriodicForgetting(2.0)])
@@ -154,6 +95,10 @@ def test_amplitudes_are_remembered(tmp_path: Path) -> None:
     between = profile.at(60.0).theta
     assert np.all(np.sort([profile.theta[0], between, profile.theta[1]], axis=0)[1] == between)
 
+    swings = profile.swings.copy()
+    own = pz.AmplitudeProfile(swings, profile.theta)
+    swings[0] = 99.0
+    np.testing.assert_array_equal(own.swings, profile.swings)
     path = tmp_path / "profile.json"
     profile.save(path)
     loaded = pz.AmplitudeProfile.load(path)

@@ -1,4 +1,4 @@
-"""After a short fault of the sensor an estimator finds back to the stage."""
+"""Readings that a stage cannot have made are left out; after a fault an estimator finds back to the stage."""
 
 from collections.abc import Callable
 from typing import Any
@@ -90,3 +90,26 @@ def test_decay_of_a_kalman_filter_is_bounded() -> None:
     x[START : START + 1200] = np.random.default_rng(0).normal(0.0, 5.0, 1200)
     theta = estimator.run(U[: START + 1200], x[: START + 1200]).theta
     assert np.max(theta[PERIOD:, 0]) < 1.0
+
+
+# ---------------------------------------------------------------- readings that are cut off or coarse
+
+LONG = np.asarray(pz.signals.triangle(35.0, 5.0, 8, 20_000.0))
+LOOP = pz.ColemanHodgdon(0.021, 0.147, 0.0043).simulate(LONG)
+
+
+@pytest.mark.parametrize("kind", [pz.HysteresisRLS, pz.PrandtlIshlinskiiRLS])
+def test_saturated_readings_are_left_out(kind: Any) -> None:
+    saturated = kind(20_000.0)
+    saturated.run(LONG, np.clip(LOOP, -4.0, 4.0))
+    assert saturated.status.outliers > 0.9 * np.count_nonzero(np.abs(LOOP) > 4.0)
+    slope = np.polyfit(LONG, saturated.model.simulate(LONG), 1)[0]
+    assert slope == pytest.approx(np.polyfit(LONG, LOOP, 1)[0], rel=0.03)
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_a_coarse_converter_still_teaches(bits: int) -> None:
+    code = 2.0 * np.max(np.abs(LOOP)) / 2**bits
+    estimator: Any = pz.HysteresisRLS(20_000.0)
+    estimator.run(LONG, code * np.round(LOOP / code))
+    assert np.max(np.abs(estimator.model.simulate(LONG) - LOOP)[-4000:]) < 0.005 + 0.5 * code

@@ -20,19 +20,13 @@ def record(seconds: float = 1.0, noise: float = 0.0, fs: float = FS, model: Any 
 
 
 def test_equals_the_textbook_with_gaps() -> None:
-    u, x = record(0.3, 1e-3)
-    x[2000] = x[7001] = x[7002] = np.nan
+    u, x = record(0.15, 1e-3)
+    x[2000] = x[5001] = x[5002] = np.nan
     estimator = pz.HysteresisRLS(FS, memory=0.1, policies=())
     theta = estimator.run(u, x).theta
+    start = np.array([0.02, 0.12, 0.0036])
     expected = reference.coleman_hodgdon(
-        u,
-        x,
-        FS,
-        start=np.array([0.02, 0.12, 0.0036]),
-        uncertainty=0.5,
-        noise=1.5e-3,
-        memory=0.1,
-        cutoff=2500.0,
+        u, x, FS, start=start, uncertainty=0.5, noise=1.5e-3, memory=0.1, cutoff=2500.0
     )
     np.testing.assert_allclose(theta, expected, rtol=1e-7)
 
@@ -75,14 +69,10 @@ def test_delay(delay: float) -> None:
     estimator = pz.HysteresisRLS(FS, memory=0.4, delay=delay)
     estimator.run(u, late)
     np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=2e-3)
-    # At a tenth of the rate the same delay, left out, would show.
-    slow_u, slow_x = record(1.0, fs=2000.0)
-    late = np.interp(np.arange(slow_x.size) - delay, np.arange(slow_x.size), slow_x)
-    told, untold = pz.HysteresisRLS(2000.0, memory=0.4, delay=delay), pz.HysteresisRLS(2000.0, memory=0.4)
-    told.run(slow_u, late)
-    untold.run(slow_u, late)
-    error = np.abs(told.theta / TRUE.theta - 1.0).max()
-    assert error < 0.3 * np.abs(untold.theta / TRUE.theta - 1.0).max()
+    untold = pz.HysteresisRLS(FS, memory=0.4)
+    untold.run(u, late)
+    errors = [np.abs(each.theta / TRUE.theta - 1.0).max() for each in (estimator, untold)]
+    assert errors[0] < 0.5 * errors[1]
 
 
 def test_long_gap_starts_anew() -> None:
@@ -93,16 +83,7 @@ def test_long_gap_starts_anew() -> None:
     np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=1e-3)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {},
-        {"errors": False, "delay": 1.5},
-        {"memory": 0.4, "errors": False},
-        {"initial_model": pz.LinearGain(0.15), "offset": True},
-        {"time_base": "continuous", "high_pass": 0.5},
-    ],
-)
+@pytest.mark.parametrize("options", [{}, {"time_base": "continuous", "high_pass": 0.5}])
 def test_machine_code_does_what_its_source_says(options: dict[str, Any]) -> None:
     u, x = record(0.02, 1e-3)
     x[300:310] = u[500] = np.nan

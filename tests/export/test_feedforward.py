@@ -3,7 +3,7 @@
 import shutil
 import subprocess
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def controller(estimators: str, limits: pz.VoltageLimits = LIMITS) -> Any:
 
 @pytest.fixture(
     scope="module",
-    params=["default", *(pytest.param(name, marks=pytest.mark.slow) for name in ("ekf", "line"))],
+    params=["ekf", *(pytest.param(name, marks=pytest.mark.slow) for name in ("default", "line"))],
 )
 def pair(request: pytest.FixtureRequest) -> tuple[Any, Any]:
     """A controller, and what is exported of it."""
@@ -36,7 +36,7 @@ def pair(request: pytest.FixtureRequest) -> tuple[Any, Any]:
 
 @pytest.fixture(scope="module")
 def single() -> Any:
-    return pz.export.CompiledFeedforward(pz.export.c(controller("default"), precision="float"))
+    return pz.export.CompiledFeedforward(pz.export.c(controller("ekf"), precision="float"))
 
 
 def rig(family: str, mechanics: str = "none") -> Any:
@@ -110,10 +110,7 @@ def test_it_goes_on_from_where_it_was_exported() -> None:
 @pytest.mark.parametrize("gain", [0.2, -0.2])
 def test_a_gain_that_is_known_need_not_be_right(gain: float) -> None:
     library = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), gain=gain, feedback=5.0)
-    code = pz.export.c(library)
-    assert f"Gain: about {gain:g} um/V." in code.header
-    assert "Feedback: 5 1/s." in code.header
-    seen = drive(library, pz.export.CompiledFeedforward(code), rig("duhem", "lag"))
+    seen = drive(library, pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem", "lag"))
     assert {stage for stage, _, _ in seen} == {0, 1, 2}
     assert any(event.reason.startswith("gain") for event in library.events) == (gain < 0.0)
 
@@ -203,22 +200,18 @@ def test_sanitizers_are_silent(tmp_path: Path) -> None:
 
 
 def test_what_does_not_go_together_is_refused() -> None:
-    library = controller("line")
-    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
-    inverse = pz.InverseCompensator(start, LIMITS)
-    with pytest.raises(ValueError, match="leave out"):
-        pz.export.c(library, inverse)
-    with pytest.raises(ValueError, match="leave out"):
-        pz.export.c(library, update_interval=20)
-    with pytest.raises(ValueError, match="AdaptiveFeedforward"):
-        pz.export.fmu(library, None, "stage.fmu")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="name"):
-        pz.export.c(library, name="double-u")
-    with pytest.raises(ValueError, match="precision"):
-        pz.export.c(library, precision="half")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="CompiledFeedforward"):
-        pz.export.CompiledController(pz.export.c(library))
-    with pytest.raises(ValueError, match="CompiledController"):
-        pz.export.CompiledFeedforward(pz.export.c(None, inverse))
-    with pytest.raises(ValueError, match="compensator"):
-        pz.export.c(pz.HysteresisRLS(FS))
+    library, c, odd = controller("line"), pz.export.c, cast("Any", None)
+    inverse = pz.InverseCompensator(pz.ColemanHodgdon(0.02, 0.12, 0.0036), LIMITS)
+    calls: list[tuple[Any, str]] = [
+        (lambda: c(library, inverse), "leave out"),
+        (lambda: c(library, update_interval=20), "leave out"),
+        (lambda: pz.export.fmu(library, odd, "stage.fmu"), "AdaptiveFeedforward"),
+        (lambda: c(library, name="double-u"), "name"),
+        (lambda: c(library, precision=odd), "precision"),
+        (lambda: pz.export.CompiledController(c(library)), "CompiledFeedforward"),
+        (lambda: pz.export.CompiledFeedforward(c(None, inverse)), "CompiledController"),
+        (lambda: c(pz.HysteresisRLS(FS)), "compensator"),
+    ]
+    for call, words in calls:
+        with pytest.raises(ValueError, match=words):
+            call()

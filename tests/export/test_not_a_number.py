@@ -5,11 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import piezoest as pz
-
-FloatArray = NDArray[np.float64]
+from tests.wild import wild
 
 FS = 1000.0
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
@@ -19,66 +17,36 @@ PLAYS = pz.PrandtlIshlinskii(
     bends=[-10.0], bend_weights=[[5e-4, 0.0, 0.0]], sample_rate=FS,
 )  # fmt: skip
 LIMITS = pz.VoltageLimits(-60.0, 60.0)
-
-
-def pair(kind: str) -> Any:
-    estimators: dict[str, Any] = {
-        "rls": lambda: pz.HysteresisRLS(FS, initial_model=START),
-        "rls-bare": lambda: pz.HysteresisRLS(FS, initial_model=START, memory=0.4, policies=(), errors=False),
-        "rls-continuous": lambda: pz.HysteresisRLS(
-            FS, initial_model=START, time_base="continuous", policies=(pz.policies.NormBound(),)
-        ),
-        "rls-line": lambda: pz.HysteresisRLS(FS, initial_model=LINE, offset=True),
-        "ekf": lambda: pz.HysteresisEKF(FS, initial_model=START),
-        "ekf-free": lambda: pz.HysteresisEKF(FS, initial_model=START, offset=True, project=False),
-        "output-error": lambda: pz.OutputErrorRLS(FS, initial_model=START),
-    }
-    if kind == "plays":
-        return None, pz.InverseCompensator(PLAYS, LIMITS)
-    model = LINE if kind.endswith("line") else START
-    return estimators[kind](), pz.InverseCompensator(model, LIMITS)
-
-
-KINDS = ("plays", "rls", "rls-bare", "rls-continuous", "rls-line", "ekf", "ekf-free", "output-error")
-
-
-def wild(rng: np.random.Generator, count: int, precision: str) -> FloatArray:
-    """Any bits of that precision, all sizes, and a wave between them."""
-    if precision == "double":
-        bits = rng.integers(0, 2**64, count, dtype=np.uint64).view(np.float64)
-    else:
-        bits = rng.integers(0, 2**32, count, dtype=np.uint32).view(np.float32).astype(np.float64)
-    sizes = rng.choice([-1.0, 1.0], count) * 10.0 ** rng.uniform(-30.0, 9.0, count)
-    wave = 5.0 * np.sin(np.arange(count) / rng.uniform(1.0, 50.0))
-    special = rng.choice([0.0, -0.0, np.nan, np.inf, -np.inf, 1e-45, 3e38, 9e8], count)
-    kinds = np.stack([bits, sizes, wave, special])
-    share = rng.dirichlet(np.full(len(kinds), 0.4))
-    return np.asarray(kinds[rng.choice(len(kinds), count, p=share), np.arange(count)])
-
-
-def feed(kind: str, precision: Any, rounds: int) -> None:
-    estimator, compensator = pair(kind)
-    made = pz.export.CompiledController(pz.export.c(estimator, compensator, precision=precision))
-    rng = np.random.default_rng(0)
-    least = 0.9e-3 * (START.c if not kind.endswith("line") else LINE.gain)
-    for _ in range(rounds):
-        made.reset()
-        for _ in range(4):
-            count = int(rng.integers(1, 80))
-            with np.errstate(all="ignore"):
-                u = made.run(wild(rng, count, precision), wild(rng, count, precision))
-            assert np.all(np.isfinite(u))
-            assert np.all(np.abs(u) <= 60.0)
-            parameters = made.parameters
-            assert np.all(np.isfinite(parameters)), parameters
-            if kind == "plays":
-                continue
-            slope = parameters[0] if kind.endswith("line") else parameters[2] / parameters[0]
-            assert slope >= least, parameters
+ESTIMATORS: dict[str, Any] = {
+    "plays": lambda: None,
+    "rls": lambda: pz.HysteresisRLS(FS, initial_model=START),
+    "rls-bare": lambda: pz.HysteresisRLS(FS, initial_model=START, memory=0.4, policies=(), errors=False),
+    "rls-continuous": lambda: pz.HysteresisRLS(
+        FS, initial_model=START, time_base="continuous", policies=(pz.policies.NormBound(),)
+    ),
+    "rls-line": lambda: pz.HysteresisRLS(FS, initial_model=LINE, offset=True),
+    "ekf": lambda: pz.HysteresisEKF(FS, initial_model=START),
+    "ekf-free": lambda: pz.HysteresisEKF(FS, initial_model=START, offset=True, project=False),
+    "output-error": lambda: pz.OutputErrorRLS(FS, initial_model=START),
+}
 
 
 @pytest.mark.parametrize(
-    ("kind", "precision"), list(zip(KINDS, itertools.cycle(("float", "double")), strict=False))
+    ("kind", "precision"), list(zip(ESTIMATORS, itertools.cycle(("float", "double")), strict=False))
 )
-def test_any_bits(kind: str, precision: str) -> None:
-    feed(kind, precision, 150)
+def test_any_bits(kind: str, precision: Any) -> None:
+    model: Any = {"plays": PLAYS, "rls-line": LINE}.get(kind, START)
+    compensator = pz.InverseCompensator(model, LIMITS)
+    made = pz.export.CompiledController(pz.export.c(ESTIMATORS[kind](), compensator, precision=precision))
+    rng, bits = np.random.default_rng(0), np.uint32 if precision == "float" else np.uint64
+    for _ in range(150):
+        made.reset()
+        for count in rng.integers(1, 80, 4).tolist():
+            with np.errstate(all="ignore"):
+                u = made.run(wild(rng, count, 5.0, bits), wild(rng, count, 5.0, bits))
+            assert np.all(np.abs(u) <= 60.0)
+            parameters = made.parameters
+            assert np.all(np.isfinite(parameters)), parameters
+            if kind != "plays":
+                slope = parameters[0] if model is LINE else parameters[2] / parameters[0]
+                assert slope >= 0.9e-3 * (LINE.gain if model is LINE else START.c), parameters

@@ -101,10 +101,6 @@ def test_arithmetic_is_the_same(tmp_path: Path) -> None:
 # ---------------------------------------------------------------- refusals
 
 
-def with_a_list(x: Any) -> Any:
-    return [x]
-
-
 def with_a_step(x: Any) -> None:
     for i in range(0, 10, int(x[0])):
         x[i] = 0.0
@@ -116,10 +112,6 @@ def with_a_power(x: Any) -> Any:
 
 def with_keywords(x: Any) -> Any:
     return ignores(x, value=1)
-
-
-def with_a_default(x: Any = 1.0) -> Any:
-    return x
 
 
 def writes(x: Any) -> Any:
@@ -139,22 +131,15 @@ def with_itself(x: Any) -> Any:
     return with_itself(x)
 
 
-def with_text(x: Any) -> Any:
-    return x.title()
-
-
 @pytest.mark.parametrize(
     ("function", "word"),
     [
-        (with_a_list, "List"),
         (with_a_step, "range with a step"),
         (with_a_power, "write x * x"),
         (with_keywords, "positional"),
-        (with_a_default, "default"),
         (with_a_slice, "slice"),
         (with_a_hidden_write, "put it into a name first"),
         (with_itself, "calls itself"),
-        (with_text, "title"),
     ],
 )
 def test_what_is_not_in_the_subset_is_refused(function: Any, word: str) -> None:

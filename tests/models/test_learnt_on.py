@@ -39,26 +39,17 @@ def test_turns_are_the_extremes_that_the_signal_runs_back_from() -> None:
 # ---------------------------------------------------------------- ranges of a log
 
 
-def test_a_log_has_its_ranges() -> None:
+def test_a_log_has_its_ranges_without_what_is_wild_or_missing() -> None:
     u = np.concatenate((wave(20.0, 2.0), wave(40.0, 10.0)))
-    found = LearntOn.of(u, 0.1 * u + 1.0, FS)
-    assert found.voltage == (-40.0, 40.0)
-    assert found.displacement == pytest.approx((-3.0, 5.0), abs=0.05)
-    assert found.rate == pytest.approx(1600.0)
-    assert found.frequency == pytest.approx((2.0, 10.0), rel=0.01)
-
-
-def test_what_is_wild_or_missing_does_not_count() -> None:
-    u = wave()
-    x = 0.1 * u
-    plain = LearntOn.of(u, x, FS)
-    u[700], x[[100, 3000]] = np.nan, [1e6, -1e6]
-    u[1000:1100], x[2000:2010] = np.nan, np.nan
-    found = LearntOn.of(u, x, FS)
-    assert found.voltage == plain.voltage
-    assert found.displacement == pytest.approx(plain.displacement, abs=0.02)
-    assert found.rate == pytest.approx(800.0)
-    assert found.frequency == pytest.approx((5.0, 5.0), rel=0.01)
+    x = 0.1 * u + 1.0
+    for _ in range(2):
+        found = LearntOn.of(u, x, FS)
+        assert found.voltage == (-40.0, 40.0)
+        assert found.displacement == pytest.approx((-3.0, 5.0), abs=0.05)
+        assert found.rate == pytest.approx(1600.0)
+        assert found.frequency == pytest.approx((2.0, 10.0), rel=0.01)
+        u[700], x[[100, 3000]] = np.nan, [1e6, -1e6]
+        u[1000:1100], x[2000:2010] = np.nan, np.nan
 
 
 def test_steps_spikes_rests_and_converters_are_no_rate() -> None:
@@ -89,24 +80,22 @@ def test_blocks_of_a_log_have_the_ranges_of_the_log() -> None:
 
 
 @pytest.mark.parametrize(
-    ("used", "words"),
+    ("used", "count"),
     [
-        (KNOWN, ()),
+        (KNOWN, 0),
         # Within 5 % of the width, of the frequency, a factor of 1.5.
-        (LearntOn((-43.9, 43.9), (-6.5, 6.5), 1190.0, (3.9, 6.2)), ()),
-        (LearntOn((-1.0, 1.0), (-0.1, 0.1), 1.0), ()),
-        (LearntOn((-44.1, 40.0), (-6.0, 6.0), 1.0), ("-44.1 to 40 V",)),
-        (LearntOn((0.0, 44.1), (0.0, 6.7), 1.0), ("0 to 6.7 µm", "0 to 44.1 V")),
-        (LearntOn((0.0, 1.0), (-6.7, 0.0), 1.0), ("-6.7 to 0 µm",)),
-        (LearntOn((0.0, 1.0), (0.0, 1.0), 1234.5), ("1230 V/s",)),
-        (LearntOn((0.0, 1.0), (0.0, 1.0), 1.0, (5.0, 6.4)), ("5 to 6.4 Hz",)),
-        (LearntOn((0.0, 1.0), (0.0, 1.0), 1.0, (3.5, 3.5)), ("3.5 Hz",)),
+        (LearntOn((-43.9, 43.9), (-6.5, 6.5), 1190.0, (3.9, 6.2)), 0),
+        (LearntOn((-1.0, 1.0), (-0.1, 0.1), 1.0), 0),
+        (LearntOn((-44.1, 40.0), (-6.0, 6.0), 1.0), 1),
+        (LearntOn((0.0, 44.1), (0.0, 6.7), 1.0), 2),
+        (LearntOn((0.0, 1.0), (-6.7, 0.0), 1.0), 1),
+        (LearntOn((0.0, 1.0), (0.0, 1.0), 1234.5), 1),
+        (LearntOn((0.0, 1.0), (0.0, 1.0), 1.0, (5.0, 6.4)), 1),
+        (LearntOn((0.0, 1.0), (0.0, 1.0), 1.0, (3.5, 3.5)), 1),
     ],
 )
-def test_who_leaves_a_range_is_told_the_figures(used: LearntOn, words: tuple[str, ...]) -> None:
-    said = KNOWN.left_by(used)
-    assert len(said) == len(words)
-    assert all(word in left for word, left in zip(words, said, strict=True))
+def test_who_leaves_a_range_is_told(used: LearntOn, count: int) -> None:
+    assert len(KNOWN.left_by(used)) == count
 
 
 @pytest.mark.parametrize("kind", [pz.signals.triangle, pz.signals.sine])
@@ -130,11 +119,8 @@ def test_a_model_comes_in_many_forms(tmp_path: Path) -> None:
     assert LearntModel.of(pz.HysteresisRLS(FS, initial_model=LOOP)).learnt_on is None
     file, bare = tmp_path / "model.json", {"alpha": 0.02, "beta": 0.12, "gamma": 0.0036, "offset": 3.0}
     for data, expected in (
-        (both.to_dict(), both),
         (both.to_dict() | {"format": "piezoest-identification-1", "advice": []}, both),
-        ({"model": LOOP.to_dict()}, plain),
         (LOOP.to_dict(), plain),
-        (bare, plain),
         ({"model": bare}, plain),
     ):
         file.write_text(json.dumps(data), encoding="utf-8")

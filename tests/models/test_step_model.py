@@ -1,7 +1,10 @@
 """A model that two functions of one sample describe, compiled: simulated, inverted, in a stage, fitted."""
 
+import sys
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -9,6 +12,7 @@ import pytest
 import piezoest as pz
 from piezoest.compile import inlined
 from piezoest.models import StepModel, model_from_dict
+from piezoest.models._base import REGISTERED
 
 RATE = 1000.0
 R = pz.signals.triangle(5.0, 5.0, periods=2, sample_rate=RATE).values
@@ -66,6 +70,18 @@ def test_a_compensator_and_a_stage_are_made_of_it() -> None:
     np.testing.assert_allclose([stage.step(value) for value in u[:50].tolist()], R[:50], atol=1e-12)
 
 
+@pytest.mark.parametrize("method", ["single-shooting", "multiple-shooting"])
+def test_a_fit_finds_it(method: Any) -> None:
+    u = 8.0 * R
+    x = MODEL.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
+    fit = pz.BatchFit(RATE, initial_model=Slack(0.12, 0.02, 6.0), offset=True, method=method).fit(u, x)
+    assert fit.success
+    assert isinstance(fit.model, Slack)
+    assert np.all(np.abs(fit.theta[:4] - [*MODEL.theta, MODEL.offset]) < 4.0 * fit.standard_errors[:4])
+    with pytest.raises(ValueError, match="Slack has no form"):
+        pz.MovingHorizon(RATE, initial_model=MODEL)
+
+
 def test_a_compensator_goes_over_to_it_without_a_bump() -> None:
     """Its play then stands where the voltage's turning points have left it."""
     both = []
@@ -84,3 +100,31 @@ def test_gain_and_temperature_change_it_as_any_other() -> None:
     options: dict[str, Any] = {"gain_schedule": [[0.0, 1.0], [0.4, 1.2]], "temperature": 40.0}
     stages = [pz.SimulatedStage(RATE, model, **options) for model in (MODEL, PLAYS)]
     np.testing.assert_allclose(stages[0].run(u), stages[1].run(u), atol=1e-12)
+
+
+# ---------------------------------------------------------------- what is wrong with one is said
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"parameter_names": None}, "Mine.parameter_names must be a tuple"),
+        ({"fields": ("gain", "state_names")}, "Mine.state_names must be a tuple"),
+        ({"parameter_units": ("µm/V", "V")}, "one unit per parameter"),
+        ({"fields": ("gian",)}, "must have the fields .'gain'.*"),
+        ({"functions": {"displacement": displacement}}, "has no function voltage"),
+        ({"functions": {"displacement": lambda *_: 0.0, "voltage": voltage}}, "mark it @inlined"),
+    ],
+)
+def test_says_what_is_wrong(monkeypatch: pytest.MonkeyPatch, changes: dict[str, Any], words: str) -> None:
+    changes = dict(changes)
+    module = ModuleType(f"step_model_of_a_test_{words.replace(' ', '_')}")
+    vars(module).update(changes.pop("functions", {"displacement": displacement, "voltage": voltage}))
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    fields = dict.fromkeys((*changes.pop("fields", ("gain",)), "offset"), float)
+    names = {"parameter_names": ("gain",), "parameter_units": ("µm/V",), "state_names": ("last",)}
+    body = {"__module__": module.__name__, "__annotations__": fields, "offset": 0.0, **names, **changes}
+    with patch.dict(REGISTERED):
+        mine: Any = dataclass(frozen=True, slots=True)(type("Mine", (StepModel,), body))
+        with pytest.raises(TypeError, match=words):
+            mine(0.15).simulate(np.zeros(3))

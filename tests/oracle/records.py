@@ -67,12 +67,6 @@ def nan(seed: int = 2) -> tuple[Array, Array]:
     return u, x
 
 
-def gaps() -> tuple[Array, Array]:
-    u, x = triangle(33.0), answer(triangle(33.0))
-    x[210:420], x[700:703], u[800:850], u[1000] = np.nan, np.nan, np.nan, np.nan
-    return u, x
-
-
 def spikes(seed: int = 3) -> tuple[Array, Array]:
     u, x, rng = sine(33.0), answer(sine(33.0)), np.random.default_rng(seed)
     places = rng.random(u.size) < 0.02
@@ -88,13 +82,6 @@ def jump() -> tuple[Array, Array]:
     return u, rounded(x)
 
 
-def frozen() -> tuple[Array, Array]:
-    """A reading that stands still, at half height and at a turn."""
-    u, x = sine(33.0), answer(sine(33.0))
-    x[330:480], x[700:740] = x[330], x[700]
-    return u, x
-
-
 def wild(seed: int = 4) -> tuple[Array, Array]:
     u, x, rng = sine(33.0), answer(sine(33.0)), np.random.default_rng(seed)
     odd = np.array([np.inf, -np.inf, np.nan, 1e300, -1e300, 1e30, 9e8, 5e-324])
@@ -102,12 +89,6 @@ def wild(seed: int = 4) -> tuple[Array, Array]:
         places = rng.random(u.size) < share
         values[places] = rng.choice(odd, int(places.sum()))
     return u, x
-
-
-def late(samples: float) -> tuple[Array, Array]:
-    u = sine(33.0)
-    index = np.arange(u.size)
-    return u, answer(rounded(np.interp(index - samples, index, u)))
 
 
 def rough(seed: int = 5) -> tuple[Array, Array]:
@@ -127,28 +108,17 @@ def of(u: Array, noise: float = 1.5e-3, gain: float = 1.0, offset: float = 0.0) 
 
 SCENARIOS: dict[str, Any] = {
     "sine": lambda: of(sine(33.0)),
-    "triangle": lambda: of(triangle(33.0), noise=0.0),
     "walk": lambda: of(walk(30.0)),
     "growing": lambda: of(growing()),
     "unipolar": lambda: of(rounded(triangle(25.0) + 50.0)),
     "dwell": lambda: of(dwelling()),
-    "silent": lambda: of(np.zeros(LENGTH)),
     "nan": nan,
-    "gaps": gaps,
     "spikes": spikes,
     "jump": jump,
     "saturated": lambda: (sine(33.0), np.clip(answer(sine(33.0)), -3.0, 3.5)),
-    "frozen": frozen,
-    "delayed": lambda: late(2.4),
     "biased": lambda: (triangle(33.0), rounded(answer(triangle(33.0)) + 8.0 + 1e-3 * np.arange(LENGTH))),
-    "noisy": lambda: of(sine(33.0), noise=0.2),
     "wild": wild,
-    "reversed": lambda: of(triangle(33.0), gain=-1.0),
-    "small": lambda: of(sine(0.01), noise=1e-4),
     "rough": rough,
 }
-NAMES = tuple(SCENARIOS)
-
-
 # The three that hold most.
 SOME = ("rough", "growing", "jump")

@@ -2,19 +2,20 @@
 
 import contextlib
 import dataclasses
-import importlib.util
+import functools
 import itertools
 import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from types import ModuleType
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 import piezoest as pz
 from piezoest import policies as p
-from piezoest.layout import ABSENT, new, record
+from piezoest.layout import record
 from piezoest.policies import base
 
 RATE = 2000.0
@@ -84,79 +85,54 @@ def test_every_policy_is_carried_out(name: str) -> None:
     )
 
 
-def test_what_is_off_is_absent() -> None:
-    kept, given, values = base.layouts((p.DeadZone(2.0), p.AmplitudeMemory(places=3)), AT)
-    assert [name for name, _ in given.fields] == list(base.REGISTERED)
-    assert {name for name, field in given.fields if field != ABSENT} == {"dead_zone", "amplitude_memory"}
-    assert {name for name, field in kept.fields if field != ABSENT} == {"amplitude_memory"}
-    settings = new(given, **values)
-    assert settings["dead_zone"]["threshold"] == 2.0
-    assert new(kept)["amplitude_memory"]["sizes"].shape == (3,)
-
-
 # ---------------------------------------------------------------- policies of one's own
 
 Maker = Callable[..., Any]
 
 
 @pytest.fixture
-def policy_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Maker]:
-    """Makes a policy of one's own in a file of its own; all is forgotten afterwards."""
-    registered, chained = dict(base.REGISTERED), dict(base._chained)
+def policy_of(monkeypatch: pytest.MonkeyPatch) -> Iterator[Maker]:
+    """Makes a policy of one's own, of the functions in its module; all is forgotten afterwards."""
     monkeypatch.setattr(base, "note_source", lambda function: None)
-    files: list[str] = []
 
-    def make(name: str, functions: str = "", body: str = "gain: float = 2.0", file: str = "") -> Any:
-        module = file or f"own_{name.lower()}"
-        path = tmp_path / f"{module}.py"
-        path.write_text(
-            "from dataclasses import dataclass\n"
-            "from piezoest.policies.base import Policy\n"
-            f"@dataclass(frozen=True)\nclass {name}(Policy):\n    {body}\n{functions}\n",
-            encoding="utf-8",
-        )
-        spec = importlib.util.spec_from_file_location(module, path)
-        assert spec is not None
-        assert spec.loader is not None
-        files.append(module)
-        monkeypatch.setitem(sys.modules, module, importlib.util.module_from_spec(spec))
-        spec.loader.exec_module(sys.modules[module])
-        return getattr(sys.modules[module], name)
+    def make(name: str, **functions: Any) -> Any:
+        module = ModuleType(f"own_{name.lower()}")
+        vars(module).update(functions)
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+        body = {"__module__": module.__name__, "__annotations__": {"gain": float}, "gain": 2.0}
+        return dataclasses.dataclass(frozen=True)(type(name, (base.Policy,), body))
 
-    yield make
-    for store, before in ((base.REGISTERED, registered), (base._chained, chained)):
-        store.clear()
-        store.update(before)  # type: ignore[arg-type]
+    with patch.dict(base.REGISTERED), patch.dict(base._chained):
+        yield make
 
 
-def hook(name: str, body: str, arguments: str = "own, fixed, state, settings") -> str:
-    return f"def {name}({arguments}):\n    {body}\n"
+def hook(own: Any, fixed: Any, state: Any, settings: Any) -> Any:
+    return True
 
 
-OTHER_ARGUMENTS = hook("prepare", "pass") + hook("permits", "return True", "own, numbers, state, settings")
-CALLED = "\n\nclass Called:\n    def __call__(self, own, fixed, state, settings):\n        return True\n"
+def other_arguments(own: Any, numbers: Any, state: Any, settings: Any) -> Any:
+    return True
 
 
 @pytest.mark.parametrize(
     ("functions", "words"),
     [
-        ("", "Mine does nothing: its file has none of prepare, permits"),
-        (hook("prepair", "pass") + hook("permits", "return True"), "prepair are no hooks, these are prepare"),
-        (OTHER_ARGUMENTS, "permits must have the arguments own, fixed"),
-        (
-            hook("prepare", "pass") + CALLED + "\n\npermits = Called()\n",
-            "permits must be a plain function, marked @inlined",
-        ),
+        ({}, "Mine does nothing: its file has none of prepare, permits"),
+        ({"prepair": hook, "permits": hook}, "prepair are no hooks, these are prepare"),
+        ({"permits": other_arguments}, "must have the arguments own, fixed"),
+        ({"permits": functools.partial(hook)}, "permits must be a plain function, marked @inlined"),
     ],
 )
-def test_what_cannot_be_carried_out_is_refused(policy_file: Maker, functions: str, words: str) -> None:
-    policy = policy_file("Mine", functions)
+def test_what_cannot_be_carried_out_is_refused(
+    policy_of: Maker, functions: dict[str, Any], words: str
+) -> None:
+    policy = policy_of("Mine", **functions)
     with pytest.raises(ValueError, match=words):
         base.layouts((policy(),), AT)
 
 
-def test_a_policy_defined_after_the_estimators_is_refused(policy_file: Maker) -> None:
-    policy = policy_file("Late", hook("prepare", "pass"))
+def test_a_policy_defined_after_the_estimators_is_refused(policy_of: Maker) -> None:
+    policy = policy_of("Late", prepare=hook)
     for make in (
         lambda: pz.HysteresisRLS(RATE, memory=None, policies=(policy(),)),
         lambda: pz.RecursiveLeastSquares(2, policies=(policy(),)),
@@ -167,9 +143,6 @@ def test_a_policy_defined_after_the_estimators_is_refused(policy_file: Maker) ->
     estimator = pz.RecursiveLeastSquares(2, policies=(p.DeadZone(),))
     estimator.update(1.0, [1.0, 1.0])
     assert estimator.theta.sum() == pytest.approx(1.0, rel=1e-3)
-
-
-# ---------------------------------------------------------------- chains
 
 
 def test_all_policies_are_saved_by_their_fields() -> None:

@@ -15,6 +15,7 @@ from piezoest import (
     PrandtlIshlinskii,
     PreisachStage,
     SimulatedStage,
+    TemperatureLaw,
 )
 from piezoest.equations.filters import biquad_step, butterworth_low_pass
 from piezoest.layout import Named
@@ -76,6 +77,17 @@ def test_step_run_and_split_run_give_the_same_bits(hysteresis: Any, temperature:
     assert isinstance(single.step(1.0), float)
     assert isinstance(single.displacement, float)
     assert single.time == pytest.approx((u.size + 1) / FS)
+
+
+@pytest.mark.parametrize("hysteresis", [COLEMAN_HODGDON, PLAYS])
+def test_machine_code_does_what_its_source_says(hysteresis: Any) -> None:
+    stage, u, measured, one = full_stage(hysteresis), U[:50].copy(), np.empty(50), np.ones(1)
+    state, settings = map(Named, (stage._state, stage._settings), stage._layouts)
+    kernel.run.function(state, settings, u, np.zeros(1), one, one, measured)
+    stage.reset()
+    stage._noisy = False
+    np.testing.assert_allclose(stage.run(U[:50]), measured, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(stage.displacement, u, rtol=0.0, atol=1e-12)
 
 
 def test_reset_repeats_and_seeds_differ() -> None:
@@ -152,14 +164,24 @@ def test_gain_schedule() -> None:
     np.testing.assert_allclose(called.run(u), [3.0, 4.0, 5.0, 6.0, 7.0], atol=1e-12)
     constant = SimulatedStage(FS, model, gain_schedule=lambda t: 2.0)  # type: ignore[arg-type, return-value]
     np.testing.assert_allclose(constant.run(u), 4.0)
-    with pytest.raises(ValueError, match="one factor per time"):
-        SimulatedStage(FS, model, gain_schedule=lambda t: np.ones(3)).run(u)
-    with pytest.raises(ValueError, match="NaN or infinity"):
-        SimulatedStage(FS, model, gain_schedule=lambda t: t * np.nan).step(1.0)
-    with pytest.raises(ValueError, match="rising times"):
-        SimulatedStage(FS, model, gain_schedule=np.array([[1.0, 1.0], [0.0, 3.0]]))
-    with pytest.raises(ValueError, match="shape"):
-        SimulatedStage(FS, model, gain_schedule=np.array([1.0, 2.0]))
+
+
+def test_temperature_scales_the_loop_against_the_line() -> None:
+    """In (2), (3) it is b that makes w_h; a, the voltage scale, stays."""
+    law = TemperatureLaw(reference=20.0, gain=2e-3, hysteresis=-6e-3)
+    g, h = np.exp(2e-3 * 25.0), np.exp(-6e-3 * 25.0)
+    model = COLEMAN_HODGDON
+    a, b, c = model.a, g * h * model.b, g * model.c
+    for stage, scaled in (
+        (PLAYS, PrandtlIshlinskii(g * PLAYS.gain, PLAYS.thresholds, g * h * PLAYS.weights, PLAYS.offset)),
+        (model, ColemanHodgdon(a, c - b, a * c, model.offset)),
+    ):
+        warm = SimulatedStage(FS, stage, temperature=45.0, temperature_law=law).run(U)
+        np.testing.assert_allclose(warm, scaled.simulate(U), atol=1e-12)
+
+
+def of_line(**options: Any) -> Any:
+    return lambda: SimulatedStage(FS, LinearGain(0.1), **options).run(np.ones(5))
 
 
 @pytest.mark.parametrize(
@@ -167,28 +189,18 @@ def test_gain_schedule() -> None:
     [
         (lambda: SimulatedStage(0.0, PLAYS), "sample_rate must be above zero"),
         (lambda: SimulatedStage(FS, LinearGain), "hysteresis must be a LinearGain or .*, got ABCMeta"),  # type: ignore[arg-type]
-        (lambda: SimulatedStage(FS, PLAYS, gauge=Amplifier()), "gauge must be a Gauge, got Amplifier"),  # type: ignore[arg-type]
-        (lambda: SimulatedStage(FS, PLAYS, seed=-1), "seed must be a whole number"),
+        (of_line(gauge=Amplifier()), "gauge must be a Gauge, got Amplifier"),
+        (of_line(seed=-1), "seed must be a whole number"),
         (lambda: Amplifier(slew_rate=0.0), "slew_rate must be above zero"),
-        (lambda: Amplifier(resolution=-1.0), "resolution must be zero or more"),
         (lambda: Gauge(noise=float("nan")), "noise must be finite"),
+        (of_line(gain_schedule=lambda t: np.ones(3)), "one factor per time"),
+        (of_line(gain_schedule=lambda t: t * np.nan), "NaN or infinity"),
+        (of_line(gain_schedule=[[1.0, 1.0], [0.0, 3.0]]), "rising times"),
+        (of_line(temperature=np.array([20.0, 30.0])), r"temperature must have shape \(M, 2\)"),
+        (of_line(temperature=float("nan")), "temperature must be finite"),
+        (of_line(temperature=lambda t: np.ones(3)), "temperature must return one temperature per time"),
     ],
-)  # fmt: skip
+)
 def test_refusals(make: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make()
-
-
-@pytest.mark.parametrize("hysteresis", [LinearGain(0.15, offset=1.0), COLEMAN_HODGDON, PLAYS])
-def test_compiled_loops_do_what_their_python_does(hysteresis: Any) -> None:
-    for stage in (full_stage(hysteresis), SimulatedStage(FS, hysteresis)):
-        state, settings = map(Named, (stage._state, stage._settings), stage._layouts)
-        x, measured, one = U[:50].copy(), np.empty(50), np.ones(1)
-        kernel.run.function(state, settings, x, np.zeros(1), one, one, measured)
-        alone = kernel.step.function(state, settings, U[50], 0.0, 1.0, 1.0)
-        stage.reset()
-        stage._noisy = False
-        np.testing.assert_allclose(stage.run(U[:50]), measured, rtol=0.0, atol=1e-12)
-        np.testing.assert_allclose(stage.displacement, x, rtol=0.0, atol=1e-12)
-        np.testing.assert_allclose(stage.step(U[50]), alone[0], rtol=0.0, atol=1e-12)
-        np.testing.assert_allclose(stage.displacement, alone[1], rtol=0.0, atol=1e-12)

@@ -1,0 +1,93 @@
+"""The program that judges fits to logs: what it judges against, and what it counts."""
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest.bench.zoo.logs import Log
+
+N, TRAINED = 4000, 2000
+
+
+@pytest.fixture(autouse=True)
+def _paths(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+
+@pytest.fixture
+def judging() -> Any:
+    return importlib.import_module("log_judging")
+
+
+def voltage() -> Any:
+    t = np.arange(N) / N
+    return 5.0 + 5.0 * (0.6 * np.sin(80.0 * t) + 0.4 * np.sin(190.0 * t))
+
+
+def log(**given: Any) -> Log:
+    """A stage that is a line."""
+    truth = 2.0 * voltage()
+    nothing = {"truth": truth, "x": truth.copy(), "jumps": np.zeros(N), "spikes": np.zeros(N, bool)}
+    return Log(
+        **{
+            "seed": 1, "u": voltage(), "sample_rate": 1000.0, "family": "paper", "model": None,
+            "voltage": "sine", "stroke": 20.0, "added": {"noise": 1e-3}, **nothing, **given,
+        }
+    )  # fmt: skip
+
+
+def test_plays_by_least_squares_find_a_stage_made_of_plays(judging: Any) -> None:
+    u = voltage()
+    thresholds = 0.5 * np.ptp(u[:TRAINED]) * np.array([2, 5, 11]) / judging.PLAYS
+    # From plays that begin at the first voltage.
+    truth = pz.PrandtlIshlinskii(0.3, thresholds, [0.1, 0.05, 0.08], offset=-7.0).simulate(u - u[0])
+    x = truth + np.random.default_rng(0).normal(0.0, 0.02, N)
+    x[100:150] = np.nan
+    assert judging.rms((judging.by_plays(u, x, TRAINED) - truth)[TRAINED:]) < 0.2 * 0.02
+    assert judging.rms((judging.by_line(u, x, TRAINED) - truth)[TRAINED:]) > 1.0 * 0.02
+
+
+def test_jumps_count_up_to_the_end_of_the_fitted_part(judging: Any) -> None:
+    jumps = np.where(np.arange(N) < 500, 0.0, 1.5) + np.where(np.arange(N) < 3000, 0.0, 4.0)
+    one = log(jumps=jumps)
+    np.testing.assert_array_equal(judging.expected(one, TRAINED), one.truth[TRAINED:] + 1.5)
+
+
+def test_coverage_counts_readings_without_spikes_and_later_jumps(judging: Any) -> None:
+    one = log()
+    one.jumps[3000:] = 4.0
+    one.x[3000:] += 4.0
+    one.x[TRAINED : TRAINED + 500] = np.nan
+    one.spikes[3500:] = True
+    one.x[3500:] += 50.0
+    lower, upper = one.truth - 1.0, one.truth + 1.0
+    assert judging.coverage(one, TRAINED, lower, upper) == 1.0
+    # Of 1000 that count, 250 are below.
+    lower[3250:] += 3.0
+    assert judging.coverage(one, TRAINED, lower, upper) == 0.75
+
+
+def test_a_row_holds_the_chosen_the_best_and_scores_or_what_failed(
+    judging: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    one = log(family="coleman-hodgdon", model=model)
+    monkeypatch.setattr(judging, "draw", lambda seed: one)
+    found = judging.Found(
+        "a", {"a": one.truth + 0.3, "b": one.truth + 0.1, "c": one.truth + 9.0},
+        {"a": 0.5, "b": 0.2, "c": 0.9}, one.truth - 1.0, one.truth + 1.0,
+        errors={"alpha": 0.001, "beta": 0.01, "gamma": 0.0, "offset": 1.0},
+        theta=model.theta + np.array([0.002, -0.01, 0.1]),
+    )  # fmt: skip
+    monkeypatch.setattr(judging, "fitted", lambda log: found)
+    row = judging.judge(1)
+    assert row["failure"] is None
+    assert (row["chosen"], row["best"], row["own"], row["coverage"]) == pytest.approx((0.3, 0.1, 0.5, 1.0))
+    assert (row["chosen_name"], row["best_name"]) == ("a", "b")
+    assert row["z"] == [pytest.approx(2.0), pytest.approx(-1.0), None]
+    found.predictions["a"][:] = np.nan
+    assert judging.judge(1)["failure"]
