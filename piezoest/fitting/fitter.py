@@ -304,7 +304,7 @@ class Fitter:
             initial_state=_initial_state(design, w, model),
             held_out=fitted.held_out,
             ahead=fitted.ahead,
-            spread=trust.spread_of(fitted, log),
+            spread=trust.spread_of(fitted, log, self._given, delay),
             counts=log.counts,
             left_out=self.left_out,
             spikes=self.spikes,

@@ -24,7 +24,7 @@ BEYOND, LAST, GOES_ON = 5, 0.25, 0.3
 # in inverse proportion; of plays that move well the record alone says all.
 HARDLY, LEAST_MOVING = 3e-5, 1e-3
 # ... and this times as much of a segment that a play hardly reaches, to the next one. Without it a voltage
-# that goes further may be missed by more than by a line; with more, what is known of the next segment suffers.
+# that goes further may be missed by more than by a line; with more, the next segment suffers.
 ACROSS = 0.1
 # A range is about 0 V if its middle is nearer to it than this fraction of its half.
 ABOUT_ZERO = 0.1

@@ -1,10 +1,14 @@
 """What to know before using an identified model, in plain sentences."""
 
+import dataclasses
+
 import numpy as np
 
+from piezoest._checks import FloatArray
 from piezoest.fitting.search import LONGEST_DELAY
 from piezoest.identification.data import Data, turning_voltages
 from piezoest.identification.result import Identification
+from piezoest.models import LearntOn
 
 DRIFT_WORTH_A_WORD = 0.5
 WORSE_ON_HELD_OUT = 1.5
@@ -15,15 +19,32 @@ ABOVE_NOISE = 1.3
 def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
     """All there is to say, the log's own doubts first."""
     said = [each.sentence for each in found.findings]
-    said += [
-        sentence for say in (_left_out, _delay, _centre, _remainder, _along) for sentence in say(found, data)
-    ]
+    checks = (_left_out, _delay, _centre, _remainder, _along, _held_out)
+    said += [sentence for say in checks for sentence in say(found, data)]
     return tuple(said)
 
 
 def unsettled_sentence(seconds: float) -> str:
     """That the start was left out, which lasts so long [s]."""
     return f"The first {seconds:.3g} s do not fit the rest (the stage had not settled): left out."
+
+
+def beyond_sentences(name: str, learnt_on: LearntOn, u: FloatArray, sample_rate: float) -> list[str]:
+    """In what a voltage [V] leaves the ranges of the part that was fitted; `name` is what it belongs to."""
+    used = LearntOn.of(u, u, sample_rate)
+    # The level of the displacement may change between two days.
+    left = learnt_on.left_by(dataclasses.replace(used, displacement=learnt_on.displacement))
+    if not left:
+        return []
+    return [
+        f"{name} goes beyond what was fitted: {', and '.join(left)}. There the model is a guess: let the fitted "
+        "part contain such swings."
+    ]
+
+
+def _held_out(found: Identification, data: Data) -> list[str]:
+    u = found.record.voltage[found.trained :]
+    return beyond_sentences("The held-out part", found.learnt_on, u, found.sample_rate)
 
 
 def _left_out(found: Identification, data: Data) -> list[str]:

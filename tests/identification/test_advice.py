@@ -69,6 +69,20 @@ def test_what_a_fast_voltage_moves_is_no_noise() -> None:
     assert identify(log(u, x, 5e-3), model="plays").noise_floor == pytest.approx(5e-3, rel=0.2)
 
 
+def test_what_goes_beyond_the_fitted_part_is_said() -> None:
+    u = signals.multi_amplitude([10.0, 20.0, 40.0, 40.0], 5.0, 4, FS).values
+    grows, steady = log(u, LOOP.simulate(u)), log(swings(), LOOP.simulate(swings()))
+    fast = Record.from_arrays(steady.voltage, steady.displacement, 2.0 * FS)
+    said = identify(grows, model="line", validate=[steady]).advice
+    (held,) = [each for each in said if each.startswith("The held-out part goes beyond")]
+    assert "the voltage goes from -38.8 to 38.8 V, the model was learnt from -19.4 to 19.4 V" in held
+    assert any(each.startswith("Other log") and "learnt from -19.4 to 19.4 V" in each for each in said)
+    said = identify(steady, model="line", validate=[steady, fast]).advice
+    (other,) = [each for each in said if "goes beyond" in each]
+    assert "V/s" in other
+    assert "swings at 10 Hz" in other
+
+
 def test_one_log_to_validate_is_no_list() -> None:
     with pytest.raises(ValueError, match="validate must be a list"):
         identify(log(swings(), LOOP.simulate(swings())), validate="log.csv")
