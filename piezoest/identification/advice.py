@@ -37,8 +37,8 @@ def beyond_sentences(name: str, learnt_on: LearntOn, u: FloatArray, sample_rate:
     if not left:
         return []
     return [
-        f"{name} goes beyond what was fitted: {', and '.join(left)}. There the model is a guess: let the fitted "
-        "part contain such swings."
+        f"{name} goes beyond what was fitted: {', and '.join(left)}. There the model is a guess: let the "
+        "fitted part contain such swings."
     ]
 
 
