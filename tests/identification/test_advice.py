@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import piezoest as pz
 from piezoest import signals
@@ -81,6 +82,19 @@ def test_what_goes_beyond_the_fitted_part_is_said() -> None:
     (other,) = [each for each in said if "goes beyond" in each]
     assert "V/s" in other
     assert "swings at 10 Hz" in other
+
+
+def test_ringing_is_said() -> None:
+    """A square voltage makes a stage ring; a loop that is missed has harmonics, and does not ring."""
+    u = 30.0 * np.sign(np.sin(2.0 * np.pi * 2.0 * np.arange(8000) / FS) + 1e-9)
+    x = LOOP.simulate(u, allow_jumps=True)
+    pole = 0.99 * np.exp(2j * np.pi * 80.0 / FS)
+    ringing = lfilter([abs(1.0 - pole) ** 2], [1.0, -2.0 * pole.real, abs(pole) ** 2], x)
+    (said,) = [each for each in identify(log(u, ringing), model="plays").advice if "oscillates" in each]
+    assert "at 80" in said
+    missed = identify(log(swings(), LOOP.simulate(swings())), model="line")
+    assert missed.train.rms > 0.05
+    assert not any("oscillates" in each for each in missed.advice)
 
 
 def test_one_log_to_validate_is_no_list() -> None:
