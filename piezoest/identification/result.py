@@ -14,6 +14,7 @@ from piezoest.fitting import Fit, Prediction
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
 from piezoest.fitting.regression import Fitted
+from piezoest.identification.choice import rivals_of
 from piezoest.identification.data import judged
 from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.sense import Finding
@@ -275,12 +276,21 @@ class Identification:
     def predict(self, u: FloatArray | None = None) -> Prediction:
         """Displacement that the model expects, and between what a reading will lie, 95 times in 100.
 
+        Kinds that predict about as well may be right: the interval is wider by how far they differ.
+
         Parameters
         ----------
         u : array_like, shape (N,), optional
             Voltage [V]; by default this record's.
         """
-        return self.best.prediction if u is None else self.fit.predict(u)
+
+        def of(one: Candidate) -> Prediction:
+            return one.prediction if u is None else one.fit.predict(u)
+
+        own = of(self.best)
+        apart = [np.abs(of(each).x - own.x) for each in rivals_of(self.best, self.candidates)]
+        half = np.hypot(own.upper - own.x, np.max(apart, axis=0, initial=0.0))
+        return Prediction(own.x, own.x - half, own.x + half)
 
     def compare(self, *others: Identification) -> str:
         """Return a table of errors [µm rms] of this and other identifications, of the same log or of others.
