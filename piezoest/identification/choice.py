@@ -1,15 +1,9 @@
 """Which of several fitted models to use, and why."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from piezoest.identification.result import Candidate
+from piezoest.identification.result import Candidate
 
-# Kinds may be right as well that miss blocks left out by no more than this times what the chosen one does.
-AS_WELL = 1.5
 # A simpler model is preferred until a richer one is better by this fraction on the blocks left out.
 WORTH_IT = 0.02
 
@@ -23,12 +17,6 @@ def simplest(errors: Sequence[float]) -> int:
 def best_of(candidates: Sequence[Candidate]) -> Candidate:
     """The simplest of those that predict blocks left out about best; from the simplest to the richest."""
     return candidates[simplest([item.cross_validated for item in candidates])]
-
-
-def rivals_of(best: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Those that may be right as well."""
-    most = AS_WELL * best.cross_validated
-    return [each for each in candidates if each is not best and each.cross_validated <= most]
 
 
 def reason_for(candidates: Sequence[Candidate], best: Candidate) -> str:

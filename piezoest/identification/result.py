@@ -14,7 +14,6 @@ from piezoest.fitting import Fit, Prediction
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
 from piezoest.fitting.regression import Fitted
-from piezoest.identification.choice import rivals_of
 from piezoest.identification.data import judged
 from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.sense import Finding
@@ -27,6 +26,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from piezoest.identification.drawing import Drawn
+
+# Kinds may be right as well that miss blocks left out by no more than this times what the chosen one does.
+AS_WELL = 1.5
 
 
 def left_out_error(fitted: Fit | Fitted) -> float:
@@ -288,7 +290,9 @@ class Identification:
             return one.prediction if u is None else one.fit.predict(u)
 
         own = of(self.best)
-        apart = [np.abs(of(each).x - own.x) for each in rivals_of(self.best, self.candidates)]
+        most = AS_WELL * self.best.cross_validated
+        others = [each for each in self.candidates if each is not self.best and each.cross_validated <= most]
+        apart = [np.abs(of(each).x - own.x) for each in others]
         half = np.hypot(own.upper - own.x, np.max(apart, axis=0, initial=0.0))
         return Prediction(own.x, own.x - half, own.x + half)
 
