@@ -42,10 +42,6 @@ class Basis(Protocol):
         """How many of them, at the end, say where the stage was before the record."""
 
     @property
-    def goes_on(self) -> bool:
-        """Whether a model may have what goes on beyond the record."""
-
-    @property
     def foretells(self) -> bool:
         """Whether the model says by itself how a stage goes on beyond the voltages of the record."""
 

@@ -290,8 +290,7 @@ class Fitter:
             with_gains = replace(fitted, used=np.union1d(fitted.used, np.r_[fitted.design.gains]))
             errors = trust.standard_errors(with_gains, log)
             parameters = int(trust.free_columns(with_gains).size)
-        wider, rest = _beyond(fitted)
-        design, w = wider if fitted.design.basis.goes_on else (fitted.design, fitted.w)
+        design, w, rest = _beyond(fitted)
         model = design.model(w)
         return Fit(
             model=model,
@@ -305,14 +304,14 @@ class Fitter:
             initial_state=_initial_state(design, w, model),
             held_out=fitted.held_out,
             ahead=fitted.ahead,
-            spread=trust.spread_of(fitted, log),
+            spread=trust.spread_of(fitted, log, self._given, delay),
             counts=log.counts,
             left_out=self.left_out,
             spikes=self.spikes,
             drift=float(w[design.offset + 1]),
             solver=SOLVER.format(quadratic_solver(), gap),
-            _design=wider[0],
-            _w=wider[1],
+            _design=design,
+            _w=w,
             _rest=rest,
             _u=self._given,
         )
@@ -324,7 +323,7 @@ def _initial_state(design: Design, w: FloatArray, model: Model) -> Any:
     return np.concatenate([state, w[design.crept] / design.creep.gains]) if design.terms else state
 
 
-def _beyond(fitted: Fitted) -> tuple[tuple[Design, FloatArray], FloatArray]:
+def _beyond(fitted: Fitted) -> tuple[Design, FloatArray, FloatArray]:
     """Design and coefficients that go on beyond the record, and what creep has of that at rest [µm]."""
     size = fitted.design.basis.size
     basis, w, added = fitted.design.basis.beyond(fitted.w[:size])
@@ -334,4 +333,4 @@ def _beyond(fitted: Fitted) -> tuple[tuple[Design, FloatArray], FloatArray]:
     rest = design.creep.gains * added
     w[design.crept] += rest
     w[design.offset] -= added + float(rest.sum())
-    return (design, w), rest
+    return design, w, rest

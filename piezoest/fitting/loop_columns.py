@@ -35,7 +35,6 @@ class LoopColumns:
 
     size: ClassVar[int] = 3
     free: ClassVar[int] = 1
-    goes_on: ClassVar[bool] = True
     foretells: ClassVar[bool] = True
 
     def begin(self) -> FloatArray:

@@ -23,6 +23,9 @@ BEYOND, LAST, GOES_ON = 5, 0.25, 0.3
 # move less. Of sixty simulated logs (benchmarks/logs.py) errors are 6 % less than with a cost, not its root,
 # in inverse proportion; of plays that move well the record alone says all.
 HARDLY, LEAST_MOVING = 3e-5, 1e-3
+# ... and this times as much of a segment that a play hardly reaches, to the next one. Without it a voltage
+# that goes further may be missed by more than by a line; with more, the next segment suffers.
+ACROSS = 0.1
 # A range is about 0 V if its middle is nearer to it than this fraction of its half.
 ABOUT_ZERO = 0.1
 FAR = 1e300
@@ -62,8 +65,9 @@ class PlayColumns:
         Where the plays were before the first sample.
     visited : tuple of float
         Range of the voltage of the record that is fitted [V].
-    moving : ndarray, shape (n,)
-        How far each play goes in it, relative to the voltage.
+    moving : ndarray, shape (k + 1, n)
+        How far each play goes in it within each segment, relative to the voltage's whole way divided by the
+        number of segments.
     moved : int, optional
         How many of the plays moved in it; those beyond begin in its middle, so that they move one after
         the other as the voltage goes further on either side.
@@ -93,7 +97,7 @@ class PlayColumns:
 
     @property
     def _edges(self) -> FloatArray:
-        return np.concatenate(([-FAR], self.bends, [FAR]))
+        return edges_of(self.bends)
 
     def begin(self) -> FloatArray:
         """State before the first sample: that of the plays [V]."""
@@ -135,23 +139,27 @@ class PlayColumns:
 
     def unevenness(self) -> FloatArray:
         """Squared differences of neighbouring plays, as densities, and of neighbouring segments."""
-        return self._differences(np.ones(self.thresholds.size))
+        return self._differences(np.ones_like(self.moving[0]), np.ones_like(self.moving[1:]))
 
     def prior(self) -> FloatArray:
-        """The same where plays hardly move: they are as their neighbours are."""
-        return self._differences(HARDLY / np.maximum(self.moving, LEAST_MOVING))
+        """The same where plays hardly move: they are as their neighbours are, and as in the next segment."""
+        along = HARDLY / np.maximum(self.moving.mean(axis=0), LEAST_MOVING)
+        less = np.minimum(self.moving[1:], self.moving[:-1])
+        return self._differences(along, ACROSS * HARDLY / np.maximum(less, LEAST_MOVING))
 
-    def _differences(self, root_weight: FloatArray) -> FloatArray:
+    def _differences(self, along: FloatArray, across: FloatArray) -> FloatArray:
+        """The squares, with roots of their weights: of plays (n,), of a segment and the next (k, n)."""
         n, segments = self.thresholds.size, self.bends.size + 1
-        along = root_weight[2:, None] * np.diff(np.eye(n), axis=0)[1:]
-        across = np.kron(np.diff(np.eye(segments), axis=0), np.diag(root_weight)) / np.sqrt(n)
-        rows = np.vstack([np.kron(np.eye(segments), along), across])
+        plays = along[2:, None] * np.diff(np.eye(n), axis=0)[1:]
+        apart = across.reshape(-1, 1) * np.kron(np.diff(np.eye(segments), axis=0), np.eye(n)) / np.sqrt(n)
+        rows = np.vstack([np.kron(np.eye(segments), plays), apart])
         return np.asarray((self.thresholds[-1] * n) ** 2 * rows.T @ rows)
 
     def merged(self) -> tuple[PlayColumns, FloatArray]:
         """The same without bends, and how its columns come from these (size, n)."""
         n, segments = self.thresholds.size, self.bends.size + 1
-        return replace(self, bends=np.empty(0)), np.tile(np.eye(n), (segments, 1))
+        whole = replace(self, bends=np.empty(0), moving=self.moving.mean(axis=0, keepdims=True))
+        return whole, np.tile(np.eye(n), (segments, 1))
 
     def model(self, w: FloatArray, offset: float, creep: Creep | None, rate: float) -> Model:
         """Plays that have a slope."""
@@ -165,24 +173,20 @@ class PlayColumns:
             float(slopes[0, 0]), thresholds, slopes[0, 1:], offset, creep, self.bends, changes, rate
         )
 
-    @property
-    def goes_on(self) -> bool:
-        """Whether a model may have plays beyond the record: they begin at zero, its middle.
-
-        A voltage must be able to leave them there beside the widest that moved.
-        """
-        apart = abs(float(self.begin()[-1]) - self.middle)
-        about_zero = abs(self.middle) < ABOUT_ZERO * 0.5 * (self.visited[1] - self.visited[0])
-        return about_zero and apart <= self.thresholds[-1] / BEYOND
-
     def beyond(self, w: FloatArray) -> tuple[PlayColumns, FloatArray, float]:
         """The same with wider plays, all coefficients, and what they add in the record [µm].
 
-        Nothing is known of them but their neighbours. There are none where the stage comes from a voltage
-        beyond the record: plays that had moved there go along with each new extreme, whatever their width.
+        Nothing is known of them but their neighbours. There are none where they cannot be at zero, as a model
+        has them without a record: they begin there if the voltage swings about it, and has left the widest
+        that moved near it. Nor are there any where the stage comes from a voltage beyond the record: plays
+        that had moved there go along with each new extreme, whatever their width.
         """
         n, slopes = self.thresholds.size, w.reshape(self.bends.size + 1, -1)
-        if n < 3 or not self.visited[0] <= self.start.centre <= self.visited[1]:
+        low, high = self.visited
+        about_zero = abs(self.middle) < ABOUT_ZERO * 0.5 * (high - low)
+        apart = abs(float(self.begin()[-1]) - self.middle)
+        beside = apart <= self.thresholds[-1] / BEYOND
+        if n < 3 or not (about_zero and beside and low <= self.start.centre <= high):
             return self, w, 0.0
         step, widest = float(self.thresholds[1]), float(self.thresholds[-1])
         more = widest * (1.0 + np.arange(1, BEYOND + 1) / BEYOND)
@@ -215,20 +219,27 @@ class PlayColumns:
         return np.union1d([0], np.flatnonzero(np.any(slopes > 0.0, axis=0)))
 
 
-def moving_of(u: FloatArray, thresholds: FloatArray, start: Start) -> FloatArray:
-    """How far plays go along a voltage, relative to the voltage itself, shape (n,)."""
-    way = np.zeros(thresholds.size)
-    _ways(u, thresholds, start.states(thresholds), way)
-    return way / max(float(np.sum(np.abs(np.diff(u)))), 1e-300)
+def edges_of(bends: FloatArray) -> FloatArray:
+    """Bounds of the segments between bends, shape (k + 2,) [V]; the outermost are far away."""
+    return np.concatenate(([-FAR], bends, [FAR]))
+
+
+def moving_of(u: FloatArray, thresholds: FloatArray, bends: FloatArray, start: Start) -> FloatArray:
+    """How far plays go along a voltage within segments, shape (k + 1, n), as `PlayColumns.moving`."""
+    way = np.zeros((bends.size + 1, thresholds.size))
+    _ways(u, thresholds, edges_of(bends), start.states(thresholds), way)
+    return way * way.shape[0] / max(float(np.sum(np.abs(np.diff(u)))), 1e-300)
 
 
 @compiled
-def _ways(u: Vector, thresholds: Vector, y: Vector, way: Vector) -> None:
-    """Adds to `way` how far plays go; the states `y` go on."""
+def _ways(u: Vector, thresholds: Vector, edges: Vector, y: Vector, way: Matrix) -> None:
+    """Adds to `way` how far plays go in each segment; the states `y` go on."""
     for k in range(u.size):
         for i in range(y.size):
             now = play(y[i], u[k], thresholds[i])
-            way[i] += abs(now - y[i])
+            low, high = min(y[i], now), max(y[i], now)
+            for s in range(way.shape[0]):
+                way[s, i] += max(min(high, edges[s + 1]) - max(low, edges[s]), 0.0)
             y[i] = now
 
 

@@ -162,8 +162,8 @@ class Regression:
         return float(np.linalg.lstsq(line.gram, line.moment, rcond=None)[0][0])
 
     def columns(self, *, drift: bool, gains: bool = True) -> IntArray:
-        """Columns that are fitted, of those that the record shows."""
-        shown = np.diag(self.all.gram) > 0.0
+        """Columns that are fitted, of those that the record shows or that follow their neighbours."""
+        shown = np.diag(self.all.gram + self._always) > 0.0
         shown[self.design.offset + 1] &= drift
         shown[self.design.gains] &= gains
         return np.flatnonzero(shown)

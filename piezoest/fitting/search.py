@@ -45,7 +45,7 @@ def plays(log: Log, start: Start, thresholds: int = THRESHOLDS, bends: int = 0) 
     inner = log.u.min() + 2.0 * log.half * np.arange(1, bends + 1) / (bends + 1)
     visited = (float(log.u.min()), float(log.u.max()))
     laid = (1.0 - MOVES) * log.half * np.arange(thresholds) / max(thresholds - 1, 1)
-    return PlayColumns(laid, inner, start, visited, moving_of(log.u, laid, start))
+    return PlayColumns(laid, inner, start, visited, moving_of(log.u, laid, inner, start))
 
 
 def design_of(log: Log, basis: Basis, creep: Creep = NO_CREEP) -> Design:

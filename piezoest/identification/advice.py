@@ -1,13 +1,21 @@
 """What to know before using an identified model, in plain sentences."""
 
+import dataclasses
+
 import numpy as np
 
+from piezoest._checks import FloatArray
 from piezoest.fitting.search import LONGEST_DELAY
 from piezoest.identification.data import Data, turning_voltages
+from piezoest.identification.residual import Oscillation
 from piezoest.identification.result import Identification
+from piezoest.models import LearntOn
 
 DRIFT_WORTH_A_WORD = 0.5
 WORSE_ON_HELD_OUT = 1.5
+# An oscillation makes this part of the residual and is so many times as fast as the swings: a loop that
+# is missed has harmonics of these.
+OSCILLATES, FASTER = 0.75, 15.0
 # An error above so many times the noise floor is not noise.
 ABOVE_NOISE = 1.3
 
@@ -15,15 +23,32 @@ ABOVE_NOISE = 1.3
 def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
     """All there is to say, the log's own doubts first."""
     said = [each.sentence for each in found.findings]
-    said += [
-        sentence for say in (_left_out, _delay, _centre, _remainder, _along) for sentence in say(found, data)
-    ]
+    checks = (_left_out, _delay, _centre, _remainder, _along, _held_out)
+    said += [sentence for say in checks for sentence in say(found, data)]
     return tuple(said)
 
 
 def unsettled_sentence(seconds: float) -> str:
     """That the start was left out, which lasts so long [s]."""
     return f"The first {seconds:.3g} s do not fit the rest (the stage had not settled): left out."
+
+
+def beyond_sentences(name: str, learnt_on: LearntOn, u: FloatArray, sample_rate: float) -> list[str]:
+    """In what a voltage [V] leaves the ranges of the part that was fitted; `name` is what it belongs to."""
+    used = LearntOn.of(u, u, sample_rate)
+    # The level of the displacement may change between two days.
+    left = learnt_on.left_by(dataclasses.replace(used, displacement=learnt_on.displacement))
+    if not left:
+        return []
+    return [
+        f"{name} goes beyond what was fitted: {', and '.join(left)}. There the model is a guess: let the "
+        "fitted part contain such swings."
+    ]
+
+
+def _held_out(found: Identification, data: Data) -> list[str]:
+    u = found.record.voltage[found.trained :]
+    return beyond_sentences("The held-out part", found.learnt_on, u, found.sample_rate)
 
 
 def _left_out(found: Identification, data: Data) -> list[str]:
@@ -95,10 +120,24 @@ def _remainder(found: Identification, data: Data) -> list[str]:
             "The residual is not white: what is left is not noise but what the model cannot do "
             "(creep, drift, rate, minor loops); the standard errors are widened for it."
         )
+    said += _oscillation(found)
     odd = _drift(found) or any(each.severity == "doubt" or each.name == "drift" for each in found.findings)
     if found.held_out.rms > 0.9 * found.line_held_out.rms and found.fit.form != "line" and not odd:
         said.append("A straight line does about as well: the record shows little hysteresis.")
     return said
+
+
+def _oscillation(found: Identification) -> list[str]:
+    residual = found.residual[found.left_out : found.trained]
+    strongest = Oscillation.of(residual, found.sample_rate)
+    swings = found.learnt_on.frequency
+    if strongest.share < OSCILLATES or swings is None or strongest.frequency < FASTER * swings[1]:
+        return []
+    return [
+        f"{100.0 * strongest.share:.0f} % of the residual oscillates at {strongest.frequency:.3g} Hz: a "
+        "resonance of the stage, or hum. No model here has it: move the voltage more smoothly, or find the "
+        "source."
+    ]
 
 
 def _drift(found: Identification) -> list[str]:

@@ -12,7 +12,7 @@ from piezoest.fitting import FORMS, Fitter
 from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.fitting.runs import BoolArray
 from piezoest.fitting.search import checked_delay
-from piezoest.identification.advice import advice_of
+from piezoest.identification.advice import advice_of, beyond_sentences
 from piezoest.identification.choice import best_of, reason_for
 from piezoest.identification.data import Data, check_excitation, judged, noise_of, prepare
 from piezoest.identification.lag import tells_lag
@@ -169,6 +169,16 @@ def identify(
         learnt_on=LearntOn.of(record.voltage[:trained], record.displacement[:trained], record.sample_rate),
         validations=tuple(Validation.of(best.fit, *each) for each in validated),
     )
+    of_others += [
+        said
+        for each, its in validated
+        for said in beyond_sentences(
+            f"Other log {Path(each.source).name}",
+            result.learnt_on,
+            its.without(each.voltage),
+            each.sample_rate,
+        )
+    ]
     return dataclasses.replace(result, advice=(*advice_of(result, first), *of_others))
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from piezoest._checks import FloatArray
 
 WHITENESS_LAGS = 20
+# Parts of a residual whose spectra are averaged, and half of the width of a peak [lines].
+SEGMENTS, PEAK = 16, 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +102,46 @@ class Whiteness:
             "first_autocorrelation": self.first_autocorrelation,
             "white": self.is_white,
         }
+
+
+class Oscillation(NamedTuple):
+    """The strongest oscillation of a residual.
+
+    Parameters
+    ----------
+    frequency : float
+        [Hz].
+    share : float
+        Part of the residual's square that it makes.
+    """
+
+    frequency: float
+    share: float
+
+    @classmethod
+    def of(cls, residual: FloatArray, sample_rate: float) -> Oscillation:
+        """Look for the strongest one; NaN counts as absent.
+
+        The spectrum is the mean of those of `SEGMENTS` parts, each faded in and out.
+
+        Parameters
+        ----------
+        residual : ndarray, shape (N,)
+            [µm].
+        sample_rate : float
+            [Hz].
+        """
+        known = np.isfinite(residual)
+        length = residual.size // SEGMENTS
+        if length < 4 * PEAK:
+            return cls(0.0, 0.0)
+        e = np.where(known, residual - np.mean(residual[known]), 0.0)
+        parts = e[: length * SEGMENTS].reshape(SEGMENTS, length)
+        power = np.mean(np.abs(np.fft.rfft(parts * np.hanning(length), axis=1)) ** 2, axis=0)
+        power[:PEAK] = 0.0
+        k = int(np.argmax(power))
+        share = float(np.sum(power[max(k - PEAK, 0) : k + PEAK + 1]) / max(float(np.sum(power)), 1e-300))
+        return cls(k * sample_rate / length, share)
 
 
 def autocorrelation(residual: FloatArray, lags: int) -> FloatArray:

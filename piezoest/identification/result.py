@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
     from piezoest.identification.drawing import Drawn
 
+# Kinds may be right as well that miss blocks left out by no more than this times what the chosen one does.
+AS_WELL = 1.5
+
 
 def left_out_error(fitted: Fit | Fitted) -> float:
     """Geometric mean of a fit's errors on blocks between others, and on blocks behind all others [µm rms]."""
@@ -275,12 +278,23 @@ class Identification:
     def predict(self, u: FloatArray | None = None) -> Prediction:
         """Displacement that the model expects, and between what a reading will lie, 95 times in 100.
 
+        Kinds that predict about as well may be right: the interval is wider by how far they differ.
+
         Parameters
         ----------
         u : array_like, shape (N,), optional
             Voltage [V]; by default this record's.
         """
-        return self.best.prediction if u is None else self.fit.predict(u)
+
+        def of(one: Candidate) -> Prediction:
+            return one.prediction if u is None else one.fit.predict(u)
+
+        own = of(self.best)
+        most = AS_WELL * self.best.cross_validated
+        others = [each for each in self.candidates if each is not self.best and each.cross_validated <= most]
+        apart = [np.abs(of(each).x - own.x) for each in others]
+        half = np.hypot(own.upper - own.x, np.max(apart, axis=0, initial=0.0))
+        return Prediction(own.x, own.x - half, own.x + half)
 
     def compare(self, *others: Identification) -> str:
         """Return a table of errors [µm rms] of this and other identifications, of the same log or of others.

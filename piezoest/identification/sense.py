@@ -187,7 +187,7 @@ def _direction(log: Examined) -> Iterator[Finding]:
         yield doubt(
             "falls",
             f"The displacement falls as the voltage rises ({log.gain:.4g} µm/V): change the sign of one of "
-            "the two columns.",
+            "the two columns, unless the stage swings above its resonance: then move it more slowly.",
         )
     elif log.loop.opening < -CLOCKWISE and log.loop.clockwise > MOST_BRANCHES:
         yield doubt(

@@ -312,7 +312,7 @@ def _fits(
             break
     bent = Regression(design, sums)
     merged, to_plays = basis.merged()
-    one = dataclasses.replace(merged, thresholds=merged.thresholds[:1], moving=merged.moving[:1])
+    one = dataclasses.replace(merged, thresholds=merged.thresholds[:1], moving=merged.moving[:, :1])
     return {
         "line": bent.combined(one, to_plays[:, :1]).best(),
         "plays": bent.combined(merged, to_plays).best(),

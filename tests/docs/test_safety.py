@@ -1,4 +1,4 @@
-"""The data of the page *Safety on unknown rigs*: what is counted of the runs, and that all of them are described."""
+"""The data of *Safety on unknown rigs*: what is counted of the runs, and that all of it is described."""
 
 import importlib
 import re

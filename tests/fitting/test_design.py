@@ -8,11 +8,13 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
+from piezoest.fitting import search
 from piezoest.fitting.design import CHUNK, NO_CREEP, Basis, Design
 from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.play_columns import PlayColumns, Start, moving_of, starts
+from piezoest.fitting.regression import Log
 from piezoest.models import Creep
-from tests.fitting.stages import RATE, play_matrix, stage, voltage
+from tests.fitting.stages import RATE, noise, play_matrix, stage, voltage
 
 CREEP = Creep([0.05, 0.02], [0.02, 0.6])
 SEEDS = range(6)
@@ -31,7 +33,7 @@ def columns_of(u: FloatArray, bends: int = 0, count: int = 8, start: Start | Non
     thresholds = 0.45 * (high - low) * np.arange(count) / count
     inner = low + (high - low) * np.arange(1, bends + 1) / (bends + 1)
     start = Start(float(u[0]), 0.5 * (low + high)) if start is None else start
-    return PlayColumns(thresholds, inner, start, (low, high), moving_of(u, thresholds, start))
+    return PlayColumns(thresholds, inner, start, (low, high), moving_of(u, thresholds, inner, start))
 
 
 def slopes(basis: PlayColumns, seed: int) -> FloatArray:
@@ -160,9 +162,9 @@ def test_wider_plays_change_nothing_within_the_record() -> None:
         u = walk(seed)
         u -= 0.5 * (u.min() + u.max()) - 0.5
         basis = columns_of(u, bends=2, count=20, start=Start(float(u[0]), 0.0))
-        assert basis.goes_on
         w = slopes(basis, seed)
         wider, more, added = basis.beyond(w)
+        assert wider.thresholds.size > basis.thresholds.size
         x = Design(basis, RATE, u.size).output(u, np.append(w, [0.0, 0.0]))
         y = Design(wider, RATE, u.size).output(u, np.append(more, [-added, 0.0]))
         np.testing.assert_allclose(y, x, atol=1e-9)
@@ -175,9 +177,36 @@ def test_wider_plays_change_nothing_within_the_record() -> None:
 
 def test_a_model_goes_on_where_a_voltage_can_leave_its_plays() -> None:
     u = 30.0 * np.cos(np.linspace(0.0, 20.0, 1000))
-    assert columns_of(u, count=20, start=Start(30.0, 0.0)).goes_on
-    assert not columns_of(u, count=20, start=Start(30.0, 30.0)).goes_on
-    assert not columns_of(u + 10.0, count=20, start=Start(40.0, 10.0)).goes_on
+
+    def goes_on(basis: PlayColumns) -> bool:
+        return basis.beyond(np.ones(20))[0] is not basis
+
+    assert goes_on(columns_of(u, count=20, start=Start(30.0, 0.0)))
+    assert not goes_on(columns_of(u, count=20, start=Start(30.0, 30.0)))
+    assert not goes_on(columns_of(u + 10.0, count=20, start=Start(40.0, 10.0)))
+
+
+def test_a_play_has_the_slope_of_the_next_segment_where_it_never_was() -> None:
+    """A voltage that goes further brings it there."""
+    u = 30.0 * np.sin(np.linspace(0.0, 60.0, 3000))
+    x = stage(np.random.default_rng(2), 30.0).simulate(u) + noise(5e-3, 0, 3000)
+    log = Log(u, x, np.ones(3000, bool), RATE, np.empty(0))
+    basis = search.plays(log, Start(0.0, 0.0), bends=2)
+    never = basis.moving == 0.0
+    assert list(np.any(never, axis=1)) == [True, False, True]
+    slopes = search.regression(log, basis).best().w[: basis.size].reshape(3, -1)
+    widest = slopes[:, -1]
+    assert widest[1] > 0.0
+    np.testing.assert_allclose(widest, widest[1], rtol=0.2)
+
+
+def test_the_less_a_play_goes_in_a_segment_the_more_it_follows_the_next_one() -> None:
+    u = 30.0 * np.sin(np.linspace(0.0, 60.0, 3000))
+    basis = columns_of(u, bends=1)
+    unlike = np.eye(basis.size)[basis.thresholds.size :]
+    costs = np.diag(unlike @ basis.prior() @ unlike.T)
+    assert basis.moving[1, 1] > 2.0 * basis.moving[1, -1] > 0.0
+    assert costs[-1] > 4.0 * costs[0]
 
 
 def test_starts_of_a_stage_are_reachable() -> None:
@@ -198,8 +227,12 @@ def test_a_model_of_plays_without_slope_is_a_line() -> None:
 
 def test_how_far_plays_move() -> None:
     u = np.array([0.0, 10.0, -10.0])
-    moving = moving_of(u, np.array([0.0, 5.0, 20.0]), Start(0.0, 0.0))
-    np.testing.assert_allclose(moving, [1.0, 15.0 / 30.0, 0.0])
+    thresholds, start = np.array([0.0, 5.0, 20.0]), Start(0.0, 0.0)
+    moving = moving_of(u, thresholds, np.empty(0), start)
+    np.testing.assert_allclose(moving, [[1.0, 15.0 / 30.0, 0.0]])
+    # Below 4 V the play of 5 V goes from 0 to 4, from 4 to -5.
+    parts = moving_of(u, thresholds, np.array([4.0]), start)
+    np.testing.assert_allclose(parts, 2.0 * np.array([[18.0, 13.0, 0.0], [12.0, 2.0, 0.0]]) / 30.0)
 
 
 def test_a_stage_drawn_at_random_is_admissible() -> None:

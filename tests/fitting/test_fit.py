@@ -1,6 +1,5 @@
 """The face of a fit: what it refuses, what it shows, and where it goes on."""
 
-import itertools
 from dataclasses import replace
 from typing import Any
 
@@ -159,29 +158,42 @@ def test_what_is_continued_begins_as_the_fitted_record() -> None:
 
 @pytest.mark.parametrize("model", ["plays", "plays-asymmetric"])
 def test_growing_amplitude_is_predicted_no_worse_than_by_the_plays_that_moved(model: str) -> None:
-    """Stages whose plays go on beyond the fitted range, from rest at 0 V or cycled about the middle."""
+    """Stages whose plays go on beyond the fitted range, from rest at 0 V."""
     ratios = []
-    for seed, centre in itertools.product(range(5), (0.0, 40.0)):
+    for seed in range(5):
         rng = np.random.default_rng(seed)
-        u = centre + 40.0 * np.linspace(0.35, 1.0, N) * np.sin(2.0 * np.pi * 1.7 * T + rng.uniform(0.0, 6.0))
-        cycled = centre + np.linspace(60.0, 0.0, 3000) * np.sin(np.linspace(0.0, 60.0, 3000))
-        before = cycled if centre else np.empty(0)
-        x = stage(rng, 40.0, plays=25).simulate(np.append(before, u))[before.size :]
+        u = growing(rng)
+        x = stage(rng, 40.0, plays=25).simulate(u)
         half = N // 2
         found = fit(u[:half], (x + noise(1e-3 * float(np.ptp(x)), seed))[:half], model=model)
         narrow = _without_wider_plays(found, u)
         ratios.append(rms((found.continued(u).x - x)[half:]) / rms((narrow - x)[half:]))
-    assert max(ratios) < 1.02
-    assert np.exp(np.mean(np.log(ratios))) < 0.95
+    assert max(ratios) < 0.95
+
+
+@pytest.mark.parametrize("centre", [0.0, 40.0])
+def test_a_prediction_beyond_the_record_is_that_of_the_model(centre: float) -> None:
+    rng = np.random.default_rng(0)
+    u = growing(rng, centre)
+    x = stage(rng, 40.0, plays=25).simulate(u)
+    found: Any = fit(u[: N // 2], x[: N // 2], model="plays")
+    np.testing.assert_allclose(
+        found.continued(u).x, found.model.simulate(u, initial_state=found.initial_state), atol=1e-9
+    )
 
 
 def test_no_plays_are_added_where_all_go_along_with_a_new_extreme() -> None:
-    u = 40.0 + 40.0 * np.linspace(0.35, 0.7, N) * np.sin(2.0 * np.pi * 1.7 * T)
     basis = PlayColumns(
-        np.linspace(0.0, 20.0, 5), np.empty(0), Start(40.0, 0.0), (float(u.min()), float(u.max())), np.ones(5)
+        np.linspace(0.0, 20.0, 5), np.empty(0), Start(60.0, 60.0), (-28.0, 28.0), np.ones((1, 5))
     )
     assert basis.beyond(np.ones(5))[0] is basis
-    assert replace(basis, start=Start(40.0, 40.0)).beyond(np.ones(5))[0].thresholds.size > 5
+    assert replace(basis, start=Start(0.0, 0.0)).beyond(np.ones(5))[0].thresholds.size > 5
+
+
+def growing(rng: np.random.Generator, centre: float = 0.0) -> FloatArray:
+    """Swings that grow from 0.35 of 40 V to all of it."""
+    wave = np.sin(2.0 * np.pi * 1.7 * T + rng.uniform(0.0, 6.0))
+    return np.asarray(centre + 40.0 * np.linspace(0.35, 1.0, N) * wave)
 
 
 def _without_wider_plays(found: Any, u: FloatArray) -> FloatArray:

@@ -113,6 +113,24 @@ def test_an_interval_stays_wide_after_a_voltage_beyond_the_range() -> None:
     np.testing.assert_allclose(half, [3.0, 5.0, 5.0])
 
 
+def test_an_interval_widens_where_the_voltage_moves_further_within_the_delay() -> None:
+    """And stays wide, for a swing that is flattened by its rate is so at its end."""
+    spread = Spread(3.0, 0.0, 0.4, (-10.0, 10.0), by_move=2.0, delay=2.0, moved=3.0)
+    half = spread.along(np.array([0.0, 0.0, 5.0, 5.0, 5.0]), np.zeros(5))
+    np.testing.assert_allclose(half, [3.0, 3.0, 5.0, 5.0, 5.0])
+
+
+def test_an_interval_holds_a_lag_that_is_no_delay() -> None:
+    """A chirp of which the slow half is fitted: in the fast one a lag of first order flattens the swings."""
+    t = np.arange(2 * N) / (2 * N)
+    u = 40.0 * np.sin(2.0 * np.pi * (20.0 * t + 150.0 * t * t))
+    x = stage(np.random.default_rng(0)).simulate(u)
+    y = lfilter([0.3], [1.0, -0.7], x - x[0]) + x[0] + noise(2e-3 * float(np.ptp(x)), 0, 2 * N)
+    found = pz.fit(u[:N], y[:N], sample_rate=RATE, model="plays", delay="auto")
+    p = found.continued(u)
+    assert np.mean(((y >= p.lower) & (y <= p.upper))[N:]) > 0.9
+
+
 def test_blocks_beyond_the_others_do_not_widen_the_interval_within_the_range() -> None:
     """Nothing was known there; within the range a stage of plays is known well."""
     t = np.linspace(0.0, 1.0, N)

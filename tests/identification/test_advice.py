@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import piezoest as pz
 from piezoest import signals
@@ -67,6 +68,33 @@ def test_what_a_fast_voltage_moves_is_no_noise() -> None:
     u = np.random.default_rng(4).uniform(-30.0, 30.0, 6000)
     x = pz.PrandtlIshlinskii(0.1, [5.0, 15.0], [0.02, 0.02]).simulate(u)
     assert identify(log(u, x, 5e-3), model="plays").noise_floor == pytest.approx(5e-3, rel=0.2)
+
+
+def test_what_goes_beyond_the_fitted_part_is_said() -> None:
+    u = signals.multi_amplitude([10.0, 20.0, 40.0, 40.0], 5.0, 4, FS).values
+    grows, steady = log(u, LOOP.simulate(u)), log(swings(), LOOP.simulate(swings()))
+    fast = Record.from_arrays(steady.voltage, steady.displacement, 2.0 * FS)
+    said = identify(grows, model="line", validate=[steady]).advice
+    (held,) = [each for each in said if each.startswith("The held-out part goes beyond")]
+    assert "the voltage goes from -38.8 to 38.8 V, the model was learnt from -19.4 to 19.4 V" in held
+    assert any(each.startswith("Other log") and "learnt from -19.4 to 19.4 V" in each for each in said)
+    said = identify(steady, model="line", validate=[steady, fast]).advice
+    (other,) = [each for each in said if "goes beyond" in each]
+    assert "V/s" in other
+    assert "swings at 10 Hz" in other
+
+
+def test_ringing_is_said() -> None:
+    """A square voltage makes a stage ring; a loop that is missed has harmonics, and does not ring."""
+    u = 30.0 * np.sign(np.sin(2.0 * np.pi * 2.0 * np.arange(8000) / FS) + 1e-9)
+    x = LOOP.simulate(u, allow_jumps=True)
+    pole = 0.99 * np.exp(2j * np.pi * 80.0 / FS)
+    ringing = lfilter([abs(1.0 - pole) ** 2], [1.0, -2.0 * pole.real, abs(pole) ** 2], x)
+    (said,) = [each for each in identify(log(u, ringing), model="plays").advice if "oscillates" in each]
+    assert "at 80" in said
+    missed = identify(log(swings(), LOOP.simulate(swings())), model="line")
+    assert missed.train.rms > 0.05
+    assert not any("oscillates" in each for each in missed.advice)
 
 
 def test_one_log_to_validate_is_no_list() -> None:

@@ -407,3 +407,18 @@ def test_free_running_sees_only_the_voltage(real: Identification) -> None:
     x[real.trained :] = np.where(np.arange(x.size - real.trained) % 2, 1.0, -1.0)
     blind = identify(changed(x, record))
     np.testing.assert_allclose(blind.prediction, real.prediction, atol=1e-6)
+
+
+def test_an_interval_holds_what_kinds_expect_that_may_be_right_as_well() -> None:
+    """Beyond the fitted voltages, where they differ by more than what any of them misses within."""
+    found = identify(plays_log(0, bends=2))
+    u = 2.0 * (found.record.voltage - 40.0) + 40.0
+    expected = found.predict(u)
+    least = 1.5 * found.best.cross_validated
+    rivals = [each for each in found.candidates if each is not found.best and each.cross_validated < least]
+    assert rivals
+    apart = np.max([np.abs(each.fit.predict(u).x - expected.x) for each in rivals], axis=0)
+    assert apart.max() > found.fit.spread.within
+    own = found.fit.predict(u)
+    np.testing.assert_allclose(expected.upper - expected.x, np.hypot(own.upper - own.x, apart))
+    np.testing.assert_allclose(expected.x - expected.lower, expected.upper - expected.x)
