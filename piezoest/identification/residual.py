@@ -122,7 +122,7 @@ class Oscillation(NamedTuple):
     def of(cls, residual: FloatArray, sample_rate: float) -> Oscillation:
         """Look for the strongest one; NaN counts as absent.
 
-        The spectrum is the mean of those of `SEGMENTS` parts, each faded in and out.
+        The spectrum is the mean of those of `SEGMENTS` parts (Welch, 1967).
 
         Parameters
         ----------
@@ -131,13 +131,14 @@ class Oscillation(NamedTuple):
         sample_rate : float
             [Hz].
         """
+        from scipy import signal
+
         known = np.isfinite(residual)
         length = residual.size // SEGMENTS
         if length < 4 * PEAK:
             return cls(0.0, 0.0)
         e = np.where(known, residual - np.mean(residual[known]), 0.0)
-        parts = e[: length * SEGMENTS].reshape(SEGMENTS, length)
-        power = np.mean(np.abs(np.fft.rfft(parts * np.hanning(length), axis=1)) ** 2, axis=0)
+        _, power = signal.welch(e, nperseg=length, noverlap=0, detrend=False)
         power[:PEAK] = 0.0
         k = int(np.argmax(power))
         share = float(np.sum(power[max(k - PEAK, 0) : k + PEAK + 1]) / max(float(np.sum(power)), 1e-300))
