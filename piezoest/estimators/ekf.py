@@ -29,8 +29,11 @@ class HysteresisEKF(CompiledEstimator):
 
     Parameters
     ----------
-    sample_rate, initial_model, delay
-        As in `HysteresisRLS`.
+    sample_rate : float
+        [Hz].
+    initial_model : ColemanHodgdon or LinearGain, optional
+        Initial model; a model of the same kind is estimated. Default
+        ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack actuator.
     uncertainty : float
         Standard deviation of each initial parameter (a, b, c or the gain), relative to its value.
     noise : float
@@ -45,6 +48,8 @@ class HysteresisEKF(CompiledEstimator):
     offset : bool
         Also estimate an offset of the displacement, with the random walk `mismatch`. A larger loop
         leaves such an offset after a change of amplitude.
+    delay : float
+        Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     project : bool
         Keep the estimate in the admissible set by a projection in the metric of P.
 

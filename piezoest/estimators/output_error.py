@@ -35,8 +35,8 @@ class OutputErrorRLS(Freezable):
 
     Parameters
     ----------
-    sample_rate, delay
-        As in `HysteresisRLS`.
+    sample_rate : float
+        [Hz].
     initial_model : ColemanHodgdon, optional
         Initial model. Default ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack actuator.
     uncertainty : float
@@ -47,6 +47,8 @@ class OutputErrorRLS(Freezable):
         Factor: the bank covers the initial decay divided by `span` to the initial decay times `span`.
     members : int
         Number of decays in the bank, 3 to 1000.
+    delay : float
+        Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     policies : tuple of policies, optional
         `policies.RandomWalk`, which sets the memory, and optionally `policies.OutlierRejection`.
         Default: both.

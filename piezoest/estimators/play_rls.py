@@ -30,8 +30,8 @@ class PrandtlIshlinskiiRLS(Freezable):
 
     Parameters
     ----------
-    sample_rate, delay
-        As in `HysteresisRLS`.
+    sample_rate : float
+        [Hz].
     initial_model : PrandtlIshlinskii, ColemanHodgdon or LinearGain, optional
         Initial model. The thresholds, bends and time constants of creep of a `PrandtlIshlinskii` are
         kept. A `ColemanHodgdon` (default ``ColemanHodgdon(0.02, 0.12, 0.0036)``) is converted to
@@ -50,6 +50,8 @@ class PrandtlIshlinskiiRLS(Freezable):
         Relative standard deviation of the initial model's scale and of the shape of its loop.
     noise : float
         Standard deviation of the displacement's noise [µm].
+    delay : float
+        Samples by which the measured displacement lags the voltage, up to a million; may be fractional.
     mechanics : MassSpringDamper, optional
         Resonance through which the voltage is filtered first, so that it is not learnt as hysteresis.
         Use it with a `LeadFilter`, for references close to the resonance.
