@@ -37,6 +37,9 @@ ANSWERED = 0.1
 # Where no line explains the points, the stage goes too far at so many times what the gain says, if the
 # voltage was at a limit and if not.
 FARTHER, MUCH_FARTHER = 1.5, 2.5
+# ... and not far enough at so many times that, if the mean square of its way is below this fraction of the
+# square of the reference's: then it goes less than half of it.
+NEARER, STANDS = 0.4, 0.5**2 / 12.0
 # After a leg those before it count for KEPT (longest - leg) + LEFT leg of their length; the longest one of
 # late fades by this factor at each turn.
 LEFT, KEPT, FADES = 1.0 / 3.0, 2.0, 0.95
@@ -129,11 +132,15 @@ def _take(legs: Any, now: Any, leg: Any, kept: Any) -> None:
 
 
 @register_jitable
-def _draw(line: Any, points: Any) -> None:
-    """Draw the line through the middle of points, with their slope if they lie near it."""
+def _draw(line: Any, points: Any, leg: Any) -> None:
+    """Draw the line through the middle of points, with their slope if they lie near it.
+
+    `leg` is how far the reference has gone meanwhile [µm].
+    """
     square, square_x, product = points.square, points.square_x, points.product
     most = CHANGE if line.legs < CERTAIN else LATER_CHANGE
     answers = product * line.gain > 0.0 and product * product > ANSWERED * square * square_x
+    nearer, steeper = NEARER * line.gain, np.abs(line.gain) > np.abs(line.first_gain)
     farther = (FARTHER if line.clipped != 0.0 else MUCH_FARTHER) * line.gain
     if product * product > EXPLAINED * square * square_x and product * line.gain > 0.0:
         gain = product / square
@@ -144,6 +151,9 @@ def _draw(line: Any, points: Any) -> None:
     elif square_x > farther * farther * square > 0.0:
         # The stage goes much farther than the line says, late or ringing: with less voltage it does no harm.
         line.gain *= most
+    elif square_x < nearer * nearer * square and square_x < STANDS * leg * leg and steeper:
+        # It hardly moves: what has made the line steeper, like ringing, is over.
+        line.gain = np.sign(line.gain) * max(np.abs(line.gain) / most, np.abs(line.first_gain))
     elif not answers:
         # Readings that do not go with the voltage say nothing of the centre either: it would run away.
         return
@@ -151,7 +161,7 @@ def _draw(line: Any, points: Any) -> None:
 
 
 @register_jitable
-def _through_both(line: Any, legs: Any, others: Any, direction: Any) -> None:
+def _through_both(line: Any, legs: Any, others: Any, direction: Any, leg: Any) -> None:
     """Draw the line through the legs of both directions, which count alike, however long they took."""
     unlike = line.legs <= SETTLED and others.points.square > UNLIKE * line.now.square
     # Where a quick way back has too few readings, those of an earlier one become old.
@@ -161,7 +171,7 @@ def _through_both(line: Any, legs: Any, others: Any, direction: Any) -> None:
     _join(line.both, legs.points, 1.0)
     if others.length > 0.0:
         _join(line.both, others.points, 0.5)
-    _draw(line, line.both)
+    _draw(line, line.both, leg)
 
 
 @register_jitable
@@ -181,10 +191,10 @@ def turn(line: Any, direction: Any, leg: Any) -> None:
         line.agreed = line.agreed + 1.0 if agrees else 0.5 * line.agreed
     if direction > 0.0:
         _take(line.up, now, leg, kept)
-        _through_both(line, line.up, line.down, direction)
+        _through_both(line, line.up, line.down, direction, leg)
     else:
         _take(line.down, now, leg, kept)
-        _through_both(line, line.down, line.up, direction)
+        _through_both(line, line.down, line.up, direction, leg)
     line.clipped = 0.0
     forget(now)
 
@@ -196,7 +206,7 @@ def grow(line: Any, leg: Any) -> bool:
     if line.legs > 0.0 or leg < 2.0 * line.looked or now.count < 16.0:
         return False
     line.looked = leg
-    _draw(line, now)
+    _draw(line, now, 0.0)
     return True
 
 
