@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+import pytest
 
 import piezoest as pz
 from piezoest.controller import line as lines
@@ -43,3 +44,21 @@ def test_a_way_back_of_few_readings_leaves_nothing_old() -> None:
         _leg(line, 0.14, 1.0, -1.0, 3)
     assert abs(line.gain / 0.14 - 1.0) < 0.02
     assert abs(line.centre - 1.0) < 0.02
+
+
+@pytest.mark.parametrize(("answer", "gain"), [(0.02, 0.2), (0.6, 2.0)])
+def test_a_line_that_became_too_steep_comes_back_where_the_stage_hardly_moves(
+    answer: float, gain: float
+) -> None:
+    """Behind ringing a tenth of the voltage is left, which a stage with backlash hardly answers."""
+    line = Named(new(lines.LINE), lines.LINE)
+    lines.begin(line, 0.2, 0.0, 0.0, 1.0)
+    line.gain = 2.0
+    for k in range(20):
+        # A loop that no line explains; the reference goes by 2 µm, for which the voltage goes by 1 V.
+        direction = 1.0 - 2.0 * (k % 2)
+        for phase in np.linspace(0.0, np.pi, 50):
+            u = -0.5 * direction * np.cos(phase)
+            lines.add(line.now, u, answer * (u + 2.0 * direction * np.sin(phase)), 1e9)
+        lines.turn(line, direction, 2.0)
+    assert line.gain == pytest.approx(gain, rel=0.2)
