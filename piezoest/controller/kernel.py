@@ -48,7 +48,7 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
-        noticed=COUNT, notice=whole(0.0, 12.0), shaken=COUNT,
+        noticed=COUNT, notice=whole(0.0, 13.0), shaken=COUNT,
         # When the last one was noted; reference, reading and voltage then.
         seen=record(samples=COUNT, r=MEASURED, x=MEASURED, u=MEASURED),
         # What the line misses, the most of late, what it missed of a swing when it drove; what the stage

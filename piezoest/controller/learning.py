@@ -220,7 +220,7 @@ def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
     if start.given != 0.0:
         given.compare(state, settings)
     elif reach.is_refuted(state, recent.mean_u - start.origin, recent.mean_x - start.zero):
-        reach.seek_again(state, settings)
+        reach.begin_anew(state, settings)
     elif way >= state.confirmed and way > 0.0:
         # Only on new ground: on the way back hysteresis would pass for gain.
         state.confirmed = way

@@ -31,6 +31,13 @@ def seek_again(state: Any, settings: Any) -> None:
 
 
 @register_jitable
+def begin_anew(state: Any, settings: Any) -> None:
+    """What the start has found is wrong: say so, and seek again."""
+    reading.notice(state, reading.FALSE_START)
+    seek_again(state, settings)
+
+
+@register_jitable
 def is_refuted(state: Any, gone: Any, answer: Any) -> bool:
     """Whether the answer to a way from where all began speaks against the sign of the gain.
 
@@ -80,4 +87,4 @@ def watch(state: Any, settings: Any, moved: Any) -> None:
     sure = reading.is_sure(state.readings)
     most = RESTED if sure or state.reference.turns < travels.SHOWN else SOON_RESTED
     if state.railed > most * state.reference.swing or (reading.go_wrong(state.readings) and not sure):
-        seek_again(state, settings)
+        begin_anew(state, settings)

@@ -26,6 +26,8 @@ FAST, LATE = 9.0, 10.0
 OUTSIDE = 11.0
 # The stage does not go as far as the reference.
 OUT_OF_REACH = 12.0
+# What the start has found is wrong.
+FALSE_START = 13.0
 FAULTS = (
     "",
     "no response",
@@ -40,6 +42,7 @@ FAULTS = (
     "lag",
     "outside",
     "out of reach",
+    "false start",
 )
 
 READINGS = record(

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from piezoest.controller import candidate, slots
 from piezoest.controller.pace import WAVE
-from piezoest.controller.readings import FAST, FAULTS, LATE, OUT_OF_REACH, OUTSIDE
+from piezoest.controller.readings import FALSE_START, FAST, FAULTS, LATE, OUT_OF_REACH, OUTSIDE
 from piezoest.equations import loop_inverse, play_inverse
 from piezoest.layout import Named
 from piezoest.models import ColemanHodgdon, LinearGain, Model, PrandtlIshlinskii
@@ -36,9 +36,11 @@ MEANINGS = {
     "identified from a log that goes as far",
     "out of reach": "the reference asks for {wanted:.4g} µm, and the stage is at {there:.4g} µm with the "
     "voltage at its limit of {limit:.4g} V: keep the reference within what the stage reaches",
+    "false start": "the stage does not go as the start has shown, which was hum, drift or wrong readings: the "
+    "gain is sought again, on longer ways",
 }
 # Of what is noted beside faults, that which the user is to change.
-WARNINGS = (FAST, LATE, OUTSIDE, OUT_OF_REACH)
+WARNINGS = (FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START)
 
 
 @dataclass(frozen=True, slots=True)
