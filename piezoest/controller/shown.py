@@ -36,8 +36,8 @@ MEANINGS = {
     "identified from a log that goes as far",
     "out of reach": "the reference asks for {wanted:.4g} µm, and the stage is at {there:.4g} µm with the "
     "voltage at its limit of {limit:.4g} V: keep the reference within what the stage reaches",
-    "false start": "the stage does not go as the start has shown, which was hum, drift or wrong readings: the "
-    "gain is sought again, on longer ways",
+    "false start": "the stage does not go as the start has shown, which was hum or drift: the gain "
+    "is sought again, on longer ways",
 }
 # Of what is noted beside faults, that which the user is to change.
 WARNINGS = (FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START)
