@@ -86,5 +86,5 @@ def watch(state: Any, settings: Any, moved: Any) -> None:
     state.railed = state.railed + moved if rests and doubted else max(state.railed - moved, 0.0)
     sure = reading.is_sure(state.readings)
     most = RESTED if sure or state.reference.turns < travels.SHOWN else SOON_RESTED
-    if state.railed > most * state.reference.swing or (reading.go_wrong(state.readings) and not sure):
+    if state.railed > most * state.reference.swing or (reading.go_the_wrong_way(state.readings) and not sure):
         begin_anew(state, settings)

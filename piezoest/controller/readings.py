@@ -195,7 +195,7 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> N
 
 
 @register_jitable
-def go_wrong(readings: Any) -> bool:
+def go_the_wrong_way(readings: Any) -> bool:
     """Whether readings have gone the wrong way for long: they lie, or the line does if it is not sure."""
     return readings.wrong > WRONG_FOR
 
@@ -203,7 +203,7 @@ def go_wrong(readings: Any) -> bool:
 @register_jitable
 def _name(readings: Any) -> float:
     """The fault that the evidence shows; the present one until it is over."""
-    if go_wrong(readings) and is_sure(readings):
+    if go_the_wrong_way(readings) and is_sure(readings):
         return REVERSED
     if readings.large > LARGE_FOR:
         return SCALED
