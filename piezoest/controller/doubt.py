@@ -12,6 +12,8 @@ from piezoest.controller import travel as travels
 
 # A voltage that may not have been written does not matter below this fraction of a swing.
 NOTHING = 1.0 / 64.0
+# A small scan has become wide again in a leg that is so many times as long as those before.
+OUTGROWN = 2.0
 
 
 @register_jitable
@@ -46,4 +48,20 @@ def narrow(state: Any) -> None:
     travels.narrow(reference, waits, least)
     travels.narrow(state.travel, waits, least / np.abs(line.gain))
     lines.begin(line, line.gain, state.u, lines.at(line, state.u), least / np.abs(line.gain))
+    state.small = 1.0
     all_models(state)
+
+
+@register_jitable
+def widen(state: Any) -> None:
+    """A small scan has become wide again: the line has the slope of wide ways, those of small ones are flat."""
+    reference, line = state.reference, state.line
+    longest = max(line.longest, reference.least)
+    if state.small == 0.0 or np.abs(reference.last - reference.turned) < OUTGROWN * longest:
+        return
+    state.small = 0.0
+    x = lines.at(line, state.u)
+    if np.abs(line.gain) < np.abs(line.first_gain):
+        line.gain = line.first_gain
+        line.centre = x - line.gain * state.u
+        lines.forget_legs(line)

@@ -18,7 +18,7 @@ from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
 from piezoest.controller.learning import begin_homing, take
 from piezoest.controller.voltage import RUN, plan
-from piezoest.layout import AMOUNT, COUNT, FIXED, MEASURED, NUMBER, Field, record, whole
+from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, Field, record, whole
 from piezoest.layout import Record as Layout
 
 # Half-width of the corridor, as a fraction of half the widest swing of the reference of late.
@@ -43,6 +43,8 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         unit=NUMBER, zero=MEASURED,
         # Half the swing that they began with; zero before [V].
         scale=AMOUNT,
+        # Whether the reference goes on small behind a wide way.
+        small=FLAG,
         # Correction of the reference by feedback [µm], and that of the voltage planned.
         feedback=NUMBER, back=NUMBER,
         # Travel of the voltage since the last believed reading, and since models were handed over.

@@ -69,7 +69,7 @@ def _begin_learning(state: Any, settings: Any) -> None:
     state.confirmed = max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
     state.gone = state.handed = 0.0
     state.railed, state.patience = 0.0, driving.PATIENCE
-    state.owed = 0.0
+    state.owed = state.small = 0.0
     reading.forget(state.readings)
     # The last readings may be as old as the start is long.
     state.readings.before = state.readings.last = start.now
@@ -369,6 +369,7 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     if state.stage == RUN and state.readings.fault == reading.NONE:
         redraw.draw(state)
     if state.stage == RUN:
+        doubt.widen(state)
         doubt.narrow(state)
     state.gone += gone
     state.handed += gone
