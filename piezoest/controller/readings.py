@@ -67,6 +67,8 @@ READINGS = record(
 
 # The recent points, in legs; legs that must have agreed with the line before a fault is named.
 RECENT, TRUSTED = 0.3, 3.0
+# Before so many legs the way to the reference has shown more than they have.
+EARLY = 8.0
 # Slopes, relative to the line's, of no response, of the wrong way round, and of too much, even for a line
 # that is not sure; and of a good one.
 WEAK, WRONG, LARGE, HUGE, GOOD = 0.12, -0.3, 3.0, 30.0, 0.4
@@ -171,6 +173,8 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> N
     clear = np.abs(line.gain) * readings.swing > 30.0 * np.sqrt(readings.noise)
     known = clear and moved
     answer = np.sqrt(recent.square_x / recent.square) / np.abs(line.gain) if recent.square > 0.0 else 0.0
+    # The way to the reference was wider than small legs, which are flat: what it has shown is not too much.
+    steep = max(np.abs(line.first_gain / line.gain), 1.0) if line.legs < EARLY else 1.0
     slope, explained = lines.slope(recent) / line.gain, lines.explained(recent)
     stopped = sure and clear and _stands_still(readings, line, travel, STOPPED_FOR, 4.0)
     straight = explained > STRAIGHT
@@ -185,7 +189,7 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> N
     readings.wrong = readings.wrong + share * swings if wrong else 0.0
     # What is far too large passes for noise.
     plain = straight or (sure and clear and off)
-    large = (answer > LARGE if sure else slope > HUGE and line.legs >= TRUSTED) and moved and plain
+    large = (answer > LARGE * steep if sure else slope > HUGE and line.legs >= TRUSTED) and moved and plain
     readings.large = readings.large + swings if large else 0.0
     readings.stopped = 1.0 if stopped else 0.0
     lowest = GOOD if sure else WEAK

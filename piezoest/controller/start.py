@@ -67,8 +67,9 @@ CHECK = 2.0
 # At rest the means of two windows, of a slow stage of three, differ by less than this fraction of the answer;
 # so many windows are enough at any rate; at least so many are looked at where there is no answer. A stage is
 # slow that changes by less than this fraction of the mean speed of the voltage, which is half as fast again
-# midway.
+# midway. Where it moves with more than this fraction of its fastest change it may take more windows.
 STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 4.0, 0.75
+SLEWS, MOST_SLEWING = 0.7, 150.0
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
 
@@ -193,7 +194,10 @@ def _rests(start: Any, settings: Any) -> bool:
     still = still and (not slow or np.abs(start.mean - start.oldest_mean) < most)
     # Where nothing is seen yet, it may be late.
     least = 1.0 if np.abs(start.now - start.from_x) > _clear(start, STEPS) else LATE
-    return start.windows > least and (still or start.windows >= MOST_WINDOWS)
+    # What slews comes as fast as ever until it is there.
+    slews = np.abs(start.mean - start.mean_before) > SLEWS * settings.window * start.change
+    most_windows = MOST_SLEWING if slews else MOST_WINDOWS
+    return start.windows > least and (still or start.windows >= most_windows)
 
 
 @register_jitable
