@@ -69,7 +69,7 @@ CHECK = 2.0
 # slow that changes by less than this fraction of the mean speed of the voltage, which is half as fast again
 # midway. Where it moves with more than this fraction of its fastest change it may take more windows.
 STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 4.0, 0.75
-SLEWS, MOST_SLEWING = 0.7, 150.0
+SLEWS, MOST_SLEWING = 0.7, 400.0
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
 
@@ -190,14 +190,14 @@ def _rests(start: Any, settings: Any) -> bool:
     most = STILL * np.abs(start.now - start.from_x) + chance
     # What came slowly may still come, hidden by chance for one window.
     slow = start.change * settings.ramp < SLOW * np.abs(start.now - start.from_x)
-    still = np.abs(start.mean - start.mean_before) < most
-    still = still and (not slow or np.abs(start.mean - start.oldest_mean) < most)
+    moves = np.abs(start.mean - start.mean_before)
+    still = moves < most and (not slow or np.abs(start.mean - start.oldest_mean) < most)
+    # What slews comes as fast as ever until it is there.
+    slews = moves > max(SLEWS * settings.window * start.change, chance)
+    enough = MOST_SLEWING if slews else MOST_WINDOWS
     # Where nothing is seen yet, it may be late.
     least = 1.0 if np.abs(start.now - start.from_x) > _clear(start, STEPS) else LATE
-    # What slews comes as fast as ever until it is there.
-    slews = np.abs(start.mean - start.mean_before) > SLEWS * settings.window * start.change
-    most_windows = MOST_SLEWING if slews else MOST_WINDOWS
-    return start.windows > least and (still or start.windows >= most_windows)
+    return start.windows > least and ((still and not slews) or start.windows >= enough)
 
 
 @register_jitable
