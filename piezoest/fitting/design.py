@@ -190,7 +190,8 @@ class Along:
             rows[:, design.crept] = np.where(past < LONG_AGO, np.exp(-np.minimum(past, LONG_AGO)), 0.0)
         rows[:, design.offset] = 1.0
         t = index / design.samples
-        rows[:, design.offset + 1] = np.minimum(t, 1.0) + SLOWER * np.log(np.maximum(t, 1.0))
+        beyond = np.maximum(t, 1.0) if self._seen > design.samples else None
+        rows[:, design.offset + 1] = t if beyond is None else np.minimum(t, 1.0) + SLOWER * np.log(beyond)
         rows[:, design.offset + 2 :] = index[:, None] >= design.jumps
         return rows
 
