@@ -54,7 +54,7 @@ def narrow(state: Any) -> None:
 
 @register_jitable
 def widen(state: Any) -> None:
-    """A small scan has become wide again: the line has the slope of wide ways, those of small ones are flat."""
+    """A small scan has become wide again: the line has the slope of wide ways."""
     reference, line = state.reference, state.line
     longest = max(line.longest, reference.least)
     if state.small == 0.0 or np.abs(reference.last - reference.turned) < OUTGROWN * longest:

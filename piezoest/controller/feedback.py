@@ -9,10 +9,20 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
+from piezoest.controller import redraw
+from piezoest.controller import travel as travels
 from piezoest.controller.voltage import is_held
+from piezoest.layout import COUNT, FLAG, MEASURED, NUMBER, record
 
 # No sample corrects more than this fraction of an error, of one that is answered late less.
 FASTEST = 0.25
+# A rest is over where the reference has gone so far from it, in swings.
+OVER = 0.02
+# Whether the reference rests; where it does, and the correction before. Behind a rest: turns left to look at;
+# readings since the first one, and the sum of the corrections that they ask for.
+REST = record(now=FLAG, r=MEASURED, feedback=NUMBER, left=COUNT, count=COUNT, sum=NUMBER)
+# Between the first and the last of so many turns lie two whole legs.
+TURNS = 3.0
 
 
 @register_jitable
@@ -23,5 +33,57 @@ def follow(state: Any, settings: Any, x: Any) -> None:
     if is_held(settings, state.u, growth * state.line.gain):
         # At a limit it would only wind up.
         return
+    state.feedback = _within(state, settings, state.feedback + growth)
+
+
+@register_jitable
+def _within(state: Any, settings: Any, correction: Any) -> float:
+    """The correction, or as much of it as the corridor leaves room for."""
     room = settings.corridor * 0.5 * state.reference.swing + 3.0 * np.sqrt(state.readings.noise)
-    state.feedback = min(max(state.feedback + growth, -room), room)
+    return min(max(correction, -room), room)
+
+
+@register_jitable
+def forget(state: Any) -> None:
+    """Forget the correction."""
+    state.feedback = state.rest.now = state.rest.left = 0.0
+
+
+@register_jitable
+def _correct(state: Any, settings: Any, correction: Any) -> None:
+    """Change the correction at once; the difference is owed, and paid on the way."""
+    correction = _within(state, settings, correction)
+    if correction != state.feedback and settings.minimum < state.u < settings.maximum:
+        state.feedback = correction
+        redraw.go_on(state, settings)
+
+
+@register_jitable
+def watch_rest(state: Any, settings: Any, x: Any, moved: Any) -> None:
+    """Behind a rest, begin with the correction before it, and learn anew from the first two legs.
+
+    What the stage has crept is wiped out in motion; what has drifted is not, and shows in their mean error.
+    """
+    rest = state.rest
+    if rest.now == 0.0:
+        rest.now = 1.0 if travels.rests(state.reference, moved) else 0.0
+        rest.r, rest.feedback = state.r, state.feedback
+        _learn_from_legs(state, settings, x)
+    elif np.abs(state.r - rest.r) > OVER * state.reference.swing:
+        rest.now = rest.count = rest.sum = 0.0
+        rest.left = TURNS
+        _correct(state, settings, rest.feedback)
+
+
+@register_jitable
+def _learn_from_legs(state: Any, settings: Any, x: Any) -> None:
+    """Correct by what the first two whole legs behind a rest have missed in the mean."""
+    rest = state.rest
+    if rest.left == 0.0:
+        return
+    rest.left -= state.reference.turned_now
+    if rest.left == 0.0 and rest.count > 0.0:
+        _correct(state, settings, rest.sum / rest.count)
+    elif rest.left < TURNS and np.isfinite(x):
+        rest.count += 1.0
+        rest.sum += state.feedback + state.r - x

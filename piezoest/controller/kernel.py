@@ -10,6 +10,7 @@ from numba.extending import register_jitable
 
 from piezoest.compile import Record, Vector, compiled
 from piezoest.controller import candidate, homing, redraw, slots
+from piezoest.controller import feedback as feedbacks
 from piezoest.controller import line as lines
 from piezoest.controller import outside as outsides
 from piezoest.controller import pace as paces
@@ -46,7 +47,7 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         # Whether the reference goes on small behind a wide way.
         small=FLAG,
         # Correction of the reference by feedback [µm], and that of the voltage planned.
-        feedback=NUMBER, back=NUMBER,
+        feedback=NUMBER, back=NUMBER, rest=feedbacks.REST,
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.

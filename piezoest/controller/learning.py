@@ -311,7 +311,8 @@ def begin_homing(state: Any, settings: Any, amplitude: Any, turn: Any, cycles: A
         return False
     if state.unit != 0.0:
         doubt.all_models(state)
-    state.stage, state.feedback = HOME, 0.0
+    state.stage = HOME
+    feedback.forget(state)
     reading.forget(state.readings)
     return True
 
@@ -383,6 +384,8 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         x = _believe(state, settings, u, x, gone, moved)
         if state.stage == RUN and np.isfinite(x):
             feedback.follow(state, settings, x)
+        if state.stage == RUN and settings.feedback > 0.0:
+            feedback.watch_rest(state, settings, x, moved)
         if state.reference.turned_now != 0.0:
             paces.watch(state, settings)
         outside.watch(state, settings)

