@@ -143,7 +143,7 @@ def _draw(line: Any, points: Any, leg: Any) -> None:
     nearer, steeper = NEARER * line.gain, np.abs(line.gain) > np.abs(line.first_gain)
     farther = (FARTHER if line.clipped != 0.0 else MUCH_FARTHER) * line.gain
     if product * product > EXPLAINED * square * square_x and product * line.gain > 0.0:
-        gain = product / square
+        gain = np.sign(product) * np.sqrt(square_x / square)
         line.gain *= min(max(gain / line.gain, 1.0 / most), most)
         if line.legs < 1.0 and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
             # What lags goes on while the voltage hardly moves.
