@@ -29,9 +29,10 @@ LINE = record(
     direction=SIGN, now=POINTS, up=LEGS, down=LEGS, both=POINTS,
 )  # fmt: skip
 
-# Points of which a line explains less than this share teach nothing about its gain; it changes by no more
-# than this factor at once, and by less after so many legs; before it grows no more than that in all.
-EXPLAINED, CHANGE, LATER_CHANGE, CERTAIN = 0.8, 2.0, 1.3, 4.0
+# Points of which a line explains less than the first share are not straight; less than the second, they teach
+# nothing about its gain. It changes by no more than this factor at once, and by less after so many legs;
+# before it grows no more than that in all.
+EXPLAINED, SIGNED, CHANGE, LATER_CHANGE, CERTAIN = 0.8, 0.5, 2.0, 1.3, 4.0
 # Points of which a line explains less than this share teach nothing at all.
 ANSWERED = 0.1
 # Where no line explains the points, the stage goes too far at so many times what the gain says, if the
@@ -142,7 +143,7 @@ def _draw(line: Any, points: Any, leg: Any) -> None:
     answers = product * line.gain > 0.0 and product * product > ANSWERED * square * square_x
     nearer, steeper = NEARER * line.gain, np.abs(line.gain) > np.abs(line.first_gain)
     farther = (FARTHER if line.clipped != 0.0 else MUCH_FARTHER) * line.gain
-    if product * product > EXPLAINED * square * square_x and product * line.gain > 0.0:
+    if product * product > SIGNED * square * square_x and product * line.gain > 0.0:
         gain = np.sign(product) * np.sqrt(square_x / square)
         line.gain *= min(max(gain / line.gain, 1.0 / most), most)
         if line.legs < 1.0 and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
