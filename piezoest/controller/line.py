@@ -1,9 +1,9 @@
 """The straight line x = gain u + centre that readings show: linear feed-forward, always a candidate.
 
-Least squares over the last legs of the reference, those up and those down alike, so that a loop's width
-cancels. It is fitted again at each turn; between turns nothing that a resonance or a lag does can lead it
-astray. A short leg takes little weight from those before it: small loops are flatter than the wide one around
-them, and a line through the last two small ones would be wrong.
+Its slope is the ratio of the spreads of reading and voltage over the last legs of the reference, those up and
+those down alike, so that a loop's width cancels. It is drawn again at each turn; between turns nothing that a
+resonance or a lag does can lead it astray. A short leg takes little weight from those before it: small loops
+are flatter than the wide one around them, and a line through the last two small ones would be wrong.
 """
 
 from typing import Any
@@ -95,6 +95,15 @@ def slope(points: Any) -> float:
 
 
 @register_jitable
+def spread(points: Any) -> float:
+    """How far readings spread for the voltage's spread, with the slope's sign [µm/V]; zero without any.
+
+    The slope of least squares is this times the correlation, which a delay or a wide loop lowers.
+    """
+    return np.sign(points.product) * np.sqrt(points.square_x / points.square) if points.square > 0.0 else 0.0
+
+
+@register_jitable
 def explained(points: Any) -> float:
     """Share of the readings' mean square that a line explains: the square of their correlation."""
     both = points.square * points.square_x
@@ -143,9 +152,10 @@ def _draw(line: Any, points: Any, leg: Any) -> None:
     answers = product * line.gain > 0.0 and product * product > ANSWERED * square * square_x
     nearer, steeper = NEARER * line.gain, np.abs(line.gain) > np.abs(line.first_gain)
     farther = (FARTHER if line.clipped != 0.0 else MUCH_FARTHER) * line.gain
-    if product * product > SIGNED * square * square_x and product * line.gain > 0.0:
-        gain = np.sign(product) * np.sqrt(square_x / square)
-        line.gain *= min(max(gain / line.gain, 1.0 / most), most)
+    # The first way may lead from rest to where the reference is, and no loop is round yet.
+    least = SIGNED if line.legs > 1.0 else EXPLAINED
+    if product * product > least * square * square_x and product * line.gain > 0.0:
+        line.gain *= min(max(spread(points) / line.gain, 1.0 / most), most)
         if line.legs < 1.0 and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
             # What lags goes on while the voltage hardly moves.
             line.gain = CHANGE * line.first_gain
@@ -187,8 +197,8 @@ def turn(line: Any, direction: Any, leg: Any) -> None:
     line.held_gain, line.held_centre = line.last_gain, line.last_centre
     line.last_gain, line.last_centre = line.gain, line.centre
     if leg > SHORT * line.longest:
-        ratio = slope(now) / line.gain
-        agrees = explained(now) > EXPLAINED and 1.0 / ALIKE < ratio < ALIKE
+        ratio = spread(now) / line.gain
+        agrees = explained(now) > SIGNED and 1.0 / ALIKE < ratio < ALIKE
         line.agreed = line.agreed + 1.0 if agrees else 0.5 * line.agreed
     if direction > 0.0:
         _take(line.up, now, leg, kept)
