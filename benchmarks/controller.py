@@ -6,12 +6,12 @@ it runs the stage itself, and its settled error is compared with the library's. 
     python benchmarks/controller.py [--samples N] [--only SCENARIO] [--json FILE]
 """
 
-import argparse
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import typer
 
 import piezoest as pz
 from piezoest.bench.origin import origin, put
@@ -92,21 +92,16 @@ def is_near(row: dict[str, Any]) -> bool:
     return bool(row["double_difference"] <= LARGEST_DIFFERENCE and row["float_difference"] <= allowed)
 
 
-def main() -> int:
-    """Print the comparison; 1 if a difference is too large."""
-    parser = argparse.ArgumentParser(description="Generated C against the library, scenario by scenario.")
-    parser.add_argument("--samples", type=int, default=1_000_000, help="of each scenario")
-    parser.add_argument("--only", action="append", help="only this scenario; may be repeated")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures to this file")
-    given = parser.parse_args()
+def main(samples: int = 1_000_000, only: list[str] | None = None, json: Path | None = None) -> None:
+    """Compare SAMPLES of each scenario, or ONLY of some; fails if a difference is too large."""
     rows = []
-    for name in given.only or SCENARIOS:
+    for name in only or SCENARIOS:
         for learner in ESTIMATORS:
-            rows.append(compare(name, learner, given.samples))
+            rows.append(compare(name, learner, samples))
             print(rows[-1], "" if is_near(rows[-1]) else "too far apart", file=sys.stderr, flush=True)
-    put({**origin(), "rows": rows}, given.json)
-    return 0 if all(map(is_near, rows)) else 1
+    put({**origin(), "rows": rows}, json)
+    sys.exit(not all(map(is_near, rows)))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

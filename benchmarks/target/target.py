@@ -5,7 +5,6 @@ Needs arm-none-eabi-gcc with newlib, and qemu-system-arm (`make tools`).
     python benchmarks/target/target.py [--samples N] [--traced N] [--json FILE]
 """
 
-import argparse
 import copy
 import re
 import shutil
@@ -13,12 +12,14 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+import typer
 from cycles import count_cycles
 
 import piezoest as pz
+from piezoest._options import one_of
 from piezoest.bench.origin import put
 from piezoest.bench.scenarios import SCENARIOS
 
@@ -78,11 +79,6 @@ def prepare(name: str, samples: int) -> tuple[Any, Any, Any, Any]:
     estimator, before = copy.deepcopy(estimator), compensator.copy()
     record = pz.track(r[learnt:end], stage=stage, compensator=compensator, estimator=teacher)
     return estimator, before, r[learnt:end], np.concatenate([[np.nan], record.measured[:-1]])
-
-
-def missing_tools() -> list[str]:
-    """Names of programs that are not there."""
-    return [name for name in (f"{CROSS}gcc", f"{CROSS}objdump", EMULATOR) if shutil.which(name) is None]
 
 
 def measure(name: str, precision: Any, samples: int, traced: int) -> dict[str, Any]:
@@ -193,37 +189,31 @@ def flash_and_ram(folder: Path, firmware: Path) -> dict[str, int]:
     return {"flash_controller": controller, "flash_firmware": whole, "ram_state": state}
 
 
-def main() -> int:
-    """Print the table; 1 if a voltage differs from the host's by more than rounding."""
-    parser = argparse.ArgumentParser(description="Exported controllers on an emulated Cortex-M4F.")
-    parser.add_argument("--samples", type=int, default=SAMPLES, help="samples compared with the host")
-    parser.add_argument("--traced", type=int, default=TRACED, help="samples whose instructions are counted")
-    parser.add_argument("--only", choices=sorted(controllers()), help="only this controller")
-    parser.add_argument("--precision", choices=["float", "double"], help="only this precision")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures to this file too")
-    arguments = parser.parse_args()
-    if absent := missing_tools():
+def main(
+    samples: int = SAMPLES, traced: int = TRACED,
+    only: Annotated[str | None, typer.Option(callback=one_of(*controllers()))] = None,
+    precision: Literal["float", "double"] | None = None, json: Path | None = None,
+) -> None:  # fmt: skip
+    """Compare SAMPLES with the host, count the instructions of TRACED; ONLY one controller, one PRECISION.
+
+    Fails if a voltage differs from the host's by more than rounding.
+    """
+    programs = (f"{CROSS}gcc", f"{CROSS}objdump", EMULATOR)
+    if absent := [name for name in programs if shutil.which(name) is None]:
         print(f"not found: {', '.join(absent)}: run make tools", file=sys.stderr)
-        return 2
+        sys.exit(2)
     rows = [
-        measure(name, precision, arguments.samples, arguments.traced)
-        for name in ([arguments.only] if arguments.only else controllers())
-        for precision in ([arguments.precision] if arguments.precision else ("float", "double"))
+        measure(name, kind, samples, traced)
+        for name in ([only] if only else controllers())
+        for kind in ([precision] if precision else ("float", "double"))
     ]
     for row in rows:
         print(", ".join(f"{name} {value}" for name, value in row.items()))
-    if arguments.json is not None:
-        put(
-            {"clock_Hz": CLOCK, "sample_rate_Hz": SAMPLE_RATE, "tools": tools(), "rows": rows}, arguments.json
-        )
-    apart = [row for row in rows if not row["largest_difference_from_host"] < 1e-5]
-    return 1 if apart else 0
-
-
-def tools() -> list[str]:
-    """First line of what each program says of itself."""
-    return [printed(name, "--version").splitlines()[0] for name in (f"{CROSS}gcc", EMULATOR)]
+    if json is not None:
+        tools = [printed(name, "--version").splitlines()[0] for name in (f"{CROSS}gcc", EMULATOR)]
+        put({"clock_Hz": CLOCK, "sample_rate_Hz": SAMPLE_RATE, "tools": tools, "rows": rows}, json)
+    sys.exit(any(not row["largest_difference_from_host"] < 1e-5 for row in rows))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)
