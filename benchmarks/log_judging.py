@@ -134,6 +134,7 @@ def judge(seed: int) -> Row:
     with warnings.catch_warnings(action="ignore"), np.errstate(all="ignore"):
         try:
             row |= judged(log, trained, fitted(log))
+            row |= ratios(row)
         except Exception as error:
             row["failure"] = f"{type(error).__name__}: {error}"[:FAILED]
     return {**row, "seconds": time.perf_counter() - began}
@@ -159,6 +160,17 @@ def judged(log: Log, trained: int, found: Found) -> Row:
     if log.family == FAMILY and found.theta is not None:
         row["z"] = scores(log, found)
     return row
+
+
+def ratios(row: Row) -> Row:
+    """The error relative to others', to the stroke and to the noise.
+
+    What is far below the noise counts as equal. `regret` is that to the best of all that is known.
+    """
+    floor = NEGLIGIBLE * row["noise"]
+    of = {name: max(row["chosen"], floor) / max(row[name], floor) for name in ("best", "nnls", "line")}
+    sizes = {name: row["chosen"] / row[name] for name in ("stroke", "noise")}
+    return {"ratio": of | sizes, "regret": max(of.values())}
 
 
 def scores(log: Log, found: Found) -> list[float | None]:

@@ -39,25 +39,9 @@ WORST = 10
 SHOWN = ("seed", "family", "voltage", "added", "chosen_name", "best_name")
 
 
-def ratios(row: Row) -> Row:
-    """The row and, if it was fitted, its error relative to others', to the stroke and to the noise.
-
-    What is far below the noise counts as equal. `regret` is that to the best of all that is known.
-    """
-    if row["failure"] is not None:
-        return row
-    floor = NEGLIGIBLE * row["noise"]
-    mine = max(row["chosen"], floor)
-    of = {name: mine / max(row[name], floor) for name in ("best", "nnls", "line")}
-    of |= {"stroke": row["chosen"] / row["stroke"], "noise": row["chosen"] / row["noise"]}
-    return {**row, "ratio": of, "regret": max(of["best"], of["nnls"], of["line"])}
-
-
 def quantiles(values: Sequence[float]) -> dict[str, float]:
     """By level, in per cent."""
-    if not values:
-        return {}
-    return {f"{100.0 * level:g} %": float(np.quantile(values, level)) for level in LEVELS}
+    return {f"{100.0 * level:g} %": float(np.quantile(values, level)) for level in LEVELS if values}
 
 
 def share(hits: Iterable[bool], of: int) -> float | None:
@@ -121,7 +105,6 @@ def scores(rows: Sequence[Row], clean: Sequence[Row]) -> list[Row]:
 
 def summarise(rows: Sequence[Row], clean: Sequence[Row] = ()) -> Row:
     """All that the page shows, as small for many logs as for few."""
-    rows = list(map(ratios, rows))
     fitted = [row for row in rows if row["failure"] is None]
     failed = [row for row in rows if row["failure"] is not None]
     worst = sorted(fitted, key=lambda row: row["regret"], reverse=True)[:WORST]
@@ -173,7 +156,7 @@ def main(
         **summarise(rows, pure),
     }
     if rows_to is not None:
-        lines = (json.dumps(json_safe(ratios(row)), ensure_ascii=False) for row in rows)
+        lines = (json.dumps(json_safe(row), ensure_ascii=False) for row in rows)
         write_text(rows_to, "".join(f"{line}\n" for line in lines))
     put(json_safe(document, DIGITS), json_to)
 

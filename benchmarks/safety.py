@@ -10,6 +10,7 @@ A run takes about half a second.
 """
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -47,17 +48,15 @@ CROSSED = {
     "by_family": ("family",), "by_reference": ("reference",), "by_mechanics": ("mechanics",),
     "by_often": ("often",),
 }  # fmt: skip
-COLOURS = {"controller": "#D55E00", "no_corridor": "#CC79A7", "line": "#0072B2", "parts": "#888888"}
-NAMES = {
-    "controller": "AdaptiveFeedforward", "no_corridor": "without corridor",
-    "line": "without candidates", "parts": "by hand",
-}  # fmt: skip
-GROUPS = {"all": "all runs", "healthy": "healthy rigs", "often": "called often"}
-# Which are drawn, and how.
-CURVES = [
-    ("controller", "all", "-"), ("controller", "healthy", "--"), ("controller", "often", ":"),
-    ("no_corridor", "all", "-"), ("line", "all", "-"), ("parts", "all", "-"),
-]  # fmt: skip
+# Which runs are drawn, and how.
+CURVES = {
+    ("controller", "all"): ("AdaptiveFeedforward, all runs", "#D55E00", "-"),
+    ("controller", "healthy"): ("AdaptiveFeedforward, healthy rigs", "#D55E00", "--"),
+    ("controller", "often"): ("AdaptiveFeedforward, called often", "#D55E00", ":"),
+    ("no_corridor", "all"): ("without corridor, all runs", "#CC79A7", "-"),
+    ("line", "all"): ("without candidates, all runs", "#0072B2", "-"),
+    ("parts", "all"): ("by hand, all runs", "#888888", "-"),
+}
 
 
 def often(row: Row) -> bool:
@@ -99,10 +98,9 @@ def summed_up(rows: Sequence[Row]) -> Row:
 def drawn(rows: Sequence[Row]) -> Row:
     """What was drawn, counted: names with their runs, numbers with their range."""
     names = {name: [row[name] for row in rows] for name in FEATURES}
-    limits = [f"{row['low']:g} to {row['high']:g}" for row in rows]
+    names["limits"] = [f"{row['low']:g} to {row['high']:g}" for row in rows]
     return {
-        **{name: {each: of.count(each) for each in sorted(set(of))} for name, of in names.items()},
-        "limits": {each: limits.count(each) for each in sorted(set(limits))},
+        **{name: dict(sorted(Counter(of).items())) for name, of in names.items()},
         "spans": {name: [min(row[name] for row in rows), max(row[name] for row in rows)] for name in SPANS},
     }
 
@@ -112,10 +110,9 @@ def draw(document: Row, path: Path) -> None:
     figure = new_figure(6.0, 4.6)
     axes = figure.subplots()
     above, least = 1.0 - np.array(document["levels"]), 1.0 / document["runs"]
-    for name, group, style in CURVES:
+    for (name, group), (label, color, style) in CURVES.items():
         if curve := document[name][group]["curve"]:
-            label = f"{NAMES[name]}, {GROUPS[group]}"
-            axes.plot(curve, np.maximum(above, least), style, color=COLOURS[name], lw=1.3, label=label)
+            axes.plot(curve, np.maximum(above, least), style, color=color, lw=1.3, label=label)
     axes.axvline(1.0, color="0.4", lw=0.8)
     axes.set(
         xscale="log", yscale="log", ylim=(0.8 * least, 1.1),

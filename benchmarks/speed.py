@@ -8,14 +8,14 @@ medians of the ratios within a round. Ours must come to its peer's result. Needs
 It takes some minutes.
 """
 
-import functools
 import itertools
 import os
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +73,11 @@ SLOW = (
 )
 
 
+our_rls = partial(pz.HysteresisRLS, SAMPLE_RATE, initial_model=START)
+our_ekf = partial(pz.HysteresisEKF, SAMPLE_RATE, initial_model=START)
+our_plays = partial(pz.PrandtlIshlinskiiRLS, SAMPLE_RATE, thresholds=12)
+
+
 def record(samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Reference, voltage and displacement of a triangle."""
     r = np.asarray(pz.signals.triangle(5.0, 5.0, samples * 5.0 / SAMPLE_RATE, SAMPLE_RATE)).copy()
@@ -101,14 +106,6 @@ def updated(z: FloatArray, phi: FloatArray) -> FloatArray:
     return learner.theta
 
 
-def our_rls(**options: Any) -> pz.HysteresisRLS:
-    return pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, **options)
-
-
-def our_plays(**options: Any) -> pz.PrandtlIshlinskiiRLS:
-    return pz.PrandtlIshlinskiiRLS(SAMPLE_RATE, thresholds=12, **options)
-
-
 def fast_work(c: peers.Reference, r: FloatArray, u: FloatArray, x: FloatArray) -> dict[str, Work]:
     """What takes nanoseconds a sample, by name."""
     off, on = peers.rls_settings(bounded=False), peers.rls_settings(bounded=True)
@@ -127,7 +124,7 @@ def fast_work(c: peers.Reference, r: FloatArray, u: FloatArray, x: FloatArray) -
         f"{RLS}, default": lambda: learnt(our_rls(errors=False), u, x),
         f"{RLS}, default, with errors": lambda: learnt(our_rls(), u, x),
         "exported C": lambda: exported(u, x)[-1],
-        EKF: lambda: learnt(pz.HysteresisEKF(SAMPLE_RATE, initial_model=START), u, x),
+        EKF: lambda: learnt(our_ekf(), u, x),
         "C, EKF": lambda: peers.loop_parameters(c.run("ekf", 4, kalman, u, x)[-1]),
         "InverseCompensator.run": lambda: pz.InverseCompensator(TRUE, limits=LIMITS).run(r)[-1:],
         "C, inverse": lambda: c.run("inverse", 1, inverse, r)[-1],
@@ -141,13 +138,9 @@ def fast_work(c: peers.Reference, r: FloatArray, u: FloatArray, x: FloatArray) -
 def slow_work(u: FloatArray, x: FloatArray) -> dict[str, Work]:
     """What takes microseconds a sample, and ours on the same short record."""
     z, phi = peers.regression(u, x)
-
-    def ekf() -> pz.HysteresisEKF:
-        return pz.HysteresisEKF(SAMPLE_RATE, initial_model=START, project=False)
-
     return {
-        FREE_EKF: lambda: learnt(ekf(), u, x),
-        "HysteresisEKF.step, not projected": lambda: stepped(ekf(), u, x),
+        FREE_EKF: lambda: learnt(our_ekf(project=False), u, x),
+        "HysteresisEKF.step, not projected": lambda: stepped(our_ekf(project=False), u, x),
         "FilterPyEKF.run": lambda: learnt(pz.FilterPyEKF(SAMPLE_RATE, initial_model=START), u, x),
         FILTERPY: lambda: peers.loop_parameters(peers.filterpy_ekf(u, x)),
         "filterpy's UKF, bare loop": lambda: peers.loop_parameters(peers.filterpy_ukf(u, x)),
@@ -181,17 +174,11 @@ def compared(pairs: tuple[Pair, ...], work: dict[str, Work], samples: int, round
     rows = []
     for pair in pairs:
         ours, peer = seconds[pair.ours], seconds[pair.peer]
-        apart = None
+        ns, peer_ns = (1e9 * float(np.median(each)) / samples for each in (ours, peer))
+        times = {"ns": ns, "peer_ns": peer_ns, "ratio": float(np.median(ours / peer)), "difference": None}
         if pair.is_same:
-            apart = float(np.max(np.abs(work[pair.ours]() / work[pair.peer]() - 1.0)))
-        rows.append(
-            {
-                "ours": pair.ours, "peer": pair.peer, "peer_does": pair.peer_does, "at_most": pair.at_most,
-                "ns": 1e9 * float(np.median(ours)) / samples,
-                "peer_ns": 1e9 * float(np.median(peer)) / samples,
-                "ratio": float(np.median(ours / peer)), "difference": apart,
-            }
-        )  # fmt: skip
+            times["difference"] = float(np.max(np.abs(work[pair.ours]() / work[pair.peer]() - 1.0)))
+        rows.append(asdict(pair) | times)
     return rows
 
 
@@ -219,8 +206,8 @@ def bank(c: peers.Reference, samples: int, rounds: int) -> list[Row]:
             bank.reset()
             bank.run(u, x, every=len(u))
 
-        work: dict[str, Work] = {name: functools.partial(go, each) for name, each in banks.items()}
-        work["C, one thread"] = functools.partial(c.bank, u, x, settings)
+        work: dict[str, Work] = {name: partial(go, each) for name, each in banks.items()}
+        work["C, one thread"] = partial(c.bank, u, x, settings)
         seconds = interleaved(work, rounds, time.perf_counter)
         apart = float(np.max(np.abs(banks["two threads"].theta / c.bank(u, x, settings) - 1.0)))
         times = {name: float(1e9 * np.median(values) / u.size) for name, values in seconds.items()}
@@ -241,8 +228,7 @@ def single_calls(function: Callable[..., Any], columns: tuple[FloatArray, ...], 
     seconds = 1e-9 * (clock() - began_all)
     own = float(np.median([-(clock() - clock()) for _ in range(1000)]))
     median, rare = np.percentile(times - own, [50.0, 99.9]).tolist()
-    late = int(np.sum(times > LATE))
-    return {"calls": count, "median": median, "p99.9": rare, "late": late, "late_per_second": late / seconds}
+    return {"median": median, "p99.9": rare, "late_per_second": int(np.sum(times > LATE)) / seconds}
 
 
 def live(r: FloatArray, u: FloatArray, x: FloatArray, turns: int) -> dict[str, Row]:

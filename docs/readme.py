@@ -11,8 +11,10 @@ from typing import Any
 import typer
 from page_parts import DOCS, NEEDS, SPEED, part_of, read
 
+import piezoest as pz
 from piezoest._files import save_figure, write_text
 from piezoest.bench import report
+from piezoest.bench.figures import new_figure
 
 README = DOCS.parent / "README.md"
 FIGURE = DOCS / "figures" / "effect.png"
@@ -76,24 +78,15 @@ def parts(text: str) -> tuple[str, str, str]:
 
 def draw(path: Path) -> None:
     """The error of a straight line whose gain is learnt, and of the controller, which is told the limits."""
-    import matplotlib.pyplot as plt
-
-    import piezoest as pz
-
     r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=8, sample_rate=50_000.0)
-    gain = pz.LinearGain(0.12)
+    gain, limits = pz.LinearGain(0.12), pz.VoltageLimits(-50.0, 100.0)
+    learner = pz.HysteresisRLS(r.sample_rate, initial_model=gain)
     ways: dict[str, dict[str, Any]] = {
-        "linear feed-forward": {
-            "compensator": pz.LinearCompensator(gain),
-            "estimator": pz.HysteresisRLS(r.sample_rate, initial_model=gain),
-        },
-        "AdaptiveFeedforward": {
-            "controller": pz.AdaptiveFeedforward(r.sample_rate, limits=pz.VoltageLimits(-50.0, 100.0))
-        },
+        "linear feed-forward": {"compensator": pz.LinearCompensator(gain), "estimator": learner},
+        "AdaptiveFeedforward": {"controller": pz.AdaptiveFeedforward(r.sample_rate, limits=limits)},
     }
-    figure, (series, loop) = plt.subplots(
-        1, 2, figsize=(6.4, 3.4), width_ratios=[1.6, 1], layout="constrained"
-    )
+    figure = new_figure(6.4, 3.4)
+    series, loop = figure.subplots(1, 2, width_ratios=[1.6, 1])
     for (name, loops), color in zip(ways.items(), ("0.55", "C0"), strict=True):
         record = pz.track(r, stage=pz.PaperStage(r.sample_rate, seed=0), **loops)
         label = f"{name}: {record.max_error(last_periods=2):.3f} µm at last"

@@ -65,7 +65,11 @@ def pieces(document: Document) -> dict[str, str]:
         "by_often": by(document, "often", "called often"),
         "crossed": crossed(mine),
         "worst": table_of("The worst runs of the controller", mine["worst"], WORST),
-        "told": told(mine["by_mode"]),
+        "told": table_of(
+            "Faults that got their right name, and errors that were as before",
+            (row for row in mine["by_mode"] if row["to_name"] or row["to_recover"]),
+            TOLD,
+        ),
         **settling(document),
         "singles": singles(document["singles"]),
         "dwell": table_of("After a long rest", (document["dwell"] or {"groups": []})["groups"], DWELL),
@@ -89,13 +93,11 @@ def numbers(document: Document) -> str:
 def drawn(of: Document) -> str:
     """Names with their runs, and spans of numbers."""
     body = [
-        [title, "; ".join(f"{each} {runs}" for each, runs in of[name].items())]
-        for name, title in DRAWN.items()
+        (title, "; ".join(f"{each} {n}" for each, n in of[name].items())) for name, title in DRAWN.items()
     ]
-    body += [[title, " to ".join(map(shown, of["spans"][name]))] for name, title in SPANS.items()]
-    return table(
-        "What is drawn: names with their runs, or smallest and largest number", ["quantity", "drawn"], body
-    )
+    body += [(title, " to ".join(map(shown, of["spans"][name]))) for name, title in SPANS.items()]
+    title = "What is drawn: names with their runs, or smallest and largest number"
+    return table(title, ["quantity", "drawn"], body)
 
 
 def groups(document: Document) -> list[tuple[list[str], Document]]:
@@ -108,10 +110,7 @@ def violations(document: Document) -> str:
     """Counts of each criterion that some run breaks."""
     broken = [name for name in CRITERIA if any(of["violations"][name] for _, of in groups(document))]
     body = [
-        [
-            *who,
-            *(f"{of['violations'][name]}/{of['judged' if 'ratio' in name else 'runs']}" for name in broken),
-        ]
+        who + [f"{of['violations'][name]}/{of['judged' if 'ratio' in name else 'runs']}" for name in broken]
         for who, of in groups(document)
     ]
     title = "Runs that break a promise, of the runs that are judged by it"
@@ -183,12 +182,6 @@ def found(document: Document) -> str:
     return table(
         "The other questions, in short", ["", "yes"], ([name, of_all(*of)] for name, of in lines.items())
     )
-
-
-def told(rows: list[Document]) -> str:
-    """Names of faults, and recovery."""
-    asked = [row for row in rows if row["to_name"] or row["to_recover"]]
-    return table_of("Faults that got their right name, and errors that were as before", asked, TOLD)
 
 
 def settling(document: Document) -> dict[str, str]:

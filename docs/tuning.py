@@ -11,8 +11,10 @@ from page_parts import DOCS, Document
 
 import piezoest as pz
 from piezoest._files import save_figure
+from piezoest.bench.figures import new_figure
 from piezoest.bench.metrics import settles
 from piezoest.bench.origin import origin, put
+from piezoest.stage.paper import mechanics_and_instruments
 
 RATE, FREQUENCY, AMPLITUDE = 10_000.0, 5.0, 5.0  # Hz, Hz, µm
 SEEDS = 3
@@ -35,11 +37,9 @@ def triangle(seconds: float, amplitude: float = AMPLITUDE) -> pz.Signal:
 
 def late_stage(lag: int) -> pz.SimulatedStage:
     """The simulated stage, with a sensor that lags by whole samples."""
-    paper = pz.PaperStage(RATE)
-    return pz.SimulatedStage(
-        RATE, paper.hysteresis, creep=paper.creep, mechanics=paper.mechanics, amplifier=paper.amplifier,
-        gauge=replace(paper.gauge, delay=lag),
-    )  # fmt: skip
+    paper, parts = pz.PaperStage(RATE), mechanics_and_instruments(RATE)
+    parts["gauge"] = replace(parts["gauge"], delay=lag)
+    return pz.SimulatedStage(hysteresis=paper.hysteresis, creep=paper.creep, **parts)
 
 
 def learn(r: pz.Signal, stage: Any, estimator: Any, every: int = 50) -> pz.TrackingRecord:
@@ -126,9 +126,8 @@ def excitation() -> list[Document]:
 
 
 def draw(document: Document) -> None:
-    import matplotlib.pyplot as plt
-
-    figure, (first, middle, last) = plt.subplots(3, 1, figsize=(6, 9.5), layout="constrained")
+    figure = new_figure(6, 9.5)
+    first, middle, last = figure.subplots(3)
     default, *fixed = document["memories"]
     for name, color in ((WORST, "C3"), (SETTLED, "C0")):
         first.loglog(MEMORIES, [row[name] for row in fixed], "o-", color=color, label=f"memory=…: {name}")

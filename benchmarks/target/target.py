@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -34,32 +35,23 @@ SAMPLE_RATE, CLOCK = 50_000.0, 168e6  # Hz
 LEARNT = 4.048  # s
 SAMPLES, TRACED = 4000, 400
 MOVED = "RLS, model moved"
+START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
 OUTSIDE = pz.ColemanHodgdon(0.02, 0.12, 0.0072)
 LIMITS = pz.VoltageLimits(-60.0, 60.0)
 
 
 def controllers() -> dict[str, tuple[Any, Any]]:
     """What is measured, by name: estimator and compensator."""
-    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    rls, inverse = partial(pz.HysteresisRLS, SAMPLE_RATE), partial(pz.InverseCompensator, START, LIMITS)
     line = pz.LinearGain(0.15)
-
-    def inverse() -> Any:
-        return pz.InverseCompensator(start, LIMITS)
-
     return {
         "inverse alone": (None, inverse()),
-        "linear gain learnt": (
-            pz.HysteresisRLS(SAMPLE_RATE, initial_model=line),
-            pz.LinearCompensator(line, LIMITS),
-        ),
-        "RLS and inverse": (pz.HysteresisRLS(SAMPLE_RATE, initial_model=start), inverse()),
+        "linear gain learnt": (rls(initial_model=line), pz.LinearCompensator(line, LIMITS)),
+        "RLS and inverse": (rls(initial_model=START), inverse()),
         # Outside of the admissible set, and sure of it: every model handed over has to be moved.
-        MOVED: (pz.HysteresisRLS(SAMPLE_RATE, initial_model=OUTSIDE, uncertainty=1e-3), inverse()),
-        "RLS, the paper's memory": (
-            pz.HysteresisRLS(SAMPLE_RATE, initial_model=start, memory=0.4),
-            inverse(),
-        ),
-        "EKF and inverse": (pz.HysteresisEKF(SAMPLE_RATE, initial_model=start), inverse()),
+        MOVED: (rls(initial_model=OUTSIDE, uncertainty=1e-3), inverse()),
+        "RLS, the paper's memory": (rls(initial_model=START, memory=0.4), inverse()),
+        "EKF and inverse": (pz.HysteresisEKF(SAMPLE_RATE, initial_model=START), inverse()),
     }
 
 
@@ -91,8 +83,7 @@ def measure(name: str, precision: Any, samples: int, traced: int) -> dict[str, A
         code.write(folder)
         firmware = build(folder, precision, r, x)
         voltages, stack = run(firmware, precision)
-        few = build(folder, precision, r[:traced], x[:traced])
-        counts, cycles = trace(few)
+        counts, cycles = trace(build(folder, precision, r[:traced], x[:traced]))
         sizes = flash_and_ram(folder, firmware)
     apart = np.abs(voltages - expected) / np.max(np.abs(expected))
     budget = CLOCK / SAMPLE_RATE
@@ -109,7 +100,6 @@ def measure(name: str, precision: Any, samples: int, traced: int) -> dict[str, A
         "cycles_largest": int(np.max(cycles)),
         "load_mean": float(np.mean(cycles[10:])) / budget,
         "load_largest": int(np.max(cycles)) / budget,
-        "half_left": bool(np.max(cycles) <= 0.5 * budget),
         "stack": stack,
         **sizes,
     }
@@ -152,13 +142,10 @@ def emulate(firmware: Path, *options: str) -> str:
 
 def run(firmware: Path, precision: str) -> tuple[Any, int]:
     """Voltages and bytes of stack."""
-    text = emulate(firmware)
-    digits, number, whole = (
-        (8, np.float32, np.uint32) if precision == "float" else (16, np.float64, np.uint64)
-    )
-    before, after = text.split("stack ")
-    words = re.findall(rf"^[0-9a-f]{{{digits}}}$", before, re.M)
-    voltages = np.array([int(word, 16) for word in words], whole).view(number).astype(np.float64)
+    size = 4 if precision == "float" else 8
+    before, after = emulate(firmware).split("stack ")
+    words = re.findall(rf"^[0-9a-f]{{{2 * size}}}$", before, re.M)
+    voltages = np.frombuffer(bytes.fromhex("".join(words)), f">f{size}").astype(np.float64)
     return voltages, int(after.split()[0], 16)
 
 
@@ -167,9 +154,7 @@ def trace(firmware: Path) -> tuple[Any, Any]:
     listing = printed(f"{CROSS}objdump", "-d", "--no-show-raw-insn", str(firmware))
     path = firmware.with_suffix(".trace")
     emulate(firmware, "-singlestep", "-d", "exec,nochain", "-D", str(path))
-    result = count_cycles(listing, path)
-    path.unlink()
-    return result
+    return count_cycles(listing, path)
 
 
 def printed(*command: str) -> str:
@@ -178,15 +163,12 @@ def printed(*command: str) -> str:
 
 
 def flash_and_ram(folder: Path, firmware: Path) -> dict[str, int]:
-    """Bytes of the controller's code and constants, of the whole firmware with its log, of the state."""
+    """Bytes of the controller's code and constants, and of its state."""
     subprocess.run([f"{CROSS}gcc", *CPU, *FLAGS, "-c", "controller.c", "-o", "c.o"], cwd=folder, check=True)
-    controller, whole = (
-        int(printed(f"{CROSS}size", str(binary)).splitlines()[1].split()[0])
-        for binary in (folder / "c.o", firmware)
-    )
+    flash = int(printed(f"{CROSS}size", str(folder / "c.o")).splitlines()[1].split()[0])
     symbols = map(str.split, printed(f"{CROSS}nm", "-S", "--defined-only", str(firmware)).splitlines())
     state = next(int(row[1], 16) for row in symbols if len(row) == 4 and row[3] == "state")
-    return {"flash_controller": controller, "flash_firmware": whole, "ram_state": state}
+    return {"flash_controller": flash, "ram_state": state}
 
 
 def main(

@@ -25,7 +25,7 @@ from piezoest.bench.paper_tables import PRBS_ROW, Published, crossed_row, publis
 from piezoest.compensators import InverseCompensator, LinearCompensator
 from piezoest.estimators.rls import HysteresisRLS
 from piezoest.models import ColemanHodgdon, LinearGain
-from piezoest.stage import PaperStage
+from piezoest.stage import PaperStage, SimulatedStage
 from piezoest.tracking import TrackingRecord, track
 
 Compensation = Literal["linear", "inverse"]
@@ -94,26 +94,24 @@ class Experiment:
         """Least length of the run [s]."""
         return max(SECONDS, MEMORIES_TO_SETTLE * (self.memory or 0.0))
 
-    def run(self) -> Run:
-        """Run it."""
-        model: Any = self.model
-        compensator = (
-            LinearCompensator(model)
-            if self.compensation == "linear"
-            else InverseCompensator(model, hand_over=HAND_OVER)
-        )
-        estimator = (
-            None
-            if self.memory is None
-            else HysteresisRLS(SAMPLE_RATE, initial_model=self.model, memory=self.memory)
-        )
-        record = track(
-            self.reference.signal(self.seconds),
-            stage=PaperStage(SAMPLE_RATE, seed=self.seed),
-            compensator=compensator,
+    def follow(self, stage: SimulatedStage, seconds: float) -> TrackingRecord:
+        """Record of a stage that follows the reference for at least so long [s]."""
+        model, estimator = self.model, None
+        if self.memory is not None:
+            estimator = HysteresisRLS(SAMPLE_RATE, initial_model=model, memory=self.memory)
+        return track(
+            self.reference.signal(seconds),
+            stage=stage,
+            compensator=LinearCompensator(model)
+            if isinstance(model, LinearGain)
+            else InverseCompensator(model, hand_over=HAND_OVER),
             estimator=estimator,
             update_interval=UPDATE_INTERVAL,
         )
+
+    def run(self) -> Run:
+        """Run it."""
+        record = self.follow(PaperStage(SAMPLE_RATE, seed=self.seed), self.seconds)
         last = record.theta[-(record.period or 1) :]
         return Run(
             experiment=self,
