@@ -21,6 +21,7 @@ import numpy as np
 from piezoest import signals
 from piezoest._checks import integer, positive
 from piezoest.bench.executors import in_processes
+from piezoest.bench.metrics import settles
 from piezoest.bench.paper_tables import PRBS_ROW, Published, crossed_row, published, triangle_row
 from piezoest.compensators import InverseCompensator, LinearCompensator
 from piezoest.estimators.rls import HysteresisRLS
@@ -153,9 +154,8 @@ class Run:
         """
         if self.max_error > SETTLED * self.errors[0]:
             return None
-        late = np.flatnonzero(np.asarray(self.errors) > SETTLED * self.max_error)
-        settled = int(late[-1]) + 1 if late.size else 0
-        return settled if settled <= len(self.errors) // 2 else None
+        settled = settles(np.asarray(self.errors), SETTLED * self.max_error)
+        return settled if settled is not None and settled <= len(self.errors) // 2 else None
 
     @property
     def settling_time(self) -> float | None:
