@@ -6,20 +6,21 @@ it runs the stage itself, and its settled error is compared with the library's. 
     python benchmarks/controller.py [--samples N] [--only SCENARIO] [--json FILE]
 """
 
-import argparse
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import typer
 
 import piezoest as pz
+from piezoest.bench.estimators import candidate
 from piezoest.bench.origin import origin, put
 from piezoest.bench.scenarios import SCENARIOS
 
 JUDGED = 10  # periods at the end; the stage has settled long before
 LIMITS = pz.VoltageLimits(-80.0, 80.0)
-ESTIMATORS: dict[str, Any] = {"HysteresisRLS": pz.HysteresisRLS, "HysteresisEKF": pz.HysteresisEKF}
+ESTIMATORS = ("HysteresisRLS", "HysteresisEKF")
 LARGEST_DIFFERENCE, LARGEST_FLOAT = 1e-12, 0.01
 ROUNDING = 3.0  # times that of the reference: a float build rounds at every step, not once
 
@@ -28,11 +29,8 @@ def build(name: str, samples: int) -> tuple[Any, Any]:
     """Case and reference of at least so many samples, where the scenario can be that long."""
     periods = max(2, samples // 10_000)
     seconds = samples / 50_000.0
-    before = max(1, periods // 2)
-    switches = name in ("amplitude-switch", "amplitude-drop")
     case = SCENARIOS[name].build(
-        0, sample_rate=50_000.0, updates=200, before=before,
-        after=periods - before if switches else periods,
+        0, sample_rate=50_000.0, updates=200, before=max(1, periods // 2), after=periods,
         rest=0.5 * seconds, drift=min(0.9 * seconds, 30.0),
     )  # fmt: skip
     r = case.reference
@@ -49,7 +47,7 @@ def settled(error: Any, period: float) -> float:
 def compare(name: str, learner: str, samples: int) -> dict[str, Any]:
     """One scenario, one estimator."""
     case, r = build(name, samples)
-    estimator = ESTIMATORS[learner](case.sample_rate, initial_model=case.start)
+    estimator = candidate(learner)(case.sample_rate, case.start)
     compensator = pz.InverseCompensator(case.start, LIMITS)
     double, single = (
         pz.export.CompiledController(pz.export.c(estimator, compensator, precision=precision))
@@ -64,21 +62,20 @@ def compare(name: str, learner: str, samples: int) -> dict[str, Any]:
     before = np.concatenate([[np.nan], library.measured[:-1]])
     off = np.max(np.abs(double.run(library.reference, before) - library.voltage))
     own = pz.track(r, stage=case.new_stage(), compensator=single)
-    errors = [settled(record.error, case.period) for record in (library, own)]
-    apart, rounded = abs(errors[1] / errors[0] - 1.0), None
+    ours, float_ = (settled(record.error, case.period) for record in (library, own))
+    apart, rounded = abs(float_ / ours - 1.0), None
     if apart > LARGEST_FLOAT:
         # How far the ring carries a difference in the seventh digit: no float build can come closer.
-        near = pz.signals.from_array(
-            r.values.astype(np.float32).astype(float), r.sample_rate, period=r.period
-        )
-        rounded = settled(by_library(near).error, case.period)
+        near = r.values.astype(np.float32).astype(float)
+        near_run = by_library(pz.signals.from_array(near, r.sample_rate, period=r.period))
+        rounded = settled(near_run.error, case.period)
     return {
         "scenario": name,
         "estimator": learner,
         "samples": len(r),
         "double_difference": float(off / np.max(np.abs(library.voltage))),
-        "settled_error_um": errors[0],
-        "settled_error_float_um": errors[1],
+        "settled_error_um": ours,
+        "settled_error_float_um": float_,
         "float_difference": apart,
         "settled_error_of_rounded_reference_um": rounded,
     }
@@ -92,21 +89,16 @@ def is_near(row: dict[str, Any]) -> bool:
     return bool(row["double_difference"] <= LARGEST_DIFFERENCE and row["float_difference"] <= allowed)
 
 
-def main() -> int:
-    """Print the comparison; 1 if a difference is too large."""
-    parser = argparse.ArgumentParser(description="Generated C against the library, scenario by scenario.")
-    parser.add_argument("--samples", type=int, default=1_000_000, help="of each scenario")
-    parser.add_argument("--only", action="append", help="only this scenario; may be repeated")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures to this file")
-    given = parser.parse_args()
+def main(samples: int = 1_000_000, only: list[str] | None = None, json: Path | None = None) -> None:
+    """Compare SAMPLES of each scenario, or ONLY of some; fails if a difference is too large."""
     rows = []
-    for name in given.only or SCENARIOS:
+    for name in only or SCENARIOS:
         for learner in ESTIMATORS:
-            rows.append(compare(name, learner, given.samples))
+            rows.append(compare(name, learner, samples))
             print(rows[-1], "" if is_near(rows[-1]) else "too far apart", file=sys.stderr, flush=True)
-    put({**origin(), "rows": rows}, given.json)
-    return 0 if all(map(is_near, rows)) else 1
+    put({**origin(), "rows": rows}, json)
+    sys.exit(not all(map(is_near, rows)))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

@@ -9,8 +9,8 @@ does that.
 import contextlib
 import time
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -45,10 +45,7 @@ class Found:
 
 def fitted(log: Log) -> Found:
     """The one place that knows piezoest's face."""
-
-    def identify(model: str = "auto") -> Any:
-        return pz.identify(log.u, log.x, sample_rate=log.sample_rate, train=TRAIN, model=model)
-
+    identify = partial(pz.identify, log.u, log.x, sample_rate=log.sample_rate, train=TRAIN)
     found = identify()
     predicted = found.predict()
     result = Found(
@@ -58,7 +55,7 @@ def fitted(log: Log) -> Found:
     if log.family == FAMILY:
         # A log may leave a parameter open, which identify then refuses.
         with contextlib.suppress(ValueError):
-            of = found if isinstance(found.model, ColemanHodgdon) else identify(FAMILY)
+            of = found if isinstance(found.model, ColemanHodgdon) else identify(model=FAMILY)
             result.theta, result.errors = np.array(of.model.theta), dict(of.standard_errors)
     return result
 
@@ -133,15 +130,14 @@ def judge(seed: int) -> Row:
         "line": rms(by_line(u, log.x, trained)[trained:] - target), "failure": None,
     }  # fmt: skip
     began = time.perf_counter()
-    try:
-        with _quietly():
-            found = fitted(log)
-            row["seconds"] = time.perf_counter() - began
-            row |= judged(log, trained, found)
-    except Exception as error:
-        row["seconds"] = time.perf_counter() - began
-        row["failure"] = f"{type(error).__name__}: {error}"[:FAILED]
-    return row
+    # Warnings of numbers are not the judge's matter; what comes out is.
+    with warnings.catch_warnings(action="ignore"), np.errstate(all="ignore"):
+        try:
+            row |= judged(log, trained, fitted(log))
+            row |= ratios(row)
+        except Exception as error:
+            row["failure"] = f"{type(error).__name__}: {error}"[:FAILED]
+    return {**row, "seconds": time.perf_counter() - began}
 
 
 def judged(log: Log, trained: int, found: Found) -> Row:
@@ -149,28 +145,32 @@ def judged(log: Log, trained: int, found: Found) -> Row:
 
     A candidate is best whose own held-out error is the least; it is then judged as the others are.
     """
-    target = expected(log, trained)
-
     # Some predict only what was read.
     read = np.isfinite(log.x[trained:])
-
-    def error(name: str) -> np.ndarray:
-        return (found.predictions[name][trained:] - target)[read]
-
-    missed = error(found.chosen)
-    if not np.isfinite(missed).all():
+    missed = {name: (x[trained:] - expected(log, trained))[read] for name, x in found.predictions.items()}
+    if not np.isfinite(missed[found.chosen]).all():
         raise ValueError("the prediction is not finite")
-    best = min(found.held_out, key=lambda name: found.held_out[name])
+    best = min(found.held_out, key=found.held_out.__getitem__)
     row: Row = {
-        "chosen": rms(missed), "best": min(rms(missed), rms(error(best))),
-        "chosen_name": found.chosen, "best_name": best, "level": float(abs(np.mean(missed))),
-        "own": found.held_out[found.chosen],
+        "chosen": rms(missed[found.chosen]), "chosen_name": found.chosen, "best_name": best,
+        "best": min(rms(missed[name]) for name in (found.chosen, best)), "own": found.held_out[found.chosen],
     }  # fmt: skip
     if found.lower is not None and found.upper is not None:
         row["coverage"] = coverage(log, trained, found.lower, found.upper)
     if log.family == FAMILY and found.theta is not None:
         row["z"] = scores(log, found)
     return row
+
+
+def ratios(row: Row) -> Row:
+    """The error relative to others', to the stroke and to the noise.
+
+    What is far below the noise counts as equal. `regret` is that to the best of all that is known.
+    """
+    floor = NEGLIGIBLE * row["noise"]
+    of = {name: max(row["chosen"], floor) / max(row[name], floor) for name in ("best", "nnls", "line")}
+    sizes = {name: row["chosen"] / row[name] for name in ("stroke", "noise")}
+    return {"ratio": of | sizes, "regret": max(of.values())}
 
 
 def scores(log: Log, found: Found) -> list[float | None]:
@@ -185,14 +185,6 @@ def clean_scores(seed: int) -> Row:
     """Scores of a Coleman-Hodgdon stage to whose log nothing is added that the model lacks."""
     log = draw(seed, family=FAMILY, clean=True)
     row: Row = {"seed": seed, "z": None}
-    with contextlib.suppress(Exception), _quietly():
+    with contextlib.suppress(Exception), warnings.catch_warnings(action="ignore"), np.errstate(all="ignore"):
         row["z"] = scores(log, fitted(log))
     return row
-
-
-@contextlib.contextmanager
-def _quietly() -> Iterator[None]:
-    """Warnings of numbers are not the judge's matter; what comes out is."""
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        yield

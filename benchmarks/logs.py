@@ -9,15 +9,14 @@ straight line.
 A log takes about a second.
 """
 
-import argparse
 import json
-import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 from log_judging import NEGLIGIBLE, PLAYS, TRAIN, clean_scores, judge
 
 from piezoest._files import write_text
@@ -32,34 +31,17 @@ from piezoest.models import ColemanHodgdon
 Row = dict[str, Any]
 
 NEAR = 1.2  # of the best candidate's error
-SIZES = {"short": (0, 10_000), "middle": (10_000, 25_000), "long": (25_000, 1 << 30)}  # samples
 LEVELS = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 1.0)
 RATIOS = ("best", "nnls", "line", "stroke", "noise")
 COVERED = ("below 50 %", "50 to 90 %", "90 to 98 %", "above 98 %")
 COVERED_AT = (0.5, 0.9, 0.98)
 WORST = 10
-SHOWN = ("seed", "family", "voltage", "added", "chosen_name", "best_name", "seconds")
-
-
-def ratios(row: Row) -> Row:
-    """The row and, if it was fitted, its error relative to others', to the stroke and to the noise.
-
-    What is far below the noise counts as equal. `regret` is that to the best of all that is known.
-    """
-    if row["failure"] is not None:
-        return row
-    floor = NEGLIGIBLE * row["noise"]
-    mine = max(row["chosen"], floor)
-    of = {name: mine / max(row[name], floor) for name in ("best", "nnls", "line")}
-    of |= {"stroke": row["chosen"] / row["stroke"], "noise": row["chosen"] / row["noise"]}
-    return {**row, "ratio": of, "regret": max(of["best"], of["nnls"], of["line"])}
+SHOWN = ("seed", "family", "voltage", "added", "chosen_name", "best_name")
 
 
 def quantiles(values: Sequence[float]) -> dict[str, float]:
     """By level, in per cent."""
-    if not values:
-        return {}
-    return {f"{100.0 * level:g} %": float(np.quantile(values, level)) for level in LEVELS}
+    return {f"{100.0 * level:g} %": float(np.quantile(values, level)) for level in LEVELS if values}
 
 
 def share(hits: Iterable[bool], of: int) -> float | None:
@@ -102,9 +84,8 @@ def coverages(known: Sequence[float]) -> Row | None:
     """How often the interval of 95 % held what."""
     if not known:
         return None
-    places = np.digitize(known, COVERED_AT, right=False)
-    counts = {name: int(np.sum(places == i)) for i, name in enumerate(COVERED)}
-    return {"logs": len(known), "counts": counts, "quantiles": quantiles(known)}
+    places = np.digitize(known, COVERED_AT)
+    return {"counts": {name: int(np.sum(places == i)) for i, name in enumerate(COVERED)}}
 
 
 def scores(rows: Sequence[Row], clean: Sequence[Row]) -> list[Row]:
@@ -116,22 +97,14 @@ def scores(rows: Sequence[Row], clean: Sequence[Row]) -> list[Row]:
     for group, mine in (("clean", clean), ("all", rows)):
         for i, name in enumerate(ColemanHodgdon.parameter_names):
             z = [abs(each[i]) for each in values(mine, "z") if each[i] is not None]
-            found.append(
-                {
-                    "logs_with": group,
-                    "parameter": name,
-                    "logs": len(z),
-                    "within_2": share((each <= 2.0 for each in z), len(z)),
-                    "median": median(z),
-                    "largest": max(z, default=None),
-                }
-            )
+            within = share((each <= 2.0 for each in z), len(z))
+            row = {"logs_with": group, "parameter": name, "logs": len(z), "within_2": within}
+            found.append({**row, "median": median(z), "largest": max(z, default=None)})
     return found
 
 
 def summarise(rows: Sequence[Row], clean: Sequence[Row] = ()) -> Row:
     """All that the page shows, as small for many logs as for few."""
-    rows = [{**ratios(row), "size": size(row["samples"])} for row in rows]
     fitted = [row for row in rows if row["failure"] is None]
     failed = [row for row in rows if row["failure"] is not None]
     worst = sorted(fitted, key=lambda row: row["regret"], reverse=True)[:WORST]
@@ -139,24 +112,15 @@ def summarise(rows: Sequence[Row], clean: Sequence[Row] = ()) -> Row:
         "all": part(rows),
         "by_family": parts(rows, "family"),
         "by_voltage": parts(rows, "voltage"),
-        "by_size": parts(rows, "size"),
         "by_chosen": parts(fitted, "chosen_name"),
         "by_added": by_added(rows),
         "quantiles": {name: quantiles([row["ratio"][name] for row in fitted]) for name in RATIOS},
         "seconds": quantiles([row["seconds"] for row in rows]),
         "coverage": coverages(values(fitted, "coverage")),
         "scores": scores(fitted, clean),
-        "worst": [
-            {**{name: row[name] for name in SHOWN}, **row["ratio"], "level": row["level"] / row["chosen"]}
-            for row in worst
-        ],
+        "worst": [{**{name: row[name] for name in SHOWN}, **row["ratio"]} for row in worst],
         "failures": [{"seed": row["seed"], "text": row["failure"]} for row in failed[:WORST]],
     }
-
-
-def size(samples: int) -> str:
-    """Short, middle or long."""
-    return next(name for name, (low, high) in SIZES.items() if low <= samples < high)
 
 
 def played(what: str, work: Callable[[int], Row], seeds: Sequence[int], workers: int | None) -> list[Row]:
@@ -169,39 +133,33 @@ def played(what: str, work: Callable[[int], Row], seeds: Sequence[int], workers:
     return sorted(rows, key=lambda row: row["seed"])
 
 
-def main(given: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--logs", type=int, default=200, help="one for each seed")
-    parser.add_argument("--seed", type=int, default=5000, help="the first one")
-    parser.add_argument(
-        "--clean", type=int, default=50, help="Coleman-Hodgdon stages for the standard errors"
-    )
-    parser.add_argument("--workers", type=int, help="processes; default one for each core")
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--rows", type=Path, help="each log as a line of JSON, to compare two versions")
-    arguments = parser.parse_args(given)
-    if arguments.logs < 1:
-        parser.error("--logs must be at least 1")
+def main(
+    logs: Annotated[int, typer.Option(min=1)] = 200, seed: int = 5000, clean: int = 50,
+    workers: int | None = None, json_to: Annotated[Path | None, typer.Option("--json")] = None,
+    rows_to: Annotated[Path | None, typer.Option("--rows")] = None,
+) -> None:  # fmt: skip
+    """Fit LOGS, one for each seed from SEED on, and CLEAN Coleman-Hodgdon stages for the standard errors.
 
+    It takes WORKERS processes, one for each core. ROWS gets each log as a line of JSON, to compare two
+    versions.
+    """
     began = time.perf_counter()
-    first = arguments.seed
-    rows = played("logs", judge, range(first, first + arguments.logs), arguments.workers)
-    clean = played("clean logs", clean_scores, range(first, first + arguments.clean), arguments.workers)
+    rows = played("logs", judge, range(seed, seed + logs), workers)
+    pure = played("clean logs", clean_scores, range(seed, seed + clean), workers)
     document = {
         "suite": "logs",
         **origin(began),
-        "logs": arguments.logs,
-        "seed": first,
-        "clean": arguments.clean,
-        "criteria": {"train": TRAIN, "plays": PLAYS, "near": NEAR, "negligible": NEGLIGIBLE, "sizes": SIZES},
-        **summarise(rows, clean),
+        "logs": logs,
+        "seed": seed,
+        "clean": clean,
+        "criteria": {"train": TRAIN, "plays": PLAYS, "near": NEAR, "negligible": NEGLIGIBLE},
+        **summarise(rows, pure),
     }
-    if arguments.rows is not None:
-        lines = (json.dumps(json_safe(ratios(row)), ensure_ascii=False) for row in rows)
-        write_text(arguments.rows, "".join(f"{line}\n" for line in lines))
-    put(json_safe(document, DIGITS), arguments.json)
-    return 0
+    if rows_to is not None:
+        lines = (json.dumps(json_safe(row), ensure_ascii=False) for row in rows)
+        write_text(rows_to, "".join(f"{line}\n" for line in lines))
+    put(json_safe(document, DIGITS), json_to)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from padasip.filters import FilterRLS
 
 import piezoest as pz
+from piezoest.equations.coleman_hodgdon import sample_regressor
 
 FloatArray = NDArray[np.float64]
 
@@ -75,14 +76,12 @@ class Exported:
     """What `piezoest export c` makes of a `HysteresisRLS`, without the controller round it."""
 
     def __init__(self, estimator: pz.HysteresisRLS) -> None:
-        limits = pz.VoltageLimits(-100.0, 100.0)
-        code = pz.export.c(estimator, pz.InverseCompensator(START, limits))
+        code = pz.export.c(estimator, pz.InverseCompensator(START, pz.VoltageLimits(-100.0, 100.0)))
         self._scale = np.ascontiguousarray(estimator.settings["parameter_scale"])
         with tempfile.TemporaryDirectory() as folder:
             _, source = code.write(folder)
             loop = Path(folder) / "loop.c"
-            text = _LOOP.format(source=source.name, name=code.name, n=self._scale.size)
-            loop.write_text(text, encoding="utf-8")
+            loop.write_text(_LOOP.format(source=source.name, name=code.name, n=self._scale.size))
             self._library = compiled(loop)
 
     def __call__(self, u: FloatArray, x: FloatArray) -> FloatArray:
@@ -193,10 +192,8 @@ def filterpy_ukf(u: FloatArray, x: FloatArray) -> FloatArray:
 
 def regression(u: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Output and regressors of (18)-(20), unfiltered."""
-    du = np.diff(u)
-    travel = np.abs(du)
-    middle_u, middle_x = 0.5 * (u[1:] + u[:-1]), 0.5 * (x[1:] + x[:-1])
-    return np.diff(x), np.column_stack([-middle_x * travel, du, middle_u * travel])
+    rise, moment, travel = sample_regressor(u[:-1], u[1:])
+    return np.diff(x), np.column_stack([-0.5 * (x[1:] + x[:-1]) * travel, rise, moment])
 
 
 def padasip_rls(z: FloatArray, phi: FloatArray) -> FloatArray:

@@ -9,26 +9,28 @@ the rest. What is written sums them up and is as small for many runs as for few.
 A run takes about half a second.
 """
 
-import argparse
-import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from piezoest._files import save_figure
 from piezoest._progress import progress
+from piezoest.bench.figures import new_figure
 from piezoest.bench.origin import json_safe, origin, put
 from piezoest.bench.store import played
 from piezoest.bench.table import DIGITS
-from piezoest.bench.zoo import contenders, dwelling, judging, settling
+from piezoest.bench.zoo import contenders, dwelling, judging, settling, tasks
 from piezoest.bench.zoo.contest import contest, summarise_contest
 from piezoest.bench.zoo.summary import counts, grouped, summarise, values
-from piezoest.bench.zoo.tasks import Task, over_cores, runs, tasks
+from piezoest.bench.zoo.tasks import Task, over_cores
 
 Row = dict[str, Any]
+Count = Annotated[int, typer.Option(min=1)]
 
 DEFAULT = contenders.DEFAULT
 CONTROLLERS = {
@@ -46,17 +48,15 @@ CROSSED = {
     "by_family": ("family",), "by_reference": ("reference",), "by_mechanics": ("mechanics",),
     "by_often": ("often",),
 }  # fmt: skip
-COLOURS = {"controller": "#D55E00", "no_corridor": "#CC79A7", "line": "#0072B2", "parts": "#888888"}
-NAMES = {
-    "controller": "AdaptiveFeedforward", "no_corridor": "without corridor",
-    "line": "without candidates", "parts": "by hand",
-}  # fmt: skip
-GROUPS = {"all": "all runs", "healthy": "healthy rigs", "often": "called often"}
-# Which are drawn, and how.
-CURVES = [
-    ("controller", "all", "-"), ("controller", "healthy", "--"), ("controller", "often", ":"),
-    ("no_corridor", "all", "-"), ("line", "all", "-"), ("parts", "all", "-"),
-]  # fmt: skip
+# Which runs are drawn, and how.
+CURVES = {
+    ("controller", "all"): ("AdaptiveFeedforward, all runs", "#D55E00", "-"),
+    ("controller", "healthy"): ("AdaptiveFeedforward, healthy rigs", "#D55E00", "--"),
+    ("controller", "often"): ("AdaptiveFeedforward, called often", "#D55E00", ":"),
+    ("no_corridor", "all"): ("without corridor, all runs", "#CC79A7", "-"),
+    ("line", "all"): ("without candidates, all runs", "#0072B2", "-"),
+    ("parts", "all"): ("by hand, all runs", "#888888", "-"),
+}
 
 
 def often(row: Row) -> bool:
@@ -98,26 +98,21 @@ def summed_up(rows: Sequence[Row]) -> Row:
 def drawn(rows: Sequence[Row]) -> Row:
     """What was drawn, counted: names with their runs, numbers with their range."""
     names = {name: [row[name] for row in rows] for name in FEATURES}
-    limits = [f"{row['low']:g} to {row['high']:g}" for row in rows]
+    names["limits"] = [f"{row['low']:g} to {row['high']:g}" for row in rows]
     return {
-        **{name: {each: of.count(each) for each in sorted(set(of))} for name, of in names.items()},
-        "limits": {each: limits.count(each) for each in sorted(set(limits))},
+        **{name: dict(sorted(Counter(of).items())) for name, of in names.items()},
         "spans": {name: [min(row[name] for row in rows), max(row[name] for row in rows)] for name in SPANS},
     }
 
 
 def draw(document: Row, path: Path) -> None:
     """Draw how large a part of the runs has a ratio above any value."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.0, 4.6), layout="constrained")
+    figure = new_figure(6.0, 4.6)
     axes = figure.subplots()
-    above = 1.0 - np.array(document["levels"])
-    least = 1.0 / document["runs"]
-    for name, group, style in CURVES:
+    above, least = 1.0 - np.array(document["levels"]), 1.0 / document["runs"]
+    for (name, group), (label, color, style) in CURVES.items():
         if curve := document[name][group]["curve"]:
-            label = f"{NAMES[name]}, {GROUPS[group]}"
-            axes.plot(curve, np.maximum(above, least), style, color=COLOURS[name], lw=1.3, label=label)
+            axes.plot(curve, np.maximum(above, least), style, color=color, lw=1.3, label=label)
     axes.axvline(1.0, color="0.4", lw=0.8)
     axes.set(
         xscale="log", yscale="log", ylim=(0.8 * least, 1.1),
@@ -127,47 +122,37 @@ def draw(document: Row, path: Path) -> None:
     save_figure(figure, path, dpi=130, metadata={"Software": None})
 
 
-def main(given: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    for name, default, words in (
-        ("runs", 2000, "rigs, one for each seed"),
-        ("others", None, "rigs for what it is compared with; default as many"),
-        ("map", 0, "seeds for each place of the map"),
-        ("singles", 0, "seeds for each family and reference"),
-        ("dwell", 0, "rigs that rest for a minute"),
-        ("seed", 0, "the first one"),
-        ("workers", None, "processes; default one for each core"),
-    ):
-        parser.add_argument(f"--{name}", type=int, default=default, help=words)
-    parser.add_argument("--out", type=Path, default=Path("bench-results-safety"), help="of finished runs")
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--figure", type=Path)
-    arguments = parser.parse_args(given)
-    if arguments.runs < 1:
-        parser.error("--runs must be at least 1")
+def main(
+    runs: Count = 2000, others: Count | None = None, map: int = 0, singles: int = 0, dwell: int = 0,
+    seed: int = 0, workers: int | None = None, out: Path = Path("bench-results-safety"),
+    json: Path | None = None, figure: Path | None = None,
+) -> None:  # fmt: skip
+    """Play RUNS rigs, one for each seed from SEED on, and OTHERS for what it is compared with.
 
+    Besides, MAP seeds for each place of the map, SINGLES for each family and reference, and DWELL rigs that
+    rest for a minute; in WORKERS processes, one for each core. Finished runs are kept in OUT.
+    """
     began = time.perf_counter()
-    others = min(arguments.runs, arguments.others or arguments.runs)
-    execute = over_cores(arguments.workers)
+    others = min(runs, others or runs)
+    execute = over_cores(workers)
 
     def play(what: str, planned: Sequence[Task]) -> list[Row]:
         with progress(f"runs of {what}", lines=True) as say:
-            return played(planned, arguments.out, execute, say.done)
+            return played(planned, out, execute, say.done)
 
-    first = arguments.seed
     rows = {}
     for name, controller in CONTROLLERS.items():
-        count = arguments.runs if name == "controller" else others
-        rows[name] = play(controller, runs(controller, range(first, first + count)))
-    on_map = play("the map", tasks(DEFAULT, settling.cells(range(arguments.map))))
-    rested = play("rests", tasks(DEFAULT, dwelling.dwells(range(first, first + arguments.dwell))))
-    alone = play("single estimators", contest(DEFAULT, range(arguments.singles)))
+        count = runs if name == "controller" else others
+        rows[name] = play(controller, tasks.runs(controller, range(seed, seed + count)))
+    on_map = play("the map", tasks.tasks(DEFAULT, settling.cells(range(map))))
+    rested = play("rests", tasks.tasks(DEFAULT, dwelling.dwells(range(seed, seed + dwell))))
+    alone = play("single estimators", contest(DEFAULT, range(singles)))
     document = {
         "suite": "safety",
         **origin(began),
-        "runs": arguments.runs,
+        "runs": runs,
         "others": others,
-        "seed": arguments.seed,
+        "seed": seed,
         "controllers": CONTROLLERS,
         "criteria": {
             "line": judging.ALLOWED, "noise": judging.NOISES, "swing": judging.NEGLIGIBLE,
@@ -178,16 +163,15 @@ def main(given: Sequence[str] | None = None) -> int:
         "drawn": drawn(rows["controller"]),
         "levels": [round(float(level), 6) for level in LEVELS],
         **{name: summed_up(each) for name, each in rows.items()},
-        "map": {"seeds": arguments.map, **settling.summarise_cells(on_map)} if on_map else None,
+        "map": {"seeds": map, **settling.summarise_cells(on_map)} if on_map else None,
         "singles": summarise_contest(alone, DEFAULT) if alone else None,
         "dwell": dwelling.summarise_dwells(rested) if rested else None,
     }  # fmt: skip
     document = json_safe(document, DIGITS)
-    put(document, arguments.json)
-    if arguments.figure is not None:
-        draw(document, arguments.figure)
-    return 0
+    put(document, json)
+    if figure is not None:
+        draw(document, figure)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

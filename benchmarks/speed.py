@@ -8,24 +8,25 @@ medians of the ratios within a round. Ours must come to its peer's result. Needs
 It takes some minutes.
 """
 
-import argparse
-import functools
 import itertools
 import os
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import peers
+import typer
 from peers import MEMORY, NOISE, SAMPLE_RATE, START, FloatArray
 
 import piezoest as pz
 from piezoest._files import save_figure
+from piezoest.bench.figures import new_figure
 from piezoest.bench.origin import origin, put
 from piezoest.policies import Forgetting
 
@@ -72,6 +73,11 @@ SLOW = (
 )
 
 
+our_rls = partial(pz.HysteresisRLS, SAMPLE_RATE, initial_model=START)
+our_ekf = partial(pz.HysteresisEKF, SAMPLE_RATE, initial_model=START)
+our_plays = partial(pz.PrandtlIshlinskiiRLS, SAMPLE_RATE, thresholds=12)
+
+
 def record(samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Reference, voltage and displacement of a triangle."""
     r = np.asarray(pz.signals.triangle(5.0, 5.0, samples * 5.0 / SAMPLE_RATE, SAMPLE_RATE)).copy()
@@ -100,14 +106,6 @@ def updated(z: FloatArray, phi: FloatArray) -> FloatArray:
     return learner.theta
 
 
-def our_rls(**options: Any) -> pz.HysteresisRLS:
-    return pz.HysteresisRLS(SAMPLE_RATE, initial_model=START, **options)
-
-
-def our_plays(**options: Any) -> pz.PrandtlIshlinskiiRLS:
-    return pz.PrandtlIshlinskiiRLS(SAMPLE_RATE, thresholds=12, **options)
-
-
 def fast_work(c: peers.Reference, r: FloatArray, u: FloatArray, x: FloatArray) -> dict[str, Work]:
     """What takes nanoseconds a sample, by name."""
     off, on = peers.rls_settings(bounded=False), peers.rls_settings(bounded=True)
@@ -126,7 +124,7 @@ def fast_work(c: peers.Reference, r: FloatArray, u: FloatArray, x: FloatArray) -
         f"{RLS}, default": lambda: learnt(our_rls(errors=False), u, x),
         f"{RLS}, default, with errors": lambda: learnt(our_rls(), u, x),
         "exported C": lambda: exported(u, x)[-1],
-        EKF: lambda: learnt(pz.HysteresisEKF(SAMPLE_RATE, initial_model=START), u, x),
+        EKF: lambda: learnt(our_ekf(), u, x),
         "C, EKF": lambda: peers.loop_parameters(c.run("ekf", 4, kalman, u, x)[-1]),
         "InverseCompensator.run": lambda: pz.InverseCompensator(TRUE, limits=LIMITS).run(r)[-1:],
         "C, inverse": lambda: c.run("inverse", 1, inverse, r)[-1],
@@ -140,13 +138,9 @@ def fast_work(c: peers.Reference, r: FloatArray, u: FloatArray, x: FloatArray) -
 def slow_work(u: FloatArray, x: FloatArray) -> dict[str, Work]:
     """What takes microseconds a sample, and ours on the same short record."""
     z, phi = peers.regression(u, x)
-
-    def ekf() -> pz.HysteresisEKF:
-        return pz.HysteresisEKF(SAMPLE_RATE, initial_model=START, project=False)
-
     return {
-        FREE_EKF: lambda: learnt(ekf(), u, x),
-        "HysteresisEKF.step, not projected": lambda: stepped(ekf(), u, x),
+        FREE_EKF: lambda: learnt(our_ekf(project=False), u, x),
+        "HysteresisEKF.step, not projected": lambda: stepped(our_ekf(project=False), u, x),
         "FilterPyEKF.run": lambda: learnt(pz.FilterPyEKF(SAMPLE_RATE, initial_model=START), u, x),
         FILTERPY: lambda: peers.loop_parameters(peers.filterpy_ekf(u, x)),
         "filterpy's UKF, bare loop": lambda: peers.loop_parameters(peers.filterpy_ukf(u, x)),
@@ -180,17 +174,11 @@ def compared(pairs: tuple[Pair, ...], work: dict[str, Work], samples: int, round
     rows = []
     for pair in pairs:
         ours, peer = seconds[pair.ours], seconds[pair.peer]
-        apart = None
+        ns, peer_ns = (1e9 * float(np.median(each)) / samples for each in (ours, peer))
+        times = {"ns": ns, "peer_ns": peer_ns, "ratio": float(np.median(ours / peer)), "difference": None}
         if pair.is_same:
-            apart = float(np.max(np.abs(work[pair.ours]() / work[pair.peer]() - 1.0)))
-        rows.append(
-            {
-                "ours": pair.ours, "peer": pair.peer, "peer_does": pair.peer_does, "at_most": pair.at_most,
-                "ns": 1e9 * float(np.median(ours)) / samples,
-                "peer_ns": 1e9 * float(np.median(peer)) / samples,
-                "ratio": float(np.median(ours / peer)), "difference": apart,
-            }
-        )  # fmt: skip
+            times["difference"] = float(np.max(np.abs(work[pair.ours]() / work[pair.peer]() - 1.0)))
+        rows.append(asdict(pair) | times)
     return rows
 
 
@@ -218,8 +206,8 @@ def bank(c: peers.Reference, samples: int, rounds: int) -> list[Row]:
             bank.reset()
             bank.run(u, x, every=len(u))
 
-        work: dict[str, Work] = {name: functools.partial(go, each) for name, each in banks.items()}
-        work["C, one thread"] = functools.partial(c.bank, u, x, settings)
+        work: dict[str, Work] = {name: partial(go, each) for name, each in banks.items()}
+        work["C, one thread"] = partial(c.bank, u, x, settings)
         seconds = interleaved(work, rounds, time.perf_counter)
         apart = float(np.max(np.abs(banks["two threads"].theta / c.bank(u, x, settings) - 1.0)))
         times = {name: float(1e9 * np.median(values) / u.size) for name, values in seconds.items()}
@@ -240,8 +228,7 @@ def single_calls(function: Callable[..., Any], columns: tuple[FloatArray, ...], 
     seconds = 1e-9 * (clock() - began_all)
     own = float(np.median([-(clock() - clock()) for _ in range(1000)]))
     median, rare = np.percentile(times - own, [50.0, 99.9]).tolist()
-    late = int(np.sum(times > LATE))
-    return {"calls": count, "median": median, "p99.9": rare, "late": late, "late_per_second": late / seconds}
+    return {"median": median, "p99.9": rare, "late_per_second": int(np.sum(times > LATE)) / seconds}
 
 
 def live(r: FloatArray, u: FloatArray, x: FloatArray, turns: int) -> dict[str, Row]:
@@ -282,60 +269,32 @@ def in_seconds(rounds: int) -> dict[str, float]:
     return found
 
 
-def fits(rounds: int) -> list[Row]:
-    """Seconds of fits of a record, and of solves of a moving window, also in simulations of the record."""
-    samples, hop = 200_000, 5000
-    _, u, x = record(samples)
-    works: dict[str, Work] = {"simulation": functools.partial(TRUE.simulate, u)}
-    for method in ("single-shooting", "multiple-shooting"):
-        fit = pz.BatchFit(SAMPLE_RATE, method=method)
-        works[f"BatchFit, {method}"] = functools.partial(fit.fit, u, x)
-    seconds = {name: float(np.median(each)) for name, each in interleaved(works, rounds).items()}
-    simulation = seconds.pop("simulation")
-    rows = [(name, samples, each) for name, each in seconds.items()]
-    for name, decimation in (("thinned", None), ("full rate", 1)):
-        horizon, solves = pz.MovingHorizon(SAMPLE_RATE, decimation=decimation), []
-        for start in range(0, samples, hop):
-            horizon.run(u[start : start + hop], x[start : start + hop])
-            solves.append(horizon.last_solve_seconds)
-        rows.append((f"MovingHorizon, {name}", int(MEMORY * SAMPLE_RATE), float(np.median(solves[5:]))))
-    return [
-        {"name": name, "samples": N, "seconds": each, "simulations": each / simulation * samples / N}
-        for name, N, each in rows
-    ]
-
-
 def draw(rows: list[Row], path: Path) -> None:
     """Time of a sample, of ours and of its peers."""
-    from matplotlib.figure import Figure
-
     times = {row["ours"]: (row["ns"], "#D55E00") for row in reversed(rows)}
     times |= {row["peer"]: (row["peer_ns"], "0.6") for row in reversed(rows)}
     names = sorted(times, key=lambda name: -times[name][0])
-    figure = Figure(figsize=(6.0, 0.27 * len(names) + 0.6), layout="constrained")
+    figure = new_figure(6.0, 0.27 * len(names) + 0.6)
     axes = figure.subplots()
     axes.barh(names, [times[name][0] for name in names], color=[times[name][1] for name in names])
     axes.set(xscale="log", xlabel="ns per sample; of this library in colour")
     save_figure(figure, path, dpi=130)
 
 
-def main() -> int:
-    """Print the table; 1 if a result differs from its peer's."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--samples", type=int, default=100_000, help="length of the record (default 100000)")
-    parser.add_argument("--slow", type=int, default=30_000, help="samples for filterpy and padasip")
-    parser.add_argument("--rounds", type=int, default=15, help="rounds, of which the median counts")
-    parser.add_argument("--turns", type=int, default=2_000_000, help="single calls from Python")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to this file too")
-    parser.add_argument("--figure", type=Path, metavar="FILE", help="draw the times into this file")
-    given = parser.parse_args()
-    few = max(1, given.rounds // 5)
-    c, (r, u, x) = peers.Reference(), record(given.samples)
+def main(
+    samples: int = 100_000, slow: int = 30_000, rounds: int = 15, turns: int = 2_000_000,
+    json: Path | None = None, figure: Path | None = None,
+) -> None:  # fmt: skip
+    """Compare the speed; fails if a result differs from its peer's.
+
+    SAMPLES in the record, SLOW of them for filterpy and padasip; ROUNDS, of which the median counts; TURNS
+    single calls from Python. All figures are written to JSON, the times drawn into FIGURE.
+    """
+    few = max(1, rounds // 5)
+    c, (r, u, x) = peers.Reference(), record(samples)
     began, load = time.perf_counter(), os.getloadavg()[0]
-    against_c = compared(FAST, fast_work(c, r, u, x), given.samples, given.rounds)
-    against_python = compared(SLOW, slow_work(u[: given.slow], x[: given.slow]), given.slow, few)
+    against_c = compared(FAST, fast_work(c, r, u, x), samples, rounds)
+    against_python = compared(SLOW, slow_work(u[:slow], x[:slow]), slow, few)
     rows = against_c + against_python
     for row in rows:
         apart = "" if row["difference"] is None else f"  {row['difference']:.0e} apart"
@@ -344,23 +303,20 @@ def main() -> int:
             f"  {row['ratio']:.3g} times as long, asked {row['at_most'] or '-'}{apart}"
         )
     document = {
-        "suite": "speed", "compiler": " ".join(peers.COMMAND), "samples": given.samples, "slow": given.slow,
-        "rounds": given.rounds, "against_c": against_c, "against_python": against_python,
-        "bank": bank(c, 16 * given.samples, few), "calls": live(r, u, x, given.turns),
-        "once": in_seconds(few), "fits": fits(few), "load": load, **origin(began),
+        "suite": "speed", "compiler": " ".join(peers.COMMAND), "samples": samples, "slow": slow,
+        "rounds": rounds, "against_c": against_c, "against_python": against_python,
+        "bank": bank(c, 16 * samples, few), "calls": live(r, u, x, turns), "once": in_seconds(few),
+        "load": load, **origin(began),
     }  # fmt: skip
-    for name in ("bank", "calls", "once", "fits", "machine", "versions"):
+    for name in ("bank", "calls", "once", "machine", "versions"):
         print(f"{name}: {document[name]}")
-    if given.json is not None:
-        put(document, given.json)
-    if given.figure is not None:
-        draw(rows, given.figure)
-    differences = [each["difference"] or 0.0 for each in rows + document["bank"]]
-    if not max(differences) <= LARGEST_DIFFERENCE:
-        print("not the result of its peer", file=sys.stderr)
-        return 1
-    return 0
+    if json is not None:
+        put(document, json)
+    if figure is not None:
+        draw(rows, figure)
+    if not max(each["difference"] or 0.0 for each in rows + document["bank"]) <= LARGEST_DIFFERENCE:
+        sys.exit("not the result of its peer")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

@@ -28,6 +28,7 @@ import piezoest as pz
 from piezoest._files import write_text
 from piezoest.bench import paper
 from piezoest.bench.paper_tables import PRBS_ROW
+from piezoest.stage.paper import mechanics_and_instruments
 
 FOLDER = Path(__file__).parent
 STAGE = FOLDER.parent / "piezoest" / "stage" / "paper_stage.json"
@@ -40,17 +41,7 @@ SETTLING = 8.0  # s, and the periods that are judged
 # Held out: the PRBS row, and of Table III row applied, row of the parameters, error [µm].
 PAPER_PRBS = search.of_paper(PRBS_ROW)[:-1]
 CROSSED = ((0, 3, 0.28), (3, 0, 0.67))
-HEAD = """# Smoothness against agreement
-
-Written by `calibrate_paper_stage.py`. Each line is the smoothest stage for one weight of the
-smoothness. The worst deviation is that of the calibration rows, in parts of its tolerance, measured
-in the ring; the choice (in bold) is by that column alone: the largest weight whose worst deviation is
-at most 0.95. The columns to its right were computed after the choice and took no part in it: ratios of
-ours to the paper's for the PRBS row, and the two ratios of Table III.
-
-| weight | roughness | worst deviation | PRBS α | β | γ | K | linear | compensated | III, 2.5 µm | 7.5 µm |
-|---|---|---|---|---|---|---|---|---|---|---|
-"""
+TRADE_OFF, RULE = FOLDER / "trade_off.md", "|" + 11 * "---|" + "\n"
 
 
 def main() -> None:
@@ -66,7 +57,8 @@ def main() -> None:
         *prbs, small, large = held_out(step)
         cells += [*(f"{ratio:.3f}" for ratio in prbs), f"{small:.2f}", f"{large:.2f}"]
         lines.append("| " + " | ".join(f"**{cell}**" if step is chosen else cell for cell in cells) + " |\n")
-    write_text(FOLDER / "trade_off.md", HEAD + "".join(lines))
+    head = TRADE_OFF.read_text(encoding="utf-8").partition(RULE)[0]
+    write_text(TRADE_OFF, head + RULE + "".join(lines))
 
 
 def trade_off() -> list[dict[str, Any]]:
@@ -97,46 +89,33 @@ def held_out(step: dict[str, Any]) -> list[float]:
     ratios = list(numbers(stage, paper.PRBS) / PAPER_PRBS)
     for applied, other, published in CROSSED:
         model = pz.ColemanHodgdon(*step["rows"][other][:3].tolist())
-        error = follow(
-            stage, triangle(applied), pz.InverseCompensator(model, hand_over=paper.HAND_OVER), None
-        )[1]
-        ratios.append(error / published)
+        ratios.append(follow(stage, paper.TRIANGLES[applied], model, None)[1] / published)
     return ratios
 
 
 # ---------------------------------------------------------------- the ring: the paper's procedure, with noise
 
 
-def triangle(row: int) -> paper.Reference:
-    """The reference of a calibration row."""
-    return paper.Reference("triangle", *search.ROWS[row])
-
-
 def ring_rows(p: Any) -> Any:
     """Numbers (4, 6) of the calibration rows in the ring."""
     stage = stage_of(p)
-    return np.array([numbers(stage, triangle(row)) for row in range(len(search.ROWS))])
+    return np.array([numbers(stage, reference) for reference in paper.TRIANGLES])
 
 
 def numbers(stage: Any, reference: paper.Reference) -> Any:
     """(alpha, beta, gamma, K, linear error, compensated error), all estimated while running."""
-    gain, linear = follow(stage, reference, pz.LinearCompensator(paper.START_GAIN), paper.START_GAIN)
-    inverse = pz.InverseCompensator(paper.START, hand_over=paper.HAND_OVER)
-    theta, compensated = follow(stage, reference, inverse, paper.START)
+    gain, linear = follow(stage, reference, paper.START_GAIN)
+    theta, compensated = follow(stage, reference, paper.START)
     return np.array([*theta, gain[0], linear, compensated])
 
 
-def follow(stage: Any, reference: paper.Reference, compensator: Any, model: Any) -> tuple[Any, float]:
-    """Parameters and largest error in the end; what is learnt starts from `model`, None: nothing is."""
+def follow(
+    stage: Any, reference: paper.Reference, model: Any, memory: float | None = paper.MEMORY
+) -> tuple[Any, float]:
+    """Parameters and largest error in the end; without memory nothing is learnt."""
     stage.reset()
-    options = {"initial_model": model, "memory": paper.MEMORY}
-    record = pz.track(
-        reference.signal(SETTLING + paper.STATIONARY_PERIODS / (reference.frequency or 1.0)),
-        stage=stage,
-        compensator=compensator,
-        estimator=None if model is None else pz.HysteresisRLS(paper.SAMPLE_RATE, **options),
-        update_interval=paper.UPDATE_INTERVAL,
-    )
+    seconds = SETTLING + paper.STATIONARY_PERIODS / (reference.frequency or 1.0)
+    record = paper.Experiment(reference, model, memory, seed=0).follow(stage, seconds)
     return record.theta[-record.period :].mean(axis=0), record.max_error(paper.STATIONARY_PERIODS)
 
 
@@ -151,14 +130,11 @@ def rounded(p: Any) -> surrogate.Plant:
 
 def stage_of(p: Any) -> pz.SimulatedStage:
     """The whole stage: the fitted parts, the assumed ones as they stand in the file."""
-    plant, assumed = rounded(p), pz.PaperStage()
+    plant = rounded(p)
     return pz.SimulatedStage(
-        assumed.sample_rate,
-        pz.PrandtlIshlinskii(plant.gain[0], plant.thresholds, plant.weights),
+        hysteresis=pz.PrandtlIshlinskii(plant.gain[0], plant.thresholds, plant.weights),
         creep=pz.Creep(plant.creep_gains, plant.time_constants),
-        mechanics=assumed.mechanics,
-        amplifier=assumed.amplifier,
-        gauge=assumed.gauge,
+        **mechanics_and_instruments(paper.SAMPLE_RATE),
     )
 
 
@@ -172,12 +148,10 @@ def write_stage(chosen: dict[str, Any]) -> None:
         "worst_deviation": round(chosen["worst"], 4),
         "columns": list(search.COLUMNS),
         "rows": {
-            f"triangle {amplitude:g} µm {frequency:g} Hz": [
+            f"triangle {each.amplitude:g} µm {each.frequency:g} Hz": [
                 *(float(f"{value:.4g}") for value in found), round(float(reduction), 2)
             ]
-            for (amplitude, frequency), found, reduction in zip(
-                search.ROWS, rows, search.reductions(rows), strict=True
-            )
+            for each, found, reduction in zip(paper.TRIANGLES, rows, search.reductions(rows), strict=True)
         },
     }  # fmt: skip
     write_text(STAGE, json.dumps(data, indent=1, ensure_ascii=False) + "\n")

@@ -7,10 +7,10 @@ import numpy as np
 import surrogate
 from scipy.optimize import least_squares
 
-from piezoest.bench.paper_tables import CALIBRATION_BOUNDS, published, triangle_row
+from piezoest.bench.paper import TRIANGLES
+from piezoest.bench.paper_tables import CALIBRATION_BOUNDS, published
 
 COLUMNS = ("alpha", "beta", "gamma", "K", "linear_max_error", "compensated_max_error", "error_reduction")
-ROWS = ((2.5, 5.0), (5.0, 2.5), (5.0, 5.0), (7.5, 5.0))  # µm, Hz
 SLOW, FAST = 1, 2  # the rows of one amplitude and two frequencies
 _PUBLISHED = {(number.row, number.quantity): number.value for number in published() if number.table != "III"}
 
@@ -20,14 +20,14 @@ def of_paper(row: str) -> Any:
     return np.array([_PUBLISHED[row, column] for column in COLUMNS])
 
 
-PAPER, REDUCTIONS = np.split(np.array([of_paper(triangle_row(*row)) for row in ROWS]), [-1], axis=1)
+PAPER, REDUCTIONS = np.split(np.array([of_paper(each.name) for each in TRIANGLES]), [-1], axis=1)
 REDUCTIONS = REDUCTIONS.ravel()  # %
 *_relative, REDUCTION_TOLERANCE = (CALIBRATION_BOUNDS[column] for column in COLUMNS)  # the last in points
 RELATIVE_TOLERANCES = np.array(_relative)
 LEAST_DIFFERENCE = 0.1  # of the paper's between 2.5 Hz and 5 Hz
 _DIFFERING = [0, 1, 2, 3, 5]  # the linear errors are equal
 STEEPNESS, FAILED = 30.0, 50.0
-_PERIODS = tuple(surrogate.period(*row) for row in ROWS)
+_PERIODS = tuple(surrogate.period(each.amplitude, each.frequency) for each in TRIANGLES)
 
 
 def reductions(rows: Any) -> Any:
@@ -68,9 +68,8 @@ class Search:
 
         def residuals(found: Any) -> Any:
             d = np.clip(deviations(found), -8.0, 8.0)
-            return np.concatenate(
-                (np.sign(d) * np.abs(d) ** power, np.minimum(differences(found) - 0.3, 0.0))
-            )
+            same = np.minimum(differences(found) - 0.3, 0.0)
+            return np.concatenate((np.sign(d) * np.abs(d) ** power, same))
 
         return self._solve(p, residuals, 1e-3, evaluations)
 
@@ -86,13 +85,8 @@ class Search:
 
     def _rows(self, p: Any, start: Any, rounds: int) -> Any:
         """Numbers (4, 6) of the calibration rows on the surrogate, iterated from those of `start`."""
-        plant = surrogate.plant(p)
-        return np.array(
-            [
-                surrogate.stationary(plant, r, self._lags, near, rounds)
-                for r, near in zip(_PERIODS, start, strict=True)
-            ]
-        )
+        plant, rows = surrogate.plant(p), zip(_PERIODS, start, strict=True)
+        return np.array([surrogate.stationary(plant, r, self._lags, near, rounds) for r, near in rows])
 
     def _solve(self, p: Any, residuals: Callable[[Any], Any], weight: float, evaluations: int) -> Any:
         near, best = self._rows(p, PAPER, 20), np.inf
@@ -110,9 +104,7 @@ class Search:
                 best, near = value @ value, found  # a warm start for the fixed point, no more
             return value
 
-        lowest, highest = surrogate.LOWEST, surrogate.HIGHEST
-        inside = np.clip(p, lowest + 1e-6, highest - 1e-6)
-        bounds = (lowest, highest)
-        return least_squares(
-            cost, inside, bounds=bounds, x_scale="jac", diff_step=1e-3, max_nfev=evaluations
-        ).x
+        bounds = surrogate.LOWEST, surrogate.HIGHEST
+        inside = np.clip(p, bounds[0] + 1e-6, bounds[1] - 1e-6)
+        options: dict[str, Any] = {"x_scale": "jac", "diff_step": 1e-3, "max_nfev": evaluations}
+        return least_squares(cost, inside, bounds=bounds, **options).x

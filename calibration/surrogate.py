@@ -89,8 +89,8 @@ def lags(stage: pz.SimulatedStage) -> tuple[float, float]:
     )
     ramp = np.arange(20_000) / stage.sample_rate
     measured = linear.run(ramp)
-    true = np.asarray(linear.displacement)
-    return float(np.mean((ramp - true)[-1000:])), float(np.mean((ramp - measured)[-1000:]))
+    true, late = (float(np.mean((ramp - x)[-1000:])) for x in (linear.displacement, measured))
+    return true, late
 
 
 @njit

@@ -21,27 +21,20 @@ ROOT = Path(__file__).resolve().parents[1]
 FACES: tuple[type, ...] = (Model, FreeRunning, Policy, CompiledEstimator)
 
 
-def is_documented(value: Any) -> bool:
-    """Whether a value is a class or a function."""
-    return inspect.isclass(value) or inspect.isfunction(value)
-
-
 def public_objects() -> dict[str, Any]:
     """Every public class and function, once, under its shortest public name."""
-    values = {name: getattr(piezoest, name) for name in piezoest.__all__}
-    found = {name: value for name, value in values.items() if is_documented(value)}
-    for name, module in values.items():
-        if inspect.ismodule(module):
-            own = [
-                key
-                for key, value in vars(module).items()
-                if getattr(value, "__module__", "") == module.__name__
-            ]
-            for inner in getattr(module, "__all__", [key for key in own if not key.startswith("_")]):
-                value = getattr(module, inner)
-                if is_documented(value) and value not in found.values():
-                    found[f"{name}.{inner}"] = value
-    return found
+    found: dict[str, Any] = {name: getattr(piezoest, name) for name in piezoest.__all__}
+    for name, module in [each for each in found.items() if inspect.ismodule(each[1])]:
+        own = [
+            key for key, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__
+        ]
+        for inner in getattr(module, "__all__", [key for key in own if not key.startswith("_")]):
+            value = getattr(module, inner)
+            if value not in found.values():
+                found[f"{name}.{inner}"] = value
+    return {
+        name: value for name, value in found.items() if inspect.isclass(value) or inspect.isfunction(value)
+    }
 
 
 def own_methods(cls: type) -> Iterator[tuple[str, Any]]:
@@ -73,22 +66,18 @@ def faults() -> Iterator[str]:
     # The tests take the public names from this file, and do without numpydoc.
     from numpydoc.validate import get_validation_checks, validate
 
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"][
-        "numpydoc_validation"
-    ]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    settings = project["tool"]["numpydoc_validation"]
     checks = get_validation_checks(set(settings["checks"]))
     objects = public_objects()
     for name, cls in list(objects.items()):
         if inspect.isclass(cls):
             objects |= {f"{name}.{method}": value for method, value in own_methods(cls)}
+    for name in settings["exclude"]:
+        objects.pop(name)
     for name, value in objects.items():
-        if name in settings["exclude"]:
-            continue
-        yield from (
-            f"{name}: {code} {text}"
-            for code, text in validate(f"piezoest.{name}")["errors"]
-            if code in checks
-        )
+        errors = validate(f"piezoest.{name}")["errors"]
+        yield from (f"{name}: {code} {text}" for code, text in errors if code in checks)
         # Of this numpydoc knows nothing.
         if raises(value) and "Raises\n---" not in (inspect.getdoc(value) or ""):
             yield f"{name}: raises, and does not say so"

@@ -57,23 +57,17 @@ def broken(folder: Path) -> Iterator[str]:
                 if needed:
                     yield f"{place} comes from elsewhere"
                 continue
+            anchor = unquote(parts.fragment)
             target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
             if target.is_dir():
                 target /= "index.html"
             if not target.is_file():
                 yield f"{place} does not exist"
-            elif (
-                target in pages
-                and SOURCES not in path.parts
-                and unquote(parts.fragment) not in pages[target].anchors
-            ):
+            elif SOURCES not in path.parts and target in pages and anchor not in pages[target].anchors:
                 yield f"{place}: no such anchor"
 
 
 if __name__ == "__main__":
-    found = list(broken(Path(sys.argv[1])))
-    for sentence in found:
-        print(sentence, file=sys.stderr)
-    if found:
-        sys.exit(f"{len(found)} broken links")
+    if found := list(broken(Path(sys.argv[1]))):
+        sys.exit("\n".join([*found, f"{len(found)} broken links"]))
     print("all links lead somewhere")

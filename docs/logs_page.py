@@ -1,81 +1,90 @@
 """Tables of the page `simulated_logs`, from docs/data/logs.json; no number is typed by hand."""
 
-from collections.abc import Sequence
-from typing import Any
+from page_parts import Document, percent, replacements, table, table_of
 
-from page_parts import Document, percent, replacements, shown, table, table_of
+from piezoest._tables import Columns
 
 ADDED = {
-    "noise": "noise",
-    "creep": "creep",
-    "drift": "drift",
-    "jumps": "one or two jumps",
-    "spikes": "spikes",
-    "dropouts": "missing readings",
-    "rows": "missing voltages",
-    "rest": "a rest at the start",
-    "delay": "a delay",
-    "cycled": "a stage that was moved before",
+    "noise": "noise", "creep": "creep", "drift": "drift", "jumps": "one or two jumps", "spikes": "spikes",
+    "dropouts": "missing readings", "rows": "missing voltages", "rest": "a rest at the start",
+    "delay": "a delay", "cycled": "a stage that was moved before",
     "beyond": "a second half of larger voltages",
-}
+}  # fmt: skip
 RATIOS = {
-    "best": "error / best candidate's",
-    "nnls": "error / NNLS's",
-    "line": "error / line's",
-    "stroke": "error / stroke",
-    "noise": "error / noise",
-}
+    "best": "error / best candidate's", "nnls": "error / NNLS's", "line": "error / line's",
+    "stroke": "error / stroke", "noise": "error / noise",
+}  # fmt: skip
 # What is said of a group of logs.
-PART: dict[str, Any] = {
+PART: Columns = {
     "logs": "logs",
     "refused": "failed",
     "near the best": lambda row: percent(row["near_best"]),
     "no worse than NNLS": lambda row: percent(row["beats_nnls"]),
     "no worse than a line": lambda row: percent(row["beats_line"]),
-    "median error / NNLS's": lambda row: shown(row["median_nnls"]),
+    "median error / NNLS's": "median_nnls",
     "median error / stroke": lambda row: percent(row["median_stroke"]),
     "median coverage": lambda row: percent(row["covered"]),
-    "median time [s]": lambda row: shown(row["seconds"]),
+    "median time [s]": "seconds",
 }
 GROUPS = {"clean": "nothing that the model lacks", "all": "anything"}
+SCORES: Columns = {
+    "added": lambda row: GROUPS[row["logs_with"]],
+    "parameter": "parameter",
+    "logs": "logs",
+    "within 2 standard errors": lambda row: percent(row["within_2"]),
+    "median": "median",
+    "largest": "largest",
+}
+WORST: Columns = {
+    "seed": "seed", "family": "family", "voltage": "voltage",
+    "added": lambda row: ", ".join(f"{name} {size:.2g}" for name, size in row["added"].items()),
+    "chosen": "chosen_name", "best": "best_name",
+    **{RATIOS[name]: name for name in ("best", "nnls", "line")},
+    RATIOS["stroke"]: lambda row: percent(row["stroke"]),
+}  # fmt: skip
 
 
 def pieces(document: Document) -> dict[str, str]:
+    scores = "Coleman-Hodgdon stages: errors of the parameters by their standard errors"
+    quantiles = {RATIOS[name]: each for name, each in document["quantiles"].items()}
+    quantiles["time [s]"] = document["seconds"]
+    levels = list(document["seconds"])
+    return {
+        "numbers": numbers(document),
+        "quantiles": table(
+            "Quantiles over the logs",
+            ["", *levels],
+            ([name, *map(each.get, levels)] for name, each in quantiles.items()),
+        ),
+        "coverage": table(
+            "Readings within the interval of 95 %",
+            ["part of the held-out readings", "logs"],
+            (document["coverage"] or {"counts": {}})["counts"].items(),
+        ),
+        "scores": table_of(scores, document["scores"], SCORES),
+        "worst": table_of(f"The worst {len(document['worst'])} logs", document["worst"], WORST),
+        "failures": table_of(
+            "Logs that were refused", document["failures"], {"seed": "seed", "message": "text"}
+        ),
+        **groups(document),
+    }
+
+
+def groups(document: Document) -> dict[str, str]:
+    """Tables of parts of the logs."""
     families = [{"name": "all", **document["all"]}, *document["by_family"]]
     added = [
         {**part, "name": name}
         for row in document["by_added"]
         for name, part in ((ADDED[row["name"]], row), ("without it", row["without"]))
     ]
-    return {
-        "numbers": numbers(document),
-        "families": grouped("By family of the hysteresis", "family", families),
-        "voltages": grouped("By voltage", "voltage", document["by_voltage"]),
-        "chosen": grouped("By the model that was chosen", "model", document["by_chosen"]),
-        "added": grouped("By what was added", "with", added),
-        "quantiles": quantiles(document),
-        "coverage": table(
-            "Readings within the interval of 95 %",
-            ["part of the held-out readings", "logs"],
-            (document["coverage"] or {"counts": {}})["counts"].items(),
-        ),
-        "scores": table_of(
-            "Coleman-Hodgdon stages: errors of the parameters by their standard errors",
-            document["scores"],
-            {
-                "added": lambda row: GROUPS[row["logs_with"]],
-                "parameter": "parameter",
-                "logs": "logs",
-                "within 2 standard errors": lambda row: percent(row["within_2"]),
-                "median": "median",
-                "largest": "largest",
-            },
-        ),
-        "worst": worst(document["worst"]),
-        "failures": table_of(
-            "Logs that were refused", document["failures"], {"seed": "seed", "message": "text"}
-        ),
+    parts = {
+        "families": ("By family of the hysteresis", "family", families),
+        "voltages": ("By voltage", "voltage", document["by_voltage"]),
+        "chosen": ("By the model that was chosen", "model", document["by_chosen"]),
+        "added": ("By what was added", "with", added),
     }
+    return {name: table_of(title, rows, {of: "name", **PART}) for name, (title, of, rows) in parts.items()}
 
 
 def numbers(document: Document) -> str:
@@ -93,30 +102,3 @@ def numbers(document: Document) -> str:
         "within": percent(min(within, default=0.0)),
     }
     return replacements("logs", values, document)
-
-
-def grouped(title: str, of: str, rows: Sequence[Document]) -> str:
-    return table_of(title, rows, {of: "name", **PART})
-
-
-def quantiles(document: Document) -> str:
-    """Of each ratio, and of the time."""
-    rows = {RATIOS[name]: each for name, each in document["quantiles"].items()}
-    rows["time [s]"] = document["seconds"]
-    levels = list(document["seconds"])
-    body = [[name, *(each.get(level) for level in levels)] for name, each in rows.items()]
-    return table("Quantiles over the logs", ["", *levels], body)
-
-
-def worst(rows: Sequence[Document]) -> str:
-    columns: dict[str, Any] = {
-        "seed": "seed",
-        "family": "family",
-        "voltage": "voltage",
-        "added": lambda row: ", ".join(f"{name} {size:.2g}" for name, size in row["added"].items()),
-        "chosen": "chosen_name",
-        "best": "best_name",
-        **{RATIOS[name]: name for name in ("best", "nnls", "line")},
-        RATIOS["stroke"]: lambda row: percent(row["stroke"]),
-    }
-    return table_of(f"The worst {len(rows)} logs", rows, columns)

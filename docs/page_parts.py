@@ -8,6 +8,7 @@ import io
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 from piezoest._files import write_text
@@ -49,18 +50,14 @@ def write_page(page: Any, app: Any = None) -> None:
 
 def table(title: str, heading: Iterable[str], body: Iterable[Iterable[Any]]) -> str:
     """A csv-table; ✗ in bold."""
-    body = list(body)
-    if not body:
+    rows = [[f"**{text}**" if text.endswith("✗") else text for text in map(shown, row)] for row in body]
+    if not rows:
         return f"*{title}: none.*\n"
     written = io.StringIO()
     writer = csv.writer(written, lineterminator="\n", quoting=csv.QUOTE_ALL)
-    writer.writerow(name.replace("\n", " ") for name in heading)
-    for row in body:
-        texts = [shown(cell) for cell in row]
-        writer.writerow(f"**{text}**" if text.endswith("✗") else text for text in texts)
-    header, *lines = written.getvalue().splitlines()
-    rows = "".join(f"   {line}\n" for line in lines)
-    return f".. csv-table:: {title}\n   :header: {header}\n   :widths: auto\n\n{rows}"
+    writer.writerows([[name.replace("\n", " ") for name in heading], *rows])
+    header, _, lines = written.getvalue().partition("\n")
+    return f".. csv-table:: {title}\n   :header: {header}\n   :widths: auto\n\n{indent(lines, '   ')}"
 
 
 def table_of(title: str, rows: Iterable[Any], columns: Columns | None = None) -> str:

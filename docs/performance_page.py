@@ -1,56 +1,49 @@
 """Tables and numbers of the page `performance`, from docs/data/speed.json; no number is typed by hand."""
 
-from page_parts import Document, replacements, table
+from page_parts import Document, replacements, table, table_of
 
 SOURCES = ("speed",)
+CALLS = {
+    "call": "name",
+    "median, µs": lambda row: f"{1e-3 * row['median']:.2f}",
+    "99.9 %, µs": lambda row: f"{1e-3 * row['p99.9']:.2f}",
+    "above 20 µs, per second": lambda row: f"{row['late_per_second']:.0f}",
+}
 
 
 def pieces(document: Document) -> dict[str, str]:
     bank = document["bank"]
-    calls = [
-        [
-            name, f"{1e-3 * row['median']:.2f}", f"{1e-3 * row['p99.9']:.2f}",
-            f"{row['late_per_second']:.0f}",
-        ]
-        for name, row in document["calls"].items()
-    ]  # fmt: skip
     return {
-        "python": table("Against Python", *against(document["against_python"], faster=True)),
-        "c": table("Against C", *against(document["against_c"], faster=False)),
-        "calls": table(
+        "python": against("Against Python", document["against_python"], faster=True),
+        "c": against("Against C", document["against_c"], faster=False),
+        "calls": table_of(
             "Single calls from Python",
-            ["call", "median, µs", "99.9 %, µs", "above 20 µs, per second"],
-            calls,
+            [{"name": name, **row} for name, row in document["calls"].items()],
+            CALLS,
         ),
         "bank": table(
             "A bank: ns per channel and sample",
             ["channels", "samples", *bank[0]["ns"]],
-            [
-                [str(row["channels"]), str(row["samples"]), *(f"{value:.1f}" for value in row["ns"].values())]
-                for row in bank
-            ],
+            [[row["channels"], row["samples"], *(f"{ns:.1f}" for ns in row["ns"].values())] for row in bank],
         ),
         "numbers": numbers(document),
     }
 
 
-def against(rows: list[Document], *, faster: bool) -> tuple[list[str], list[list[str]]]:
-    """Heading and body of a comparison; the ratio as times faster than the peer, or as times its time."""
+def against(title: str, rows: list[Document], *, faster: bool) -> str:
+    """A comparison; the ratio as times faster than the peer, or as times its time."""
     body = []
     for row in rows:
         ratio, asked = row["ratio"], row["at_most"]
         mark = "" if asked is None or ratio <= asked else " ✗"
         if faster:
             ratio, asked = 1.0 / ratio, asked and 1.0 / asked
-        body.append(
-            [
-                row["ours"], f"{row['ns']:.0f}", row["peer"], f"{row['peer_ns']:.0f}",
-                f"{ratio:.0f}{mark}" if ratio >= 100.0 else f"{ratio:.2g}{mark}",
-                "" if asked is None else f"{asked:g}", row["peer_does"],
-            ]
-        )  # fmt: skip
+        times = f"{ratio:.0f}{mark}" if ratio >= 100.0 else f"{ratio:.2g}{mark}"
+        limit = "" if asked is None else f"{asked:g}"
+        compared = [row["ours"], f"{row['ns']:.0f}", row["peer"], f"{row['peer_ns']:.0f}"]
+        body.append([*compared, times, limit, row["peer_does"]])
     said = ("times faster", "asked: at least") if faster else ("times its time", "asked: at most")
-    return ["this library", "ns", "compared with", "ns", *said, "which does"], body
+    return table(title, ["this library", "ns", "compared with", "ns", *said, "which does"], body)
 
 
 def numbers(document: Document) -> str:

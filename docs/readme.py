@@ -4,15 +4,17 @@ python docs/readme.py            # rewrites the table
 python docs/readme.py --figure   # and draws docs/figures/effect.png, in some seconds
 """
 
-import argparse
 import textwrap
 from pathlib import Path
 from typing import Any
 
+import typer
 from page_parts import DOCS, NEEDS, SPEED, part_of, read
 
+import piezoest as pz
 from piezoest._files import save_figure, write_text
 from piezoest.bench import report
+from piezoest.bench.figures import new_figure
 
 README = DOCS.parent / "README.md"
 FIGURE = DOCS / "figures" / "effect.png"
@@ -37,17 +39,20 @@ not seen, and that of a straight line {line:.2f} µm.
 def figures() -> str:
     """Tables and sentences between the marks."""
     runs, paper, recording = read("table"), read("paper"), read("real_data")
-    ours, theirs = (paper_row(paper, key) for key in ("ours", "value"))
     found = recording["identify"]
+    row = {
+        entry["quantity"]: entry for entry in paper["tables"] if (entry["table"], entry["row"]) == ("II", ROW)
+    }
+    linear, compensated = row["linear_max_error"], row["compensated_max_error"]
     values = {
         "seeds": runs["plan"]["seeds"],
         "stages": len(runs["plan"]["stages"]),
         "machine": runs["machine"]["cpu"],
         "date": runs["date"][:10],
-        "linear_theirs": theirs[0],
-        "theirs": theirs[1],
-        "linear_ours": ours[0],
-        "ours": ours[1],
+        "linear_theirs": linear["value"],
+        "theirs": compensated["value"],
+        "linear_ours": linear["ours"],
+        "ours": compensated["ours"],
         "travel": recording["displacement_um"],
         "missed": found["held_out"]["rms_um"],
         "line": found["line_held_out"]["rms_um"],
@@ -60,22 +65,8 @@ def figures() -> str:
 
 def markdown(heading: list[str], body: list[list[str]]) -> list[str]:
     """Lines of a table, numbers to the right."""
-    rows = [
-        heading,
-        ["---", "---" if len(body[0][1]) > 12 else "---:", *["---:"] * (len(heading) - 2)],
-        *body,
-    ]
-    return [f"| {' | '.join(row)} |" for row in rows]
-
-
-def paper_row(document: dict[str, Any], key: str) -> tuple[float, float]:
-    """Errors with linear feed-forward and with compensation [µm], of one row of Table II."""
-    found = {
-        entry["quantity"]: entry[key]
-        for entry in document["tables"]
-        if entry["table"] == "II" and entry["row"] == ROW
-    }
-    return found["linear_max_error"], found["compensated_max_error"]
+    rule = ["---", "---" if len(body[0][1]) > 12 else "---:", *["---:"] * (len(heading) - 2)]
+    return [f"| {' | '.join(row)} |" for row in (heading, rule, *body)]
 
 
 def parts(text: str) -> tuple[str, str, str]:
@@ -87,24 +78,15 @@ def parts(text: str) -> tuple[str, str, str]:
 
 def draw(path: Path) -> None:
     """The error of a straight line whose gain is learnt, and of the controller, which is told the limits."""
-    import matplotlib.pyplot as plt
-
-    import piezoest as pz
-
     r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=8, sample_rate=50_000.0)
-    gain = pz.LinearGain(0.12)
+    gain, limits = pz.LinearGain(0.12), pz.VoltageLimits(-50.0, 100.0)
+    learner = pz.HysteresisRLS(r.sample_rate, initial_model=gain)
     ways: dict[str, dict[str, Any]] = {
-        "linear feed-forward": {
-            "compensator": pz.LinearCompensator(gain),
-            "estimator": pz.HysteresisRLS(r.sample_rate, initial_model=gain),
-        },
-        "AdaptiveFeedforward": {
-            "controller": pz.AdaptiveFeedforward(r.sample_rate, limits=pz.VoltageLimits(-50.0, 100.0))
-        },
+        "linear feed-forward": {"compensator": pz.LinearCompensator(gain), "estimator": learner},
+        "AdaptiveFeedforward": {"controller": pz.AdaptiveFeedforward(r.sample_rate, limits=limits)},
     }
-    figure, (series, loop) = plt.subplots(
-        1, 2, figsize=(6.4, 3.4), width_ratios=[1.6, 1], layout="constrained"
-    )
+    figure = new_figure(6.4, 3.4)
+    series, loop = figure.subplots(1, 2, width_ratios=[1.6, 1])
     for (name, loops), color in zip(ways.items(), ("0.55", "C0"), strict=True):
         record = pz.track(r, stage=pz.PaperStage(r.sample_rate, seed=0), **loops)
         label = f"{name}: {record.max_error(last_periods=2):.3f} µm at last"
@@ -119,17 +101,13 @@ def draw(path: Path) -> None:
     save_figure(figure, path, dpi=130)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--figure", action="store_true", help="draw the picture too")
-    given = parser.parse_args()
-    if given.figure:
+def main(figure: bool = False) -> None:
+    """Rewrite the table, and draw the picture with --figure."""
+    if figure:
         draw(FIGURE)
     before, _, behind = parts(README.read_text(encoding="utf-8"))
     write_text(README, before + figures() + behind)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

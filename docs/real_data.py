@@ -6,14 +6,14 @@ PIEZOEST_DATA, or --data, names its folder. Without it, the old numbers of that 
     python docs/real_data.py [--data DIR] [--json FILE] [--figures DIR]
 """
 
-import argparse
 import json
-import os
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
+from page_parts import DOCS
 
 import piezoest as pz
 from piezoest._files import save_figure
@@ -62,24 +62,20 @@ def covered(found: pz.Identification) -> float:
     return float(np.mean(inside[found.trained :][np.isfinite(found.residual[found.trained :])]))
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    docs = Path(__file__).resolve().parent
-    data = Path(os.environ.get("PIEZOEST_DATA") or docs.parents[1] / "shared" / "data")
-    parser.add_argument("--data", type=Path, default=data)
-    parser.add_argument("--json", type=Path, default=docs / "data" / "real_data.json")
-    parser.add_argument("--figures", type=Path, default=docs / "figures")
-    given = parser.parse_args()
-    other = given.data / OTHER
+def main(
+    data: Annotated[Path, typer.Option(envvar="PIEZOEST_DATA")] = DOCS.parents[1] / "shared" / "data",
+    json_to: Annotated[Path, typer.Option("--json")] = DOCS / "data" / "real_data.json",
+    figures: Path = DOCS / "figures",
+) -> None:
+    """Identify the recording that comes with the package; DATA has another one of the same stage."""
+    other = data / OTHER
     document, found = figures_of(other if other.is_file() else None)
     if "other" not in document:
-        print(f"no {OTHER} in {given.data}: what is said of it stays as it is", file=sys.stderr)
-        document["other"] = json.loads(given.json.read_text(encoding="utf-8"))["other"]
-    put(document, given.json)
-    save_figure(found.plot(), given.figures / "real_data.png", dpi=90)
+        print(f"no {OTHER} in {data}: what is said of it stays as it is", file=sys.stderr)
+        document["other"] = json.loads(json_to.read_text(encoding="utf-8"))["other"]
+    put(document, json_to)
+    save_figure(found.plot(), figures / "real_data.png", dpi=90)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

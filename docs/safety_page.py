@@ -1,17 +1,14 @@
 """Tables and numbers of the page `safety`, from docs/data/safety.json."""
 
-from functools import partial
-from typing import Any
-
 from page_parts import Document, of_all, percent, replacements, shown, table, table_of
+
+from piezoest._tables import Columns
 
 GROUPS = {"all": "all", "healthy": "healthy", "often": "called often"}
 WHO = {
     "controller": "controller", "no_corridor": "without corridor", "line": "without candidates",
     "parts": "by hand",
 }  # fmt: skip
-# Which runs are shown of whom.
-LINES = [*(("controller", group) for group in GROUPS), *((who, "all") for who in list(WHO)[1:])]
 MODES = {"from the start": "from-start", "for a time": "transient", "until the end": "permanent"}
 CRITERIA = {
     "failed": "error raised", "not finite": "voltage not finite", "outside the limits": "outside the limits",
@@ -34,6 +31,25 @@ CHANGES = {
     "cold start": "cold-start", "60 % of the amplitude": "switch", "20 %": "drop", "100 %": "switch-back",
     "gain changes by 30 %": "gain-step",
 }  # fmt: skip
+WORST: Columns = {
+    "seed": lambda row: str(row["seed"]), "family": "family", "reference": "reference", "fault": "fault",
+    "time": "mode", "ratio": "ratio", "last cycle": "last_ratio", "at a limit [quarter swings]": "rail",
+    "drove last": "driver", "error": "failure",
+}  # fmt: skip
+TOLD: Columns = {
+    "fault": "fault",
+    "time": "mode",
+    "right name": lambda row: of_all(row["named"], row["to_name"]),
+    "after [periods]": "named_periods",
+    "as before in the first cycle": lambda row: of_all(row["recovered_first"], row["to_recover"]),
+    "in the first three": lambda row: of_all(row["recovered_soon"], row["to_recover"]),
+}
+DWELL: Columns = {
+    "creep": "creep", "feedback": "feedback", "noise": "noise",
+    "as before in the first period": lambda row: of_all(row["kept"], row["runs"]),
+    "first": "first", "second": "second", "third": "third", "largest first": "largest",
+    "travel": "excursion", "longest travel": "farthest",
+}  # fmt: skip
 
 
 def pieces(document: Document) -> dict[str, str]:
@@ -48,11 +64,15 @@ def pieces(document: Document) -> dict[str, str]:
         "by_mechanics": by(document, "mechanics", "mechanics"),
         "by_often": by(document, "often", "called often"),
         "crossed": crossed(mine),
-        "worst": worst(mine["worst"]),
-        "told": told(mine["by_mode"]),
+        "worst": table_of("The worst runs of the controller", mine["worst"], WORST),
+        "told": table_of(
+            "Faults that got their right name, and errors that were as before",
+            (row for row in mine["by_mode"] if row["to_name"] or row["to_recover"]),
+            TOLD,
+        ),
         **settling(document),
         "singles": singles(document["singles"]),
-        "dwell": dwell(document.get("dwell")),
+        "dwell": table_of("After a long rest", (document["dwell"] or {"groups": []})["groups"], DWELL),
     }
 
 
@@ -73,37 +93,37 @@ def numbers(document: Document) -> str:
 def drawn(of: Document) -> str:
     """Names with their runs, and spans of numbers."""
     body = [
-        [title, "; ".join(f"{each} {runs}" for each, runs in of[name].items())]
-        for name, title in DRAWN.items()
+        (title, "; ".join(f"{each} {n}" for each, n in of[name].items())) for name, title in DRAWN.items()
     ]
-    body += [[title, " to ".join(map(shown, of["spans"][name]))] for name, title in SPANS.items()]
-    return table(
-        "What is drawn: names with their runs, or smallest and largest number", ["quantity", "drawn"], body
-    )
+    body += [(title, " to ".join(map(shown, of["spans"][name]))) for name, title in SPANS.items()]
+    title = "What is drawn: names with their runs, or smallest and largest number"
+    return table(title, ["quantity", "drawn"], body)
+
+
+def groups(document: Document) -> list[tuple[list[str], Document]]:
+    """Whose runs are shown, and what is said of them."""
+    shown = [("controller", name) for name in GROUPS] + [(who, "all") for who in list(WHO)[1:]]
+    return [([WHO[who], GROUPS[name]], document[who][name]) for who, name in shown]
 
 
 def violations(document: Document) -> str:
     """Counts of each criterion that some run breaks."""
-    heading = ["", "runs", *CRITERIA.values()]
+    broken = [name for name in CRITERIA if any(of["violations"][name] for _, of in groups(document))]
     body = [
-        [WHO[who], GROUPS[group], *(
-            f"{of['violations'][name]}/{of['judged' if 'ratio' in name else 'runs']}" for name in CRITERIA
-        )]
-        for who, group in LINES for of in [document[who][group]]
-    ]  # fmt: skip
-    never = [k for k in range(2, len(heading)) if all(row[k].startswith("0/") for row in body)]
-    heading, *body = ([cell for k, cell in enumerate(row) if k not in never] for row in [heading, *body])
+        who + [f"{of['violations'][name]}/{of['judged' if 'ratio' in name else 'runs']}" for name in broken]
+        for who, of in groups(document)
+    ]
     title = "Runs that break a promise, of the runs that are judged by it"
-    return table(title, heading, body)
+    return table(title, ["", "runs", *(CRITERIA[name] for name in broken)], body)
 
 
 def quantiles(document: Document) -> str:
     """Quantiles of the ratio over the whole run and of that of the last cycle."""
-    ratios = {"ratio": "whole run", "last_ratio": "last cycle"}
     body = [
-        [WHO[who], GROUPS[group], title, *document[who][group]["quantiles"][name].values()]
-        for who, group in LINES for name, title in ratios.items()
-    ]  # fmt: skip
+        [*who, title, *of["quantiles"][name].values()]
+        for who, of in groups(document)
+        for name, title in (("ratio", "whole run"), ("last_ratio", "last cycle"))
+    ]
     levels = document["controller"]["all"]["quantiles"]["ratio"]
     return table("Quantiles of the ratio", ["", "runs", "ratio", *levels], body)
 
@@ -113,16 +133,16 @@ def cell(row: Document | None) -> str:
     return f"{shown(row['ratio'])}; {row['over']}/{row['judged']}" if row and row["judged"] else "—"
 
 
-def by(document: Document, column: str, name: str, more: dict[str, Any] | None = None) -> str:
+def by(document: Document, column: str, name: str, more: Columns | None = None) -> str:
     """The controller beside the straight line alone."""
     line = {row[column]: row for row in document["line"][f"by_{column}"]}
-    columns = {name: column, "controller": cell, **(more or {})}
-    title = f"By {name}: median of the ratio; runs above 1"
     beside = {"without candidates": lambda row: cell(line.get(row[column]))}
-    return table_of(title, document["controller"][f"by_{column}"], columns | beside)
+    columns = {name: column, "controller": cell, **(more or {}), **beside}
+    title = f"By {name}: median of the ratio; runs above 1"
+    return table_of(title, document["controller"][f"by_{column}"], columns)
 
 
-def modes(rows: list[Document]) -> dict[str, Any]:
+def modes(rows: list[Document]) -> Columns:
     """A column of the controller's ratio for each time of a fault."""
     cells = {(row["fault"], row["mode"]): cell(row) for row in rows}
     return {said: lambda row, mode=mode: cells.get((row["fault"], mode), "—") for said, mode in MODES.items()}
@@ -136,19 +156,9 @@ def crossed(mine: Document) -> str:
         [row["family"], *(cell(rows.get((row["family"], each))) for each in below), cell(row)]
         for row in mine["by_family"]
     ]
-    body.append(["all", *map(cell, below.values()), ""])
-    return table(
-        "By family and reference: median of the ratio; runs above 1", ["family", *below, "all"], body
-    )
-
-
-def worst(rows: list[Document]) -> str:
-    names = {
-        "family": "family", "reference": "reference", "fault": "fault", "time": "mode", "ratio": "ratio",
-        "last cycle": "last_ratio", "at a limit [quarter swings]": "rail", "drove last": "driver",
-        "error": "failure",
-    }  # fmt: skip
-    return table_of("The worst runs of the controller", rows, {"seed": lambda row: str(row["seed"]), **names})
+    last = ["all", *map(cell, below.values()), ""]
+    title = "By family and reference: median of the ratio; runs above 1"
+    return table(title, ["family", *below, "all"], [*body, last])
 
 
 def found(document: Document) -> str:
@@ -157,77 +167,46 @@ def found(document: Document) -> str:
     asked, named, left, recovered = (
         sum(row[name] for row in rows) for name in ("to_name", "named", "to_recover", "recovered_soon")
     )
-    body = [
-        ["faults that got their right name", of_all(named, asked)],
-        ["errors as before within three cycles after a fault", of_all(recovered, left)],
-    ]
-    if rested := document.get("dwell"):
-        body.append(
-            ["errors as before in the first period after a rest", of_all(rested["kept"], rested["runs"])]
-        )
+    lines = {
+        "faults that got their right name": (named, asked),
+        "errors as before within three cycles after a fault": (recovered, left),
+    }
+    if rested := document["dwell"]:
+        lines["errors as before in the first period after a rest"] = rested["kept"], rested["runs"]
     if alone := document["singles"]:
         title = f"cells with a settled error of at most {alone['allowed']:g} times that of the best estimator"
-        body.append([title, of_all(alone["kept"], len(alone["cells"]))])
+        lines[title] = alone["kept"], len(alone["cells"])
     if cells := document["map"] and document["map"]["cells"]:
-        for title, name in CHANGES.items():
-            body.append([f"cells that settle soon: {title}", of_all(cells["kept"][name], cells["asked"])])
-    return table("The other questions, in short", ["", "yes"], body)
-
-
-def told(rows: list[Document]) -> str:
-    """Names of faults, and recovery."""
-    columns = {
-        "fault": "fault",
-        "time": "mode",
-        "right name": lambda row: of_all(row["named"], row["to_name"]),
-        "after [periods]": "named_periods",
-        "as before in the first cycle": lambda row: of_all(row["recovered_first"], row["to_recover"]),
-        "in the first three": lambda row: of_all(row["recovered_soon"], row["to_recover"]),
-    }
-    asked = [row for row in rows if row["to_name"] or row["to_recover"]]
-    return table_of("Faults that got their right name, and errors that were as before", asked, columns)
+        kept = {f"cells that settle soon: {title}": cells["kept"][name] for title, name in CHANGES.items()}
+        lines |= {title: (count, cells["asked"]) for title, count in kept.items()}
+    return table(
+        "The other questions, in short", ["", "yes"], ([name, of_all(*of)] for name, of in lines.items())
+    )
 
 
 def settling(document: Document) -> dict[str, str]:
     """Share of runs that settled soon after each change, by family and by place of the map."""
-    parts = {
+    parts: dict[str, tuple[str, Columns]] = {
         "by_family": ("required", {"family": "family"}),
         "by_place": ("required", PLACE),
         "other_places": ("not required", PLACE),
     }
+    shares: Columns = {each: lambda row, name=name: percent(row[name]) for each, name in CHANGES.items()}
     texts = {}
     for part, (asked, names) in parts.items():
         rows = document["map"][part] if document["map"] else []
         title = f"Runs that settled within {document['criteria']['soon']} periods, where this is {asked}"
-        shares = {each: partial(share, name=name) for each, name in CHANGES.items()}
-        columns = names | {"runs": "runs"} | shares
-        texts[f"map_{part}"] = table_of(title, rows, columns)
+        texts[f"map_{part}"] = table_of(title, rows, {**names, "runs": "runs", **shares})
     return texts
-
-
-def share(row: Document, name: str) -> str:
-    return percent(row[name])
 
 
 def singles(alone: Document | None) -> str:
     """Settled errors, and their ratios to those of the best single estimator."""
-    rows = alone["cells"] if alone else []
     cells = {
-        (row["family"], row["reference"]): f"{share(row, 'settled')}; {shown(row['ratio'])}" for row in rows
+        (row["family"], row["reference"]): f"{percent(row['settled'])}; {shown(row['ratio'])}"
+        for row in (alone["cells"] if alone else [])
     }
-    families, references = (
-        (list(dict.fromkeys(names)) for names in zip(*cells, strict=True)) if rows else ([], [])
-    )
+    families, references = (list(dict.fromkeys(key[k] for key in cells)) for k in (0, 1))
     body = [[family, *(cells.get((family, each), "—") for each in references)] for family in families]
     title = "Settled error relative to the amplitude, median; its ratio to that of the best single estimator"
     return table(title, ["family", *references], body)
-
-
-def dwell(rested: Document | None) -> str:
-    columns = {
-        "creep": "creep", "feedback": "feedback", "noise": "noise",
-        "as before in the first period": lambda row: of_all(row["kept"], row["runs"]),
-        "first": "first", "second": "second", "third": "third", "largest first": "largest",
-        "travel": "excursion", "longest travel": "farthest",
-    }  # fmt: skip
-    return table_of("After a long rest", rested["groups"] if rested else [], columns)

@@ -4,6 +4,7 @@ import re
 
 from page_parts import NEEDS, SPEED, Document, part_of, replacements, table
 
+from piezoest._tables import Columns, cells_of
 from piezoest.bench import report
 from piezoest.bench.scenarios import UNREPEATED
 
@@ -28,34 +29,34 @@ def pieces(runs: Document, policies: Document) -> dict[str, str]:
 def linked(of: report.Table) -> str:
     """A table whose estimators are links, but not within code; no line ends before a bracket."""
     names = re.compile(r"\b(AdaptiveFeedforward|BatchFit|MovingHorizon|\w+(?:RLS|EKF|UKF))\b")
+
+    def link(cell: str) -> str:
+        return (
+            cell
+            if "``" in cell
+            else names.sub(r":class:`~piezoest.\1`", cell).replace(" (", "\N{NO-BREAK SPACE}(")
+        )
+
+    return table("", of[0], (map(link, row) for row in of[1]))
+
+
+def by_estimator(document: Document, columns: list[str], cells: dict[tuple[str, str], str]) -> report.Table:
+    """Cells by estimator and column, the estimator that adapts best first."""
     body = [
-        [
-            c if "``" in c else names.sub(r":class:`~piezoest.\1`", c).replace(" (", "\N{NO-BREAK SPACE}(")
-            for c in row
-        ]
-        for row in of[1]
+        [short(document["estimators"][name]["name"]), *(cells.get((name, column), "") for column in columns)]
+        for name in (row["estimator"] for row in report.best_first(document) if row["typical"])
     ]
-    return table("", of[0], body)
-
-
-def names(document: Document) -> list[str]:
-    """Estimators, the one that adapts best first."""
-    return [row["estimator"] for row in report.best_first(document) if row["typical"]]
+    return ["estimator", *columns], body
 
 
 def settles(document: Document) -> report.Table:
     """Periods until each estimator settles, in each scenario on the first stage."""
-    scenarios, stage = list(document["scenarios"]), document["plan"]["stages"][0]
-    mine = [cell for cell in document["cells"] if cell["stage"] == stage]
-    cells = {(cell["scenario"], cell["estimator"]): cell for cell in mine}
-    body = []
-    for name in names(document):
-        row = [short(document["estimators"][name]["name"])]
-        for scenario in scenarios:
-            cell = cells.get((scenario, name))
-            row.append("" if cell is None else periods(cell["settles"]))
-        body.append(row)
-    return ["estimator", *scenarios], body
+    cells = {
+        (cell["estimator"], cell["scenario"]): periods(cell["settles"])
+        for cell in document["cells"]
+        if cell["stage"] == document["plan"]["stages"][0]
+    }
+    return by_estimator(document, list(document["scenarios"]), cells)
 
 
 def short(name: str) -> str:
@@ -72,35 +73,26 @@ def periods(quantiles: list[float | None]) -> str:
 
 def stages(document: Document) -> report.Table:
     """Settled error of each estimator on each stage, over the scenarios that repeat."""
-    plan = document["plan"]
-    body = []
-    for name in names(document):
-        row = [document["estimators"][name]["name"]]
-        for stage in plan["stages"]:
-            mine = [
-                cell["settled"][0]
-                for cell in document["cells"]
-                if cell["stage"] == stage and cell["estimator"] == name and cell["scenario"] not in UNREPEATED
-            ]
-            row.append(report.percent(sorted(mine)[len(mine) // 2]) if mine else "")
-        body.append(row)
-    return ["estimator", *plan["stages"]], body
+    errors: dict[tuple[str, str], list[float]] = {}
+    for cell in document["cells"]:
+        if cell["scenario"] not in UNREPEATED:
+            errors.setdefault((cell["estimator"], cell["stage"]), []).append(cell["settled"][0])
+    cells = {key: report.percent(sorted(found)[len(found) // 2]) for key, found in errors.items()}
+    return by_estimator(document, document["plan"]["stages"], cells)
 
 
 def tuned(document: Document) -> report.Table:
     """What tuning chose, and what it gained on other seeds."""
-    overview = {row["estimator"]: row for row in document["overview"]}
-    body = []
-    for each in document["tuned"]:
-        before, after = (overview[each[which]]["typical"] for which in ("default", "chosen"))
-        settings = each["chosen"] if each["chosen"] != each["default"] else "the default"
-        body.append(
-            [
-                document["estimators"][each["default"]]["name"], report.percent(before[0]),
-                report.percent(after[0]), f"``{settings}``",
-            ]
-        )  # fmt: skip
-    return ["estimator", "typical error, default", "tuned", "settings"], body
+    typical = {row["estimator"]: row["typical"] for row in document["overview"]}
+    columns: Columns = {
+        "estimator": lambda each: document["estimators"][each["default"]]["name"],
+        "typical error, default": lambda each: report.percent(typical[each["default"]][0]),
+        "tuned": lambda each: report.percent(typical[each["chosen"]][0]),
+        "settings": lambda each: (
+            f"``{'the default' if each['chosen'] == each['default'] else each['chosen']}``"
+        ),
+    }
+    return cells_of(document["tuned"], columns)
 
 
 def substitutions(prefix: str, document: Document) -> str:

@@ -38,13 +38,10 @@ def cost(mnemonic: str, operands: str) -> int:
 
 
 def registers(operands: str) -> int:
-    """Number of registers in a list."""
-    found = re.search(r"\{([^}]*)\}", operands)
-    total = 0
-    for span in (found[1] if found else "").split(","):
-        ends = [int(number) for number in re.findall(r"\d+", span)]
-        total += ends[1] - ends[0] + 1 if "-" in span and len(ends) == 2 else 1
-    return total
+    """Number of registers in a list, such as {r4-r7, lr}."""
+    spans = operands[operands.find("{") + 1 :].rstrip("} ").split(",")
+    ends = [[int(number) for number in re.findall(r"\d+", span)] for span in spans]
+    return sum(each[1] - each[0] + 1 if len(each) == 2 else 1 for each in ends)
 
 
 def count_cycles(listing: str, trace: Path) -> tuple[Any, Any]:
@@ -54,22 +51,17 @@ def count_cycles(listing: str, trace: Path) -> tuple[Any, Any]:
     """
     costs = {int(at, 16): cost(name, operands) for at, name, operands in _LINE.findall(listing)}
     start = {name: int(at, 16) for at, name in _SYMBOL.findall(listing)}["one_step"]
-    callers = {int(at, 16) + 4 for at, name, operands in _LINE.findall(listing) if "<one_step>" in operands}
+    callers = {int(at, 16) + 4 for at, _, operands in _LINE.findall(listing) if "<one_step>" in operands}
     instructions: list[int] = []
     cycles: list[int] = []
     inside, last = False, 0
     with trace.open(encoding="utf-8") as lines:
-        for line in lines:
-            found = _TRACE.search(line)
-            if found is None:
-                continue
-            at = int(found[1], 16)
+        for at in (int(found[1], 16) for line in lines if (found := _TRACE.search(line))):
             if at == start:
                 inside = True
                 instructions.append(0)
                 cycles.append(0)
-            elif inside and at in callers:
-                inside = False
+            inside = inside and at not in callers
             if inside:
                 instructions[-1] += 1
                 # An instruction is two or four bytes long: farther away, the one before it branched.

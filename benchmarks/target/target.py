@@ -5,20 +5,22 @@ Needs arm-none-eabi-gcc with newlib, and qemu-system-arm (`make tools`).
     python benchmarks/target/target.py [--samples N] [--traced N] [--json FILE]
 """
 
-import argparse
 import copy
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+import typer
 from cycles import count_cycles
 
 import piezoest as pz
+from piezoest._options import one_of
 from piezoest.bench.origin import put
 from piezoest.bench.scenarios import SCENARIOS
 
@@ -33,32 +35,23 @@ SAMPLE_RATE, CLOCK = 50_000.0, 168e6  # Hz
 LEARNT = 4.048  # s
 SAMPLES, TRACED = 4000, 400
 MOVED = "RLS, model moved"
+START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
 OUTSIDE = pz.ColemanHodgdon(0.02, 0.12, 0.0072)
 LIMITS = pz.VoltageLimits(-60.0, 60.0)
 
 
 def controllers() -> dict[str, tuple[Any, Any]]:
     """What is measured, by name: estimator and compensator."""
-    start = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    rls, inverse = partial(pz.HysteresisRLS, SAMPLE_RATE), partial(pz.InverseCompensator, START, LIMITS)
     line = pz.LinearGain(0.15)
-
-    def inverse() -> Any:
-        return pz.InverseCompensator(start, LIMITS)
-
     return {
         "inverse alone": (None, inverse()),
-        "linear gain learnt": (
-            pz.HysteresisRLS(SAMPLE_RATE, initial_model=line),
-            pz.LinearCompensator(line, LIMITS),
-        ),
-        "RLS and inverse": (pz.HysteresisRLS(SAMPLE_RATE, initial_model=start), inverse()),
+        "linear gain learnt": (rls(initial_model=line), pz.LinearCompensator(line, LIMITS)),
+        "RLS and inverse": (rls(initial_model=START), inverse()),
         # Outside of the admissible set, and sure of it: every model handed over has to be moved.
-        MOVED: (pz.HysteresisRLS(SAMPLE_RATE, initial_model=OUTSIDE, uncertainty=1e-3), inverse()),
-        "RLS, the paper's memory": (
-            pz.HysteresisRLS(SAMPLE_RATE, initial_model=start, memory=0.4),
-            inverse(),
-        ),
-        "EKF and inverse": (pz.HysteresisEKF(SAMPLE_RATE, initial_model=start), inverse()),
+        MOVED: (rls(initial_model=OUTSIDE, uncertainty=1e-3), inverse()),
+        "RLS, the paper's memory": (rls(initial_model=START, memory=0.4), inverse()),
+        "EKF and inverse": (pz.HysteresisEKF(SAMPLE_RATE, initial_model=START), inverse()),
     }
 
 
@@ -80,11 +73,6 @@ def prepare(name: str, samples: int) -> tuple[Any, Any, Any, Any]:
     return estimator, before, r[learnt:end], np.concatenate([[np.nan], record.measured[:-1]])
 
 
-def missing_tools() -> list[str]:
-    """Names of programs that are not there."""
-    return [name for name in (f"{CROSS}gcc", f"{CROSS}objdump", EMULATOR) if shutil.which(name) is None]
-
-
 def measure(name: str, precision: Any, samples: int, traced: int) -> dict[str, Any]:
     """Build, run and count one controller."""
     estimator, compensator, r, x = prepare(name, samples)
@@ -95,8 +83,7 @@ def measure(name: str, precision: Any, samples: int, traced: int) -> dict[str, A
         code.write(folder)
         firmware = build(folder, precision, r, x)
         voltages, stack = run(firmware, precision)
-        few = build(folder, precision, r[:traced], x[:traced])
-        counts, cycles = trace(few)
+        counts, cycles = trace(build(folder, precision, r[:traced], x[:traced]))
         sizes = flash_and_ram(folder, firmware)
     apart = np.abs(voltages - expected) / np.max(np.abs(expected))
     budget = CLOCK / SAMPLE_RATE
@@ -113,7 +100,6 @@ def measure(name: str, precision: Any, samples: int, traced: int) -> dict[str, A
         "cycles_largest": int(np.max(cycles)),
         "load_mean": float(np.mean(cycles[10:])) / budget,
         "load_largest": int(np.max(cycles)) / budget,
-        "half_left": bool(np.max(cycles) <= 0.5 * budget),
         "stack": stack,
         **sizes,
     }
@@ -156,13 +142,10 @@ def emulate(firmware: Path, *options: str) -> str:
 
 def run(firmware: Path, precision: str) -> tuple[Any, int]:
     """Voltages and bytes of stack."""
-    text = emulate(firmware)
-    digits, number, whole = (
-        (8, np.float32, np.uint32) if precision == "float" else (16, np.float64, np.uint64)
-    )
-    before, after = text.split("stack ")
-    words = re.findall(rf"^[0-9a-f]{{{digits}}}$", before, re.M)
-    voltages = np.array([int(word, 16) for word in words], whole).view(number).astype(np.float64)
+    size = 4 if precision == "float" else 8
+    before, after = emulate(firmware).split("stack ")
+    words = re.findall(rf"^[0-9a-f]{{{2 * size}}}$", before, re.M)
+    voltages = np.frombuffer(bytes.fromhex("".join(words)), f">f{size}").astype(np.float64)
     return voltages, int(after.split()[0], 16)
 
 
@@ -171,9 +154,7 @@ def trace(firmware: Path) -> tuple[Any, Any]:
     listing = printed(f"{CROSS}objdump", "-d", "--no-show-raw-insn", str(firmware))
     path = firmware.with_suffix(".trace")
     emulate(firmware, "-singlestep", "-d", "exec,nochain", "-D", str(path))
-    result = count_cycles(listing, path)
-    path.unlink()
-    return result
+    return count_cycles(listing, path)
 
 
 def printed(*command: str) -> str:
@@ -182,48 +163,39 @@ def printed(*command: str) -> str:
 
 
 def flash_and_ram(folder: Path, firmware: Path) -> dict[str, int]:
-    """Bytes of the controller's code and constants, of the whole firmware with its log, of the state."""
+    """Bytes of the controller's code and constants, and of its state."""
     subprocess.run([f"{CROSS}gcc", *CPU, *FLAGS, "-c", "controller.c", "-o", "c.o"], cwd=folder, check=True)
-    controller, whole = (
-        int(printed(f"{CROSS}size", str(binary)).splitlines()[1].split()[0])
-        for binary in (folder / "c.o", firmware)
-    )
+    flash = int(printed(f"{CROSS}size", str(folder / "c.o")).splitlines()[1].split()[0])
     symbols = map(str.split, printed(f"{CROSS}nm", "-S", "--defined-only", str(firmware)).splitlines())
     state = next(int(row[1], 16) for row in symbols if len(row) == 4 and row[3] == "state")
-    return {"flash_controller": controller, "flash_firmware": whole, "ram_state": state}
+    return {"flash_controller": flash, "ram_state": state}
 
 
-def main() -> int:
-    """Print the table; 1 if a voltage differs from the host's by more than rounding."""
-    parser = argparse.ArgumentParser(description="Exported controllers on an emulated Cortex-M4F.")
-    parser.add_argument("--samples", type=int, default=SAMPLES, help="samples compared with the host")
-    parser.add_argument("--traced", type=int, default=TRACED, help="samples whose instructions are counted")
-    parser.add_argument("--only", choices=sorted(controllers()), help="only this controller")
-    parser.add_argument("--precision", choices=["float", "double"], help="only this precision")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures to this file too")
-    arguments = parser.parse_args()
-    if absent := missing_tools():
+def main(
+    samples: int = SAMPLES, traced: int = TRACED,
+    only: Annotated[str | None, typer.Option(callback=one_of(*controllers()))] = None,
+    precision: Literal["float", "double"] | None = None, json: Path | None = None,
+) -> None:  # fmt: skip
+    """Compare SAMPLES with the host, count the instructions of TRACED; ONLY one controller, one PRECISION.
+
+    Fails if a voltage differs from the host's by more than rounding.
+    """
+    programs = (f"{CROSS}gcc", f"{CROSS}objdump", EMULATOR)
+    if absent := [name for name in programs if shutil.which(name) is None]:
         print(f"not found: {', '.join(absent)}: run make tools", file=sys.stderr)
-        return 2
+        sys.exit(2)
     rows = [
-        measure(name, precision, arguments.samples, arguments.traced)
-        for name in ([arguments.only] if arguments.only else controllers())
-        for precision in ([arguments.precision] if arguments.precision else ("float", "double"))
+        measure(name, kind, samples, traced)
+        for name in ([only] if only else controllers())
+        for kind in ([precision] if precision else ("float", "double"))
     ]
     for row in rows:
         print(", ".join(f"{name} {value}" for name, value in row.items()))
-    if arguments.json is not None:
-        put(
-            {"clock_Hz": CLOCK, "sample_rate_Hz": SAMPLE_RATE, "tools": tools(), "rows": rows}, arguments.json
-        )
-    apart = [row for row in rows if not row["largest_difference_from_host"] < 1e-5]
-    return 1 if apart else 0
-
-
-def tools() -> list[str]:
-    """First line of what each program says of itself."""
-    return [printed(name, "--version").splitlines()[0] for name in (f"{CROSS}gcc", EMULATOR)]
+    if json is not None:
+        tools = [printed(name, "--version").splitlines()[0] for name in (f"{CROSS}gcc", EMULATOR)]
+        put({"clock_Hz": CLOCK, "sample_rate_Hz": SAMPLE_RATE, "tools": tools, "rows": rows}, json)
+    sys.exit(any(not row["largest_difference_from_host"] < 1e-5 for row in rows))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

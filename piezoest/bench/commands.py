@@ -41,9 +41,7 @@ def paper(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Start of the random numbers of the stage.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Without the sweep over the memory.")] = False,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes; default one for each processor.")
-    ] = None,
+    workers: shared.Processes = None,
     html: shared.Html = None,
 ) -> None:
     """Tables I, II and III of the paper beside those of the simulated stage.

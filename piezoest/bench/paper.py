@@ -21,11 +21,12 @@ import numpy as np
 from piezoest import signals
 from piezoest._checks import integer, positive
 from piezoest.bench.executors import in_processes
+from piezoest.bench.metrics import settles
 from piezoest.bench.paper_tables import PRBS_ROW, Published, crossed_row, published, triangle_row
 from piezoest.compensators import InverseCompensator, LinearCompensator
 from piezoest.estimators.rls import HysteresisRLS
 from piezoest.models import ColemanHodgdon, LinearGain
-from piezoest.stage import PaperStage
+from piezoest.stage import PaperStage, SimulatedStage
 from piezoest.tracking import TrackingRecord, track
 
 Compensation = Literal["linear", "inverse"]
@@ -94,26 +95,24 @@ class Experiment:
         """Least length of the run [s]."""
         return max(SECONDS, MEMORIES_TO_SETTLE * (self.memory or 0.0))
 
-    def run(self) -> Run:
-        """Run it."""
-        model: Any = self.model
-        compensator = (
-            LinearCompensator(model)
-            if self.compensation == "linear"
-            else InverseCompensator(model, hand_over=HAND_OVER)
-        )
-        estimator = (
-            None
-            if self.memory is None
-            else HysteresisRLS(SAMPLE_RATE, initial_model=self.model, memory=self.memory)
-        )
-        record = track(
-            self.reference.signal(self.seconds),
-            stage=PaperStage(SAMPLE_RATE, seed=self.seed),
-            compensator=compensator,
+    def follow(self, stage: SimulatedStage, seconds: float) -> TrackingRecord:
+        """Record of a stage that follows the reference for at least so long [s]."""
+        model, estimator = self.model, None
+        if self.memory is not None:
+            estimator = HysteresisRLS(SAMPLE_RATE, initial_model=model, memory=self.memory)
+        return track(
+            self.reference.signal(seconds),
+            stage=stage,
+            compensator=LinearCompensator(model)
+            if isinstance(model, LinearGain)
+            else InverseCompensator(model, hand_over=HAND_OVER),
             estimator=estimator,
             update_interval=UPDATE_INTERVAL,
         )
+
+    def run(self) -> Run:
+        """Run it."""
+        record = self.follow(PaperStage(SAMPLE_RATE, seed=self.seed), self.seconds)
         last = record.theta[-(record.period or 1) :]
         return Run(
             experiment=self,
@@ -155,9 +154,8 @@ class Run:
         """
         if self.max_error > SETTLED * self.errors[0]:
             return None
-        late = np.flatnonzero(np.asarray(self.errors) > SETTLED * self.max_error)
-        settled = int(late[-1]) + 1 if late.size else 0
-        return settled if settled <= len(self.errors) // 2 else None
+        settled = settles(np.asarray(self.errors), SETTLED * self.max_error)
+        return settled if settled is not None and settled <= len(self.errors) // 2 else None
 
     @property
     def settling_time(self) -> float | None:

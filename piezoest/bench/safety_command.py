@@ -15,8 +15,8 @@ import typer
 from piezoest._options import grouped
 from piezoest._progress import LOADING, progress
 from piezoest._tables import shown
+from piezoest.bench import shared
 from piezoest.bench.origin import origin, put
-from piezoest.bench.shared import Json, check, show, usage
 
 if TYPE_CHECKING:
     from piezoest.bench.store import Row
@@ -81,19 +81,15 @@ class Written:
     output: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the results, and of finished runs.")
     ] = FOLDER
-    table: Annotated[
-        str | None, typer.Option(help="parquet or csv; default Parquet where pyarrow is installed.")
-    ] = None
+    table: shared.Format = None
 
 
 @grouped
 def safety(
     which: Which,
     written: Written,
-    workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Processes; default one for each core.")
-    ] = None,
-    json_to: Json = None,
+    workers: shared.Processes = None,
+    json_to: shared.Json = None,
 ) -> None:
     """A controller on a zoo of rigs: stages of many kinds, and what goes wrong with them, at random.
 
@@ -101,9 +97,9 @@ def safety(
     none of them without need, and the error stays below 1.5 times that of the best straight line. Stopped and
     started again, it goes on where it was.
     """
-    check(json_to)
+    shared.check(json_to)
     began, asked = time.perf_counter(), which.asked
-    with usage():
+    with shared.usage():
         with progress("", lines=True) as say:
             say(LOADING)
             from piezoest.bench import tables
@@ -120,7 +116,7 @@ def safety(
             say("drawing")
             campaign = _campaign(which, name, given)
             format = tables.checked_format(written.table)
-        with usage(written.output), progress("runs", lines=True) as say:
+        with shared.usage(written.output), progress("runs", lines=True) as say:
             rows = played(campaign.tasks, written.output, tasks.over_cores(workers), say.done)
     document = {"suite": "safety", **origin(began), "controller": name, "given": given}
     tables.write_table(
@@ -129,7 +125,7 @@ def safety(
     )
     document |= campaign.summarise(rows)
     put(document, written.output / f"{asked[0] if asked else 'safety'}.json")
-    show(document, json_to, campaign.print, f"Results: {written.output}")
+    shared.show(document, json_to, campaign.print, f"Results: {written.output}")
 
 
 def _given(pairs: list[str]) -> dict[str, Any]:

@@ -18,6 +18,11 @@ Json = Annotated[
     str | None, typer.Option("--json", metavar="FILE", help="Write JSON; - prints it instead of the tables.")
 ]
 
+Processes = Annotated[int | None, typer.Option(min=1, help="Processes; default one for each core.")]
+Format = Annotated[
+    str | None, typer.Option(help="parquet or csv; default Parquet where pyarrow is installed.")
+]
+
 
 def check(json_to: str | None, html: Path | None = None) -> None:
     """Refuse what cannot be written before the work is done, not after."""

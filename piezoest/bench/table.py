@@ -166,6 +166,7 @@ def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) 
         _cell(key, group, errors.get(key, []))
         for key, group in frame.groupby(["stage", "scenario", "estimator"], sort=False)
     ]
+    overview = [_overview(frame, text, plan) for text in names]
     document = {
         "suite": "table",
         "code": fingerprint(),
@@ -180,7 +181,7 @@ def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) 
             for text in names
         },
         "runs": len(rows),
-        "overview": [_overview(frame, text, plan) for text in names],
+        "overview": overview,
         "cells": cells,
         "needs": [
             {**asdict(need), "order": order(frame[~frame["estimator"].isin(plan.tuned)], need, plan.stages)}
@@ -192,16 +193,10 @@ def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) 
             for row in rows
             if row["failure"] is not None
         ],
-        "all_failed": [text for text in names if _failed(frame, text)],
+        "all_failed": [row["estimator"] for row in overview if row["failures"] == row["runs"] > 0],
         "tracebacks": list(dict.fromkeys(row["traceback"] for row in rows if row.get("traceback")))[:5],
     }
     return dict(json_safe(document, DIGITS))
-
-
-def _failed(frame: pd.DataFrame, text: str) -> bool:
-    """Whether an estimator was run, and no run of it came to its end."""
-    failure = frame.loc[frame["estimator"] == text, "failure"]
-    return bool(failure.size and failure.notna().all())
 
 
 def _cell(key: Any, group: pd.DataFrame, errors: Sequence[Sequence[float]]) -> Row:

@@ -77,9 +77,7 @@ class Shown:
         Path | None,
         typer.Option("--output", "-o", metavar="DIR", help=f"Folder of the results; default {FOLDER}."),
     ] = None
-    table: Annotated[
-        str | None, typer.Option(help="parquet or csv; default Parquet where pyarrow is installed.")
-    ] = None
+    table: shared.Format = None
     scenarios: Annotated[bool, typer.Option("--by-scenario", help="Print each scenario's table.")] = False
     figures: Annotated[
         Path | None, typer.Option("--figures", metavar="DIR", help="Draw the figures, as PNG.")
@@ -91,9 +89,7 @@ class Shown:
 class Where:
     """On what the runs are made."""
 
-    jobs: Annotated[
-        int | None, typer.Option("--jobs", min=1, help="Processes; default one for each core.")
-    ] = None
+    jobs: shared.Processes = None
     dask: Annotated[bool, typer.Option("--dask", help="Run on Dask, on this machine's cores.")] = False
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: tcp://10.0.0.1:8786.")

@@ -27,15 +27,11 @@ Space = Mapping[str, Values]
 
 def value_at(values: Values, position: float) -> Any:
     """Value at a position along the way, within [0, 1). `position`: 0 for the first."""
-    match values:
-        case list():
-            return values[min(int(position * len(values)), len(values) - 1)]
-        case range(start=low, stop=high):
-            value = math.exp(math.log(low) + position * (math.log(high) - math.log(low)))
-            return min(int(value), high - 1)
-        case (low, high):
-            value = math.exp(math.log(low) + position * (math.log(high) - math.log(low)))
-            return float(f"{value:.3g}")
+    if isinstance(values, list):
+        return values[min(int(position * len(values)), len(values) - 1)]
+    low, high = (values.start, values.stop) if isinstance(values, range) else values
+    value = math.exp(math.log(low) + position * (math.log(high) - math.log(low)))
+    return min(int(value), high - 1) if isinstance(values, range) else float(f"{value:.3g}")
 
 
 @dataclass(frozen=True, slots=True)

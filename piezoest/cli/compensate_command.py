@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -89,10 +89,8 @@ def compensate(
 
             writer_for(output)  # refuses a name before the work is done
             learnt = _model(stated)
-            voltage_limits = VoltageLimits(
-                minimum=-float("inf") if limits.minimum is None else limits.minimum,
-                maximum=float("inf") if limits.maximum is None else limits.maximum,
-            )
+            given = {name: value for name, value in asdict(limits).items() if value is not None}
+            voltage_limits = VoltageLimits(**given)
             signal = read_reference(reference, column=column, sample_rate=sample_rate)
             compensator = InverseCompensator(learnt.model, voltage_limits, sample_rate=signal.sample_rate)
             check_continuity(signal.values, signal.sample_rate, "the reference")

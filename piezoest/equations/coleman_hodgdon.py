@@ -39,12 +39,6 @@ def rate(w, u, u_dot, alpha, beta, gamma):
 
 
 @register_jitable
-def hysteresis_rate(w_h, u_dot, a, b):
-    """dw_h/dt of the second form (3) [µm/s]."""
-    return -b * u_dot - a * w_h * np.abs(u_dot)
-
-
-@register_jitable
 def relative_decay(travel):
     """(1 - exp(-travel)) / travel, which is 1 at travel = 0.
 
@@ -93,15 +87,6 @@ def hysteresis_jacobian(w_h, du, a, b):
     """Derivatives of `hysteresis_step` by w_h, a and b."""
     _, kept, by_a, by_b = hysteresis_linearised(w_h, du, a, b)
     return kept, by_a, by_b
-
-
-@register_jitable
-def branch(u, u_0, w_0, alpha, beta, gamma):
-    """w at voltage u on the branch through (u_0, w_0): (B5)-(B8), the exact solution of (1)."""
-    s = np.sign(u - u_0)
-    asymptote = s * (alpha * beta - gamma) / alpha**2
-    c = gamma / alpha
-    return c * u + asymptote + (w_0 - asymptote - c * u_0) * np.exp(-alpha * np.abs(u - u_0))
 
 
 @register_jitable

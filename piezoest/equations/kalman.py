@@ -53,20 +53,6 @@ def predict_covariance(P, row, m, q):
 
 
 @inlined
-def update(s, P, h, y, R, gain):
-    """Measurement update for one measurement; returns the innovation's variance S.
-
-    S = h P h' + R, K = P h'/S, s += K y, and Joseph's form of the covariance,
-    (I - K h) P (I - K h)' + K R K', row by row so that P stays symmetric. `gain` (n,)
-    receives K.
-    """
-    product = like(s)
-    S = innovation_variance(P, h, R, product)
-    correct(s, P, h, y, R, S, gain, product)
-    return S
-
-
-@inlined
 def innovation_variance(P, h, R, product):
     """S = h P h' + R; `product` (n,) receives P h'."""
     n = len(h)
@@ -101,7 +87,11 @@ def is_covariance(P):
 
 @inlined
 def correct(s, P, h, y, R, S, gain, product):
-    """The part of `update` behind `innovation_variance`, which left P h' in `product`."""
+    """Measurement update, after `innovation_variance`, which left P h' in `product`.
+
+    K = P h'/S, s += K y, and Joseph's form of the covariance, (I - K h) P (I - K h)' + K R K', row by row so
+    that P stays symmetric. `gain` (n,) receives K.
+    """
     n = len(s)
     rest = like(s)
     each = 1.0 / S

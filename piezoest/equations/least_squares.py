@@ -85,23 +85,14 @@ def is_safe(P, y, spread, product):
 
 
 @inlined
-def discrete_update(theta, P, phi, z, forgetting, R, bound):
-    """One sample of recursive least squares; returns the innovation y and its variance S.
+def discrete_correction(theta, P, y, quadratic, forgetting, R, bound, product):
+    """One sample of recursive least squares, after `innovation`; returns the innovation's variance S.
 
     With mu = `forgetting` (mu = exp(-dt/memory) forgets as (A4) does):
     S = phi' P phi / mu + R, K = P phi / (mu S), theta += K y, P = (P - K phi' P) / mu.
     P is kept if the update would take its trace above `bound` (R0 of A6). Unlike (A6) taken
     literally, this cannot freeze P for ever.
     """
-    product = like(theta)
-    y, quadratic = innovation(theta, P, phi, z, product)
-    S = discrete_correction(theta, P, y, quadratic, forgetting, R, bound, product)
-    return y, S
-
-
-@inlined
-def discrete_correction(theta, P, y, quadratic, forgetting, R, bound, product):
-    """The part of `discrete_update` behind `innovation`; returns S."""
     n = len(theta)
     spread = quadratic + forgetting * R
     gain = 1.0 / spread
@@ -198,24 +189,15 @@ def continuous_correction(theta, P, h, bound, rates):
 
 
 @inlined
-def directional_update(theta, P, phi, z, forgetting, R, bound):
-    """One sample that forgets only along the present regressor; returns (y, S).
+def directional_correction(theta, P, y, q, forgetting, R, bound, product):
+    """One sample that forgets only along the present regressor, after `innovation`; returns S.
 
     R. Kulhavy, Restricted exponential forgetting in real-time identification, Automatica 23
     (1987) 589-600; in terms of the information matrix, L. Cao, H. Schwartz, Automatica 36 (2000)
     1725-1731. With q = phi' P phi and mu = `forgetting`: K = P phi/(R + q),
     P^-1 += (mu - (1 - mu) R/q) phi phi'/R. This is exponential forgetting along phi; other directions
-    are kept. `bound` as in `discrete_update`.
+    are kept. `bound` as in `discrete_correction`.
     """
-    product = like(theta)
-    y, q = innovation(theta, P, phi, z, product)
-    S = directional_correction(theta, P, y, q, forgetting, R, bound, product)
-    return y, S
-
-
-@inlined
-def directional_correction(theta, P, y, q, forgetting, R, bound, product):
-    """The part of `directional_update` behind `innovation`; returns S."""
     n = len(theta)
     S = q + R
     lost = (1.0 - forgetting) * R

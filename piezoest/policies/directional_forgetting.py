@@ -14,7 +14,7 @@ class DirectionalForgetting(InUnits, Policy):  # type: ignore[override]
     """Forget only along the present regressor; directions without new data are kept.
 
     R. Kulhavy, Automatica 23 (1987) 589-600; L. Cao, H. Schwartz, Automatica 36 (2000) 1725-1731.
-    See `piezoest.equations.least_squares.directional_update`.
+    See `piezoest.equations.least_squares.directional_correction`.
 
     Parameters
     ----------

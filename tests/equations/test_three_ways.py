@@ -29,10 +29,8 @@ PLAYS = (np.array([-0.2, 3.0, 0.0, -4.0]), 9.0, 0.1, THRESHOLDS, WEIGHTS)
     ("function", "arguments"),
     [
         (ch.rate, (0.8, 20.0, -3.0, 0.02, 0.15, 0.004)),
-        (ch.hysteresis_rate, (0.8, -3.0, 0.02, 0.05)),
         (ch.hysteresis_step, (0.8, -3.0, 0.02, 0.05)),
         (ch.hysteresis_step, (0.8, 0.0, 0.02, 0.05)),
-        (ch.branch, (12.0, 10.0, 1.2, 0.02, 0.15, 0.004)),
         (ch.inverse_rate, (0.8, -3.0, 0.02, 0.05, 0.2)),
         (ch.inverse_increment, (0.8, 1.5, 0.02, 0.05, 0.2)),
         (ch.inverse_increment, (-0.8, 0.0, 0.02, 0.05, 0.2)),

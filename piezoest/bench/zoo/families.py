@@ -177,9 +177,3 @@ def _slopes(u: FloatArray, x: FloatArray) -> FloatArray:
     du = np.diff(u)
     moved = du != 0.0
     return np.diff(x)[moved] / du[moved]
-
-
-def width_of(model: Any, reach: Reach) -> float:
-    """Width of a model's loop over the reach, relative to its stroke. `model`: from `draw_family`."""
-    x = model.simulate(reach.cycle())
-    return _opening(x) / float(np.ptp(x[-POINTS:]))
