@@ -15,8 +15,6 @@ import pytest
 from piezoest.records import read_record, write_columns
 from tests.logs import LOG, TIME, VOLTAGE, N, write_hdf5, write_sheets, write_tdms
 
-# ---------------------------------------------------------------- more than there is room for
-
 
 def hdf5_that_declares_much(path: Path) -> None:
     with pytest.importorskip("h5py").File(path, "w") as file:
@@ -78,9 +76,6 @@ def test_what_a_file_declares_is_checked(
         read_record(tmp_path / name)
 
 
-# ---------------------------------------------------------------- numbers that lie elsewhere
-
-
 def external_storage(file: Any, folder: Path) -> None:
     del file["displacement_um"]
     file.create_dataset("displacement_um", shape=(N,), dtype="f8", external=[(folder / "raw", 0, 8 * N)])
@@ -118,9 +113,6 @@ def test_what_lies_in_the_file_is_read(tmp_path: Path) -> None:
         file["none"] = h5py.Empty("f8")
         virtual(file, tmp_path, other=".")
     assert len(read_record(tmp_path / "log.h5", columns={"displacement": "position_um"})) == N
-
-
-# ---------------------------------------------------------------- not a log
 
 
 TEXT = "time_s,voltage_V,displacement_um\n" + "".join(f"{k},{k},{k}\n" for k in range(N))

@@ -19,9 +19,7 @@ def write_parquet(file: Path, columns: dict[str, Any], units: dict[str, str] | N
     pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     fields = [
         pa.field(
-            name,
-            pa.array(values).type,
-            metadata={"unit": units[name]} if units and name in units else None,
+            name, pa.array(values).type, metadata={"unit": units[name]} if units and name in units else None
         )
         for name, values in columns.items()
     ]

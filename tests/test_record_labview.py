@@ -87,10 +87,7 @@ PARTS = (slice(0, 20), slice(20, 45), slice(45, N))
 )
 @pytest.mark.parametrize("x_columns", ["One", "No"])
 def test_lvm_of_several_segments(
-    tmp_path: Path,
-    starts: list[tuple[float, float]],
-    rows: int,
-    x_columns: str,
+    tmp_path: Path, starts: list[tuple[float, float]], rows: int, x_columns: str
 ) -> None:
     segments = tuple((part, *start) for part, start in zip(PARTS, starts, strict=True))
     file = lvm(tmp_path / "log.lvm", segments, x_columns=x_columns)
@@ -99,9 +96,6 @@ def test_lvm_of_several_segments(
     np.testing.assert_array_equal(np.concatenate([block.voltage for block in stream]), VOLTAGE)
     assert stream.count() == N
     assert stream_record(file, sample_rate=RATE).count() == N
-
-
-# ---------------------------------------------------------------- TDMS
 
 
 def test_write_tdms(tmp_path: Path) -> None:

@@ -9,13 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import piezoest as pz
-from piezoest.records import (
-    Record,
-    RecordStream,
-    read_record,
-    stream_record,
-    write_columns,
-)
+from piezoest.records import Record, RecordStream, read_record, stream_record, write_columns
 
 RATE = 1000.0
 
@@ -77,13 +71,7 @@ def test_any_blocks_give_the_same_samples(
 
 
 @pytest.mark.parametrize(("rows", "kind"), [(1, "npy"), (13, "csv"), (400, "npy")])
-@pytest.mark.parametrize(
-    "estimator",
-    [
-        lambda: pz.HysteresisRLS(RATE),
-        lambda: pz.PrandtlIshlinskiiRLS(RATE),
-    ],
-)
+@pytest.mark.parametrize("estimator", [lambda: pz.HysteresisRLS(RATE), lambda: pz.PrandtlIshlinskiiRLS(RATE)])
 def test_estimators_end_in_the_same_bits(tmp_path: Path, rows: int, kind: str, estimator: object) -> None:
     assert callable(estimator)
     time, voltage, displacement = swing()

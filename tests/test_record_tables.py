@@ -15,9 +15,6 @@ START = datetime.datetime(2026, 11, 22, 10)
 STAMPS = [START + datetime.timedelta(seconds=t) for t in TIME.tolist()]
 
 
-# ---------------------------------------------------------------- spreadsheets
-
-
 def rows(time: list[Any], header: tuple[str, ...] = ("t", "drive_V", "gauge (nm)")) -> list[list[Any]]:
     values = [list(row) for row in zip(time, VOLTAGE.tolist(), (1e3 * DISPLACEMENT).tolist(), strict=True)]
     return [list(header), *values]
@@ -54,9 +51,6 @@ def test_cells_without_numbers(tmp_path: Path) -> None:
     table[12][1] = "off"
     with pytest.raises(ValueError, match=r"row 13, column 'drive_V': 'off' is not a number"):
         read_record(write_sheets(tmp_path / "log.xlsx", log=table))
-
-
-# ---------------------------------------------------------------- DataFrames
 
 
 def test_complex_numbers_are_refused() -> None:
@@ -99,9 +93,6 @@ def test_frame_of_polars() -> None:
     check(Record.from_frame(frame.with_columns(pl.Series("t_ms", 1e3 * TIME))))
     with pytest.raises(ValueError, match=r"pass frame\.collect\(\)"):
         Record.from_frame(frame.lazy())
-
-
-# ---------------------------------------------------------------- whatever holds a log
 
 
 def test_as_record_takes_what_holds_a_log(tmp_path: Path) -> None:

@@ -120,11 +120,7 @@ def test_a_mark_that_appears_late_is_no_number(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("header", ["t_ms,u,x", "When,u,x", ""])
-def test_time_stamps(
-    tmp_path: Path,
-    write_stamp: Callable[[str], str],
-    header: str,
-) -> None:
+def test_time_stamps(tmp_path: Path, write_stamp: Callable[[str], str], header: str) -> None:
     rows = [
         (write_stamp(t), f"{u:.3f}", f"{x:.3f}")
         for t, u, x in zip(STAMPS, VOLTAGE, DISPLACEMENT, strict=True)

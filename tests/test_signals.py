@@ -30,9 +30,6 @@ EXAMPLES: dict[str, Callable[[], Signal]] = {
 }
 
 
-# --- every signal -----------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_signals_are_finite_continuous_deterministic_and_periodic(name: str) -> None:
     signal = EXAMPLES[name]()
@@ -48,9 +45,6 @@ def test_signals_are_finite_continuous_deterministic_and_periodic(name: str) -> 
             n = round(again.period)
             assert n == pytest.approx(again.period)
             np.testing.assert_allclose(again.values[n:], again.values[:-n], rtol=0.0, atol=1e-12)
-
-
-# --- triangle ---------------------------------------------------------------------------------------------
 
 
 def test_triangle_is_linear_up_to_ninety_per_cent() -> None:
@@ -96,9 +90,6 @@ def test_triangle_never_exceeds_its_amplitude_or_its_slope(
     assert np.all(np.abs(np.diff(r.values)) <= 4.0 * 5.0 * frequency / 1000.0 * (1 + 1e-6) + 1e-12)
 
 
-# --- phase and period -------------------------------------------------------------------------------------
-
-
 def test_phase_does_not_drift_when_the_frequency_does_not_divide_the_sample_rate() -> None:
     r = signals.sine(1.0, 7.0, 7000, 1000.0)
     assert r.period == pytest.approx(1000 / 7)
@@ -121,9 +112,6 @@ def test_multi_amplitude_changes_at_zero() -> None:
 )
 def test_two_tone_period_is_the_common_one(frequencies: tuple[float, float], period: float | None) -> None:
     assert signals.two_tone((1.0, 1.0), frequencies, 1.0, 1000.0).period == pytest.approx(period)
-
-
-# --- PRBS and other filtered signals ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("bits", [2, 3, 5, 8])
@@ -164,9 +152,6 @@ def test_random_walk_is_band_limited_and_reproducible() -> None:
     assert not np.allclose(r.values, signals.random_walk(5.0, 20.0, 3.0, 1000.0, seed=8).values)
 
 
-# --- Signal -----------------------------------------------------------------------------------------------
-
-
 def test_signal_is_an_array_where_one_is_wanted() -> None:
     given_values = np.array([1.0, -3.0, 2.0])
     r = signals.from_array(given_values, 10.0, period=3)
@@ -204,9 +189,6 @@ def test_signal_arithmetic() -> None:
         r - r
 
 
-# --- the way to the first value ---------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("start", [0.0, 12.0, 45.0, 80.0])
 def test_a_lead_in_goes_smoothly_from_rest_to_the_first_value(start: float) -> None:
     r = signals.triangle(5.0, 5.0, 2, 1000.0) + 45.0
@@ -223,8 +205,6 @@ def test_a_lead_in_goes_smoothly_from_rest_to_the_first_value(start: float) -> N
     assert steps.max() <= 1.875 * abs(45.0 - start) / 300
     check_continuity(led)
 
-
-# --- jumps ------------------------------------------------------------------------------------------------
 
 T = np.arange(2000) / 1000.0
 SLOW, STEP = np.sin(2.0 * np.pi * T), np.where(T < 1.0, 0.0, 1.0)
@@ -257,9 +237,6 @@ def test_jumps_are_refused_and_nothing_else(name: str) -> None:
         return
     with pytest.raises(ValueError, match=r"^r jumps by .* use signals\.filtered_steps"):
         check_continuity(JUMPY[name], 1000.0, "r")
-
-
-# --- bad arguments ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ MISSES = {
     ("7.5 µm @ 5.0 Hz, parameters of 2.5 µm", "compensated_max_error"): (
         "the parameters of the 2.5 µm row, off by less than their bounds, are extrapolated threefold: "
         "calibration/trade_off.md"
-    ),
+    )
 }
 
 
@@ -71,8 +71,7 @@ def test_number_is_within_its_bound(number: Published, bench: Bench) -> None:
 
 
 @pytest.mark.parametrize(
-    ("quantity", "sign"),
-    [("alpha", -1), ("beta", 1), ("gamma", -1), ("K", 1), ("compensated_max_error", 1)],
+    ("quantity", "sign"), [("alpha", -1), ("beta", 1), ("gamma", -1), ("K", 1), ("compensated_max_error", 1)]
 )
 def test_slow_row_differs_from_the_fast_one_as_in_the_paper(quantity: str, sign: int, bench: Bench) -> None:
     slow, fast = (bench.number(f"5.0 µm @ {f} Hz", quantity) for f in ("2.5", "5.0"))

@@ -94,9 +94,6 @@ def test_signed_rank_of_few_is_the_exact_one(seed: int) -> None:
     assert signed_rank(np.full(20, np.inf)) < 1e-3
 
 
-# ---------------------------------------------------------------- two campaigns
-
-
 def test_the_same_campaign_has_not_changed() -> None:
     frame = runs({"e": 1.0})
     found = comparison.compare(frame, frame)

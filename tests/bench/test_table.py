@@ -65,9 +65,6 @@ def plan(*estimators: str, **given: Any) -> table.Plan:
     return table.Plan(estimators=estimators, **{**asked, **given})
 
 
-# ---------------------------------------------------------------- stages and estimators
-
-
 @pytest.mark.parametrize("name", STAGES)
 def test_a_stage_is_a_function_of_its_seed_and_has_a_loop(name: str) -> None:
     u = pz.signals.triangle(90.0, 5.0, 3.0, 2000.0).values
@@ -113,9 +110,6 @@ def test_what_is_no_estimator_is_refused(text: str, words: str) -> None:
         candidate(text)
 
 
-# ---------------------------------------------------------------- a run
-
-
 def test_a_run_is_a_function_of_its_task() -> None:
     first, again = play(task()), play(task())
     assert first == again
@@ -159,9 +153,6 @@ def test_what_an_estimator_raises_is_its_own_failure(own: str, name: str, failur
     assert row["errors"] == []
 
 
-# ---------------------------------------------------------------- tables
-
-
 @pytest.mark.parametrize("format", tables.FORMATS)
 def test_tables_are_tidy_and_read_back(tmp_path: Path, format: str) -> None:
     if format == "parquet":
@@ -174,9 +165,6 @@ def test_tables_are_tidy_and_read_back(tmp_path: Path, format: str) -> None:
     assert pd.isna(read["failure"][0])
     periods = tables.read_table(tmp_path, table.PERIODS, table.PERIOD_COLUMNS)
     assert periods["error"].to_list() == rows[0]["errors"]
-
-
-# ---------------------------------------------------------------- many runs
 
 
 def test_processes_give_the_same_rows(tmp_path: Path) -> None:
@@ -235,9 +223,6 @@ def test_a_document_sums_up(own: str, tmp_path: Path) -> None:
         write_html({"suite": "other"}, tmp_path / "page.html")
 
 
-# ---------------------------------------------------------------- recorded logs
-
-
 def write_log(path: Path, seed: int) -> None:
     u = pz.signals.triangle(30.0, 5.0, 10.0, 2000.0).values
     x = pz.PaperStage(2000.0, seed=seed).run(u)
@@ -273,8 +258,6 @@ def test_recorded_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(FileNotFoundError, match="nowhere"):
         recorded.logs_of("nowhere")
 
-
-# ---------------------------------------------------------------- the command
 
 SHORT = ("--scenario", "cold-start", "--scenario", "noise", "--quick", "--only", "HysteresisEKF", "--jobs", 1)
 

@@ -153,17 +153,7 @@ def test_integral_feedback_does_not_wind_up() -> None:
 
 
 ODD = [np.array([2.0]), np.array(2.0), [2.0], (2.0,), np.float32(2.0), np.int64(2), 2, np.ma.array([2.0])]
-NO_NUMBERS = [
-    "2",
-    10**400,
-    2j,
-    object(),
-    [1.0, 2.0],
-    np.zeros(3),
-    np.ma.masked,
-    None,
-    b"2",
-]
+NO_NUMBERS = ["2", 10**400, 2j, object(), [1.0, 2.0], np.zeros(3), np.ma.masked, None, b"2"]
 
 
 def lead(compensator: Any) -> Any:

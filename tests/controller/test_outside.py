@@ -11,10 +11,9 @@ import pytest
 import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.models import LearntModel, LearntOn
+from tests.controller.shared import LIMITS, LOOP, in_blocks
 
 FS = 10_000.0
-LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
-LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
 WIDE = LearntOn((-60.0, 60.0), (-10.0, 10.0), 1e4)
 SMALL, LARGE = (pz.signals.triangle(amplitude, 10.0, 3, FS).values for amplitude in (2.0, 4.0))
 
@@ -24,10 +23,7 @@ def controller(model: Any, **options: Any) -> Any:
 
 
 def driven(driver: Any, r: FloatArray, block: int = 1) -> Any:
-    stage = pz.SimulatedStage(FS, LOOP)
-    for begin in range(0, r.size, block):
-        u = driver.run(r[begin : begin + block])
-        driver.learn(u, stage.run(u))
+    in_blocks(driver, pz.SimulatedStage(FS, LOOP), r, block)
     return driver
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import piezoest as pz
+from tests.controller.shared import LIMITS, drive, last_error
 
 FS = 2000.0
-LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
 # Its small loops close: those of a Coleman-Hodgdon stage wander for many periods.
 LOOP = pz.PaperStage(FS).hysteresis
 
@@ -18,12 +18,9 @@ def scan(part: float, periods: int = 25, wide: Any = ()) -> tuple[Any, Any, floa
     small = 5.0 * part * pz.signals.triangle(1.0, 5.0, periods, FS).values
     r = np.concatenate((wide, np.linspace(0.0, 5.0, 800), 5.0 + small))
     driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS), pz.SimulatedStage(FS, LOOP)
-    rng, x = np.random.default_rng(0), np.empty_like(r)
-    for k, r_k in enumerate(r.tolist()):
-        u = driver.step(r_k)
-        x[k] = stage.step(u)
-        driver.learn(u, float(x[k] + 1e-4 * rng.normal()))
-    return r, driver, float(np.abs(r - x)[-800:].max() / small.max())
+    rng = np.random.default_rng(0)
+    x = drive(driver, stage, r, lambda _, x: x + 1e-4 * rng.normal()).x
+    return r, driver, last_error(r, x, 800) / small.max()
 
 
 @pytest.mark.parametrize("part", [0.002, 0.004, 0.008, 0.012, 0.03])
@@ -40,16 +37,10 @@ def test_a_small_scan_behind_wide_waves_is_learnt(part: float) -> None:
 
 
 def test_wide_waves_behind_a_small_scan_are_learnt() -> None:
-    r, driver, _ = scan(0.004)
-    stage, errors = pz.SimulatedStage(FS, LOOP), []
+    _, driver, _ = scan(0.004)
+    stage, r = pz.SimulatedStage(FS, LOOP), pz.signals.triangle(4.0, 5.0, 12, FS).values
     stage.run(np.full(10, driver.voltage))
-    for r_k in pz.signals.triangle(4.0, 5.0, 12, FS).values.tolist():
-        u = driver.step(r_k)
-        x = stage.step(u)
-        driver.learn(u, x)
-        errors.append(abs(r_k - x))
-    assert max(errors[-800:]) < 0.12
-    assert r[-1] < 5.1
+    assert last_error(r, drive(driver, stage, r).x, 800) < 0.12
 
 
 def test_noise_of_a_reference_at_rest_is_no_scan() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import piezoest as pz
+from tests.controller.shared import in_blocks
 
 FS, SLOPE, SWEPT = 10_000.0, 0.06, 2.5
 UNIPOLAR, BIASED, BIPOLAR = (0.0, 150.0), (-20.0, 120.0), (-100.0, 100.0)
@@ -44,11 +45,8 @@ def test_a_gain_of_the_wrong_sign_is_doubted(limits: Any, width: float, hum: flo
 def test_an_event_tells_where_it_was_noticed_also_within_a_block() -> None:
     limits = pz.VoltageLimits(-50.0, 100.0)
     driver = pz.AdaptiveFeedforward(FS, limits=limits, estimators=())
-    stage = pz.SimulatedStage(FS, pz.LinearGain(0.1))
     r = pz.signals.triangle(14.0, 2.0, 4, FS).values
-    for part in np.split(r, 10):
-        u = driver.run(part)
-        driver.learn(u, stage.run(u))
+    in_blocks(driver, pz.SimulatedStage(FS, pz.LinearGain(0.1)), r, 2000)
     (event,) = [event for event in driver.events if event.reason.startswith("out of reach")]
     assert "limit of 100 V" in event.reason or "limit of -50 V" in event.reason
-    assert event.time % (part.size / FS) != 0.0
+    assert event.time % (2000 / FS) != 0.0

@@ -17,16 +17,10 @@ def program(name: str, monkeypatch: pytest.MonkeyPatch) -> Any:
     return importlib.import_module(name)
 
 
-# ---------------------------------------------------------------- README
-
-
 def test_readme_has_the_figures_of_the_data(monkeypatch: pytest.MonkeyPatch) -> None:
     readme = program("readme", monkeypatch)
     _, inside, _ = readme.parts((ROOT / "README.md").read_text(encoding="utf-8"))
     assert inside == readme.figures(), "run python docs/readme.py"
-
-
-# ---------------------------------------------------------------- links
 
 
 GOOD = (

@@ -63,11 +63,7 @@ def test_two_forms_agree(loop: tuple[float, float, float], turning_points: list[
     assert w == pytest.approx(expected, abs=1e-9 * (1.0 + abs(expected)))
 
 
-@given(
-    loops(),
-    st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=8),
-    st.floats(-1.0, 1.0),
-)
+@given(loops(), st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=8), st.floats(-1.0, 1.0))
 def test_invert_and_simulate_are_inverse(
     loop: tuple[float, float, float], turning_points: list[float], place: float
 ) -> None:

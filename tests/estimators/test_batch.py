@@ -27,9 +27,6 @@ def record(
     return u, x + noise * np.random.default_rng(seed).standard_normal(u.size)
 
 
-# ---------------------------------------------------------------- what it finds
-
-
 def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
     """Of alpha, beta and gamma, the start state unknown: sensitivities by finite differences."""
     u, _ = record()
@@ -116,9 +113,6 @@ def test_linear_gain(method: Any) -> None:
     assert fit.model == pz.LinearGain(*fit.theta)
 
 
-# ---------------------------------------------------------------- bounds and masks
-
-
 @pytest.mark.parametrize("gamma", [0.021 * 0.147 * 2.2, 0.021 * 0.147 * 0.95])
 def test_model_is_admissible_where_the_plant_is_not(gamma: float) -> None:
     plant = pz.ColemanHodgdon(0.021, 0.147, gamma)
@@ -130,8 +124,7 @@ def test_model_is_admissible_where_the_plant_is_not(gamma: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "names",
-    [("alpha",), ("beta",), ("gamma",), ("alpha", "gamma"), ("alpha", "beta", "gamma")],
+    "names", [("alpha",), ("beta",), ("gamma",), ("alpha", "gamma"), ("alpha", "beta", "gamma")]
 )
 def test_fixed_parameters_stay(names: tuple[str, ...]) -> None:
     u, x = record()
@@ -146,9 +139,6 @@ def test_fixed_parameters_stay(names: tuple[str, ...]) -> None:
     assert np.all(np.abs(fit.theta - [*TRUE.theta, 0.0, 0.0])[~held] < 4.0 * fit.standard_errors[~held])
     assert np.all(fit.standard_errors[~held] < free.standard_errors[~held])
     assert fit.model.is_admissible
-
-
-# ---------------------------------------------------------------- bad data
 
 
 def test_missing_samples_count_nothing() -> None:
@@ -202,9 +192,6 @@ def test_a_failure_is_told_in_the_solvers_words_with_the_best_iterate() -> None:
     assert estimator.result is not None
     assert not estimator.result.success
     assert estimator.model == scipy.model
-
-
-# ---------------------------------------------------------------- the face
 
 
 def test_collects_and_fits_when_asked() -> None:

@@ -92,18 +92,12 @@ def assert_sound(estimator: Any) -> None:
     assert estimator.model.is_admissible
 
 
-# ---------------------------------------------------------------- the exceptions themselves
-
-
 def test_exceptions_name_promises_and_give_reasons(kind: Any) -> None:
     names = vars(sys.modules[__name__])
     promises = {name.removeprefix("test_") for name in names if name.startswith("test_")}
     for promise, reason in kind.conformance_exceptions.items():
         assert promise in promises, f"{kind.__name__} excepts itself from {promise!r}, which nobody promises"
         assert reason
-
-
-# ---------------------------------------------------------------- construction
 
 
 def test_refuses_wrong_arguments(kind: Any) -> None:
@@ -124,9 +118,6 @@ def test_refuses_wrong_arguments(kind: Any) -> None:
         with pytest.raises(ValueError, match=next(iter(options))):
             estimator.run(u, x, **options)
     assert face(estimator) == face(kind(RATE))
-
-
-# ---------------------------------------------------------------- one sample, many samples
 
 
 def test_run_and_predict_with_update_are_steps(kind: Any) -> None:
@@ -168,9 +159,6 @@ def test_trace_holds_what_was_asked_for(kind: Any) -> None:
     np.testing.assert_array_equal(thin.index, np.arange(6, u.size, 7))
     np.testing.assert_array_equal(thin.theta, full.theta[thin.index])
     assert face(asked) == face(plain) == face(sparse)
-
-
-# ---------------------------------------------------------------- what is a number, and what is missing
 
 
 class Sulking:
@@ -245,9 +233,6 @@ def test_what_is_no_number_is_missing(kind: Any) -> None:
     assert face(other) == face(plain)
 
 
-# ---------------------------------------------------------------- what it shows
-
-
 def test_shapes_and_covariance(kind: Any) -> None:
     u, x = record(2.0)
     estimator = kind(RATE)
@@ -266,9 +251,6 @@ def test_shapes_and_covariance(kind: Any) -> None:
     assert 0.0 < estimator.S < np.inf
     assert estimator.status.samples == u.size
     assert np.all(estimator.standard_errors > 0.0)
-
-
-# ---------------------------------------------------------------- what it learns
 
 
 def test_learns_the_parameters(kind: Any) -> None:
@@ -373,9 +355,6 @@ def test_works_in_the_ring(kind: Any) -> None:
     for k in range(0, len(reference), 25):
         alone.run(record.voltage[k : k + 25], record.measured[k : k + 25])
     assert face(estimator) == face(alone)
-
-
-# ---------------------------------------------------------------- copies of itself
 
 
 def test_reset_equals_new(kind: Any) -> None:

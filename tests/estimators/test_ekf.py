@@ -28,9 +28,6 @@ def test_jacobian_is_casadis_derivative(travel: float, sign: float) -> None:
             np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12 * abs(expected).max())
 
 
-# ---------------------------------------------------------------- reductions
-
-
 @pytest.mark.parametrize("offset", [False, True])
 def test_of_a_linear_gain_is_recursive_least_squares(offset: bool) -> None:
     fs, gain, uncertainty, noise = 2000.0, 0.1, 0.5, 1.5e-3
@@ -51,9 +48,6 @@ def test_of_a_linear_gain_is_recursive_least_squares(offset: bool) -> None:
     np.testing.assert_allclose(filtered.P, squares.P, rtol=1e-9, atol=1e-9 * scale)
     assert filtered.y == pytest.approx(squares.y, rel=1e-6, abs=1e-12)
     assert pytest.approx(squares.S, rel=1e-9) == filtered.S
-
-
-# ---------------------------------------------------------------- what it learns
 
 
 def test_stays_admissible_while_it_learns() -> None:

@@ -21,9 +21,6 @@ def loop_error(model: pz.ColemanHodgdon, u: FloatArray, offset: float = 0.0) -> 
     return float(np.abs(model.simulate(u) - TRUE.simulate(u) - offset)[-400:].max())
 
 
-# ---------------------------------------------------------------- what it learns
-
-
 @pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0), (0.6, 1.0, 0.7), (1.5, 0.8, 1.3)])
 def test_recovers_the_loop_from_any_start(factors: tuple[float, float, float]) -> None:
     # The loop is within 1.2 % of its amplitude after two periods; telling decay and slopes apart takes time.
@@ -57,9 +54,6 @@ def test_noise_makes_no_wrong_loop(noise: float) -> None:
     # Noise leaves the decay itself uncertain, not the slope of a first branch.
     assert theta[1] == pytest.approx(TRUE.beta, rel=0.05)
     assert loop_error(estimator.model, u) < 5e-3 + 2.0 * noise
-
-
-# ---------------------------------------------------------------- what must not move it
 
 
 def test_rest_moves_nothing() -> None:

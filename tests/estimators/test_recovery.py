@@ -92,8 +92,6 @@ def test_decay_of_a_kalman_filter_is_bounded() -> None:
     assert np.max(theta[PERIOD:, 0]) < 1.0
 
 
-# ---------------------------------------------------------------- readings that are cut off or coarse
-
 LONG = np.asarray(pz.signals.triangle(35.0, 5.0, 8, 20_000.0))
 LOOP = pz.ColemanHodgdon(0.021, 0.147, 0.0043).simulate(LONG)
 

@@ -71,9 +71,6 @@ def log() -> tuple[Any, Any]:
     return record.reference, np.concatenate([[np.nan], record.measured[:-1]])
 
 
-# ---------------------------------------------------------------- the text
-
-
 @pytest.mark.parametrize(
     ("cc", "precision", "names"),
     [
@@ -84,9 +81,6 @@ def log() -> tuple[Any, Any]:
 def test_compiles_without_a_warning(cc: str, precision: str, names: tuple[str, ...], tmp_path: Path) -> None:
     for name in names:
         compile_strictly(cc, code(name, precision), tmp_path, "-O1")
-
-
-# ---------------------------------------------------------------- parity
 
 
 @pytest.mark.parametrize("name", PAIRS)
@@ -101,9 +95,6 @@ def test_double_equals_the_library(name: str, log: tuple[Any, Any]) -> None:
     theirs = pz.export.Controller(*PAIRS[name]()).run(r, x)
     ours = pz.export.CompiledController(code(name)).run(r, x)
     np.testing.assert_array_equal(ours, theirs)
-
-
-# ---------------------------------------------------------------- handling
 
 
 @pytest.mark.parametrize("name", ["rls", "ekf"])
@@ -138,9 +129,6 @@ def test_sanitizers_are_silent(name: str, tmp_path: Path, log: tuple[Any, Any]) 
     assert done == (0, b"")
 
 
-# ---------------------------------------------------------------- refusals
-
-
 @pytest.mark.parametrize(
     ("parts", "words"),
     [
@@ -162,12 +150,7 @@ def test_float_settles_to_the_same_error(name: str) -> None:
     case = SCENARIOS["cold-start"].build(0, after=10, **AT)
     estimator, compensator = PAIRS[name]()
     single = pz.export.CompiledController(code(name, "float"))
-    library = pz.track(
-        case.reference,
-        stage=case.new_stage(),
-        compensator=compensator,
-        estimator=estimator,
-    )
+    library = pz.track(case.reference, stage=case.new_stage(), compensator=compensator, estimator=estimator)
     own = pz.track(case.reference, stage=case.new_stage(), compensator=single)
     # Rounding moves the samples at which a model is handed over.
     assert own.max_error(2) == pytest.approx(library.max_error(2), rel=0.03)

@@ -56,12 +56,7 @@ def start(unit: Path, folder: Path) -> Any:
 def test_equals_the_library(unit: Path, tmp_path: Path) -> None:
     r = pz.signals.triangle(5.0, 5.0, 1, FS).values[:6000]
     estimator, compensator = pair()
-    record = pz.track(
-        r,
-        stage=pz.PaperStage(FS, seed=0),
-        compensator=compensator,
-        estimator=estimator,
-    )
+    record = pz.track(r, stage=pz.PaperStage(FS, seed=0), compensator=compensator, estimator=estimator)
     running = start(unit, tmp_path)
     assert running.getReal([2]) == [0.0]
     u = np.empty(r.size)

@@ -40,9 +40,6 @@ def build(folder: Path, function: Any, *arguments: Value) -> Callable[..., Any]:
     return made
 
 
-# ---------------------------------------------------------------- order
-
-
 def _count(state: Any) -> Any:
     state.gain += 1.0
     return state.gain
@@ -74,9 +71,6 @@ def test_operands_come_from_left_to_right(tmp_path: Path) -> None:
     assert function(ctypes.c_void_p(own.ctypes.data)) == 30.0 + 4.0 * 5.0 - 5.0
 
 
-# ---------------------------------------------------------------- arithmetic
-
-
 @compiled
 def arithmetic(u: float, x: float) -> float:
     """All at once."""
@@ -96,9 +90,6 @@ def test_arithmetic_is_the_same(tmp_path: Path) -> None:
     for u in every.tolist():
         for x in every[1:].tolist():
             np.testing.assert_array_equal(function(u, x), arithmetic(u, x))
-
-
-# ---------------------------------------------------------------- refusals
 
 
 def with_a_step(x: Any) -> None:

@@ -49,9 +49,6 @@ def plays_log(seed: int = 0, rate: float = 1000.0, **kinds: Any) -> Record:
     return Record.from_arrays(u, x + noise(1e-3 * float(np.ptp(x)), seed), rate)
 
 
-# ---------------------------------------------------------------- a stage that is known
-
-
 def test_finds_a_known_model_within_its_standard_errors() -> None:
     z = []
     for seed in range(8):
@@ -153,9 +150,6 @@ def test_noise_is_what_repeated_periods_differ_by() -> None:
     assert identify(u, x, sample_rate=RATE, model="line").noise_floor == pytest.approx(0.02, rel=0.2)
 
 
-# ---------------------------------------------------------------- which kind
-
-
 @pytest.mark.parametrize(
     ("kinds", "wanted"),
     [({}, {"plays"}),
@@ -198,9 +192,6 @@ def test_one_kind_is_fitted_where_one_is_named(model: str) -> None:
     assert found.chosen == model
     assert [each.name for each in found.candidates] == list(dict.fromkeys(["line", model]))
     assert found.line.theta[0] == pytest.approx(found.candidates[0].model.theta[0])
-
-
-# ---------------------------------------------------------------- what is given
 
 
 def test_arrays_records_files_and_tables_give_the_same(tmp_path: Path) -> None:
@@ -314,9 +305,6 @@ def test_what_is_no_log_is_refused() -> None:
         identify("no.csv")
 
 
-# ---------------------------------------------------------------- what is shown
-
-
 @pytest.mark.parametrize("model", FORMS)
 def test_dictionary_is_json_and_holds_the_model(model: str, tmp_path: Path) -> None:
     found = identify(plays_log(1, creep=pz.Creep([0.06], [0.25])), model=model)
@@ -371,9 +359,6 @@ def test_whiteness() -> None:
     coloured = Whiteness.of(np.convolve(white, np.ones(5), mode="valid"))
     assert not coloured.is_white
     assert coloured.first_autocorrelation == pytest.approx(0.8, abs=0.05)
-
-
-# ---------------------------------------------------------------- a real recording
 
 
 @pytest.fixture(scope="module")

@@ -92,8 +92,7 @@ def test_where_half_of_the_fitted_part_is_missing_it_is_as_good_as_in_memory(tmp
 
 
 @pytest.mark.parametrize(
-    ("change", "name"),
-    [(lambda u, x: (x, u), "clockwise"), (lambda u, x: (u, 1e4 * x), "too large")],
+    ("change", "name"), [(lambda u, x: (x, u), "clockwise"), (lambda u, x: (u, 1e4 * x), "too large")]
 )
 def test_the_start_is_checked(tmp_path: Path, change: Any, name: str) -> None:
     found = pz.identify_stream(saved(tmp_path, *change(*drawn())))

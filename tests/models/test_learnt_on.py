@@ -24,9 +24,6 @@ def wave(amplitude: float = 40.0, frequency: float = 5.0, periods: int = 8) -> F
     return amplitude * np.interp(time * frequency % 1.0, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0.0])
 
 
-# ---------------------------------------------------------------- turns
-
-
 def test_turns_are_the_extremes_that_the_signal_runs_back_from() -> None:
     u = wave(periods=2)
     assert turns(u, 1.0).tolist() == [250, 750, 1250, 1750]
@@ -34,9 +31,6 @@ def test_turns_are_the_extremes_that_the_signal_runs_back_from() -> None:
     assert turns(u, 100.0).size == turns(np.ones(5), 0.0).size == turns([], 1.0).size == 0
     # Of a flat one the first sample counts, where the signal came from does not.
     assert turns([5.0, 0.0, 3.0, 3.0, 3.0, 0.0, 4.0], 1.0).tolist() == [1, 2, 5]
-
-
-# ---------------------------------------------------------------- ranges of a log
 
 
 def test_a_log_has_its_ranges_without_what_is_wild_or_missing() -> None:
@@ -76,9 +70,6 @@ def test_blocks_of_a_log_have_the_ranges_of_the_log() -> None:
     assert still.joined(still) == still
 
 
-# ---------------------------------------------------------------- who leaves them
-
-
 @pytest.mark.parametrize(
     ("used", "count"),
     [
@@ -105,9 +96,6 @@ def test_the_same_reference_again_leaves_nothing(kind: Any) -> None:
     log = pz.InverseCompensator(LOOP).run(kind(5.0, 5.0, 4, FS).values + LOOP.offset)
     known = LearntOn.of(kind(np.ptp(log) / 2.0, 5.0, 4, FS).values, r, FS)
     assert known.left_by(LearntOn.of(log, r, FS)) == ()
-
-
-# ---------------------------------------------------------------- with a model
 
 
 def test_a_model_comes_in_many_forms(tmp_path: Path) -> None:

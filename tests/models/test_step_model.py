@@ -102,9 +102,6 @@ def test_gain_and_temperature_change_it_as_any_other() -> None:
     np.testing.assert_allclose(stages[0].run(u), stages[1].run(u), atol=1e-12)
 
 
-# ---------------------------------------------------------------- what is wrong with one is said
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

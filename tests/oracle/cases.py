@@ -70,9 +70,6 @@ def compensator_numbers(status: Any) -> Array:
     return flat([float(getattr(status, name)) for name in COMPENSATOR_COUNTS])
 
 
-# ---------------------------------------------------------------- estimators
-
-
 def shown(estimator: Any, name: str) -> Any:
     """An attribute; not a number where this estimator does not follow it."""
     try:
@@ -142,8 +139,6 @@ def estimator_cases() -> Cases:
         for name, (make, scenarios) in STREAMING.items() for scenario in scenarios
     }  # fmt: skip
 
-
-# ---------------------------------------------------------------- compensators
 
 LIMITS = pz.VoltageLimits(-60.0, 60.0)
 TIGHT = pz.VoltageLimits(-20.0, 25.0, slew_rate=1200.0, sample_rate=RATE)

@@ -85,8 +85,6 @@ def test_every_policy_is_carried_out(name: str) -> None:
     )
 
 
-# ---------------------------------------------------------------- policies of one's own
-
 Maker = Callable[..., Any]
 
 
