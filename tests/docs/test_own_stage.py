@@ -59,8 +59,7 @@ def test_it_follows_and_ends_at_rest(program: Any) -> None:
     assert error.size == 2000
     assert np.max(np.abs(error[-400:])) < 0.1
     u = np.array(used.written)
-    assert u.min() >= program.LIMITS.minimum
-    assert u.max() <= program.LIMITS.maximum
+    assert program.LIMITS.minimum <= u.min() <= u.max() <= program.LIMITS.maximum
     ramp = int(program.BIAS / program.SLOPE * program.RATE)
     largest = program.SLOPE / program.RATE * (1.0 + 1e-9)
     assert np.max(np.abs(np.diff(u[:ramp], prepend=program.REST))) <= largest
