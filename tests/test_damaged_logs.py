@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from piezoest.records import read_record, write_columns
-from tests.logs import LOG, TIME, VOLTAGE, N, write_hdf5, write_sheets, write_tdms
+from tests.logs import LOG, N, write_hdf5, write_lvm, write_sheets, write_tdms
 
 
 def hdf5_that_declares_much(path: Path) -> None:
@@ -164,16 +164,9 @@ def packed(path: Path) -> None:
     path.write_bytes(gzip.compress(plain.read_bytes()))
 
 
-def labview(path: Path) -> None:
-    rows = [f"{t}\t{u:.6f}\t{1.5 * u:.6f}\t" for t, u in zip(TIME.tolist(), VOLTAGE.tolist(), strict=True)]
-    head = ["LabVIEW Measurement\t", "Separator\tTab", "Decimal_Separator\t.", "***End_of_Header***\t", "\t"]
-    segment = ["Channels\t2\t\t", "***End_of_Header***\t\t\t", "X_Value\tdrive_V\tgauge_um\tComment"]
-    path.write_text("\n".join([*head, *segment, *rows[:30], "", *segment, *rows[30:]]) + "\n")
-
-
 MAKERS: dict[str, Callable[[Path], Any]] = {
     "csv.gz": packed,
-    "lvm": labview,
+    "lvm": lambda path: write_lvm(path, ((slice(0, 30), 0.0, 0.0), (slice(30, N), 0.3, 0.0))),
     "tdms": write_tdms,
     "xlsx": lambda path: write_sheets(path, log=[list(LOG), *np.column_stack(list(LOG.values())).tolist()]),
     "npz": lambda path: np.savez_compressed(path, **LOG),

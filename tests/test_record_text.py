@@ -169,6 +169,10 @@ def test_every_bit_of_a_number_and_what_stands_between(tmp_path: Path, separator
     wanted[300, 1] = 2.5
     np.testing.assert_array_equal(record.voltage, wanted[:, 1])
     np.testing.assert_array_equal(record.displacement, wanted[:, 2])
+    for size in (1, 50, 4000):
+        stream = stream_record(file, rows=size)
+        np.testing.assert_array_equal(np.concatenate([block.voltage for block in stream]), record.voltage)
+        assert (stream.sample_rate, stream.count()) == (record.sample_rate, 3000)
     rows[2500] = (rows[2500][0], "text", "1")
     with pytest.raises(ValueError, match="line 2502, column 'u': 'text' is not a number"):
         read_record(write(file, separator, rows))  # type: ignore[arg-type]
