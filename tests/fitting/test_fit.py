@@ -1,6 +1,5 @@
 """The face of a fit: what it refuses, what it shows, and where it goes on."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting import FORMS, Fitter
 from piezoest.fitting.flaws import flawed
-from piezoest.fitting.play_columns import PlayColumns, Start
 from tests.fitting.stages import RATE, N, T, noise, rms, stage, voltage
 
 U = voltage(np.random.default_rng(0))
@@ -53,27 +51,19 @@ def test_bad_input_is_refused(name: str) -> None:
 
 
 @pytest.mark.parametrize("model", FORMS)
-def test_every_kind_is_fitted_and_shown(model: str) -> None:
-    found = fit(model=model)
-    assert found.form == model
-    assert found.label == FORMS[model].label
-    assert repr(found).startswith(f"<Fit of {found.label}: ")
+def test_every_kind_is_fitted_and_the_same_record_gives_the_same_bits(model: str) -> None:
+    found, again = fit(model=model), fit(model=model)
+    assert (found.form, found.label) == (model, FORMS[model].label)
     assert found.solver
     assert found.model.is_admissible
     prediction = found.predict()
+    np.testing.assert_array_equal(again.predict().x, prediction.x)
+    assert again.standard_errors == found.standard_errors
     assert prediction.x.shape == U.shape
     assert np.all(prediction.lower < prediction.upper)
     state = {} if found.initial_state is None else {"initial_state": found.initial_state}
-    np.testing.assert_allclose(
-        found.model.simulate(U, **state) + found.drift * np.arange(N) / N, prediction.x, atol=1e-9
-    )
-
-
-@pytest.mark.parametrize("model", FORMS)
-def test_the_same_record_gives_the_same_bits(model: str) -> None:
-    one, other = fit(model=model), fit(model=model)
-    np.testing.assert_array_equal(one.predict().x, other.predict().x)
-    assert one.standard_errors == other.standard_errors
+    x = found.model.simulate(U, **state) + found.drift * np.arange(N) / N
+    np.testing.assert_allclose(x, prediction.x, atol=1e-9)
 
 
 def test_a_delay_counts_as_a_parameter_where_it_is_fitted() -> None:
@@ -180,14 +170,6 @@ def test_a_prediction_beyond_the_record_is_that_of_the_model(centre: float) -> N
     np.testing.assert_allclose(
         found.continued(u).x, found.model.simulate(u, initial_state=found.initial_state), atol=1e-9
     )
-
-
-def test_no_plays_are_added_where_all_go_along_with_a_new_extreme() -> None:
-    basis = PlayColumns(
-        np.linspace(0.0, 20.0, 5), np.empty(0), Start(60.0, 60.0), (-28.0, 28.0), np.ones((1, 5))
-    )
-    assert basis.beyond(np.ones(5))[0] is basis
-    assert replace(basis, start=Start(0.0, 0.0)).beyond(np.ones(5))[0].thresholds.size > 5
 
 
 def growing(rng: np.random.Generator, centre: float = 0.0) -> FloatArray:

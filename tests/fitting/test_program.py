@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import lsq_linear, nnls
+from scipy.optimize import lsq_linear
 
 from piezoest._checks import FloatArray
 from piezoest.fitting.program import RIDGE, Sums, checked, solve, total
-from piezoest.symbolic import quadratic_program, quadratic_solver
+from piezoest.symbolic import quadratic_program
 
 SEEDS = range(12)
 
@@ -44,15 +44,6 @@ def test_solved_as_by_scipy(seed: int) -> None:
     assert checked(sums, lower, np.zeros((lower.size, lower.size)), w) < 1e-10
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_solved_as_by_nnls(seed: int) -> None:
-    A, x, _ = problem(seed)
-    sums, none = Sums.of(A, x), np.zeros((A.shape[1], A.shape[1]))
-    expected, left = nnls(A, x)
-    assert sums.missed(solve(sums, np.zeros(A.shape[1]), none)) == pytest.approx(left**2, rel=1e-6)
-    np.testing.assert_allclose(solve(sums, np.zeros(A.shape[1]), none), expected, atol=1e-6 * expected.max())
-
-
 def test_a_penalty_is_as_rows_more() -> None:
     A, x, lower = problem(1)
     rng = np.random.default_rng(1)
@@ -76,10 +67,6 @@ def test_a_worse_answer_is_seen() -> None:
     none = np.zeros((lower.size, lower.size))
     w = solve(Sums.of(A, x), lower, none)
     assert checked(Sums.of(A, x), lower, none, w + 0.1 / np.std(A, axis=0)) > 1e-6
-
-
-def test_solver_has_a_name() -> None:
-    assert quadratic_solver()
 
 
 def alike(one: Sums, other: Sums) -> None:
