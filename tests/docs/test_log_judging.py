@@ -13,13 +13,9 @@ from piezoest.bench.zoo.logs import Log
 N, TRAINED = 4000, 2000
 
 
-@pytest.fixture(autouse=True)
-def _paths(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).resolve().parents[2] / "benchmarks"))
-
-
 @pytest.fixture
-def judging() -> Any:
+def judging(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.syspath_prepend(str(Path(__file__).resolve().parents[2] / "benchmarks"))
     return importlib.import_module("log_judging")
 
 
@@ -30,13 +26,11 @@ def voltage() -> Any:
 
 def log(**given: Any) -> Log:
     """A stage that is a line."""
-    truth = 2.0 * voltage()
-    nothing = {"truth": truth, "x": truth.copy(), "jumps": np.zeros(N), "spikes": np.zeros(N, bool)}
+    truth, zeros = 2.0 * voltage(), np.zeros(N)
+    mine = {"truth": truth, "x": truth.copy(), "jumps": zeros, "spikes": zeros > 0.0, "u": voltage(), **given}
     return Log(
-        **{
-            "seed": 1, "u": voltage(), "sample_rate": 1000.0, "family": "paper", "model": None,
-            "voltage": "sine", "stroke": 20.0, "added": {"noise": 1e-3}, **nothing, **given,
-        }
+        **{"seed": 1, "sample_rate": 1000.0, "family": "paper", "model": None, "voltage": "sine",
+           "stroke": 20.0, "added": {"noise": 1e-3}, **mine}
     )  # fmt: skip
 
 

@@ -44,17 +44,13 @@ def test_sums_count_what_is_judged_only(program: Any) -> None:
         row(3, 3.0, block=50), row(4, None),
     ]  # fmt: skip
     found = program.summed_up(rows)
-    assert found["all"]["runs"] == 5
-    assert found["all"]["judged"] == 3
-    assert found["all"]["violations"]["ratio"] == 2
-    assert found["all"]["quantiles"]["ratio"]["100 %"] == 3.0
-    assert found["all"]["curve"][0] == 0.5
-    assert len(found["all"]["curve"]) == len(program.LEVELS)
-    assert found["healthy"]["runs"] == 3
-    assert found["often"]["runs"] == 4
-    assert [(each["fault"], each["judged"], each["over"]) for each in found["by_fault"]] == [
-        ("gap", 1, 1), ("none", 2, 1),
-    ]  # fmt: skip
+    every = found["all"]
+    assert (every["runs"], every["judged"], every["violations"]["ratio"]) == (5, 3, 2)
+    assert (every["quantiles"]["ratio"]["100 %"], every["curve"][0]) == (3.0, 0.5)
+    assert len(every["curve"]) == len(program.LEVELS)
+    assert (found["healthy"]["runs"], found["often"]["runs"]) == (3, 4)
+    by_fault = [(each["fault"], each["judged"], each["over"]) for each in found["by_fault"]]
+    assert by_fault == [("gap", 1, 1), ("none", 2, 1)]
     assert [each["seed"] for each in found["worst"]][:2] == [3, 1]
     assert program.drawn(rows)["fault"] == {"gap": 2, "none": 3}
 
