@@ -9,6 +9,7 @@ import piezoest as pz
 
 FS = 50_000.0
 START = pz.ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)
+LINE = pz.LinearGain(0.14)
 
 
 def test_plain_arrays_need_a_rate() -> None:
@@ -68,16 +69,14 @@ def test_ones_own_parts_are_told_of_no_measurement_by_none() -> None:
     assert controller.seen[1::2] == [(u, None) for u in r]
 
 
-def test_wrong_references() -> None:
-    def follow(r: Any) -> None:
+@pytest.mark.parametrize(
+    ("r", "words"),
+    [([0.0, np.nan], "r holds 1 values that are NaN"), ([], "r needs at least 1 samples"),
+     (np.repeat([0.0, 1.0, 0.0], 100), r"signals\.filtered_steps")],
+)  # fmt: skip
+def test_wrong_references(r: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
         pz.track(r, stage=pz.PaperStage(), compensator=pz.InverseCompensator(START))
-
-    with pytest.raises(ValueError, match="r holds 1 values that are NaN"):
-        follow([0.0, np.nan])
-    with pytest.raises(ValueError, match="r needs at least 1 samples"):
-        follow([])
-    with pytest.raises(ValueError, match=r"signals\.filtered_steps"):
-        follow(np.repeat([0.0, 1.0, 0.0], 100))
 
 
 class Driver:
@@ -96,10 +95,7 @@ class Driver:
         (START, lambda: pz.HysteresisRLS(FS, initial_model=START)),
         (START, lambda: pz.HysteresisRLS(FS, initial_model=START, memory=0.2, offset=False, delay=1.5)),
         (START, lambda: pz.HysteresisEKF(FS, initial_model=START, offset=True)),
-        (
-            pz.LinearGain(0.14),
-            lambda: pz.HysteresisRLS(FS, initial_model=pz.LinearGain(0.14, 0.2), memory=0.2),
-        ),
+        (LINE, lambda: pz.HysteresisRLS(FS, initial_model=pz.LinearGain(0.14, 0.2), memory=0.2)),
         (pz.ColemanHodgdon(0.05, 0.01, 0.0009), lambda: pz.HysteresisRLS(FS, policies=(), memory=0.001)),
     ],
 )
@@ -112,13 +108,12 @@ def test_the_compiled_ring_is_the_loop_over_its_parts(model: Any, make: Any, opt
         estimator.predict(0.1)
         compensator = pz.InverseCompensator(model, pz.VoltageLimits(-30.0, 30.0))
         for interval in (70, 7):
-            record = pz.track(
-                r, stage=wrap(stage), compensator=compensator, estimator=estimator, update_interval=interval
-            )
-        parts = record.voltage, record.measured, record.displacement, record.parameters
+            parts: Any = {"compensator": compensator, "estimator": estimator, "update_interval": interval}
+            record = pz.track(r, stage=wrap(stage), **parts)
+        traces = record.voltage, record.measured, record.displacement, record.parameters
         moved = np.asarray(stage.displacement).tolist()
         found = estimator.to_dict(), compensator.model, compensator.status, stage.time, moved
-        results.append((parts, found, record.parameter_names, compensator.step(1.0), stage.step(2.0)))
+        results.append((traces, found, record.parameter_names, compensator.step(1.0), stage.step(2.0)))
     for one, other in zip(results[0][0], results[1][0], strict=True):
         np.testing.assert_array_equal(one, other)
     assert results[0][1:] == results[1][1:]
