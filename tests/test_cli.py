@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -132,9 +133,7 @@ def test_identify_the_example(tmp_path: Path, log: Path) -> None:
 
 
 @pytest.mark.parametrize("options", [("--model", "plays-creep"), ("--stream",)])
-def test_a_model_goes_into_compensate_with_its_ranges(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...]
-) -> None:
+def test_a_model_goes_into_compensate_with_its_ranges(tmp_path: Path, monkeypatch: Any, options: Any) -> None:
     monkeypatch.chdir(tmp_path)
     assert run("identify", "example", "--no-plot", "-o", "model.json", *options).exit_code == 0
     learnt = LearntModel.read("model.json")
@@ -235,7 +234,7 @@ def test_mistakes_in_compensate(reference: Path) -> None:
     assert not Path("voltage.csv").exists()
 
 
-def test_a_disk_that_is_full_and_a_record_that_is_too_long(
+def test_a_full_disk_and_a_record_too_long(
     log: Path, reference: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if Path("/dev/full").exists():

@@ -103,9 +103,7 @@ OTHER_EDITS = [
 ]
 
 
-def test_only_an_edit_of_a_source_makes_machine_code_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_an_edit_of_a_source_makes_machine_code_anew(tmp_path: Path, monkeypatch: Any) -> None:
     copy = tmp_path / "piezoest"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(machine_code, "_PACKAGE", copy)
@@ -150,9 +148,7 @@ def test_a_damaged_file_is_compiled_anew(kept_in: Path) -> None:
     assert list(kept_in.iterdir()) == [file]
 
 
-def test_other_sources_options_or_versions_are_compiled_anew(
-    kept_in: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_sources_options_or_versions_are_compiled_anew(kept_in: Path, monkeypatch: Any) -> None:
     assert (loaded(), loaded()) == (0, 1)
     for name, value in (("digest", lambda: "another"), ("_own_source", lambda path: "another")):
         with monkeypatch.context() as changed:

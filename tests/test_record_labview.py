@@ -1,6 +1,7 @@
 """LabVIEW's logs: .lvm with its headers, and TDMS."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,9 +33,7 @@ PARTS = (slice(0, 20), slice(20, 45), slice(45, N))
     ],
 )
 @pytest.mark.parametrize("x_columns", ["One", "No"])
-def test_lvm_of_several_segments(
-    tmp_path: Path, starts: list[tuple[float, float]], rows: int, x_columns: str
-) -> None:
+def test_lvm_of_several_segments(tmp_path: Path, starts: Any, rows: int, x_columns: str) -> None:
     segments = tuple((part, *start) for part, start in zip(PARTS, starts, strict=True))
     file = write_lvm(tmp_path / "log.lvm", segments, x_columns=x_columns)
     check(read_record(file))

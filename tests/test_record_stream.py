@@ -25,7 +25,7 @@ def joined(stream: RecordStream) -> list[np.ndarray]:
     timeless=st.integers(0, 20),
     jitter=st.sampled_from([0.0, 0.1]),
 )
-def test_any_blocks_give_the_same_samples(
+def test_any_blocks_are_the_log(
     tmp_path: Path, seed: int, rows: int, gaps: int, timeless: int, jitter: float
 ) -> None:
     rng = np.random.default_rng(seed)

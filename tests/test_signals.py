@@ -69,7 +69,7 @@ def test_triangle_without_smoothing_is_ideal() -> None:
 
 @settings(max_examples=50)
 @given(st.floats(0.01, 100.0), st.floats(0.0, 1.0), st.integers(1, 8), st.floats(-2.0, 2.0))
-def test_triangle_never_exceeds_its_amplitude_or_its_slope(
+def test_triangle_keeps_amplitude_and_slope(
     frequency: float, smoothing: float, continuity: int, phase: float
 ) -> None:
     r = signals.triangle(5.0, frequency, 2, 1000.0, smoothing, continuity, phase)

@@ -44,7 +44,7 @@ def cluster(tmp_path: Path) -> Iterator[Any]:
 
 
 @pytest.mark.slow
-def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
+def test_a_worker_killed_half_way_loses_nothing(
     cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Where the workers do not look: the module has to be sent to them.

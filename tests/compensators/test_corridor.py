@@ -62,7 +62,7 @@ MORE_PACES = itertools.product(
     ("make", "amplitude", "frequency", "seed", "every"),
     [*PACES, *(pytest.param(*case, *pace, marks=pytest.mark.slow) for *case, pace in MORE_PACES)],
 )
-def test_models_at_any_pace_do_not_run_away(
+def test_no_pace_of_models_runs_away(
     make: Any, amplitude: float, frequency: float, seed: int, every: int
 ) -> None:
     r = np.asarray(pz.signals.triangle(amplitude, frequency, 8, FS))
@@ -178,7 +178,7 @@ positive = st.floats(min_value=5e-324, max_value=1.7e308)
     plays=st.tuples(positive, positive, extreme, extreme),
     r=st.lists(st.floats(width=64), min_size=3, max_size=8),
 )
-def test_a_voltage_is_finite_and_within_its_limits_for_every_model(
+def test_every_voltage_is_finite_and_within_its_limits(
     numbers: Any, line: Any, plays: Any, r: list[float]
 ) -> None:
     def made(make: Any) -> list[Any]:

@@ -1,6 +1,5 @@
 """Integral feedback within the controller: what it removes, and how far a wrong sensor can drive it."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,7 @@ def controller(feedback: float | None, limits: pz.VoltageLimits = LIMITS, **opti
     return pz.AdaptiveFeedforward(FS, limits=limits, estimators=(), feedback=feedback, **options)
 
 
-def drive(
-    driver: Any, r: FloatArray, drift: Callable[[float], float], noise: tuple[float, float] = (0.0, 0.0)
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def drive(driver: Any, r: FloatArray, drift: Any, noise: Any = (0.0, 0.0)) -> Any:
     """Voltage, displacement and correction of a stage that drifts; noise of reference and reading."""
     stage, rng = pz.SimulatedStage(FS, LOOP), np.random.default_rng(0)
     u, x, i = np.empty_like(r), np.empty_like(r), np.empty_like(r)

@@ -19,9 +19,7 @@ def triangle(periods: int, amplitude: float) -> FloatArray:
     return pz.signals.triangle(amplitude, 10.0, periods, FS).values
 
 
-def driven(
-    r: FloatArray, stage: Any, *, block: int = 1, **options: Any
-) -> tuple[Any, FloatArray, FloatArray]:
+def driven(r: FloatArray, stage: Any, *, block: int = 1, **options: Any) -> Any:
     """The controller, its voltages, and where the stage was."""
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, **options)
     return driver, *in_blocks(driver, stage, r, block)

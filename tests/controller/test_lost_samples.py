@@ -15,9 +15,7 @@ FS = 5000.0
 TRIANGLE = pz.signals.triangle(5.0, 10.0, 30, FS).values
 
 
-def drive(
-    sensor: Callable[[int, float], float], r: FloatArray = TRIANGLE, left_out: Any = ()
-) -> tuple[Any, FloatArray, FloatArray]:
+def drive(sensor: Any, r: FloatArray = TRIANGLE, left_out: Any = ()) -> tuple[Any, FloatArray, FloatArray]:
     """A controller after a reference, the voltage, and where the stage was; some `learn` are left out."""
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
     return driver, *shared.drive(driver, pz.SimulatedStage(FS, LOOP), r, sensor, left_out)[:2]

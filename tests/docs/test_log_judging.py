@@ -65,9 +65,7 @@ def test_coverage_counts_readings_without_spikes_and_later_jumps(judging: Any) -
     assert judging.coverage(one, TRAINED, lower, upper) == 0.75
 
 
-def test_a_row_holds_the_chosen_the_best_and_scores_or_what_failed(
-    judging: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_row_holds_the_chosen_the_best_and_scores_or_what_failed(judging: Any, monkeypatch: Any) -> None:
     model = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
     one = log(family="coleman-hodgdon", model=model)
     monkeypatch.setattr(judging, "draw", lambda seed: one)

@@ -14,17 +14,9 @@ NOISE = 1e-3
 METHODS: list[Any] = ["single-shooting", "multiple-shooting"]
 
 
-def record(
-    seconds: float = 2.0,
-    noise: float = NOISE,
-    seed: int = 0,
-    rate: float = RATE,
-    model: Any = TRUE,
-    state: float = 0.0,
-) -> tuple[Any, Any]:
-    u = pz.signals.triangle(33.0, 5.0, 5.0 * seconds, rate).values
-    x = model.simulate(u, initial_state=state) if state else model.simulate(u)
-    return u, x + noise * np.random.default_rng(seed).standard_normal(u.size)
+def record(seconds: float = 2.0, noise: float = NOISE, seed: int = 0, model: Any = TRUE, **given: Any) -> Any:
+    u = pz.signals.triangle(33.0, 5.0, 5.0 * seconds, RATE).values
+    return u, model.simulate(u, **given) + noise * np.random.default_rng(seed).standard_normal(u.size)
 
 
 def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
@@ -35,9 +27,7 @@ def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
     def simulated(p: Any) -> Any:
         return pz.ColemanHodgdon(*p[:3]).simulate(u, initial_state=p[3])
 
-    J = np.column_stack(
-        [(simulated(point + h) - simulated(point - h)) / (2.0 * h.sum()) for h in np.diag(steps)]
-    )
+    J = np.array([(simulated(point + h) - simulated(point - h)) / (2.0 * h.sum()) for h in np.diag(steps)]).T
     scale = np.linalg.norm(J, axis=0)
     bound = (NOISE**2 * np.linalg.inv((J / scale).T @ (J / scale)) / np.outer(scale, scale))[:3, :3]
     fits = [BatchFit(RATE).fit(*record(seed=seed)) for seed in range(60)]
@@ -55,7 +45,7 @@ def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_start_state_and_offset(method: Any) -> None:
     """A unipolar voltage and a biased gauge, in the middle of a loop."""
-    u, x = record(state=-1.2)
+    u, x = record(initial_state=-1.2)
     fit = BatchFit(RATE, offset=True, method=method).fit(u + 60.0, x - 120.0)
     assert fit.success
     names = ("alpha", "beta", "gamma", "offset", "initial_state")
@@ -228,8 +218,7 @@ def test_hop_bounds_the_number_of_fits() -> None:
     assert len(np.unique(trace.theta[:, 0])) == 3
     np.testing.assert_array_equal(trace.theta[399], part.theta)
     np.testing.assert_array_equal(trace.theta[198], [0.02, 0.12, 0.0036])
-    steps = BatchFit(RATE, hop=0.2)
-    halves = BatchFit(RATE, hop=0.2)
+    steps, halves = BatchFit(RATE, hop=0.2), BatchFit(RATE, hop=0.2)
     theta = [halves.run(u[:111], x[:111]).theta, halves.run(u[111:], x[111:]).theta]
     np.testing.assert_array_equal(np.concatenate(theta), trace.theta)
     for k in range(u.size):

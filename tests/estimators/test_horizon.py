@@ -54,13 +54,7 @@ def test_tracks_a_step_of_the_gain() -> None:
 def test_arrival_cost_keeps_what_has_left_the_window() -> None:
     """Without process noise the window and its arrival cost are the whole record."""
     u, x = record(2.0)
-    options: dict[str, Any] = {
-        "window": 0.2,
-        "hop": 0.05,
-        "decimation": 1,
-        "noise": NOISE,
-        "uncertainty": 50.0,
-    }
+    options: Any = {"window": 0.2, "hop": 0.05, "decimation": 1, "noise": NOISE, "uncertainty": 50.0}
     keeping = MovingHorizon(RATE, process_noise=0.0, **options)
     forgetting = MovingHorizon(RATE, process_noise=10.0, **options)
     keeping.run(u, x)

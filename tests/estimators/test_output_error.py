@@ -1,5 +1,7 @@
 """OutputErrorRLS: exact on its own plant from any start, noise, rest."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -71,14 +73,9 @@ def test_rest_moves_nothing() -> None:
 
 
 def test_settles_within_two_periods_from_a_bad_start() -> None:
-    fs = 10_000.0
-    start = pz.ColemanHodgdon(0.014, 0.2, 0.0054).nearest_admissible(1e-3)
-    reference = pz.signals.triangle(5.0, 5.0, 8.0, fs)
-    record = pz.track(
-        reference,
-        stage=pz.PaperStage(sample_rate=fs, seed=0),
-        compensator=pz.InverseCompensator(start, transfer_samples=100),
-        estimator=pz.OutputErrorRLS(fs, initial_model=start),
-        update_interval=10,
-    )
+    fs, start = 10_000.0, pz.ColemanHodgdon(0.014, 0.2, 0.0054).nearest_admissible(1e-3)
+    compensator = pz.InverseCompensator(start, transfer_samples=100)
+    parts: Any = {"compensator": compensator, "estimator": pz.OutputErrorRLS(fs, initial_model=start)}
+    reference, stage = pz.signals.triangle(5.0, 5.0, 8.0, fs), pz.PaperStage(sample_rate=fs, seed=0)
+    record = pz.track(reference, stage=stage, **parts, update_interval=10)
     assert np.abs(record.error)[4000:].max() < 0.06

@@ -22,9 +22,7 @@ def misfit(estimator: Any) -> float:
     return float(np.max(np.abs(error - error.mean())) / np.ptp(X) * 2.0)
 
 
-def after(
-    estimator: Any, seconds: float, fault: Callable[[FloatArray], FloatArray], start: int = START
-) -> float:
+def after(estimator: Any, seconds: float, fault: Any, start: int = START) -> float:
     """Misfit after readings that `fault` has changed for some time, and right ones for twenty periods."""
     x = X.copy()
     faulty = slice(start, start + max(1, int(seconds * FS)))

@@ -25,9 +25,8 @@ def test_equals_the_textbook_with_gaps() -> None:
     estimator = pz.HysteresisRLS(FS, memory=0.1, policies=())
     theta = estimator.run(u, x).theta
     start = np.array([0.02, 0.12, 0.0036])
-    expected = reference.coleman_hodgdon(
-        u, x, FS, start=start, uncertainty=0.5, noise=1.5e-3, memory=0.1, cutoff=2500.0
-    )
+    given = {"uncertainty": 0.5, "noise": 1.5e-3, "memory": 0.1, "cutoff": 2500.0}
+    expected = reference.coleman_hodgdon(u, x, FS, start, **given)
     np.testing.assert_allclose(theta, expected, rtol=1e-7)
 
 
@@ -55,11 +54,8 @@ def test_high_pass_removes_a_bias_of_the_sensor() -> None:
     biased, passed = pz.HysteresisRLS(FS, memory=0.4), pz.HysteresisRLS(FS, memory=0.4, high_pass=0.5)
     biased.run(u, x + 2.0)
     passed.run(u, x + 2.0)
-
-    def worst(estimator: Any) -> float:
-        return float(np.max(np.abs(estimator.theta / TRUE.theta - 1.0)))
-
-    assert worst(passed) < 1e-3 < 0.5 < worst(biased)
+    worst = [np.abs(each.theta / TRUE.theta - 1.0).max() for each in (passed, biased)]
+    assert worst[0] < 1e-3 < 0.5 < worst[1]
 
 
 @pytest.mark.parametrize("delay", [0.5, 2.5, 3.0])

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,9 +65,7 @@ def test_what_does_not_count_hurts_no_figure(gap: Callable[[FloatArray, FloatArr
 
 
 @pytest.mark.parametrize("gap", LOST_TURN)
-def test_what_comes_after_a_lost_turn_is_judged_when_it_is_forgotten(
-    gap: Callable[[FloatArray, FloatArray], None],
-) -> None:
+def test_what_comes_after_a_lost_turn_is_judged_when_it_is_forgotten(gap: Any) -> None:
     record = wrong(gap)
     found = fitted(record)
     missed = (found.prediction - record.displacement)[HALF:]

@@ -3,6 +3,7 @@
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -73,9 +74,7 @@ def test_page_is_sound_and_self_contained(found: pz.Identification, tmp_path: Pa
     assert len(body) < 1_000_000
 
 
-def test_command_writes_the_report(
-    record: pz.Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_command_writes_the_report(record: pz.Record, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.chdir(tmp_path)
     record.write("log.csv")
     arguments = ["identify", "log.csv", "--no-plot"]
