@@ -1,6 +1,7 @@
 """Generated controllers: clean to compilers, equal to the library, safe with any input."""
 
 import functools
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 import piezoest as pz
 from piezoest.bench.scenarios import SCENARIOS
 from tests.export.building import compile_strictly, under_sanitizers
+from tests.wild import wild
 
 FS = 50_000.0
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
@@ -49,6 +51,8 @@ PAIRS: dict[str, Any] = {
     "rls-line-offset": lambda: (rls(initial_model=LINE, offset=True), pz.LinearCompensator(LINE, LIMITS)),
     "ekf": lambda: (pz.HysteresisEKF(FS, initial_model=START), inverse()),
     "ekf-offset": lambda: (pz.HysteresisEKF(FS, initial_model=START, offset=True, delay=1.5), inverse()),
+    "output-error": lambda: (pz.OutputErrorRLS(FS, initial_model=START), inverse()),
+    "ekf-free": lambda: (pz.HysteresisEKF(FS, initial_model=START, offset=True, project=False), inverse()),
     "ekf-line": lambda: (pz.HysteresisEKF(FS, initial_model=LINE), pz.InverseCompensator(LINE, SLEWED)),
 }
 
@@ -171,3 +175,24 @@ def test_parameters_and_limits_can_be_set(log: tuple[Any, Any]) -> None:
     assert (u.min(), u.max()) == (-5.0, 4.0)
     with pytest.raises(ValueError, match="below"):
         ours.set_limits(3.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "precision"), list(zip(PAIRS, itertools.cycle(("float", "double")), strict=False))
+)
+def test_of_any_bits_it_makes_numbers(name: str, precision: Any) -> None:
+    """What it learns and what it puts out."""
+    made = pz.export.CompiledController(code(name, precision))
+    rng, bits = np.random.default_rng(0), np.uint32 if precision == "float" else np.uint64
+    for _ in range(100):
+        made.reset()
+        for count in rng.integers(1, 80, 4).tolist():
+            with np.errstate(all="ignore"):
+                u = made.run(wild(rng, count, 5.0, bits), wild(rng, count, 5.0, bits))
+            assert np.all(np.abs(u) <= 60.0)
+            parameters = made.parameters
+            assert np.all(np.isfinite(parameters)), parameters
+            if "line" in name:
+                assert parameters[0] >= 0.9e-3 * LINE.gain, parameters
+            elif not name.startswith("plays"):
+                assert parameters[2] / parameters[0] >= 0.9e-3 * START.c, parameters
