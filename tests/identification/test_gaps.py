@@ -1,13 +1,10 @@
 """Gaps and wrong voltages of a log: models are judged where the stage is known, and never by NaN."""
 
 import dataclasses
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
-from piezoest._checks import FloatArray
 from piezoest.identification import Identification, identify
 from piezoest.records import Record
 from tests.identification.test_identify import LOOP, made
@@ -17,33 +14,23 @@ HALF = len(RECORD) // 2
 TURN = HALF + int(np.argmax(RECORD.voltage[HALF:]))
 
 
-def wrong(change: Callable[[FloatArray, FloatArray], None]) -> Record:
+AROUND, NONE = slice(TURN - 60, TURN + 60), slice(0)
+# Voltages and displacements that are missing.
+LOST_TURN = {"rows": (AROUND, AROUND), "voltage": (AROUND, NONE)}
+OTHERS = {
+    "at both ends": (slice(-400, None), slice(HALF, HALF + 300)),
+    "most": (NONE, slice(HALF, len(RECORD) - 300)),
+    "spike": (NONE, NONE),
+}
+
+
+def wrong(name: str) -> Record:
     u, x = RECORD.voltage.copy(), RECORD.displacement.copy()
-    change(u, x)
+    lost = (LOST_TURN | OTHERS)[name]
+    u[lost[0]], x[lost[1]] = np.nan, np.nan
+    if name == "spike":
+        u[TURN - 200] = -300.0
     return dataclasses.replace(RECORD, voltage=u, displacement=x)
-
-
-def no_rows(u: FloatArray, x: FloatArray) -> None:
-    u[TURN - 60 : TURN + 60] = x[TURN - 60 : TURN + 60] = np.nan
-
-
-def no_voltage(u: FloatArray, x: FloatArray) -> None:
-    u[TURN - 60 : TURN + 60] = np.nan
-
-
-def at_both_ends(u: FloatArray, x: FloatArray) -> None:
-    u[-400:], x[HALF : HALF + 300] = np.nan, np.nan
-
-
-def spike(u: FloatArray, x: FloatArray) -> None:
-    u[TURN - 200] = -300.0
-
-
-def most(u: FloatArray, x: FloatArray) -> None:
-    x[HALF : len(x) - 300] = np.nan
-
-
-LOST_TURN, OTHERS = (no_rows, no_voltage), (at_both_ends, spike, most)
 
 
 def fitted(record: Record, model: str = LOOP, validate: tuple[Record, ...] = ()) -> Identification:
@@ -54,7 +41,7 @@ WHOLE = fitted(RECORD, validate=(RECORD,))
 
 
 @pytest.mark.parametrize("gap", OTHERS)
-def test_what_does_not_count_hurts_no_figure(gap: Callable[[FloatArray, FloatArray], None]) -> None:
+def test_what_does_not_count_hurts_no_figure(gap: str) -> None:
     found = fitted(wrong(gap))
     assert found.held_out.rms < 1.1 * WHOLE.held_out.rms
     assert found.held_out.max < 1.1 * WHOLE.held_out.max
@@ -65,7 +52,7 @@ def test_what_does_not_count_hurts_no_figure(gap: Callable[[FloatArray, FloatArr
 
 
 @pytest.mark.parametrize("gap", LOST_TURN)
-def test_what_comes_after_a_lost_turn_is_judged_when_it_is_forgotten(gap: Any) -> None:
+def test_what_comes_after_a_lost_turn_is_judged_when_it_is_forgotten(gap: str) -> None:
     record = wrong(gap)
     found = fitted(record)
     missed = (found.prediction - record.displacement)[HALF:]
@@ -76,15 +63,14 @@ def test_what_comes_after_a_lost_turn_is_judged_when_it_is_forgotten(gap: Any) -
 
 
 def test_a_held_out_part_that_does_not_count_is_refused() -> None:
-    def lost(u: FloatArray, x: FloatArray) -> None:
-        x[HALF + 30 :] = np.nan
-
+    x = RECORD.displacement.copy()
+    x[HALF + 30 :] = np.nan
     with pytest.raises(ValueError, match=r"held-out part of .* 30 usable samples"):
-        fitted(wrong(lost))
+        fitted(dataclasses.replace(RECORD, displacement=x))
 
 
 def test_wrong_voltages_are_said_and_shown_as_missing() -> None:
-    found = fitted(wrong(spike))
+    found = fitted(wrong("spike"))
     assert [each.name for each in found.findings if each.name == "wrong voltage"]
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(found.record.voltage)), [TURN - 200])
     assert not any(each.name == "wrong voltage" for each in WHOLE.findings)
