@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -240,10 +241,8 @@ def test_a_full_disk_and_a_record_too_long(
     if Path("/dev/full").exists():
         refused(run("compensate", reference, *THETA, "-o", "/dev/full"), "/dev/full: No space left")
 
-    def too_long(*_: object, **__: object) -> None:
-        raise MemoryError("Unable to allocate 8 TiB")
-
-    monkeypatch.setattr("piezoest.records.read_record", too_long)
+    too_long = MemoryError("Unable to allocate 8 TiB")
+    monkeypatch.setattr("piezoest.records.read_record", Mock(side_effect=too_long))
     refused(run("identify", log, "--no-plot"), "not enough memory: Unable to allocate 8 TiB")
 
 
@@ -265,13 +264,9 @@ def test_an_encoding_without_our_signs_is_no_mistake(log: Path) -> None:
 
 
 def test_interrupt_is_quiet(monkeypatch: pytest.MonkeyPatch, log: Path) -> None:
-    def interrupt(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("piezoest.records.read_record", interrupt)
+    monkeypatch.setattr("piezoest.records.read_record", Mock(side_effect=KeyboardInterrupt))
     result = run("identify", log)
-    assert result.exit_code == 130
-    assert result.output == ""
+    assert (result.exit_code, result.output) == (130, "")
 
 
 def test_help_and_version() -> None:

@@ -159,12 +159,6 @@ def test_after_a_fault_two_swings_pass(fault: str, mode: str) -> None:
     assert play(draw(1, **SHORT), Parts)["after_worst"] is None
 
 
-def test_the_parts_settle_on_their_own_family() -> None:
-    row = play(draw(2, **{**SHORT, "family": "coleman-hodgdon"}), Parts)
-    assert row["last_ratio"] < 0.7
-    assert row["driver"] in ("line", "coleman-hodgdon")
-
-
 def test_the_map_counts_periods() -> None:
     cell = settling.Cell("paper", 5.0, 10.0, 1)
     rig = settling.cell_rig(cell)

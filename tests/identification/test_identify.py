@@ -13,6 +13,7 @@ from piezoest import signals
 from piezoest._checks import FloatArray
 from piezoest.fitting import FORMS
 from piezoest.identification import Identification, Whiteness, identify
+from piezoest.identification.sense import findings
 from piezoest.models import ColemanHodgdon
 from piezoest.models.reading import LearntModel
 from piezoest.records import Record
@@ -109,7 +110,7 @@ def test_flaws_of_a_log_do_not_matter_and_are_said(name: str) -> None:
     np.testing.assert_allclose(found.model.theta, TRUE.theta, rtol=0.01)
     assert found.held_out.rms < 4e-3
     assert np.all(np.isfinite(found.prediction))
-    assert any(said in sentence for sentence in (*found.advice, *found.record.notes))
+    assert sum(said in sentence for sentence in (*found.advice, *found.record.notes)) == 1
 
 
 def test_drift_is_found_and_said() -> None:
@@ -275,6 +276,10 @@ def test_what_is_no_log_is_refused() -> None:
         identify(made().voltage, made().displacement)
     with pytest.raises(OSError, match=r"no\.csv"):
         identify("no.csv")
+    with pytest.raises(ValueError, match="validate must be a list"):
+        identify(made(), validate="log.csv")
+    with pytest.raises(ValueError, match="record must be a Record"):
+        findings("log.csv")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("model", FORMS)

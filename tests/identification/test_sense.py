@@ -66,8 +66,3 @@ def test_the_opening_of_a_loop_is_its_width_whatever_drifts() -> None:
     assert still.clockwise == 0.0
     assert still.opening > 0.0
     assert loop_of(t, t, known, 1.0).opening == 0.0  # which does not turn
-
-
-def test_what_is_no_record_is_refused() -> None:
-    with pytest.raises(ValueError, match="record must be a Record"):
-        findings("log.csv")  # type: ignore[arg-type]
