@@ -1,8 +1,8 @@
 """The worked examples of CONTRIBUTING.md: each section "Adding a …" is carried out in a copy of the package.
 
-The first line of a fenced block says where it goes: ``# new file PATH``, ``# added to PATH``, for its end, or
-``# added to PATH, below LINE``. The last block of a section is a test file; it is run as plain Python, for to
-compile the copy would take a minute. So are the tests that find by themselves what was added.
+The first line of a fenced block says where it goes. The last block of a section is a test file; it is run as
+plain Python, for to compile the copy would take a minute. So are the
+tests that find by themselves what was added.
 """
 
 import os

@@ -102,13 +102,10 @@ def test_plays_by_least_squares_find_a_stage_made_of_plays(judging: Any) -> None
     assert judging.rms((judging.by_line(u, x, TRAINED) - truth)[TRAINED:]) > 1.0 * 0.02
 
 
-def test_jumps_count_up_to_the_end_of_the_fitted_part(judging: Any) -> None:
-    jumps = np.where(np.arange(N) < 500, 0.0, 1.5) + np.where(np.arange(N) < 3000, 0.0, 4.0)
-    one = log(jumps=jumps)
-    np.testing.assert_array_equal(judging.expected(one, TRAINED), one.truth[TRAINED:] + 1.5)
-
-
 def test_coverage_counts_readings_without_spikes_and_later_jumps(judging: Any) -> None:
+    one = log(jumps=1.5 * (np.arange(N) >= 500) + 4.0 * (np.arange(N) >= 3000))
+    # Jumps count up to the end of the fitted part.
+    np.testing.assert_array_equal(judging.expected(one, TRAINED), one.truth[TRAINED:] + 1.5)
     one = log()
     one.jumps[3000:] = 4.0
     one.x[3000:] += 4.0

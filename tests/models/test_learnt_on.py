@@ -10,7 +10,7 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
-from piezoest.models import LearntModel, LearntOn, model_from_dict
+from piezoest.models import LearntModel, LearntOn
 from piezoest.signals.turns import turns
 
 FS = 5000.0
@@ -100,21 +100,18 @@ def test_the_same_reference_again_leaves_nothing(kind: Any) -> None:
 
 def test_a_model_comes_in_many_forms(tmp_path: Path) -> None:
     plain, both = LearntModel(LOOP), LearntModel(LOOP, KNOWN)
-    assert LearntModel.of(LOOP) == plain
-    assert LearntModel.of(both) == both
-    assert LearntModel.of(SimpleNamespace(model=LOOP)) == plain
-    assert LearntModel.of(SimpleNamespace(model=LOOP, learnt_on=KNOWN)) == both
+    for given, expected in (
+        (LOOP, plain), (both, both), (SimpleNamespace(model=LOOP), plain),
+        (SimpleNamespace(model=LOOP, learnt_on=KNOWN), both),
+    ):  # fmt: skip
+        assert LearntModel.of(given) == expected
     assert LearntModel.of(pz.HysteresisRLS(FS, initial_model=LOOP)).learnt_on is None
     file, bare = tmp_path / "model.json", {"alpha": 0.02, "beta": 0.12, "gamma": 0.0036, "offset": 3.0}
-    for data, expected in (
-        (both.to_dict() | {"format": "piezoest-identification-1", "advice": []}, both),
-        (LOOP.to_dict(), plain),
-        ({"model": bare}, plain),
-    ):
+    more = both.to_dict() | {"format": "piezoest-identification-1", "advice": []}
+    for data, expected in ((more, both), (LOOP.to_dict(), plain), ({"model": bare}, plain)):
         file.write_text(json.dumps(data), encoding="utf-8")
         assert LearntModel.of(file) == LearntModel.of(str(file)) == expected
     line = LearntModel(pz.LinearGain(0.1), KNOWN)
     assert LearntModel.from_dict(line.to_dict()) == line
     with pytest.raises(ValueError, match="dictionary"):
         LearntModel.from_dict([1])  # type: ignore[arg-type]
-    assert model_from_dict(both.to_dict()["model"]) == LOOP

@@ -1,9 +1,7 @@
 """All cases of the oracle, of estimators and compensators: what each of them gives, by public names alone.
 
+A case is a function without arguments that returns named arrays of numbers, and makes all that it needs.
 Models and stages have exact tests; what a solver ends at depends on its tolerance.
-
-A case is a function without arguments that returns named arrays of numbers. It makes all that it needs,
-so that no case depends on another.
 """
 
 import itertools
