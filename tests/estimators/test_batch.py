@@ -7,16 +7,15 @@ import pytest
 
 import piezoest as pz
 from piezoest.estimators.batch import BatchFit
+from tests.estimators.shared import TRUE, recorded
 
-TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 RATE = 1000.0
 NOISE = 1e-3
 METHODS: list[Any] = ["single-shooting", "multiple-shooting"]
 
 
-def record(seconds: float = 2.0, noise: float = NOISE, seed: int = 0, model: Any = TRUE, **given: Any) -> Any:
-    u = pz.signals.triangle(33.0, 5.0, 5.0 * seconds, RATE).values
-    return u, model.simulate(u, **given) + noise * np.random.default_rng(seed).standard_normal(u.size)
+def record(seconds: float = 2.0, **given: Any) -> Any:
+    return recorded(RATE, 5.0 * seconds, **given)
 
 
 def test_scatter_is_that_of_the_cramer_rao_bound() -> None:

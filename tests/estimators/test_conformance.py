@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 import piezoest as pz
 from piezoest.estimators.base import EstimatorBase
+from tests.estimators.shared import TRUE, recorded
 from tests.wild import wild
 
 FloatArray = NDArray[np.float64]
 
 RATE = 1000.0
-TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 PUBLIC = {name: getattr(pz, name) for name in pz.__all__}
 FOUND = {
     name: value for name, value in PUBLIC.items()
@@ -47,15 +47,9 @@ def kind(request: pytest.FixtureRequest) -> Any:
     return cls
 
 
-def voltage(periods: float = 1.0, rate: float = RATE) -> FloatArray:
-    return pz.signals.triangle(33.0, 5.0, periods, rate).values
-
-
-def record(periods: float = 1.0, model: pz.models.Model = TRUE, rate: float = RATE) -> Any:
+def record(periods: float = 1.0, model: Any = TRUE) -> Any:
     """Voltage and measured displacement of a true plant, 1 nm noise."""
-    u = voltage(periods, rate)
-    assert isinstance(model, pz.ColemanHodgdon | pz.LinearGain)
-    return u, model.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
+    return recorded(RATE, periods, model=model)
 
 
 def steps(estimator: Any, u: FloatArray, x: FloatArray) -> None:
@@ -283,7 +277,7 @@ def test_a_dwell_moves_nothing(kind: Any) -> None:
 
 N = 300
 RNG = np.random.default_rng(2)
-HELD, WAVE = voltage(1.5), TRUE.simulate(voltage(1.5))
+HELD, WAVE = recorded(RATE, 1.5, noise=0.0)
 # Records that no stage makes.
 HOSTILE: dict[str, tuple[FloatArray, FloatArray]] = {
     "noise": (RNG.normal(0.0, 50.0, N), RNG.normal(0.0, 10.0, N)),

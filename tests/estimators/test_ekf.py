@@ -8,8 +8,7 @@ import pytest
 
 import piezoest as pz
 from piezoest.equations import coleman_hodgdon as equations
-
-TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
+from tests.estimators.shared import recorded
 
 
 # At 50 kHz and 5 Hz a sample's travel a |du| is 3e-4.
@@ -31,8 +30,7 @@ def test_jacobian_is_casadis_derivative(travel: float, sign: float) -> None:
 @pytest.mark.parametrize("offset", [False, True])
 def test_of_a_linear_gain_is_recursive_least_squares(offset: bool) -> None:
     fs, gain, uncertainty, noise = 2000.0, 0.1, 0.5, 1.5e-3
-    u = pz.signals.triangle(33.0, 5.0, 5.0, fs).values
-    x = 0.155 * u + noise * np.random.default_rng(0).standard_normal(u.size) + 0.2 * offset
+    u, x = recorded(fs, 5.0, noise, model=pz.LinearGain(0.155, 0.2 * offset))
     # With an offset the filter counts from its first sample.
     u0, x0 = (u[0], x[0]) if offset else (0.0, 0.0)
     given: Any = {"uncertainty": uncertainty, "noise": noise, "drift": 0.0, "mismatch": 0.0}
@@ -53,8 +51,7 @@ def test_of_a_linear_gain_is_recursive_least_squares(offset: bool) -> None:
 def test_stays_admissible_while_it_learns() -> None:
     """From a start that drives the unbounded filter out of the set."""
     fs = 2000.0
-    u = pz.signals.triangle(33.0, 5.0, 2.5, fs).values
-    x = TRUE.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
+    u, x = recorded(fs, 2.5)
     start = pz.ColemanHodgdon.from_loop(0.06, 0.2, 0.45)
     kept, free = (
         pz.HysteresisEKF(fs, initial_model=start, uncertainty=2.0, project=project)

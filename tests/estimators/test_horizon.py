@@ -9,16 +9,15 @@ import piezoest as pz
 from piezoest.estimators.batch import BatchFit
 from piezoest.estimators.horizon import MovingHorizon
 from piezoest.estimators.thinning import thinned
+from tests.estimators.shared import TRUE, recorded
 
-TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 RATE = 2000.0
 NOISE = 1e-3
 START = (0.02, 0.12, 0.0036)
 
 
-def record(seconds: float = 1.0, noise: float = NOISE, seed: int = 0, model: Any = TRUE) -> tuple[Any, Any]:
-    u = pz.signals.triangle(33.0, 5.0, 5.0 * seconds, RATE).values
-    return u, model.simulate(u) + noise * np.random.default_rng(seed).standard_normal(u.size)
+def record(seconds: float = 1.0, **given: Any) -> tuple[Any, Any]:
+    return recorded(RATE, 5.0 * seconds, **given)
 
 
 def test_solves_once_a_hop_and_holds_between() -> None:

@@ -7,11 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 import piezoest as pz
+from tests.estimators.shared import TRUE, recorded
 
 FloatArray = NDArray[np.float64]
 
 RATE = 2000.0
-TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 
 
 def voltage(periods: float = 8.0) -> FloatArray:
@@ -49,8 +49,7 @@ def test_finds_an_offset() -> None:
 
 @pytest.mark.parametrize("noise", [1e-3, 3e-2])
 def test_noise_makes_no_wrong_loop(noise: float) -> None:
-    u = voltage(40.0)
-    x = TRUE.simulate(u) + noise * np.random.default_rng(0).standard_normal(u.size)
+    u, x = recorded(RATE, 40.0, noise)
     estimator = pz.OutputErrorRLS(RATE)
     theta = estimator.run(u, x).theta[u.size // 2 :].mean(axis=0)
     # Noise leaves the decay itself uncertain, not the slope of a first branch.
