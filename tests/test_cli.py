@@ -29,8 +29,7 @@ def run(*arguments: object) -> Result:
 
 def refused(result: Result, *words: str) -> None:
     """One sentence on stderr, exit code 1, nothing on stdout."""
-    assert result.exit_code == 1
-    assert result.stdout == ""
+    assert (result.exit_code, result.stdout) == (1, "")
     assert "Traceback" not in result.output
     assert result.stderr.startswith("error: ")
     assert len(result.stderr.strip().splitlines()) == 1

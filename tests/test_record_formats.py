@@ -181,8 +181,7 @@ def test_streamed_equals_read(tmp_path: Path, name: str, rows: int) -> None:
     for attribute in ("time", "voltage", "displacement"):
         together = np.concatenate([getattr(block, attribute) for block in stream])
         np.testing.assert_array_equal(together, getattr(record, attribute))
-    assert stream.sample_rate == record.sample_rate
-    assert stream.count() == N
+    assert (stream.sample_rate, stream.count()) == (record.sample_rate, N)
     assert max(block.voltage.size for block in stream) <= rows
 
 
@@ -195,8 +194,7 @@ def test_written_and_read_again_to_the_bit(tmp_path: Path, name: str) -> None:
     for attribute in ("voltage", "displacement"):
         np.testing.assert_array_equal(getattr(again, attribute), getattr(record, attribute))
     np.testing.assert_allclose(again.time, TIME, atol=1e-12)
-    assert again.sample_rate == pytest.approx(RATE)
-    assert again.skipped == 1
+    assert (again.sample_rate, again.skipped) == (pytest.approx(RATE), 1)
 
 
 @pytest.mark.parametrize(

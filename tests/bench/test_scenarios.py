@@ -64,8 +64,7 @@ def test_a_case_is_fit_for_the_loop(name: str) -> None:
 @EVERY
 def test_amplitude_frequency_and_sample_rate_scale(name: str) -> None:
     base, large = case(name), case(name, amplitude=2.0, frequency=2.5, rest=1.0, drift=2.0)
-    assert large.period == 2.0 * base.period
-    assert large.change == 2 * base.change
+    assert (large.period, large.change) == (2.0 * base.period, 2 * base.change)
     assert large.update_interval == 2 * base.update_interval
     assert len(large.reference) == 2 * len(base.reference)
     ratio = large.reference.amplitude / base.reference.amplitude

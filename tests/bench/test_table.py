@@ -112,8 +112,7 @@ def test_a_run_is_a_function_of_its_task() -> None:
     assert first == again
     assert set(first) == {*COLUMNS, "errors"}
     assert first["failure"] is None
-    assert first["key"] == task().key
-    assert first["period"] == pytest.approx(0.2)
+    assert (first["key"], first["period"]) == (task().key, pytest.approx(0.2))
     assert first["typical"] == pytest.approx(math.prod(first["errors"]) ** (1.0 / 6.0))
     assert first["worst"] >= max(first["errors"])
     json.dumps(first, allow_nan=False)
@@ -203,8 +202,7 @@ def test_a_document_sums_up(own: str, tmp_path: Path) -> None:
     machine = {"date": "2026-01-01", "machine": {"cpu": "x", "python": "3"}, "versions": {"numpy": "2"}}
     write_html({**document, **machine}, tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert page.count("<table>") == 2 + 4
-    assert page.count("data:image/png") == 4
+    assert (page.count("<table>"), page.count("data:image/png")) == (2 + 4, 4)
     with pytest.raises(ValueError, match="no page for the suite"):
         write_html({"suite": "other"}, tmp_path / "page.html")
 
@@ -259,8 +257,7 @@ def test_command_end_to_end(own: str, tmp_path: Path) -> None:
     folder = Path("bench-results-quick")
     document = json.loads((folder / "table.json").read_text(encoding="utf-8"))
     assert document == json.loads(Path("a.json").read_text(encoding="utf-8"))
-    assert document["runs"] == 12
-    assert document["conditions"]["sample_rate"] == 2000.0
+    assert (document["runs"], document["conditions"]["sample_rate"]) == (12, 2000.0)
     assert document["versions"]["piezoest"] == pz.__version__
     assert len(tables.read_table(folder, table.RUNS, COLUMNS)) == 12
     for each in document["estimators"].values():

@@ -82,8 +82,7 @@ def test_what_is_drawn_is_within_reason() -> None:
         assert np.all(np.isfinite(rig.reference))
         assert np.max(np.abs(rig.plain.values - rig.plain.centre)) >= 0.99 * rig.plain.amplitude
         assert 0 <= rig.fault.start <= rig.fault.stop <= row["samples"]
-    assert seen["family"] == set(FAMILIES)
-    assert seen["reference"] == set(SHAPES)
+    assert (seen["family"], seen["reference"]) == (set(FAMILIES), set(SHAPES))
     assert len(seen["fault"]) > 0.7 * len(FAULTS)
     assert len(seen["mechanics"]) == 5
 
@@ -215,8 +214,7 @@ def test_controllers_of_ones_own(own: str, tmp_path: Path) -> None:
 
 def test_the_default_controller_changed() -> None:
     known = {name: contender(name).args[0].keywords for name in CHANGED}  # type: ignore[attr-defined]
-    assert known["line"] == {"estimators": ()}
-    assert known["no-corridor"] == {"corridor": 1.0}
+    assert (known["line"], known["no-corridor"]) == ({"estimators": ()}, {"corridor": 1.0})
     alone = {name: given["estimators"] for name, given in known.items() if given.get("estimators")}
     assert {name: (each.__name__,) for name, (each,) in alone.items()} == {name: (name,) for name in alone}
     assert {*CANDIDATES} < {*alone}

@@ -305,8 +305,7 @@ def test_the_model_is_in_micrometres(estimators: Any) -> None:
         assert each.missed is not None
     assert missed["line"] > 0.2
     (driving,) = [each for each in driver.candidates if each.drives]
-    assert driving.name == driver.status.driving
-    assert driving.model == driver.model
+    assert (driving.name, driving.model) == (driver.status.driving, driver.model)
     if estimators is None:
         assert driving.name != "line"
         kinds = [type(each.model) for each in driver.candidates[:-1]]

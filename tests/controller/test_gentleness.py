@@ -1,4 +1,4 @@
-"""What a controller does not do to a stage: jumps, shaking, following what is not true."""
+"""What a controller does not do to a stage: jumps, shaking, following what is not true, wrong names."""
 
 from typing import Any
 
@@ -9,6 +9,7 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.bench import zoo
 from piezoest.bench.zoo.running import run_controller
+from piezoest.controller.readings import FAULTS
 from piezoest.stage import Amplifier
 from tests.controller.shared import LIMITS, LOOP, drive, in_blocks, last_error
 
@@ -107,3 +108,22 @@ def test_a_sensor_that_never_speaks_is_named() -> None:
     _, x, _ = drive(driver, stage, r)
     assert driver.status.stage == "running"
     assert abs(x[-1] - 1.0) < 0.1
+
+
+def named(seed: int, fault: str) -> list[str]:
+    rig = zoo.draw(seed, fault=fault)
+    row = zoo.play(rig, lambda sample_rate, limits: pz.AdaptiveFeedforward(sample_rate, limits=limits))
+    assert row["failure"] is None
+    return [name for name in row["named"].split("; ") if name in FAULTS[1:6]]
+
+
+# Steps, walks and sums of sines with minor loops; a block that was planned before the reference was reached.
+@pytest.mark.parametrize("seed", [92035, 92129, 92148, 92176, 92189, 92232, 92235])
+def test_a_healthy_stage_gets_no_name(seed: int) -> None:
+    assert named(seed, "none") == []
+
+
+# A thousand times too large; reversed, in few samples; a thousand times too small.
+@pytest.mark.parametrize(("seed", "name"), [(92026, "scaled"), (92020, "reversed"), (92022, "scaled")])
+def test_a_wrong_factor_has_its_name(seed: int, name: str) -> None:
+    assert name in named(seed, "sensor-factor")

@@ -66,8 +66,7 @@ def test_it_changes_no_voltage() -> None:
     known = LearntOn((-1.0, 1.0), (-1.0, 1.0), 1.0)
     with_ranges, without = (driven(controller(each), LARGE) for each in (LearntModel(LOOP, known), LOOP))
     assert notes(with_ranges)
-    assert with_ranges.voltage == without.voltage
-    assert with_ranges.model == without.model
+    assert (with_ranges.voltage, with_ranges.model) == (without.voltage, without.model)
 
 
 def test_a_file_and_what_identify_returns_will_do(tmp_path: Path) -> None:

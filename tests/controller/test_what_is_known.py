@@ -189,3 +189,44 @@ def test_a_reference_out_of_reach_is_no_reason_to_begin_again() -> None:
     last = stages.index("running")
     assert "seeking" not in stages[last:]
     np.testing.assert_array_equal(u[-2000:], driver.limits.maximum)
+
+
+# Hum that passes for the answer to the first small ways: the gain is doubted, and sought again.
+FAST, SLOPE, SWEPT = 10_000.0, 0.06, 2.5
+UNIPOLAR, BIASED, BIPOLAR = (0.0, 150.0), (-20.0, 120.0), (-100.0, 100.0)
+
+
+def humming(limits: Any, width: float, hum: float, phase: float = 2.0 * np.pi / 3.0) -> tuple[Any, float]:
+    """A controller behind a triangle on a stage with backlash and 50 Hz on its gauge; its last error [µm]."""
+    driver = pz.AdaptiveFeedforward(FAST, limits=pz.VoltageLimits(*limits), estimators=())
+    bias = 0.7 * SLOPE * 0.5 * (limits[0] + limits[1])
+    wave = pz.signals.triangle(SWEPT, 5.0, 14, FAST).values + bias
+    r = np.concatenate((np.linspace(0.0, wave[0], 1000), wave))
+    seen = hum * np.sin(2.0 * np.pi * 50.0 * np.arange(r.size) / FAST + phase)
+    play = backlash(width)
+    stage = SimpleNamespace(step=lambda u: SLOPE * (play(u) / 0.15 + 0.05 * u) / 1.05)
+    x = shared.drive(driver, stage, r, lambda k, x: x + float(seen[k])).x
+    return driver, last_error(r, x, 2000)
+
+
+@pytest.mark.parametrize(
+    ("limits", "width", "hum"),
+    [(UNIPOLAR, 2.0, 0.1), (UNIPOLAR, 5.0, 0.2), (BIASED, 2.0, 0.1), (BIASED, 5.0, 0.2), (BIPOLAR, 2.0, 0.2)],
+)
+def test_a_gain_of_the_wrong_sign_is_doubted(limits: Any, width: float, hum: float) -> None:
+    driver, error = humming(limits, width, hum)
+    assert driver.model.line[0] == pytest.approx(SLOPE, rel=0.3)
+    assert error < 0.5 * SWEPT
+    said = [event.reason for event in driver.events]
+    assert any(reason.startswith("false start") for reason in said)
+    assert not any(reason.startswith("out of reach") for reason in said)
+
+
+def test_an_event_tells_where_it_was_noticed_also_within_a_block() -> None:
+    limits = pz.VoltageLimits(-50.0, 100.0)
+    driver = pz.AdaptiveFeedforward(FAST, limits=limits, estimators=())
+    r = pz.signals.triangle(14.0, 2.0, 4, FAST).values
+    shared.in_blocks(driver, pz.SimulatedStage(FAST, pz.LinearGain(0.1)), r, 2000)
+    (event,) = [event for event in driver.events if event.reason.startswith("out of reach")]
+    assert "limit of 100 V" in event.reason or "limit of -50 V" in event.reason
+    assert event.time % (2000 / FAST) != 0.0

@@ -31,8 +31,7 @@ def test_solves_once_a_hop_and_holds_between() -> None:
         assert (estimator.solves, estimator.status.last) == (k // 100, "updated" if due else "held")
         assert np.array_equal(estimator.theta, last) != due
         last = estimator.theta
-    assert estimator.status.updates == 10
-    assert estimator.status.held == u.size - 10
+    assert (estimator.status.updates, estimator.status.held) == (10, u.size - 10)
     assert estimator.failures == 0
     assert "satisfied" in estimator.solver_message
 

@@ -67,8 +67,7 @@ def test_rest_moves_nothing() -> None:
     noise = 1e-3 * np.random.default_rng(0).standard_normal(creep.size)
     estimator.run(np.full(creep.size, u[-1]), x[-1] + creep + noise)
     np.testing.assert_array_equal(estimator.theta, before)
-    assert estimator.status.held == held + creep.size
-    assert estimator.status.last == "held"
+    assert (estimator.status.held, estimator.status.last) == (held + creep.size, "held")
 
 
 def test_settles_within_two_periods_from_a_bad_start() -> None:

@@ -71,8 +71,7 @@ def test_a_delay_counts_as_a_parameter_where_it_is_fitted() -> None:
     def parameters(**options: Any) -> int:
         return Fitter(U, Y, sample_rate=RATE, **options).form("coleman-hodgdon").parameters
 
-    assert parameters(delay=0.0) == 5
-    assert parameters(delay="auto") == 6
+    assert (parameters(delay=0.0), parameters(delay="auto")) == (5, 6)
     assert parameters(delay="auto", tells_lag=False) == 5
 
 

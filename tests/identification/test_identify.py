@@ -287,8 +287,7 @@ def test_dictionary_is_json_and_holds_the_model(model: str, tmp_path: Path) -> N
     found = identify(plays_log(1, creep=pz.Creep([0.06], [0.25])), model=model)
     (tmp_path / "found.json").write_text(json.dumps(found.to_dict(), allow_nan=False), encoding="utf-8")
     learnt = LearntModel.read(tmp_path / "found.json")
-    assert learnt == LearntModel.of(found)
-    assert learnt.learnt_on == found.learnt_on
+    assert (learnt, learnt.learnt_on) == (LearntModel.of(found), found.learnt_on)
     data = found.to_dict()
     assert data["held_out"]["rms_um"] == found.held_out.rms
     assert set(data["standard_errors"]) == {*found.model.parameter_names, "offset", "delay"}

@@ -65,8 +65,7 @@ def test_reset_repeats_and_seeds_differ() -> None:
     stage = full_stage()
     first = stage.run(U)
     stage.reset()
-    assert stage.time == 0.0
-    assert stage.displacement == PLAYS.offset
+    assert (stage.time, stage.displacement) == (0.0, PLAYS.offset)
     np.testing.assert_array_equal(stage.run(U), first)
     other = full_stage(seed=4)
     assert np.any(other.run(U) != first)
