@@ -1,5 +1,6 @@
 """The ring: what goes round it, and what it says when something does not fit."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,21 +14,17 @@ LINE = pz.LinearGain(0.14)
 
 
 def test_plain_arrays_need_a_rate() -> None:
-    class Wire:
-        def step(self, u: float) -> float:
-            return u
-
-    compensator = pz.LinearCompensator(pz.LinearGain(1.0))
+    wire, compensator = SimpleNamespace(step=lambda u: u), pz.LinearCompensator(pz.LinearGain(1.0))
     r = np.sin(np.linspace(0.0, 6.0, 100))
     with pytest.raises(ValueError, match="sample_rate is unknown"):
-        pz.track(r, stage=Wire(), compensator=compensator)
-    record = pz.track(r, stage=Wire(), compensator=compensator, sample_rate=100.0)
+        pz.track(r, stage=wire, compensator=compensator)
+    record = pz.track(r, stage=wire, compensator=compensator, sample_rate=100.0)
     np.testing.assert_allclose(record.error, 0.0, atol=1e-12)
     assert record.time[1] == 0.01
     assert record.theta.shape == (100, 0)
     with pytest.raises(ValueError, match="has no period"):
         record.max_error(last_periods=1)
-    record = pz.track(pz.signals.sine(1.0, 5.0, 2, 100.0), stage=Wire(), compensator=compensator)
+    record = pz.track(pz.signals.sine(1.0, 5.0, 2, 100.0), stage=wire, compensator=compensator)
     with pytest.raises(ValueError, match="last_periods is 5, the record has 2 periods"):
         record.max_error(last_periods=5)
     with pytest.raises(ValueError, match="sample rates differ"):
@@ -35,11 +32,7 @@ def test_plain_arrays_need_a_rate() -> None:
 
 
 def test_ones_own_parts_are_told_of_no_measurement_by_none() -> None:
-    class Deaf:
-        sample_rate = 100.0
-
-        def step(self, u: float) -> Any:
-            return float("nan") if u > 0.0 else None
+    deaf: Any = SimpleNamespace(sample_rate=100.0, step=lambda u: float("nan") if u > 0.0 else None)
 
     class Learner:
         model = pz.LinearGain(1.0)
@@ -54,18 +47,15 @@ def test_ones_own_parts_are_told_of_no_measurement_by_none() -> None:
         def learn(self, u: float, x: float | None) -> None:
             self.seen.append((u, x))
 
-    class Odd:
-        def step(self, u: float) -> object:
-            return ("late", [1.0], None, 0.5)[round(u)]
-
+    odd: Any = SimpleNamespace(step=lambda u: ("late", [1.0], None, 0.5)[round(u)])
     r = np.sin(np.linspace(0.0, 6.0, 100))
     estimator, controller = Learner(), Learner()
     line: Any = {"compensator": pz.LinearCompensator(pz.LinearGain(1.0))}
-    record = pz.track(np.arange(4.0), stage=Odd(), **line, sample_rate=100.0)
+    record = pz.track(np.arange(4.0), stage=odd, **line, sample_rate=100.0)
     np.testing.assert_array_equal(np.isfinite(record.measured), [False, True, False, True])
-    pz.track(r, stage=Deaf(), **line, estimator=estimator)
+    pz.track(r, stage=deaf, **line, estimator=estimator)
     assert estimator.seen == [None] * r.size
-    pz.track(r, stage=Deaf(), controller=controller)
+    pz.track(r, stage=deaf, controller=controller)
     assert controller.seen[1::2] == [(u, None) for u in r]
 
 

@@ -129,9 +129,10 @@ def test_whose_coordinates_count() -> None:
 
 
 def test_a_fault_that_is_unknown_is_refused() -> None:
-    with pytest.raises(ValueError, match="fault must be none or one of"):
-        draw(0, fault="gremlins")
-    with pytest.raises(ValueError, match="dwell is transient"):
-        draw(0, fault="dwell", mode="permanent")
-    with pytest.raises(ValueError, match="colour: choose one of"):
-        draw(0, colour="red")
+    for given, words in (
+        ({"fault": "gremlins"}, "fault must be none or one of"),
+        ({"fault": "dwell", "mode": "permanent"}, "dwell is transient"),
+        ({"colour": "red"}, "colour: choose one of"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            draw(0, **given)

@@ -35,9 +35,8 @@ def same(first: Any, second: Any) -> bool:
 
 
 def test_what_is_no_number_is_missing() -> None:
-    driver, other = controller(), controller()
-    stage = pz.SimulatedStage(FS, LOOP)
-    drive(driver, stage, triangle(2))
+    driver = controller()
+    drive(driver, pz.SimulatedStage(FS, LOOP), triangle(2))
     other = driver.copy()
     for bad in NO_NUMBERS:
         u = driver.step(bad)
@@ -366,16 +365,13 @@ def test_the_range_may_have_one_sign(estimators: Any, limits: tuple[float, float
 
 def test_track_drives_the_ring() -> None:
     r = pz.signals.triangle(5.0, 10.0, 20, FS)
-    records = {}
-    for name, estimators in {"line": (), "default": None}.items():
-        stage = pz.PaperStage(FS, seed=0)
-        records[name] = pz.track(r, stage=stage, controller=controller(estimators))
-    assert records["default"].max_error(last_periods=2) < 0.1 * records["line"].max_error(last_periods=2)
-    record = records["default"]
-    assert record.parameter_names == ()
-    assert record.theta.shape == (len(r), 0)
-    driver, stage = controller(None), pz.PaperStage(FS, seed=0)
-    u, x, _ = drive(driver, stage, r.values)
+    line, record = (
+        pz.track(r, stage=pz.PaperStage(FS, seed=0), controller=controller(estimators))
+        for estimators in ((), None)
+    )
+    assert record.max_error(last_periods=2) < 0.1 * line.max_error(last_periods=2)
+    assert (record.parameter_names, record.theta.shape) == ((), (len(r), 0))
+    u, x, _ = drive(controller(None), pz.PaperStage(FS, seed=0), r.values)
     np.testing.assert_array_equal(record.voltage, u)
     np.testing.assert_array_equal(record.measured, x)
     assert "max error" in record.table()
@@ -384,13 +380,10 @@ def test_track_drives_the_ring() -> None:
 def test_track_wants_one_driver() -> None:
     r = pz.signals.triangle(5.0, 10.0, 1, FS)
     driver, stage = controller(), pz.PaperStage(FS, seed=0)
-    others: dict[str, Any] = {
-        "compensator": pz.LinearCompensator(pz.LinearGain(0.15)),
-        "estimator": pz.HysteresisRLS(FS),
-    }
-    for name, other in others.items():
-        with pytest.raises(ValueError, match=f"does without {name}"):
-            pz.track(r, stage=stage, controller=driver, **{name: other})
+    line: Any = pz.LinearCompensator(pz.LinearGain(0.15))
+    for other in ({"compensator": line}, {"estimator": pz.HysteresisRLS(FS)}):
+        with pytest.raises(ValueError, match=f"does without {next(iter(other))}"):
+            pz.track(r, stage=stage, controller=driver, **other)
     with pytest.raises(ValueError, match="pass compensator= or controller="):
         pz.track(r, stage=stage)
     with pytest.raises(ValueError, match="sample rates differ"):

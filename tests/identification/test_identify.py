@@ -270,16 +270,16 @@ def test_arguments_out_of_range(arguments: dict[str, Any]) -> None:
 
 
 def test_what_is_no_log_is_refused() -> None:
-    with pytest.raises(ValueError, match="data must be a log"):
-        identify(made().voltage)
-    with pytest.raises(ValueError, match="sample_rate must be given"):
-        identify(made().voltage, made().displacement)
-    with pytest.raises(OSError, match=r"no\.csv"):
-        identify("no.csv")
-    with pytest.raises(ValueError, match="validate must be a list"):
-        identify(made(), validate="log.csv")
-    with pytest.raises(ValueError, match="record must be a Record"):
-        findings("log.csv")  # type: ignore[arg-type]
+    record, text = made(), cast(Any, "log.csv")
+    for call, words in (
+        (lambda: identify(record.voltage), "data must be a log"),
+        (lambda: identify(record.voltage, record.displacement), "sample_rate must be given"),
+        (lambda: identify(record, validate=text), "validate must be a list"),
+        (lambda: findings(text), "record must be a Record"),
+        (lambda: identify(text), r"log\.csv"),
+    ):
+        with pytest.raises((ValueError, OSError), match=words):
+            call()
 
 
 @pytest.mark.parametrize("model", FORMS)

@@ -62,7 +62,8 @@ def test_blocks_of_a_log_have_the_ranges_of_the_log() -> None:
     parts = [LearntOn.of(part, 0.1 * part, FS) for part in np.split(u, 4)]
     joined = parts[0].joined(parts[1]).joined(parts[2]).joined(parts[3])
     whole = LearntOn.of(u, 0.1 * u, FS)
-    assert (joined.voltage, joined.rate) == (whole.voltage, pytest.approx(whole.rate))
+    assert joined.voltage == whole.voltage
+    assert joined.rate == pytest.approx(whole.rate)
     assert joined.frequency == pytest.approx(whole.frequency, rel=0.01)
     still = LearntOn((0.0, 0.0), (0.0, 0.0), 0.0)
     assert still.joined(KNOWN) == KNOWN.joined(still) == KNOWN

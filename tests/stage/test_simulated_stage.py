@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter
 
 import piezoest as pz
 from piezoest import Amplifier, ColemanHodgdon, Creep, Gauge, LinearGain, PrandtlIshlinskii, SimulatedStage
@@ -111,8 +112,6 @@ def test_noise_is_white_before_the_filter() -> None:
 
 
 def test_filter_is_the_butterworth_low_pass() -> None:
-    from scipy.signal import butter, lfilter
-
     b, a = butter(2, 1000.0, fs=FS)
     np.testing.assert_allclose(butterworth_low_pass(1000.0, FS), [*b, *a[1:]], atol=1e-14)
     stage = SimulatedStage(FS, LinearGain(1.0), amplifier=Amplifier(cutoff=1000.0))
