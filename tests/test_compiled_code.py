@@ -17,7 +17,9 @@ from numba.core.dispatcher import Dispatcher
 
 import piezoest
 from piezoest import compile, machine_code
+from piezoest.compensators import inverse_kernel
 from piezoest.compile import Compiled, compiled
+from piezoest.controller import kernel
 
 PACKAGE = Path(piezoest.__file__).parent
 
@@ -190,3 +192,35 @@ def test_an_edit_of_what_a_model_of_ones_own_imports_counts(tmp_path: Path) -> N
         (tmp_path / "helper.py").write_text(text)
         done = subprocess.run(program, capture_output=True, text=True, check=True, env=environment)
         assert done.stdout.strip() == factor
+
+
+LOOPS = (kernel.step, kernel.learn, kernel.run, kernel.learn_all)  # what a live loop will call
+
+
+def forget(monkeypatch: pytest.MonkeyPatch, *loops: Any) -> None:
+    for loop in loops:
+        monkeypatch.setattr(loop, "_entries", {})
+
+
+def test_the_class_stands_for_a_controller_of_any_rate_and_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    forget(monkeypatch, *LOOPS)
+    assert piezoest.warmup(piezoest.AdaptiveFeedforward) > 0.0
+    loaded = [list(loop._entries) for loop in LOOPS]
+    controller = piezoest.AdaptiveFeedforward(1234.0, limits=piezoest.VoltageLimits(-3.0, 7.0, 100.0, 1234.0))
+    assert loaded == [[controller.layouts]] * len(LOOPS)
+
+
+def test_what_is_warmed_up_is_left_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    controller = piezoest.AdaptiveFeedforward(
+        1000.0, limits=piezoest.VoltageLimits(0.0, 100.0), estimators=()
+    )
+    before = controller.to_dict()
+    piezoest.warmup(controller)
+    assert controller.to_dict() == before
+    forget(monkeypatch, inverse_kernel.step, inverse_kernel.run)
+    model = piezoest.PrandtlIshlinskii(0.1, [1.0, 2.0, 3.0], [0.02, 0.01, 0.01])
+    compensator = piezoest.InverseCompensator(model, sample_rate=1000.0)
+    piezoest.warmup(compensator)
+    assert compensator.status.samples == 0
+    assert compensator.layouts in inverse_kernel.step._entries
+    assert compensator.layouts in inverse_kernel.run._entries

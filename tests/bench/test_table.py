@@ -3,6 +3,8 @@
 import dataclasses
 import json
 import math
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -321,3 +323,57 @@ def test_tuning_finds_settings_on_other_seeds(own: str, tmp_path: Path) -> None:
     assert rls["default"] == "HysteresisRLS" == rls["trials"][0]["estimator"]
     with pytest.raises(ValueError, match="power of two"):
         tuning.draws(tuning.tunable(texts[0]), 3, 0)
+
+
+def test_a_store_keeps_the_first_row_of_each_key_and_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "runs.sqlite"
+    with Store(path) as store, Store(path) as other:
+        assert store.append({"key": "a", "value": 1})
+        assert not other.append({"key": "a", "value": 2})
+        assert other.append({"key": "b", "value": 3})
+    with Store(path) as store:
+        assert len(store) == 2
+        assert "c" not in store
+        assert store.append({"key": "c", "value": 4})
+        assert [row["value"] for row in store.rows(["c", "no", "a", "b"])] == [4, 1, 3]
+
+
+def test_a_file_that_is_no_store_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "runs.sqlite"
+    path.write_text("no rows" * 1000)
+    with pytest.raises(OSError, match=r"runs\.sqlite: file is not a database"), Store(path):
+        pass
+
+
+APPEND = """
+import sys
+from pathlib import Path
+
+from piezoest.bench.store import Store
+
+path, name = Path(sys.argv[1]), sys.argv[2]
+keys = [f"{name}{k}" for k in range(500)]
+with Store(path) as store:
+    print("open", flush=True)
+    sys.stdin.readline()
+    for k, key in enumerate(keys):
+        assert store.append({"key": key, "text": name * (k % 997)})
+    rows = list(store.rows(keys))
+assert [row["key"] for row in rows] == keys
+assert all(row["text"] == name * (k % 997) for k, row in enumerate(rows))
+"""
+
+
+def test_two_processes_append_to_one_store(tmp_path: Path) -> None:
+    path = tmp_path / "runs.sqlite"
+    command = [sys.executable, "-c", APPEND, str(path)]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    workers = [subprocess.Popen([*command, name], **pipes) for name in "xy"]  # type: ignore[call-overload]
+    for worker in workers:
+        worker.stdout.readline()
+    for worker in workers:
+        worker.stdin.write("\n")
+        worker.stdin.flush()
+    assert [worker.communicate() and worker.returncode for worker in workers] == [0, 0]
+    with Store(path) as store:
+        assert len(store) == 1000
