@@ -74,7 +74,6 @@ def sample(state: Any, given: Any, x: Any) -> None:
 
 @compiled
 def step(state: Record, given: Record, x: float) -> float:
-    """Every way to reach a number."""
     sample(state, given, x)
     return state.total
 

@@ -30,7 +30,6 @@ def tripled(x: float) -> float:
 
 
 def compiled_functions() -> dict[str, Compiled]:
-    """Every compiled function of the package."""
     found: dict[str, Compiled] = {}
     for each in pkgutil.walk_packages([str(PACKAGE)], "piezoest."):
         for name, value in vars(importlib.import_module(each.name)).items():

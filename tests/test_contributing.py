@@ -54,7 +54,6 @@ EXAMPLES = examples((ROOT / "CONTRIBUTING.md").read_text())
 
 
 def run(folder: Path, *arguments: str) -> None:
-    """Run tests of the copy, without compiling."""
     environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments]
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=600)

@@ -34,7 +34,6 @@ def is_private(name: str) -> bool:
 
 
 def foreign_names(module: str, tree: ast.Module) -> Iterator[str]:
-    """Private names of other sub-packages that a module uses."""
     foreign = set()
     for source, used, name in imported(tree):
         if source.split(".")[:2] != module.split(".")[:2]:

@@ -42,7 +42,6 @@ def number_of(document: Any, row: str, quantity: str) -> Any:
 
 
 def bounded_numbers() -> list[Any]:
-    """Every number with a bound, those that miss it marked."""
     return [
         pytest.param(
             number,

@@ -23,7 +23,6 @@ def case(name: str, seed: int = 0, **overrides: Any) -> Case:
 
 
 def factors(made: Case) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """The stage's gain at every sample."""
     times, values = np.array(made.gain_schedule or ((0.0, 1.0),)).T
     return np.interp(made.reference.time, times, values)
 

@@ -16,7 +16,6 @@ MODES = [(kind, mode) for kind, each in FAULTS.items() for mode in each.modes]
 
 
 def seen(rig: Rig, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Reading and true displacement."""
     stage = rig.stage()
     x = stage.run(u)
     return x, np.asarray(stage.displacement)

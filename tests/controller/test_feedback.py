@@ -81,7 +81,6 @@ def test_none_changes_nothing() -> None:
 
 
 def test_it_goes_no_farther_than_the_corridor() -> None:
-    """A sensor that lies slowly."""
     r = np.concatenate([WAVE, np.full(10_000, 0.0)])
     _, _, i = drive(controller(20.0, corridor=0.2), r, lambda t: 2.0 * max(t - 5.0, 0.0))
     assert np.abs(i).max() == pytest.approx(0.2 * 5.0, rel=0.1)

@@ -21,7 +21,6 @@ def triangle(periods: int, amplitude: float) -> FloatArray:
 
 
 def driven(r: FloatArray, stage: Any, *, block: int = 1, **options: Any) -> Any:
-    """The controller, its voltages, and where the stage was."""
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, **options)
     return driver, *in_blocks(driver, stage, r, block)
 

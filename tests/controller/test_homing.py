@@ -135,7 +135,6 @@ def test_it_goes_on_in_copies_files_and_blocks(after: int) -> None:
 
 
 def learnt(estimators: Any = (pz.OutputErrorRLS,)) -> tuple[Any, Any]:
-    """A controller that a model drives, and its stage."""
     driver, stage = controller(estimators=estimators), pz.SimulatedStage(FS, LOOP)
     drive(driver, stage, np.tile(SINE, 20))
     assert driver.status.driving != "line"

@@ -65,7 +65,6 @@ def test_a_reference_near_the_resonance_is_told_once(resonance: float | None, to
 
 
 def test_a_rest_is_not_fast() -> None:
-    """Noise of the reference turns at each sample."""
     rest = 1.0 + 1e-3 * np.random.default_rng(1).normal(size=20_000)
     r = np.concatenate((wave(20.0, 4), np.linspace(0.0, 1.0, 200), rest, wave(20.0, 4)[125:]))
     assert warnings(driven(r, resonance=500.0)) == []

@@ -20,7 +20,6 @@ GIVEN = record(inverse=recorded_loop.LOOP)
 
 
 def recorded(u: FloatArray, x: FloatArray, state: Any = None) -> Any:
-    """The recorder's state after a record."""
     state = Named(new(recorder.STATE), recorder.STATE) if state is None else state
     for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
         recorder.sample(state, None, u_k, x_k)

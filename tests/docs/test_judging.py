@@ -32,7 +32,6 @@ def judging() -> Any:
 
 
 def row(seed: int, ratio: float | None = 0.5, **given: Any) -> dict[str, Any]:
-    """A row with what is summed up."""
     numbers = dict.fromkeys(("amplitude", "gain", "width", "sensor_noise", "creep"), 1.0)
     return {
         **numbers, "seed": seed, "family": "duhem", "reference": "sine", "fault": "none", "mode": "none",

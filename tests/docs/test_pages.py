@@ -12,7 +12,6 @@ DOCS = ROOT / "docs"
 
 
 def program(name: str, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A program of docs/, as a module."""
     monkeypatch.syspath_prepend(str(DOCS))
     return importlib.import_module(name)
 

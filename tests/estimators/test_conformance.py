@@ -48,7 +48,6 @@ def kind(request: pytest.FixtureRequest) -> Any:
 
 
 def record(periods: float = 1.0, model: Any = TRUE) -> Any:
-    """Voltage and measured displacement of a true plant, 1 nm noise."""
     return recorded(RATE, periods, model=model)
 
 

@@ -19,7 +19,6 @@ def voltage(periods: float = 8.0) -> FloatArray:
 
 
 def loop_error(model: pz.ColemanHodgdon, u: FloatArray, offset: float = 0.0) -> float:
-    """Largest difference over the last period [µm]."""
     return float(np.abs(model.simulate(u) - TRUE.simulate(u) - offset)[-400:].max())
 
 

@@ -181,7 +181,6 @@ def test_parameters_and_limits_can_be_set(log: tuple[Any, Any]) -> None:
     ("name", "precision"), list(zip(PAIRS, itertools.cycle(("float", "double")), strict=False))
 )
 def test_of_any_bits_it_makes_numbers(name: str, precision: Any) -> None:
-    """What it learns and what it puts out."""
     made = pz.export.CompiledController(code(name, precision))
     rng, bits = np.random.default_rng(0), np.uint32 if precision == "float" else np.uint64
     for _ in range(100):

@@ -66,7 +66,6 @@ def test_calls_are_made_from_left_to_right(tmp_path: Path, function: Any, value:
 
 @compiled
 def arithmetic(u: float, x: float) -> float:
-    """All at once."""
     total = 0.0
     for i in range(1, 12, 3):
         place, rest = i // 4, i % 4

@@ -52,7 +52,6 @@ RECORDED: dict[str, Callable[[FloatArray], FloatArray]] = {
 
 
 def slow(x: FloatArray, samples: float) -> FloatArray:
-    """The displacement behind a low-pass filter."""
     y, keep = x.copy(), float(np.exp(-1.0 / samples))
     for k in range(1, N):
         y[k] = keep * y[k - 1] + (1.0 - keep) * x[k]

@@ -19,7 +19,6 @@ KNOWN = LearntOn((-40.0, 40.0), (-6.0, 6.0), 800.0, (4.0, 6.0))
 
 
 def wave(amplitude: float = 40.0, frequency: float = 5.0, periods: int = 8) -> FloatArray:
-    """A triangle with sharp corners."""
     time = np.arange(round(periods * FS / frequency)) / FS
     return amplitude * np.interp(time * frequency % 1.0, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0.0])
 

@@ -56,7 +56,6 @@ VOLTAGES: dict[str, Array] = {
 
 
 def flat(*values: Any) -> Array:
-    """All numbers in one array."""
     return np.concatenate([np.asarray(value, dtype=np.float64).ravel() for value in values])
 
 
@@ -77,7 +76,6 @@ def shown(estimator: Any, name: str) -> Any:
 
 
 def end(estimator: Any) -> Outcome:
-    """All that an estimator shows now."""
     has = partial(hasattr, type(estimator))
     outcome = {"end": flat(*(shown(estimator, name) for name in ATTRIBUTES if has(name)))}
     outcome |= {f"end.{name}": flat(shown(estimator, name)) for name in MATRICES if has(name)}
