@@ -59,3 +59,60 @@ def write_tdms(path: Path, **changes: object) -> Path:
             )
             writer.write_segment([u, x, nptdms.ChannelObject("notes", "words", ["a", "b"])])
     return path
+
+
+FILE_HEADER = """LabVIEW Measurement\t
+Writer_Version\t2
+Reader_Version\t2
+Separator\t{name}
+Decimal_Separator\t{decimal}
+Multi_Headings\tYes
+X_Columns\t{x_columns}
+Time_Pref\tRelative
+Operator\tAda
+Date\t2026/11/22
+Time\t10:00:00,0
+***Start_Special***
+Channels\t99
+***End_Special***
+***End_of_Header***\t
+"""
+SEGMENT = """\t
+Channels\t2\t\t
+Samples\t{samples}\t{samples}\t
+Date\t2026/11/22\t2026/11/22\t
+Time\t10:00:{second:012.9f}\t10:00:{second:012.9f}\t
+Y_Unit_Label\tVolts\tum\t
+X_Dimension\tTime\tTime\t
+X0\t{x_0}\t{x_0}\t
+Delta_X\t0.01\t0.01\t
+***End_of_Header***\t\t\t
+{names}
+"""
+
+
+COLUMNS = "X_Value\tDrive\tPosition\tComment"
+
+
+def write_lvm(
+    path: Path,
+    segments: tuple[tuple[slice, float, float], ...] = ((slice(0, N), 0.0, 0.0),),
+    *,
+    decimal: str = ".",
+    separator: str = "\t",
+    x_columns: str = "One",
+) -> Path:
+    """Write a .lvm file of segments: rows, X of the first row, seconds of the clock."""
+    names = "X_Value\tDrive\tX_Value\tPosition\tComment" if x_columns == "Multi" else COLUMNS
+    word = {"\t": "Tab", ";": "Semicolon"}[separator]
+    content = FILE_HEADER.format(name=word, decimal=decimal, x_columns=x_columns)
+    for part, x_0, second in segments:
+        count = len(range(N)[part])
+        content += SEGMENT.format(samples=count, second=second, x_0=x_0, names=names)
+        for k, (u, x) in enumerate(zip(VOLTAGE[part], DISPLACEMENT[part], strict=True)):
+            t = f"{x_0 + k / RATE:.6f}"
+            row = {"No": ["", f"{u:.6f}", f"{x:.6f}"], "Multi": [t, f"{u:.6f}", t, f"{x:.6f}"]}
+            cells = row.get(x_columns, [t, f"{u:.6f}", f"{x:.6f}"])
+            content += "\t".join(cells) + ("\tbegins" if k == 0 else "") + "\n"
+    path.write_text(content.replace(".", decimal).replace("\t", separator), encoding="utf-8")
+    return path

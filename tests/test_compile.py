@@ -14,17 +14,7 @@ from numba.extending import register_jitable
 
 from piezoest.compile import Record, compiled, inlined, like, local, local_rows
 from piezoest.compiled_records import record_type
-from piezoest.layout import (
-    ABSENT,
-    COUNT,
-    FIXED,
-    NUMBER,
-    Length,
-    Named,
-    new,
-    numbers,
-    record,
-)
+from piezoest.layout import ABSENT, COUNT, FIXED, NUMBER, Length, Named, new, numbers, record
 from piezoest.layout import Record as Layout
 
 INNER = record(count=COUNT, theta=numbers(3), P=numbers(2, 3))
@@ -84,7 +74,6 @@ def sample(state: Any, given: Any, x: Any) -> None:
 
 @compiled
 def step(state: Record, given: Record, x: float) -> float:
-    """Every way to reach a number."""
     sample(state, given, x)
     return state.total
 
@@ -98,9 +87,6 @@ def misspelt(state: Record) -> None:
 def stack_of_unknown_size(state: Record) -> None:
     room = like(state.memory.u)
     room[0] = 1.0
-
-
-# ---------------------------------------------------------------- layouts
 
 
 def test_unknown_names_are_refused() -> None:
@@ -134,9 +120,6 @@ def test_named_reads_and_writes_the_array() -> None:
             misspelt()
 
 
-# ---------------------------------------------------------------- the same as Python
-
-
 @settings(max_examples=25)
 @given(plays=st.one_of(st.integers(0, 9), st.none()), places=st.integers(0, 9), x=st.floats(-1e3, 1e3))
 def test_machine_code_does_what_python_does_at_any_length(plays: int | None, places: int, x: float) -> None:
@@ -150,22 +133,10 @@ def test_machine_code_does_what_python_does_at_any_length(plays: int | None, pla
     assert step.of(layout, GAIN) is step.of(layout_of(None if plays is None else 4), GAIN)
 
 
-# ---------------------------------------------------------------- what does not compile
-
-
-@pytest.mark.parametrize(
-    ("function", "words"),
-    [
-        (misspelt, "thetta"),
-        (stack_of_unknown_size, "like"),
-    ],
-)
+@pytest.mark.parametrize(("function", "words"), [(misspelt, "thetta"), (stack_of_unknown_size, "like")])
 def test_does_not_compile(function: Any, words: str) -> None:
     with pytest.raises((TypingError, LoweringError), match=words):
         function.of(layout_of())
-
-
-# ---------------------------------------------------------------- one machine code, one layout
 
 
 def several() -> list[Layout]:

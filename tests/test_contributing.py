@@ -1,8 +1,8 @@
 """The worked examples of CONTRIBUTING.md: each section "Adding a …" is carried out in a copy of the package.
 
-The first line of a fenced block says where it goes: ``# new file PATH``, ``# added to PATH``, for its end, or
-``# added to PATH, below LINE``. The last block of a section is a test file; it is run as plain Python, for to
-compile the copy would take a minute. So are the tests that find by themselves what was added.
+The first line of a fenced block says where it goes. The last block of a section is a test file; it is run as
+plain Python, for to compile the copy would take a minute. So are the
+tests that find by themselves what was added.
 """
 
 import os
@@ -46,10 +46,7 @@ def apply(block: str, folder: Path) -> Path:
 
 # Tests that find what was added, and its name.
 FOUND_BY = {
-    "Adding a policy": (
-        "VarianceLimit",
-        "tests/test_package.py", "tests/policies/test_base.py",
-    ),
+    "Adding a policy": ("VarianceLimit", "tests/test_package.py", "tests/policies/test_base.py"),
     "Adding a model": ("Backlash", "tests/test_package.py"),
     "Adding an estimator": ("SlopeFilter", "tests/test_package.py", "tests/estimators/test_conformance.py"),
 }  # fmt: skip
@@ -57,17 +54,9 @@ EXAMPLES = examples((ROOT / "CONTRIBUTING.md").read_text())
 
 
 def run(folder: Path, *arguments: str) -> None:
-    """Run tests of the copy, without compiling."""
     environment = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": "1"}
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,
-    )
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 
 from piezoest.records import read_record, write_columns
-from tests.logs import LOG, TIME, VOLTAGE, N, write_hdf5, write_sheets, write_tdms
-
-# ---------------------------------------------------------------- more than there is room for
+from tests.logs import LOG, N, write_hdf5, write_lvm, write_sheets, write_tdms
 
 
 def hdf5_that_declares_much(path: Path) -> None:
@@ -70,15 +68,10 @@ def parquet_of_nothing_but_zeros(path: Path) -> None:
         ("log.parquet", parquet_of_nothing_but_zeros, "declares 537 MB of numbers"),
     ],
 )
-def test_what_a_file_declares_is_checked(
-    tmp_path: Path, name: str, make: Callable[[Path], None], words: str
-) -> None:
+def test_what_a_file_declares_is_checked(tmp_path: Path, name: str, make: Any, words: str) -> None:
     make(tmp_path / name)
     with pytest.raises(ValueError, match=rf"log\.\w+: .*{words}"):
         read_record(tmp_path / name)
-
-
-# ---------------------------------------------------------------- numbers that lie elsewhere
 
 
 def external_storage(file: Any, folder: Path) -> None:
@@ -118,9 +111,6 @@ def test_what_lies_in_the_file_is_read(tmp_path: Path) -> None:
         file["none"] = h5py.Empty("f8")
         virtual(file, tmp_path, other=".")
     assert len(read_record(tmp_path / "log.h5", columns={"displacement": "position_um"})) == N
-
-
-# ---------------------------------------------------------------- not a log
 
 
 TEXT = "time_s,voltage_V,displacement_um\n" + "".join(f"{k},{k},{k}\n" for k in range(N))
@@ -172,16 +162,9 @@ def packed(path: Path) -> None:
     path.write_bytes(gzip.compress(plain.read_bytes()))
 
 
-def labview(path: Path) -> None:
-    rows = [f"{t}\t{u:.6f}\t{1.5 * u:.6f}\t" for t, u in zip(TIME.tolist(), VOLTAGE.tolist(), strict=True)]
-    head = ["LabVIEW Measurement\t", "Separator\tTab", "Decimal_Separator\t.", "***End_of_Header***\t", "\t"]
-    segment = ["Channels\t2\t\t", "***End_of_Header***\t\t\t", "X_Value\tdrive_V\tgauge_um\tComment"]
-    path.write_text("\n".join([*head, *segment, *rows[:30], "", *segment, *rows[30:]]) + "\n")
-
-
 MAKERS: dict[str, Callable[[Path], Any]] = {
     "csv.gz": packed,
-    "lvm": labview,
+    "lvm": lambda path: write_lvm(path, ((slice(0, 30), 0.0, 0.0), (slice(30, N), 0.3, 0.0))),
     "tdms": write_tdms,
     "xlsx": lambda path: write_sheets(path, log=[list(LOG), *np.column_stack(list(LOG.values())).tolist()]),
     "npz": lambda path: np.savez_compressed(path, **LOG),

@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
+from piezoest._files import save_figure
 from piezoest.bench import origin, table, tables
 from piezoest.export.generated import CCode
 from piezoest.export.tables import Table
@@ -51,10 +53,6 @@ def page(path: Path, seed: int) -> None:
 
 
 def figure(path: Path, seed: int) -> None:
-    from matplotlib.figure import Figure
-
-    from piezoest._files import save_figure
-
     drawn = Figure()
     drawn.subplots().plot(columns(seed)["voltage_V"])
     save_figure(drawn, path)
@@ -76,13 +74,11 @@ OUTPUTS: dict[str, Callable[[Path, int], Any]] = {
         for ending in (".csv", ".parquet", ".h5", ".mat", ".npy")
     },
     "profile.json": lambda path, seed: AmplitudeProfile(
-        np.arange(1.0, SIZE), np.full((SIZE - 1, 3), 0.1 * seed)
-    ).save(path),
+        np.arange(1.0, SIZE), np.full((SIZE - 1, 3), 0.1 * seed)).save(path),
     "page.html": page,
     "figure.png": figure,
     "controller.c": lambda path, seed: CCode(
-        "controller", f"{seed}" * SIZE, f"{seed}" * SIZE, "double", False
-    ).write(path.parent),
+        "controller", f"{seed}" * SIZE, f"{seed}" * SIZE, "double", False).write(path.parent),
     "waveform.csv": waveform,
     "put.json": lambda path, seed: origin.put(columns(seed)["voltage_V"].tolist(), path),
     "periods.csv": lambda path, seed: rows(path, seed, "csv"),

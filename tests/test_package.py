@@ -32,16 +32,10 @@ MADE_BY_USERS: dict[str, Any] = {
 }
 
 
-# ---------------------------------------------------------------- light to import
-
-
 def test_import_loads_nothing_heavy() -> None:
     code = f"import sys, piezoest; print(set(sys.modules) & set({HEAVY!r}))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
     assert done.stdout == "set()\n"
-
-
-# ---------------------------------------------------------------- names
 
 
 def test_version_is_one_and_the_same() -> None:
@@ -60,9 +54,6 @@ def test_name_is_in_the_reference(name: str) -> None:
     assert {name, f"piezoest.{name}"} & listed, f"add {name} to docs/reference.rst"
 
 
-# ---------------------------------------------------------------- misspelt keywords and attributes
-
-
 @pytest.mark.parametrize("name", MADE_BY_USERS)
 def test_unknown_keyword_is_refused(name: str) -> None:
     with pytest.raises(TypeError, match="no_such_keyword"):
@@ -75,9 +66,6 @@ def test_misspelt_attribute_is_refused(name: str) -> None:
     has_no_dict = cls.__dictoffset__ == 0 and not any("__dict__" in vars(base) for base in cls.__mro__[:-1])
     checks_names = cls.__setattr__ is not object.__setattr__
     assert has_no_dict or checks_names, f"{name} accepts any attribute: give it and its bases __slots__"
-
-
-# ---------------------------------------------------------------- pages, layers
 
 
 MARKDOWN_CODE = re.compile(r"^```python\n(.*?)^```", re.S | re.M)

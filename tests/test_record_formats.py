@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from piezoest.records import Record, read_record, stream_record
 from tests.logs import DISPLACEMENT, LOG, RATE, TIME, VOLTAGE, N, check, write_hdf5
@@ -19,20 +20,12 @@ def write_parquet(file: Path, columns: dict[str, Any], units: dict[str, str] | N
     pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
     fields = [
         pa.field(
-            name,
-            pa.array(values).type,
-            metadata={"unit": units[name]} if units and name in units else None,
+            name, pa.array(values).type, metadata={"unit": units[name]} if units and name in units else None
         )
         for name, values in columns.items()
     ]
     table = pa.table([pa.array(values) for values in columns.values()], schema=pa.schema(fields))
     pq.write_table(table, file, row_group_size=16)
-
-
-def write_mat(file: Path, columns: dict[str, Any]) -> None:
-    from scipy.io import savemat
-
-    savemat(file, columns)
 
 
 def write_mat_73(file: Path, columns: dict[str, Any]) -> None:
@@ -48,23 +41,16 @@ def write_mat_73(file: Path, columns: dict[str, Any]) -> None:
 
 
 def write_npy(file: Path, columns: dict[str, Any]) -> None:
-    rows = np.zeros(len(next(iter(columns.values()))), [(name, np.float64) for name in columns])
-    for name, values in columns.items():
-        rows[name] = values
-    np.save(file, rows)
-
-
-def write_npz(file: Path, columns: dict[str, Any]) -> None:
-    np.savez_compressed(file, **columns)
+    np.save(file, np.rec.fromarrays(list(columns.values()), [(name, np.float64) for name in columns]))
 
 
 WRITERS: dict[str, Callable[[Path, dict[str, Any]], None]] = {
     "log.parquet": write_parquet,
     "log.h5": write_hdf5,
-    "log.mat": write_mat,
+    "log.mat": savemat,
     "log73.mat": write_mat_73,
     "log.npy": write_npy,
-    "log.npz": write_npz,
+    "log.npz": lambda file, columns: np.savez_compressed(file, **columns),
 }
 STREAMED = [name for name in WRITERS if name not in ("log.mat", "log.npz")]
 
@@ -88,13 +74,10 @@ def test_columns_and_units(log: Path) -> None:
     WRITERS[log.name](log, dict(zip("abc", (1e3 * TIME, VOLTAGE / 20.0, 1e3 * DISPLACEMENT), strict=True)))
     units = {"time": "ms", "voltage": "20 V", "displacement": "nm"}
     record = read_record(log, columns=named, units=units)
-    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
-    np.testing.assert_allclose(record.voltage, VOLTAGE, atol=1e-12)
-    np.testing.assert_allclose(record.displacement, DISPLACEMENT, atol=1e-12)
+    check(record)
     assert "displacement: converted to µm (factor 0.001)" in record.notes
     # A sample rate stands in for the column of time.
-    record = read_record(log, columns={"voltage": "b", "displacement": "c"}, units=units, sample_rate=RATE)
-    np.testing.assert_allclose(record.time, TIME, atol=1e-12)
+    check(read_record(log, columns={"voltage": "b", "displacement": "c"}, units=units, sample_rate=RATE))
 
 
 def test_unknown_column_lists_those_that_exist(log: Path) -> None:
@@ -105,21 +88,16 @@ def test_unknown_column_lists_those_that_exist(log: Path) -> None:
             assert name in str(caught.value)
 
 
-def test_truncated_file(log: Path) -> None:
+def test_truncated_file_empty_one_and_one_of_another_format(log: Path) -> None:
     raw = log.read_bytes()
-    for part in (0.3, 0.6, 0.95):
-        log.write_bytes(raw[: int(part * len(raw))])
-        with pytest.raises(ValueError, match=log.name):
+    for content, words in (
+        *((raw[: int(part * len(raw))], log.name) for part in (0.3, 0.6, 0.95)),
+        (b"", "the file is empty"),
+        (b"time_s,voltage_V,displacement_um\n" * 40, rf"{log.name}.*(this is no|cannot be read)"),
+    ):
+        log.write_bytes(content)
+        with pytest.raises(ValueError, match=words):
             read_record(log)
-
-
-def test_empty_file_and_file_of_another_format(log: Path) -> None:
-    log.write_bytes(b"")
-    with pytest.raises(ValueError, match="the file is empty"):
-        read_record(log)
-    log.write_text("time_s,voltage_V,displacement_um\n" * 40)
-    with pytest.raises(ValueError, match=rf"{log.name}.*(this is no|cannot be read)"):
-        read_record(log)
     with pytest.raises(FileNotFoundError):
         read_record(log.with_name("none" + log.suffix))
 
@@ -160,7 +138,7 @@ def test_matrix_without_names(tmp_path: Path, turned: bool) -> None:
     assert "columns without names: taken as time = 1, voltage = 2, displacement = 3" in record.notes[0]
     named = {"time": "1", "voltage": "3", "displacement": "2"}
     np.testing.assert_array_equal(read_record(tmp_path / "log.npy", columns=named).voltage, DISPLACEMENT)
-    write_mat(tmp_path / "log.mat", {"data": matrix})
+    savemat(tmp_path / "log.mat", {"data": matrix})
     check(read_record(tmp_path / "log.mat"))
     write_hdf5(tmp_path / "log.h5", {"data": matrix, "other": np.zeros(3)})
     named = {"time": "data:1", "voltage": "data:2", "displacement": "data:3"}
@@ -182,8 +160,7 @@ def test_units_that_the_file_states(tmp_path: Path) -> None:
             root[name].attrs["units"] = unit
     for name in ("log.parquet", "log.h5"):
         record = read_record(tmp_path / name)
-        np.testing.assert_allclose(record.time, TIME, atol=1e-9)
-        np.testing.assert_allclose(record.displacement, DISPLACEMENT, atol=1e-9)
+        check(record)
         assert "column 'x [nm]': converted to µm (factor 0.001)" in record.notes
 
 
@@ -204,8 +181,7 @@ def test_streamed_equals_read(tmp_path: Path, name: str, rows: int) -> None:
     for attribute in ("time", "voltage", "displacement"):
         together = np.concatenate([getattr(block, attribute) for block in stream])
         np.testing.assert_array_equal(together, getattr(record, attribute))
-    assert stream.sample_rate == record.sample_rate
-    assert stream.count() == N
+    assert (stream.sample_rate, stream.count()) == (record.sample_rate, N)
     assert max(block.voltage.size for block in stream) <= rows
 
 
@@ -222,11 +198,19 @@ def test_written_and_read_again_to_the_bit(tmp_path: Path, name: str) -> None:
     assert again.skipped == 1
 
 
-@pytest.mark.parametrize(("file", "package"), [("log.parquet", "pyarrow"), ("log.h5", "h5py")])
-def test_missing_extra_of_writing_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str, package: str
+@pytest.mark.parametrize(
+    ("file", "start", "package"),
+    [("log.parquet", b"", "pyarrow"), ("log.h5", b"", "h5py"), ("a.xlsx", b"PK\x03\x04", "python_calamine"),
+     ("a.tdms", b"TDSm", "nptdms")],
+)  # fmt: skip
+def test_missing_extra_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, file: str, start: bytes, package: str
 ) -> None:
+    """Of a file that is read, or, where it has no content yet, written."""
+    if start:
+        (tmp_path / file).write_bytes(start + bytes(200))
     monkeypatch.setitem(sys.modules, package, None)
+    record = Record.from_arrays(VOLTAGE, DISPLACEMENT, RATE)
     with pytest.raises(ImportError, match=rf"needs {package}, .* pip install 'piezoest\[formats\]'"):
-        Record.from_arrays(VOLTAGE, DISPLACEMENT, RATE).write(tmp_path / file)
-    assert not list(tmp_path.iterdir())
+        (read_record if start else record.write)(tmp_path / file)
+    assert len(list(tmp_path.iterdir())) == bool(start)

@@ -3,6 +3,7 @@
 import gzip
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -92,9 +93,7 @@ def german(value: float) -> str:
     ],
 )
 @pytest.mark.parametrize("header", ["t,u,x", ""])
-def test_separators_of_thousands(
-    tmp_path: Path, separator: str, write_number: Callable[[float], str], header: str
-) -> None:
+def test_separators_of_thousands(tmp_path: Path, separator: str, write_number: Any, header: str) -> None:
     check(write(tmp_path / "log.csv", separator, rows_of(write_number), header))
 
 
@@ -120,11 +119,7 @@ def test_a_mark_that_appears_late_is_no_number(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("header", ["t_ms,u,x", "When,u,x", ""])
-def test_time_stamps(
-    tmp_path: Path,
-    write_stamp: Callable[[str], str],
-    header: str,
-) -> None:
+def test_time_stamps(tmp_path: Path, write_stamp: Callable[[str], str], header: str) -> None:
     rows = [
         (write_stamp(t), f"{u:.3f}", f"{x:.3f}")
         for t, u, x in zip(STAMPS, VOLTAGE, DISPLACEMENT, strict=True)
@@ -173,6 +168,10 @@ def test_every_bit_of_a_number_and_what_stands_between(tmp_path: Path, separator
     wanted[300, 1] = 2.5
     np.testing.assert_array_equal(record.voltage, wanted[:, 1])
     np.testing.assert_array_equal(record.displacement, wanted[:, 2])
+    for size in (1, 50, 4000):
+        stream = stream_record(file, rows=size)
+        np.testing.assert_array_equal(np.concatenate([block.voltage for block in stream]), record.voltage)
+        assert (stream.sample_rate, stream.count()) == (record.sample_rate, 3000)
     rows[2500] = (rows[2500][0], "text", "1")
     with pytest.raises(ValueError, match="line 2502, column 'u': 'text' is not a number"):
         read_record(write(file, separator, rows))  # type: ignore[arg-type]

@@ -1,5 +1,6 @@
 """The ring: what goes round it, and what it says when something does not fit."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,24 +10,21 @@ import piezoest as pz
 
 FS = 50_000.0
 START = pz.ColemanHodgdon(alpha=0.02, beta=0.12, gamma=0.0036)
+LINE = pz.LinearGain(0.14)
 
 
 def test_plain_arrays_need_a_rate() -> None:
-    class Wire:
-        def step(self, u: float) -> float:
-            return u
-
-    compensator = pz.LinearCompensator(pz.LinearGain(1.0))
+    wire, compensator = SimpleNamespace(step=lambda u: u), pz.LinearCompensator(pz.LinearGain(1.0))
     r = np.sin(np.linspace(0.0, 6.0, 100))
     with pytest.raises(ValueError, match="sample_rate is unknown"):
-        pz.track(r, stage=Wire(), compensator=compensator)
-    record = pz.track(r, stage=Wire(), compensator=compensator, sample_rate=100.0)
+        pz.track(r, stage=wire, compensator=compensator)
+    record = pz.track(r, stage=wire, compensator=compensator, sample_rate=100.0)
     np.testing.assert_allclose(record.error, 0.0, atol=1e-12)
     assert record.time[1] == 0.01
     assert record.theta.shape == (100, 0)
     with pytest.raises(ValueError, match="has no period"):
         record.max_error(last_periods=1)
-    record = pz.track(pz.signals.sine(1.0, 5.0, 2, 100.0), stage=Wire(), compensator=compensator)
+    record = pz.track(pz.signals.sine(1.0, 5.0, 2, 100.0), stage=wire, compensator=compensator)
     with pytest.raises(ValueError, match="last_periods is 5, the record has 2 periods"):
         record.max_error(last_periods=5)
     with pytest.raises(ValueError, match="sample rates differ"):
@@ -34,11 +32,7 @@ def test_plain_arrays_need_a_rate() -> None:
 
 
 def test_ones_own_parts_are_told_of_no_measurement_by_none() -> None:
-    class Deaf:
-        sample_rate = 100.0
-
-        def step(self, u: float) -> Any:
-            return float("nan") if u > 0.0 else None
+    deaf: Any = SimpleNamespace(sample_rate=100.0, step=lambda u: float("nan") if u > 0.0 else None)
 
     class Learner:
         model = pz.LinearGain(1.0)
@@ -53,31 +47,26 @@ def test_ones_own_parts_are_told_of_no_measurement_by_none() -> None:
         def learn(self, u: float, x: float | None) -> None:
             self.seen.append((u, x))
 
-    class Odd:
-        def step(self, u: float) -> object:
-            return ("late", [1.0], None, 0.5)[round(u)]
-
+    odd: Any = SimpleNamespace(step=lambda u: ("late", [1.0], None, 0.5)[round(u)])
     r = np.sin(np.linspace(0.0, 6.0, 100))
     estimator, controller = Learner(), Learner()
     line: Any = {"compensator": pz.LinearCompensator(pz.LinearGain(1.0))}
-    record = pz.track(np.arange(4.0), stage=Odd(), **line, sample_rate=100.0)
+    record = pz.track(np.arange(4.0), stage=odd, **line, sample_rate=100.0)
     np.testing.assert_array_equal(np.isfinite(record.measured), [False, True, False, True])
-    pz.track(r, stage=Deaf(), **line, estimator=estimator)
+    pz.track(r, stage=deaf, **line, estimator=estimator)
     assert estimator.seen == [None] * r.size
-    pz.track(r, stage=Deaf(), controller=controller)
+    pz.track(r, stage=deaf, controller=controller)
     assert controller.seen[1::2] == [(u, None) for u in r]
 
 
-def test_wrong_references() -> None:
-    def follow(r: Any) -> None:
+@pytest.mark.parametrize(
+    ("r", "words"),
+    [([0.0, np.nan], "r holds 1 values that are NaN"), ([], "r needs at least 1 samples"),
+     (np.repeat([0.0, 1.0, 0.0], 100), r"signals\.filtered_steps")],
+)  # fmt: skip
+def test_wrong_references(r: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
         pz.track(r, stage=pz.PaperStage(), compensator=pz.InverseCompensator(START))
-
-    with pytest.raises(ValueError, match="r holds 1 values that are NaN"):
-        follow([0.0, np.nan])
-    with pytest.raises(ValueError, match="r needs at least 1 samples"):
-        follow([])
-    with pytest.raises(ValueError, match=r"signals\.filtered_steps"):
-        follow(np.repeat([0.0, 1.0, 0.0], 100))
 
 
 class Driver:
@@ -96,10 +85,7 @@ class Driver:
         (START, lambda: pz.HysteresisRLS(FS, initial_model=START)),
         (START, lambda: pz.HysteresisRLS(FS, initial_model=START, memory=0.2, offset=False, delay=1.5)),
         (START, lambda: pz.HysteresisEKF(FS, initial_model=START, offset=True)),
-        (
-            pz.LinearGain(0.14),
-            lambda: pz.HysteresisRLS(FS, initial_model=pz.LinearGain(0.14, 0.2), memory=0.2),
-        ),
+        (LINE, lambda: pz.HysteresisRLS(FS, initial_model=pz.LinearGain(0.14, 0.2), memory=0.2)),
         (pz.ColemanHodgdon(0.05, 0.01, 0.0009), lambda: pz.HysteresisRLS(FS, policies=(), memory=0.001)),
     ],
 )
@@ -112,13 +98,12 @@ def test_the_compiled_ring_is_the_loop_over_its_parts(model: Any, make: Any, opt
         estimator.predict(0.1)
         compensator = pz.InverseCompensator(model, pz.VoltageLimits(-30.0, 30.0))
         for interval in (70, 7):
-            record = pz.track(
-                r, stage=wrap(stage), compensator=compensator, estimator=estimator, update_interval=interval
-            )
-        parts = record.voltage, record.measured, record.displacement, record.parameters
+            parts: Any = {"compensator": compensator, "estimator": estimator, "update_interval": interval}
+            record = pz.track(r, stage=wrap(stage), **parts)
+        traces = record.voltage, record.measured, record.displacement, record.parameters
         moved = np.asarray(stage.displacement).tolist()
         found = estimator.to_dict(), compensator.model, compensator.status, stage.time, moved
-        results.append((parts, found, record.parameter_names, compensator.step(1.0), stage.step(2.0)))
+        results.append((traces, found, record.parameter_names, compensator.step(1.0), stage.step(2.0)))
     for one, other in zip(results[0][0], results[1][0], strict=True):
         np.testing.assert_array_equal(one, other)
     assert results[0][1:] == results[1][1:]

@@ -9,9 +9,7 @@ SPECIAL = np.array([0.0, -0.0, 5e-324, -5e-324, 1e-310, 1e-160, 1e-45, -1e-20, 1
                     3e38, 1e155, -1e308, np.nan, np.inf, -np.inf])  # fmt: skip
 
 
-def wild(
-    rng: np.random.Generator, count: int, wave: float = 33.0, bits: Any = np.uint64
-) -> NDArray[np.float64]:
+def wild(rng: Any, count: int, wave: float = 33.0, bits: Any = np.uint64) -> NDArray[np.float64]:
     """Any bits of a float of that size, all sizes a stage takes, special ones, and a wave between them."""
     kind = {np.uint64: np.float64, np.uint32: np.float32}[bits]
     any_bits = rng.integers(0, np.iinfo(bits).max, count, dtype=bits, endpoint=True).view(kind)

@@ -12,7 +12,7 @@ import pytest
 
 from piezoest.bench import executors, table
 from piezoest.bench.store import played
-from tests.bench.shared import SMALL
+from tests.bench.shared import SMALL, own_module
 
 distributed = pytest.importorskip("distributed")
 
@@ -44,17 +44,14 @@ def cluster(tmp_path: Path) -> Iterator[Any]:
 
 
 @pytest.mark.slow
-def test_a_worker_killed_half_way_loses_no_result_and_none_counts_twice(
+def test_a_worker_killed_half_way_loses_nothing(
     cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Where the workers do not look: the module has to be sent to them.
     home = tmp_path / "home"
     home.mkdir()
-    monkeypatch.chdir(home)
-    monkeypatch.syspath_prepend(home)
     monkeypatch.setenv("NOTES", str(home / "unused.txt"))
-    (home / "own_estimators_on_dask.py").write_text(OWN, encoding="utf-8")
-    estimators = ("own_estimators_on_dask:Noted", "HysteresisRLS")
+    estimators = (f"{own_module(home, monkeypatch, OWN)}:Noted", "HysteresisRLS")
     scenarios = ("cold-start", "two-tone")
     plan = table.Plan(estimators=estimators, scenarios=scenarios, stages=("paper",), seeds=8, given=SMALL)
     tasks = plan.tasks()

@@ -35,18 +35,10 @@ def numbers(
 
 @pytest.mark.parametrize(
     ("errors", "periods"),
-    [
-        ([0.01, 0.01], 0),
-        ([1.0, 0.059], 1),
-        ([1.0, 0.06], None),
-        ([0.01, 1.0, 0.01], 2),
-        ([1.0, 0.01, 1.0], None),
-        ([1.0, 0.01, np.nan], None),
-    ],
-)
-def test_periods_until_every_further_error_is_below_the_level(
-    errors: list[float], periods: int | None
-) -> None:
+    [([0.01, 0.01], 0), ([1.0, 0.059], 1), ([1.0, 0.06], None), ([0.01, 1.0, 0.01], 2),
+     ([1.0, 0.01, 1.0], None), ([1.0, 0.01, np.nan], None)],
+)  # fmt: skip
+def test_periods_until_every_further_error_is_below_the_level(errors: Any, periods: int | None) -> None:
     assert settles(np.array(errors), 0.06) == periods
 
 

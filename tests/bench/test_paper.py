@@ -2,7 +2,6 @@
 
 import json
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,38 +17,31 @@ MISSES = {
     ("7.5 µm @ 5.0 Hz, parameters of 2.5 µm", "compensated_max_error"): (
         "the parameters of the 2.5 µm row, off by less than their bounds, are extrapolated threefold: "
         "calibration/trade_off.md"
-    ),
+    )
 }
 
 
-@dataclass(frozen=True)
-class Bench:
-    """What one call of the command left behind."""
-
-    document: dict[str, Any]
-    output: str
-    figures: Path
-
-    def number(self, row: str, quantity: str) -> dict[str, Any]:
-        """The entry of a number; rows of Table III have names of their own."""
-        (entry,) = (
-            entry for entry in self.document["tables"] if (entry["row"], entry["quantity"]) == (row, quantity)
-        )
-        return dict(entry)
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What the whole procedure leaves behind, without the sweep over the memory."""
+    folder = tmp_path_factory.mktemp("paper")
+    result = command("paper", "--quick", "--json", folder / "paper.json", "--figures", folder)
+    assert result.exit_code == 0, result.output
+    return folder
 
 
 @pytest.fixture(scope="session")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    """The whole procedure, without the sweep over the memory."""
-    folder = tmp_path_factory.mktemp("paper")
-    target, figures = folder / "paper.json", folder / "figures"
-    result = command("paper", "--quick", "--json", target, "--figures", figures)
-    assert result.exit_code == 0, result.output
-    return Bench(json.loads(target.read_text(encoding="utf-8")), result.stdout, figures)
+def document(folder: Path) -> Any:
+    return json.loads((folder / "paper.json").read_text(encoding="utf-8"))
+
+
+def number_of(document: Any, row: str, quantity: str) -> Any:
+    """The entry of a number; rows of Table III have names of their own."""
+    (entry,) = (each for each in document["tables"] if (each["row"], each["quantity"]) == (row, quantity))
+    return entry
 
 
 def bounded_numbers() -> list[Any]:
-    """Every number with a bound, those that miss it marked."""
     return [
         pytest.param(
             number,
@@ -64,33 +56,35 @@ def bounded_numbers() -> list[Any]:
 
 
 @pytest.mark.parametrize("number", bounded_numbers())
-def test_number_is_within_its_bound(number: Published, bench: Bench) -> None:
-    entry = bench.number(number.row, number.quantity)
+def test_number_is_within_its_bound(number: Published, document: Any) -> None:
+    entry = number_of(document, number.row, number.quantity)
     assert entry["bound"] == number.bound
     assert abs(number.deviation(entry["ours"])) <= entry["bound"]
 
 
 @pytest.mark.parametrize(
-    ("quantity", "sign"),
-    [("alpha", -1), ("beta", 1), ("gamma", -1), ("K", 1), ("compensated_max_error", 1)],
+    ("quantity", "sign"), [("alpha", -1), ("beta", 1), ("gamma", -1), ("K", 1), ("compensated_max_error", 1)]
 )
-def test_slow_row_differs_from_the_fast_one_as_in_the_paper(quantity: str, sign: int, bench: Bench) -> None:
-    slow, fast = (bench.number(f"5.0 µm @ {f} Hz", quantity) for f in ("2.5", "5.0"))
+def test_slow_row_differs_from_the_fast_one_as_in_the_paper(quantity: str, sign: int, document: Any) -> None:
+    slow, fast = (number_of(document, f"5.0 µm @ {f} Hz", quantity) for f in ("2.5", "5.0"))
     assert sign * (slow["value"] - fast["value"]) > 0.0
     assert sign * (slow["ours"] - fast["ours"]) > 0.0
 
 
-def test_every_number_of_the_paper_has_one_of_ours(bench: Bench) -> None:
-    assert len(bench.document["tables"]) == len(published()) == 49
-    for entry in bench.document["tables"]:
+def test_every_number_of_the_paper_has_one_of_ours_and_figures_are_drawn(document: Any, folder: Path) -> None:
+    sizes = {path.stem: path.stat().st_size for path in folder.glob("*.png")}
+    assert set(sizes) == {"figure3", "figure4", "figure5", "adaptation"}
+    assert 10_000 < min(sizes.values()) < max(sizes.values()) < 200_000
+    assert len(document["tables"]) == len(published()) == 49
+    for entry in document["tables"]:
         assert math.isfinite(entry["ours"])
         assert entry["ratio"] == pytest.approx(entry["ours"] / entry["value"])
         assert entry["held_out"] == (entry["row"] == PRBS_ROW or entry["table"] == "III")
         assert (entry["within"] is None) == (entry["bound"] is None)
 
 
-def test_every_row_adapts_and_settles(bench: Bench) -> None:
-    runs = bench.document["adaptation"]
+def test_every_row_adapts_and_settles(document: Any) -> None:
+    runs = document["adaptation"]
     assert len(runs) == 10
     for run in runs:
         assert run["settling_periods"] is not None
@@ -101,20 +95,10 @@ def test_every_row_adapts_and_settles(bench: Bench) -> None:
             assert run["max_error_um"][0] > 3.0 * run["stationary_max_error_um"]
 
 
-def test_figures_are_written(bench: Bench) -> None:
-    names = {path.stem: path for path in bench.figures.glob("*.png")}
-    assert set(names) == {"figure3", "figure4", "figure5", "adaptation"}
-    for path in names.values():
-        assert 10_000 < path.stat().st_size < 200_000
-
-
 def test_wrong_usage(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    for arguments in (
-        ("--json", tmp_path / "no" / "paper.json"),
-        ("--figures", tmp_path / "file"),
-        ("--memory", 0),
-    ):
+    no_folder = tmp_path / "no" / "paper.json"
+    for arguments in (("--json", no_folder), ("--figures", tmp_path / "file"), ("--memory", 0)):
         assert command("paper", *arguments).exit_code == 2
 
 

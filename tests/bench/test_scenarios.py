@@ -23,7 +23,6 @@ def case(name: str, seed: int = 0, **overrides: Any) -> Case:
 
 
 def factors(made: Case) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """The stage's gain at every sample."""
     times, values = np.array(made.gain_schedule or ((0.0, 1.0),)).T
     return np.interp(made.reference.time, times, values)
 
@@ -64,8 +63,7 @@ def test_a_case_is_fit_for_the_loop(name: str) -> None:
 @EVERY
 def test_amplitude_frequency_and_sample_rate_scale(name: str) -> None:
     base, large = case(name), case(name, amplitude=2.0, frequency=2.5, rest=1.0, drift=2.0)
-    assert large.period == 2.0 * base.period
-    assert large.change == 2 * base.change
+    assert (large.period, large.change) == (2.0 * base.period, 2 * base.change)
     assert large.update_interval == 2 * base.update_interval
     assert len(large.reference) == 2 * len(base.reference)
     ratio = large.reference.amplitude / base.reference.amplitude
@@ -101,19 +99,15 @@ def test_gain_steps_within_a_twentieth_of_a_period() -> None:
     assert min(phases) < 0.2 < 0.8 < max(phases)
 
 
-def test_drift_is_one_per_cent_a_second_to_the_end() -> None:
+def test_drift_is_one_per_cent_a_second_and_a_dwell_rests() -> None:
     made = case("drift", drift=2.0)
     factor = factors(made)
     assert np.all(factor[: made.change + 1] == 1.0)
-    slope = np.diff(factor[made.change :]) * made.sample_rate
-    np.testing.assert_allclose(slope, DRIFT)
+    np.testing.assert_allclose(np.diff(factor[made.change :]) * made.sample_rate, DRIFT)
     assert (len(made.reference) - made.change) / made.sample_rate == pytest.approx(2.0)
     assert SCENARIOS["drift"].build(0, sample_rate=1000.0).reference.duration == pytest.approx(5.8)
-
-
-def test_dwell_rests_and_goes_on() -> None:
     made = case("dwell")
-    first, end = round(3 * made.period), made.change
-    assert np.all(made.reference.values[first:end] == 0.0)
+    r, first, end = made.reference.values, round(3 * made.period), made.change
+    assert np.all(r[first:end] == 0.0)
     assert (end - first) / made.sample_rate == 0.5
-    np.testing.assert_array_equal(made.reference.values[end : end + 800], made.reference.values[:800])
+    np.testing.assert_array_equal(r[end : end + 800], r[:800])

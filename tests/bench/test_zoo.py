@@ -20,6 +20,7 @@ from tests.bench import shared
 from tests.bench.shared import Line, bench, own_module, said
 
 SHORT = {**shared.SHORT, "family": "backlash", "fault": "none"}
+GIVEN = [f"--set={name}={value}" for name, value in SHORT.items() if name != "slew"]
 
 OWN = """
 import os
@@ -81,8 +82,7 @@ def test_what_is_drawn_is_within_reason() -> None:
         assert np.all(np.isfinite(rig.reference))
         assert np.max(np.abs(rig.plain.values - rig.plain.centre)) >= 0.99 * rig.plain.amplitude
         assert 0 <= rig.fault.start <= rig.fault.stop <= row["samples"]
-    assert seen["family"] == set(FAMILIES)
-    assert seen["reference"] == set(SHAPES)
+    assert (seen["family"], seen["reference"]) == (set(FAMILIES), set(SHAPES))
     assert len(seen["fault"]) > 0.7 * len(FAULTS)
     assert len(seen["mechanics"]) == 5
 
@@ -125,9 +125,7 @@ def test_no_other_line_is_much_better(limits: str) -> None:
 def test_what_is_not_finite_or_outside_the_limits_is_seen() -> None:
     rig = draw(1, **SHORT)
     row = play(rig, lambda fs, limits: Wild(0.15, 0.0, limits))
-    assert row["finite"] is False
-    assert row["within_limits"] is False
-    assert row["failure"] is None
+    assert (row["finite"], row["within_limits"], row["failure"]) == (False, False, None)
 
 
 def test_a_rest_at_a_limit_is_seen() -> None:
@@ -149,25 +147,15 @@ def test_beyond_the_stroke_a_limit_is_where_to_be() -> None:
     assert row["line_worst"] >= np.max(np.abs(traces.lines.fitted.error[rig.judged_from :])) > 1.0
 
 
-def test_after_a_transient_fault_two_swings_pass() -> None:
-    rig = draw(1, **{**SHORT, "fault": "gap", "mode": "transient"})
+@pytest.mark.parametrize(("fault", "mode"), [("gap", "transient"), ("gain-step", "permanent")])
+def test_after_a_fault_two_swings_pass(fault: str, mode: str) -> None:
+    rig = draw(1, **{**SHORT, "fault": fault, "mode": mode})
     row, traces = traced(rig, best_line(rig))
     assert traces.run is not None
-    first = rig.fault.stop + rig.learning
     assert rig.learning == rig.plain.two_swings + rig.block
-    assert row["after_worst"] == np.max(np.abs(traces.run.error[first:]))
-    rig = draw(1, **{**SHORT, "fault": "gain-step", "mode": "permanent"})
-    row, traces = traced(rig, best_line(rig))
-    assert traces.run is not None
-    first = rig.fault.start + rig.learning
+    first = rig.learning + (rig.fault.stop if mode == "transient" else rig.fault.start)
     assert row["after_worst"] == np.max(np.abs(traces.run.error[first:]))
     assert play(draw(1, **SHORT), Parts)["after_worst"] is None
-
-
-def test_the_parts_settle_on_their_own_family() -> None:
-    row = play(draw(2, **{**SHORT, "family": "coleman-hodgdon"}), Parts)
-    assert row["last_ratio"] < 0.7
-    assert row["driver"] in ("line", "coleman-hodgdon")
 
 
 def test_the_map_counts_periods() -> None:
@@ -195,11 +183,10 @@ def test_the_map_counts_periods() -> None:
 
 def test_the_command_goes_on_where_it_was(tmp_path: Path) -> None:
     options = ("--workers", 1, "--out", tmp_path, "--table", "csv", "--controller", "parts")
-    given = [f"--set={name}={value}" for name, value in SHORT.items() if name not in ("slew", "fault")]
-    first = safety("--runs", 2, *options, *given)
+    first = safety("--runs", 2, *options, *GIVEN)
     assert first.exit_code == 0, first.output
     assert "0 of 2 runs" in first.output
-    second = safety("--runs", 3, *options, *given, "--json", tmp_path / "all.json")
+    second = safety("--runs", 3, *options, *GIVEN, "--json", tmp_path / "all.json")
     assert "2 of 3 runs" in second.output
     document = json.loads((tmp_path / "safety.json").read_text(encoding="utf-8"))
     assert document == json.loads((tmp_path / "all.json").read_text(encoding="utf-8"))
@@ -210,16 +197,14 @@ def test_the_command_goes_on_where_it_was(tmp_path: Path) -> None:
 
 
 def test_the_command_draws_a_run(tmp_path: Path) -> None:
-    given = [f"--set={name}={value}" for name, value in SHORT.items() if name != "slew"]
-    result = safety("--show", 3, "--out", tmp_path, "-c", "parts", *given)
+    result = safety("--show", 3, "--out", tmp_path, "-c", "parts", *GIVEN)
     assert result.exit_code == 0, result.output
     assert (tmp_path / "run-3.png").stat().st_size > 20_000
     assert "backlash" in result.output
 
 
 def test_controllers_of_ones_own(own: str, tmp_path: Path) -> None:
-    given = [f"--set={name}={value}" for name, value in SHORT.items() if name != "slew"]
-    result = safety("--runs", 2, "--workers", 1, "-c", f"{own}:Breaks", "--out", tmp_path / "a", *given)
+    result = safety("--runs", 2, "--workers", 1, "-c", f"{own}:Breaks", "--out", tmp_path / "a", *GIVEN)
     assert result.exit_code == 0, result.output
     document = json.loads((tmp_path / "a" / "safety.json").read_text(encoding="utf-8"))
     assert document["violations"]["failed"] == 2
@@ -229,8 +214,7 @@ def test_controllers_of_ones_own(own: str, tmp_path: Path) -> None:
 
 def test_the_default_controller_changed() -> None:
     known = {name: contender(name).args[0].keywords for name in CHANGED}  # type: ignore[attr-defined]
-    assert known["line"] == {"estimators": ()}
-    assert known["no-corridor"] == {"corridor": 1.0}
+    assert (known["line"], known["no-corridor"]) == ({"estimators": ()}, {"corridor": 1.0})
     alone = {name: given["estimators"] for name, given in known.items() if given.get("estimators")}
     assert {name: (each.__name__,) for name, (each,) in alone.items()} == {name: (name,) for name in alone}
     assert {*CANDIDATES} < {*alone}

@@ -94,7 +94,6 @@ def test_a_small_way_changes_no_slope() -> None:
 
 
 def test_it_never_stays_where_it_does_not_belong() -> None:
-    """A line that has gone to a limit comes back."""
     rig = rig_with("zero-off", "permanent", amplitude=3.0, gain=0.4)
     run = learnt(rig)[0]
     assert abs(rig.fault.size) == 20.0

@@ -28,16 +28,11 @@ def test_shares_count_what_is_asked_for() -> None:
     assert found["cells"]["kept"] == dict(zip(CHANGES, (1, 1, 0, 0, 1), strict=True))
     assert found["others"] == 1
     first = found["by_place"][0]
-    assert (first["amplitude"], first["runs"], first["cold-start"], first["gain-step"]) == (
-        1.0,
-        20,
-        1.0,
-        0.95,
-    )
+    names = ("amplitude", "runs", "cold-start", "gain-step")
+    assert [first[name] for name in names] == [1.0, 20, 1.0, 0.95]
     assert first["cold-start periods"] == 2.0
     assert first["switch-back periods"] is None
-    assert found["by_family"][0]["runs"] == 21
-    assert found["other_places"][0]["switch"] == 1.0
+    assert (found["by_family"][0]["runs"], found["other_places"][0]["switch"]) == (21, 1.0)
 
 
 @pytest.mark.parametrize("frequency", settling.FREQUENCIES)
@@ -69,17 +64,11 @@ def settled(seed: int, controller: str, error: float | None) -> dict[str, Any]:
 
 def test_the_best_single_estimator_is_chosen_for_each_cell() -> None:
     first, second, third = CANDIDATES
-    of = {
-        DEFAULT: (0.2, 0.3, 0.4),
-        first: (0.1, 0.5, 0.9),
-        second: (0.1, 0.2, 0.3),
-        third: (0.0001, 0.4, None),
-    }
+    of = {DEFAULT: (0.2, 0.3, 0.4), first: (0.1, 0.5, 0.9), second: (0.1, 0.2, 0.3), third: (1e-4, 0.4, None)}
     rows = [settled(k, name, error) for name, each in of.items() for k, error in enumerate(each)]
     found = summarise_contest(rows, DEFAULT)
     (cell,) = found["cells"]
-    assert cell["best"] == second
-    assert cell["settled"] == pytest.approx(0.03)
+    assert (cell["best"], cell["settled"]) == (second, pytest.approx(0.03))
     assert cell["ratio"] == pytest.approx(1.5)
     assert (found["kept"], found["failures"], found["seeds"]) == (0, 1, 3)
     # Below the floor all are alike.

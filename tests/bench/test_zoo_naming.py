@@ -30,8 +30,7 @@ def test_the_right_name_counts_and_how_soon() -> None:
     assert found["named_periods"] == pytest.approx(1.5)
     assert found["named"] == "scaled; saturated; reversed"
     assert found["named_first"] == "saturated"
-    assert found["named_after"] == pytest.approx(0.05)
-    assert found["driver"] == "line"
+    assert (found["named_after"], found["driver"]) == (pytest.approx(0.05), "line")
     wrong = after(rig, (-2.0, "scaled"), (1.0, "no response"))
     assert wrong["named_right"] is False
     assert wrong["named_periods"] is None
@@ -39,19 +38,13 @@ def test_the_right_name_counts_and_how_soon() -> None:
 
 
 def test_of_what_was_there_from_the_start_silence_alone_is_named() -> None:
-    asked = {
-        kind
-        for kind in FAULTS
-        if "from-start" in FAULTS[kind].modes and rig_with(kind, "from-start").fault.names
-    }
+    begins = {kind for kind, each in FAULTS.items() if "from-start" in each.modes}
+    asked = {kind for kind in begins if rig_with(kind, "from-start").fault.names}
     assert asked == {"amplifier-frozen", "stage-stuck", "sensor-constant", "sensor-noise"}
     later = {kind for kind in FAULTS if rig_with(kind, FAULTS[kind].modes[-1]).fault.names}
     assert later == {*asked, "sensor-saturated", "sensor-factor", "zero-off"}
-
-
-def test_every_name_is_one_that_a_controller_has() -> None:
-    assert set(ANY) <= set(MEANINGS)
-    assert {name for kind in FAULTS.values() for name in kind.names} == set(ANY)
+    # Every name is one that a controller has.
+    assert {name for kind in FAULTS.values() for name in kind.names} == set(ANY) <= set(MEANINGS)
 
 
 def errors(rig: Rig, *cycles: float) -> FloatArray:

@@ -1,6 +1,6 @@
 """Integral feedback within the controller: what it removes, and how far a wrong sensor can drive it."""
 
-from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,10 +8,10 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
+from tests.controller import shared
+from tests.controller.shared import LIMITS, LOOP, last_error
 
 FS = 1000.0
-LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
-LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
 WAVE = 5.0 * np.sin(2.0 * np.pi * 2.0 * np.arange(5000) / FS)
 
 
@@ -19,9 +19,7 @@ def controller(feedback: float | None, limits: pz.VoltageLimits = LIMITS, **opti
     return pz.AdaptiveFeedforward(FS, limits=limits, estimators=(), feedback=feedback, **options)
 
 
-def drive(
-    driver: Any, r: FloatArray, drift: Callable[[float], float], noise: tuple[float, float] = (0.0, 0.0)
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def drive(driver: Any, r: FloatArray, drift: Any, noise: Any = (0.0, 0.0)) -> Any:
     """Voltage, displacement and correction of a stage that drifts; noise of reference and reading."""
     stage, rng = pz.SimulatedStage(FS, LOOP), np.random.default_rng(0)
     u, x, i = np.empty_like(r), np.empty_like(r), np.empty_like(r)
@@ -33,18 +31,17 @@ def drive(
     return u, x, i
 
 
-def creep(t: float) -> float:
-    return 0.6 * float(np.log10(1.0 + max(t - 5.0, 0.0) / 0.1))
-
-
 def none(t: float) -> float:
     return 0.0
 
 
 @pytest.mark.parametrize("gain", [1.0, 10.0])
 def test_creep_in_a_dwell_is_taken_back(gain: float) -> None:
-    r = np.concatenate([WAVE, np.full(12000, 3.0)])
-    errors = []
+    r, errors = np.concatenate([WAVE, np.full(12000, 3.0)]), []
+
+    def creep(t: float) -> float:
+        return 0.6 * float(np.log10(1.0 + max(t - 5.0, 0.0) / 0.1))
+
     for feedback in (None, gain):
         _, x, i = drive(controller(feedback), r, creep, (0.0, 0.01))
         errors.append(np.abs(r - x)[-2000:].max())
@@ -86,7 +83,6 @@ def test_none_changes_nothing() -> None:
 
 
 def test_it_goes_no_farther_than_the_corridor() -> None:
-    """A sensor that lies slowly."""
     r = np.concatenate([WAVE, np.full(10_000, 0.0)])
     _, _, i = drive(controller(20.0, corridor=0.2), r, lambda t: 2.0 * max(t - 5.0, 0.0))
     assert np.abs(i).max() == pytest.approx(0.2 * 5.0, rel=0.1)
@@ -112,11 +108,35 @@ def test_a_fault_holds_it() -> None:
 
 
 def test_a_stage_that_answers_late_does_not_swing() -> None:
-    driver, x, share, r = controller(200.0), 0.0, 1.0 - np.exp(-1.0 / (0.02 * FS)), np.full(20_000, 5.0)
-    far = np.empty_like(r)
-    for k, r_k in enumerate(r.tolist()):
-        u = driver.step(r_k)
+    driver, r, x, share = controller(200.0), np.full(20_000, 5.0), 0.0, 1.0 - np.exp(-1.0 / (0.02 * FS))
+
+    def late(u: float) -> float:
+        nonlocal x
         x += share * (0.15 * u - x)
+        return x
+
+    assert last_error(r, shared.drive(driver, SimpleNamespace(step=late), r).x, 5000) < 0.01
+
+
+@pytest.mark.parametrize("part", [0.1, 0.3, 0.6, 0.85])
+def test_what_feedback_corrects_at_rest_does_not_spoil_the_waves_behind(part: float) -> None:
+    """The stage creeps at rest by 0.43 µm; the first waves behind wipe that out within 0.1 s."""
+    period, rests = 250, 20_000
+    wave = np.tile(5.0 * np.sin(2.0 * np.pi * np.arange(period) / period), 24)
+    k = 12 * period + round(part * period)
+    r = np.concatenate((wave[:k], np.full(rests, wave[k - 1]), wave[k:]))
+    crept = np.zeros_like(r)
+    crept[k : k + rests] = 0.1 * np.log10(1.0 + np.arange(rests))
+    crept[k + rests :] = crept[k + rests - 1] * np.exp(-np.arange(r.size - k - rests) / 100.0)
+    driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS, feedback=1.0), pz.SimulatedStage(FS, LOOP)
+    error, corrected = np.empty_like(r), np.empty_like(r)
+    for j, r_j in enumerate(r.tolist()):
+        u = driver.step(r_j)
+        x = stage.step(u) - crept[j]
         driver.learn(u, x)
-        far[k] = abs(x - r_k)
-    assert far[-5000:].max() < 0.01
+        error[j], corrected[j] = abs(r_j - x), driver.state["feedback"]
+    assert abs(corrected[k + rests - 1]) > 0.3
+    assert error[k + rests - 1] < 5e-3
+    waves = error[k + rests :][: 4 * period].reshape(4, -1).max(axis=1)
+    assert waves[1] < 0.15  # 0.28 to 0.44 if the correction stays
+    assert waves[3] < 0.06

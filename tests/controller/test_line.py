@@ -47,9 +47,7 @@ def test_a_way_back_of_few_readings_leaves_nothing_old() -> None:
 
 
 @pytest.mark.parametrize(("answer", "gain"), [(0.02, 0.2), (0.6, 2.0)])
-def test_a_line_that_became_too_steep_comes_back_where_the_stage_hardly_moves(
-    answer: float, gain: float
-) -> None:
+def test_a_line_that_became_too_steep_comes_back_where_little_moves(answer: float, gain: float) -> None:
     """Behind ringing a tenth of the voltage is left, which a stage with backlash hardly answers."""
     line = Named(new(lines.LINE), lines.LINE)
     lines.begin(line, 0.2, 0.0, 0.0, 1.0)

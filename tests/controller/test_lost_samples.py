@@ -8,31 +8,22 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
+from tests.controller import shared
+from tests.controller.shared import LIMITS, LOOP
 
 FS = 5000.0
-LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
-LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
 TRIANGLE = pz.signals.triangle(5.0, 10.0, 30, FS).values
 
 
-def drive(
-    sensor: Callable[[int, float], float], r: FloatArray = TRIANGLE, left_out: Any = ()
-) -> tuple[Any, FloatArray, FloatArray]:
+def drive(sensor: Any, r: FloatArray = TRIANGLE, left_out: Any = ()) -> tuple[Any, FloatArray, FloatArray]:
     """A controller after a reference, the voltage, and where the stage was; some `learn` are left out."""
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
-    stage = pz.SimulatedStage(FS, LOOP)
-    u, x = np.empty_like(r), np.empty_like(r)
-    for k, r_k in enumerate(r.tolist()):
-        u[k] = driver.step(r_k)
-        x[k] = stage.step(u[k])
-        if k not in left_out:
-            driver.learn(float(u[k]), sensor(k, float(x[k])))
-    return driver, u, x
+    return driver, *shared.drive(driver, pz.SimulatedStage(FS, LOOP), r, sensor, left_out)[:2]
 
 
 def last(x: FloatArray) -> float:
     """Largest error of the last three periods [µm]."""
-    return float(np.abs(TRIANGLE - x)[-1500:].max())
+    return shared.last_error(TRIANGLE, x, 1500)
 
 
 def garbage(wrong: Callable[[Any], float], share: float) -> Callable[[int, float], float]:

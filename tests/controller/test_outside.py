@@ -11,10 +11,9 @@ import pytest
 import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.models import LearntModel, LearntOn
+from tests.controller.shared import LIMITS, LOOP, in_blocks
 
 FS = 10_000.0
-LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
-LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
 WIDE = LearntOn((-60.0, 60.0), (-10.0, 10.0), 1e4)
 SMALL, LARGE = (pz.signals.triangle(amplitude, 10.0, 3, FS).values for amplitude in (2.0, 4.0))
 
@@ -24,10 +23,7 @@ def controller(model: Any, **options: Any) -> Any:
 
 
 def driven(driver: Any, r: FloatArray, block: int = 1) -> Any:
-    stage = pz.SimulatedStage(FS, LOOP)
-    for begin in range(0, r.size, block):
-        u = driver.run(r[begin : begin + block])
-        driver.learn(u, stage.run(u))
+    in_blocks(driver, pz.SimulatedStage(FS, LOOP), r, block)
     return driver
 
 
@@ -70,8 +66,7 @@ def test_it_changes_no_voltage() -> None:
     known = LearntOn((-1.0, 1.0), (-1.0, 1.0), 1.0)
     with_ranges, without = (driven(controller(each), LARGE) for each in (LearntModel(LOOP, known), LOOP))
     assert notes(with_ranges)
-    assert with_ranges.voltage == without.voltage
-    assert with_ranges.model == without.model
+    assert (with_ranges.voltage, with_ranges.model) == (without.voltage, without.model)
 
 
 def test_a_file_and_what_identify_returns_will_do(tmp_path: Path) -> None:

@@ -7,10 +7,9 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
+from tests.controller.shared import LIMITS, LOOP, drive
 
 FS = 10_000.0
-LIMITS = pz.VoltageLimits(minimum=-60.0, maximum=60.0)
-LOOP = pz.ColemanHodgdon(alpha=0.021, beta=0.147, gamma=0.00429)
 
 
 def wave(frequency: float, periods: int = 5) -> FloatArray:
@@ -49,14 +48,10 @@ def test_a_lag_that_passes_for_hysteresis_is_told_once(block: int, noise: float)
 
 def test_an_amplifier_that_slews_is_no_lag() -> None:
     """The start goes faster than it can; the reference does not."""
-    slow, r = (
-        pz.SimulatedStage(FS, LOOP, amplifier=pz.stage.Amplifier(-60.0, 60.0, slew_rate=120.0)),
-        wave(1.0, 3),
-    )
+    amplifier, r = pz.stage.Amplifier(-60.0, 60.0, slew_rate=120.0), wave(1.0, 3)
+    slow = pz.SimulatedStage(FS, LOOP, amplifier=amplifier)
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=())
-    for r_k in np.concatenate((r, 0.1 * wave(30.0))).tolist():
-        u = driver.step(r_k)
-        driver.learn(u, slow.step(u))
+    drive(driver, slow, np.concatenate((r, 0.1 * wave(30.0))))
     assert warnings(driver) == []
 
 
@@ -64,15 +59,12 @@ def test_an_amplifier_that_slews_is_no_lag() -> None:
 def test_a_reference_near_the_resonance_is_told_once(resonance: float | None, told: list[str]) -> None:
     driver = driven(wave(20.0, 10), resonance=resonance)
     assert warnings(driver) == told
+    # A lag is told beside it, also within blocks.
+    driver = driven(wave(20.0, 30), lag=1e-3, block=2000, resonance=resonance)
+    assert sorted(warnings(driver)) == ["lag", *told]
 
 
 def test_a_rest_is_not_fast() -> None:
-    """Noise of the reference turns at each sample."""
     rest = 1.0 + 1e-3 * np.random.default_rng(1).normal(size=20_000)
     r = np.concatenate((wave(20.0, 4), np.linspace(0.0, 1.0, 200), rest, wave(20.0, 4)[125:]))
     assert warnings(driven(r, resonance=500.0)) == []
-
-
-def test_both_are_told_within_blocks() -> None:
-    driver = driven(wave(20.0, 30), lag=1e-3, block=2000, resonance=300.0)
-    assert sorted(warnings(driver)) == ["lag", "resonance"]

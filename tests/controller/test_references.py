@@ -1,39 +1,100 @@
-"""References that do not repeat: minor loops, a walk, and the first period of all."""
+"""References: small scans behind large moves, minor loops, a walk, the first period, and a long rest."""
 
 from typing import Any
 
 import numpy as np
+import pytest
 
 import piezoest as pz
+from tests.controller import shared
+from tests.controller.shared import LIMITS, drive, last_error
 
-FS = 5000.0
-AMPLITUDE = 5.0
-
-
-def error(r: Any) -> Any:
-    """Error relative to the amplitude, of the default controller on the paper's stage."""
-    driver = pz.AdaptiveFeedforward(FS, limits=pz.VoltageLimits(minimum=-100.0, maximum=100.0))
-    return pz.track(r, stage=pz.PaperStage(FS, seed=1), controller=driver).error / AMPLITUDE
+FS, FAST, SLOW = 2000.0, 5000.0, 1000.0
+# Its small loops close: those of a Coleman-Hodgdon stage wander for many periods.
+LOOP = pz.PaperStage(FS).hysteresis
 
 
-def largest(error: Any) -> float:
-    return float(np.max(np.abs(error)))
+def scan(part: float, periods: int = 25, wide: Any = ()) -> tuple[Any, Any, float]:
+    """A move of 5 µm, or wide waves before it, and a triangle of a part of it on both sides of its end."""
+    small = 5.0 * part * pz.signals.triangle(1.0, 5.0, periods, FS).values
+    r = np.concatenate((wide, np.linspace(0.0, 5.0, 800), 5.0 + small))
+    driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS), pz.SimulatedStage(FS, LOOP)
+    rng = np.random.default_rng(0)
+    x = drive(driver, stage, r, lambda _, x: x + 1e-4 * rng.normal()).x
+    return r, driver, last_error(r, x, 800) / small.max()
 
 
-def test_minor_loops_are_followed_like_waves() -> None:
-    # 10 % where the corridor goes by the last legs alone, 3 % where the line's changes slow the models down.
-    r = pz.signals.two_tone([0.7 * AMPLITUDE, 0.3 * AMPLITUDE], [2.0, 7.0], 4.0, FS)
-    assert largest(error(r)[-5000:]) < 0.01
+@pytest.mark.parametrize("part", [0.002, 0.004, 0.008, 0.012, 0.03])
+def test_a_small_scan_behind_a_large_move_is_learnt(part: float) -> None:
+    _, driver, error = scan(part)
+    assert error < 0.06
+    assert driver.events == ()
 
 
-def test_a_walk_is_not_left_to_the_line() -> None:
-    # 4 % to 12 % where models are measured by the smallest miss of the line, whatever the last legs were.
-    r = pz.signals.random_walk(AMPLITUDE, 10.0, 10.0, FS, seed=0)
-    late = error(r)[10_000:]
-    assert float(np.sqrt(np.mean(late**2))) < 0.02
+@pytest.mark.parametrize("part", [0.004, 0.02])
+def test_a_small_scan_behind_wide_waves_is_learnt(part: float) -> None:
+    wide = pz.signals.triangle(5.0, 5.0, 6, FS).values
+    assert scan(part, 40, wide)[2] < 0.1
 
 
-def test_a_model_drives_from_the_first_turn_on() -> None:
-    # 2 % where two legs have to pass.
-    r = pz.signals.triangle(AMPLITUDE, 5.0, 3, FS)
-    assert largest(error(r)[1000:]) < 0.012
+def test_wide_waves_behind_a_small_scan_are_learnt() -> None:
+    _, driver, _ = scan(0.004)
+    stage, r = pz.SimulatedStage(FS, LOOP), pz.signals.triangle(4.0, 5.0, 12, FS).values
+    stage.run(np.full(10, driver.voltage))
+    assert last_error(r, drive(driver, stage, r).x, 800) < 0.12
+
+
+def test_noise_of_a_reference_at_rest_is_no_scan() -> None:
+    rng = np.random.default_rng(0)
+    driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS), pz.SimulatedStage(FS, LOOP)
+    wave = pz.signals.triangle(5.0, 5.0, 6, FS).values
+    gains = []
+    for r_k in (*wave.tolist(), *(1e-3 * rng.normal(size=20_000)).tolist()):
+        u = driver.step(r_k)
+        driver.learn(u, stage.step(u) + 1e-3 * rng.normal())
+        gains.append(float(driver.state["line"]["gain"]))
+    assert np.abs(np.array(gains[wave.size :]) / gains[wave.size - 1] - 1.0).max() < 0.05
+
+
+LATE, BEHIND_A_TURN = slice(-5000, None), slice(1000, None)
+
+
+@pytest.mark.parametrize(
+    ("r", "part", "most"),
+    [
+        # 10 % where the corridor goes by the last legs alone.
+        (pz.signals.two_tone([3.5, 1.5], [2.0, 7.0], 4.0, FAST), LATE, 0.01),
+        # 2 % where two legs have to pass before a model drives.
+        (pz.signals.triangle(5.0, 5.0, 3, FAST), BEHIND_A_TURN, 0.012),
+        # More where models are measured by the smallest miss of the line, whatever the last legs were.
+        (pz.signals.random_walk(5.0, 10.0, 10.0, FAST, seed=0), slice(10_000, None), None),
+    ],
+    ids=["minor loops", "first turn", "walk"],
+)
+def test_what_does_not_repeat_is_followed(r: pz.Signal, part: slice, most: float | None) -> None:
+    """Largest error relative to the amplitude, or, of a walk, the root of its mean square."""
+    driver = pz.AdaptiveFeedforward(FAST, limits=pz.VoltageLimits(minimum=-100.0, maximum=100.0))
+    error = pz.track(r, stage=pz.PaperStage(FAST, seed=1), controller=driver).error[part] / 5.0
+    if most is None:
+        assert np.sqrt(np.mean(error**2)) < 0.02
+    else:
+        assert np.abs(error).max() < most
+
+
+@pytest.mark.parametrize(("part", "noise"), [(0.1, 1e-3), (0.3, 0.0), (0.4, 1e-3), (0.6, 0.0), (0.85, 1e-3)])
+def test_a_rest_does_not_count_as_a_leg(part: float, noise: float) -> None:
+    """A minute is hundreds of legs, in which a stage creeps and a loop is at one side."""
+    rng, period = np.random.default_rng(0), 500
+    wave = np.tile(5.0 * np.sin(2.0 * np.pi * np.arange(period) / period), 10)
+    k = 6 * period + round(part * period)
+    rest = wave[k - 1] + noise * rng.normal(size=30_000)
+    r = np.concatenate((wave[:k], rest, wave[k:]))
+    driver = pz.AdaptiveFeedforward(SLOW, limits=LIMITS, estimators=())
+    stage = pz.SimulatedStage(SLOW, shared.LOOP)
+    gains = []
+    for j, r_j in enumerate(r.tolist()):
+        u = driver.step(r_j)
+        driver.learn(u, stage.step(u) + 1e-3 * rng.normal() - 0.1 * np.log10(1.0 + max(j - k, 0)))
+        gains.append(float(driver.state["line"]["gain"]))
+    before, after = gains[k], np.array(gains[k + rest.size :])
+    assert np.abs(after / before - 1.0).max() < 0.08

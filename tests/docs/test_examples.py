@@ -12,10 +12,8 @@ import piezoest as pz
 
 
 def found() -> Iterator[tuple[str, Any]]:
-    modules = {
-        "": pz,
-        **{f"{name}.": getattr(pz, name) for name in ("signals", "export", "records", "report")},
-    }
+    names = ("signals", "export", "records", "report")
+    modules = {"": pz, **{f"{name}.": getattr(pz, name) for name in names}}
     for prefix, module in modules.items():
         for name in module.__all__:
             value = getattr(module, name)

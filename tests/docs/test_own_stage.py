@@ -1,6 +1,6 @@
 """The program for hardware, `examples/own_stage.py`, on simulated drivers, of which some fail."""
 
-import importlib.util
+import importlib
 from pathlib import Path
 from typing import Any
 
@@ -13,19 +13,16 @@ ROOT = Path(__file__).resolve().parents[2]
 @pytest.fixture
 def program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
     monkeypatch.chdir(tmp_path)
-    specification = importlib.util.spec_from_file_location("own_stage", ROOT / "examples" / "own_stage.py")
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
+    monkeypatch.syspath_prepend(str(ROOT / "examples"))
+    module = importlib.import_module("own_stage")
     now = [0.0]
 
-    def clock() -> float:
-        now[0] += 1e-5
+    def sleep(left: float = 1e-5) -> float:
+        now[0] += left
         return now[0]
 
-    monkeypatch.setattr(module.time, "perf_counter", clock)
-    monkeypatch.setattr(module.time, "sleep", lambda left: now.__setitem__(0, now[0] + left))
+    monkeypatch.setattr(module.time, "perf_counter", sleep)
+    monkeypatch.setattr(module.time, "sleep", sleep)
     return module
 
 
@@ -36,7 +33,6 @@ def driver(program: Any, fails_at: int | None = None, error: BaseException | Non
         def __init__(self) -> None:
             super().__init__()
             self.written: list[float] = []
-            self.closed = False
 
         def write(self, voltage: float) -> None:
             if len(self.written) == fails_at and error is not None:
@@ -46,7 +42,7 @@ def driver(program: Any, fails_at: int | None = None, error: BaseException | Non
             super().write(voltage)
 
         def close(self) -> None:
-            self.closed = True
+            self.written.append(np.inf)
 
     return Watched()
 
@@ -54,25 +50,22 @@ def driver(program: Any, fails_at: int | None = None, error: BaseException | Non
 def test_it_follows_and_ends_at_rest(program: Any) -> None:
     used = driver(program)
     assert program.main(used) == 0
+    assert used.written.pop() == np.inf  # closed
     record = np.load("run.npz")
     error = record["reference"] - record["displacement"]
     assert error.size == 2000
     assert np.max(np.abs(error[-400:])) < 0.1
     u = np.array(used.written)
-    assert u.min() >= program.LIMITS.minimum
-    assert u.max() <= program.LIMITS.maximum
+    assert program.LIMITS.minimum <= u.min() <= u.max() <= program.LIMITS.maximum
     ramp = int(program.BIAS / program.SLOPE * program.RATE)
     largest = program.SLOPE / program.RATE * (1.0 + 1e-9)
     assert np.max(np.abs(np.diff(u[:ramp], prepend=program.REST))) <= largest
     assert u[-1] == program.REST
     assert abs(u[-2]) <= largest
-    assert used.closed
 
 
 @pytest.mark.parametrize("error", [OSError("the cable is off"), KeyboardInterrupt()])
-def test_a_run_that_is_cut_short_is_kept_and_ends_at_rest(
-    program: Any, error: BaseException, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_that_is_cut_short_is_kept_and_ends_at_rest(program: Any, error: Any, capsys: Any) -> None:
     ramp = int(program.BIAS / program.SLOPE * program.RATE)
     used = driver(program, fails_at=ramp + 700, error=error)
     assert program.main(used) == 1
@@ -80,17 +73,14 @@ def test_a_run_that_is_cut_short_is_kept_and_ends_at_rest(
     record = np.load("run.npz")
     assert record["voltage"].size == 700
     assert np.all(np.isfinite(record["voltage"]))
-    assert used.written[-1] == program.REST
-    after = np.array(used.written[ramp + 701 :])
-    assert (
-        np.max(np.abs(np.diff(after, prepend=record["voltage"][-1]))) <= program.SLOPE / program.RATE * 1.001
-    )
-    assert used.closed
+    assert used.written[-2:] == [program.REST, np.inf]
+    after = np.diff(used.written[ramp + 701 : -1], prepend=record["voltage"][-1])
+    assert np.max(np.abs(after)) <= program.SLOPE / program.RATE * 1.001
 
 
 def test_a_displacement_that_is_too_far_stops_the_run(program: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(program, "FARTHEST", 1.0)
     used = driver(program)
     assert program.main(used) == 1
-    assert used.written[-1] == program.REST
+    assert used.written[-2:] == [program.REST, np.inf]
     assert 0 < np.load("run.npz")["displacement"].size < 2000

@@ -66,7 +66,6 @@ def test_of_more_nested_loops_than_are_kept_the_smallest_are_forgotten() -> None
 
 
 def line(*turns: float) -> Any:
-    """Straight lines from turn to turn."""
     parts = [np.linspace(a, b, 101)[1:] for a, b in itertools.pairwise(turns)]
     return np.concatenate([[turns[0]], *parts])
 

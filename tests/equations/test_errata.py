@@ -41,9 +41,7 @@ def slope_of_the_voltage(place: float, s: float, a: float, b: float, c: float) -
 
 @pytest.mark.parametrize("theta", TABLE_I)
 @pytest.mark.parametrize("s", [1.0, -1.0])
-def test_switching_by_the_reference_needs_the_admissible_set(
-    theta: tuple[float, float, float], s: float
-) -> None:
+def test_switching_by_the_reference_needs_the_admissible_set(theta: Any, s: float) -> None:
     """(C3) switches on the voltage, (17) on the reference: the same only for c >= 2 b."""
     a, b, c = ch.loop_parameters(*theta)
     places = np.linspace(-1.0, 1.0, 41)

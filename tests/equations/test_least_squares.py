@@ -35,15 +35,13 @@ def directional(theta: Any, P: Any, phi: Any, z: float) -> tuple[Any, Any]:
 
 def variable(theta: Any, P: Any, phi: Any, z: float) -> tuple[Any, Any]:
     y, q = z - theta @ phi, phi @ P @ phi
-    return reference.discrete(
-        theta, P, phi, z, max(1.0 - y * y / (R + q) * (1.0 - MU), np.exp(-1.0 / 5.0)), R
-    )
+    mu = max(1.0 - y * y / (R + q) * (1.0 - MU), np.exp(-1.0 / 5.0))
+    return reference.discrete(theta, P, phi, z, mu, R)
 
 
 def continuous(normalised: bool) -> Any:
-    return lambda theta, P, phi, z: reference.bogacki_shampine(
-        theta, P, 0.01, phi, z, 1.0 / 3.0, normalised
-    )  # fmt: skip
+    step = reference.bogacki_shampine
+    return lambda theta, P, phi, z: step(theta, P, 0.01, phi, z, 1.0 / 3.0, normalised)
 
 
 CONTINUOUS: dict[str, Any] = {"time_base": "continuous", "step": 0.01}

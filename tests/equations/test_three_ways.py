@@ -60,8 +60,6 @@ def test_functions_of_numbers(function: Any, arguments: tuple[Any, ...]) -> None
     np.testing.assert_allclose(traced(*arguments).full()[:, 0], expected, rtol=1e-13, atol=1e-16)
 
 
-# ---------------------------------------------------------------- functions that write into arrays
-
 RATES = record(theta=numbers(4), P=numbers(4, 4))
 MORE: Any = {name: numbers(4) for name in ("theta", "h", "gain", "product")}
 CASE = record(z=NUMBER, y=NUMBER, P=numbers(4, 4), rates=RATES, **MORE)
@@ -156,9 +154,6 @@ def test_functions_that_write_into_arrays(function: Any, z: float) -> None:
     function.of(CASE)(machine)
     for found in (flat(machine), symbolic_):
         np.testing.assert_allclose(found, flat(plain), rtol=1e-13, atol=1e-15)
-
-
-# ---------------------------------------------------------------- whole records
 
 
 @pytest.mark.parametrize("samples", [1, 50, 1777])

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import piezoest as pz
+from tests.estimators.shared import TRUE, recorded
 
 FS = 50_000.0
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
-TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 
 
 def ring(r: Any, estimator: Any = None, **stage: Any) -> Any:
@@ -19,11 +19,6 @@ def ring(r: Any, estimator: Any = None, **stage: Any) -> Any:
         compensator=pz.InverseCompensator(START),
         estimator=estimator or pz.HysteresisRLS(r.sample_rate),
     )
-
-
-def record(seconds: float = 1.0, noise: float = 1e-3) -> tuple[Any, Any]:
-    u = pz.signals.triangle(33.0, 5.0, 5.0 * seconds, FS).values
-    return u, TRUE.simulate(u) + noise * np.random.default_rng(0).standard_normal(u.size)
 
 
 TRIANGLE, STEP = pz.signals.triangle, {"gain_schedule": np.array([[1.0, 1.0], [1.005, 0.8]])}
@@ -51,7 +46,7 @@ def test_settles_within_periods(reference: Any, stage: Any, within: dict[int, fl
 
 @pytest.mark.parametrize("memory", ["period", 0.4])
 def test_a_dwell_of_half_a_minute_moves_nothing(memory: Any) -> None:
-    u, x = record(2.0)
+    u, x = recorded(FS, 10.0)
     half = u.size // 2
     estimator = pz.HysteresisRLS(FS, memory=memory)
     estimator.run(u[:half], x[:half])
@@ -67,7 +62,7 @@ def test_a_dwell_of_half_a_minute_moves_nothing(memory: Any) -> None:
 
 
 def test_spikes_are_left_out() -> None:
-    u, x = record(1.0)
+    u, x = recorded(FS, 5.0)
     clean, spiked = pz.HysteresisRLS(FS), pz.HysteresisRLS(FS)
     clean.run(u, x)
     places = np.random.default_rng(0).choice(np.arange(1000, x.size), 200, replace=False)
@@ -78,7 +73,7 @@ def test_spikes_are_left_out() -> None:
 
 
 def test_step_of_the_sensors_offset_is_taken_for_a_new_level() -> None:
-    u, x = record(3.0)
+    u, x = recorded(FS, 15.0)
     estimator = pz.HysteresisRLS(FS)
     estimator.run(u, x + np.where(np.arange(x.size) > 20_000, 1.0, 0.0))
     assert 90 <= estimator.status.outliers <= 110
@@ -89,7 +84,7 @@ def test_step_of_the_sensors_offset_is_taken_for_a_new_level() -> None:
 
 
 def test_frozen() -> None:
-    u, x = record(0.4)
+    u, x = recorded(FS, 2.0)
     estimator = pz.HysteresisRLS(FS)
     estimator.run(u[:5000], x[:5000])
     before = estimator.theta

@@ -50,8 +50,7 @@ def test_each_channel_is_a_single_estimator(estimator: Any) -> None:
         assert after_run[c] == single.to_dict()
         single.run(u[-3:, c].copy(), x[-3:, c].copy())
         np.testing.assert_array_equal(bank.theta[c], single.theta)
-        assert bank.models[c] == single.model
-        assert bank.status[c] == single.status
+        assert (bank.models[c], bank.status[c]) == (single.model, single.status)
         assert bank.channel(c).to_dict() == single.to_dict()
     bank.reset()
     np.testing.assert_array_equal(bank.theta[0], estimator.theta)

@@ -7,27 +7,15 @@ import pytest
 
 import piezoest as pz
 from piezoest.estimators.batch import BatchFit
+from tests.estimators.shared import TRUE, recorded
 
-TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 RATE = 1000.0
 NOISE = 1e-3
 METHODS: list[Any] = ["single-shooting", "multiple-shooting"]
 
 
-def record(
-    seconds: float = 2.0,
-    noise: float = NOISE,
-    seed: int = 0,
-    rate: float = RATE,
-    model: Any = TRUE,
-    state: float = 0.0,
-) -> tuple[Any, Any]:
-    u = pz.signals.triangle(33.0, 5.0, 5.0 * seconds, rate).values
-    x = model.simulate(u, initial_state=state) if state else model.simulate(u)
-    return u, x + noise * np.random.default_rng(seed).standard_normal(u.size)
-
-
-# ---------------------------------------------------------------- what it finds
+def record(seconds: float = 2.0, **given: Any) -> Any:
+    return recorded(RATE, 5.0 * seconds, **given)
 
 
 def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
@@ -38,9 +26,7 @@ def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
     def simulated(p: Any) -> Any:
         return pz.ColemanHodgdon(*p[:3]).simulate(u, initial_state=p[3])
 
-    J = np.column_stack(
-        [(simulated(point + h) - simulated(point - h)) / (2.0 * h.sum()) for h in np.diag(steps)]
-    )
+    J = np.array([(simulated(point + h) - simulated(point - h)) / (2.0 * h.sum()) for h in np.diag(steps)]).T
     scale = np.linalg.norm(J, axis=0)
     bound = (NOISE**2 * np.linalg.inv((J / scale).T @ (J / scale)) / np.outer(scale, scale))[:3, :3]
     fits = [BatchFit(RATE).fit(*record(seed=seed)) for seed in range(60)]
@@ -58,7 +44,7 @@ def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_start_state_and_offset(method: Any) -> None:
     """A unipolar voltage and a biased gauge, in the middle of a loop."""
-    u, x = record(state=-1.2)
+    u, x = record(initial_state=-1.2)
     fit = BatchFit(RATE, offset=True, method=method).fit(u + 60.0, x - 120.0)
     assert fit.success
     names = ("alpha", "beta", "gamma", "offset", "initial_state")
@@ -116,9 +102,6 @@ def test_linear_gain(method: Any) -> None:
     assert fit.model == pz.LinearGain(*fit.theta)
 
 
-# ---------------------------------------------------------------- bounds and masks
-
-
 @pytest.mark.parametrize("gamma", [0.021 * 0.147 * 2.2, 0.021 * 0.147 * 0.95])
 def test_model_is_admissible_where_the_plant_is_not(gamma: float) -> None:
     plant = pz.ColemanHodgdon(0.021, 0.147, gamma)
@@ -130,8 +113,7 @@ def test_model_is_admissible_where_the_plant_is_not(gamma: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "names",
-    [("alpha",), ("beta",), ("gamma",), ("alpha", "gamma"), ("alpha", "beta", "gamma")],
+    "names", [("alpha",), ("beta",), ("gamma",), ("alpha", "gamma"), ("alpha", "beta", "gamma")]
 )
 def test_fixed_parameters_stay(names: tuple[str, ...]) -> None:
     u, x = record()
@@ -146,9 +128,6 @@ def test_fixed_parameters_stay(names: tuple[str, ...]) -> None:
     assert np.all(np.abs(fit.theta - [*TRUE.theta, 0.0, 0.0])[~held] < 4.0 * fit.standard_errors[~held])
     assert np.all(fit.standard_errors[~held] < free.standard_errors[~held])
     assert fit.model.is_admissible
-
-
-# ---------------------------------------------------------------- bad data
 
 
 def test_missing_samples_count_nothing() -> None:
@@ -204,9 +183,6 @@ def test_a_failure_is_told_in_the_solvers_words_with_the_best_iterate() -> None:
     assert estimator.model == scipy.model
 
 
-# ---------------------------------------------------------------- the face
-
-
 def test_collects_and_fits_when_asked() -> None:
     u, x = record(1.0)
     estimator = BatchFit(RATE)
@@ -241,8 +217,7 @@ def test_hop_bounds_the_number_of_fits() -> None:
     assert len(np.unique(trace.theta[:, 0])) == 3
     np.testing.assert_array_equal(trace.theta[399], part.theta)
     np.testing.assert_array_equal(trace.theta[198], [0.02, 0.12, 0.0036])
-    steps = BatchFit(RATE, hop=0.2)
-    halves = BatchFit(RATE, hop=0.2)
+    steps, halves = BatchFit(RATE, hop=0.2), BatchFit(RATE, hop=0.2)
     theta = [halves.run(u[:111], x[:111]).theta, halves.run(u[111:], x[111:]).theta]
     np.testing.assert_array_equal(np.concatenate(theta), trace.theta)
     for k in range(u.size):

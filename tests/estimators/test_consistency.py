@@ -1,10 +1,8 @@
 """Do estimators know what they do not know? Their errors against their own standard errors.
 
-A true Coleman-Hodgdon plant with the parameters of Table I, 1 nm of white noise, 2 s of a 5 Hz
-triangle, many seeds. For a consistent filter the errors lie within three standard errors, the
-normalised estimation error squared (NEES) has the mean n, and the normalised innovation squared
-(NIS) the mean 1. Y. Bar-Shalom, X. R. Li, T. Kirubarajan, Estimation with Applications to Tracking and
-Navigation (2001), sec. 5.4.
+For a consistent filter the errors lie within three standard errors, the normalised estimation error squared
+(NEES) has the mean n, the normalised innovation squared (NIS) the mean 1. Y. Bar-Shalom, X. R. Li,
+T. Kirubarajan, Estimation with Applications to Tracking and Navigation (2001), sec. 5.4.
 """
 
 from collections.abc import Callable

@@ -9,16 +9,15 @@ import piezoest as pz
 from piezoest.estimators.batch import BatchFit
 from piezoest.estimators.horizon import MovingHorizon
 from piezoest.estimators.thinning import thinned
+from tests.estimators.shared import TRUE, recorded
 
-TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 RATE = 2000.0
 NOISE = 1e-3
 START = (0.02, 0.12, 0.0036)
 
 
-def record(seconds: float = 1.0, noise: float = NOISE, seed: int = 0, model: Any = TRUE) -> tuple[Any, Any]:
-    u = pz.signals.triangle(33.0, 5.0, 5.0 * seconds, RATE).values
-    return u, model.simulate(u) + noise * np.random.default_rng(seed).standard_normal(u.size)
+def record(seconds: float = 1.0, **given: Any) -> tuple[Any, Any]:
+    return recorded(RATE, 5.0 * seconds, **given)
 
 
 def test_solves_once_a_hop_and_holds_between() -> None:
@@ -32,8 +31,7 @@ def test_solves_once_a_hop_and_holds_between() -> None:
         assert (estimator.solves, estimator.status.last) == (k // 100, "updated" if due else "held")
         assert np.array_equal(estimator.theta, last) != due
         last = estimator.theta
-    assert estimator.status.updates == 10
-    assert estimator.status.held == u.size - 10
+    assert (estimator.status.updates, estimator.status.held) == (10, u.size - 10)
     assert estimator.failures == 0
     assert "satisfied" in estimator.solver_message
 
@@ -54,13 +52,7 @@ def test_tracks_a_step_of_the_gain() -> None:
 def test_arrival_cost_keeps_what_has_left_the_window() -> None:
     """Without process noise the window and its arrival cost are the whole record."""
     u, x = record(2.0)
-    options: dict[str, Any] = {
-        "window": 0.2,
-        "hop": 0.05,
-        "decimation": 1,
-        "noise": NOISE,
-        "uncertainty": 50.0,
-    }
+    options: Any = {"window": 0.2, "hop": 0.05, "decimation": 1, "noise": NOISE, "uncertainty": 50.0}
     keeping = MovingHorizon(RATE, process_noise=0.0, **options)
     forgetting = MovingHorizon(RATE, process_noise=10.0, **options)
     keeping.run(u, x)

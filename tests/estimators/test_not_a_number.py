@@ -57,9 +57,6 @@ def assert_numbers(estimator: Any) -> None:
     assert model.is_admissible, model
 
 
-# ---------------------------------------------------------------- what was seen to fail
-
-
 def test_covariance_that_winds_up_starts_anew() -> None:
     estimator = rls(memory=0.4, policies=())
     u = 33.0 * np.sin(np.arange(2000) / 50.0)

@@ -1,15 +1,17 @@
 """OutputErrorRLS: exact on its own plant from any start, noise, rest."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import piezoest as pz
+from tests.estimators.shared import TRUE, recorded
 
 FloatArray = NDArray[np.float64]
 
 RATE = 2000.0
-TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 
 
 def voltage(periods: float = 8.0) -> FloatArray:
@@ -17,11 +19,7 @@ def voltage(periods: float = 8.0) -> FloatArray:
 
 
 def loop_error(model: pz.ColemanHodgdon, u: FloatArray, offset: float = 0.0) -> float:
-    """Largest difference over the last period [µm]."""
     return float(np.abs(model.simulate(u) - TRUE.simulate(u) - offset)[-400:].max())
-
-
-# ---------------------------------------------------------------- what it learns
 
 
 @pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0), (0.6, 1.0, 0.7), (1.5, 0.8, 1.3)])
@@ -50,16 +48,12 @@ def test_finds_an_offset() -> None:
 
 @pytest.mark.parametrize("noise", [1e-3, 3e-2])
 def test_noise_makes_no_wrong_loop(noise: float) -> None:
-    u = voltage(40.0)
-    x = TRUE.simulate(u) + noise * np.random.default_rng(0).standard_normal(u.size)
+    u, x = recorded(RATE, 40.0, noise)
     estimator = pz.OutputErrorRLS(RATE)
     theta = estimator.run(u, x).theta[u.size // 2 :].mean(axis=0)
     # Noise leaves the decay itself uncertain, not the slope of a first branch.
     assert theta[1] == pytest.approx(TRUE.beta, rel=0.05)
     assert loop_error(estimator.model, u) < 5e-3 + 2.0 * noise
-
-
-# ---------------------------------------------------------------- what must not move it
 
 
 def test_rest_moves_nothing() -> None:
@@ -72,19 +66,13 @@ def test_rest_moves_nothing() -> None:
     noise = 1e-3 * np.random.default_rng(0).standard_normal(creep.size)
     estimator.run(np.full(creep.size, u[-1]), x[-1] + creep + noise)
     np.testing.assert_array_equal(estimator.theta, before)
-    assert estimator.status.held == held + creep.size
-    assert estimator.status.last == "held"
+    assert (estimator.status.held, estimator.status.last) == (held + creep.size, "held")
 
 
 def test_settles_within_two_periods_from_a_bad_start() -> None:
-    fs = 10_000.0
-    start = pz.ColemanHodgdon(0.014, 0.2, 0.0054).nearest_admissible(1e-3)
-    reference = pz.signals.triangle(5.0, 5.0, 8.0, fs)
-    record = pz.track(
-        reference,
-        stage=pz.PaperStage(sample_rate=fs, seed=0),
-        compensator=pz.InverseCompensator(start, transfer_samples=100),
-        estimator=pz.OutputErrorRLS(fs, initial_model=start),
-        update_interval=10,
-    )
+    fs, start = 10_000.0, pz.ColemanHodgdon(0.014, 0.2, 0.0054).nearest_admissible(1e-3)
+    compensator = pz.InverseCompensator(start, transfer_samples=100)
+    parts: Any = {"compensator": compensator, "estimator": pz.OutputErrorRLS(fs, initial_model=start)}
+    reference, stage = pz.signals.triangle(5.0, 5.0, 8.0, fs), pz.PaperStage(sample_rate=fs, seed=0)
+    record = pz.track(reference, stage=stage, **parts, update_interval=10)
     assert np.abs(record.error)[4000:].max() < 0.06

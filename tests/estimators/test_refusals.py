@@ -25,7 +25,6 @@ OPTIONS: list[tuple[Any, dict[str, Any], str]] = [
     (pz.HysteresisEKF, {"initial_model": WRONG}, "is not admissible: use nearest_admissible"),
     (pz.HysteresisEKF, {"uncertainty": 0.0}, "uncertainty must be above zero"),
     (pz.HysteresisEKF, {"drift": -1.0}, "drift must be zero or more"),
-    (pz.HysteresisEKF, {"delay": -1.0}, "delay must be zero or more"),
     (pz.OutputErrorRLS, {"span": 1.0}, "span"),
     (pz.OutputErrorRLS, {"members": 2}, "members"),
     (pz.OutputErrorRLS, {"policies": ()}, "RandomWalk"),
@@ -48,7 +47,6 @@ OPTIONS: list[tuple[Any, dict[str, Any], str]] = [
     (pz.BatchFit, {"initial_model": pz.LinearGain(0.0)}, "gain of zero"),
     # What becomes a size is bounded.
     (pz.HysteresisRLS, {"delay": 1e9}, "delay must be at most"),
-    (pz.PrandtlIshlinskiiRLS, {"delay": 1e9}, "delay must be at most"),
     (pz.OutputErrorRLS, {"members": 10**9}, "members must be a whole number from 3 to 1000"),
     (pz.PrandtlIshlinskiiRLS, {"thresholds": 10**9}, "thresholds must be a whole number from 0"),
     (pz.PrandtlIshlinskiiRLS, {"thresholds": 200, "bends": 50}, "more than 1000: take fewer"),
@@ -56,7 +54,6 @@ OPTIONS: list[tuple[Any, dict[str, Any], str]] = [
     (pz.BatchFit, {"hop": 1e29}, "hop must be at most"),
     # Policies that do not go together, or not with the estimator.
     (pz.HysteresisRLS, {"policies": (p.RandomWalk(), p.PeriodicForgetting())}, "exclude each other"),
-    (pz.HysteresisRLS, {"policies": (p.RandomWalk(), p.DirectionalForgetting())}, "exclude each other"),
     (pz.HysteresisRLS, {"policies": (p.DirectionalForgetting(),), "memory": 0.4}, "exclude each other"),
     (pz.HysteresisRLS, {"policies": (p.RandomWalk(),), "memory": 0.4}, "goes with memory='period'"),
     *((pz.HysteresisRLS, {"policies": (each,), "memory": None, "time_base": "continuous"}, "discrete time")

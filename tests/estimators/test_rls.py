@@ -8,26 +8,20 @@ import pytest
 import piezoest as pz
 from piezoest.estimators import rls_kernel
 from piezoest.layout import Named, leaves
+from tests.estimators.shared import TRUE, recorded
 from tests.reference import hysteresis_rls as reference
 
 FS = 50_000.0
-TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
-
-
-def record(seconds: float = 1.0, noise: float = 0.0, fs: float = FS, model: Any = TRUE) -> tuple[Any, Any]:
-    u = pz.signals.triangle(33.0, 5.0, 5.0 * seconds, fs).values
-    return u, model.simulate(u) + noise * np.random.default_rng(0).standard_normal(u.size)
 
 
 def test_equals_the_textbook_with_gaps() -> None:
-    u, x = record(0.15, 1e-3)
+    u, x = recorded(FS, 0.75)
     x[2000] = x[5001] = x[5002] = np.nan
     estimator = pz.HysteresisRLS(FS, memory=0.1, policies=())
     theta = estimator.run(u, x).theta
     start = np.array([0.02, 0.12, 0.0036])
-    expected = reference.coleman_hodgdon(
-        u, x, FS, start=start, uncertainty=0.5, noise=1.5e-3, memory=0.1, cutoff=2500.0
-    )
+    given = {"uncertainty": 0.5, "noise": 1.5e-3, "memory": 0.1, "cutoff": 2500.0}
+    expected = reference.coleman_hodgdon(u, x, FS, start, **given)
     np.testing.assert_allclose(theta, expected, rtol=1e-7)
 
 
@@ -38,7 +32,7 @@ def test_equals_the_textbook_with_gaps() -> None:
 )  # fmt: skip
 def test_finds_the_centre_of_the_loop(estimator: Any) -> None:
     """A unipolar voltage and a biased gauge: centre (60 V, -120 µm)."""
-    u, x = record(1.0, 1e-3)
+    u, x = recorded(FS, 5.0)
     estimator.run(u + 60.0, x - 120.0)
     np.testing.assert_allclose(estimator.theta[:3], TRUE.theta, rtol=0.03)
     model = estimator.model
@@ -55,16 +49,13 @@ def test_high_pass_removes_a_bias_of_the_sensor() -> None:
     biased, passed = pz.HysteresisRLS(FS, memory=0.4), pz.HysteresisRLS(FS, memory=0.4, high_pass=0.5)
     biased.run(u, x + 2.0)
     passed.run(u, x + 2.0)
-
-    def worst(estimator: Any) -> float:
-        return float(np.max(np.abs(estimator.theta / TRUE.theta - 1.0)))
-
-    assert worst(passed) < 1e-3 < 0.5 < worst(biased)
+    worst = [np.abs(each.theta / TRUE.theta - 1.0).max() for each in (passed, biased)]
+    assert worst[0] < 1e-3 < 0.5 < worst[1]
 
 
 @pytest.mark.parametrize("delay", [0.5, 2.5, 3.0])
 def test_delay(delay: float) -> None:
-    u, x = record(1.0)
+    u, x = recorded(FS, 5.0, 0.0)
     late = np.interp(np.arange(x.size) - delay, np.arange(x.size), x)
     estimator = pz.HysteresisRLS(FS, memory=0.4, delay=delay)
     estimator.run(u, late)
@@ -76,7 +67,7 @@ def test_delay(delay: float) -> None:
 
 
 def test_long_gap_starts_anew() -> None:
-    u, x = record(2.0)
+    u, x = recorded(FS, 10.0, 0.0)
     x[30_000:52_345] = np.nan
     estimator = pz.HysteresisRLS(FS, memory=0.4)
     estimator.run(u, x)
@@ -85,7 +76,7 @@ def test_long_gap_starts_anew() -> None:
 
 @pytest.mark.parametrize("options", [{}, {"time_base": "continuous", "high_pass": 0.5}])
 def test_machine_code_does_what_its_source_says(options: dict[str, Any]) -> None:
-    u, x = record(0.02, 1e-3)
+    u, x = recorded(FS, 0.1)
     x[300:310] = u[500] = np.nan
     x[20:120] = np.inf
     machine, plain = pz.HysteresisRLS(FS, **options), pz.HysteresisRLS(FS, **options)

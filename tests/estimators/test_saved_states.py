@@ -31,13 +31,6 @@ def holder_of(data: dict[str, Any], path: str) -> tuple[dict[str, Any], str]:
     return holder, name
 
 
-def with_value(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
-    data = copy.deepcopy(data)
-    holder, name = holder_of(data, path)
-    holder[name] = value
-    return data
-
-
 ALL = (
     pz.HysteresisRLS(RATE, delay=7.0),
     pz.HysteresisRLS(RATE, policies=(policies.RandomWalk(), policies.AmplitudeMemory())),
@@ -72,8 +65,11 @@ def test_indices_and_lengths_are_checked(estimator: Any, path: str) -> None:
         if value != 3.0:
             wrong[path] = "a whole number"
         for name, words in wrong.items():
+            changed = copy.deepcopy(data)
+            holder, last = holder_of(changed, name)
+            holder[last] = value
             with pytest.raises(ValueError, match=f"state: {name} must be {words}"):
-                type(estimator).from_dict(with_value(data, name, value))
+                type(estimator).from_dict(changed)
 
 
 @pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)

@@ -1,6 +1,7 @@
 """Generated controllers: clean to compilers, equal to the library, safe with any input."""
 
 import functools
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 import piezoest as pz
 from piezoest.bench.scenarios import SCENARIOS
 from tests.export.building import compile_strictly, under_sanitizers
+from tests.wild import wild
 
 FS = 50_000.0
 START = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
@@ -49,10 +51,9 @@ PAIRS: dict[str, Any] = {
     "rls-line-offset": lambda: (rls(initial_model=LINE, offset=True), pz.LinearCompensator(LINE, LIMITS)),
     "ekf": lambda: (pz.HysteresisEKF(FS, initial_model=START), inverse()),
     "ekf-offset": lambda: (pz.HysteresisEKF(FS, initial_model=START, offset=True, delay=1.5), inverse()),
-    "ekf-line": lambda: (
-        pz.HysteresisEKF(FS, initial_model=LINE),
-        pz.InverseCompensator(LINE, pz.VoltageLimits(-60.0, 60.0, slew_rate=1e4, sample_rate=FS)),
-    ),
+    "output-error": lambda: (pz.OutputErrorRLS(FS, initial_model=START), inverse()),
+    "ekf-free": lambda: (pz.HysteresisEKF(FS, initial_model=START, offset=True, project=False), inverse()),
+    "ekf-line": lambda: (pz.HysteresisEKF(FS, initial_model=LINE), pz.InverseCompensator(LINE, SLEWED)),
 }
 
 
@@ -65,13 +66,9 @@ def code(name: str, precision: Any = "double") -> Any:
 def log() -> tuple[Any, Any]:
     """Reference, and measurement before each sample of it."""
     case = SCENARIOS["cold-start"].build(0, after=2, **AT)
-    record = pz.track(
-        case.reference, stage=case.new_stage(), compensator=pz.InverseCompensator(case.start, LIMITS)
-    )
+    compensator = pz.InverseCompensator(case.start, LIMITS)
+    record = pz.track(case.reference, stage=case.new_stage(), compensator=compensator)
     return record.reference, np.concatenate([[np.nan], record.measured[:-1]])
-
-
-# ---------------------------------------------------------------- the text
 
 
 @pytest.mark.parametrize(
@@ -84,9 +81,6 @@ def log() -> tuple[Any, Any]:
 def test_compiles_without_a_warning(cc: str, precision: str, names: tuple[str, ...], tmp_path: Path) -> None:
     for name in names:
         compile_strictly(cc, code(name, precision), tmp_path, "-O1")
-
-
-# ---------------------------------------------------------------- parity
 
 
 @pytest.mark.parametrize("name", PAIRS)
@@ -103,19 +97,15 @@ def test_double_equals_the_library(name: str, log: tuple[Any, Any]) -> None:
     np.testing.assert_array_equal(ours, theirs)
 
 
-# ---------------------------------------------------------------- handling
-
-
 @pytest.mark.parametrize("name", ["rls", "ekf"])
 def test_freeze_holds_the_model_as_in_python(name: str) -> None:
     case = SCENARIOS["cold-start"].build(0, after=2, **AT)
     stages = case.new_stage(), case.new_stage()
-    ours, theirs = pz.export.CompiledController(code(name)), pz.export.Controller(*PAIRS[name]())
-    both: tuple[Any, Any] = ours, theirs
+    ours = pz.export.CompiledController(code(name))
+    both: tuple[Any, Any] = ours, pz.export.Controller(*PAIRS[name]())
     x: list[Any] = [None, None]
-    for part, frozen in zip(
-        np.split(case.reference.values, [8000, 12_000]), (False, True, False), strict=True
-    ):
+    parts = np.split(case.reference.values, [8000, 12_000])
+    for part, frozen in zip(parts, (False, True, False), strict=True):
         before = ours.parameters
         for controller in both:
             controller.frozen = frozen
@@ -136,9 +126,6 @@ def test_sanitizers_are_silent(name: str, tmp_path: Path, log: tuple[Any, Any]) 
     call = f"controller_step(&state, ({precision})pair[0], ({precision})pair[1])"
     done = under_sanitizers(code(name, precision), pairs, tmp_path, call=call, low="-60.0", high="60.0")
     assert done == (0, b"")
-
-
-# ---------------------------------------------------------------- refusals
 
 
 @pytest.mark.parametrize(
@@ -162,21 +149,15 @@ def test_float_settles_to_the_same_error(name: str) -> None:
     case = SCENARIOS["cold-start"].build(0, after=10, **AT)
     estimator, compensator = PAIRS[name]()
     single = pz.export.CompiledController(code(name, "float"))
-    library = pz.track(
-        case.reference,
-        stage=case.new_stage(),
-        compensator=compensator,
-        estimator=estimator,
-    )
+    library = pz.track(case.reference, stage=case.new_stage(), compensator=compensator, estimator=estimator)
     own = pz.track(case.reference, stage=case.new_stage(), compensator=single)
     # Rounding moves the samples at which a model is handed over.
     assert own.max_error(2) == pytest.approx(library.max_error(2), rel=0.03)
 
 
-def test_parameters_can_be_set(log: tuple[Any, Any]) -> None:
+def test_parameters_and_limits_can_be_set(log: tuple[Any, Any]) -> None:
     r, x = log
-    ours = pz.export.CompiledController(code("inverse"))
-    compensator = inverse()
+    ours, compensator = pz.export.CompiledController(code("inverse")), inverse()
     ours.run(r[:500], x[:500])
     compensator.run(r[:500])
     ours.parameters = [0.021, 0.14, 0.0042, 0.1]
@@ -188,14 +169,29 @@ def test_parameters_can_be_set(log: tuple[Any, Any]) -> None:
     for wrong in ([np.nan, 0.1, 0.1, 0.0], [0.02, np.inf, 0.1, 0.0]):
         with pytest.raises(ValueError, match="parameters"):
             ours.parameters = wrong
-
-
-def test_limits_are_kept_and_can_be_set(log: tuple[Any, Any]) -> None:
-    r, x = log
     ours = pz.export.CompiledController(code("inverse"))
     ours.set_limits(-5.0, 4.0)
     u = ours.run(r, x)
-    assert u.min() == -5.0
-    assert u.max() == 4.0
+    assert (u.min(), u.max()) == (-5.0, 4.0)
     with pytest.raises(ValueError, match="below"):
         ours.set_limits(3.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "precision"), list(zip(PAIRS, itertools.cycle(("float", "double")), strict=False))
+)
+def test_of_any_bits_it_makes_numbers(name: str, precision: Any) -> None:
+    made = pz.export.CompiledController(code(name, precision))
+    rng, bits = np.random.default_rng(0), np.uint32 if precision == "float" else np.uint64
+    for _ in range(100):
+        made.reset()
+        for count in rng.integers(1, 80, 4).tolist():
+            with np.errstate(all="ignore"):
+                u = made.run(wild(rng, count, 5.0, bits), wild(rng, count, 5.0, bits))
+            assert np.all(np.abs(u) <= 60.0)
+            parameters = made.parameters
+            assert np.all(np.isfinite(parameters)), parameters
+            if "line" in name:
+                assert parameters[0] >= 0.9e-3 * LINE.gain, parameters
+            elif not name.startswith("plays"):
+                assert parameters[2] / parameters[0] >= 0.9e-3 * START.c, parameters

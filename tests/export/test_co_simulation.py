@@ -5,6 +5,7 @@ import os
 import zipfile
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -56,12 +57,7 @@ def start(unit: Path, folder: Path) -> Any:
 def test_equals_the_library(unit: Path, tmp_path: Path) -> None:
     r = pz.signals.triangle(5.0, 5.0, 1, FS).values[:6000]
     estimator, compensator = pair()
-    record = pz.track(
-        r,
-        stage=pz.PaperStage(FS, seed=0),
-        compensator=compensator,
-        estimator=estimator,
-    )
+    record = pz.track(r, stage=pz.PaperStage(FS, seed=0), compensator=compensator, estimator=estimator)
     running = start(unit, tmp_path)
     assert running.getReal([2]) == [0.0]
     u = np.empty(r.size)
@@ -93,22 +89,23 @@ def test_equals_the_library(unit: Path, tmp_path: Path) -> None:
 
 
 def test_wrong_arguments_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"\.fmu"):
-        pz.export.fmu(*pair(), tmp_path / "a.zip")
-    with pytest.raises(ValueError, match="sample_rate"):
-        pz.export.fmu(None, pz.LinearCompensator(pz.LinearGain(0.15)), tmp_path / "a.fmu")
-    with pytest.raises(ValueError, match="sample_rate"):
-        pz.export.fmu(*pair(), tmp_path / "a.fmu", sample_rate=1e3)
+    line = None, pz.LinearCompensator(pz.LinearGain(0.15))
+    arguments: Any
+    options: Any
+    for arguments, options, words in (
+        ((*pair(), tmp_path / "a.zip"), {}, r"\.fmu"),
+        ((*line, tmp_path / "a.fmu"), {}, "sample_rate"),
+        ((*pair(), tmp_path / "a.fmu"), {"sample_rate": 1e3}, "sample_rate"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            pz.export.fmu(*arguments, **options)
 
 
 def test_a_full_disk_leaves_the_old_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "stage.fmu"
     path.write_bytes(b"as it was")
-
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(zipfile.ZipFile, "writestr", full)
+    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    monkeypatch.setattr(zipfile.ZipFile, "writestr", Mock(side_effect=full))
     with pytest.raises(OSError, match=r"stage\.fmu"):
         pz.export.fmu(*pair("line"), path)
     assert [each.read_bytes() for each in tmp_path.iterdir()] == [b"as it was"]

@@ -69,9 +69,6 @@ def drive(library: Any, board: Any, own: Any, wrong: Any = float, count: int = 1
     return seen
 
 
-# ---------------------------------------------------------------- parity
-
-
 def test_voltages_are_the_librarys_over_all_stages_and_faults(pair: tuple[Any, Any]) -> None:
     library, board = pair
     seen = set()
@@ -129,9 +126,6 @@ def test_it_homes(begin: int) -> None:
             board.home(*wrong)
 
 
-# ---------------------------------------------------------------- float
-
-
 def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> None:
     rng = np.random.default_rng(1)
     wild = np.array([np.nan, np.inf, -np.inf, 1e308, -1e308, 1e30, -1e30, 9e8, -9e8, 1e5, 0.0, 1e-45])
@@ -149,9 +143,6 @@ def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> N
             single.learn(drawn[1, k] if odd[1, k] else u, drawn[2, k] if odd[2, k] else x)
             stages.add(single.status[0])
     assert stages == {0, 1, 2}
-
-
-# ---------------------------------------------------------------- the text
 
 
 @pytest.mark.parametrize(
@@ -194,9 +185,6 @@ def test_sanitizers_are_silent(tmp_path: Path) -> None:
         low="-100.0", high="100.0", then="stage_learn(&state, u, pair[1]);", end="stage_get_stage(&state)",
     )  # fmt: skip
     assert done == (2, b"")
-
-
-# ---------------------------------------------------------------- refusals
 
 
 def test_what_does_not_go_together_is_refused() -> None:

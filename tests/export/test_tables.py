@@ -52,12 +52,13 @@ def test_files_can_be_read_back(tmp_path: Path) -> None:
 
 
 def test_wrong_references_are_refused() -> None:
-    model = MODELS["coleman-hodgdon"]
-    with pytest.raises(ValueError, match="sample_rate"):
-        pz.export.table(model, np.zeros(10))
-    with pytest.raises(ValueError, match="sample_rate"):
-        pz.export.table(model, pz.signals.triangle(4.0, 5.0, 1, 5000.0), sample_rate=1.0)
-    with pytest.raises(ValueError, match="whole number"):
-        pz.export.table(model, pz.Signal(np.zeros(100), 100.0, 33.3))
-    with pytest.raises(ValueError, match="jump"):
-        pz.export.table(model, np.linspace(0.0, 5.0, 500), sample_rate=500.0)
+    options: Any
+    triangle = pz.signals.triangle(4.0, 5.0, 1, 5000.0)
+    for r, options, words in (
+        (np.zeros(10), {}, "sample_rate"),
+        (triangle, {"sample_rate": 1.0}, "sample_rate"),
+        (pz.Signal(np.zeros(100), 100.0, 33.3), {}, "whole number"),
+        (np.linspace(0.0, 5.0, 500), {"sample_rate": 500.0}, "jump"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            pz.export.table(MODELS["coleman-hodgdon"], r, **options)

@@ -24,11 +24,9 @@ def text_of(function: Any, *arguments: Value) -> tuple[str, str]:
     """Text of the file, and the name of the function in C."""
     file = File("test", "double")
     made, _ = translate(file, function, list(arguments))
-    functions = file.text(f"{made.name}()")
-    types = "".join(text for _, text in file.types.values())
-    head = functions.replace(f"static void {made.name}", f"void {made.name}")
-    head = head.replace(f"static double {made.name}", f"double {made.name}")
-    return f"#include <math.h>\n{types}{head}", made.name
+    text = "".join(text for _, text in file.types.values()) + file.text(f"{made.name}()")
+    text = re.sub(rf"static (void|double) {made.name}", rf"\1 {made.name}", text)
+    return f"#include <math.h>\n{text}", made.name
 
 
 def build(folder: Path, function: Any, *arguments: Value) -> Callable[..., Any]:
@@ -40,9 +38,6 @@ def build(folder: Path, function: Any, *arguments: Value) -> Callable[..., Any]:
     return made
 
 
-# ---------------------------------------------------------------- order
-
-
 def _count(state: Any) -> Any:
     state.gain += 1.0
     return state.gain
@@ -52,15 +47,9 @@ def ignores(none: Any, value: Any) -> Any:
     return 1.0 if none is None else value
 
 
-def does_it_all_the_same(state: Any) -> Any:
+def unused_argument(state: Any) -> Any:
     one = ignores(None, _count(state))
     return one + state.gain
-
-
-def test_a_call_in_an_argument_that_is_not_used_is_made(tmp_path: Path) -> None:
-    own = np.array([3.0])
-    function = build(tmp_path, does_it_all_the_same, STATE)
-    assert function(ctypes.c_void_p(own.ctypes.data)) == 5.0
 
 
 def in_order(state: Any) -> Any:
@@ -68,18 +57,15 @@ def in_order(state: Any) -> Any:
     return state.gain
 
 
-def test_operands_come_from_left_to_right(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("function", "value"), [(unused_argument, 5.0), (in_order, 30.0 + 4.0 * 5.0 - 5.0)])
+def test_calls_are_made_from_left_to_right(tmp_path: Path, function: Any, value: float) -> None:
+    """Also one in an argument that is not used."""
     own = np.array([3.0])
-    function = build(tmp_path, in_order, STATE)
-    assert function(ctypes.c_void_p(own.ctypes.data)) == 30.0 + 4.0 * 5.0 - 5.0
-
-
-# ---------------------------------------------------------------- arithmetic
+    assert build(tmp_path, function, STATE)(ctypes.c_void_p(own.ctypes.data)) == value
 
 
 @compiled
 def arithmetic(u: float, x: float) -> float:
-    """All at once."""
     total = 0.0
     for i in range(1, 12, 3):
         place, rest = i // 4, i % 4
@@ -96,9 +82,6 @@ def test_arithmetic_is_the_same(tmp_path: Path) -> None:
     for u in every.tolist():
         for x in every[1:].tolist():
             np.testing.assert_array_equal(function(u, x), arithmetic(u, x))
-
-
-# ---------------------------------------------------------------- refusals
 
 
 def with_a_step(x: Any) -> None:

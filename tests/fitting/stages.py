@@ -37,7 +37,6 @@ def stage(
 
 
 def noise(size: float, seed: int = 0, count: int = N) -> FloatArray:
-    """White noise of a standard deviation [µm]."""
     return size * np.random.default_rng([seed, 7]).standard_normal(count)
 
 

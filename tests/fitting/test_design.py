@@ -209,15 +209,6 @@ def test_the_less_a_play_goes_in_a_segment_the_more_it_follows_the_next_one() ->
     assert costs[-1] > 4.0 * costs[0]
 
 
-def test_starts_of_a_stage_are_reachable() -> None:
-    u = voltage(np.random.default_rng(0))
-    thresholds = np.linspace(0.0, 40.0, 20)
-    for start in starts(u):
-        states = start.states(thresholds)
-        assert np.all(np.abs(np.diff(states)) <= np.diff(thresholds) + 1e-12)
-        assert np.all(np.abs(states - start.left) <= thresholds + 1e-12)
-
-
 def test_a_model_of_plays_without_slope_is_a_line() -> None:
     u = walk(5)
     model = columns_of(u, count=1).model(np.array([0.3]), 1.0, None, RATE)
@@ -233,7 +224,3 @@ def test_how_far_plays_move() -> None:
     # Below 4 V the play of 5 V goes from 0 to 4, from 4 to -5.
     parts = moving_of(u, thresholds, np.array([4.0]), start)
     np.testing.assert_allclose(parts, 2.0 * np.array([[18.0, 13.0, 0.0], [12.0, 2.0, 0.0]]) / 30.0)
-
-
-def test_a_stage_drawn_at_random_is_admissible() -> None:
-    assert all(stage(np.random.default_rng(seed), bends=2).is_admissible for seed in range(20))

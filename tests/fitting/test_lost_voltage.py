@@ -1,19 +1,21 @@
-"""Samples at which the recorded voltage is not what drove the stage: found, and nothing else."""
+"""Where the recorded voltage is not what drove the stage, or missing: found, and nothing else."""
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
 
+import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting import fit
 from piezoest.fitting.flaws import flawed
-from piezoest.models import ColemanHodgdon
+from piezoest.fitting.gaps import forgotten
 
 N = 6000
 T = np.arange(N) / 1000.0
-MODEL = ColemanHodgdon.from_loop(0.03, 0.04, 0.1)
+MODEL = pz.ColemanHodgdon.from_loop(0.03, 0.04, 0.1)
 
 
 def simulated(u: FloatArray, seed: int = 0, noise: float = 2e-3) -> FloatArray:
@@ -50,7 +52,6 @@ RECORDED: dict[str, Callable[[FloatArray], FloatArray]] = {
 
 
 def slow(x: FloatArray, samples: float) -> FloatArray:
-    """The displacement behind a low-pass filter."""
     y, keep = x.copy(), float(np.exp(-1.0 / samples))
     for k in range(1, N):
         y[k] = keep * y[k - 1] + (1.0 - keep) * x[k]
@@ -65,53 +66,30 @@ def test_no_sample_of_a_healthy_voltage_is_wrong(name: str, recorded: str) -> No
         assert not flawed(RECORDED[recorded](u), x).voltage.any()
 
 
-def spikes(u: FloatArray, x: FloatArray) -> list[int]:
-    u[[700, 2111, 4321]] += [25.0, -30.0, 8.0]
-    return [700, 2111, 4321]
+# Places, and what is recorded there of the voltage.
+WRONG: dict[str, tuple[list[int], Callable[[FloatArray], Any]]] = {
+    "spikes": ([700, 2111, 4321], lambda u: np.add(u, [25.0, -30.0, 8.0])),
+    "zeros": ([900, 2500, 2501, *range(4000, 4025)], lambda u: 0.0 * u),
+    "rows of zeros": ([900, 2500, 2501, 4100], lambda u: 0.0 * u),
+    "overflow": ([1500, 3000], lambda u: [9.9e37, -1e4]),
+    "garbage": ([1500, 1501, 1502, 3333, 3334], lambda u: [80.0, 5.0, 90.0, -20.0, 99.0]),
+    "stuck": (list(range(2900, 3100)), lambda u: u[0]),
+}
 
 
-def zeros(u: FloatArray, x: FloatArray) -> list[int]:
-    places = [900, 2500, 2501, *range(4000, 4025)]
-    u[places] = 0.0
-    return places
-
-
-def rows_of_zeros(u: FloatArray, x: FloatArray) -> list[int]:
-    places = [900, 2500, 2501, 4100]
-    u[places] = x[places] = 0.0
-    return places
-
-
-def overflow(u: FloatArray, x: FloatArray) -> list[int]:
-    u[[1500, 3000]] = 9.9e37, -1e4
-    return [1500, 3000]
-
-
-def garbage(u: FloatArray, x: FloatArray) -> list[int]:
-    u[1500:1503], u[3333:3335] = (80.0, 5.0, 90.0), (-20.0, 99.0)
-    return [1500, 1501, 1502, 3333, 3334]
-
-
-def stuck(u: FloatArray, x: FloatArray) -> list[int]:
-    u[2900:3100] = u[2900]
-    return list(range(2900, 3100))
-
-
-WRONG = (spikes, zeros, rows_of_zeros, overflow, garbage, stuck)
-
-
-@pytest.mark.parametrize("wrong", WRONG)
-def test_wrong_voltages_are_found_and_left_out(wrong: Callable[[FloatArray, FloatArray], list[int]]) -> None:
-    u = swings()
-    x = simulated(u)
-    truth, places = MODEL.simulate(u, allow_jumps=True), wrong(u, x)
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_voltages_are_found_and_left_out(name: str) -> None:
+    (places, recorded), u = WRONG[name], swings()
+    x, truth = simulated(u), MODEL.simulate(u, allow_jumps=True)
+    u[places] = recorded(u[places])
+    if name == "rows of zeros":
+        x[places] = 0.0
     flaws = flawed(u, x)
     np.testing.assert_array_equal(np.flatnonzero(flaws.voltage), places)
     assert flaws.jumps.size == 0
     found = fit(u, x, sample_rate=1000.0, model="coleman-hodgdon")
     assert not found.counts[places].any()
-    missed = (found.predict().x - truth)[found.counts]
-    assert np.std(missed) < 2e-3
+    assert np.std((found.predict().x - truth)[found.counts]) < 2e-3
 
 
 def test_spikes_in_steps_are_told_from_them() -> None:
@@ -143,3 +121,36 @@ def test_an_overflow_is_found_anywhere_in_a_short_log(place: int) -> None:
     v = u[:300].copy()
     v[place] = 1e5
     np.testing.assert_array_equal(np.flatnonzero(flawed(v, x[:300]).voltage), [place])
+
+
+def waves(sizes: list[float]) -> FloatArray:
+    return np.concatenate([size * np.sin(2.0 * np.pi * np.arange(200) / 200.0) for size in sizes])
+
+
+def bridged(u: FloatArray) -> FloatArray:
+    known = np.isfinite(u)
+    return np.interp(np.arange(u.size), np.flatnonzero(known), u[known])
+
+
+def test_samples_behind_a_gap_are_left_out_until_both_extremes_were_passed() -> None:
+    u = waves([10.0] * 6)
+    u[430:530] = np.nan  # over a maximum
+    found = np.flatnonzero(forgotten(u, bridged(u)))
+    assert found[0] == 530
+    assert 630 < found[-1] < 670  # the next maximum is at 650
+
+
+def test_short_gaps_and_those_without_a_turn_are_no_matter() -> None:
+    u = waves([10.0] * 6)
+    u[500:503], u[690:720] = np.nan, np.nan
+    assert not forgotten(u, bridged(u)).any()
+
+
+def test_a_turn_that_was_lost_does_not_spoil_a_fit() -> None:
+    u = waves([4.0, 10.0, 6.0, 9.0, 3.0, 10.0, 5.0, 8.0, 10.0, 2.0])
+    model = pz.PrandtlIshlinskii(gain=0.1, thresholds=[1.0, 3.0], weights=[0.03, 0.05])
+    x = model.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
+    u[400:500], x[400:500] = np.nan, np.nan
+    found = fit(u, x, sample_rate=1000.0, model="plays")
+    missed = (found.predict().x - x)[found.counts]
+    assert np.sqrt(np.mean(missed**2)) < 2e-3

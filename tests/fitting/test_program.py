@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import lsq_linear, nnls
+from scipy.optimize import lsq_linear
 
 from piezoest._checks import FloatArray
 from piezoest.fitting.program import RIDGE, Sums, checked, solve, total
-from piezoest.symbolic import quadratic_program, quadratic_solver
+from piezoest.fitting.rows import FEW, gram, onto, times
+from piezoest.symbolic import quadratic_program
 
 SEEDS = range(12)
 
@@ -44,15 +45,6 @@ def test_solved_as_by_scipy(seed: int) -> None:
     assert checked(sums, lower, np.zeros((lower.size, lower.size)), w) < 1e-10
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_solved_as_by_nnls(seed: int) -> None:
-    A, x, _ = problem(seed)
-    sums, none = Sums.of(A, x), np.zeros((A.shape[1], A.shape[1]))
-    expected, left = nnls(A, x)
-    assert sums.missed(solve(sums, np.zeros(A.shape[1]), none)) == pytest.approx(left**2, rel=1e-6)
-    np.testing.assert_allclose(solve(sums, np.zeros(A.shape[1]), none), expected, atol=1e-6 * expected.max())
-
-
 def test_a_penalty_is_as_rows_more() -> None:
     A, x, lower = problem(1)
     rng = np.random.default_rng(1)
@@ -76,10 +68,6 @@ def test_a_worse_answer_is_seen() -> None:
     none = np.zeros((lower.size, lower.size))
     w = solve(Sums.of(A, x), lower, none)
     assert checked(Sums.of(A, x), lower, none, w + 0.1 / np.std(A, axis=0)) > 1e-6
-
-
-def test_solver_has_a_name() -> None:
-    assert quadratic_solver()
 
 
 def alike(one: Sums, other: Sums) -> None:
@@ -110,3 +98,12 @@ def test_sums_of_combined_columns() -> None:
 def test_no_rounding_makes_what_is_missed_negative() -> None:
     A = np.random.default_rng(5).standard_normal((50, 2)) + 1e6
     assert Sums.of(A, A @ np.array([1.0, 2.0])).missed(np.array([1.0, 2.0])) >= 0.0
+
+
+@pytest.mark.parametrize("count", [0, 1, FEW - 1, FEW, 3 * FEW + 5])
+def test_products_of_rows(count: int) -> None:
+    rng = np.random.default_rng(count)
+    rows, x, w = rng.standard_normal((count, 5)), rng.standard_normal(count), rng.standard_normal(5)
+    np.testing.assert_allclose(gram(rows), rows.T @ rows, atol=1e-12)
+    np.testing.assert_allclose(onto(rows, x), rows.T @ x, atol=1e-12)
+    np.testing.assert_allclose(times(rows, w), rows @ w, atol=1e-12)

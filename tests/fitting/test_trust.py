@@ -8,7 +8,6 @@ from scipy.signal import lfilter
 
 import piezoest as pz
 from piezoest._checks import FloatArray
-from piezoest.fitting.runs import runs
 from piezoest.fitting.trust import Spread
 from tests.fitting.stages import RATE, N, noise, stage, voltage
 
@@ -21,30 +20,19 @@ def coloured(size: float, seed: int, memory: float) -> FloatArray:
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.9])
-def test_standard_errors_of_a_loop_cover(memory: float) -> None:
+@pytest.mark.parametrize("model", ["coleman-hodgdon", "line"])
+def test_standard_errors_cover(model: str, memory: float) -> None:
+    true: Any = LOOP if model == "coleman-hodgdon" else pz.LinearGain(0.2, -3.0)
     z = []
-    for seed in range(10):
-        u = voltage(np.random.default_rng(seed))
-        x = LOOP.simulate(u) + coloured(5e-3, seed, memory)
-        found = pz.fit(u, x, sample_rate=RATE, model="coleman-hodgdon")
-        values = dict(zip(found.model.parameter_names, found.model.theta, strict=True))
-        values["offset"] = found.model.offset
-        true = dict(zip(LOOP.parameter_names, LOOP.theta, strict=True)) | {"offset": 1.5}
-        z += [(values[name] - true[name]) / found.standard_errors[name] for name in true]
-        assert found.standard_errors["delay"] == 0.0
-    # Standard errors that are right give 1; ten runs of four leave it within this.
-    assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.5
-
-
-@pytest.mark.parametrize("memory", [0.0, 0.9])
-def test_standard_errors_of_a_line_cover(memory: float) -> None:
-    z = []
-    for seed in range(20):
+    for seed in range(15):
         u = voltage(np.random.default_rng(seed), centre=30.0)
-        x = 0.2 * u - 3.0 + coloured(0.02, seed, memory)
-        found: Any = pz.fit(u, x, sample_rate=RATE, model="line")
-        z.append((found.model.gain - 0.2) / found.standard_errors["gain"])
-        z.append((found.model.offset + 3.0) / found.standard_errors["offset"])
+        x = true.simulate(u) + coloured(5e-3, seed, memory)
+        found = pz.fit(u, x, sample_rate=RATE, model=model)
+        errors = [found.standard_errors[name] for name in (*true.parameter_names, "offset")]
+        missed = np.append(found.model.theta, found.model.offset) - np.append(true.theta, true.offset)
+        z.append(missed / errors)
+        assert found.standard_errors["delay"] == 0.0
+    # Standard errors that are right give 1; so many runs leave it within this.
     assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.5
 
 
@@ -100,24 +88,20 @@ def test_intervals_hold_what_they_promise(model: str) -> None:
     assert min(inside) > 0.85
 
 
-def test_an_interval_widens_behind_the_record_and_beyond_its_range() -> None:
-    spread = Spread(3.0, 4.0, 0.4, (-10.0, 10.0))
-    half = spread.along(np.array([0.0, 10.0, 20.0]), np.zeros(3))
-    np.testing.assert_allclose(half, [3.0, 3.0, 5.0])
-    np.testing.assert_allclose(spread.along(np.zeros(2), np.array([0.0, np.expm1(1.0)])), [3.0, 5.0])
-
-
-def test_an_interval_stays_wide_after_a_voltage_beyond_the_range() -> None:
-    """The stage remembers where it was."""
-    half = Spread(3.0, 4.0, 0.4, (-10.0, 10.0)).along(np.array([0.0, 20.0, 0.0]), np.zeros(3))
-    np.testing.assert_allclose(half, [3.0, 5.0, 5.0])
-
-
-def test_an_interval_widens_where_the_voltage_moves_further_within_the_delay() -> None:
-    """And stays wide, for a swing that is flattened by its rate is so at its end."""
-    spread = Spread(3.0, 0.0, 0.4, (-10.0, 10.0), by_move=2.0, delay=2.0, moved=3.0)
-    half = spread.along(np.array([0.0, 0.0, 5.0, 5.0, 5.0]), np.zeros(5))
-    np.testing.assert_allclose(half, [3.0, 3.0, 5.0, 5.0, 5.0])
+@pytest.mark.parametrize(
+    ("spread", "u", "behind", "half"),
+    [
+        (Spread(3.0, 4.0, 0.4, (-10.0, 10.0)), [0.0, 10.0, 20.0], [0.0, 0.0, 0.0], [3.0, 3.0, 5.0]),
+        (Spread(3.0, 4.0, 0.4, (-10.0, 10.0)), [0.0, 0.0], [0.0, np.expm1(1.0)], [3.0, 5.0]),
+        # After a voltage beyond the range it stays wide: the stage remembers where it was.
+        (Spread(3.0, 4.0, 0.4, (-10.0, 10.0)), [0.0, 20.0, 0.0], [0.0, 0.0, 0.0], [3.0, 5.0, 5.0]),
+        # And where the voltage moves further within the delay: a swing is flattened by its rate to its end.
+        (Spread(3.0, 0.0, 0.4, (-10.0, 10.0), by_move=2.0, delay=2.0, moved=3.0),
+         [0.0, 0.0, 5.0, 5.0, 5.0], [0.0] * 5, [3.0, 3.0, 5.0, 5.0, 5.0]),
+    ],
+)  # fmt: skip
+def test_an_interval_widens(spread: Spread, u: list[float], behind: list[float], half: list[float]) -> None:
+    np.testing.assert_allclose(spread.along(np.array(u), np.array(behind)), half)
 
 
 def test_an_interval_holds_a_lag_that_is_no_delay() -> None:
@@ -146,9 +130,3 @@ def test_a_loop_is_trusted_beyond_the_range_and_plays_are_not() -> None:
     x = LOOP.simulate(u) + noise(5e-3)
     wide = [pz.fit(u, x, sample_rate=RATE, model=name).spread for name in ("coleman-hodgdon", "plays")]
     assert wide[0].by_volt < 0.5 * wide[1].by_volt
-
-
-def test_runs_are_where_marks_are_set() -> None:
-    starts, ends = runs(np.array([True, False, True, True, False, True]))
-    assert list(zip(starts, ends, strict=True)) == [(0, 1), (2, 4), (5, 6)]
-    assert runs(np.zeros(5, np.bool_))[0].size == 0

@@ -57,13 +57,6 @@ def test_a_lag_longer_than_is_looked_for_is_said() -> None:
     assert any("10 samples or more" in said for said in found.advice)
 
 
-def test_one_jump_is_said_once() -> None:
-    x = LOOP.simulate(swings())
-    x[-400:] += 5.0
-    (said,) = [said for said in identify(log(swings(), x), model="line").advice if "jump" in said]
-    assert "once" in said
-
-
 def test_what_a_fast_voltage_moves_is_no_noise() -> None:
     u = np.random.default_rng(4).uniform(-30.0, 30.0, 6000)
     x = pz.PrandtlIshlinskii(0.1, [5.0, 15.0], [0.02, 0.02]).simulate(u)
@@ -95,11 +88,6 @@ def test_ringing_is_said() -> None:
     missed = identify(log(swings(), LOOP.simulate(swings())), model="line")
     assert missed.train.rms > 0.05
     assert not any("oscillates" in each for each in missed.advice)
-
-
-def test_one_log_to_validate_is_no_list() -> None:
-    with pytest.raises(ValueError, match="validate must be a list"):
-        identify(log(swings(), LOOP.simulate(swings())), validate="log.csv")
 
 
 def test_other_logs_are_checked_too() -> None:

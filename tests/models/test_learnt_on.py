@@ -10,7 +10,7 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
-from piezoest.models import LearntModel, LearntOn, model_from_dict
+from piezoest.models import LearntModel, LearntOn
 from piezoest.signals.turns import turns
 
 FS = 5000.0
@@ -19,12 +19,8 @@ KNOWN = LearntOn((-40.0, 40.0), (-6.0, 6.0), 800.0, (4.0, 6.0))
 
 
 def wave(amplitude: float = 40.0, frequency: float = 5.0, periods: int = 8) -> FloatArray:
-    """A triangle with sharp corners."""
     time = np.arange(round(periods * FS / frequency)) / FS
     return amplitude * np.interp(time * frequency % 1.0, [0.0, 0.25, 0.75, 1.0], [0.0, 1.0, -1.0, 0.0])
-
-
-# ---------------------------------------------------------------- turns
 
 
 def test_turns_are_the_extremes_that_the_signal_runs_back_from() -> None:
@@ -34,9 +30,6 @@ def test_turns_are_the_extremes_that_the_signal_runs_back_from() -> None:
     assert turns(u, 100.0).size == turns(np.ones(5), 0.0).size == turns([], 1.0).size == 0
     # Of a flat one the first sample counts, where the signal came from does not.
     assert turns([5.0, 0.0, 3.0, 3.0, 3.0, 0.0, 4.0], 1.0).tolist() == [1, 2, 5]
-
-
-# ---------------------------------------------------------------- ranges of a log
 
 
 def test_a_log_has_its_ranges_without_what_is_wild_or_missing() -> None:
@@ -76,9 +69,6 @@ def test_blocks_of_a_log_have_the_ranges_of_the_log() -> None:
     assert still.joined(still) == still
 
 
-# ---------------------------------------------------------------- who leaves them
-
-
 @pytest.mark.parametrize(
     ("used", "count"),
     [
@@ -107,26 +97,20 @@ def test_the_same_reference_again_leaves_nothing(kind: Any) -> None:
     assert known.left_by(LearntOn.of(log, r, FS)) == ()
 
 
-# ---------------------------------------------------------------- with a model
-
-
 def test_a_model_comes_in_many_forms(tmp_path: Path) -> None:
     plain, both = LearntModel(LOOP), LearntModel(LOOP, KNOWN)
-    assert LearntModel.of(LOOP) == plain
-    assert LearntModel.of(both) == both
-    assert LearntModel.of(SimpleNamespace(model=LOOP)) == plain
-    assert LearntModel.of(SimpleNamespace(model=LOOP, learnt_on=KNOWN)) == both
+    for given, expected in (
+        (LOOP, plain), (both, both), (SimpleNamespace(model=LOOP), plain),
+        (SimpleNamespace(model=LOOP, learnt_on=KNOWN), both),
+    ):  # fmt: skip
+        assert LearntModel.of(given) == expected
     assert LearntModel.of(pz.HysteresisRLS(FS, initial_model=LOOP)).learnt_on is None
     file, bare = tmp_path / "model.json", {"alpha": 0.02, "beta": 0.12, "gamma": 0.0036, "offset": 3.0}
-    for data, expected in (
-        (both.to_dict() | {"format": "piezoest-identification-1", "advice": []}, both),
-        (LOOP.to_dict(), plain),
-        ({"model": bare}, plain),
-    ):
+    more = both.to_dict() | {"format": "piezoest-identification-1", "advice": []}
+    for data, expected in ((more, both), (LOOP.to_dict(), plain), ({"model": bare}, plain)):
         file.write_text(json.dumps(data), encoding="utf-8")
         assert LearntModel.of(file) == LearntModel.of(str(file)) == expected
     line = LearntModel(pz.LinearGain(0.1), KNOWN)
     assert LearntModel.from_dict(line.to_dict()) == line
     with pytest.raises(ValueError, match="dictionary"):
         LearntModel.from_dict([1])  # type: ignore[arg-type]
-    assert model_from_dict(both.to_dict()["model"]) == LOOP

@@ -62,12 +62,15 @@ def test_it_is_simulated_and_inverted() -> None:
 
 
 def test_a_compensator_and_a_stage_are_made_of_it() -> None:
-    stage = pz.SimulatedStage(RATE, MODEL)
-    u = pz.InverseCompensator(MODEL).run(R)
+    stage, u = pz.SimulatedStage(RATE, MODEL), pz.InverseCompensator(MODEL).run(R)
     np.testing.assert_allclose(u, MODEL.invert(R), atol=1e-12)
     np.testing.assert_allclose(stage.run(u), R, atol=1e-12)
     stage.reset()
     np.testing.assert_allclose([stage.step(value) for value in u[:50].tolist()], R[:50], atol=1e-12)
+    # Gain and temperature change it as any other.
+    options: dict[str, Any] = {"gain_schedule": [[0.0, 1.0], [0.4, 1.2]], "temperature": 40.0}
+    stages = [pz.SimulatedStage(RATE, model, **options) for model in (MODEL, PLAYS)]
+    np.testing.assert_allclose(stages[0].run(8.0 * R), stages[1].run(8.0 * R), atol=1e-12)
 
 
 @pytest.mark.parametrize("method", ["single-shooting", "multiple-shooting"])
@@ -93,16 +96,6 @@ def test_a_compensator_goes_over_to_it_without_a_bump() -> None:
         assert not compensator.status.projected
     np.testing.assert_allclose(both[0], both[1], atol=1e-9)
     assert np.abs(np.diff(both[0])).max() < 2.0 * np.abs(np.diff(R)).max() / 0.15
-
-
-def test_gain_and_temperature_change_it_as_any_other() -> None:
-    u = 8.0 * R
-    options: dict[str, Any] = {"gain_schedule": [[0.0, 1.0], [0.4, 1.2]], "temperature": 40.0}
-    stages = [pz.SimulatedStage(RATE, model, **options) for model in (MODEL, PLAYS)]
-    np.testing.assert_allclose(stages[0].run(u), stages[1].run(u), atol=1e-12)
-
-
-# ---------------------------------------------------------------- what is wrong with one is said
 
 
 @pytest.mark.parametrize(

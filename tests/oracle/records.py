@@ -60,20 +60,6 @@ def answer(u: Array, noise: float = 1.5e-3, seed: int = 1, model: Any = TRUE) ->
     return rounded(x + noise * np.random.default_rng(seed).standard_normal(u.size))
 
 
-def nan(seed: int = 2) -> tuple[Array, Array]:
-    u, x, rng = sine(33.0), answer(sine(33.0)), np.random.default_rng(seed)
-    x[rng.random(u.size) < 0.05] = np.nan
-    u[rng.random(u.size) < 0.02] = np.nan
-    return u, x
-
-
-def spikes(seed: int = 3) -> tuple[Array, Array]:
-    u, x, rng = sine(33.0), answer(sine(33.0)), np.random.default_rng(seed)
-    places = rng.random(u.size) < 0.02
-    x[places] += rounded(rng.choice([-1.0, 1.0], places.sum()) * rng.choice([0.1, 2.0, 50.0], places.sum()))
-    return u, x
-
-
 def jump() -> tuple[Array, Array]:
     """The stage's gain changes, then its level."""
     u, x = triangle(33.0), answer(triangle(33.0))
@@ -92,7 +78,7 @@ def wild(seed: int = 4) -> tuple[Array, Array]:
 
 
 def rough(seed: int = 5) -> tuple[Array, Array]:
-    """Rests, spikes, gaps, a bias that drifts, a delay, missing voltages: all of it."""
+    """Rests, spikes, gaps, a bias that drifts, a delay, missing voltages, a sensor that ends: all of it."""
     u, rng = dwelling(), np.random.default_rng(seed)
     index = np.arange(u.size)
     x = answer(rounded(np.interp(index - 1.3, index, u)), 5e-3) + 2.0 + rounded(2e-4 * index)
@@ -102,8 +88,8 @@ def rough(seed: int = 5) -> tuple[Array, Array]:
     return u, np.clip(x, -4.0, 9.0)
 
 
-def of(u: Array, noise: float = 1.5e-3, gain: float = 1.0, offset: float = 0.0) -> tuple[Array, Array]:
-    return u, rounded(gain * answer(u, noise) + offset)
+def of(u: Array) -> tuple[Array, Array]:
+    return u, answer(u)
 
 
 SCENARIOS: dict[str, Any] = {
@@ -112,11 +98,7 @@ SCENARIOS: dict[str, Any] = {
     "growing": lambda: of(growing()),
     "unipolar": lambda: of(rounded(triangle(25.0) + 50.0)),
     "dwell": lambda: of(dwelling()),
-    "nan": nan,
-    "spikes": spikes,
     "jump": jump,
-    "saturated": lambda: (sine(33.0), np.clip(answer(sine(33.0)), -3.0, 3.5)),
-    "biased": lambda: (triangle(33.0), rounded(answer(triangle(33.0)) + 8.0 + 1e-3 * np.arange(LENGTH))),
     "wild": wild,
     "rough": rough,
 }

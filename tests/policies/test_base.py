@@ -85,8 +85,6 @@ def test_every_policy_is_carried_out(name: str) -> None:
     )
 
 
-# ---------------------------------------------------------------- policies of one's own
-
 Maker = Callable[..., Any]
 
 
@@ -123,9 +121,7 @@ def other_arguments(own: Any, numbers: Any, state: Any, settings: Any) -> Any:
         ({"permits": functools.partial(hook)}, "permits must be a plain function, marked @inlined"),
     ],
 )
-def test_what_cannot_be_carried_out_is_refused(
-    policy_of: Maker, functions: dict[str, Any], words: str
-) -> None:
+def test_what_cannot_be_carried_out_is_refused(policy_of: Maker, functions: Any, words: str) -> None:
     policy = policy_of("Mine", **functions)
     with pytest.raises(ValueError, match=words):
         base.layouts((policy(),), AT)

@@ -12,7 +12,6 @@ def coleman_hodgdon(
     u: Array,
     x: Array,
     fs: float,
-    *,
     start: Array,
     uncertainty: float,
     noise: float,
@@ -32,14 +31,8 @@ def coleman_hodgdon(
                 du = np.diff(u[last : k + 1])
                 middle = 0.5 * (u[last + 1 : k + 1] + u[last:k])
                 travel = np.sum(np.abs(du))
-                raw = np.array(
-                    [
-                        -0.5 * (x[k] + x[last]) * travel,
-                        u[k] - u[last],
-                        np.sum(np.abs(du) * middle),
-                        x[k] - x[last],
-                    ]
-                )
+                area = np.sum(np.abs(du) * middle)
+                raw = np.array([-0.5 * (x[k] + x[last]) * travel, u[k] - u[last], area, x[k] - x[last]])
                 filtered = pole * filtered + (1.0 - pole) * raw
                 theta, P = discrete(theta, P, filtered[:3], filtered[3], np.exp(-1.0 / (fs * memory)), R)
             last = k
