@@ -60,3 +60,26 @@ def test_a_line_that_became_too_steep_comes_back_where_little_moves(answer: floa
             lines.add(line.now, u, answer * (u + 2.0 * direction * np.sin(phase)), 1e9)
         lines.turn(line, direction, 2.0)
     assert line.gain == pytest.approx(gain, rel=0.2)
+
+
+def test_late_readings_do_not_make_the_line_flat() -> None:
+    """Five samples late, of legs of 25: least squares gives 0.078 µm/V."""
+    driver = pz.AdaptiveFeedforward(1000.0, limits=pz.VoltageLimits(-100.0, 100.0), estimators=())
+    x = np.zeros(5)
+    for r_k in pz.signals.triangle(2.0, 20.0, 40, 1000.0).values.tolist():
+        u = driver.step(r_k)
+        driver.learn(u, float(x[0]))
+        x = np.append(x[1:], 0.1 * u)
+    assert driver.state["line"]["gain"] == pytest.approx(0.1, rel=0.12)
+
+
+def test_a_factor_of_the_sensor_is_no_new_start_where_readings_were_late() -> None:
+    """The line was never straight, and has held for long: the voltage stays with it."""
+    driver = pz.AdaptiveFeedforward(1000.0, limits=pz.VoltageLimits(-100.0, 100.0), estimators=())
+    x, u = np.zeros(5), []
+    for k, r_k in enumerate(pz.signals.triangle(2.0, 20.0, 80, 1000.0).values.tolist()):
+        u.append(driver.step(r_k))
+        driver.learn(u[-1], float(x[0]) * (1.0 if k < 2000 else -0.05))
+        x = np.append(x[1:], 0.1 * u[-1])
+    assert np.abs(u[2000:]).max() < 25.0
+    assert driver.status.fault in ("reversed", "no response", "scaled")
