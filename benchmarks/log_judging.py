@@ -127,17 +127,19 @@ def judge(seed: int) -> Row:
         "seed": seed, "family": log.family, "voltage": log.voltage, "samples": log.u.size,
         "sample_rate": log.sample_rate, "stroke": log.stroke, "noise": log.noise, "added": log.added,
         "nnls": rms(by_plays(u, log.x, trained)[trained:] - target),
-        "line": rms(by_line(u, log.x, trained)[trained:] - target), "failure": None,
+        "line": rms(by_line(u, log.x, trained)[trained:] - target), "failure": None, "seconds": None,
     }  # fmt: skip
     began = time.perf_counter()
     # Warnings of numbers are not the judge's matter; what comes out is.
     with warnings.catch_warnings(action="ignore"), np.errstate(all="ignore"):
         try:
-            row |= judged(log, trained, fitted(log))
+            found = fitted(log)
+            row["seconds"] = time.perf_counter() - began
+            row |= judged(log, trained, found)
             row |= ratios(row)
         except Exception as error:
             row["failure"] = f"{type(error).__name__}: {error}"[:FAILED]
-    return {**row, "seconds": time.perf_counter() - began}
+    return row
 
 
 def judged(log: Log, trained: int, found: Found) -> Row:

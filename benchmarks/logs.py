@@ -115,7 +115,7 @@ def summarise(rows: Sequence[Row], clean: Sequence[Row] = ()) -> Row:
         "by_chosen": parts(fitted, "chosen_name"),
         "by_added": by_added(rows),
         "quantiles": {name: quantiles([row["ratio"][name] for row in fitted]) for name in RATIOS},
-        "seconds": quantiles([row["seconds"] for row in rows]),
+        "seconds": quantiles(values(rows, "seconds")),
         "coverage": coverages(values(fitted, "coverage")),
         "scores": scores(fitted, clean),
         "worst": [{**{name: row[name] for name in SHOWN}, **row["ratio"]} for row in worst],

@@ -72,6 +72,15 @@ def drive(state: Any, number: Any) -> None:
 
 
 @register_jitable
+def owe(state: Any, more: Any) -> None:
+    """Let the model that drives, or the line, owe more."""
+    if state.driving > 0.0:
+        slots.owe(state.candidates, state.driving, _stands(state) + more)
+    else:
+        state.owed += more
+
+
+@register_jitable
 def _faked(state: Any) -> float:
     """By how much late readings miss what is true: models learn it as if it were hysteresis."""
     reference = state.reference

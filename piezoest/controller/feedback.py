@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.controller import redraw
+from piezoest.controller import driving
+from piezoest.controller import readings as reading
 from piezoest.controller import travel as travels
 from piezoest.controller.voltage import is_held
 from piezoest.layout import COUNT, FLAG, MEASURED, NUMBER, record
@@ -18,11 +19,11 @@ from piezoest.layout import COUNT, FLAG, MEASURED, NUMBER, record
 FASTEST = 0.25
 # A rest is over where the reference has gone so far from it, in swings.
 OVER = 0.02
-# Whether the reference rests; where it does, and the correction before. Behind a rest: turns left to look at;
-# readings since the first one, and the sum of the corrections that they ask for.
-REST = record(now=FLAG, r=MEASURED, feedback=NUMBER, left=COUNT, count=COUNT, sum=NUMBER)
-# Between the first and the last of so many turns lie two whole legs.
-TURNS = 3.0
+# Whether the reference rests, and where. Behind a rest: turns left to look at; samples since the first one,
+# those with a reading, and the sum of the corrections that these ask for.
+REST = record(now=FLAG, r=MEASURED, left=COUNT, count=COUNT, known=COUNT, sum=NUMBER)
+# Between the first and the last of so many turns lie two whole legs; this part of them must have readings.
+TURNS, KNOWN = 3.0, 0.5
 
 
 @register_jitable
@@ -53,26 +54,26 @@ def forget(state: Any) -> None:
 def _correct(state: Any, settings: Any, correction: Any) -> None:
     """Change the correction at once; the difference is owed, and paid on the way."""
     correction = _within(state, settings, correction)
-    if correction != state.feedback and settings.minimum < state.u < settings.maximum:
-        state.feedback = correction
-        redraw.go_on(state, settings)
+    driving.owe(state, (correction - state.feedback) / state.unit)
+    state.feedback = state.back = correction
 
 
 @register_jitable
 def watch_rest(state: Any, settings: Any, x: Any, moved: Any) -> None:
-    """Behind a rest, begin with the correction before it, and learn anew from the first two legs.
+    """Behind a long rest, learn the correction anew from the first two legs.
 
-    What the stage has crept is wiped out in motion; what has drifted is not, and shows in their mean error.
+    What the stage has crept is wiped out in motion, and the integral alone would keep it for long.
     """
     rest = state.rest
+    if state.readings.fault != reading.NONE:
+        rest.left = 0.0
     if rest.now == 0.0:
         rest.now = 1.0 if travels.rests(state.reference, moved) else 0.0
-        rest.r, rest.feedback = state.r, state.feedback
+        rest.r = state.r
         _learn_from_legs(state, settings, x)
     elif np.abs(state.r - rest.r) > OVER * state.reference.swing:
-        rest.now = rest.count = rest.sum = 0.0
+        rest.now = rest.count = rest.known = rest.sum = 0.0
         rest.left = TURNS
-        _correct(state, settings, rest.feedback)
 
 
 @register_jitable
@@ -82,8 +83,11 @@ def _learn_from_legs(state: Any, settings: Any, x: Any) -> None:
     if rest.left == 0.0:
         return
     rest.left -= state.reference.turned_now
-    if rest.left == 0.0 and rest.count > 0.0:
-        _correct(state, settings, rest.sum / rest.count)
-    elif rest.left < TURNS and np.isfinite(x):
-        rest.count += 1.0
+    if rest.left == TURNS:
+        return
+    rest.count += 1.0
+    if np.isfinite(x):
+        rest.known += 1.0
         rest.sum += state.feedback + state.r - x
+    if rest.left == 0.0 and rest.known > KNOWN * rest.count:
+        _correct(state, settings, rest.sum / rest.known)
