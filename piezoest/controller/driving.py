@@ -61,23 +61,27 @@ def _stands(state: Any) -> float:
 
 
 @register_jitable
+def stand_at(state: Any, z: Any) -> None:
+    """Let what drives, a model or the line, owe what it takes to stand at z."""
+    if state.driving > 0.0:
+        slots.owe(state.candidates, state.driving, z)
+    else:
+        state.owed = z - line_z(state)
+
+
+@register_jitable
 def drive(state: Any, number: Any) -> None:
     """Let another model drive, without a bump."""
     z = _stands(state)
     state.switches += number != state.driving
     state.driving = number
-    slots.owe(state.candidates, number, z)
-    if number == 0.0:
-        state.owed = z - line_z(state)
+    stand_at(state, z)
 
 
 @register_jitable
 def owe(state: Any, more: Any) -> None:
-    """Let the model that drives, or the line, owe more."""
-    if state.driving > 0.0:
-        slots.owe(state.candidates, state.driving, _stands(state) + more)
-    else:
-        state.owed += more
+    """Let what drives, a model or the line, owe more."""
+    stand_at(state, _stands(state) + more)
 
 
 @register_jitable

@@ -96,11 +96,11 @@ def slope(points: Any) -> float:
 
 @register_jitable
 def spread(points: Any) -> float:
-    """How far readings spread for the voltage's spread, with the slope's sign [µm/V]; zero without any.
+    """How far readings spread for the voltage's spread [µm/V]; zero without any.
 
     The slope of least squares is this times the correlation, which a delay or a wide loop lowers.
     """
-    return np.sign(points.product) * np.sqrt(points.square_x / points.square) if points.square > 0.0 else 0.0
+    return np.sqrt(points.square_x / points.square) if points.square > 0.0 else 0.0
 
 
 @register_jitable
@@ -155,7 +155,7 @@ def _draw(line: Any, points: Any, leg: Any) -> None:
     # The first way may lead from rest to where the reference is, and no loop is round yet.
     least = SIGNED if line.legs > 1.0 else EXPLAINED
     if product * product > least * square * square_x and product * line.gain > 0.0:
-        line.gain *= min(max(spread(points) / line.gain, 1.0 / most), most)
+        line.gain *= min(max(spread(points) / np.abs(line.gain), 1.0 / most), most)
         if line.legs < 1.0 and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
             # What lags goes on while the voltage hardly moves.
             line.gain = CHANGE * line.first_gain
@@ -197,7 +197,7 @@ def turn(line: Any, direction: Any, leg: Any) -> None:
     line.held_gain, line.held_centre = line.last_gain, line.last_centre
     line.last_gain, line.last_centre = line.gain, line.centre
     if leg > SHORT * line.longest:
-        ratio = spread(now) / line.gain
+        ratio = np.sign(now.product) * spread(now) / line.gain
         agrees = explained(now) > SIGNED and 1.0 / ALIKE < ratio < ALIKE
         line.agreed = line.agreed + 1.0 if agrees else 0.5 * line.agreed
     if direction > 0.0:

@@ -172,7 +172,7 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> N
     moved = recent.square > (0.05 * readings.swing) ** 2
     clear = np.abs(line.gain) * readings.swing > 30.0 * np.sqrt(readings.noise)
     known = clear and moved
-    answer = np.sqrt(recent.square_x / recent.square) / np.abs(line.gain) if recent.square > 0.0 else 0.0
+    answer = lines.spread(recent) / np.abs(line.gain)
     # The way to the reference was wider than small legs, which are flat: what it has shown is not too much.
     steep = max(np.abs(line.first_gain / line.gain), 1.0) if line.legs < EARLY else 1.0
     slope, explained = lines.slope(recent) / line.gain, lines.explained(recent)

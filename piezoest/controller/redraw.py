@@ -94,8 +94,4 @@ def go_on(state: Any, settings: Any) -> None:
     """After a block: whatever it has changed is owed, so that the voltage goes on from where it is."""
     if not settings.minimum < state.u < settings.maximum:
         return
-    z = (state.r + state.feedback - state.zero) / state.unit
-    if state.driving > 0.0:
-        slots.owe(state.candidates, state.driving, z)
-    else:
-        state.owed = z - driving.line_z(state)
+    driving.stand_at(state, (state.r + state.feedback - state.zero) / state.unit)
