@@ -10,6 +10,8 @@ from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 from piezoest.controller import travel as travels
 
+# The line alone drives until it has seen a leg, or the voltage has come back this fraction of its first way.
+BACK = 0.5
 # What a change of model owes is paid within this fraction of a swing of the reference: faster, a loop through
 # the models would feed a resonance.
 PAID = 1.0 / 4.0
@@ -86,9 +88,14 @@ def owe(state: Any, more: Any) -> None:
 
 @register_jitable
 def _faked(state: Any) -> float:
-    """By how much late readings miss what is true: models learn it as if it were hysteresis."""
+    """By how much late readings miss what is true: models learn it as if it were hysteresis.
+
+    It is most where the reference is fastest, as on edges between rests.
+    """
     reference = state.reference
-    return state.start.lag / max(reference.usual, 1.0) * state.travel.swing
+    fastest = travels.in_swings(reference, reference.fastest)
+    late = state.start.lag * max(1.0 / max(reference.usual, 1.0), fastest)
+    return min(late, 1.0) * state.travel.swing
 
 
 @register_jitable
@@ -129,13 +136,15 @@ def _disappoints(state: Any) -> bool:
 
     A model can be right and still shake a resonance, which every model then misses alike.
     """
-    swing = travels.widest(state.travel)
-    if state.driving == 0.0:
-        if state.since > SEEN:
-            state.line_missed = candidate.missed(state.score) / swing
-            state.line_peak = state.score.peak / swing
+    if state.since <= SEEN:
         return False
-    return state.since > SEEN and candidate.missed(state.outcome) > state.line_missed * swing + _floor(state)
+    swing = travels.widest(state.travel)
+    missed, peak = candidate.missed(state.score) / swing, state.score.peak / swing
+    if state.driving > 0.0:
+        # What it missed on the first way, or before it was drawn anew, would excuse too much.
+        missed, peak = min(missed, state.line_missed), min(peak, state.line_peak)
+    state.line_missed, state.line_peak = missed, peak
+    return state.driving > 0.0 and candidate.missed(state.outcome) > missed * swing + _floor(state)
 
 
 @register_jitable
@@ -160,8 +169,17 @@ def _change(state: Any, chosen: Any) -> None:
 
 
 @register_jitable
+def _has_come_back(state: Any) -> bool:
+    """Whether the voltage has come back some of its way from the start."""
+    turned, origin = state.travel.turned, state.start.origin
+    return (turned - state.u) * np.sign(turned - origin) > BACK * state.confirmed
+
+
+@register_jitable
 def reconsider(state: Any, settings: Any) -> None:
     """Let the best model drive."""
+    if state.line.legs < 1.0 and not _has_come_back(state):
+        return
     chosen = 0.0 if _disappoints(state) else _choose(state, settings)
     if chosen != state.driving:
         _change(state, chosen)

@@ -25,8 +25,8 @@ from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
 from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK, is_held
 
-# Models are handed over after this fraction of a swing; legs of the line before another model drives.
-HAND_OVER, FIRST_LEGS = 1.0 / 8.0, 1.0
+# Models are handed over after this fraction of a swing.
+HAND_OVER = 1.0 / 8.0
 # The way to the reference is over within this fraction of its length, or after so many times what a doubling
 # takes: a fast reference is never caught.
 NEAR, LONGEST = 0.05, 50.0
@@ -39,9 +39,9 @@ BEYOND = 0.1
 # The models begin where the voltage is farther from where all began than this fraction of half the range, in
 # a unit that is usual then.
 WIDE, USUAL = 0.12, 0.4
-# Else in the second leg when it has gone this fraction of the first, if that was so many times as long as the
-# way of the start, or after the second leg. Their unit is no smaller than this fraction of that way.
-PASSED, LARGE, SMALLEST = 0.7, 4.0, 0.25
+# Else in the second leg when it has gone this fraction of the first way, or after it. Their unit is no smaller
+# than this fraction of the way of the start.
+PASSED, SMALLEST = 0.7, 0.25
 # Readings of a moved zero have at least this slope relative to the line's; they are near the reference by
 # so many swings if it has moved, too, or nearer than the line by this factor.
 LEAST_SLOPE, NEAR_IT, NEARER = 0.2, 0.6, 0.5
@@ -89,11 +89,12 @@ def _size_up(state: Any, settings: Any, u: Any) -> None:
         return
     if state.stage == APPROACH or travel.turns == 0.0:
         return
-    leg, way = np.abs(u - travel.turned), np.abs(state.start.target - state.start.from_u)
-    early = leg > PASSED * travel.leg > PASSED * LARGE * way
+    way = np.abs(state.start.target - state.start.from_u)
+    first = max(travel.leg, np.abs(travel.turned - origin))
+    early = travel.turns == 1.0 and np.abs(u - travel.turned) > PASSED * first > 0.0
     if early or travel.turns > 1.0:
         # Early, the second leg is expected to go on as far again.
-        state.scale = max(travel.leg if early else 0.5 * travel.leg, SMALLEST * way)
+        state.scale = max(first if early else 0.5 * travel.leg, SMALLEST * way)
         slots.begin(models, numbers, origin, travel.turned + travel.direction * state.scale, state.scale)
         slots.advance(models, numbers, travel.turned)
         slots.advance(models, numbers, u)
@@ -105,8 +106,7 @@ def _hand_over(state: Any, settings: Any) -> None:
     """Take up the estimators' models of now, and choose which drives; without a bump."""
     if state.scale > 0.0:
         slots.hand_over(state.candidates, settings.candidates)
-    if state.line.legs >= FIRST_LEGS:
-        driving.reconsider(state, settings)
+    driving.reconsider(state, settings)
 
 
 @register_jitable

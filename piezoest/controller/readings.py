@@ -74,6 +74,8 @@ EARLY = 8.0
 WEAK, WRONG, LARGE, HUGE, GOOD = 0.12, -0.3, 3.0, 30.0, 0.4
 # Points of which a line explains this share show a slope; the sign of one.
 STRAIGHT, SIGNED = 0.7, 0.4
+# A leg that is so many times as long as the longest of late is new ground.
+OUTGROWN = 3.0
 # Widest backlash, in swings.
 BACKLASH = 0.35
 # Of the widest swing this fraction counts after another turn: in the minor loops of a walk or of steps the
@@ -84,7 +86,7 @@ KEPT, ENOUGH = 0.9, 6.0
 # samples, or oscillate.
 MOST, MOST_STILL = 0.03, 0.01
 # For so many swings.
-WEAK_FOR, WRONG_FOR, LARGE_FOR, STOPPED_FOR, OFF_FOR = 0.35, 0.15, 0.15, 0.04, 0.3
+WEAK_FOR, WRONG_FOR, LARGE_FOR, STOPPED_FOR, OFF_FOR = 0.35, 0.15, 0.15, 0.06, 0.3
 # A zero that has moved has its name after so many swings, for what is late comes back after a turn; it is
 # followed after so many, if the reference has not moved with it.
 MOVED_FOR, HELD_FOR = 0.5, 24.0
@@ -145,6 +147,9 @@ def _size_up(readings: Any, line: Any, travel: Any) -> None:
     kept = KEPT if travel.turned_now != 0.0 else 1.0
     readings.swing = max(travel.swing, kept * readings.swing)
     readings.sure = max(min(line.agreed, ENOUGH), kept * readings.sure)
+    if np.abs((travel.last - travel.turned) * line.gain) > OUTGROWN * line.longest:
+        # Legs that were so much shorter say little of such a wide one.
+        readings.sure = line.agreed = 0.0
 
 
 @register_jitable

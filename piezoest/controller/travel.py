@@ -13,12 +13,12 @@ from piezoest.layout import COUNT, DISTANCE, FLAG, MEASURED, SIGN, record
 # Direction of travel, furthest value in it, where this leg began, length of the last leg; size of a usual
 # swing, least one before two turns were seen; turns so far, the last value, whether it has just turned;
 # samples of this leg, those since the furthest value, and those of the last leg; the farthest way back since
-# then; the extremes of late; whether each of the last two legs, this one and the last, is no longer than the
-# one before it.
+# then; the largest change of late from one sample to the next; the extremes of late; whether each of the last
+# two legs, this one and the last, is no longer than the one before it.
 TRAVEL = record(
     direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE, swing=DISTANCE, least=DISTANCE,
     turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, waits=COUNT, usual=COUNT,
-    back=DISTANCE, highest=MEASURED, lowest=MEASURED, nested=FLAG,
+    back=DISTANCE, fastest=DISTANCE, highest=MEASURED, lowest=MEASURED, nested=FLAG,
 )  # fmt: skip
 
 # A way back of this fraction of a swing is a turn; so many turns show a swing. Before, a smaller one is: the
@@ -33,6 +33,8 @@ LONG = 2.0
 SMALL, NOISE = 1e-3, 10.0
 # No swing counts for less than this fraction of the one before: noise at rest would.
 LEAST = 0.02
+# At each turn this fraction of the largest change of late is kept.
+SLOWER = 0.7
 # At each turn the extremes come nearer to the present leg by this fraction of the way there.
 FADES = 0.1
 
@@ -42,7 +44,7 @@ def begin(travel: Any, value: Any, least: Any) -> None:
     """Begin, or start again, at a value; no swing is smaller than `least` until two turns were seen."""
     travel.furthest = travel.turned = travel.last = travel.highest = travel.lowest = value
     travel.direction = travel.leg = travel.turns = travel.back = 0.0
-    travel.count = travel.waits = travel.usual = 0.0
+    travel.count = travel.waits = travel.usual = travel.fastest = 0.0
     travel.swing = travel.least = least
 
 
@@ -51,6 +53,7 @@ def follow(travel: Any, value: Any) -> float:
     """Follow the signal to its next value; how far it has gone since the last one."""
     gone = np.abs(value - travel.last)
     travel.last = value
+    travel.fastest = max(travel.fastest, gone)
     travel.turned_now = 0.0
     travel.count += 1.0
     travel.waits += 1.0
@@ -66,6 +69,7 @@ def follow(travel: Any, value: Any) -> float:
         travel.turns += 1.0
         swing = max(leg, travel.leg, LEAST * travel.swing, travel.least if travel.turns < SHOWN else 0.0)
         travel.turned_now = 1.0
+        travel.fastest *= SLOWER
         travel.usual = travel.count
         travel.count = travel.waits = travel.back = 0.0
         travel.nested = 1.0 if leg <= (1.0 + LONGER) * travel.leg else 0.0

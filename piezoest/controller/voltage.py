@@ -69,15 +69,18 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
 
 @register_jitable
 def _nearer(state: Any, settings: Any, target: Any) -> float:
-    """The next voltage on the way to a target: faster and faster from where all began, gently at the end."""
+    """The next voltage on the way to a target: faster and faster from where all began, gently at the end.
+
+    Where a way was answered it may go as fast: else it would never catch a reference that goes to and fro.
+    """
     start = state.start
-    span = max(np.abs(state.u - start.origin), np.abs(start.target - start.from_u))
+    span = max(np.abs(state.u - start.origin), state.confirmed)
     doubling = max(settings.doubling, LATE * start.lag)
     end = start.origin + AHEAD * np.sign(target - start.origin) * state.confirmed
     left = target - state.u
     if np.abs(target - start.origin) > np.abs(end - start.origin):
         left = end - state.u
-    way = min(max(span, state.confirmed / AHEAD), np.abs(left)) / doubling
+    way = min(span, np.abs(left)) / doubling
     if start.fastest > 0.0:
         way = min(way, FOLLOWED * start.fastest)
     return state.u + min(max(left, -way), way)
