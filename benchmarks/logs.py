@@ -4,7 +4,7 @@ Each log is drawn from its seed (`piezoest.bench.zoo.logs`) and judged by `log_j
 chosen stand the best candidate in hindsight, a gain and 20 plays by non-negative least squares, and a
 straight line.
 
-    python benchmarks/logs.py [--logs N] [--seed S] [--clean N] [--workers N] [--json FILE] [--rows FILE]
+    python benchmarks/logs.py [--logs N] [--seed S] [--clean N] [--jobs N] [--json FILE] [--rows FILE]
 
 A log takes about a second.
 """
@@ -135,17 +135,18 @@ def played(what: str, work: Callable[[int], Row], seeds: Sequence[int], workers:
 
 def main(
     logs: Annotated[int, typer.Option(min=1)] = 200, seed: int = 5000, clean: int = 50,
-    workers: int | None = None, json_to: Annotated[Path | None, typer.Option("--json")] = None,
+    jobs: Annotated[int | None, typer.Option("--jobs", "--workers")] = None,
+    json_to: Annotated[Path | None, typer.Option("--json")] = None,
     rows_to: Annotated[Path | None, typer.Option("--rows")] = None,
 ) -> None:  # fmt: skip
     """Fit LOGS, one for each seed from SEED on, and CLEAN Coleman-Hodgdon stages for the standard errors.
 
-    It takes WORKERS processes, one for each core. ROWS gets each log as a line of JSON, to compare two
+    It takes JOBS processes, one for each core. ROWS gets each log as a line of JSON, to compare two
     versions.
     """
     began = time.perf_counter()
-    rows = played("logs", judge, range(seed, seed + logs), workers)
-    pure = played("clean logs", clean_scores, range(seed, seed + clean), workers)
+    rows = played("logs", judge, range(seed, seed + logs), jobs)
+    pure = played("clean logs", clean_scores, range(seed, seed + clean), jobs)
     document = {
         "suite": "logs",
         **origin(began),

@@ -3,8 +3,8 @@
 Every run follows from its seed. Finished runs are kept in the folder; started again, the same command does
 the rest. What is written sums them up and is as small for many runs as for few.
 
-    python benchmarks/safety.py [--runs N] [--others N] [--map N] [--singles N] [--dwell N] [--workers N]
-                                [--out DIR] [--json FILE] [--figure FILE]
+    python benchmarks/safety.py [--runs N] [--others N] [--map N] [--singles N] [--dwell N] [--jobs N]
+                                [--output DIR] [--json FILE] [--figure FILE]
 
 A run takes about half a second.
 """
@@ -124,21 +124,22 @@ def draw(document: Row, path: Path) -> None:
 
 def main(
     runs: Count = 2000, others: Count | None = None, map: int = 0, singles: int = 0, dwell: int = 0,
-    seed: int = 0, workers: int | None = None, out: Path = Path("bench-results-safety"),
+    seed: int = 0, jobs: Annotated[int | None, typer.Option("--jobs", "--workers")] = None,
+    output: Annotated[Path, typer.Option("--output", "--out")] = Path("bench-results-safety"),
     json: Path | None = None, figure: Path | None = None,
 ) -> None:  # fmt: skip
     """Play RUNS rigs, one for each seed from SEED on, and OTHERS for what it is compared with.
 
     Besides, MAP seeds for each place of the map, SINGLES for each family and reference, and DWELL rigs that
-    rest for a minute; in WORKERS processes, one for each core. Finished runs are kept in OUT.
+    rest for a minute; in JOBS processes, one for each core. Finished runs are kept in OUTPUT.
     """
     began = time.perf_counter()
     others = min(runs, others or runs)
-    execute = over_cores(workers)
+    execute = over_cores(jobs)
 
     def play(what: str, planned: Sequence[Task]) -> list[Row]:
         with progress(f"runs of {what}", lines=True) as say:
-            return played(planned, out, execute, say.done)
+            return played(planned, output, execute, say.done)
 
     rows = {}
     for name, controller in CONTROLLERS.items():

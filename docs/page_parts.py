@@ -13,8 +13,10 @@ from typing import Any
 
 from piezoest._files import write_text
 from piezoest._tables import Columns, cells_of, shown
+from piezoest.bench import report
 from piezoest.bench.origin import machine_of
 from piezoest.bench.report import Table
+from piezoest.bench.scenarios import UNREPEATED
 
 DOCS = Path(__file__).resolve().parent
 
@@ -70,6 +72,27 @@ def part_of(of: Table, columns: Mapping[str, str]) -> Table:
     places = [of[0].index(name) for name in columns]
     rows = [[row[k] for k in places] for row in of[1] if not row[0].endswith(", tuned")]
     return list(columns.values()), rows
+
+
+def speed_table(document: Document) -> Table:
+    """How fast each estimator adapts on the first stage, and the share of runs that settle on the others."""
+    heading, body = part_of(report.overview_table(document), SPEED)
+    first, runs = document["plan"]["stages"][0], {}
+    for cell in document["cells"]:
+        if cell["stage"] != first and cell["scenario"] not in UNREPEATED:
+            name = document["estimators"][cell["estimator"]]["name"]
+            runs.setdefault(name, []).append((cell["settled_runs"], cell["runs"]))
+    for row in body:
+        settled, total = map(sum, zip(*runs.get(row[0], [(0, 0)]), strict=True))
+        row.insert(2, f"{100 * settled // total} %" if total else "—")
+    return [*heading[:2], "others settle", *heading[2:]], body
+
+
+def cold_start(document: Document) -> str:
+    """Error of the controller in the first period from a cold start, on the first stage [%]."""
+    at = ("AdaptiveFeedforward", "cold-start", document["plan"]["stages"][0])
+    cells = {(cell["estimator"], cell["scenario"], cell["stage"]): cell for cell in document["cells"]}
+    return report.percent(cells[at]["first"][0])
 
 
 def replacements(prefix: str, values: dict[str, Any], document: Document | None = None) -> str:

@@ -23,8 +23,9 @@ def pieces(document: Document) -> dict[str, str]:
             {
                 "model": lambda row: "▸ " * row["chosen"] + row["label"],
                 "parameters": "parameters",
-                "blocks": lambda row: f"{row['cross_validated_um']:.3f}",
+                "blocks": lambda row: f"{row['between_um']:.3f}",
                 "ahead": lambda row: f"{row['ahead_um']:.3f}",
+                "choice": lambda row: f"{row['cross_validated_um']:.3f}",
                 "held out": lambda row: f"{row['held_out']['rms_um']:.3f}",
                 "held out, largest": lambda row: f"{row['held_out']['max_um']:.2f}",
             },

@@ -2,7 +2,7 @@
 
 import re
 
-from page_parts import NEEDS, SPEED, Document, part_of, replacements, table
+from page_parts import NEEDS, Document, cold_start, part_of, replacements, speed_table, table
 
 from piezoest._tables import Columns, cells_of
 from piezoest.bench import report
@@ -13,9 +13,11 @@ SOURCES = ("table", "policies")
 
 def pieces(runs: Document, policies: Document) -> dict[str, str]:
     return {
-        "numbers": substitutions("table", runs) + substitutions("policies", policies),
+        "numbers": substitutions("table", runs)
+        + substitutions("policies", policies)
+        + replacements("cold", {"start": f"{cold_start(runs)} %"}),
         "overview": linked(report.overview_table(runs)),
-        "speed": linked(part_of(report.overview_table(runs), SPEED)),
+        "speed": linked(speed_table(runs)),
         "needs": linked(part_of(report.needs_table(runs), NEEDS)),
         "margins": linked(report.needs_table(runs)),
         "settles": linked(settles(runs)),

@@ -135,7 +135,8 @@ def instance(name: str, value: Any, classes: Any, expected: str) -> Any:
     """Return `value` if it is of one of the classes; `expected` says what they are, and what to do."""
     if not isinstance(value, classes):
         what, _, hint = expected.partition(": ")
-        raise ValueError(f"{name} must be {what}, got {type(value).__name__}{hint and f': {hint}'}")
+        got = f"the class {value.__name__}" if isinstance(value, type) else type(value).__name__
+        raise ValueError(f"{name} must be {what}, got {got}{hint and f': {hint}'}")
     return value
 
 
@@ -181,6 +182,8 @@ def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: 
         and value.size >= minimum_length
     ):
         return value
+    if value is None:
+        raise ValueError(f"{name} must be an array, got None")
     array = as_floats(name, value)
     if array.ndim != 1:
         shape = array.shape

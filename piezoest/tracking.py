@@ -219,7 +219,8 @@ def track(
     ------
     ValueError
         If r is not a finite 1-D array or jumps, no sample rate is known or two of them differ, that of
-        the compensator's limits among them, or there is a controller beside a compensator, or neither.
+        the compensator's limits among them, the stage has no step, or there is a controller beside a
+        compensator, or neither.
 
     Notes
     -----
@@ -239,6 +240,8 @@ def track(
     0.03
     """
     _check_driver(compensator, estimator, controller)
+    if not (hasattr(stage, "step") or hasattr(stage, "run")):
+        raise ValueError(f"stage must have step(u), or run(u), got {type(stage).__name__}")
     reference = array_1d("r", r, minimum_length=1)
     rate = _sample_rate(sample_rate, r=r, stage=stage, estimator=estimator, controller=controller)
     if not allow_jumps:

@@ -154,6 +154,7 @@ def test_a_model_goes_into_compensate_with_its_ranges(tmp_path: Path, monkeypatc
 def test_compensate_keeps_within_limits_and_says_so(reference: Path) -> None:
     result = run("compensate", reference, *THETA, "--maximum", 10, "--minimum", -8, "-o", "voltage.csv")
     assert result.exit_code == 0
+    assert "reference: column reference_um" in result.stdout
     assert "limit" in result.stderr
     assert "jumps" not in result.stderr
     u = read_record("voltage.csv", columns={"displacement": "reference_um"}).voltage
@@ -210,7 +211,7 @@ def test_mistakes_in_compensate(reference: Path) -> None:
     out = ("-o", "voltage.csv")
     refused(run("compensate", reference, *out), "no model")
     refused(run("compensate", reference, *THETA, "-o", "voltage.xlsx"), "voltage.xlsx", "no format")
-    refused(run("compensate", reference, "--alpha", 1, *out), "--beta --gamma")
+    refused(run("compensate", reference, "--alpha", 1, *out), "--beta and --gamma")
     refused(run("compensate", reference, "--alpha", 1, "--beta", 1, "--gamma", 9, *out), "not admissible")
     refused(run("compensate", reference, *THETA, "--minimum", 5, "--maximum", 1, *out), "must be below")
     refused(run("compensate", reference, "-p", "none.json", *out), "none.json")

@@ -10,6 +10,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import piezoest
@@ -58,6 +59,64 @@ def test_name_is_in_the_reference(name: str) -> None:
 def test_unknown_keyword_is_refused(name: str) -> None:
     with pytest.raises(TypeError, match="no_such_keyword"):
         MADE_BY_USERS[name](no_such_keyword=1)
+
+
+pz: Any = piezoest  # unchecked: what is asked here is wrong on purpose
+FS, LIMITS = 1000.0, pz.VoltageLimits(-50.0, 100.0)
+
+
+@pytest.mark.parametrize(
+    ("mistake", "words"),
+    [
+        (lambda: pz.HysteresisRLS.from_dict({}), "data has no 'estimator': pass what HysteresisRLS.to_dict"),
+        (
+            lambda: pz.HysteresisRLS(FS, memory="periods"),
+            'must be "period", a number of seconds or None, got',
+        ),
+        (lambda: pz.HysteresisRLS(FS, policies=("DeadZone",)), "such as policies.DeadZone(), got 'DeadZone'"),
+        (
+            lambda: pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=pz.HysteresisRLS),
+            "got the class Hyst",
+        ),
+        (lambda: pz.AdaptiveFeedforward.from_dict({}), "pass what AdaptiveFeedforward.to_dict() gave"),
+        (lambda: pz.PaperStage(FS).run(None), "must be an array, got None"),
+        (
+            lambda: pz.InverseCompensator(pz.ColemanHodgdon(-1.0, 1.0, 1.0)),
+            "alpha and beta must be above zero",
+        ),
+        (lambda: pz.Record.from_arrays([1.0, 2.0, 3.0], [1.0, 2.0], FS), "as long as the voltage, 3 samples"),
+        (lambda: pz.identify([np.nan] * 200, [0.0] * 200, sample_rate=FS), "voltage has no finite sample"),
+        (
+            lambda: pz.track([0.0], stage=object(), controller=1, sample_rate=FS),
+            "must have step(u), or run(u)",
+        ),
+        (lambda: pz.foo, "piezoest has no attribute 'foo'"),
+    ],
+)
+def test_messages_name_the_mistake(mistake: Any, words: str) -> None:
+    with pytest.raises((ValueError, AttributeError), match=re.escape(words)):
+        mistake()
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (
+            lambda: pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=()),
+            "(1000 Hz): seeking, line drives>",
+        ),
+        (lambda: pz.InverseCompensator(pz.LinearGain(0.5)), "<InverseCompensator: LinearGain(gain=0.5"),
+        (
+            lambda: pz.IntegralFeedback(pz.LinearCompensator(pz.LinearGain(0.5)), gain=5.0, sample_rate=FS),
+            "around <LinearCompensator",
+        ),
+        (lambda: pz.PaperStage(FS), "<PaperStage(1000 Hz): PrandtlIshlinskii>"),
+        (lambda: pz.RecursiveLeastSquares(2), "theta [0., 0.]>"),
+        (lambda: pz.EstimatorBank(pz.HysteresisRLS(FS), 3), "<EstimatorBank: 3 channels of HysteresisRLS>"),
+    ],
+)
+def test_texts_are_short(make: Any, text: str) -> None:
+    assert text in repr(make())
 
 
 @pytest.mark.parametrize("name", MADE_BY_USERS)

@@ -159,7 +159,7 @@ def test_round_trip_and_split(tmp_path: Path) -> None:
     assert second.time[0] == pytest.approx(0.15)
     with pytest.raises(ValueError, match="part"):
         record.split(1.5)
-    with pytest.raises(ValueError, match="displacement must have shape"):
+    with pytest.raises(ValueError, match="displacement must be as long as the voltage"):
         Record.from_arrays(VOLTAGE, DISPLACEMENT[:-1], 100.0)
 
 

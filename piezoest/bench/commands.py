@@ -41,7 +41,7 @@ def paper(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Start of the random numbers of the stage.")] = 0,
     quick: Annotated[bool, typer.Option("--quick", help="Without the sweep over the memory.")] = False,
-    workers: shared.Processes = None,
+    jobs: shared.Processes = None,
     html: shared.Html = None,
 ) -> None:
     """Tables I, II and III of the paper beside those of the simulated stage.
@@ -61,7 +61,7 @@ def paper(
             memory=MEMORY if memory is None else memory,
             memories=() if quick else MEMORIES,
             seed=seed,
-            workers=workers,
+            workers=jobs,
             progress=say.done,
         )
     document = {"suite": "paper", **origin(began), **result.to_dict()}

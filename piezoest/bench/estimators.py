@@ -31,9 +31,12 @@ PAPERS = "HysteresisRLS(memory=0.4, offset=True)"
 SLOW = ("BatchFit", "FilterPyEKF", "FilterPyUKF", "MovingHorizon")
 
 
-def defaults() -> list[str]:
-    """What is compared where nothing is asked for: the controller, every estimator, and the paper's law."""
-    names = [KNOWN.get(name, name) for name in found()]
+def defaults(*, drivers: bool = True) -> list[str]:
+    """What is compared where nothing is asked for: the controller, every estimator, and the paper's law.
+
+    `drivers`: also what drives a stage, which a log does not have.
+    """
+    names = [KNOWN.get(name, name) for name, cls in found().items() if drivers or not hasattr(cls, "learn")]
     names.insert(names.index("HysteresisRLS") + 1, PAPERS)
     return names
 

@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any
 
 from piezoest._tables import Columns, cells_of, number, print_cells, say
+from piezoest.bench.metrics import DIVERGED
 from piezoest.bench.origin import machine_of
 from piezoest.bench.recorded import LEARNT
 from piezoest.records.source import counted
@@ -144,6 +145,12 @@ def print_table(document: Document, console: Any, *, scenarios: bool = False) ->
             if row["diverged"]
         ),
     )
+    if any(row["diverged"] for row in document["overview"]):
+        say(
+            console,
+            f"A run diverges if it fails, or if its largest error exceeds {DIVERGED:g} times that of "
+            + ("a straight line." if on_logs(document) else "linear feed-forward after the first period."),
+        )
     failed = [*document["failures"], *document["tracebacks"]]
     say(console, *(f"failed: {failure}" for failure in failed), style="red")
 

@@ -79,7 +79,10 @@ class Written:
     """Where results go."""
 
     output: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder of the results, and of finished runs.")
+        Path,
+        typer.Option(
+            "--output", "--out", "-o", metavar="DIR", help="Folder of the results, and of finished runs."
+        ),
     ] = FOLDER
     table: shared.Format = None
 
@@ -88,14 +91,14 @@ class Written:
 def safety(
     which: Which,
     written: Written,
-    workers: shared.Processes = None,
+    jobs: shared.Processes = None,
     json_to: shared.Json = None,
 ) -> None:
-    """A controller on a zoo of rigs: stages of many kinds, and what goes wrong with them, at random.
+    """A controller on random rigs: stages of many kinds, and what goes wrong with them.
 
     Each run is a function of its seed. A run is safe if the voltage is finite, within its limits, rests at
-    none of them without need, and the error stays below 1.5 times that of the best straight line. Stopped and
-    started again, it goes on where it was.
+    none of them without need, and the error is not clearly larger than that of the best straight line; the
+    page Safety on unknown rigs defines this. Stopped and started again, it goes on where it was.
     """
     shared.check(json_to)
     began, asked = time.perf_counter(), which.asked
@@ -117,7 +120,7 @@ def safety(
             campaign = _campaign(which, name, given)
             format = tables.checked_format(written.table)
         with shared.usage(written.output), progress("runs", lines=True) as say:
-            rows = played(campaign.tasks, written.output, tasks.over_cores(workers), say.done)
+            rows = played(campaign.tasks, written.output, tasks.over_cores(jobs), say.done)
     document = {"suite": "safety", **origin(began), "controller": name, "given": given}
     tables.write_table(
         tables.table_of(campaign.rows(rows)),

@@ -18,7 +18,9 @@ Json = Annotated[
     str | None, typer.Option("--json", metavar="FILE", help="Write JSON; - prints it instead of the tables.")
 ]
 
-Processes = Annotated[int | None, typer.Option(min=1, help="Processes; default one for each core.")]
+Processes = Annotated[
+    int | None, typer.Option("--jobs", "--workers", min=1, help="Processes; default one for each core.")
+]
 Format = Annotated[
     str | None, typer.Option(help="parquet or csv; default Parquet where pyarrow is installed.")
 ]

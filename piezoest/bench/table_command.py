@@ -190,8 +190,8 @@ def _plan(runs: Runs) -> Any:
     given = dict(table.QUICK) if runs.quick else {}
     if runs.sample_rate is not None:
         given["sample_rate"] = runs.sample_rate
-    named = [KNOWN.get(name, name) for name in runs.only] if runs.only else defaults()
     logs = logs_of(runs.logs) if runs.logs else []
+    named = [KNOWN.get(name, name) for name in runs.only] if runs.only else defaults(drivers=not logs)
     seeds = runs.seeds or (1 if runs.quick else SEEDS)
     return table.Plan(
         estimators=tuple(dict.fromkeys([*named, *(runs.estimator or [])])),
@@ -208,7 +208,8 @@ def compare(
     before: Annotated[Path, typer.Argument(metavar="A", help="Folder of a campaign.")],
     after: Annotated[Path, typer.Argument(metavar="B", help="Folder of another.")],
     level: Annotated[
-        float, typer.Option(min=0.0, max=1.0, help="Share of the changes found that may be none.")
+        float,
+        typer.Option(min=0.0, max=1.0, help="Allowed share of false alarms among the reported changes."),
     ] = 0.05,
     relevant: Annotated[float, typer.Option(min=0.0, help="Least relative change that counts.")] = 0.01,
     everything: Annotated[bool, typer.Option("--all", help="Print what did not change too.")] = False,

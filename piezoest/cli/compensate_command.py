@@ -84,19 +84,21 @@ def compensate(
             import numpy as np
 
             from piezoest.compensators import InverseCompensator, VoltageLimits
-            from piezoest.records import read_reference, write_columns, writer_for
+            from piezoest.records import write_columns, writer_for
+            from piezoest.records.record import named_reference
             from piezoest.signals import check_continuity
 
             writer_for(output)  # refuses a name before the work is done
             learnt = _model(stated)
             given = {name: value for name, value in asdict(limits).items() if value is not None}
             voltage_limits = VoltageLimits(**given)
-            signal = read_reference(reference, column=column, sample_rate=sample_rate)
+            signal, title = named_reference(reference, column, sample_rate)
             compensator = InverseCompensator(learnt.model, voltage_limits, sample_rate=signal.sample_rate)
             check_continuity(signal.values, signal.sample_rate, "the reference")
             voltage = compensator.run(signal.values)
             columns = {"time_s": signal.time, "voltage_V": voltage, "reference_um": signal.values}
             write_columns(output, columns, allow_nan=False)
+        typer.echo(f"reference: column {title}")
         typer.echo(
             f"{output}: {voltage.size} samples at {signal.sample_rate:.6g} Hz, "
             f"{voltage.min():.4g} to {voltage.max():.4g} V"
@@ -131,8 +133,8 @@ def _model(stated: Stated) -> LearntModel:
     options = {"alpha": stated.alpha, "beta": stated.beta, "gamma": stated.gamma}
     given = {name: value for name, value in options.items() if value is not None}
     if path is None:
-        if missing := sorted(set(options) - set(given)):
-            raise ValueError(f"no model: pass --parameters FILE, or also --{' --'.join(missing)}")
+        if len(given) < len(options):
+            raise ValueError("no model: pass --parameters FILE, or --alpha, --beta and --gamma")
         return LearntModel(ColemanHodgdon(**given, offset=offset or 0.0))
     if given:
         raise ValueError(f"two models: leave out --parameters or --{' --'.join(given)}")

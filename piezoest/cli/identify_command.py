@@ -71,7 +71,7 @@ class Fitting:
         ),
     ] = "auto"
     train: Annotated[
-        float, typer.Option(min=0.1, max=0.9, help="Part to fit, from the start; the rest is held out.")
+        float, typer.Option(min=0.1, max=0.9, help="Fraction to fit, from the start; the rest is held out.")
     ] = 0.5
     delay: Annotated[
         str, typer.Option(help="Samples by which the displacement lags the voltage, or auto.")

@@ -84,6 +84,10 @@ class Compensator(Copied):
         self._start = model
         self.reset()
 
+    def __repr__(self) -> str:
+        """Class and model."""
+        return f"<{type(self).__name__}: {self.model}>"
+
     @property
     def state(self) -> Any:
         """Its state: a NumPy structured array with named fields, such as ``state["voltage"]``."""
@@ -314,6 +318,10 @@ class AroundCompensator(Copied):
     def __init__(self, compensator: Compensator) -> None:
         expected = "a LinearCompensator or an InverseCompensator"
         self._compensator = instance("compensator", compensator, Compensator, expected)
+
+    def __repr__(self) -> str:
+        """Class, and what it is around."""
+        return f"<{type(self).__name__} around {self._compensator!r}>"
 
     @property
     def model(self) -> Model:

@@ -266,7 +266,7 @@ class AdaptiveFeedforward(Face):
             self._learn_block(self._planned, u, x)
         elif (isinstance(u, np.ndarray) and u.size > 1) or (isinstance(u, list | tuple) and len(u) > 1):
             raise ValueError(
-                f"u must be one number, got {len(u)}: a block is planned by run(r) before it is learnt from"
+                f"u must be one number, got {len(u)} values: call run(r) for the block before learn(u, x)"
             )
         else:
             u = u if type(u) is float else number_or_nan(u)

@@ -27,6 +27,13 @@ class Face:
     _settings: Any
     _state: Any
 
+    def __repr__(self) -> str:
+        """Class, sample rate, and how it stands."""
+        status = self.status
+        fault = f", {status.fault}" if status.fault else ""
+        name = type(self).__name__
+        return f"<{name}({self.sample_rate:g} Hz): {status.stage}, {status.driving} drives{fault}>"
+
     @property
     def sample_rate(self) -> float:
         """[Hz]."""

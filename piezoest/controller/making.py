@@ -40,7 +40,8 @@ def known_gain(gain: Any, stroke: Any, model: LearntModel | None, limits: Voltag
     given = {"gain": gain, "stroke": stroke, "model": model}
     names = [name for name, value in given.items() if value is not None]
     if len(names) > 1:
-        raise ValueError(f"{' and '.join(names)} all say the gain: pass one of them")
+        both = "both" if len(names) == 2 else "all"
+        raise ValueError(f"{' and '.join(names)} {both} give the gain: pass one of them")
     if gain is not None:
         return _gain("gain", gain)
     if stroke is not None:

@@ -24,7 +24,7 @@ def check_head(name: str, data: Any) -> None:
     """Refuse what is no dictionary of a controller of this version."""
     instance("data", data, dict, "a dictionary that to_dict() gave")
     if "controller" not in data:
-        raise ValueError('data has no "controller": pass what to_dict() of a controller gave')
+        raise ValueError(f"data has no 'controller': pass what {name}.to_dict() gave")
     if data["controller"] != name:
         raise ValueError(f"data is of a {data['controller']!r}, not of a {name}")
     if data.get("format") != FORMAT:

@@ -50,7 +50,7 @@ class Event:
     Parameters
     ----------
     time : float
-        Seconds since its start.
+        Time since its start [s].
     action : str
         ``"fell back"`` (to a line, for the readings are at fault), ``"resumed"`` or ``"went on"``.
     reason : str

@@ -68,6 +68,10 @@ class EstimatorBank(Copied):
         self._start = self._reader.state.copy()
         self._states = np.repeat(self._start[np.newaxis], channels)
 
+    def __repr__(self) -> str:
+        """Class, number of channels, and the kind of estimator."""
+        return f"<{type(self).__name__}: {len(self)} channels of {type(self._reader).__name__}>"
+
     def __len__(self) -> int:
         """Return the number of channels."""
         return len(self._states)

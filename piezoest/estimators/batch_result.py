@@ -42,7 +42,7 @@ class BatchFitResult(Outcome):
     evaluations : int
         Passes over the record that the solver took.
     seconds : float
-        Time that the fit took.
+        Time that the fit took [s].
     method : str
         ``"single-shooting"`` or ``"multiple-shooting"``.
     """

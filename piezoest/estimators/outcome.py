@@ -86,9 +86,9 @@ class Trace:
         Covariance, if asked for.
     """
 
-    index: np.ndarray[Any, np.dtype[np.int64]]
-    theta: FloatArray
+    index: np.ndarray[Any, np.dtype[np.int64]] = field(repr=False)
+    theta: FloatArray = field(repr=False)
     parameter_names: tuple[str, ...]
-    y: FloatArray | None = None
-    S: FloatArray | None = None
+    y: FloatArray | None = field(default=None, repr=False)
+    S: FloatArray | None = field(default=None, repr=False)
     P: FloatArray | None = field(default=None, repr=False)

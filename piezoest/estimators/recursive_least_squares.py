@@ -93,6 +93,11 @@ class RecursiveLeastSquares(Copied):
         self._state = new(layout, law={"theta": start, "P": P_0})
         self._layouts = (layout, settings_layout)
 
+    def __repr__(self) -> str:
+        """Class and parameters."""
+        theta = np.array2string(self.theta, precision=4, separator=", ", threshold=6, edgeitems=2)
+        return f"<{type(self).__name__}: theta {theta}>"
+
     def update(self, z: float, phi: Any) -> None:
         """Take one sample.
 

@@ -122,6 +122,8 @@ class HysteresisRLS(Freezable):
         initial = self._start_from(initial_model, ColemanHodgdon, LinearGain, admissible=False)
         if np.any(initial.theta == 0.0):
             raise ValueError(f"initial_model must have no parameter at zero, got {initial}")
+        if isinstance(memory, str) and memory != "period":
+            raise ValueError(f'memory must be "period", a number of seconds or None, got {memory!r}')
         if memory is not None and memory != "period":
             memory = moderate("memory", memory)
         if not isinstance(offset, bool | None):

@@ -118,8 +118,10 @@ def check_head(name: str, version: int, data: Any, more: tuple[str, ...]) -> Non
     """Refuse a dictionary that is not of the class `name` and this version's format."""
     if not isinstance(data, dict):
         raise ValueError(f"data must be a dictionary that to_dict() gave, got {type(data).__name__}")
-    if data.get("estimator") != name:
-        raise ValueError(f"data is of a {data.get('estimator')!r}, not of a {name}")
+    if "estimator" not in data:
+        raise ValueError(f"data has no 'estimator': pass what {name}.to_dict() gave")
+    if data["estimator"] != name:
+        raise ValueError(f"data is of a {data['estimator']!r}, not of a {name}")
     if data.get("format") != version:
         raise ValueError(f"data has format {data.get('format')!r}, this version reads {version}")
     fields("data", data, ("estimator", "format", "arguments", "state", "pending", *more))

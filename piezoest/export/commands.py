@@ -108,8 +108,8 @@ def c(
 def adaptive(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for header and source.")],
     sample_rate: Annotated[float, typer.Option(help="Samples per second of the controller.")],
-    minimum: Annotated[float, typer.Option(help="Least voltage that stage and amplifier bear [V].")],
-    maximum: Annotated[float, typer.Option(help="Largest one [V].")],
+    minimum: Annotated[float, typer.Option(help="Lowest voltage that stage and amplifier bear [V].")],
+    maximum: Annotated[float, typer.Option(help="Highest voltage that stage and amplifier bear [V].")],
     written: Written,
     slew_rate: Annotated[float | None, typer.Option(help="Largest change of voltage [V/s].")] = None,
     estimators: Annotated[
@@ -207,6 +207,8 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
             raise ValueError(f"{path}: its estimator is not what to_dict() gave: {error}") from None
     if estimator is not None and described is data:
         return estimator.model, estimator, limits
+    if "model" not in described:
+        raise ValueError(f"{path} names no model: expected the JSON that identify --output wrote")
     try:
         return model_from_dict(described), estimator, limits
     except ValueError as error:

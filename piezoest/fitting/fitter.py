@@ -63,7 +63,7 @@ def fit(
     flaws : Flaws, optional
         Spikes, dropouts and jumps; by default they are looked for.
     settle : float, optional
-        Seconds to leave out at the start; by default as long as it is off by more than four robust standard
+        Time to leave out at the start [s]; by default as long as it is off by more than four robust standard
         deviations, at most a tenth.
 
     Returns

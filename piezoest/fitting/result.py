@@ -21,6 +21,10 @@ class Prediction(NamedTuple):
     lower: FloatArray
     upper: FloatArray
 
+    def __repr__(self) -> str:
+        """Number of samples, and the widest bounds."""
+        return f"<Prediction of {self.x.size} samples, within {np.max(self.upper - self.lower) / 2.0:.3g} µm>"
+
 
 @dataclass(frozen=True)
 class Fit:

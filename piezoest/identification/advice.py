@@ -98,7 +98,7 @@ def _centre(found: Identification, data: Data) -> list[str]:
     if abs(data.middle) > 0.1 * data.extent or abs(centre) > 0.1 * float(np.ptp(x)):
         said.append(
             f"The loop is not centred at zero (voltage {data.middle:.3g} V, displacement {centre:.4g} µm): "
-            "let estimators find the offset, as HysteresisRLS does by default."
+            "set offset=True for estimators; HysteresisRLS does so by default."
         )
     turns = turning_voltages(data)
     tops = np.abs(turns - data.middle)
@@ -112,8 +112,8 @@ def _remainder(found: Identification, data: Data) -> list[str]:
     floor, error = found.noise_floor, min(found.best.cross_validated, found.held_out.rms)
     if error > ABOVE_NOISE * floor:
         said.append(
-            f"Between the noise of {floor:.2g} µm rms and the error of {error:.2g} µm lies what no model "
-            "here explains."
+            f"The error ({error:.2g} µm rms) is larger than the noise ({floor:.2g} µm): no model here "
+            "explains the rest."
         )
     if not found.whiteness.is_white:
         said.append(

@@ -22,7 +22,10 @@ def best_of(candidates: Sequence[Candidate]) -> Candidate:
 def reason_for(candidates: Sequence[Candidate], best: Candidate) -> str:
     """Why that one, with the figures; candidates come from the simplest to the richest."""
     line, error = candidates[0], best.cross_validated
-    said = f"{best.label}: {error:.3g} µm rms on blocks left out of the fit"
+    said = (
+        f"{best.label}: {error:.3g} µm rms in the choice (geometric mean of the errors on "
+        "blocks left out and on blocks ahead)"
+    )
     if best is not line and 0.0 < error < line.cross_validated:
         said += f", {100.0 * (1.0 - error / line.cross_validated):.0f} % less than a straight line"
     rival = min(candidates, key=lambda item: item.cross_validated)

@@ -24,9 +24,9 @@ class Table(NamedTuple):
 
 def tables(found: Found) -> Iterator[Table]:
     """The kinds that were fitted, the parameters of the one to use, and its errors on other logs, if any."""
-    errors = ("fitted\nrms", "blocks\nleft out", "held out\nrms", "held out\nlargest")
+    errors = ("fitted\nrms", "choice", "held out\nrms", "held out\nlargest")
     kinds = [kind.cells() for kind in found.kinds]
-    yield Table("Free-running error [µm]", ("model", "n", *errors), kinds)
+    yield Table("Error of the simulated displacement [µm]", ("model", "n", *errors), kinds)
     parameters = [
         (name, f"{value * (abs(value) > NEXT_TO_ZERO):.6g}", f"{error:.2g}" if error > 0.0 else "–", unit)
         for name, value, error, unit in found.table()

@@ -60,7 +60,7 @@ def draw(shown: Drawn) -> Figure:
     voltage.plot(record.time[thin], record.voltage[thin], lw=0.8, color="C2")
     voltage.set_ylabel("voltage [V]")
     series.plot(record.time[thin], record.displacement[thin], lw=1.8, color="0.7", label="measured")
-    series.plot(record.time[thin], shown.prediction[thin], lw=0.8, color="C0", label="model, free-running")
+    series.plot(record.time[thin], shown.prediction[thin], lw=0.8, color="C0", label="model")
     series.set_ylabel("displacement [µm]")
     _draw_residual(residual, shown, thin)
     for axes in (voltage, series, residual):
@@ -107,7 +107,7 @@ def _draw_kinds(axes: Any, kinds: tuple[Kind, ...]) -> None:
     places = np.arange(len(kinds))
     chosen = next(k for k, kind in enumerate(kinds) if kind.chosen)
     axes.axhspan(chosen - 0.5, chosen + 0.5, color="C0", alpha=0.15, lw=0)
-    axes.plot([kind.left_out for kind in kinds], places, "D", color="C0", label="blocks left out")
+    axes.plot([kind.left_out for kind in kinds], places, "D", color="C0", label="choice")
     held_out = [np.nan if kind.held_out is None else kind.held_out.rms for kind in kinds]
     axes.plot(held_out, places, "o", color="C1", label="held out")
     axes.set(xscale="log", yticks=places, ylim=(len(kinds) - 0.5, -0.5), xlabel="error [µm rms]")

@@ -75,7 +75,7 @@ def identify(
         Only swings of several sizes or frequencies, or steps, show the difference between a delay and a wider
         loop: see ``delay_known`` of the result.
     settle : float, optional
-        Seconds to leave out at the start. Default: while the error exceeds four robust standard deviations,
+        Time to leave out at the start [s]. Default: while the error exceeds four robust standard deviations,
         at most a tenth of the fitted part.
     validate : sequence
         Other logs of the stage, each a record, a file or a table, which the model predicts. They are checked
@@ -118,6 +118,8 @@ def identify(
     for each, its in validated:
         _enough("part to validate", each, judged(each, its))
     say("looking at the log")
+    if not np.any(np.isfinite(record.voltage)):
+        raise ValueError(f"{record.source}: voltage has no finite sample: check the column")
     trained = round(train * len(record))
     flaws = flawed(record.voltage, record.displacement)
     counts = judged(record, flaws, trained)

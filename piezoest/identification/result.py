@@ -45,7 +45,7 @@ class Candidate:
     fit : Fit
         The fit.
     train, held_out : Misfit
-        Free-running error where it was fitted and where it was not.
+        Error of the simulated displacement where it was fitted and where it was not.
     prediction : Prediction
         Simulated displacement over the record, and the bounds within which readings are expected [µm].
     residual : ndarray, shape (N,)
@@ -247,7 +247,7 @@ class Identification:
 
     @property
     def prediction(self) -> FloatArray:
-        """Free-running displacement [µm], shape (N,)."""
+        """Simulated displacement [µm], shape (N,)."""
         return self.best.prediction.x
 
     @property
@@ -304,7 +304,7 @@ class Identification:
         *others : Identification
             What to compare with.
         """
-        heads = ("log", "model", "held out [µm rms]", "blocks left out [µm rms]", "noise [µm rms]")
+        heads = ("log", "model", "held out [µm rms]", "choice [µm rms]", "noise [µm rms]")
         rows: list[tuple[str, ...]] = [heads]
         for each in (self, *others):
             figures = (each.held_out.rms, each.best.cross_validated, each.noise_floor)
@@ -355,11 +355,12 @@ class Identification:
         """Return parameters, errors and advice as text."""
         lines = [repr(self)[1:-1]]
         lines += [
-            f"{name:>8} {value:12.6g} ± {error:.2g} {unit}" for name, value, error, unit in self.table()
+            f"{name:>8} {value:12.6g}{f' ± {error:.2g}' if error > 0.0 else ''} {unit}"
+            for name, value, error, unit in self.table()
         ]
         lines += [
             f"{each.label:>28}: {each.held_out.rms:.4g} µm rms held out, "
-            f"{each.cross_validated:.4g} on blocks left out"
+            f"{each.cross_validated:.4g} in the choice"
             for each in self.candidates
         ]
         return "\n".join([*lines, self.reason, *self.advice])

@@ -67,7 +67,7 @@ class StreamedIdentification:
     thinned : Record
         Every k-th sample, for figures.
     prediction : ndarray
-        Free-running displacement [µm] at the samples of `thinned`.
+        Simulated displacement [µm] at the samples of `thinned`.
     findings : tuple of Finding
         What is odd about the fitted part's first 50 000 samples.
     notes, advice : tuple of str
@@ -321,7 +321,7 @@ def _fits(
 
 
 class _Judge:
-    """Free-running errors of a model and of a line, block by block in order, and points for figures."""
+    """Errors of a simulated model and of a line, block by block in order, and points for figures."""
 
     def __init__(self, fitted: Fitted, line: Fitted, samples: int, trained: slice) -> None:
         self._fits = (fitted, line)

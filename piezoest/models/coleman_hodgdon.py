@@ -70,7 +70,8 @@ class ColemanHodgdon(FreeRunning):
     parameter_units: ClassVar[tuple[str, ...]] = ("1/V", "µm/V", "µm/V²")
     inverse: ClassVar[Any] = loop_inverse
     remedy: ClassVar[str] = (
-        "gamma must be between alpha·beta and 2·alpha·beta, where nearest_admissible() moves it"
+        "alpha and beta must be above zero, and gamma between alpha·beta and 2·alpha·beta; "
+        "nearest_admissible() moves it there"
     )
 
     def __post_init__(self) -> None:

@@ -77,6 +77,12 @@ class Preisach(Model):
             centre=finite("centre", centre), width=positive("width", width), offset=finite("offset", offset),
         )  # fmt: skip
 
+    def __repr__(self) -> str:
+        return (
+            f"Preisach(gain={self.gain:.4g}, {self.thresholds.size} thresholds, centre={self.centre:.4g}, "
+            f"width={self.width:.4g}, offset={self.offset:.4g})"
+        )
+
     @property
     def parameter_names(self) -> tuple[str, ...]:  # type: ignore[override]
         """Names of the entries of `theta`."""

@@ -37,7 +37,8 @@ def default_policies(memory: Any, has_loop: bool) -> tuple[Policy, ...]:
 def check_policies(policies: tuple[Policy, ...], at: Conditions) -> tuple[Policy, ...]:
     """Return policies, if there is one of each, and one way to forget, and all go with their conditions."""
     for policy in instance("policies", policies, tuple | list, "a tuple of policies"):
-        instance("policies", policy, Policy, "made of policies: see piezoest.policies")
+        if not isinstance(policy, Policy):
+            raise ValueError(f"policies must hold policies such as policies.DeadZone(), got {policy!r}")
         same = [other for other in policies if type(other) is type(policy)]
         if len(same) > 1:
             raise ValueError(f"policies holds {len(same)} of {type(policy).__name__}: pass one")

@@ -13,7 +13,7 @@ import numpy as np
 from piezoest._checks import FloatArray, array_1d, fraction, positive
 from piezoest.records.frame import frame_source
 from piezoest.records.source import counted
-from piezoest.records.stream import RecordStream, sane, without_gaps
+from piezoest.records.stream import RecordStream, sane, title_of, without_gaps
 from piezoest.records.writing import write_columns
 
 if TYPE_CHECKING:
@@ -58,8 +58,9 @@ class Record:
             values = array_1d(name, getattr(self, name), allow_nan=name != "time", minimum_length=2)
             object.__setattr__(self, name, values if name == "time" else sane(values))
             if values.size != self.time.size:
+                other = "time" if name == "voltage" else "voltage"
                 raise ValueError(
-                    f"{name} must have shape ({self.time.size},) as time has, got ({values.size},)"
+                    f"{name} must be as long as the {other}, {self.time.size} samples, got {values.size}"
                 )
         object.__setattr__(self, "sample_rate", positive("sample_rate", self.sample_rate))
 
@@ -119,6 +120,8 @@ class Record:
 
         Examples
         --------
+        >>> import numpy as np, pandas as pd
+        >>> from piezoest import Record
         >>> frame = pd.DataFrame({"t_ms": np.arange(20.0), "u": np.arange(20.0), "x_nm": np.ones(20)})
         >>> Record.from_frame(frame).sample_rate
         1000.0
@@ -313,6 +316,13 @@ def read_reference(
     ValueError
         As `read_record`; also if the reference has gaps, which a voltage cannot have.
     """
+    return named_reference(path, column, sample_rate)[0]
+
+
+def named_reference(
+    path: str | Path, column: str | None = None, sample_rate: float | None = None
+) -> tuple[Signal, str]:
+    """Read a reference as `read_reference` does, and the title of the column that it is in."""
     from piezoest.signals import Signal
 
     log = RecordStream(
@@ -322,4 +332,4 @@ def read_reference(
         wanted=("reference",),
         held=True,
     )
-    return Signal(without_gaps(log), log.sample_rate, None, Path(path).stem)
+    return Signal(without_gaps(log), log.sample_rate, None, Path(path).stem), title_of(log, "reference")

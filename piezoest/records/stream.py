@@ -148,6 +148,7 @@ class RecordStream:
 
         Examples
         --------
+        >>> import piezoest as pz
         >>> log = pz.stream_record(pz.records.example_log())
         >>> for block in log.blocks(progress=lambda done, total: print(f"{done / total:.0%}")):
         ...     pass
@@ -307,6 +308,11 @@ def _notes(source: Source, chosen: dict[str, Column]) -> list[str]:
         units = ", ".join(BASE_UNITS[quantity] for quantity in chosen)
         said.insert(0, f"columns without names: taken as {names}, in {units}")
     return said
+
+
+def title_of(log: RecordStream, quantity: str) -> str:
+    """Title of the column that a quantity is read from."""
+    return log._chosen[quantity].title
 
 
 def without_gaps(log: RecordStream) -> FloatArray:

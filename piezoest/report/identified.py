@@ -70,7 +70,7 @@ def _cards(found: Found, label: str) -> list[tuple[str, str]]:
     held, line = found.held_out.rms, found.line_held_out.rms
     cards = [
         (label, "the model to use"),
-        (f"{held:.3g} µm", "free-running error, held out, rms"),
+        (f"{held:.3g} µm", "error of the simulated displacement, held out, rms"),
         (f"{found.held_out.max:.3g} µm", "the same, largest"),
     ]
     if found.chosen == "line" or line == 0.0:

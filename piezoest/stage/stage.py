@@ -156,6 +156,10 @@ class SimulatedStage(Copied):
         kept, slots = cast(Any, super().__getstate__())
         return kept, {**slots, "_step_loop": None, "_run_loop": None}
 
+    def __repr__(self) -> str:
+        """Class, sample rate and kind of hysteresis."""
+        return f"<{type(self).__name__}({self.sample_rate:g} Hz): {type(self._hysteresis).__name__}>"
+
     @property
     def sample_rate(self) -> float:
         """Sample rate [Hz]."""

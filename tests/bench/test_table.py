@@ -20,6 +20,7 @@ from piezoest.bench.origin import fingerprint
 from piezoest.bench.pages import write_html
 from piezoest.bench.run import COLUMNS, Task, code_of, crashed, play
 from piezoest.bench.store import FILE, Store, played
+from piezoest.bench.table_command import Runs, _plan
 from piezoest.records import Record
 from tests.bench.shared import SMALL, bench, own_module, said
 
@@ -237,6 +238,9 @@ def test_recorded_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     document = table.describe(rows, asked, {})
     assert {row["estimator"]: row["failures"] for row in document["overview"]}["HysteresisRLS"] == 1
     write_html(document, "logs.html")  # which has no stage to speak of
+    asked = _plan(Runs(logs="fleet"))
+    assert "HysteresisRLS" in asked.estimators
+    assert "AdaptiveFeedforward" not in asked.estimators  # it needs a stage
     assert "drives a stage" in play(Task(logs[0], "AdaptiveFeedforward", 0))["failure"]
     write_log(Path("fleet/a.csv"), 7)
     recorded.digest.cache_clear()

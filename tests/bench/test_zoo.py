@@ -182,7 +182,7 @@ def test_the_map_counts_periods() -> None:
 
 
 def test_the_command_goes_on_where_it_was(tmp_path: Path) -> None:
-    options = ("--workers", 1, "--out", tmp_path, "--table", "csv", "--controller", "parts")
+    options = ("--jobs", 1, "--output", tmp_path, "--table", "csv", "--controller", "parts")
     first = safety("--runs", 2, *options, *GIVEN)
     assert first.exit_code == 0, first.output
     assert "0 of 2 runs" in first.output
@@ -197,14 +197,14 @@ def test_the_command_goes_on_where_it_was(tmp_path: Path) -> None:
 
 
 def test_the_command_draws_a_run(tmp_path: Path) -> None:
-    result = safety("--show", 3, "--out", tmp_path, "-c", "parts", *GIVEN)
+    result = safety("--show", 3, "--output", tmp_path, "-c", "parts", *GIVEN)
     assert result.exit_code == 0, result.output
     assert (tmp_path / "run-3.png").stat().st_size > 20_000
     assert "backlash" in result.output
 
 
 def test_controllers_of_ones_own(own: str, tmp_path: Path) -> None:
-    result = safety("--runs", 2, "--workers", 1, "-c", f"{own}:Breaks", "--out", tmp_path / "a", *GIVEN)
+    result = safety("--runs", 2, "--jobs", 1, "-c", f"{own}:Breaks", "--output", tmp_path / "a", *GIVEN)
     assert result.exit_code == 0, result.output
     document = json.loads((tmp_path / "a" / "safety.json").read_text(encoding="utf-8"))
     assert document["violations"]["failed"] == 2
@@ -253,6 +253,6 @@ def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_run_is_said(arguments: list[str], words: str, tmp_path: Path) -> None:
-    result = safety(*arguments, "--out", tmp_path)
+    result = safety(*arguments, "--output", tmp_path)
     assert result.exit_code == 2
     assert words in said(result)

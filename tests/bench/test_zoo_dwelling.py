@@ -79,7 +79,7 @@ def test_what_breaks_is_a_row() -> None:
 
 def test_the_command_plays_it(tmp_path: Path) -> None:
     """By a controller that takes no feedback, so half of the runs fail."""
-    words = ["safety", "--dwell", 1, "-c", "parts", "--workers", 1, "--table", "csv", "--out", tmp_path]
+    words = ["safety", "--dwell", 1, "-c", "parts", "--jobs", 1, "--table", "csv", "--output", tmp_path]
     result = bench(*words, columns=160)
     assert result.exit_code == 0, result.output
     assert "After a rest of 60 s" in result.output

@@ -131,7 +131,7 @@ def test_floor_is_the_least_eigenvalue() -> None:
         ({"P": [1.0, -1.0]}, "positive definite"),
         ({"P": [[1.0, 0.5], [0.0, 1.0]]}, "symmetric"),
         ({"time_base": "continuous", "noise_variance": 2.0}, "noise_variance must be 1"),
-        ({"policies": ("forgetting",)}, "must be made of policies"),
+        ({"policies": ("forgetting",)}, "must hold policies"),
         ({"policies": (p.RandomWalk(),)}, "needs the swings of a voltage"),
         ({}, r"phi must have shape \(2,\)"),
     ],
