@@ -39,8 +39,8 @@ BEYOND = 0.1
 # The models begin where the voltage is farther from where all began than this fraction of half the range, in
 # a unit that is usual then.
 WIDE, USUAL = 0.12, 0.4
-# Else in the second leg when it has gone this fraction of the first way, or after it. Their unit is no smaller
-# than this fraction of the way of the start.
+# Else in the second leg when it has gone this fraction of the first way, or after it. Their unit is at least
+# this fraction of the way of the start.
 PASSED, SMALLEST = 0.7, 0.25
 # Readings of a moved zero have at least this slope relative to the line's; they are near the reference by
 # so many swings if it has moved, too, or nearer than the line by this factor.

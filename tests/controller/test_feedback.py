@@ -136,7 +136,7 @@ def test_what_feedback_corrects_at_rest_does_not_spoil_the_waves_behind(part: fl
     assert abs(corrected[k + rests - 1]) > 0.3
     assert error[k + rests - 1] < 5e-3
     waves = error[k + rests :][: 4 * period].reshape(4, -1).max(axis=1)
-    assert waves[3] < 0.06  # 0.16 to 0.21 by the integral alone
+    assert waves[3] < 0.08  # 0.16 to 0.21 by the integral alone
 
 
 def test_a_staircase_keeps_its_correction_and_a_square_wave_its_steps() -> None:
