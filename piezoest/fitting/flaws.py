@@ -8,6 +8,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray, array_1d
 from piezoest.compile import Vector, compiled
+from piezoest.fitting.bursts import bursts, wild
 from piezoest.fitting.coordinates import bridged
 from piezoest.fitting.lost_voltage import delay_of, lost_voltage
 from piezoest.fitting.rests import rests_of
@@ -20,7 +21,7 @@ FEWEST_SAMPLES = 64
 UNUSUAL = 6.0
 # ... and by so much of the range of the displacement: less does no harm to a fit.
 SMALLEST_SPIKE, SMALLEST_JUMP = 1e-3, 5e-3
-LONGEST_SPIKE = 3
+LONGEST_SPIKE = 6
 PASSES = 4
 # Steps of the voltage explain what happens for some samples, and this much more than their size.
 FORGOTTEN_PER_SAMPLE = 0.98
@@ -38,6 +39,8 @@ NEIGHBOURS = 3
 ONE_SIDED, BOTH_SIDES = 0.6, 0.15
 # Samples beside a spike that say whether the displacement comes back.
 BESIDE = np.arange(2, 7)
+# A gap of the voltage of more samples may hide a turn.
+SHORTEST_GAP = 8
 # A sensor that stands still for so many samples while the stage moves by so many of its steps.
 SHORTEST_DROPOUT, MOVED_IN_DROPOUT = 8, 50.0
 # Part of the range that the voltage moves, and from its ends, at which no stage stands still by itself.
@@ -52,8 +55,8 @@ class Flaws(NamedTuple):
     Parameters
     ----------
     spikes, dropouts : ndarray, shape (N,), bool
-        Samples of the displacement that are off alone, or up to three together; samples at which the reading
-        stands still while the voltage moves.
+        Samples of the displacement that are off alone or up to six together, or beyond all others as error
+        codes are; samples at which the reading stands still while the voltage moves.
     jumps : ndarray, shape (J,), int
         First samples after a step of the displacement that no step of the voltage explains.
     jump_sizes : ndarray, shape (J,)
@@ -150,17 +153,34 @@ def flawed(u: Any, x: Any) -> Flaws:
     empty = Flaws(spikes, dropouts, nowhere, np.empty(0), nowhere.reshape(0, 2), wrong)
     if np.sum(known) < FEWEST_SAMPLES or np.ptp(u[known]) == 0.0:
         return empty
+    codes = wild(u, x)
+    x = np.where(codes, np.nan, x)
+    known &= ~codes
     wrong = lost_voltage(u, x) if np.ptp(x[known]) > 0.0 else empty.voltage
     known &= ~wrong
+    unknown = _long_gaps(u, wrong)
     u = bridged(np.where(wrong, np.nan, u))
     rests = rests_of(u)
     if np.ptp(x[known]) == 0.0:
-        return empty._replace(rests=rests)
+        return empty._replace(spikes=codes, rests=rests)
     log = _Log(u, bridged(x))
     dropouts = _dropouts(log, known)
-    spikes, clean = _spikes(log, dropouts)
-    jumps, sizes = _jumps(log, clean, spikes | dropouts)
-    return Flaws(spikes & known, dropouts, jumps, sizes, rests, wrong)
+    off = _bursts(log, dropouts | unknown)
+    spikes, clean = _spikes(log, dropouts | unknown)
+    spikes = _isolated(spikes | off)
+    jumps, sizes = _jumps(log, clean, spikes | dropouts | unknown)
+    return Flaws(spikes & known | codes, dropouts, jumps, sizes, rests, wrong)
+
+
+def _long_gaps(u: FloatArray, wrong: BoolArray) -> BoolArray:
+    """Where the voltage is missing for so long that the displacement goes its own way; and just beside."""
+    gaps = ~np.isfinite(u) | wrong
+    out = np.zeros_like(gaps)
+    starts, ends = runs(gaps)
+    long = ends - starts > SHORTEST_GAP
+    for start, end in zip(starts[long], ends[long], strict=True):
+        out[max(start - EACH_SIDE, 0) : end + EACH_SIDE] = True
+    return out
 
 
 class _Log:
@@ -203,6 +223,16 @@ def _remembered(size: Vector, keep: float, out: Vector) -> None:
         out[k] = largest
 
 
+def _bursts(log: _Log, stuck: BoolArray) -> BoolArray:
+    """Samples that are off a few together; the log goes on with something sensible in their place."""
+    found = np.zeros(log.x.size, dtype=np.bool_)
+    ways = log.gain * log.late
+    for start, end in zip(*bursts(log.x - ways, log.explained, log.range, stuck), strict=True):
+        found[start:end] = True
+    log.x = np.where(found, bridged(np.where(found, np.nan, log.x - ways)) + ways, log.x)
+    return found
+
+
 def _spikes(log: _Log, stuck: BoolArray) -> tuple[BoolArray, FloatArray]:
     """Samples that are off alone, and the displacement with something sensible in their place."""
     inputs = log.gain * np.diff(log.late, 2, prepend=log.late[0], append=log.late[-1])
@@ -223,7 +253,7 @@ def _spikes(log: _Log, stuck: BoolArray) -> tuple[BoolArray, FloatArray]:
             break
         spikes[found] = True
         clean[found] -= e[found]
-    return _isolated(spikes), clean
+    return spikes, clean
 
 
 def _comes_back(log: _Log, x: FloatArray, found: IntArray, size: FloatArray) -> BoolArray:

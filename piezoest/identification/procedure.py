@@ -123,7 +123,8 @@ def identify(
     counts = judged(record, flaws, trained)
     _enough("fitted part", record, counts[:trained])
     _enough("held-out part", record, counts[trained:])
-    first = prepare(flaws.without(record.voltage)[:trained], record.displacement[:trained])
+    usable = np.where(flaws.unusable, np.nan, record.displacement)[:trained]
+    first = prepare(flaws.without(record.voltage)[:trained], usable)
     noise = noise_of(first)
     found = findings(record)
     check_excitation(first, noise, found)
@@ -166,7 +167,7 @@ def identify(
         record=record,
         findings=found,
         flaws=flaws,
-        learnt_on=LearntOn.of(record.voltage[:trained], record.displacement[:trained], record.sample_rate),
+        learnt_on=LearntOn.of(record.voltage[:trained], usable, record.sample_rate),
         validations=tuple(Validation.of(best.fit, *each) for each in validated),
     )
     of_others += [
