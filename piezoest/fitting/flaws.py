@@ -10,6 +10,7 @@ from piezoest._checks import FloatArray, array_1d
 from piezoest.compile import Vector, compiled
 from piezoest.fitting.bursts import bursts, wild
 from piezoest.fitting.coordinates import bridged
+from piezoest.fitting.held import held
 from piezoest.fitting.lost_voltage import delay_of, lost_voltage
 from piezoest.fitting.rests import rests_of
 from piezoest.fitting.rows import dot
@@ -66,6 +67,8 @@ class Flaws(NamedTuple):
     voltage : ndarray, shape (N,), bool
         Samples of the voltage that the displacement does not answer: spikes, zeros, and those at which the
         column stands still while the stage moves.
+    repeated : ndarray, shape (N,), bool
+        Samples that repeat the reading before, where the sensor measures less often than the log has samples.
     """
 
     spikes: BoolArray
@@ -74,11 +77,12 @@ class Flaws(NamedTuple):
     jump_sizes: FloatArray
     rests: IntArray
     voltage: BoolArray
+    repeated: BoolArray
 
     @property
     def unusable(self) -> BoolArray:
         """Samples that a fit should leave out, shape (N,)."""
-        return self.spikes | self.dropouts | self.voltage
+        return self.spikes | self.dropouts | self.voltage | self.repeated
 
     def without(self, u: FloatArray) -> FloatArray:
         """The voltage with NaN where it is wrong.
@@ -106,6 +110,7 @@ class Flaws(NamedTuple):
             self.jump_sizes[jumps],
             self.rests[rests],
             self.voltage[:end],
+            self.repeated[:end],
         )
 
     @property
@@ -148,28 +153,41 @@ def flawed(u: Any, x: Any) -> Flaws:
     if u.size != x.size:
         raise ValueError(f"x must have shape ({u.size},) as u has, got ({x.size},)")
     known = np.isfinite(u) & np.isfinite(x)
-    spikes, dropouts, wrong = np.zeros((3, u.size), dtype=np.bool_)
-    nowhere = np.empty(0, np.int64)
-    empty = Flaws(spikes, dropouts, nowhere, np.empty(0), nowhere.reshape(0, 2), wrong)
+    nowhere, none = np.empty(0, np.int64), np.zeros(u.size, dtype=np.bool_)
+    empty = Flaws(none, none, nowhere, np.empty(0), nowhere.reshape(0, 2), none, none)
     if np.sum(known) < FEWEST_SAMPLES or np.ptp(u[known]) == 0.0:
         return empty
     codes = wild(u, x)
     x = np.where(codes, np.nan, x)
+    repeated = held(u, x)
+    if repeated.any():
+        x = bridged(np.where(repeated, np.nan, x))
     known &= ~codes
-    wrong = lost_voltage(u, x) if np.ptp(x[known]) > 0.0 else empty.voltage
+    wrong = lost_voltage(u, x) if np.ptp(x[known]) > 0.0 else none
     known &= ~wrong
     unknown = _long_gaps(u, wrong)
     u = bridged(np.where(wrong, np.nan, u))
-    rests = rests_of(u)
+    found = empty._replace(spikes=codes, rests=rests_of(u))
     if np.ptp(x[known]) == 0.0:
-        return empty._replace(spikes=codes, rests=rests)
-    log = _Log(u, bridged(x))
-    dropouts = _dropouts(log, known)
-    off = _bursts(log, dropouts | unknown)
-    spikes, clean = _spikes(log, dropouts | unknown)
+        return found
+    found = found._replace(voltage=wrong, repeated=repeated)
+    return _of_readings(found, u, bridged(x), known, unknown)
+
+
+def _of_readings(found: Flaws, u: FloatArray, x: FloatArray, known: BoolArray, unknown: BoolArray) -> Flaws:
+    """Add the flaws of the displacement, of which only what the sensor measured anew is looked at."""
+    place = np.flatnonzero(~found.repeated)
+    known, unknown = known[place], unknown[place]
+    log = _Log(u[place], x[place])
+    lost = _dropouts(log, known)
+    off = _bursts(log, lost | unknown)
+    spikes, clean = _spikes(log, lost | unknown)
     spikes = _isolated(spikes | off)
-    jumps, sizes = _jumps(log, clean, spikes | dropouts | unknown)
-    return Flaws(spikes & known | codes, dropouts, jumps, sizes, rests, wrong)
+    jumps, sizes = _jumps(log, clean, spikes | lost | unknown)
+    alone, dropouts = found.spikes.copy(), found.dropouts.copy()
+    alone[place[spikes & known]] = True
+    dropouts[place[lost]] = True
+    return found._replace(spikes=alone, dropouts=dropouts, jumps=place[jumps], jump_sizes=sizes)
 
 
 def _long_gaps(u: FloatArray, wrong: BoolArray) -> BoolArray:

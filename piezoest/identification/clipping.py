@@ -1,6 +1,6 @@
-"""Readings that end at a limit, come in coarse steps, or come more often than the sensor measures."""
+"""Readings that end at a limit, or come in coarse steps."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,9 +11,6 @@ from piezoest.fitting.runs import runs
 AT_LIMIT = 1e-3
 # Of the way on that must be back at the end of a flat top, and of the log that flat tops are looked for in.
 BACK, MOST_TOPS, EARLY = 0.3, 10_000, 0.15
-REPEATED, STEADY = 2, 0.8
-# Steps of the sensor that a changed reading moves by, where it is held and not coarse.
-HELD_STEPS = 5.0
 
 
 class Top(NamedTuple):
@@ -59,19 +56,3 @@ def levels(y: FloatArray) -> tuple[float, float]:
     step = float(np.min(apart))
     whole = np.abs(apart / step - np.rint(apart / step))
     return (step, extent / step) if np.median(whole) < 0.01 else (0.0, np.inf)
-
-
-def repeats(y: FloatArray) -> int:
-    """How many times in a row each value stands where all are held alike; 1 if they are not."""
-    changed = np.flatnonzero(np.diff(y) != 0.0)
-    if changed.size < 10:
-        return 1
-    lengths: Any = np.diff(changed)
-    usual = int(np.median(lengths))
-    # Coarse steps repeat values too, but then each change is by one step.
-    moved = np.abs(np.diff(y)[changed])
-    held = (
-        float(np.median(moved)) > HELD_STEPS * float(np.min(moved)) or np.unique(y).size > 0.5 * changed.size
-    )
-    steady = float(np.mean(np.abs(lengths - usual) <= 1)) > STEADY
-    return usual if usual >= REPEATED and steady and held else 1

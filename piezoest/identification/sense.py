@@ -7,7 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from piezoest.identification.clipping import flat_tops, levels, repeats
+from piezoest.fitting.held import repeats
+from piezoest.identification.clipping import flat_tops, levels
 from piezoest.identification.examined import FEWEST_TURNS, Examined
 from piezoest.identification.feedback_in_log import answer
 from piezoest.records import Record
@@ -252,7 +253,8 @@ def _limits(log: Examined) -> Iterator[Finding]:
 
 
 def _resolution(log: Examined) -> Iterator[Finding]:
-    step, count = levels(log.x)
+    read = log.counts & ~log.flaws.unusable
+    step, count = levels(log.record.displacement[read])
     if count < FEW_LEVELS:
         say = doubt if count < FEWEST_LEVELS else note
         yield say(
@@ -260,11 +262,11 @@ def _resolution(log: Examined) -> Iterator[Finding]:
             f"The displacement comes in steps of {step:.3g} µm, {count:.0f} over its range, and a loop is "
             "some tenth of it: use a finer range of the converter, or save more digits.",
         )
-    elif (times := repeats(log.record.displacement[log.counts])) > 1:
+    elif (times := repeats(log.u[log.counts], log.record.displacement[log.counts])) > 1:
         yield note(
             "repeated",
             f"Each reading stands {times} times in a row: the sensor measures at {log.rate / times:.4g} Hz, "
-            f"keep one sample of {times}.",
+            f"keep one sample of {times}, as identify does.",
         )
 
 
