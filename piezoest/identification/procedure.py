@@ -153,7 +153,9 @@ def identify(
     if model in unknown:
         raise ValueError(unknown[model])
     known = [each for each in candidates if each.name not in unknown]
-    best = best_of(known) if model == "auto" else candidates[-1]
+    rested = bool(np.any(flaws.before(trained).rests[:, 0] > 0))
+    tells_creep = rested or tells_lag(first.u)
+    best = best_of(known, tells_creep=tells_creep) if model == "auto" else candidates[-1]
     result = Identification(
         best=best,
         candidates=tuple(candidates),
@@ -163,6 +165,7 @@ def identify(
         noise_floor=min(noise_floor(record, fallback=noise), best.train.rms, best.held_out.rms),
         drift=_slope(best.residual, best.fit.left_out),
         delay_known=told,
+        creep_known=tells_creep,
         trained=trained,
         record=record,
         findings=found,

@@ -212,12 +212,12 @@ def _closed_loop(log: Examined) -> Iterator[Finding]:
             "looks as if the reference in µm was logged in the place of the voltage; log what drives the "
             "amplifier.",
         )
-    elif off < STRAIGHT and log.moved > STROKES[0]:
+    elif off < STRAIGHT and opening < ALMOST_STRAIGHT and log.moved > STROKES[0]:
         yield doubt(
             "straight",
-            f"The displacement follows the voltage on a straight line to {100 * off:.2g} % of the stroke, "
-            "where a piezo stage shows a loop: perhaps a closed loop tracks and its reference was logged; "
-            "log what drives the amplifier, with the servo off.",
+            f"The displacement follows the voltage on a straight line to {100 * max(off, opening):.2g} % of "
+            "the stroke, where a piezo stage shows a loop: perhaps a closed loop tracks and its reference "
+            "was logged; log what drives the amplifier, with the servo off.",
         )
     feedback = answer(log.u, log.x, log.gain)
     if feedback.closed:

@@ -66,3 +66,24 @@ def test_the_opening_of_a_loop_is_its_width_whatever_drifts() -> None:
     assert still.clockwise == 0.0
     assert still.opening > 0.0
     assert loop_of(t, t, known, 1.0).opening == 0.0  # which does not turn
+
+
+@pytest.mark.parametrize("delay", range(8))
+def test_a_staircase_answered_late_is_not_doubted(delay: int) -> None:
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        steps = rng.integers(8, 20)
+        level = np.floor(rng.uniform(5.0, 25.0) * steps * np.arange(4000) / 4000)
+        u = 50.0 + np.round(50.0 * np.abs((level / steps) % 2.0 - 1.0))
+        x = pz.PrandtlIshlinskii(0.1, [5.0, 15.0], [0.02, 0.02]).simulate(u)
+        x = np.append(np.full(delay, x[0]), x[: 4000 - delay])
+        x += 10.0 ** rng.uniform(-4.0, -2.3) * np.ptp(x) * rng.standard_normal(4000)
+        found = findings(Record.from_arrays(u, x, 1000.0))
+        assert [each.name for each in found if each.severity == "doubt"] == []
+
+
+def test_an_ellipse_is_no_straight_line() -> None:
+    phase = 0.0126 * np.arange(6000)
+    x = 5.0 + 4.0 * np.sin(phase - 0.03) + 1e-3 * np.random.default_rng(0).standard_normal(6000)
+    found = findings(Record.from_arrays(50.0 + 40.0 * np.sin(phase), x, 1000.0))
+    assert "straight" not in [each.name for each in found]
