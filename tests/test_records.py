@@ -102,6 +102,7 @@ def test_rows_lost_all_over_a_log_are_missing_samples(tmp_path: Path, share: flo
         ({"line7": "0.050,text,1.0"}, ["log.csv, line 7", "column 'voltage_V'", "'text' is not a number"]),
         ({"line9": "0.060,1,1"}, ["line 9", "time does not increase", "0.06 s after 0.06 s"]),
         ({"line9": "0.001,1,1"}, ["line 9", "time does not increase"]),
+        ({"line2": "1700000000.005,1,1"}, ["line 3", "after 1700000000.005 s"]),
         ({"line12": "0.1045,1,1"}, ["line 12", "unevenly", "0.01 s is usual"]),
         ({"line12": "0,100,1,5,1,5"}, ["line 12", "6 fields", "3"]),
         ({"line2": "s,V,kg"}, ["line 2", "not a number"]),

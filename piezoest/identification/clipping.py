@@ -11,6 +11,9 @@ from piezoest.fitting.runs import runs
 AT_LIMIT = 1e-3
 # Of the way on that must be back at the end of a flat top, and of the log that flat tops are looked for in.
 BACK, MOST_TOPS, EARLY = 0.3, 10_000, 0.15
+# A limit at which noise ends, too: repeated so often where other values are repeated in this part of the log
+# at most. Then the other column needs to go on by this part only.
+FEWEST_REPEATS, SELDOM, EXACTLY = 10, 0.01, 0.1
 
 
 class Top(NamedTuple):
@@ -33,6 +36,8 @@ def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
     extent, reach, top = float(np.ptp(y)), float(np.ptp(other)), float(y.max())
     noise = 1.4826 * float(np.median(np.abs(np.diff(y, 3)))) / np.sqrt(20.0)
     tolerance = min(max(AT_LIMIT * extent, 7.0 * noise), 0.02 * extent)
+    if _stands_only_at(y, top):
+        tolerance, goes_on = 0.0, EXACTLY * goes_on
     starts, ends = runs(y >= top - tolerance)
     beyond = []
     for start, end in zip(starts[:MOST_TOPS], ends[:MOST_TOPS], strict=True):
@@ -43,6 +48,13 @@ def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
         if end - start > 5 and amid and min(on, back) > goes_on * reach and back > BACK * on:
             beyond.append(on)
     return Top(top, len(beyond), max(beyond)) if beyond else None
+
+
+def _stands_only_at(y: FloatArray, top: float) -> bool:
+    """Whether a column with noise repeats its greatest value, and hardly any other."""
+    same = np.diff(y) == 0.0
+    there = same & (y[1:] == top)
+    return bool(np.sum(there) >= FEWEST_REPEATS and np.sum(same & ~there) < SELDOM * y.size)
 
 
 def levels(y: FloatArray) -> tuple[float, float]:

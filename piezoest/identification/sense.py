@@ -238,7 +238,7 @@ def _limits(log: Examined) -> Iterator[Finding]:
     sign = 1.0 if log.gain >= 0.0 else -1.0
     # A stage that is stopped rings, so it must go further than a voltage.
     for name, unit, y, other_name, other_unit, other, goes_on in (
-        ("displacement", "µm", log.x, "voltage", "V", log.u, 0.04),
+        ("displacement", "µm", log.shown, "voltage", "V", log.u, 0.04),
         ("voltage", "V", log.u, "displacement", "µm", log.x, 0.08),
     ):
         top = flat_tops(y, sign * other, goes_on) if log.related else None

@@ -78,7 +78,7 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
         if np.any(steps <= 0.0):
             k = int(np.argmax(steps <= 0.0))
             raise LogError(
-                f"{at(k)}does not increase: {known.times[k + 1]:.9g} s after {known.times[k]:.9g} s; if it "
+                f"{at(k)}does not increase: {known.times[k + 1]:.15g} s after {known.times[k]:.15g} s; if it "
                 "has too few digits, give the sample rate instead"
             )
         if not count:
