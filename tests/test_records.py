@@ -84,12 +84,25 @@ def test_rows_without_numbers_are_kept_as_nan_and_counted(tmp_path: Path, line: 
     np.testing.assert_allclose(record.time, TIME, atol=1e-9)
 
 
+@pytest.mark.parametrize("share", [0.09, 0.2, 0.4])
+def test_rows_lost_all_over_a_log_are_missing_samples(tmp_path: Path, share: float) -> None:
+    t = np.arange(4000) / 1000.0
+    kept = np.random.default_rng(0).random(4000) > share
+    kept[[0, -1]] = True
+    path = tmp_path / "lost.csv"
+    np.savetxt(path, np.column_stack([t, np.sin(t), t])[kept], header="t,u,x", delimiter=",", comments="")
+    record = read_record(path)
+    assert len(record) == 4000
+    assert record.skipped == np.count_nonzero(~kept)
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
         ({"line7": "0.050,text,1.0"}, ["log.csv, line 7", "column 'voltage_V'", "'text' is not a number"]),
         ({"line9": "0.060,1,1"}, ["line 9", "time does not increase", "0.06 s after 0.06 s"]),
         ({"line9": "0.001,1,1"}, ["line 9", "time does not increase"]),
+        ({"line2": "1700000000.005,1,1"}, ["line 3", "after 1700000000.005 s"]),
         ({"line12": "0.1045,1,1"}, ["line 12", "unevenly", "0.01 s is usual"]),
         ({"line12": "0,100,1,5,1,5"}, ["line 12", "6 fields", "3"]),
         ({"line2": "s,V,kg"}, ["line 2", "not a number"]),

@@ -8,7 +8,9 @@ import numpy as np
 
 from piezoest._checks import FloatArray, array_1d
 from piezoest.compile import Vector, compiled
+from piezoest.fitting.bursts import bursts, wild
 from piezoest.fitting.coordinates import bridged
+from piezoest.fitting.held import held
 from piezoest.fitting.lost_voltage import delay_of, lost_voltage
 from piezoest.fitting.rests import rests_of
 from piezoest.fitting.rows import dot
@@ -20,7 +22,7 @@ FEWEST_SAMPLES = 64
 UNUSUAL = 6.0
 # ... and by so much of the range of the displacement: less does no harm to a fit.
 SMALLEST_SPIKE, SMALLEST_JUMP = 1e-3, 5e-3
-LONGEST_SPIKE = 3
+LONGEST_SPIKE = 6
 PASSES = 4
 # Steps of the voltage explain what happens for some samples, and this much more than their size.
 FORGOTTEN_PER_SAMPLE = 0.98
@@ -38,6 +40,8 @@ NEIGHBOURS = 3
 ONE_SIDED, BOTH_SIDES = 0.6, 0.15
 # Samples beside a spike that say whether the displacement comes back.
 BESIDE = np.arange(2, 7)
+# A gap of the voltage of more samples may hide a turn.
+SHORTEST_GAP = 8
 # A sensor that stands still for so many samples while the stage moves by so many of its steps.
 SHORTEST_DROPOUT, MOVED_IN_DROPOUT = 8, 50.0
 # Part of the range that the voltage moves, and from its ends, at which no stage stands still by itself.
@@ -52,8 +56,8 @@ class Flaws(NamedTuple):
     Parameters
     ----------
     spikes, dropouts : ndarray, shape (N,), bool
-        Samples of the displacement that are off alone, or up to three together; samples at which the reading
-        stands still while the voltage moves.
+        Samples of the displacement that are off alone or up to six together, or beyond all others as error
+        codes are; samples at which the reading stands still while the voltage moves.
     jumps : ndarray, shape (J,), int
         First samples after a step of the displacement that no step of the voltage explains.
     jump_sizes : ndarray, shape (J,)
@@ -63,6 +67,8 @@ class Flaws(NamedTuple):
     voltage : ndarray, shape (N,), bool
         Samples of the voltage that the displacement does not answer: spikes, zeros, and those at which the
         column stands still while the stage moves.
+    repeated : ndarray, shape (N,), bool
+        Samples that repeat the reading before, where the sensor measures less often than the log has samples.
     """
 
     spikes: BoolArray
@@ -71,11 +77,12 @@ class Flaws(NamedTuple):
     jump_sizes: FloatArray
     rests: IntArray
     voltage: BoolArray
+    repeated: BoolArray
 
     @property
     def unusable(self) -> BoolArray:
         """Samples that a fit should leave out, shape (N,)."""
-        return self.spikes | self.dropouts | self.voltage
+        return self.spikes | self.dropouts | self.voltage | self.repeated
 
     def without(self, u: FloatArray) -> FloatArray:
         """The voltage with NaN where it is wrong.
@@ -103,6 +110,7 @@ class Flaws(NamedTuple):
             self.jump_sizes[jumps],
             self.rests[rests],
             self.voltage[:end],
+            self.repeated[:end],
         )
 
     @property
@@ -145,22 +153,52 @@ def flawed(u: Any, x: Any) -> Flaws:
     if u.size != x.size:
         raise ValueError(f"x must have shape ({u.size},) as u has, got ({x.size},)")
     known = np.isfinite(u) & np.isfinite(x)
-    spikes, dropouts, wrong = np.zeros((3, u.size), dtype=np.bool_)
-    nowhere = np.empty(0, np.int64)
-    empty = Flaws(spikes, dropouts, nowhere, np.empty(0), nowhere.reshape(0, 2), wrong)
+    nowhere, none = np.empty(0, np.int64), np.zeros(u.size, dtype=np.bool_)
+    empty = Flaws(none, none, nowhere, np.empty(0), nowhere.reshape(0, 2), none, none)
     if np.sum(known) < FEWEST_SAMPLES or np.ptp(u[known]) == 0.0:
         return empty
-    wrong = lost_voltage(u, x) if np.ptp(x[known]) > 0.0 else empty.voltage
+    codes = wild(u, x)
+    x = np.where(codes, np.nan, x)
+    repeated = held(u, x)
+    if repeated.any():
+        x = bridged(np.where(repeated, np.nan, x))
+    known &= ~codes
+    wrong = lost_voltage(u, x) if np.ptp(x[known]) > 0.0 else none
     known &= ~wrong
+    unknown = _long_gaps(u, wrong)
     u = bridged(np.where(wrong, np.nan, u))
-    rests = rests_of(u)
+    found = empty._replace(spikes=codes, rests=rests_of(u))
     if np.ptp(x[known]) == 0.0:
-        return empty._replace(rests=rests)
-    log = _Log(u, bridged(x))
-    dropouts = _dropouts(log, known)
-    spikes, clean = _spikes(log, dropouts)
-    jumps, sizes = _jumps(log, clean, spikes | dropouts)
-    return Flaws(spikes & known, dropouts, jumps, sizes, rests, wrong)
+        return found
+    found = found._replace(voltage=wrong, repeated=repeated)
+    return _of_readings(found, u, bridged(x), known, unknown)
+
+
+def _of_readings(found: Flaws, u: FloatArray, x: FloatArray, known: BoolArray, unknown: BoolArray) -> Flaws:
+    """Add the flaws of the displacement, of which only what the sensor measured anew is looked at."""
+    place = np.flatnonzero(~found.repeated)
+    known, unknown = known[place], unknown[place]
+    log = _Log(u[place], x[place])
+    lost = _dropouts(log, known)
+    off = _bursts(log, lost | unknown)
+    spikes, clean = _spikes(log, lost | unknown)
+    spikes = _isolated(spikes | off)
+    jumps, sizes = _jumps(log, clean, spikes | lost | unknown)
+    alone, dropouts = found.spikes.copy(), found.dropouts.copy()
+    alone[place[spikes & known]] = True
+    dropouts[place[lost]] = True
+    return found._replace(spikes=alone, dropouts=dropouts, jumps=place[jumps], jump_sizes=sizes)
+
+
+def _long_gaps(u: FloatArray, wrong: BoolArray) -> BoolArray:
+    """Where the voltage is missing for so long that the displacement goes its own way; and just beside."""
+    gaps = ~np.isfinite(u) | wrong
+    out = np.zeros_like(gaps)
+    starts, ends = runs(gaps)
+    long = ends - starts > SHORTEST_GAP
+    for start, end in zip(starts[long], ends[long], strict=True):
+        out[max(start - EACH_SIDE, 0) : end + EACH_SIDE] = True
+    return out
 
 
 class _Log:
@@ -203,6 +241,16 @@ def _remembered(size: Vector, keep: float, out: Vector) -> None:
         out[k] = largest
 
 
+def _bursts(log: _Log, stuck: BoolArray) -> BoolArray:
+    """Samples that are off a few together; the log goes on with something sensible in their place."""
+    found = np.zeros(log.x.size, dtype=np.bool_)
+    ways = log.gain * log.late
+    for start, end in zip(*bursts(log.x - ways, log.explained, log.range, stuck), strict=True):
+        found[start:end] = True
+    log.x = np.where(found, bridged(np.where(found, np.nan, log.x - ways)) + ways, log.x)
+    return found
+
+
 def _spikes(log: _Log, stuck: BoolArray) -> tuple[BoolArray, FloatArray]:
     """Samples that are off alone, and the displacement with something sensible in their place."""
     inputs = log.gain * np.diff(log.late, 2, prepend=log.late[0], append=log.late[-1])
@@ -223,7 +271,7 @@ def _spikes(log: _Log, stuck: BoolArray) -> tuple[BoolArray, FloatArray]:
             break
         spikes[found] = True
         clean[found] -= e[found]
-    return _isolated(spikes), clean
+    return spikes, clean
 
 
 def _comes_back(log: _Log, x: FloatArray, found: IntArray, size: FloatArray) -> BoolArray:

@@ -17,16 +17,18 @@ NORMAL = 1.4826
 
 def unsettled(residual: FloatArray) -> int:
     """Samples at the start that are off by far more than the rest, because the stage had not settled."""
-    known = np.isfinite(residual)
-    deviation = NORMAL * float(np.median(np.abs(residual[known])))
-    off = np.abs(residual[: int(LONGEST_UNSETTLED * residual.size)]) > UNSETTLED * deviation
+    known = np.flatnonzero(np.isfinite(residual))
+    values = residual[known]
+    deviation = NORMAL * float(np.median(np.abs(values)))
+    longest = int(LONGEST_UNSETTLED * residual.size)
+    off = np.abs(values[known < longest]) > UNSETTLED * deviation
     if deviation == 0.0 or not np.any(off[:3]):
         return 0
     # A stage that settles may cross zero: ten quiet samples in a row are the end.
     quiet = np.convolve(off, np.ones(10), mode="valid") == 0.0
-    end = int(np.argmax(quiet)) if np.any(quiet) else off.size
+    end = int(known[np.argmax(quiet)]) if np.any(quiet) else longest
     # Twice as long, for what has fallen below the threshold is not yet gone.
-    return min(2 * end, off.size)
+    return min(2 * end, longest)
 
 
 def lonely(residual: FloatArray) -> Any:

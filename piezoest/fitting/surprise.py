@@ -94,21 +94,23 @@ def _robust(A: FloatArray, b: FloatArray) -> FloatArray:
     return weights
 
 
-def scale_of(e: FloatArray) -> FloatArray:
+def scale_of(e: FloatArray, block: int = BLOCK) -> FloatArray:
     """Standard deviation about each sample, shape (N,): of the log, or of where it is greater.
 
     Parameters
     ----------
     e : ndarray, shape (N,)
-        What is not foreseen; at least 32 samples.
+        What is not foreseen; at least as many samples as in a block.
+    block : int
+        Samples for which a scale holds. What stands out in a quarter of them does not make it greater.
     """
     size: FloatArray = np.abs(e)
     whole = float(np.quantile(size[:: max(1, size.size // 100_000)], QUANTILE)) / NORMAL_QUANTILE
-    blocks, place = size.size // BLOCK, int(QUANTILE * BLOCK)
-    own = size[: blocks * BLOCK].reshape(blocks, BLOCK)  # a copy, for `size` is one
+    blocks, place = size.size // block, int(QUANTILE * block)
+    own = size[: blocks * block].reshape(blocks, block)  # a copy, for `size` is one
     own.partition(place, axis=1)
     quantile = own[:, place] / NORMAL_QUANTILE
     about = np.max([quantile, _shifted(quantile, 1), _shifted(quantile, -1)], axis=0)
     # In so few samples it scatters: what is not clearly greater is the log's.
     scale: FloatArray = np.maximum(whole, about / 1.5)
-    return scale[np.minimum(np.arange(e.size) // BLOCK, blocks - 1)]
+    return scale[np.minimum(np.arange(e.size) // block, blocks - 1)]

@@ -30,6 +30,8 @@ BEYOND, FORETOLD = 0.3, 0.1
 # A delay stands for a lag of any kind: where the voltage moves further within it than in the record, another
 # delay would be right, that differs by this fraction.
 OTHERWISE_LATE = 0.75
+# A swing that was too fast is flattened at its end, too: a lag remembers for so many delays.
+REMEMBERED = 20.0
 # A coefficient is at its bound if it is nearer than this, relative to the largest.
 AT_BOUND = 1e-9
 
@@ -92,7 +94,7 @@ class Spread(NamedTuple):
     def along(self, u: FloatArray, later: FloatArray) -> FloatArray:
         """For each voltage, so many lengths of the record after its end, shape (N,)."""
         beyond = _beyond(u, self.visited)
-        faster = _beyond(_moves(u, self.delay), (0.0, self.moved))
+        faster = _remembered((_moves(u, self.delay) - self.moved).clip(0.0), self.delay)
         return np.sqrt(
             self.within**2
             + (self.behind * np.log1p(later)) ** 2
@@ -104,6 +106,17 @@ class Spread(NamedTuple):
 def _moves(u: FloatArray, delay: float) -> FloatArray:
     """How far the voltage has moved within a delay, shape (N,) [V]."""
     return np.abs(u - late(u, delay))
+
+
+def _remembered(values: FloatArray, delay: float) -> FloatArray:
+    """The largest so far that a lag has not forgotten, shape (N,)."""
+    from scipy.ndimage import maximum_filter1d
+
+    size = min(int(np.ceil(REMEMBERED * delay)) + 1, 2 * values.size - 1)
+    if not values.any():
+        return values
+    # The filter's window ends at its sample.
+    return np.asarray(maximum_filter1d(values, size, origin=(size - 1) // 2, mode="nearest"))
 
 
 def _beyond(u: FloatArray, visited: tuple[float, float]) -> FloatArray:

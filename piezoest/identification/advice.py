@@ -23,7 +23,7 @@ ABOVE_NOISE = 1.3
 def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
     """All there is to say, the log's own doubts first."""
     said = [each.sentence for each in found.findings]
-    checks = (_left_out, _delay, _centre, _remainder, _along, _held_out)
+    checks = (_left_out, _delay, _creep, _centre, _remainder, _along, _held_out)
     said += [sentence for say in checks for sentence in say(found, data)]
     return tuple(said)
 
@@ -89,6 +89,16 @@ def delay_sentences(delay: float, sample_rate: float, known: bool, estimated: bo
 
 def _delay(found: Identification, data: Data) -> list[str]:
     return delay_sentences(found.delay, found.sample_rate, found.delay_known, found.delay_estimated)
+
+
+def _creep(found: Identification, data: Data) -> list[str]:
+    if found.creep_known or max(each.creep for each in found.candidates) == 0.0:
+        return []
+    has = f"creeps by {100.0 * found.best.creep:.2g} %" if found.best.creep else "has none"
+    return [
+        "Creep is not known: all swings of the voltage are alike and it never rests, so creep looks like a "
+        f"wider loop. The model {has}: where the voltage rests it may be off. Record a rest, too."
+    ]
 
 
 def _centre(found: Identification, data: Data) -> list[str]:

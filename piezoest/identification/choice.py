@@ -6,6 +6,9 @@ from piezoest.identification.result import Candidate
 
 # A simpler model is preferred until a richer one is better by this fraction on the blocks left out.
 WORTH_IT = 0.02
+# Where the log does not tell creep from a wider loop, creep of more than this part of the way is believed
+# only if the model misses no more than this part of what others do: else it drifts away at the next rest.
+MUCH_CREEP, CLEARLY = 0.2, 0.6
 
 
 def simplest(errors: Sequence[float]) -> int:
@@ -14,8 +17,11 @@ def simplest(errors: Sequence[float]) -> int:
     return next(i for i, each in enumerate(errors) if each <= (1.0 + WORTH_IT) * least)
 
 
-def best_of(candidates: Sequence[Candidate]) -> Candidate:
+def best_of(candidates: Sequence[Candidate], *, tells_creep: bool = True) -> Candidate:
     """The simplest of those that predict blocks left out about best; from the simplest to the richest."""
+    if not tells_creep:
+        most = CLEARLY * min(item.cross_validated for item in candidates if not item.creep)
+        candidates = [each for each in candidates if each.creep <= MUCH_CREEP or each.cross_validated <= most]
     return candidates[simplest([item.cross_validated for item in candidates])]
 
 

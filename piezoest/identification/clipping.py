@@ -1,6 +1,6 @@
-"""Readings that end at a limit, come in coarse steps, or come more often than the sensor measures."""
+"""Readings that end at a limit, or come in coarse steps."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from piezoest.fitting.runs import runs
 AT_LIMIT = 1e-3
 # Of the way on that must be back at the end of a flat top, and of the log that flat tops are looked for in.
 BACK, MOST_TOPS, EARLY = 0.3, 10_000, 0.15
-REPEATED, STEADY = 2, 0.8
-# Steps of the sensor that a changed reading moves by, where it is held and not coarse.
-HELD_STEPS = 5.0
+# A limit at which noise ends, too: repeated so often where other values are repeated in this part of the log
+# at most. Then the other column needs to go on by this part only.
+FEWEST_REPEATS, SELDOM, EXACTLY = 10, 0.01, 0.1
 
 
 class Top(NamedTuple):
@@ -36,6 +36,8 @@ def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
     extent, reach, top = float(np.ptp(y)), float(np.ptp(other)), float(y.max())
     noise = 1.4826 * float(np.median(np.abs(np.diff(y, 3)))) / np.sqrt(20.0)
     tolerance = min(max(AT_LIMIT * extent, 7.0 * noise), 0.02 * extent)
+    if _stands_only_at(y, top):
+        tolerance, goes_on = 0.0, EXACTLY * goes_on
     starts, ends = runs(y >= top - tolerance)
     beyond = []
     for start, end in zip(starts[:MOST_TOPS], ends[:MOST_TOPS], strict=True):
@@ -46,6 +48,13 @@ def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
         if end - start > 5 and amid and min(on, back) > goes_on * reach and back > BACK * on:
             beyond.append(on)
     return Top(top, len(beyond), max(beyond)) if beyond else None
+
+
+def _stands_only_at(y: FloatArray, top: float) -> bool:
+    """Whether a column with noise repeats its greatest value, and hardly any other."""
+    same = np.diff(y) == 0.0
+    there = same & (y[1:] == top)
+    return bool(np.sum(there) >= FEWEST_REPEATS and np.sum(same & ~there) < SELDOM * y.size)
 
 
 def levels(y: FloatArray) -> tuple[float, float]:
@@ -59,19 +68,3 @@ def levels(y: FloatArray) -> tuple[float, float]:
     step = float(np.min(apart))
     whole = np.abs(apart / step - np.rint(apart / step))
     return (step, extent / step) if np.median(whole) < 0.01 else (0.0, np.inf)
-
-
-def repeats(y: FloatArray) -> int:
-    """How many times in a row each value stands where all are held alike; 1 if they are not."""
-    changed = np.flatnonzero(np.diff(y) != 0.0)
-    if changed.size < 10:
-        return 1
-    lengths: Any = np.diff(changed)
-    usual = int(np.median(lengths))
-    # Coarse steps repeat values too, but then each change is by one step.
-    moved = np.abs(np.diff(y)[changed])
-    held = (
-        float(np.median(moved)) > HELD_STEPS * float(np.min(moved)) or np.unique(y).size > 0.5 * changed.size
-    )
-    steady = float(np.mean(np.abs(lengths - usual) <= 1)) > STEADY
-    return usual if usual >= REPEATED and steady and held else 1

@@ -5,8 +5,10 @@ from functools import cached_property
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.coordinates import bridged
+from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.flaws import Flaws, flawed
+from piezoest.fitting.lost_voltage import delay_of
+from piezoest.identification.feedback_in_log import goes_in_steps
 from piezoest.identification.loop_direction import Loop, loop_of
 from piezoest.records import Record
 from piezoest.signals.turns import TURN, turns
@@ -25,7 +27,13 @@ class Examined:
         self.flaws: Flaws = flawed(record.voltage, record.displacement)
         self.u = bridged(self.flaws.without(record.voltage))
         self.x = bridged(np.where(self.flaws.unusable, np.nan, record.displacement))
+        # With what stands still: at a limit a sensor does so, too.
+        lost = self.flaws.unusable & ~self.flaws.dropouts
+        self.shown = bridged(np.where(lost, np.nan, record.displacement))
         self.swing = float(np.ptp(self.u))
+        # A staircase that is answered late is off by whole steps for as long.
+        stepped = np.ptp(self.x) > 0.0 and goes_in_steps(self.u)
+        self.late = late(self.u, float(delay_of(self.u, self.x)) if stepped else 0.0)
         self.turns = turns(self.u, TURN * self.swing)
         # The voltage without what drifts; each stretch between jumps has an offset of its own.
         offsets = np.zeros(self.x.size)
@@ -35,11 +43,11 @@ class Examined:
 
     @cached_property
     def line(self) -> tuple[FloatArray, FloatArray]:
-        """Weights and rest of a line in the voltage and its rate, and a parabola in time."""
+        """Weights and rest of a line in the late voltage and its rate, and a parabola in time."""
         return self._line(slice(None))
 
     def _line(self, part: slice) -> tuple[FloatArray, FloatArray]:
-        u, level, counts = self.u[part], self.level[part], self.counts[part]
+        u, level, counts = self.late[part], self.level[part], self.counts[part]
         t = np.linspace(-1.0, 1.0, u.size)
         A = np.stack([u - u.mean(), np.gradient(u), np.ones_like(t), t, t * t], axis=1)
         size = np.sqrt(np.mean(A**2, axis=0))

@@ -15,6 +15,8 @@ BEYOND_DOUBT, EXPLAINED = 20.0, 0.3
 OPPOSITE = -0.4
 # Noise of the voltage, relative to that of the displacement, below which there is nothing to be explained.
 QUIET = 1e-3
+# A voltage that stands still in this part of the samples goes in steps that were set, and has no noise.
+STANDS = 0.5
 # Noise of the displacement, relative to its range, that is but the rounding of numbers.
 NOISELESS = 1e-9
 
@@ -28,6 +30,11 @@ class Answer(NamedTuple):
     closed: bool = False  # whether this is feedback beyond doubt
 
 
+def goes_in_steps(u: FloatArray) -> bool:
+    """Whether a voltage stands still in most samples, as a staircase does."""
+    return bool(np.mean(np.diff(u) == 0.0) > STANDS)
+
+
 def answer(u: FloatArray, x: FloatArray, gain: float) -> Answer:
     """Look for feedback; open-loop voltages, and smooth or noiseless closed loops, show none.
 
@@ -36,6 +43,8 @@ def answer(u: FloatArray, x: FloatArray, gain: float) -> Answer:
     the voltage's own reading, with the sign of the gain. Negative feedback has the other sign. Source: C. W.
     J. Granger, Econometrica 37 (1969) 424-438; L. Ljung, System Identification, 2nd ed., 1999, sec. 13.4.
     """
+    if goes_in_steps(u):
+        return Answer()
     du, dx = gain * np.diff(u, 2), np.diff(x, 2)
     rows = np.arange(LAGS, min(du.size, LAGS + MOST_SAMPLES))
     if rows.size < FEWEST_SAMPLES:

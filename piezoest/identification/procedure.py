@@ -125,7 +125,8 @@ def identify(
     counts = judged(record, flaws, trained)
     _enough("fitted part", record, counts[:trained])
     _enough("held-out part", record, counts[trained:])
-    first = prepare(flaws.without(record.voltage)[:trained], record.displacement[:trained])
+    usable = np.where(flaws.unusable, np.nan, record.displacement)[:trained]
+    first = prepare(flaws.without(record.voltage)[:trained], usable)
     noise = noise_of(first)
     found = findings(record)
     check_excitation(first, noise, found)
@@ -154,7 +155,9 @@ def identify(
     if model in unknown:
         raise ValueError(unknown[model])
     known = [each for each in candidates if each.name not in unknown]
-    best = best_of(known) if model == "auto" else candidates[-1]
+    rested = bool(np.any(flaws.before(trained).rests[:, 0] > 0))
+    tells_creep = rested or tells_lag(first.u)
+    best = best_of(known, tells_creep=tells_creep) if model == "auto" else candidates[-1]
     result = Identification(
         best=best,
         candidates=tuple(candidates),
@@ -164,11 +167,12 @@ def identify(
         noise_floor=min(noise_floor(record, fallback=noise), best.train.rms, best.held_out.rms),
         drift=_slope(best.residual, best.fit.left_out),
         delay_known=told,
+        creep_known=tells_creep,
         trained=trained,
         record=record,
         findings=found,
         flaws=flaws,
-        learnt_on=LearntOn.of(record.voltage[:trained], record.displacement[:trained], record.sample_rate),
+        learnt_on=LearntOn.of(record.voltage[:trained], usable, record.sample_rate),
         validations=tuple(Validation.of(best.fit, *each) for each in validated),
     )
     of_others += [

@@ -80,11 +80,15 @@ class Candidate:
         return self.fit.parameters
 
     @property
+    def creep(self) -> float:
+        """What the model creeps by, in all terms together, relative to its way."""
+        return float(np.sum(getattr(getattr(self.model, "creep", None), "gains", 0.0)))
+
+    @property
     def cross_validated(self) -> float:
         """Error on blocks of the fitted part that were left out of the fit [µm rms]; it decides the choice.
 
-        It is the geometric mean of two errors: on blocks between others, and on blocks after all others. The
-        second says more about the time after the log; the first is less noisy.
+        The geometric mean of that on blocks between others, and of that on blocks after all others.
         """
         return left_out_error(self.fit)
 
@@ -102,10 +106,7 @@ class Candidate:
 
 
 class Validation(NamedTuple):
-    """Error of a model on another log of the same stage, from where the start has settled.
-
-    The error is given as it is and without its mean, because the offset may change between two days.
-    """
+    """Error of a model on another log, from where the start has settled; with and without its mean."""
 
     source: str
     error: Misfit
@@ -149,6 +150,8 @@ class Identification:
         Slope of the residual in time, over the whole record [µm].
     delay_known : bool
         Whether the delay was given, or the log can tell it from the width of the loop.
+    creep_known : bool
+        Whether the log can tell creep from it.
     trained : int
         Number of samples in the fitted part, which comes first.
     record : Record
@@ -172,6 +175,7 @@ class Identification:
     noise_floor: float
     drift: float
     delay_known: bool
+    creep_known: bool
     trained: int
     record: Record = field(repr=False)
     findings: tuple[Finding, ...]
@@ -332,6 +336,7 @@ class Identification:
             "initial_state": state.tolist() if isinstance(state, np.ndarray) else state,
             "delay_estimated": self.delay_estimated,
             "delay_known": self.delay_known,
+            "creep_known": self.creep_known,
             "noise_floor_um": self.noise_floor,
             "interval_um": self.fit.spread.within,
             "whiteness": self.whiteness.to_dict(),

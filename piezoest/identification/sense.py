@@ -7,7 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from piezoest.identification.clipping import flat_tops, levels, repeats
+from piezoest.fitting.held import repeats
+from piezoest.identification.clipping import flat_tops, levels
 from piezoest.identification.examined import FEWEST_TURNS, Examined
 from piezoest.identification.feedback_in_log import answer
 from piezoest.records import Record
@@ -211,12 +212,12 @@ def _closed_loop(log: Examined) -> Iterator[Finding]:
             "looks as if the reference in µm was logged in the place of the voltage; log what drives the "
             "amplifier.",
         )
-    elif off < STRAIGHT and log.moved > STROKES[0]:
+    elif off < STRAIGHT and opening < ALMOST_STRAIGHT and log.moved > STROKES[0]:
         yield doubt(
             "straight",
-            f"The displacement follows the voltage on a straight line to {100 * off:.2g} % of the stroke, "
-            "where a piezo stage shows a loop: perhaps a closed loop tracks and its reference was logged; "
-            "log what drives the amplifier, with the servo off.",
+            f"The displacement follows the voltage on a straight line to {100 * max(off, opening):.2g} % of "
+            "the stroke, where a piezo stage shows a loop: perhaps a closed loop tracks and its reference "
+            "was logged; log what drives the amplifier, with the servo off.",
         )
     feedback = answer(log.u, log.x, log.gain)
     if feedback.closed:
@@ -237,7 +238,7 @@ def _limits(log: Examined) -> Iterator[Finding]:
     sign = 1.0 if log.gain >= 0.0 else -1.0
     # A stage that is stopped rings, so it must go further than a voltage.
     for name, unit, y, other_name, other_unit, other, goes_on in (
-        ("displacement", "µm", log.x, "voltage", "V", log.u, 0.04),
+        ("displacement", "µm", log.shown, "voltage", "V", log.u, 0.04),
         ("voltage", "V", log.u, "displacement", "µm", log.x, 0.08),
     ):
         top = flat_tops(y, sign * other, goes_on) if log.related else None
@@ -252,7 +253,8 @@ def _limits(log: Examined) -> Iterator[Finding]:
 
 
 def _resolution(log: Examined) -> Iterator[Finding]:
-    step, count = levels(log.x)
+    read = log.counts & ~log.flaws.unusable
+    step, count = levels(log.record.displacement[read])
     if count < FEW_LEVELS:
         say = doubt if count < FEWEST_LEVELS else note
         yield say(
@@ -260,11 +262,11 @@ def _resolution(log: Examined) -> Iterator[Finding]:
             f"The displacement comes in steps of {step:.3g} µm, {count:.0f} over its range, and a loop is "
             "some tenth of it: use a finer range of the converter, or save more digits.",
         )
-    elif (times := repeats(log.record.displacement[log.counts])) > 1:
+    elif (times := repeats(log.u[log.counts], log.record.displacement[log.counts])) > 1:
         yield note(
             "repeated",
             f"Each reading stands {times} times in a row: the sensor measures at {log.rate / times:.4g} Hz, "
-            f"keep one sample of {times}.",
+            f"keep one sample of {times}, as identify does.",
         )
 
 

@@ -197,7 +197,7 @@ def identify_stream(
             f"at least {FEWEST_SAMPLES} are needed"
         )
     flaws = flawed(head.voltage, head.displacement)
-    data = prepare(flaws.without(head.voltage), head.displacement)
+    data = prepare(flaws.without(head.voltage), np.where(flaws.unusable, np.nan, head.displacement))
     odd = findings(head)
     check_excitation(data, noise_of(data), odd)
     wanted = checked_delay(delay)
@@ -245,7 +245,7 @@ def _advice(found: StreamedIdentification, looked_at: int) -> list[str]:
     if found.skipped:
         said.append(
             f"{counted(found.skipped, 'sample')} of {found.samples} did not count: without usable numbers, "
-            "or spikes or dropouts."
+            "repeated, or spikes or dropouts."
         )
     if found.left_out:
         said.append(unsettled_sentence(found.left_out / found.sample_rate))
@@ -268,8 +268,9 @@ class _Survey:
                 break
             if seen == 0:
                 voltage, displacement = u, x
-            u = flawed(u, x).without(u)
-            self.usable += int(np.sum(np.isfinite(u) & np.isfinite(x)))
+            flaws = flawed(u, x)
+            u = flaws.without(u)
+            self.usable += int(np.sum(np.isfinite(u) & np.isfinite(x) & ~flaws.unusable))
             if np.any(np.isfinite(u)) and np.any(np.isfinite(x)):
                 here = LearntOn.of(u, x, log.sample_rate)
                 known = here if known is None else known.joined(here)

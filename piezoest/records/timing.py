@@ -9,10 +9,10 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.records.source import LogError, counted
 
-# A step of time may differ from whole samples by this part of a sample, and rows may be
-# missing for this part of the record; beyond, the timing is not known well enough.
+# A step of time may differ from whole samples by this part of a sample, and rows may be missing in one place
+# for this part of the record, or all over it for the second part; beyond, the timing is not known.
 LARGEST_JITTER = 0.25
-MOST_MISSING = 0.1
+MOST_MISSING, MOST_IN_ALL = 0.1, 0.5
 MENTIONED_JITTER = 0.01
 
 Blocks = Callable[[], Iterable[tuple[Any, FloatArray]]]  # numbers of rows in the file, times [s]
@@ -78,7 +78,7 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
         if np.any(steps <= 0.0):
             k = int(np.argmax(steps <= 0.0))
             raise LogError(
-                f"{at(k)}does not increase: {known.times[k + 1]:.9g} s after {known.times[k]:.9g} s; if it "
+                f"{at(k)}does not increase: {known.times[k + 1]:.15g} s after {known.times[k]:.15g} s; if it "
                 "has too few digits, give the sample rate instead"
             )
         if not count:
@@ -114,7 +114,7 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
         absent, moved, jitter = 0, False, _deviation(sums / count, first, blocks())
         if jitter > LARGEST_JITTER:
             raise LogError(uneven)
-    elif absent > MOST_MISSING * rows:
+    elif largest > MOST_MISSING * (rows + absent) or absent > MOST_IN_ALL * (rows + absent):
         raise LogError(f"{words}, {absent} samples are missing in all: cut the log there")
     period = float((last[1] - first[1]) / (last[0] + absent - first[0]))
     notes = f"time is uneven by up to {100.0 * jitter:.0f} % of a sample; taken as even"

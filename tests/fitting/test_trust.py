@@ -130,3 +130,11 @@ def test_a_loop_is_trusted_beyond_the_range_and_plays_are_not() -> None:
     x = LOOP.simulate(u) + noise(5e-3)
     wide = [pz.fit(u, x, sample_rate=RATE, model=name).spread for name in ("coleman-hodgdon", "plays")]
     assert wide[0].by_volt < 0.5 * wide[1].by_volt
+
+
+def test_a_fast_step_widens_the_interval_while_it_lasts() -> None:
+    spread = Spread(0.01, 0.0, 0.0, (-50.0, 50.0), by_move=0.1, delay=3.0, moved=2.0)
+    u = np.where(np.arange(300) < 40, 0.0, 20.0)
+    half = spread.along(u, np.zeros(1))
+    assert half[41] > 1.0
+    np.testing.assert_allclose(np.delete(half, np.arange(38, 140)), 0.01)

@@ -1,5 +1,8 @@
 """What identification says of a log: advice, noise, other logs; and what it does not say."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -8,6 +11,7 @@ import piezoest as pz
 from piezoest import signals
 from piezoest._checks import FloatArray
 from piezoest.identification import identify
+from piezoest.identification.choice import best_of
 from piezoest.models import ColemanHodgdon
 from piezoest.records import Record
 from tests.fitting.stages import noise
@@ -97,3 +101,25 @@ def test_other_logs_are_checked_too() -> None:
     assert not found.findings
     with pytest.raises(ValueError, match="falls"):
         identify(right, model="line", validate=[falls], strict=True)
+
+
+@pytest.mark.parametrize(
+    ("creep", "missed", "chosen"), [(0.1, 0.8, 1), (0.4, 0.8, 0), (0.4, 0.5, 1), (0.0, 0.8, 1)]
+)
+def test_much_creep_that_a_log_cannot_tell_must_be_clearly_better(
+    creep: float, missed: float, chosen: int
+) -> None:
+    kinds: Any = [
+        SimpleNamespace(creep=0.0, cross_validated=1.0),
+        SimpleNamespace(creep=creep, cross_validated=missed),
+    ]
+    assert best_of(kinds, tells_creep=False) is kinds[chosen]
+    assert best_of(kinds) is kinds[1]
+
+
+def test_creep_is_known_where_the_voltage_rests() -> None:
+    model = pz.PrandtlIshlinskii(0.1, [5.0, 15.0], [0.02, 0.02], creep=pz.Creep([0.1], [1.0]), sample_rate=FS)
+    u = 50.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(8000) / FS)
+    rests = np.insert(u, 2050, np.full(1000, u[2050]))
+    said = [" ".join(identify(log(v, model.simulate(v))).advice) for v in (u, rests)]
+    assert ["Creep is not known" in each for each in said] == [True, False]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting.flaws import flawed
 from tests.identification.zoo_logs import zoo_log
@@ -96,3 +97,62 @@ def test_short_logs_are_taken(size: int) -> None:
 def test_one_shape_is_asked_for() -> None:
     with pytest.raises(ValueError, match=r"x must have shape \(3,\)"):
         flawed(np.zeros(3), np.zeros(4))
+
+
+def sine_log() -> tuple[FloatArray, FloatArray]:
+    """A loop with 3 nm of noise, of 10 µm."""
+    t = np.arange(4000) / 1000.0
+    u = 50.0 + 40.0 * np.sin(8.0 * t) * np.linspace(0.5, 1.0, t.size)
+    x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(u, allow_jumps=True)
+    return u, x + 3e-3 * np.random.default_rng(2).standard_normal(t.size)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("value", [None, 0.0, 99999.0, -1e6])
+def test_readings_that_are_off_together_are_found(count: int, value: float | None) -> None:
+    u, x = sine_log()
+    for start in (150, 703, 1120, 1404):
+        y = x.copy()
+        y[start : start + count] = y[start : start + count] + 3.0 if value is None else value
+        flaws = flawed(u, y)
+        np.testing.assert_array_equal(np.flatnonzero(flaws.spikes), start + np.arange(count))
+        assert flaws.jumps.size == 0
+
+
+def test_bursts_are_found_in_logs_of_all_kinds() -> None:
+    found = 0
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        u, x, _, noise = zoo_log(seed)
+        start, count = int(rng.integers(100, x.size - 100)), int(rng.integers(2, 7))
+        y = x.copy()
+        y[start : start + count] += max(0.3 * float(np.ptp(x)), 30.0 * noise)
+        found += np.array_equal(np.flatnonzero(flawed(u, y).spikes), start + np.arange(count))
+    assert found > 0.85 * len(SEEDS)
+
+
+def test_error_codes_do_not_keep_a_log_from_being_fitted() -> None:
+    u, x = sine_log()
+    x[np.random.default_rng(1).choice(4000, 8, replace=False)] = 99999.0
+    found = pz.identify(u, x, sample_rate=1000.0)
+    assert found.held_out.rms < 0.005
+    assert found.learnt_on.displacement[1] < 20.0
+
+
+def test_no_error_code_is_seen_in_the_only_swing_of_a_rest() -> None:
+    u = np.zeros(8000)
+    u[4000:4060] = 50.0 * np.sin(np.linspace(0.0, np.pi, 60))
+    flaws = flawed(u, 0.1 * u + 1e-3 * np.random.default_rng(0).standard_normal(8000))
+    assert not flaws.spikes.any()
+
+
+def test_where_the_voltage_is_missing_the_displacement_may_turn() -> None:
+    t = np.arange(4000) / 1000.0
+    for start in (310, 470, 680, 1120):
+        u = 50.0 + 40.0 * np.abs(3.3 * t % 1.0 * 2.0 - 1.0)
+        x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(u, allow_jumps=True)
+        x += 3e-3 * np.random.default_rng(start).standard_normal(t.size)
+        u[start : start + 300] = np.nan
+        flaws = flawed(u, x)
+        assert flaws.jumps.size == 0
+        assert not flaws.spikes.any()

@@ -66,3 +66,36 @@ def test_the_opening_of_a_loop_is_its_width_whatever_drifts() -> None:
     assert still.clockwise == 0.0
     assert still.opening > 0.0
     assert loop_of(t, t, known, 1.0).opening == 0.0  # which does not turn
+
+
+@pytest.mark.parametrize("delay", range(8))
+def test_a_staircase_answered_late_is_not_doubted(delay: int) -> None:
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        steps = rng.integers(8, 20)
+        level = np.floor(rng.uniform(5.0, 25.0) * steps * np.arange(4000) / 4000)
+        u = 50.0 + np.round(50.0 * np.abs((level / steps) % 2.0 - 1.0))
+        x = pz.PrandtlIshlinskii(0.1, [5.0, 15.0], [0.02, 0.02]).simulate(u)
+        x = np.append(np.full(delay, x[0]), x[: 4000 - delay])
+        x += 10.0 ** rng.uniform(-4.0, -2.3) * np.ptp(x) * rng.standard_normal(4000)
+        found = findings(Record.from_arrays(u, x, 1000.0))
+        assert [each.name for each in found if each.severity == "doubt"] == []
+
+
+def test_an_ellipse_is_no_straight_line() -> None:
+    phase = 0.0126 * np.arange(6000)
+    x = 5.0 + 4.0 * np.sin(phase - 0.03) + 1e-3 * np.random.default_rng(0).standard_normal(6000)
+    found = findings(Record.from_arrays(50.0 + 40.0 * np.sin(phase), x, 1000.0))
+    assert "straight" not in [each.name for each in found]
+
+
+@pytest.mark.parametrize("part", [0.8, 0.9, 0.96])
+@pytest.mark.parametrize("shape", [np.sin, lambda p: np.abs((p / 6.28) % 1.0 * 4.0 - 2.0) - 1.0])
+def test_a_sensor_that_ends_at_a_limit_is_clipped(shape: Any, part: float) -> None:
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        u = 50.0 + 45.0 * shape(6.28e-3 * rng.uniform(2.0, 6.0) * np.arange(4000))
+        x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(u, allow_jumps=True)
+        x += 3e-3 * rng.standard_normal(4000)
+        found = findings(Record.from_arrays(u, np.minimum(x, np.quantile(x, part)), 1000.0))
+        assert "clipped displacement" in [each.name for each in found]
