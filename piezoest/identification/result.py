@@ -358,17 +358,15 @@ class Identification:
 
     def report(self) -> str:
         """Return parameters, errors and advice as text."""
-        lines = [repr(self)[1:-1]]
-        lines += [
+        parameters = (
             f"{name:>8} {value:12.6g}{f' ± {error:.2g}' if error > 0.0 else ''} {unit}"
             for name, value, error, unit in self.table()
-        ]
-        lines += [
-            f"{each.label:>28}: {each.held_out.rms:.4g} µm rms held out, "
-            f"{each.cross_validated:.4g} in the choice"
+        )
+        kinds = (
+            f"{each.label:>28}: {each.held_out.rms:.4g} µm held out, {each.cross_validated:.4g} in the choice"
             for each in self.candidates
-        ]
-        return "\n".join([*lines, self.reason, *self.advice])
+        )
+        return "\n".join([repr(self)[1:-1], *parameters, *kinds, self.reason, *self.advice])
 
     @property
     def kinds(self) -> tuple[Kind, ...]:
