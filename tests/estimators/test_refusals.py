@@ -16,7 +16,7 @@ U, X = np.linspace(0.0, 9.0, 50), np.linspace(0.0, 1.3, 50)
 # Class, options, words of the message.
 OPTIONS: list[tuple[Any, dict[str, Any], str]] = [
     (pz.HysteresisRLS, {"memory": -1.0}, "memory must be above zero"),
-    (pz.HysteresisRLS, {"memory": "foo"}, "a number of seconds or None, got 'foo'"),
+    (pz.HysteresisRLS, {"memory": "foo"}, "memory must be .period., a number of seconds or None, got 'foo'"),
     (pz.HysteresisRLS, {"noise": 1e200}, "noise"),
     (pz.HysteresisRLS, {"time_base": "seconds"}, "time_base must be"),
     (pz.HysteresisRLS, {"offset": "x"}, "offset must be True, False or None"),
