@@ -27,6 +27,9 @@ SEEN, CALM = 0.6, 0.1
 SHOWN, PROVEN = 4.0, 1.0
 # A model that drives falls back at once where the stage misses by so many times what the line has missed.
 TRIP = 2.0
+# No model may miss more than the line has. That bound follows the line down at once, and up by this factor
+# each time, for the stage may have changed. It is at least so many swings: hysteresis lets no line be better.
+SLOWLY_UP, AT_LEAST = 1.05, 0.05
 # So often is no chance: it is said, once.
 OFTEN = 3.0
 # Misses below this fraction of a swing are all alike.
@@ -131,6 +134,12 @@ def _floor(state: Any) -> float:
 
 
 @register_jitable
+def _at_most(missed: Any, before: Any) -> float:
+    """What the line misses now, as far as it exceeds what it missed before by no more than allowed."""
+    return min(missed, max(SLOWLY_UP * before, AT_LEAST))
+
+
+@register_jitable
 def _disappoints(state: Any) -> bool:
     """Whether the stage misses the reference by more than the line did when it drove.
 
@@ -142,7 +151,7 @@ def _disappoints(state: Any) -> bool:
     missed, peak = candidate.missed(state.score) / swing, state.score.peak / swing
     if state.driving > 0.0:
         # What it missed on the first way, or before it was drawn anew, would excuse too much.
-        missed, peak = min(missed, state.line_missed), min(peak, state.line_peak)
+        missed, peak = _at_most(missed, state.line_missed), _at_most(peak, state.line_peak)
     state.line_missed, state.line_peak = missed, peak
     return state.driving > 0.0 and candidate.missed(state.outcome) > missed * swing + _floor(state)
 

@@ -53,3 +53,25 @@ def test_a_reference_that_is_faster_than_the_start_is_caught() -> None:
     run = drive(pz.AdaptiveFeedforward(5.0 * FS, limits=LIMITS), Plays(0.6), r)
     assert run.doing.index("running") < 1000
     assert np.abs(run.u).max() < 140.0
+
+
+class Changing(Plays):
+    """A stage whose gain changes by a factor after so many samples."""
+
+    def __init__(self, share: float, factor: float, after: int) -> None:
+        super().__init__(share)
+        self.factor, self.left = factor, after
+
+    def step(self, u: float) -> float:
+        self.left -= 1
+        return super().step(u) * (self.factor if self.left < 0 else 1.0)
+
+
+@pytest.mark.parametrize("share, amplitude", [(0.5, 1.0), (0.7, 1.0), (0.7, 4.0)])
+def test_models_go_on_where_the_gain_changes(share: float, amplitude: float) -> None:
+    r = pz.signals.sine(amplitude, 4.0, 14, FS).values
+    run = drive(pz.AdaptiveFeedforward(FS, limits=LIMITS), Changing(share, 0.7, 5000), r)
+    worst = np.abs(r - run.x).reshape(14, -1).max(axis=1) / amplitude
+    # Back at the line, which knows the old gain, it is 0.3 of the amplitude.
+    assert worst[10] < 0.15
+    assert worst[12] < 0.03
