@@ -216,7 +216,8 @@ class MachineCode(_Cache):  # type: ignore[misc]
         if any(path.stat().st_mtime > _IMPORTED for path in sources()):
             return
         serialise: Any = dumps
-        code: bytes = serialise(data._reduce())
+        reduce: Any = CompileResultCacheImpl.reduce
+        code: bytes = serialise(reduce(self, data))
         with contextlib.suppress(OSError), replacing(place) as beside:
             beside.write_bytes(self._fingerprint(sig, data.codegen, code) + code)
 

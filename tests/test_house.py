@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-# Private by their spelling alone: of tuples with names, of Python itself, of Numba.
-PUBLIC = ("_replace", "_asdict", "_fields", "_exit", "_reduce")
+# Private by its spelling alone, of Python itself.
+PUBLIC = ("_exit",)
 LONGEST = 400
 
 

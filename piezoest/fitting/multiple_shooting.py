@@ -47,7 +47,7 @@ def multiple_shooting(
     # Not converged, the segments need not join: the best iterate is then judged in one piece.
     if not found.success and not problem.cost(q) < problem.cost(start):
         q = start
-    return found._replace(q=np.clip(q, lower, upper))
+    return Solution(np.clip(q, lower, upper), found.success, found.message, found.evaluations)
 
 
 class _Segments:

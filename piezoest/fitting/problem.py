@@ -101,7 +101,7 @@ class Problem:
         The cost is infinite where the model is not finite.
         """
         run, by_q = self.simulate(q)
-        some = run._replace(x=run.x[:samples], jacobian=run.jacobian[:samples])
+        some = Pass(run.x[:samples], run.jacobian[:samples], run.end, run.end_jacobian)
         cost, sums = self.sums(some, slice(samples), loss, scale)
         sums = sums.through(by_q)
         if self.prior is not None:
@@ -120,5 +120,5 @@ class Problem:
     def gap(self, q: FloatArray) -> float:
         """How much less SciPy's bounded least squares leaves by one more step, relative to what x has."""
         (_, sums), (lower, upper) = self.about(q), self.bounds(q)
-        sums = sums._replace(square=dot(self.x, self.x))
+        sums = Sums(sums.gram, sums.moment, dot(self.x, self.x), sums.rows)
         return checked(sums, lower - q, np.zeros_like(sums.gram), np.zeros_like(q), upper - q)

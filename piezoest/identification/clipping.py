@@ -28,7 +28,7 @@ def flat_tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
     """Find where a column is clipped: the other one goes on by a part of its range; None if it is not."""
     for sign in (1.0, -1.0):
         if found := _tops(sign * y, sign * other, goes_on):
-            return found._replace(limit=sign * found.limit)
+            return Top(sign * found.limit, found.times, found.beyond)
     return None
 
 
