@@ -60,23 +60,14 @@ def warmup(*used: Any) -> float:
     began = time.perf_counter()
     sample_rate = 50_000.0
     u = np.linspace(0.0, 1.0, 8)
-    x = 0.15 * u
-    for estimator in (HysteresisRLS(sample_rate), HysteresisEKF(sample_rate)):
-        bank = EstimatorBank(estimator, 2)
-        bank.step(u[:2], x[:2])
-    loop = ColemanHodgdon(0.02, 0.12, 0.0036)
-    plays = PrandtlIshlinskii(0.1, [1.0], [0.02])
-    for learner in (
-        HysteresisRLS(sample_rate),
-        HysteresisEKF(sample_rate),
-        PrandtlIshlinskiiRLS(sample_rate),
-        *used,
-    ):
-        _use(learner, u, x)
+    loop, plays = ColemanHodgdon(0.02, 0.12, 0.0036), PrandtlIshlinskii(0.1, [1.0], [0.02])
+    rls, ekf = HysteresisRLS(sample_rate), HysteresisEKF(sample_rate)
+    learners = (rls, ekf, PrandtlIshlinskiiRLS(sample_rate))
+    inverses = (InverseCompensator(loop), InverseCompensator(plays), LinearCompensator(LinearGain(0.15)))
+    banks = (EstimatorBank(rls, 2), EstimatorBank(ekf, 2))
+    for each in (*learners, *inverses, *banks, *used):
+        _use(each, u, 0.15 * u)
     RecursiveLeastSquares(2).update(1.0, np.ones(2))
-    for model in (loop, plays):
-        _use(InverseCompensator(model), u, x)
-    _use(LinearCompensator(LinearGain(0.15)), u, x)
     stage = PaperStage(sample_rate)
     stage.step(0.0)
     stage.run(u)

@@ -53,7 +53,8 @@ def triangle_tracking(linear: Run, inverse: Run) -> Figure:
     panels = figure.subplot_mosaic([["a", "a"], ["b", "b"], ["c", "d"]], height_ratios=[1.0, 1.0, 1.2])
     for letters, run in (("ac", linear), ("bd", inverse)):
         _series(panels[letters[0]], letters[0], run, periods=2)
-        _map(panels[letters[1]], letters[1], run)
+        draw_map(panels[letters[1]], last_periods(run.stationary, 1))
+        panels[letters[1]].set_title(f"({letters[1]}) {WAYS[run.experiment.compensation]}", fontsize="medium")
     _legend(figure)
     figure.suptitle(f"Fig. 4: {linear.experiment.reference.name}")
     return figure
@@ -124,11 +125,6 @@ def _series(axes: Any, letter: str, run: Run, periods: int) -> None:
         f"({letter}) {WAYS[run.experiment.compensation]}: largest error {run.max_error:.3f} µm",
         fontsize="medium",
     )
-
-
-def _map(axes: Any, letter: str, run: Run) -> None:
-    draw_map(axes, last_periods(run.stationary, 1))
-    axes.set_title(f"({letter}) {WAYS[run.experiment.compensation]}", fontsize="medium")
 
 
 def _legend(figure: Figure, columns: int = 3) -> None:

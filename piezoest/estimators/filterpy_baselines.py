@@ -260,9 +260,8 @@ class FilterPyUKF(_FilterPyBaseline):
 
     def _make_filter(self, n: int) -> Any:
         points = MerweScaledSigmaPoints(n, alpha=0.1, beta=2.0, kappa=3.0 - n)
-        step = _advance if is_hysteretic(self._ekf.s) else _stay
         dt = 1.0 / self._ekf.sample_rate
-        return UnscentedKalmanFilter(dim_x=n, dim_z=1, dt=dt, hx=_read, fx=step, points=points)
+        return UnscentedKalmanFilter(dim_x=n, dim_z=1, dt=dt, hx=_read, fx=_advance, points=points)
 
     def _predict(self, du: float) -> None:
         # Sigma points see the product of errors within a sample only, not that it keeps its sign
@@ -276,11 +275,8 @@ class FilterPyUKF(_FilterPyBaseline):
 
 def _advance(s: FloatArray, dt: float, du: float) -> FloatArray:
     s = s.copy()
-    s[0] = equations.hysteresis_step(s[0], du, s[1], s[2])
-    return s
-
-
-def _stay(s: FloatArray, dt: float, du: float) -> FloatArray:
+    if is_hysteretic(s):
+        s[0] = equations.hysteresis_step(s[0], du, s[1], s[2])
     return s
 
 

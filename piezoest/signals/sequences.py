@@ -127,8 +127,10 @@ def filtered_steps(
         )
     steps = np.repeat(heights, counts)
     if periods is None:
+        from scipy.signal import sosfilt
+
         start = finite("start", start)
-        values = start + _low_pass(steps - start, cutoff, order, sample_rate)
+        values = start + sosfilt(_butterworth(cutoff, order, sample_rate), steps - start)
         return Signal(values, sample_rate, None, "filtered steps")
     n = integer("periods", periods, 1)
     cycle = _periodic_low_pass(steps, cutoff, order, sample_rate)
@@ -294,13 +296,6 @@ def random_walk(
     curve = np.fft.irfft(spectrum, n)
     curve -= curve[0]
     return Signal(curve * (amplitude / np.max(np.abs(curve))), sample_rate, float(n), "random walk")
-
-
-def _low_pass(values: FloatArray, cutoff: float, order: int, sample_rate: float) -> FloatArray:
-    """Butterworth low-pass from rest at zero."""
-    from scipy.signal import sosfilt
-
-    return np.asarray(sosfilt(_butterworth(cutoff, order, sample_rate), values), dtype=np.float64)
 
 
 def _periodic_low_pass(cycle: FloatArray, cutoff: float, order: int, sample_rate: float) -> FloatArray:
