@@ -68,23 +68,11 @@ FS, LIMITS = 1000.0, pz.VoltageLimits(-50.0, 100.0)
 @pytest.mark.parametrize(
     ("mistake", "words"),
     [
-        (lambda: pz.HysteresisRLS.from_dict({}), "data has no 'estimator': pass what HysteresisRLS.to_dict"),
-        (
-            lambda: pz.HysteresisRLS(FS, memory="periods"),
-            'must be "period", a number of seconds or None, got',
-        ),
-        (lambda: pz.HysteresisRLS(FS, policies=("DeadZone",)), "such as policies.DeadZone(), got 'DeadZone'"),
-        (
-            lambda: pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=pz.HysteresisRLS),
-            "got the class Hyst",
-        ),
-        (lambda: pz.AdaptiveFeedforward.from_dict({}), "pass what AdaptiveFeedforward.to_dict() gave"),
         (lambda: pz.PaperStage(FS).run(None), "must be an array, got None"),
         (
             lambda: pz.InverseCompensator(pz.ColemanHodgdon(-1.0, 1.0, 1.0)),
             "alpha and beta must be above zero",
         ),
-        (lambda: pz.Record.from_arrays([1.0, 2.0, 3.0], [1.0, 2.0], FS), "as long as the voltage, 3 samples"),
         (lambda: pz.identify([np.nan] * 200, [0.0] * 200, sample_rate=FS), "voltage has no finite sample"),
         (
             lambda: pz.track([0.0], stage=object(), controller=1, sample_rate=FS),

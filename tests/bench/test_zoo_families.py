@@ -12,7 +12,6 @@ from piezoest.bench.zoo.duhem import Duhem
 from piezoest.bench.zoo.families import FAMILIES, POINTS, Reach, draw_family
 from piezoest.bench.zoo.relays import Relays
 from piezoest.models import ColemanHodgdon
-from piezoest.stage import SimulatedStage
 
 REACHES = (Reach(-100.0, 100.0), Reach(0.0, 150.0))
 WIPING_OUT = ("backlash", "relays", "paper", "preisach")
@@ -57,17 +56,6 @@ def test_a_large_swing_deletes_small_ones(family: str, reach: Reach) -> None:
     plain = model.simulate(path(reach, 0.9, -0.9, 0.2))[-1]
     with_loops = model.simulate(path(reach, 0.5, 0.1, 0.9, -0.2, 0.4, -0.9, -0.3, -0.5, 0.2))[-1]
     assert with_loops == pytest.approx(plain, abs=1e-11)
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-def test_step_and_run_give_the_same_bits(family: str) -> None:
-    reach = REACHES[1]
-    model = draw_family(family, np.random.default_rng(4), reach, width=0.15, gain=0.3)
-    u = path(reach, 0.7, -0.5, 0.6)
-    stage = SimulatedStage(1000.0, model, seed=1)
-    x = stage.run(u)
-    stage.reset()
-    np.testing.assert_array_equal([stage.step(float(v)) for v in u], x)
 
 
 def test_two_families_contain_coleman_and_hodgdon() -> None:

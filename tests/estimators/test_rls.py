@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 import piezoest as pz
-from piezoest.estimators import rls_kernel
-from piezoest.layout import Named, leaves
 from tests.estimators.shared import TRUE, recorded
 from tests.reference import hysteresis_rls as reference
 
@@ -72,19 +70,3 @@ def test_long_gap_starts_anew() -> None:
     estimator = pz.HysteresisRLS(FS, memory=0.4)
     estimator.run(u, x)
     np.testing.assert_allclose(estimator.theta, TRUE.theta, rtol=1e-3)
-
-
-@pytest.mark.parametrize("options", [{}, {"time_base": "continuous", "high_pass": 0.5}])
-def test_machine_code_does_what_its_source_says(options: dict[str, Any]) -> None:
-    u, x = recorded(FS, 0.1)
-    x[300:310] = u[500] = np.nan
-    x[20:120] = np.inf
-    machine, plain = pz.HysteresisRLS(FS, **options), pz.HysteresisRLS(FS, **options)
-    machine.run(u, x)
-    state, given = Named(plain.state, plain.layout), Named(plain.settings, plain.layouts[1])
-    with np.errstate(all="ignore"):
-        for u_k, x_k in zip(u.tolist(), x.tolist(), strict=True):
-            rls_kernel.sample(state, given, u_k, x_k)
-    for name, _, (one, other) in leaves(machine.layout, machine.state, plain.state):
-        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12, err_msg=name)
-    assert machine.status.updates > 500
