@@ -20,17 +20,10 @@ def log(path: Path, header: str = "time_s,voltage_V,displacement_um", **changes:
     return file
 
 
-def test_plain_log(tmp_path: Path) -> None:
-    record = read_record(log(tmp_path))
-    check(record)
-    assert record.skipped == 0
-    assert record.notes == ()
-    assert record.duration == pytest.approx(N / RATE)
-
-
 @pytest.mark.parametrize(
     "header",
     [
+        "time_s,voltage_V,displacement_um",
         "t,u,x",
         "Time (s),Voltage (V),Position (µm)",
         "Time [s], Drive [V], Gauge [um]",
@@ -54,21 +47,9 @@ def test_other_delimiters_with_decimal_comma(tmp_path: Path, separator: str) -> 
     check(read_record(file))
 
 
-def test_units_are_converted_and_said(tmp_path: Path) -> None:
-    file = tmp_path / "log.csv"
-    columns = {"time_ms": 1e3 * TIME, "position_nm": 1e3 * DISPLACEMENT, "drive_mV": 1e3 * VOLTAGE}
-    write_columns(file, columns)
-    record = read_record(file)
-    check(record)
-    assert len(record.notes) == 3
-    assert "converted to µm (factor 0.001)" in " ".join(record.notes)
-
-
 def test_columns_by_name_and_number(tmp_path: Path) -> None:
     file = log(tmp_path, "a,b_V,c")
-    check(read_record(file, columns={"time": "a", "voltage": "b", "displacement": "3"}))
-    check(read_record(file, columns={"time": 1, "voltage": 2, "displacement": 3}))  # type: ignore[dict-item]
-    check(read_record(file, columns={"voltage": "b_V", "displacement": "c"}, sample_rate=100.0))
+    check(read_record(file, columns={"time": 1, "voltage": "b", "displacement": "3"}))  # type: ignore[dict-item]
     with pytest.raises(ValueError, match="columns must be a mapping"):
         read_record(file, columns="voltage=2")  # type: ignore[arg-type]
 
@@ -162,6 +143,7 @@ def test_round_trip_and_split(tmp_path: Path) -> None:
     voltage[3] = np.inf
     record = Record.from_arrays(voltage, DISPLACEMENT, 100.0)
     assert "1 sample" in record.notes[0]
+    assert record.duration == pytest.approx(N / RATE)
     voltage[3] = np.nan
     record.write(tmp_path / "out.csv")
     again = read_record(tmp_path / "out.csv")
