@@ -138,3 +138,23 @@ def test_a_fast_step_widens_the_interval_while_it_lasts() -> None:
     half = spread.along(u, np.zeros(1))
     assert half[41] > 1.0
     np.testing.assert_allclose(np.delete(half, np.arange(38, 140)), 0.01)
+
+
+def test_an_interval_holds_loops_that_the_record_did_not_show() -> None:
+    """Of slopes that were fitted to loops of one size; where it had shown those, nothing is wider."""
+    t = np.arange(2 * N) / RATE
+    whole = 40.0 * np.sin(2.0 * np.pi * 2.0 * t)
+    stage, before, wider = pz.PreisachStage(RATE).hysteresis, [], []
+    for small, both in ((0.4, False), (0.7, False), (0.4, True)):
+        u = np.where((t >= N / RATE) | (both & (t % 1.0 > 0.5)), small * whole, whole)
+        x = stage.simulate(u)
+        x = x + noise(1e-3 * float(np.ptp(x)), 0, 2 * N)
+        found = pz.fit(u[:N], x[:N], sample_rate=RATE, model="plays-asymmetric")
+        p = found.continued(u)
+        assert np.mean(((x >= p.lower) & (x <= p.upper))[N:]) > 0.9
+        plain = found.spread._replace(by_new=0.0).along(u, np.maximum(np.arange(2 * N) / N - 1.0, 0.0))
+        before.append(np.mean((np.abs(x - p.x) <= plain)[N:]))
+        wider.append(np.median((p.upper - p.x)[N:] / plain[N:]))
+    assert max(before[:2]) < 0.8
+    assert min(wider[:2]) > 2.0
+    assert wider[2] == pytest.approx(1.0)
