@@ -56,6 +56,28 @@ def newness(u: FloatArray, visited: tuple[float, float], seen: FloatArray) -> Fl
     return np.asarray(new)
 
 
+def running_mean(u: FloatArray, memory: float) -> FloatArray:
+    """Mean of the voltage so far that forgets with a time constant, shape (N,) [V].
+
+    Parameters
+    ----------
+    u : ndarray, shape (N,)
+        [V]; it begins at the first one.
+    memory : float
+        The time constant [samples].
+    """
+    mean = np.array(u)
+    _average(np.exp(-1.0 / memory), mean)
+    return mean
+
+
+@compiled
+def _average(keep: float, values: Vector) -> None:
+    """Each with what is kept of those before."""
+    for k in range(1, len(values)):
+        values[k] += keep * (values[k - 1] - values[k])
+
+
 @compiled
 def _follow(u: Vector, low: float, high: float, threshold: float, turns: Vector, loops: Matrix) -> None:
     """Write the last two of the `turns` that are remembered, at each voltage."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.loops import ALIKE, loops_of, newness, seen_loops
+from piezoest.fitting.loops import ALIKE, loops_of, newness, running_mean, seen_loops
 
 RANGE = (-10.0, 10.0)
 
@@ -53,3 +53,9 @@ def test_a_loop_that_was_seen_is_not_new() -> None:
     u = way(0.0, 10.0, -10.0, 10.0, -4.0, 4.0, -10.0, 10.0)
     new = newness(np.concatenate([u, way(10.0, -3.8, 4.1, -3.9, 4.0)]), RANGE, seen_loops(u, RANGE))
     np.testing.assert_array_equal(new, 0.0)
+
+
+def test_a_running_mean_begins_at_the_first_voltage_and_forgets() -> None:
+    u = np.append(np.full(5, 3.0), np.zeros(20))
+    expected = np.append(np.full(5, 3.0), 3.0 * np.exp(-np.arange(1.0, 21.0) / 10.0))
+    np.testing.assert_allclose(running_mean(u, 10.0), expected)
