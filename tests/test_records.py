@@ -81,7 +81,7 @@ def test_rows_lost_all_over_a_log_are_missing_samples(tmp_path: Path, share: flo
     ("changes", "words"),
     [
         ({"line7": "0.050,text,1.0"}, ["log.csv, line 7", "column 'voltage_V'", "'text' is not a number"]),
-        ({"line9": "0.060,1,1"}, ["line 9", "time does not increase", "0.06 s after 0.06 s"]),
+        ({"line9": "0.060,1,1", "line20": "0.170,1,1"}, ["line 9", "does not increase", "2 rows", "digits"]),
         ({"line9": "0.001,1,1"}, ["line 9", "time does not increase"]),
         ({"line2": "1700000000.005,1,1"}, ["line 3", "after 1700000000.005 s"]),
         ({"line12": "0.1045,1,1"}, ["line 12", "unevenly", "0.01 s is usual"]),
@@ -100,6 +100,24 @@ def test_refusals_name_place_and_reason(tmp_path: Path, changes: dict[str, str],
         read_record(log(tmp_path, **changes))
     for word in words:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("written_twice", [False, True])
+def test_a_repeated_time_stamp_is_read_and_said(tmp_path: Path, written_twice: bool) -> None:
+    """The stamp of a row, or the whole row."""
+    path = log(tmp_path)
+    lines = path.read_text().splitlines()
+    if written_twice:
+        lines.insert(8, lines[7])
+    else:
+        lines[8] = ",".join([lines[7].split(",")[0], *lines[8].split(",")[1:]])
+    path.write_text("\n".join(lines))
+    record = read_record(path)
+    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
+    np.testing.assert_allclose(record.voltage, VOLTAGE)
+    assert record.skipped == 0
+    (note,) = record.notes
+    assert "the first in line 9" in note
 
 
 def test_a_sample_rate_that_contradicts_time_is_said(tmp_path: Path) -> None:

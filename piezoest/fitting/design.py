@@ -45,6 +45,10 @@ class Basis(Protocol):
     def foretells(self) -> bool:
         """Whether the model says by itself how a stage goes on beyond the voltages of the record."""
 
+    @property
+    def bent(self) -> bool:
+        """Whether equal loops elsewhere may have another shape."""
+
     def begin(self) -> Any:
         """State before the first sample."""
 

@@ -25,6 +25,9 @@ from piezoest.symbolic import quadratic_solver
 FEWEST_SAMPLES = 50
 # A displacement that rises by no more than this fraction of its size over the record stands still.
 ROUNDING = 1e-9
+# Part of the displacement's scatter that a straight line does not leave, if both belong together.
+UNRELATED = 0.5
+FALLS, OTHER_RUN = "change the sign of one of them", "check that both are of one run and one axis"
 # Times that a start which has not settled is looked for, each without what was found before.
 PASSES = 3
 SOLVER = "{} through CasADi; SciPy's bounded least squares agrees to {:.0e}"
@@ -146,8 +149,10 @@ class Fitter:
         if np.ptp(x[counts]) == 0.0:
             raise ValueError(f"x must move with u, it stays at {x[counts][0]:g} µm")
         if gain * np.ptp(self._given) <= ROUNDING * np.max(np.abs(self._log.x)):
+            left = _unexplained(self._given[counts], x[counts])
             raise ValueError(
-                f"x must rise with u, a straight line has {gain:.4g} µm/V: change the sign of one of them"
+                f"x must rise with u, a straight line has {gain:.4g} µm/V and leaves {100 * left:.0f} % of "
+                f"x: {FALLS if left <= UNRELATED else OTHER_RUN}"
             )
         self._plays, self._tells_lag = plays, tells_lag
         self._begin(plays=True)
@@ -315,6 +320,11 @@ class Fitter:
             _rest=rest,
             _u=self._given,
         )
+
+
+def _unexplained(u: FloatArray, x: FloatArray) -> float:
+    """What a straight line leaves of the scatter of x, relative to that."""
+    return float(np.sqrt(max(1.0 - np.corrcoef(u, x)[0, 1] ** 2, 0.0)))
 
 
 def _initial_state(design: Design, w: FloatArray, model: Model) -> Any:

@@ -36,6 +36,7 @@ class LoopColumns:
     size: ClassVar[int] = 3
     free: ClassVar[int] = 1
     foretells: ClassVar[bool] = True
+    bent: ClassVar[bool] = False
 
     def begin(self) -> FloatArray:
         """Voltage, f, and what is left of the start; the first sample says the voltage."""

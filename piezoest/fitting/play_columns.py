@@ -91,6 +91,11 @@ class PlayColumns:
         return False
 
     @property
+    def bent(self) -> bool:
+        """Yes, if slopes change with the voltage."""
+        return self.bends.size > 0
+
+    @property
     def size(self) -> int:
         """Slopes: segment by segment, and in each of them play by play."""
         return int(self.thresholds.size * (self.bends.size + 1))

@@ -151,15 +151,25 @@ class Regression:
         self._always[:size, :size] = design.basis.prior()
         self._always[design.offset + 1, design.offset + 1] = DRIFT
 
-    @cached_property
+    @property
     def line_gain(self) -> float:
         """Slope of the straight line beside the jumps [µm/V]."""
+        return self._line[0]
+
+    @property
+    def line_missed(self) -> float:
+        """What that line misses [µm rms]."""
+        return self._line[1]
+
+    @cached_property
+    def _line(self) -> tuple[float, float]:
         beside = np.r_[self.design.offset, self.design.offset + 2 : self.design.columns]
         T = np.zeros((self.design.columns, 1 + beside.size))
         T[: self.design.basis.size, 0] = self.design.basis.line()
         T[beside, 1 + np.arange(beside.size)] = 1.0
         line = self.all.through(T)
-        return float(np.linalg.lstsq(line.gram, line.moment, rcond=None)[0][0])
+        found = np.asarray(np.linalg.lstsq(line.gram, line.moment, rcond=None)[0], dtype=np.float64)
+        return float(found[0]), float(np.sqrt(line.missed(found) / max(line.rows, 1.0)))
 
     def columns(self, *, drift: bool, gains: bool = True) -> IntArray:
         """Columns that are fitted, of those that the record shows or that follow their neighbours."""

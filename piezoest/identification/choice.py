@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
-from piezoest.identification.result import Candidate
+from piezoest.identification.candidate import Candidate
 
 # A simpler model is preferred until a richer one is better by this fraction on the blocks left out.
 WORTH_IT = 0.02
 # Where the log does not tell creep from a wider loop, creep of more than this part of the way is believed
 # only if the model misses no more than this part of what others do: else it drifts away at the next rest.
-MUCH_CREEP, CLEARLY = 0.2, 0.6
+MUCH_CREEP, CLEARLY = 0.15, 0.4
 
 
 def simplest(errors: Sequence[float]) -> int:

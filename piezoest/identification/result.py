@@ -13,8 +13,9 @@ from piezoest._checks import FloatArray
 from piezoest.fitting import Fit, Prediction
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
-from piezoest.fitting.regression import Fitted
+from piezoest.identification.candidate import Candidate
 from piezoest.identification.data import judged
+from piezoest.identification.interval import interval
 from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.sense import Finding
 from piezoest.identification.told import Kind, Row, figures_of, parameter_rows
@@ -26,83 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from piezoest.identification.drawing import Drawn
-
-# Kinds may be right as well that miss blocks left out by no more than this times what the chosen one does.
-AS_WELL = 1.5
-
-
-def left_out_error(fitted: Fit | Fitted) -> float:
-    """Geometric mean of a fit's errors on blocks between others, and on blocks behind all others [µm rms]."""
-    return float(np.sqrt(fitted.held_out * fitted.ahead))
-
-
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """One kind of model, fitted and judged.
-
-    Parameters
-    ----------
-    fit : Fit
-        The fit.
-    train, held_out : Misfit
-        Error of the simulated displacement where it was fitted and where it was not.
-    prediction : Prediction
-        Simulated displacement over the record, and the bounds within which readings are expected [µm].
-    residual : ndarray, shape (N,)
-        Measured minus simulated displacement, without jumps of the sensor after the fitted part [µm]; NaN
-        where a sample is missing or faulty.
-    """
-
-    fit: Fit
-    train: Misfit
-    held_out: Misfit
-    prediction: Prediction = field(repr=False)
-    residual: FloatArray = field(repr=False)
-
-    @property
-    def name(self) -> str:
-        """Kind of the model, as `piezoest.fit` names it."""
-        return self.fit.form
-
-    @property
-    def label(self) -> str:
-        """The same in words."""
-        return self.fit.label
-
-    @property
-    def model(self) -> Model:
-        """The model, with offset."""
-        return self.fit.model
-
-    @property
-    def parameters(self) -> int:
-        """Number of fitted parameters."""
-        return self.fit.parameters
-
-    @property
-    def creep(self) -> float:
-        """What the model creeps by, in all terms together, relative to its way."""
-        return float(np.sum(getattr(getattr(self.model, "creep", None), "gains", 0.0)))
-
-    @property
-    def cross_validated(self) -> float:
-        """Error on blocks of the fitted part that were left out of the fit [µm rms]; it decides the choice.
-
-        The geometric mean of that on blocks between others, and of that on blocks after all others.
-        """
-        return left_out_error(self.fit)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe dictionary of the figures."""
-        return {
-            "name": self.name,
-            "parameters": self.parameters,
-            "cross_validated_um": self.cross_validated,
-            "between_um": self.fit.held_out,
-            "ahead_um": self.fit.ahead,
-            "train": self.train.to_dict(),
-            "held_out": self.held_out.to_dict(),
-        }
 
 
 class Validation(NamedTuple):
@@ -282,23 +206,15 @@ class Identification:
     def predict(self, u: FloatArray | None = None) -> Prediction:
         """Displacement that the model expects, and between what a reading will lie, 95 times in 100.
 
-        Kinds that predict about as well may be right: the interval is wider by how far they differ.
+        Kinds that predict about as well may be right: the interval is wider by how far they differ. Of others
+        it is wider where they differ by more than in the fitted part.
 
         Parameters
         ----------
         u : array_like, shape (N,), optional
             Voltage [V]; by default this record's.
         """
-
-        def of(one: Candidate) -> Prediction:
-            return one.prediction if u is None else one.fit.predict(u)
-
-        own = of(self.best)
-        most = AS_WELL * self.best.cross_validated
-        others = [each for each in self.candidates if each is not self.best and each.cross_validated <= most]
-        apart = [np.abs(of(each).x - own.x) for each in others]
-        half = np.hypot(own.upper - own.x, np.max(apart, axis=0, initial=0.0))
-        return Prediction(own.x, own.x - half, own.x + half)
+        return interval(self.best, self.candidates, u)
 
     def compare(self, *others: Identification) -> str:
         """Return a table of errors [µm rms] of this and other identifications, of the same log or of others.

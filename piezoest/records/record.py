@@ -234,7 +234,8 @@ def read_record(
     -------
     Record
         In s, V and µm. Rows that hold no number, and rows missing in the
-        column of time, are NaN and are counted in `skipped`.
+        column of time, are NaN and are counted in `skipped`. Where up to 1 % of the rows repeat the time of
+        the row before, those beside say where they belong.
 
     Raises
     ------

@@ -14,6 +14,8 @@ from piezoest.records.source import LogError, counted
 LARGEST_JITTER = 0.25
 MOST_MISSING, MOST_IN_ALL = 0.1, 0.5
 MENTIONED_JITTER = 0.01
+# Part of the rows, and one in any case, that may repeat the time before; with more, digits are too few.
+MOST_REPEATED = 0.01
 
 Blocks = Callable[[], Iterable[tuple[Any, FloatArray]]]  # numbers of rows in the file, times [s]
 
@@ -40,22 +42,33 @@ class Timing(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """Rows with a time, behind the last one of the block before."""
+    """Rows with a time of their own, behind the last one of the block before; numbers of those without."""
 
     rows: Any  # counted from 0
     numbers: Any
     times: FloatArray
+    repeating: Any = ()
+
+
+def _own(time: FloatArray) -> FloatArray:
+    """Times with NaN where one repeats the time before."""
+    known = np.flatnonzero(np.isfinite(time))
+    own = time.copy()
+    own[known[1:][np.diff(time[known]) == 0.0]] = np.nan
+    return own
 
 
 def _known(blocks: Iterable[tuple[Any, FloatArray]]) -> Iterator[tuple[int, _Known, int]]:
     """Rows so far, those of a block that have a time, and how many of these are of the block before."""
     start, last = 0, _Known(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
     for numbers, time in blocks:
-        known = np.flatnonzero(np.isfinite(time))
+        own = _own(np.append(last.times, time))[last.times.size :]
+        known = np.flatnonzero(np.isfinite(own))
         found = _Known(
             np.append(last.rows, known + start),
             np.append(last.numbers, numbers[known]),
             np.append(last.times, time[known]),
+            numbers[np.isfinite(time) & np.isnan(own)],
         )
         start += time.size
         yield start, found, last.rows.size
@@ -66,6 +79,7 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
     """Find the timing; ValueError, with the place in the file, if time is not even enough."""
     rows, count, usual, jitter, absent = 0, 0, 0.0, 0.0, 0
     largest, jump, moved, words, uneven = 0, 0, False, "", ""
+    repeats, repeated = 0, ""
     sums, first, last = np.zeros(4), (0, 0.0), (0, 0.0)
     for rows, known, old in _known(blocks()):  # noqa: B007
         steps, apart = np.diff(known.times), np.diff(known.rows)
@@ -75,11 +89,13 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
 
         if not known.times.size:
             continue
-        if np.any(steps <= 0.0):
-            k = int(np.argmax(steps <= 0.0))
+        if len(known.repeating):
+            repeats += len(known.repeating)
+            repeated = repeated or f"{place} {known.repeating[0]}"
+        if np.any(steps < 0.0):
+            k = int(np.argmax(steps < 0.0))
             raise LogError(
-                f"{at(k)}does not increase: {known.times[k + 1]:.15g} s after {known.times[k]:.15g} s; if it "
-                "has too few digits, give the sample rate instead"
+                f"{at(k)}does not increase: {known.times[k + 1]:.15g} s after {known.times[k]:.15g} s"
             )
         if not count:
             first = int(known.rows[0]), float(known.times[0])
@@ -107,6 +123,11 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
             words = f"{at(k)}jumps by {steps[k]:.6g} s where {usual:.6g} s is usual"
         moved = moved or bool(np.any(gaps))
         jitter, absent = max(jitter, float(off.max())), absent + int(gaps.sum())
+    if repeats > max(1.0, MOST_REPEATED * rows):
+        raise LogError(
+            f"{where}, {repeated}: time does not increase, and so in {counted(repeats, 'row')}; if it has "
+            "too few digits, give the sample rate instead"
+        )
     if count < 2:
         raise LogError(f"{where}: only {counted(count, 'row')} with a time")
     if uneven:
@@ -117,10 +138,17 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
     elif largest > MOST_MISSING * (rows + absent) or absent > MOST_IN_ALL * (rows + absent):
         raise LogError(f"{words}, {absent} samples are missing in all: cut the log there")
     period = float((last[1] - first[1]) / (last[0] + absent - first[0]))
-    notes = f"time is uneven by up to {100.0 * jitter:.0f} % of a sample; taken as even"
+    notes = []
+    if jitter > MENTIONED_JITTER:
+        notes.append(f"time is uneven by up to {100.0 * jitter:.0f} % of a sample; taken as even")
+    if repeats:
+        notes.append(
+            f"{counted(repeats, 'row')} with the time of the row before, the first in {repeated}: placed by "
+            "the rows beside"
+        )
     return Timing(
         rows + absent, float(first[1] - first[0] * period), period, usual if moved else None, jump,
-        (notes,) if jitter > MENTIONED_JITTER else (),
+        tuple(notes),
     )  # fmt: skip
 
 
@@ -146,6 +174,7 @@ def placed(timing: Timing, blocks: Iterable[list[FloatArray]]) -> Iterator[list[
     waiting: Any = None
     for block in itertools.chain(blocks, (None,)):
         rows = np.array(block) if waiting is None else np.hstack([waiting, block or waiting[:, :0]])
+        rows[0] = _own(rows[0])
         known = np.flatnonzero(np.isfinite(rows[0]))
         end = rows.shape[1] if block is None else known[-1] if known.size else 0
         knots = np.unique(np.concatenate([[0], known, [end]]))

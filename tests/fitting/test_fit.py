@@ -32,6 +32,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "no voltage": ({"u": np.full(N, np.nan)}, "0 samples in common"),
     "constant voltage": ({"u": np.full(N, 5.0)}, "u must move, it stays at 5 V"),
     "falling": ({"x": -Y}, "x must rise with u.* change the sign"),
+    "another run": ({"u": voltage(np.random.default_rng(1))}, "x must rise with u.* leaves .* of one run"),
     "constant displacement": ({"x": np.full(N, 2.0)}, "x must move with u, it stays at 2 µm"),
     "model": ({"model": "spline"}, "model must be one of line, .*, got 'spline'"),
     "delay too long": ({"delay": 10.5}, "delay must"),

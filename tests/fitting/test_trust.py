@@ -98,6 +98,9 @@ def test_intervals_hold_what_they_promise(model: str) -> None:
         # And where the voltage moves further within the delay: a swing is flattened by its rate to its end.
         (Spread(3.0, 0.0, 0.4, (-10.0, 10.0), by_move=2.0, delay=2.0, moved=3.0),
          [0.0, 0.0, 5.0, 5.0, 5.0], [0.0] * 5, [3.0, 3.0, 5.0, 5.0, 5.0]),
+        # And where the voltage stays at one side for longer.
+        (Spread(3.0, 0.0, 0.0, (-50.0, 50.0), by_stay=0.4, memory=1e-3, stayed=(-10.0, 10.0)),
+         [0.0, 10.0, 20.0, -20.0, 0.0], [0.0] * 5, [3.0, 3.0, 5.0, 5.0, 3.0]),
     ],
 )  # fmt: skip
 def test_an_interval_widens(spread: Spread, u: list[float], behind: list[float], half: list[float]) -> None:
@@ -138,3 +141,40 @@ def test_a_fast_step_widens_the_interval_while_it_lasts() -> None:
     half = spread.along(u, np.zeros(1))
     assert half[41] > 1.0
     np.testing.assert_allclose(np.delete(half, np.arange(38, 140)), 0.01)
+
+
+def test_an_interval_holds_loops_that_the_record_did_not_show() -> None:
+    """Of slopes that were fitted to loops of one size; where it had shown those, nothing is wider."""
+    t = np.arange(2 * N) / RATE
+    whole = 40.0 * np.sin(2.0 * np.pi * 2.0 * t)
+    stage, before, wider = pz.PreisachStage(RATE).hysteresis, [], []
+    for small, both in ((0.4, False), (0.7, False), (0.4, True)):
+        u = np.where((t >= N / RATE) | (both & (t % 1.0 > 0.5)), small * whole, whole)
+        x = stage.simulate(u)
+        x = x + noise(1e-3 * float(np.ptp(x)), 0, 2 * N)
+        found = pz.fit(u[:N], x[:N], sample_rate=RATE, model="plays-asymmetric")
+        p = found.continued(u)
+        assert np.mean(((x >= p.lower) & (x <= p.upper))[N:]) > 0.9
+        plain = found.spread._replace(by_new=0.0).along(u, np.maximum(np.arange(2 * N) / N - 1.0, 0.0))
+        before.append(np.mean((np.abs(x - p.x) <= plain)[N:]))
+        wider.append(np.median((p.upper - p.x)[N:] / plain[N:]))
+    assert max(before[:2]) < 0.8
+    assert min(wider[:2]) > 2.0
+    assert wider[2] == pytest.approx(1.0)
+
+
+def test_an_interval_holds_creep_that_the_record_could_not_show() -> None:
+    """Of a stage that only swings, and then comes to rest at one side."""
+    t = np.arange(2 * N) / RATE
+    u = 40.0 * np.sin(2.0 * np.pi * 2.25 * np.minimum(t, 1.3 * N / RATE))
+    assert abs(u[-1]) > 20.0
+    creep = pz.Creep([5e-3, 5e-3, 5e-3], [0.1, 0.5, 3.0])
+    x = stage(np.random.default_rng(0), creep=creep).simulate(u)
+    x = x + noise(5e-4 * float(np.ptp(x)), 0, 2 * N)
+    found = pz.fit(u[:N], x[:N], sample_rate=RATE, model="plays")
+    p, later = found.continued(u), np.maximum(np.arange(2 * N) / N - 1.0, 0.0)
+    half = p.upper - p.x
+    assert np.mean((np.abs(x - p.x) <= half)[N:]) > 0.9
+    plain = found.spread._replace(by_stay=0.0).along(u, later)
+    assert np.mean((np.abs(x - p.x) <= plain)[N:]) < 0.8
+    np.testing.assert_allclose(half[: N + 1000], plain[: N + 1000], rtol=0.01)

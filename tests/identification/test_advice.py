@@ -104,7 +104,8 @@ def test_other_logs_are_checked_too() -> None:
 
 
 @pytest.mark.parametrize(
-    ("creep", "missed", "chosen"), [(0.1, 0.8, 1), (0.4, 0.8, 0), (0.4, 0.5, 1), (0.0, 0.8, 1)]
+    ("creep", "missed", "chosen"),
+    [(0.1, 0.8, 1), (0.18, 0.8, 0), (0.4, 0.5, 0), (0.4, 0.35, 1), (0.0, 0.8, 1)],
 )
 def test_much_creep_that_a_log_cannot_tell_must_be_clearly_better(
     creep: float, missed: float, chosen: int

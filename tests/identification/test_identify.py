@@ -443,5 +443,6 @@ def test_an_interval_holds_what_kinds_expect_that_may_be_right_as_well() -> None
     apart = np.max([np.abs(each.fit.predict(u).x - expected.x) for each in rivals], axis=0)
     assert apart.max() > found.fit.spread.within
     own = found.fit.predict(u)
-    np.testing.assert_allclose(expected.upper - expected.x, np.hypot(own.upper - own.x, apart))
+    # Kinds that are not as good may differ by even more.
+    assert np.all(expected.upper - expected.x >= 0.9999 * np.hypot(own.upper - own.x, apart))
     np.testing.assert_allclose(expected.x - expected.lower, expected.upper - expected.x)
