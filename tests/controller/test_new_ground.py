@@ -67,7 +67,7 @@ class Changing(Plays):
         return super().step(u) * (self.factor if self.left < 0 else 1.0)
 
 
-@pytest.mark.parametrize("share, amplitude", [(0.5, 1.0), (0.7, 1.0), (0.7, 4.0)])
+@pytest.mark.parametrize(("share", "amplitude"), [(0.5, 1.0), (0.7, 1.0), (0.7, 4.0)])
 def test_models_go_on_where_the_gain_changes(share: float, amplitude: float) -> None:
     r = pz.signals.sine(amplitude, 4.0, 14, FS).values
     run = drive(pz.AdaptiveFeedforward(FS, limits=LIMITS), Changing(share, 0.7, 5000), r)
