@@ -8,6 +8,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray, array_1d
 from piezoest.compile import Vector, compiled
+from piezoest.fitting.bursts import LONGEST as LONGEST_BURST
 from piezoest.fitting.bursts import bursts, wild
 from piezoest.fitting.coordinates import bridged
 from piezoest.fitting.held import held
@@ -22,7 +23,6 @@ FEWEST_SAMPLES = 64
 UNUSUAL = 6.0
 # ... and by so much of the range of the displacement: less does no harm to a fit.
 SMALLEST_SPIKE, SMALLEST_JUMP = 1e-3, 5e-3
-LONGEST_SPIKE = 6
 PASSES = 4
 # Steps of the voltage explain what happens for some samples, and this much more than their size.
 FORGOTTEN_PER_SAMPLE = 0.98
@@ -287,9 +287,9 @@ def _comes_back(log: _Log, x: FloatArray, found: IntArray, size: FloatArray) -> 
 
 
 def _isolated(marks: BoolArray) -> BoolArray:
-    """Marks of which no more than a few stand together."""
+    """Marks of which no more than in a burst stand together."""
     starts, ends = runs(marks)
-    long = ends - starts > LONGEST_SPIKE
+    long = ends - starts > LONGEST_BURST
     out = marks.copy()
     for start, end in zip(starts[long], ends[long], strict=True):
         out[start:end] = False

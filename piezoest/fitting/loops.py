@@ -9,6 +9,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.compile import Matrix, Vector, compiled
+from piezoest.fitting.runs import IntArray
 from piezoest.signals.turns import TURN
 
 # Loops whose turns are nearer than this fraction of the range are alike.
@@ -38,7 +39,15 @@ def loops_of(u: FloatArray, visited: tuple[float, float]) -> FloatArray:
 def seen_loops(u: FloatArray, visited: tuple[float, float]) -> FloatArray:
     """Those of a record, each once, shape (M, 2) [V]."""
     step = 0.5 * ALIKE * (visited[1] - visited[0])
-    return np.asarray(step * np.unique(np.round(loops_of(u, visited) / step), axis=0))
+    loops, _ = _one_by_one(u, visited)
+    return np.asarray(step * np.unique(np.round(loops / step), axis=0))
+
+
+def _one_by_one(u: FloatArray, visited: tuple[float, float]) -> tuple[FloatArray, IntArray]:
+    """Loops in the order of their samples, shape (M, 2) [V], and which of them each sample is in, (N,)."""
+    loops = loops_of(u, visited)
+    begins = np.append(True, np.any(np.diff(loops, axis=0) != 0.0, axis=1))
+    return loops[begins], np.cumsum(begins) - 1
 
 
 def newness(u: FloatArray, visited: tuple[float, float], seen: FloatArray) -> FloatArray:
@@ -48,10 +57,10 @@ def newness(u: FloatArray, visited: tuple[float, float], seen: FloatArray) -> Fl
     """
     from scipy.spatial import KDTree
 
-    loops, extent = loops_of(u, visited), visited[1] - visited[0]
-    begins = np.append(True, np.any(np.diff(loops, axis=0) != 0.0, axis=1))
-    apart, _ = KDTree(seen).query(loops[begins], p=np.inf)
-    new = (apart - ALIKE * extent).clip(0.0)[np.cumsum(begins) - 1]
+    loops, number = _one_by_one(u, visited)
+    extent = visited[1] - visited[0]
+    apart, _ = KDTree(seen).query(loops, p=np.inf)
+    new = (apart - ALIKE * extent).clip(0.0)[number]
     _remember(np.clip(u, *visited), REMEMBERED * extent, new)
     return np.asarray(new)
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.fitting.runs import IntArray, runs
+from piezoest.fitting.surprise import noise_in
 from piezoest.signals.turns import TURN, turns
 
 # A rest lasts for so many samples, and for this part of a swing; the voltage moves by this part of its
@@ -26,7 +27,7 @@ def rests_of(u: FloatArray) -> IntArray:
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     extent = float(np.ptp(u))
-    noise = 1.4826 * float(np.median(np.abs(np.diff(u, 3)))) / np.sqrt(20.0) if u.size > 3 else 0.0
+    noise = noise_in(np.diff(u, 3))
     tolerance = max(RESTING * extent, 7.0 * noise)
     swings = turns(u, max(TURN * extent, tolerance)).size + 1
     noisy = tolerance > RESTING * extent

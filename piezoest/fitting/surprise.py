@@ -57,6 +57,11 @@ def _shifted(y: FloatArray, by: int) -> FloatArray:
     return y[np.clip(np.arange(y.size) + by, 0, y.size - 1)]
 
 
+def noise_in(third: FloatArray) -> float:
+    """Standard deviation of white noise by the third differences of what has it, robustly; 0 of none."""
+    return 1.4826 * float(np.median(np.abs(third))) / np.sqrt(20.0) if third.size else 0.0
+
+
 def is_peak(size: FloatArray, reach: int, found: IntArray) -> BoolArray:
     """Whether no value within so many samples is greater, for each place.
 

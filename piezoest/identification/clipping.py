@@ -6,6 +6,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.fitting.runs import runs
+from piezoest.fitting.surprise import noise_in
 
 # A column is at its limit within this part of its range.
 AT_LIMIT = 1e-3
@@ -34,7 +35,7 @@ def flat_tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
 
 def _tops(y: FloatArray, other: FloatArray, goes_on: float) -> Top | None:
     extent, reach, top = float(np.ptp(y)), float(np.ptp(other)), float(y.max())
-    noise = 1.4826 * float(np.median(np.abs(np.diff(y, 3)))) / np.sqrt(20.0)
+    noise = noise_in(np.diff(y, 3))
     tolerance = min(max(AT_LIMIT * extent, 7.0 * noise), 0.02 * extent)
     if _stands_only_at(y, top):
         tolerance, goes_on = 0.0, EXACTLY * goes_on

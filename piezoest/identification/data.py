@@ -10,6 +10,7 @@ from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.gaps import remembered
 from piezoest.fitting.runs import BoolArray
+from piezoest.fitting.surprise import noise_in
 from piezoest.identification.examined import FEWEST_TURNS
 from piezoest.identification.sense import Finding
 from piezoest.models import ColemanHodgdon, LinearGain
@@ -79,8 +80,7 @@ def noise_of(data: Data) -> float:
     target = third[LATEST : inputs.size]
     late = np.stack([inputs[LATEST - k : inputs.size - k] for k in range(LATEST + 1)], axis=1)
     left = target - late @ np.linalg.lstsq(late, target)[0]
-    third_size = min(float(np.median(np.abs(each))) for each in (third, left))
-    return max(1.4826 * third_size / np.sqrt(20.0), 1e-9 * float(np.ptp(x)), 1e-12)
+    return max(min(noise_in(third), noise_in(left)), 1e-9 * float(np.ptp(x)), 1e-12)
 
 
 def check_excitation(data: Data, noise: float, found: Iterable[Finding]) -> None:
