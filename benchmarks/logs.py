@@ -19,14 +19,16 @@ import numpy as np
 import typer
 from log_judging import NEGLIGIBLE, PLAYS, TRAIN, clean_scores, judge
 
+import piezoest as pz
 from piezoest._files import write_text
 from piezoest._progress import progress
 from piezoest.bench.executors import in_processes
 from piezoest.bench.origin import json_safe, origin, put
 from piezoest.bench.table import DIGITS
-from piezoest.bench.zoo.logs import ADDED
+from piezoest.bench.zoo.families import draw_family
+from piezoest.bench.zoo.logs import ADDED, REACHES
 from piezoest.bench.zoo.summary import grouped, median, values
-from piezoest.models import ColemanHodgdon
+from piezoest.models import ColemanHodgdon, Creep
 
 Row = dict[str, Any]
 
@@ -36,6 +38,7 @@ RATIOS = ("best", "nnls", "line", "stroke", "noise")
 COVERED = ("below 50 %", "50 to 90 %", "90 to 98 %", "above 98 %")
 COVERED_AT = (0.5, 0.9, 0.98)
 WORST = 10
+LONG, ROUNDS = 50_000, 5  # samples of the log whose fits are timed, and times of which the median counts
 SHOWN = ("seed", "family", "voltage", "added", "chosen_name", "best_name")
 
 
@@ -123,6 +126,40 @@ def summarise(rows: Sequence[Row], clean: Sequence[Row] = ()) -> Row:
     }
 
 
+def times() -> list[Row]:
+    """Seconds of fits of a long log, by the clock of their thread, and what issue 18 asks for.
+
+    Its stage has bends and creep, and its swings differ.
+    """
+    rng, rate, t = np.random.default_rng(0), 1e4, np.arange(LONG) / LONG
+    reach = REACHES[1]
+    u = reach.middle + 0.9 * reach.half * np.sin(100.0 * np.pi * t) * np.linspace(0.3, 1.0, LONG)
+    x = draw_family("preisach", rng, reach, width=0.15, gain=0.1).simulate(u)
+    x += Creep.logarithmic(0.02, shortest=1e-3, longest=50.0).simulate(x, sample_rate=rate)
+    x += 1e-3 * np.ptp(x) * rng.standard_normal(LONG)
+
+    def fit(kind: str) -> Callable[[], Any]:
+        return lambda: pz.fit(u, x, sample_rate=rate, model=kind)
+
+    work = (
+        ("plays with 20 thresholds, creep and bends", 1.0, fit("plays-asymmetric-creep")),
+        ("Coleman-Hodgdon", 0.2, fit("coleman-hodgdon")),
+        ("all kinds, with cross-validation", 10.0, lambda: pz.identify(u, x, sample_rate=rate, train=0.9)),
+    )
+    return [{"fit": name, "asked": asked, "seconds": median_time(run)} for name, asked, run in work]
+
+
+def median_time(run: Callable[[], Any]) -> float:
+    """Seconds of a call after one to warm up."""
+    run()
+    taken = []
+    for _ in range(ROUNDS):
+        began = time.thread_time()
+        run()
+        taken.append(time.thread_time() - began)
+    return float(np.median(taken))
+
+
 def played(what: str, work: Callable[[int], Row], seeds: Sequence[int], workers: int | None) -> list[Row]:
     """Rows of some logs, in the order of their seeds."""
     rows: list[Row] = []
@@ -154,6 +191,7 @@ def main(
         "seed": seed,
         "clean": clean,
         "criteria": {"train": TRAIN, "plays": PLAYS, "near": NEAR, "negligible": NEGLIGIBLE},
+        "times": times(),
         **summarise(rows, pure),
     }
     if rows_to is not None:

@@ -26,6 +26,7 @@ PART: Columns = {
     "median coverage": lambda row: percent(row["covered"]),
     "median time [s]": "seconds",
 }
+TIMES: Columns = {"fit": "fit", "time [s]": "seconds", "asked": lambda row: f"at most {row['asked']:g}"}
 GROUPS = {"clean": "nothing that the model lacks", "all": "anything"}
 SCORES: Columns = {
     "added": lambda row: GROUPS[row["logs_with"]],
@@ -62,6 +63,7 @@ def pieces(document: Document) -> dict[str, str]:
             (document["coverage"] or {"counts": {}})["counts"].items(),
         ),
         "scores": table_of(scores, document["scores"], SCORES),
+        "times": table_of("Time of a fit of 50 000 samples, on one core", document["times"], TIMES),
         "worst": table_of(f"The worst {len(document['worst'])} logs", document["worst"], WORST),
         "failures": table_of(
             "Logs that were refused", document["failures"], {"seed": "seed", "message": "text"}

@@ -155,10 +155,12 @@ class Fitter:
                 f"x: {FALLS if left <= UNRELATED else OTHER_RUN}"
             )
         self._plays, self._tells_lag = plays, tells_lag
-        self._begin(plays=True)
-        if search.drifts(self._log, self.start):
+        # A loop says by itself where it began; only its delay is first that of plays.
+        by_plays = plays or self.delay_estimated
+        self._begin(by_plays)
+        if search.drifts(self._log, search.plays(self._log, self.start) if by_plays else self._loop):
             self._log = replace(self._log, drifts=True)
-            self._begin(plays=True)
+            self._begin(by_plays)
         self.delay = search.best_delay(self._log, self.start) if isinstance(delay, str) else delay
         if self.delay > 0.0:
             self._log = replace(self._log, u=late(self._given, self.delay))
@@ -168,9 +170,14 @@ class Fitter:
             self._refine_delay()
 
     def _begin(self, plays: bool) -> None:
-        """Find where plays were before the record; anywhere will do where there are none."""
+        """Find where plays were before the record; anywhere will do where there are none.
+
+        Fits of another delay or start are of no more use.
+        """
         first = float(self._log.u[0])
         self.start = search.best_start(self._log) if plays else Start(first, first)
+        for name in ("_first", "_loop", "_plain", "_richest"):
+            self.__dict__.pop(name, None)
 
     def _leave_out(self, settle: float | None) -> None:
         """Do without what a first fit shows to be spikes, and a start that has not settled."""
@@ -209,16 +216,10 @@ class Fitter:
                 break
             self.delay, self._log = delay, replace(self._log, u=late(self._given, delay))
             self._begin(plays=True)
-            self._forget()
             if self._richest.ahead > ahead:
                 self._log, self.start, self.delay = before
-                self._forget()
+                self._begin(plays=True)
                 break
-
-    def _forget(self) -> None:
-        """Do without fits of another delay."""
-        for name in ("_first", "_plain", "_richest"):
-            self.__dict__.pop(name, None)
 
     @property
     def _bent_plays(self) -> PlayColumns:
@@ -229,7 +230,7 @@ class Fitter:
         """Sums of plays with bends, from which those without follow; or of a loop."""
         return search.regression(self._log, self._bent_plays if self._plays else self._loop)
 
-    @property
+    @cached_property
     def _loop(self) -> LoopColumns:
         return LoopColumns(search.best_alpha(self._log))
 

@@ -11,9 +11,10 @@ from piezoest.signals.turns import TURN, turns
 # range in it.
 SHORTEST_REST, REST_OF_SWING = 20, 0.1
 RESTING = 1e-3
-# A voltage with noise must stand for so much longer, and bend or rise by no more than so many standard
-# deviations of what noise makes of that: the top of a slow swing looks like a rest.
-LONGER_IN_NOISE, BENT = 5, 10.0
+# In the inner half of a rest the voltage rises or bends by no more than this part of that, and so many
+# standard deviations of what noise makes of it: the top of a slow or small swing, where it does by a quarter,
+# is none. Where noise hides that, a rest must last for so much longer.
+STANDS, BENT, LONGER_IN_NOISE = 0.1, 6.0, 5
 
 
 def rests_of(u: FloatArray) -> IntArray:
@@ -30,8 +31,7 @@ def rests_of(u: FloatArray) -> IntArray:
     noise = noise_in(np.diff(u, 3))
     tolerance = max(RESTING * extent, 7.0 * noise)
     swings = turns(u, max(TURN * extent, tolerance)).size + 1
-    noisy = tolerance > RESTING * extent
-    longer = LONGER_IN_NOISE if noisy else 1
+    longer = LONGER_IN_NOISE if tolerance > RESTING * extent else 1
     shortest = max(SHORTEST_REST, round(longer * REST_OF_SWING * u.size / swings))
     if shortest >= u.size or extent == 0.0 or tolerance > 0.1 * extent:
         return np.empty((0, 2), np.int64)
@@ -43,12 +43,9 @@ def rests_of(u: FloatArray) -> IntArray:
     still[: shortest - 1] = False
     starts, ends = runs(still)
     found = np.stack((starts - (shortest - 1), ends), axis=1)
-    if not noisy:
-        return found
-    lengths = np.diff(found, axis=1)[:, 0]
-    allowed = RESTING * extent * lengths / shortest + BENT * noise / np.sqrt(lengths)
-    moved = np.array([_moved(u[start:end]) for start, end in found])
-    return found[moved <= allowed]
+    quarters = np.diff(found, axis=1)[:, 0] // 4
+    moved = np.array([_moved(u[a + q : b - q]) for (a, b), q in zip(found, quarters, strict=True)])
+    return found[moved <= STANDS * RESTING * extent + BENT * noise / np.sqrt(2.0 * quarters)]
 
 
 def _moved(u: FloatArray) -> float:

@@ -32,7 +32,7 @@ LONGEST_DELAY, CLOSE = 10.0, 0.02
 # Most Gauss-Newton steps of a delay.
 REFINED = 3
 # Gauss-Newton steps of the creep gains, the relative change at which they have settled, the least of them.
-STEPS, SETTLED, LEAST_CREEP = 8, 1e-3, 1e-3
+STEPS, SETTLED, LEAST_CREEP = 10, 1e-3, 1e-3
 # Creep terms are a decade apart, from so many samples to so many times the record.
 SHORTEST_CREEP, LONGEST_CREEP, MOST_TERMS = 20.0, 1.0, 4
 # Range of alpha times the range of the voltage, and how closely its logarithm is found: what ends in the
@@ -67,8 +67,15 @@ def line_gain(log: Log) -> float:
 
 def missed(log: Log, basis: Basis) -> float:
     """Mean square that a basis leaves, by some thousand rows."""
-    found = regression(log, basis, max(1, int(np.count_nonzero(log.counts)) // FEW))
-    w = found.solved(SMOOTH, found.columns(drift=log.drifts))
+    return _left(_few(log, basis), log.drifts)
+
+
+def _few(log: Log, basis: Basis) -> Regression:
+    return regression(log, basis, max(1, int(np.count_nonzero(log.counts)) // FEW))
+
+
+def _left(found: Regression, drift: bool) -> float:
+    w = found.solved(SMOOTH, found.columns(drift=drift))
     return found.all.missed(w) / max(found.all.rows, 1.0)
 
 
@@ -77,10 +84,10 @@ def best_start(log: Log) -> Start:
     return min(starts(log.u), key=lambda start: missed(log, plays(log, start)))
 
 
-def drifts(log: Log, start: Start) -> bool:
-    """Whether a drift is clear beside plays with this start."""
-    basis = plays(log, start)
-    return missed(replace(log, drifts=True), basis) < CLEAR_DRIFT * missed(log, basis)
+def drifts(log: Log, basis: Basis) -> bool:
+    """Whether a drift is clear beside a basis."""
+    few = _few(log, basis)
+    return _left(few, True) < CLEAR_DRIFT * _left(few, False)
 
 
 def checked_delay(delay: Any) -> float | Literal["auto"]:
@@ -159,13 +166,14 @@ def with_creep(log: Log, plain: Fitted, times: FloatArray) -> Fitted:
         fitted = _crept(log, fitted, Creep(gains, times)).best(smoothness)
         step = fitted.w[fitted.design.gains]
         gains = np.maximum(gains + step, 0.0)
-        if k > 1 and np.max(np.abs(step)) <= SETTLED * max(float(gains.sum()), SETTLED):
-            break
-    kept = gains > LEAST_CREEP
-    if not np.any(kept):
-        return plain
-    if not np.all(kept):
-        return with_creep(log, plain, times[kept])
+        settled = k > 1 and np.max(np.abs(step)) <= SETTLED * max(float(gains.sum()), SETTLED)
+        if settled or k in (STEPS // 2, STEPS - 1):
+            kept = gains > LEAST_CREEP
+            gains, times = gains[kept], times[kept]
+            if not gains.size:
+                return plain
+            if settled and np.all(kept):
+                break
     return _crept(log, fitted, Creep(gains, times)).best(fitted.smoothness, gains=False)
 
 

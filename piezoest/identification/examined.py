@@ -64,6 +64,12 @@ class Examined:
         return 2.0 * float(self._line(slice(self.turns[0], self.turns[-1] + 1))[0][3])
 
     @property
+    def trend(self) -> float:
+        """Rise in time of the voltage there, by a parabola [V]."""
+        part = self.late[self.turns[0] : self.turns[-1] + 1]
+        return 2.0 * float(np.polyfit(np.linspace(-1.0, 1.0, part.size), part, 2)[1])
+
+    @property
     def gain(self) -> float:
         """Slope of that line [µm/V]."""
         return float(self.line[0][0])

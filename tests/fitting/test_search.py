@@ -8,7 +8,7 @@ from scipy.optimize import nnls
 
 import piezoest as pz
 from piezoest._checks import FloatArray
-from piezoest.fitting import Fit
+from piezoest.fitting import Fit, search
 from tests.fitting.stages import RATE, N, T, noise, play_matrix, rms, stage, voltage
 
 CREEP = pz.Creep([0.06], [0.25])
@@ -121,6 +121,27 @@ def test_creep_is_found() -> None:
     u, x, sigma = drawn(7)  # which has none
     found = fit(u, x + noise(sigma), "plays-creep")
     assert found.model.creep is None or found.model.creep.gains.sum() < 0.01
+
+
+def test_creep_terms_that_are_none_do_not_begin_the_search_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    steps: list[int] = []
+    crept = search._crept
+
+    def counted(log: Any, last: Any, creep: pz.Creep) -> Any:
+        steps.append(creep.gains.size)
+        return crept(log, last, creep)
+
+    monkeypatch.setattr(search, "_crept", counted)
+    u, x, sigma = drawn(0, creep=pz.Creep([0.06], [0.5]))
+    fit(u, x + noise(sigma), "plays-creep")
+    assert steps == [3, 3, 3, 1, 1]
+
+
+def test_a_loop_without_delay_needs_no_plays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, "best_start", None)
+    u = voltage(np.random.default_rng(2))
+    found = fit(u, LOOP.simulate(u) + noise(1e-3), "coleman-hodgdon")
+    assert rms(found.predict().x - LOOP.simulate(u)) < 1e-3
 
 
 def test_creep_that_began_before_the_record_is_fitted() -> None:

@@ -203,6 +203,22 @@ def test_noise_of_the_voltage_hides_no_rest_and_makes_none(deviation: float) -> 
     np.testing.assert_allclose(rests_of(with_rest()[0] + hiss), [[2000, 5000]], atol=10)
 
 
+@pytest.mark.parametrize("hertz", [0.7, 2.0])
+@pytest.mark.parametrize("last", [0.05, 0.1, 1.0])
+def test_the_top_of_a_small_swing_is_no_rest(hertz: float, last: float) -> None:
+    wave = 60.0 * np.sin(2.0 * np.pi * hertz * T) * np.linspace(1.0, last, N)
+    for u in (wave, wave[::-1], wave + 20.0 * np.sin(2.0 * np.pi * 2.3 * hertz * T)):
+        assert len(rests_of(u)) == 0
+        assert len(rests_of(np.round(u, 3))) == 0
+
+
+def test_swings_about_a_ramp_are_no_drift() -> None:
+    """A wide loop follows the ramp by more than it does the swings."""
+    u = np.linspace(-40.0, 40.0, N) + 20.0 * np.sin(2.0 * np.pi * 5.0 * T)
+    wide = pz.PrandtlIshlinskii(0.05, [15.0, 25.0], [0.05, 0.05], sample_rate=FS)
+    assert not findings(Record.from_arrays(u, wide.simulate(u) + noise(), FS))
+
+
 def test_a_displacement_left_beside_the_line_at_rest_is_no_drift() -> None:
     u, x, rate = HEALTHY["ending at rest"]()
     assert [found.name for found in findings(Record.from_arrays(u, x, rate))] == ["rests"]
