@@ -16,9 +16,9 @@ import piezoest as pz
 from piezoest.bench import figures, recorded, table, tables, tuning
 from piezoest.bench.cases import STAGES, STRANGERS, make_stage
 from piezoest.bench.estimators import KNOWN, PAPERS, candidate, defaults, found
-from piezoest.bench.origin import fingerprint
+from piezoest.bench.origin import code_of, fingerprint
 from piezoest.bench.pages import write_html
-from piezoest.bench.run import COLUMNS, Task, code_of, crashed, play
+from piezoest.bench.run import COLUMNS, Task, crashed, play
 from piezoest.bench.store import FILE, append, opened, played, row_of
 from piezoest.bench.table_command import Runs, _plan
 from piezoest.records import Record
