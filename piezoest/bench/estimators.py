@@ -3,12 +3,11 @@
 import ast
 import inspect
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from piezoest import policies
 from piezoest.bench.cases import REACH
-from piezoest.bench.origin import imported
+from piezoest.bench.origin import imported, name_of
 from piezoest.compensators import VoltageLimits
 from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
 from piezoest.estimators.base import EstimatorBase
@@ -55,11 +54,6 @@ def found() -> dict[str, type]:
     }
 
 
-def name_of(text: str) -> str:
-    """Class of a description, without its arguments."""
-    return text.partition("(")[0].strip()
-
-
 def is_slow(text: str) -> bool:
     """Whether an estimator takes so long that it is run on fewer seeds and stages."""
     return name_of(text) in SLOW
@@ -89,33 +83,20 @@ def candidate(text: str) -> Callable[..., Any]:
 
 def class_of(name: str) -> type:
     """Class of the package, or of one's own as ``module:Class``."""
-    if ":" in name:
-        return _load(name)
-    known = found()
-    if name not in known:
-        raise ValueError(f"{name}: choose one of {', '.join(known)}, or name your own as module:Class")
-    return known[name]
-
-
-def module_of(text: str) -> Path | None:
-    """File of an estimator of one's own; None for one of the package."""
-    if ":" not in name_of(text):
-        return None
-    source = inspect.getsourcefile(_load(name_of(text)))
-    return None if source is None else Path(source)
-
-
-def _load(path: str) -> type:
-    """Class of ``module:Class``; the module may lie in the working directory."""
-    module_name, separator, class_name = path.partition(":")
-    if not (module_name and separator and class_name):
-        raise ValueError(f"an estimator of one's own must read like module:Class, got {path!r}")
-    cls = imported(path)
+    module_name, separator, class_name = name.partition(":")
+    if not separator:
+        known = found()
+        if name not in known:
+            raise ValueError(f"{name}: choose one of {', '.join(known)}, or name your own as module:Class")
+        return known[name]
+    if not (module_name and class_name):
+        raise ValueError(f"an estimator of one's own must read like module:Class, got {name!r}")
+    cls = imported(name)
     if not inspect.isclass(cls):
-        raise ValueError(f"{path}: {class_name} is no class")
+        raise ValueError(f"{name}: {class_name} is no class")
     needed = ("step", "learn") if hasattr(cls, "learn") else ("step", "model")
-    if missing := [name for name in needed if not hasattr(cls, name)]:
-        raise ValueError(f"{path}: {class_name} has no {' and no '.join(missing)}: see piezoest.Estimator")
+    if missing := [each for each in needed if not hasattr(cls, each)]:
+        raise ValueError(f"{name}: {class_name} has no {' and no '.join(missing)}: see piezoest.Estimator")
     return cls
 
 

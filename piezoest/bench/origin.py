@@ -4,6 +4,7 @@ import functools
 import hashlib
 import importlib
 import importlib.metadata
+import inspect
 import json
 import math
 import os
@@ -41,11 +42,24 @@ def fingerprint() -> str:
     return found.hexdigest()[:16]
 
 
-def code_of(source: str | Path | None) -> str:
-    """Fingerprint of this package and, if there is one, of the file of a class of one's own."""
+def code_of(text: str) -> str:
+    """Fingerprint of this package and, for a class of one's own, of its file."""
+    source = source_of(text)
     if source is None:
         return fingerprint()
-    return f"{fingerprint()}-{hashlib.sha256(Path(source).read_bytes()).hexdigest()[:16]}"
+    return f"{fingerprint()}-{hashlib.sha256(source.read_bytes()).hexdigest()[:16]}"
+
+
+def source_of(text: str) -> Path | None:
+    """File of ``module:name``, with arguments or without; None for a name of the package."""
+    name = name_of(text)
+    source = inspect.getsourcefile(imported(name)) if ":" in name else None
+    return None if source is None else Path(source)
+
+
+def name_of(text: str) -> str:
+    """Name in a description, without its arguments."""
+    return text.partition("(")[0].strip()
 
 
 def imported(path: str) -> Any:

@@ -28,9 +28,9 @@ LOGS_KEY = (
 SURE = 0.05
 
 
-def percent(share: float | None, digits: int = 2) -> str:
+def percent(share: float | None) -> str:
     """A share in per cent; a dash for what is not known or infinite."""
-    return number(None if share is None else 100.0 * share, digits)
+    return number(None if share is None else 100.0 * share, 2)
 
 
 def on_logs(document: Document) -> bool:

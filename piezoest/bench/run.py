@@ -8,9 +8,9 @@ import traceback
 from dataclasses import dataclass, field
 from typing import Any
 
-from piezoest.bench import origin, recorded
+from piezoest.bench import recorded
 from piezoest.bench.cases import Case
-from piezoest.bench.estimators import LIMITS, LINEAR, candidate, module_of
+from piezoest.bench.estimators import LIMITS, LINEAR, candidate
 from piezoest.bench.executors import quiet
 from piezoest.bench.metrics import measure
 from piezoest.bench.origin import json_safe
@@ -42,12 +42,7 @@ class Task(Keyed):
     seed: int  # start of the random numbers
     # Fields of `piezoest.bench.cases.Conditions`, the stage among them.
     given: dict[str, Any] = field(default_factory=dict, hash=False)
-    code: str = ""  # fingerprint of what is run, see `code_of`: a row of other code is another run's
-
-
-def code_of(estimator: str) -> str:
-    """Fingerprint of this package and, for an estimator of one's own, of its module."""
-    return origin.code_of(module_of(estimator))
+    code: str = ""  # fingerprint of what is run, see `origin.code_of`: a row of other code is another run's
 
 
 @quiet()

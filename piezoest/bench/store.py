@@ -10,7 +10,7 @@ import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 Row = dict[str, Any]
 FILE = "runs.sqlite"  # in the folder of a campaign
@@ -31,56 +31,28 @@ class Keyed:
 Task = TypeVar("Task", bound=Keyed)
 
 
-class Store:
-    """Rows in a file, made if it is not there; to be used in a ``with`` statement."""
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[sqlite3.Connection]:
+    """A file of rows, made if it is not there; it is named in an error of SQLite, as on a full disk."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with contextlib.closing(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)) as file:
+            file.execute("CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, row TEXT)")
+            yield file
+    except sqlite3.DatabaseError as error:
+        raise OSError(f"{path}: {error}") from None
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
 
-    def __enter__(self) -> Self:
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        with self._named():
-            self._rows = sqlite3.connect(self._path, timeout=PATIENCE, isolation_level=None)
-        try:
-            self._execute("CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, row TEXT)")
-        except OSError:
-            self._rows.close()
-            raise
-        return self
+def append(file: sqlite3.Connection, row: Row) -> bool:
+    """Keep a row, at once; False if its key is known already, and then the first one stands."""
+    text = json.dumps(row, allow_nan=False, ensure_ascii=False)
+    return file.execute("INSERT OR IGNORE INTO runs VALUES (?, ?)", (row["key"], text)).rowcount > 0
 
-    def __exit__(self, *error: object) -> None:
-        self._rows.close()
 
-    def __contains__(self, key: str) -> bool:
-        return self._row(key) is not None
-
-    def __len__(self) -> int:
-        return int(self._execute("SELECT count(*) FROM runs").fetchone()[0])
-
-    @contextlib.contextmanager
-    def _named(self) -> Iterator[None]:
-        """Name the file in an error of SQLite, as on a full disk."""
-        try:
-            yield
-        except sqlite3.DatabaseError as error:
-            raise OSError(f"{self._path}: {error}") from None
-
-    def _execute(self, statement: str, *values: str) -> sqlite3.Cursor:
-        with self._named():
-            return self._rows.execute(statement, values)
-
-    def append(self, row: Row) -> bool:
-        """Keep a row, at once; False if its key is known already, and then the first one stands."""
-        text = json.dumps(row, allow_nan=False, ensure_ascii=False)
-        return self._execute("INSERT OR IGNORE INTO runs VALUES (?, ?)", row["key"], text).rowcount > 0
-
-    def rows(self, keys: Iterable[str]) -> Iterator[Row]:
-        """Rows of these keys, in their order; a key without one is left out."""
-        return (json.loads(row) for key in keys if (row := self._row(key)) is not None)
-
-    def _row(self, key: str) -> str | None:
-        found = self._execute("SELECT row FROM runs WHERE key = ?", key).fetchone()
-        return found[0] if found else None
+def row_of(file: sqlite3.Connection, key: str) -> Row | None:
+    """Row of a key; None if there is none."""
+    found = file.execute("SELECT row FROM runs WHERE key = ?", (key,)).fetchone()
+    return json.loads(found[0]) if found else None
 
 
 def played(
@@ -93,12 +65,12 @@ def played(
 
     `progress` is called with the runs done, and with all.
     """
-    with Store(folder / FILE) as store:
-        todo = [task for task in tasks if task.key not in store]
+    with opened(folder / FILE) as file:
+        todo = [task for task in tasks if row_of(file, task.key) is None]
         done = len(tasks) - len(todo)
         progress(done, len(tasks))
         for row in execute(todo):
-            if store.append(row):
+            if append(file, row):
                 done += 1
                 progress(done, len(tasks))
-        return list(store.rows(task.key for task in tasks))
+        return [kept for task in tasks if (kept := row_of(file, task.key)) is not None]

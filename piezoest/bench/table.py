@@ -12,11 +12,11 @@ import pandas as pd
 
 from piezoest.bench import cost, tables
 from piezoest.bench.cases import PAPER, STAGES, STRANGERS, Conditions
-from piezoest.bench.estimators import KNOWN, LINEAR, PAPERS, candidate, is_slow, module_of, name_of
+from piezoest.bench.estimators import KNOWN, LINEAR, PAPERS, candidate, is_slow
 from piezoest.bench.executors import in_processes, on_dask, one_by_one
-from piezoest.bench.origin import fingerprint, json_safe
+from piezoest.bench.origin import code_of, fingerprint, json_safe, name_of, source_of
 from piezoest.bench.recorded import digest, file_of
-from piezoest.bench.run import COLUMNS, Task, code_of, crashed, follow, play
+from piezoest.bench.run import COLUMNS, Task, crashed, follow, play
 from piezoest.bench.scenarios import SCENARIOS, UNREPEATED
 from piezoest.bench.statistics import NEEDS, QUANTITIES, interval, order, relative
 from piezoest.bench.store import Row
@@ -97,7 +97,7 @@ def over_dask(
     scheduler: str | None = None, processes: int | None = None, estimators: Iterable[str] = ()
 ) -> Any:
     """Run tasks on Dask, a cluster's or this machine's processes; it is sent the estimators' modules."""
-    modules = sorted({path for name in estimators if (path := module_of(name)) is not None})
+    modules = sorted({path for name in estimators if (path := source_of(name)) is not None})
     work = partial(_play_same, ours=fingerprint())
     return partial(on_dask, work, scheduler=scheduler, processes=processes, crashed=crashed, modules=modules)
 

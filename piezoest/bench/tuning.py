@@ -9,8 +9,9 @@ import numpy as np
 
 from piezoest._checks import integer
 from piezoest.bench.cases import PAPER
-from piezoest.bench.estimators import KNOWN, is_slow, name_of
-from piezoest.bench.run import COLUMNS, Task, code_of
+from piezoest.bench.estimators import KNOWN, is_slow
+from piezoest.bench.origin import code_of, name_of
+from piezoest.bench.run import COLUMNS, Task
 from piezoest.bench.statistics import over_scenarios, relative
 from piezoest.bench.store import Row
 from piezoest.bench.tables import table_of

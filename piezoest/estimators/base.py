@@ -3,7 +3,7 @@
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from piezoest.estimators import samples, saved_state
 from piezoest.estimators.outcome import Estimator as Estimator
 from piezoest.estimators.outcome import Status as Status
 from piezoest.estimators.outcome import Trace as Trace
-from piezoest.layout import Copied, Record, by_name, from_bytes, new, write
+from piezoest.layout import Copied, Record, by_name, new, write
 from piezoest.models import ColemanHodgdon, Creep, MassSpringDamper, Model, model_from_dict
 from piezoest.policies import policy_from_dict
 
@@ -43,9 +43,6 @@ class EstimatorBase(Copied, ABC):
 
     #: What the class saves beside its state.
     _saved_too: ClassVar[tuple[str, ...]] = ()
-
-    #: Structured arrays among the slots, and the slots with their layouts.
-    _layouts_of: ClassVar[dict[str, str]] = {"_state": "_layout", "_start": "_layout"}
 
     _arguments: dict[str, Any]
     _initial: Any
@@ -331,21 +328,6 @@ class EstimatorBase(Copied, ABC):
         """Return to the state after construction."""
         self._load(self._start)
         self._pending = None
-
-    def __getstate__(self) -> Any:
-        # Pickled are numbers without their names, which the layouts have.
-        kept, slots = cast(Any, super().__getstate__())
-        for name in self._layouts_of.keys() & slots.keys():
-            slots[name] = slots[name].tobytes()
-        return kept, slots
-
-    def __setstate__(self, state: Any) -> None:
-        kept, slots = state
-        for name, layout in self._layouts_of.items():
-            if name in slots:
-                slots[name] = from_bytes(slots[layout], slots[name])
-        for name, value in {**(kept or {}), **slots}.items():
-            setattr(self, name, value)
 
     def to_dict(self) -> dict[str, Any]:
         """Return arguments and state as a JSON-safe dictionary, from which `from_dict` continues exactly."""

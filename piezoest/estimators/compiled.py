@@ -41,10 +41,6 @@ class CompiledEstimator(EstimatorBase):
 
     _places: ClassVar[dict[str, tuple[str, ...]]] = {"P": ("law", "P")}
 
-    _layouts_of: ClassVar[dict[str, str]] = {
-        "_state": "_layout", "_start": "_layout", "_settings": "_settings_layout"
-    }  # fmt: skip
-
     _settings_layout: Record
     _settings: Any
     _step_loop: Any

@@ -76,10 +76,6 @@ class _FilterPyBaseline(EstimatorBase):
         self._state, self._start = self._ekf.state, self._ekf.state.copy()
         self._load(self._start)
 
-    def __setstate__(self, state: Any) -> None:
-        super().__setstate__(state)
-        self._state = self._ekf.state  # its bookkeeping and the filter's are one
-
     # Of its class: the filterpy object for n states, and how that predicts and updates.
     _make_filter: Callable[[int], Any]
     _predict: Callable[[float], None]

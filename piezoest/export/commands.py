@@ -71,11 +71,6 @@ class Code(Written):
     )
 
 
-@app.callback()
-def _export() -> None:
-    """Take a model or an estimator to a controller: C, co-simulation unit, tables."""
-
-
 @app.command(
     epilog="Examples: piezoest export c model.json -o firmware --minimum 0 --maximum 150; "
     "piezoest export c model.json -o firmware --estimator rls --sample-rate 50000 --precision float"
@@ -88,9 +83,12 @@ def c(
     code: Code,
 ) -> None:
     """Write a controller in C99: one header, one source, no allocation."""
+    from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
     from piezoest.export.c_code import c as generate
+    from piezoest.models.reading import NO_MODEL
 
-    if (controller := _controller(source)) is not None:
+    if "controller" in (data := read_object(source, NO_MODEL)):
+        controller = AdaptiveFeedforward.from_dict(data)
         if any(value is not None for value in asdict(stated).values()):
             raise ValueError(f"{source} holds an AdaptiveFeedforward, with all that: give no limits, no rate")
         made = generate(controller, **asdict(code))
@@ -173,23 +171,15 @@ def table(
         typer.echo(path)
 
 
-def _controller(path: Path) -> Any:
-    """The AdaptiveFeedforward of a JSON file; None if it holds something else."""
-    from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
-
-    data = read_object(path, "model: write it with identify --output")
-    return AdaptiveFeedforward.from_dict(data) if "controller" in data else None
-
-
 def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
     """Model, estimator or None, and limits of a JSON file."""
     from piezoest._checks import class_named
     from piezoest.estimators.ekf import HysteresisEKF
     from piezoest.estimators.output_error import OutputErrorRLS
     from piezoest.estimators.rls import HysteresisRLS
-    from piezoest.models import model_from_dict
+    from piezoest.models.reading import NO_MODEL, model_from_dict
 
-    data = read_object(path, "model: write it with identify --output")
+    data = read_object(path, NO_MODEL)
     if "controller" in data:
         raise ValueError(f"{path} holds an AdaptiveFeedforward: only export c takes it")
     limits = data.pop("limits", None) or {}

@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from piezoest._checks import FloatArray
+from piezoest.bench.store import opened
 from piezoest.bench.zoo import draw
 from piezoest.bench.zoo.rig import Rig
 from piezoest.cli import app
@@ -65,3 +66,9 @@ def own_module(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> str:
     name = f"own_{folder.name}"
     (folder / f"{name}.py").write_text(text, encoding="utf-8")
     return name
+
+
+def kept(path: Path) -> int:
+    """How many rows a store has."""
+    with opened(path) as file:
+        return int(file.execute("SELECT count(*) FROM runs").fetchone()[0])

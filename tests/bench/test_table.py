@@ -16,13 +16,13 @@ import piezoest as pz
 from piezoest.bench import figures, recorded, table, tables, tuning
 from piezoest.bench.cases import STAGES, STRANGERS, make_stage
 from piezoest.bench.estimators import KNOWN, PAPERS, candidate, defaults, found
-from piezoest.bench.origin import fingerprint
+from piezoest.bench.origin import code_of, fingerprint
 from piezoest.bench.pages import write_html
-from piezoest.bench.run import COLUMNS, Task, code_of, crashed, play
-from piezoest.bench.store import FILE, Store, played
+from piezoest.bench.run import COLUMNS, Task, crashed, play
+from piezoest.bench.store import FILE, append, opened, played, row_of
 from piezoest.bench.table_command import Runs, _plan
 from piezoest.records import Record
-from tests.bench.shared import SMALL, bench, own_module, said
+from tests.bench.shared import SMALL, bench, kept, own_module, said
 
 OWN = """
 import os
@@ -318,8 +318,7 @@ def test_slow_estimators_run_on_fewer_seeds_and_the_first_stage() -> None:
 def test_tuning_finds_settings_on_other_seeds(own: str, tmp_path: Path) -> None:
     texts = ["HysteresisEKF(offset=True)", "HysteresisRLS(memory=0.4)", f"{own}:Still", "HysteresisRLS"]
     chosen = tuning.tune(texts, 2, SMALL, lambda tasks: played(tasks, tmp_path, table.over_cores(1)))
-    with Store(tmp_path / FILE) as store:
-        assert len(store) == 2 * 4 * (3 + 3)
+    assert kept(tmp_path / FILE) == 2 * 4 * (3 + 3)
     ekf, rls = chosen
     assert ekf["default"] == texts[0] == ekf["trials"][0]["estimator"]
     assert all("offset=True" in trial["estimator"] for trial in ekf["trials"])
@@ -331,21 +330,22 @@ def test_tuning_finds_settings_on_other_seeds(own: str, tmp_path: Path) -> None:
 
 def test_a_store_keeps_the_first_row_of_each_key_and_goes_on(tmp_path: Path) -> None:
     path = tmp_path / "new" / "runs.sqlite"
-    with Store(path) as store, Store(path) as other:
-        assert store.append({"key": "a", "value": 1})
-        assert not other.append({"key": "a", "value": 2})
-        assert other.append({"key": "b", "value": 3})
-    with Store(path) as store:
-        assert len(store) == 2
-        assert "c" not in store
-        assert store.append({"key": "c", "value": 4})
-        assert [row["value"] for row in store.rows(["c", "no", "a", "b"])] == [4, 1, 3]
+    with opened(path) as file, opened(path) as other:
+        assert append(file, {"key": "a", "value": 1})
+        assert not append(other, {"key": "a", "value": 2})
+        assert append(other, {"key": "b", "value": 3})
+    with opened(path) as file:
+        assert append(file, {"key": "c", "value": 4})
+        assert [row_of(file, key) for key in ("c", "no", "a")] == [
+            {"key": "c", "value": 4}, None, {"key": "a", "value": 1}
+        ]  # fmt: skip
+    assert kept(path) == 3
 
 
 def test_a_file_that_is_no_store_is_named(tmp_path: Path) -> None:
     path = tmp_path / "runs.sqlite"
     path.write_text("no rows" * 1000)
-    with pytest.raises(OSError, match=r"runs\.sqlite: file is not a database"), Store(path):
+    with pytest.raises(OSError, match=r"runs\.sqlite: file is not a database"), opened(path):
         pass
 
 
@@ -353,18 +353,17 @@ APPEND = """
 import sys
 from pathlib import Path
 
-from piezoest.bench.store import Store
+from piezoest.bench.store import append, opened, row_of
 
 path, name = Path(sys.argv[1]), sys.argv[2]
 keys = [f"{name}{k}" for k in range(500)]
-with Store(path) as store:
+with opened(path) as file:
     print("open", flush=True)
     sys.stdin.readline()
     for k, key in enumerate(keys):
-        assert store.append({"key": key, "text": name * (k % 997)})
-    rows = list(store.rows(keys))
-assert [row["key"] for row in rows] == keys
-assert all(row["text"] == name * (k % 997) for k, row in enumerate(rows))
+        assert append(file, {"key": key, "text": name * (k % 997)})
+    for k, key in enumerate(keys):
+        assert row_of(file, key) == {"key": key, "text": name * (k % 997)}
 """
 
 
@@ -379,5 +378,4 @@ def test_two_processes_append_to_one_store(tmp_path: Path) -> None:
         worker.stdin.write("\n")
         worker.stdin.flush()
     assert [worker.communicate() and worker.returncode for worker in workers] == [0, 0]
-    with Store(path) as store:
-        assert len(store) == 1000
+    assert kept(path) == 1000

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
-from piezoest.bench.store import FILE, Store, played
+from piezoest.bench.store import FILE, append, opened, played
 from piezoest.bench.zoo import draw, judging, play, settling, summary, tasks, traced
 from piezoest.bench.zoo.contenders import CANDIDATES, CHANGED, DEFAULT, Parts, contender
 from piezoest.bench.zoo.families import FAMILIES
@@ -17,7 +17,7 @@ from piezoest.bench.zoo.line import fit_line
 from piezoest.bench.zoo.references import SHAPES
 from piezoest.bench.zoo.rig import Rig
 from tests.bench import shared
-from tests.bench.shared import Line, bench, own_module, said
+from tests.bench.shared import Line, bench, kept, own_module, said
 
 SHORT = {**shared.SHORT, "family": "backlash", "fault": "none"}
 GIVEN = [f"--set={name}={value}" for name, value in SHORT.items() if name != "slew"]
@@ -231,11 +231,10 @@ def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
         assert tasks.died(task)["key"] == task.key
     assert summary.summarise(map(tasks.died, planned))["violations"]["failed"] == 2
     assert settling.summarise_cells(map(tasks.died, cell))["failures"] == 1
-    with Store(tmp_path / FILE) as store:
-        assert all(store.append(tasks.died(task)) for task in (*planned, *cell))
+    with opened(tmp_path / FILE) as file:
+        assert all(append(file, tasks.died(task)) for task in (*planned, *cell))
     played(tasks.runs("parts", range(1), SHORT), tmp_path, tasks.over_cores(1))
-    with Store(tmp_path / FILE) as store:
-        assert len(store) == 4
+    assert kept(tmp_path / FILE) == 4
 
 
 @pytest.mark.parametrize(

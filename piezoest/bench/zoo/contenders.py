@@ -8,7 +8,7 @@ import numpy as np
 
 import piezoest
 from piezoest._checks import FloatArray
-from piezoest.bench import origin
+from piezoest.bench.origin import imported
 from piezoest.bench.zoo.running import Factory
 from piezoest.compensators import InverseCompensator, VoltageLimits
 from piezoest.estimators.rls import HysteresisRLS
@@ -85,13 +85,8 @@ def _found(name: str) -> Any:
     if name in CHANGED:
         return functools.partial(piezoest.AdaptiveFeedforward, **CHANGED[name])
     if ":" in name:
-        return origin.imported(name)
+        return imported(name)
     if not hasattr(piezoest, name):
         known = ", ".join((PARTS, *CHANGED))
         raise ValueError(f"controller {name}: choose {known}, a class of piezoest, or module:name")
     return getattr(piezoest, name)
-
-
-def code_of(name: str) -> str:
-    """Fingerprint of this package and, for a controller of one's own, of its file."""
-    return origin.code_of(inspect.getsourcefile(_found(name)) if ":" in name else None)

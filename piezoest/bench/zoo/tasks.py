@@ -6,9 +6,9 @@ from functools import partial
 from typing import Any, Protocol
 
 from piezoest.bench.executors import in_processes, quiet
-from piezoest.bench.origin import json_safe
+from piezoest.bench.origin import code_of, json_safe
 from piezoest.bench.store import Keyed, Row
-from piezoest.bench.zoo.contenders import code_of, contender
+from piezoest.bench.zoo.contenders import contender
 from piezoest.bench.zoo.drawing import draw
 from piezoest.bench.zoo.judging import play
 from piezoest.bench.zoo.running import Factory
