@@ -33,6 +33,8 @@ LINE = record(
 # nothing about its gain. It changes by no more than this factor at once, and by less after so many legs;
 # before it grows no more than that in all.
 EXPLAINED, SIGNED, CHANGE, LATER_CHANGE, CERTAIN = 0.8, 0.5, 2.0, 1.3, 4.0
+# In the dead zone behind a turn there is hardly any answer: no line is flatter than this part of the first.
+FLATTEST = 0.3
 # Points of which a line explains less than this share teach nothing at all.
 ANSWERED = 0.1
 # Where no line explains the points, the stage goes too far at so many times what the gain says, if the
@@ -156,6 +158,8 @@ def _draw(line: Any, points: Any, leg: Any) -> None:
     least = SIGNED if line.legs > 1.0 else EXPLAINED
     if product * product > least * square * square_x and product * line.gain > 0.0:
         line.gain *= min(max(spread(points) / np.abs(line.gain), 1.0 / most), most)
+        if np.abs(line.gain) < FLATTEST * np.abs(line.first_gain):
+            line.gain = FLATTEST * line.first_gain
         if line.legs < 1.0 and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
             # What lags goes on while the voltage hardly moves.
             line.gain = CHANGE * line.first_gain

@@ -15,24 +15,30 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.compile import like
-from piezoest.controller.recorded_loop import KNOTS, LOOP, STEEP, TURN
+from piezoest.controller.recorded_loop import KNOTS, LOOP, STEEP
 from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SIGN, numbers, record
 
 BINS = 32
-# Direction of travel; furthest voltage in it, where this leg began, samples since, length of the last leg, of
-# the longest of late; width of a bin; points in each bin, sums of their voltages and displacements; the loop,
+# Voltage where a leg began, samples since, width of a bin; points in each bin, sums of their voltages and
+# displacements.
+LEG = record(
+    turned=MEASURED, passed=COUNT, width=AMOUNT, count=numbers(BINS, kind=COUNT),
+    sum_u=numbers(BINS, kind=NUMBER), sum_x=numbers(BINS, kind=NUMBER),
+)  # fmt: skip
+# Direction of travel and furthest voltage in it; this leg, and the way back from there, which is the next leg
+# once it is long enough, and how far it has led; length of the last leg, of the longest of late; the loop,
 # the direction that alone was recorded, and whether the loop is newer than the model in use.
 STATE = record(
-    __name__, direction=SIGN, furthest=MEASURED, turned=MEASURED, passed=COUNT, last=DISTANCE,
-    longest=DISTANCE, width=AMOUNT, count=numbers(BINS, kind=COUNT), sum_u=numbers(BINS, kind=NUMBER),
-    sum_x=numbers(BINS, kind=NUMBER), loop=LOOP, alone=SIGN, fresh=FLAG,
+    __name__, direction=SIGN, furthest=MEASURED, leg=LEG, back=LEG, far=DISTANCE, last=DISTANCE,
+    longest=DISTANCE, loop=LOOP, alone=SIGN, fresh=FLAG,
 )  # fmt: skip
 LAYOUTS = STATE, record()  # of state and settings, of which there are none
 
 # A leg shorter than SHORT times the longest of late is not recorded. The longest fades by FADES at each turn
-# after a leg as long, by less after shorter ones.
-SHORT, FADES = 0.05, 0.03
+# after a leg as long, by less after shorter ones. A way back shorter than TURN times the leg before or this
+# one is wiped out where the leg goes on: where models change, the voltage may go back for a moment.
+SHORT, FADES, TURN = 0.05, 0.03, 0.04
 # First width of a bin, in units; degree of the polynomial; least number of bins with readings.
 NARROW, DEGREE, LEAST = 1e-3, 4, 8
 # The readings must cover this part of a leg, and there must be one for this part of its samples: far from its
@@ -41,11 +47,19 @@ COVERED, READ = 0.9, 0.5
 
 
 @register_jitable
-def _begin_leg(state: Any, u: Any) -> None:
-    """Begin a leg at the furthest point of the last one."""
-    state.turned, state.furthest, state.width, state.passed = state.furthest, u, NARROW, 0.0
+def _begin_leg(leg: Any, u: Any) -> None:
+    """Begin a leg at a voltage."""
+    leg.turned, leg.width, leg.passed = u, NARROW, 0.0
     for i in range(BINS):
-        state.count[i] = state.sum_u[i] = state.sum_x[i] = 0.0
+        leg.count[i] = leg.sum_u[i] = leg.sum_x[i] = 0.0
+
+
+@register_jitable
+def _become(leg: Any, other: Any) -> None:
+    """Let a leg become another one."""
+    leg.turned, leg.width, leg.passed = other.turned, other.width, other.passed
+    for i in range(BINS):
+        leg.count[i], leg.sum_u[i], leg.sum_x[i] = other.count[i], other.sum_u[i], other.sum_x[i]
 
 
 @register_jitable
@@ -58,42 +72,46 @@ def _widen(numbers: Any) -> None:
 
 
 @register_jitable
-def _add(state: Any, u: Any, x: Any) -> None:
-    """Take a point of this leg."""
-    state.width = max(state.width, NARROW)
-    while np.abs(u - state.turned) >= BINS * state.width:
-        state.width *= 2.0
-        _widen(state.count)
-        _widen(state.sum_u)
-        _widen(state.sum_x)
-    i = int(np.abs(u - state.turned) / state.width)
-    state.count[i] += 1.0
-    state.sum_u[i] += u
-    state.sum_x[i] += x
+def _add(leg: Any, u: Any, x: Any) -> None:
+    """Take a sample of a leg; x may be missing."""
+    leg.passed += 1.0
+    if not np.abs(x) < WILDEST:
+        return
+    leg.width = max(leg.width, NARROW)
+    while np.abs(u - leg.turned) >= BINS * leg.width:
+        leg.width *= 2.0
+        _widen(leg.count)
+        _widen(leg.sum_u)
+        _widen(leg.sum_x)
+    i = int(np.abs(u - leg.turned) / leg.width)
+    leg.count[i] += 1.0
+    leg.sum_u[i] += u
+    leg.sum_x[i] += x
 
 
 @register_jitable
 def _draw(state: Any, curve: Any) -> None:
     """Draw a polynomial through the bins of a leg, from its beginning to its end."""
-    curve.begins, curve.apart = state.turned, np.abs(state.furthest - state.turned) / (KNOTS - 1.0)
+    leg = state.leg
+    curve.begins, curve.apart = leg.turned, np.abs(state.furthest - leg.turned) / (KNOTS - 1.0)
     # Each polynomial and the one before it, in the bins and at the knots: p(t), t = -1...1 along the curve.
-    in_bins, bins_before = like(state.count), like(state.count)
+    in_bins, bins_before = like(leg.count), like(leg.count)
     at_knots, knots_before = like(curve.x), like(curve.x)
     for i in range(BINS):
         in_bins[i], bins_before[i] = 1.0, 0.0
     for k in range(KNOTS):
         at_knots[k], knots_before[k], curve.x[k] = 1.0, 0.0, 0.0
-    half, norm_before, t = 0.5 * (KNOTS - 1.0), 1.0, like(state.count)
+    half, norm_before, t = 0.5 * (KNOTS - 1.0), 1.0, like(leg.count)
     for i in range(BINS):
         t[i] = 0.0
-        if state.count[i] > 0.0:
-            t[i] = np.abs(state.sum_u[i] / state.count[i] - state.turned) / (curve.apart * half) - 1.0
+        if leg.count[i] > 0.0:
+            t[i] = np.abs(leg.sum_u[i] / leg.count[i] - leg.turned) / (curve.apart * half) - 1.0
     for _ in range(DEGREE + 1):
         norm = product = middle = 0.0
         for i in range(BINS):
-            norm += state.count[i] * in_bins[i] * in_bins[i]
-            middle += state.count[i] * t[i] * in_bins[i] * in_bins[i]
-            product += state.sum_x[i] * in_bins[i]
+            norm += leg.count[i] * in_bins[i] * in_bins[i]
+            middle += leg.count[i] * t[i] * in_bins[i] * in_bins[i]
+            product += leg.sum_x[i] * in_bins[i]
         if not norm > 0.0:
             break
         share, middle, before = product / norm, middle / norm, norm / norm_before
@@ -113,15 +131,16 @@ def _draw(state: Any, curve: Any) -> None:
 @register_jitable
 def _is_known(state: Any) -> bool:
     """Whether there are readings all along a leg."""
+    leg = state.leg
     used, points, nearest, farthest = 0, 0.0, np.inf, 0.0
     for i in range(BINS):
-        if state.count[i] > 0.0:
+        if leg.count[i] > 0.0:
             used += 1
-            points += state.count[i]
-            way = np.abs(state.sum_u[i] / state.count[i] - state.turned)
+            points += leg.count[i]
+            way = np.abs(leg.sum_u[i] / leg.count[i] - leg.turned)
             nearest, farthest = min(nearest, way), max(farthest, way)
-    leg = np.abs(state.furthest - state.turned)
-    return used >= LEAST and points >= READ * state.passed and farthest - nearest >= COVERED * leg
+    length = np.abs(state.furthest - leg.turned)
+    return used >= LEAST and points >= READ * leg.passed and farthest - nearest >= COVERED * length
 
 
 @register_jitable
@@ -157,30 +176,39 @@ def _end_leg(state: Any) -> None:
 
 
 @register_jitable
+def _turn(state: Any, u: Any) -> None:
+    """The way back has become the next leg."""
+    length = np.abs(state.furthest - state.leg.turned)
+    state.longest = max(state.longest, length)
+    if length > SHORT * state.longest:
+        _end_leg(state)
+    if state.longest > 0.0:
+        state.longest -= FADES * length * length / state.longest
+    state.last, state.direction, state.furthest = length, -state.direction, u
+    state.far = 0.0
+    _become(state.leg, state.back)
+
+
+@register_jitable
 def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     """What becomes of one sample; x is NaN where there is no reading."""
     way = u - state.furthest
     if way == 0.0:
         # A rest is no part of a leg: creep would pass for hysteresis.
         return
-    if way * state.direction < 0.0:
-        leg = np.abs(state.furthest - state.turned)
-        if not np.abs(way) > TURN * max(leg, state.last):
-            return
-        state.longest = max(state.longest, leg)
-        if leg > SHORT * state.longest:
-            _end_leg(state)
-        if state.longest > 0.0:
-            state.longest -= FADES * leg * leg / state.longest
-        state.last, state.direction = leg, -state.direction
-        _begin_leg(state, u)
-    elif state.direction == 0.0:
+    if state.direction == 0.0:
         state.direction = np.sign(way)
-        _begin_leg(state, u)
-    state.furthest = u
-    state.passed += 1.0
-    if np.abs(x) < WILDEST:
-        _add(state, u, x)
+        _begin_leg(state.leg, state.furthest)
+    if way * state.direction > 0.0:
+        state.furthest, state.far = u, 0.0
+        _add(state.leg, u, x)
+    elif np.abs(way) > state.far:
+        if state.far == 0.0:
+            _begin_leg(state.back, state.furthest)
+        state.far = np.abs(way)
+        _add(state.back, u, x)
+        if state.far > TURN * max(np.abs(state.furthest - state.leg.turned), state.last):
+            _turn(state, u)
 
 
 @register_jitable

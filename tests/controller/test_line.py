@@ -83,3 +83,12 @@ def test_a_factor_of_the_sensor_is_no_new_start_where_readings_were_late() -> No
         x = np.append(x[1:], 0.1 * u[-1])
     assert np.abs(u[2000:]).max() < 25.0
     assert driver.status.fault in ("reversed", "no response", "scaled")
+
+
+def test_no_dead_zone_makes_the_line_flat() -> None:
+    """A flat line would let the voltage leap from limit to limit where the stage moves at last."""
+    line = Named(new(lines.LINE), lines.LINE)
+    lines.begin(line, 0.2, 0.0, 0.0, 1.0)
+    for k in range(20):
+        _leg(line, 0.01, 0.0, 1.0 - 2.0 * (k % 2), 50)
+    assert 0.04 < line.gain < 0.08

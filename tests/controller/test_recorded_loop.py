@@ -79,17 +79,17 @@ def test_after_other_turns_it_goes_as_plays_do(turns: tuple[float, ...]) -> None
     u = np.interp(np.arange(0.0, 5.0, 0.005), np.arange(6), [0.0, 1.0, -1.0, 1.0, -1.0, 1.0])
     more = np.interp(np.arange(0.0, len(turns) - 1.0, 0.01), np.arange(len(turns)), turns)
     x = plays(np.append(u, more))
-    state = recorded(np.append(u, more[:8]), x[: u.size + 8])
-    own, given = placed(state, float(more[7]))
-    stands = follows(own, given, more[8:])
-    np.testing.assert_allclose(stands, x[u.size + 8 :], atol=0.015)
+    state = recorded(np.append(u, more[:9]), x[: u.size + 9])
+    own, given = placed(state, float(more[8]))
+    stands = follows(own, given, more[9:])
+    np.testing.assert_allclose(stands, x[u.size + 9 :], atol=0.015)
     # Without memory, on the absolute curves, it would be up to half a loop beside.
     absolute = np.where(
-        np.diff(more[7:]) > 0.0,
-        np.interp(more[8:], np.linspace(-1.0, 1.0, 17), given.inverse.up.x),
-        np.interp(-more[8:], np.linspace(-1.0, 1.0, 17), given.inverse.down.x),
+        np.diff(more[8:]) > 0.0,
+        np.interp(more[9:], np.linspace(-1.0, 1.0, 17), given.inverse.up.x),
+        np.interp(-more[9:], np.linspace(-1.0, 1.0, 17), given.inverse.down.x),
     )
-    assert np.abs(absolute - x[u.size + 8 :]).max() > 0.05
+    assert np.abs(absolute - x[u.size + 9 :]).max() > 0.05
 
 
 def test_the_first_leg_stands_for_both_directions() -> None:
@@ -213,15 +213,29 @@ def test_the_inverse_goes_on_beyond_the_end_of_a_steep_curve() -> None:
 
 def test_a_way_back_too_small_to_be_recorded_does_not_confuse_it() -> None:
     u, x = loop()
-    state = recorded(np.append(u, [0.97, 0.975]), np.append(x, [0.97, 0.975]))
-    plain, given = placed(state, 0.97)
-    back, _ = placed(state, 0.975)
-    back.inverse.direction[0], back.inverse.u[0] = 1.0, 0.97
+    state = recorded(np.append(u, [0.9, 0.905]), np.append(x, [0.9, 0.905]))
+    plain, given = placed(state, 0.9)
+    back, _ = placed(state, 0.905)
+    back.inverse.direction[0], back.inverse.u[0] = 1.0, 0.9
     recorded_loop.place(back, given)
     small = 2.0 * 0.005  # what the displacement can do on so small a way
     assert recorded_loop.expected(back, given) == pytest.approx(
         recorded_loop.expected(plain, given), abs=small
     )
+
+
+@pytest.mark.parametrize("size", [0.01, 0.06])
+def test_a_leg_goes_on_behind_a_small_way_back(size: float) -> None:
+    """Where models change, the voltage may go back for a moment."""
+    u = np.interp(np.arange(0.0, 5.0, 0.005), np.arange(6), [0.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+    plain = recorded(np.append(u, 0.9), plays(np.append(u, 0.9))).loop
+    k = int(np.flatnonzero((u[:-1] < 0.2) & (u[1:] >= 0.2))[-1]) + 1
+    back = u[k] - size * np.concatenate([np.linspace(0.0, 1.0, 9), np.linspace(1.0, 0.0, 9)])
+    goes_back = np.concatenate([u[:k], back, u[k:], [0.9]])
+    found = recorded(goes_back, plays(goes_back)).loop
+    for curve, other in ((plain.up, found.up), (plain.down, found.down)):
+        np.testing.assert_allclose(other.x, curve.x, atol=1e-3)
+        assert (other.begins, other.apart) == (curve.begins, curve.apart)
 
 
 def test_a_rest_noise_and_ringing_are_not_recorded() -> None:
