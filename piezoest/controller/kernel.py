@@ -9,7 +9,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest.compile import Record, Vector, compiled
-from piezoest.controller import candidate, homing, redraw, slots
+from piezoest.controller import candidate, homing, late, redraw, slots
 from piezoest.controller import feedback as feedbacks
 from piezoest.controller import line as lines
 from piezoest.controller import outside as outsides
@@ -59,7 +59,7 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         score=candidate.SCORE, widest=AMOUNT, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
         travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,
         start=starts.START, homing=homing.HOMING, pace=paces.PACE, outside=outsides.OUTSIDE,
-        candidates=candidates,
+        late=late.LATE, candidates=candidates,
     )  # fmt: skip
     settings = record(
         minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED, feedback=FIXED,

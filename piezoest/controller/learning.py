@@ -13,6 +13,7 @@ from piezoest.controller import (
     feedback,
     given,
     homing,
+    late,
     outside,
     reach,
     redraw,
@@ -177,7 +178,7 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
     state.gone = 0.0
     state.since += swings
     if redraw.is_young(state) or not travels.rests(state.reference, moved):
-        lines.add(state.line.now, u, x, 1e9)
+        lines.add(state.line.now, late.answered(state.late, state.start), x, 1e9)
     bound = FARTHEST * state.travel.swing
     miss = z - driving.line_z(state) - state.owed
     candidate.judge(state.score, min(max(miss, -bound), bound), swings)
@@ -349,6 +350,7 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         return
     state.pending = 0.0
     state.u = u
+    late.remember(state.late, u)
     state.r = r if np.abs(r) < WILDEST else state.r
     r = state.r
     if state.stage == SEEK:

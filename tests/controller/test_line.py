@@ -92,3 +92,20 @@ def test_no_dead_zone_makes_the_line_flat() -> None:
     for k in range(20):
         _leg(line, 0.01, 0.0, 1.0 - 2.0 * (k % 2), 50)
     assert 0.04 < line.gain < 0.08
+
+
+@pytest.mark.parametrize("late", [6, 13])
+def test_the_line_is_that_of_the_voltage_that_late_readings_answer(late: int) -> None:
+    """Readings of the same samples lie on an ellipse, whose line may fall where the stage rises."""
+    fs, frequency = 1000.0, 20.0
+    r = 5.0 + np.concatenate([np.zeros(200), 2.0 * np.sin(2.0 * np.pi * frequency / fs * np.arange(1000))])
+    controller = pz.AdaptiveFeedforward(fs, limits=pz.VoltageLimits(0.0, 100.0), estimators=())
+    answers, missed = [1.0] * late, []
+    for r_k in r.tolist():
+        u = controller.step(r_k)
+        answers.append(0.2 * u + 1.0)
+        controller.learn(u, answers[-1 - late])
+        missed.append(r_k - answers[-1])
+    line = controller.state["line"]
+    assert abs(line["gain"] / 0.2 - 1.0) < 0.05
+    assert np.abs(missed[-500:]).max() < 0.1

@@ -1,0 +1,35 @@
+"""The voltage that a late reading answers: readings come after what a delay or a lag holds back.
+
+The line through voltages and readings of the same samples would be too flat where readings are late, and
+beside its place; from a quarter of a period on it would point the wrong way.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest.layout import MEASURED, numbers, record, whole
+
+# Voltages that are remembered.
+MOST = 32
+# The last voltages, and where the last one stands.
+LATE = record(u=numbers(MOST, kind=MEASURED), at=whole(0.0, MOST - 1.0))
+
+
+@register_jitable
+def remember(late: Any, u: Any) -> None:
+    """Remember a voltage that was written."""
+    late.at = late.at + 1.0 if late.at < MOST - 1.0 else 0.0
+    late.u[int(late.at)] = u
+
+
+@register_jitable
+def answered(late: Any, start: Any) -> float:
+    """The voltage that the present reading answers, or the last one that is remembered.
+
+    Who was late on the start's ways for its slew is not late on slower ones.
+    """
+    lag = np.floor(start.lag + 0.5) if start.fastest == 0.0 else 0.0
+    place = late.at - min(lag, MOST - 1.0)
+    return late.u[int(place if place >= 0.0 else place + MOST)]
