@@ -6,7 +6,6 @@ beside its place; from a quarter of a period on it would point the wrong way.
 
 from typing import Any
 
-import numpy as np
 from numba.extending import register_jitable
 
 from piezoest.layout import MEASURED, numbers, record, whole
@@ -30,6 +29,6 @@ def answered(late: Any, start: Any) -> float:
 
     Who was late on the start's ways for its slew is not late on slower ones.
     """
-    lag = np.floor(start.lag + 0.5) if start.fastest == 0.0 else 0.0
-    place = late.at - min(lag, MOST - 1.0)
-    return late.u[int(place if place >= 0.0 else place + MOST)]
+    lag = int(min(start.lag, MOST - 1.0) + 0.5) if start.fastest == 0.0 else 0
+    place = int(late.at) - lag
+    return late.u[place if place >= 0 else place + MOST]
