@@ -281,7 +281,8 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
         line.clipped = 1.0
         wanted = moved / np.abs(line.gain)
     memory = redraw.memory(state, settings)
-    x = reading.believed(state.readings, line, state.travel, memory, u, x, gone, wanted)
+    answered = late.answered(state.late, state.start)
+    x = reading.believed(state.readings, line, state.travel, memory, answered, u, x, gone, wanted)
     _follow_zero(state)
     _watch_voltage(state, settings, gone, moved)
     if state.readings.fault != before:

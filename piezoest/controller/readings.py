@@ -272,11 +272,12 @@ def _is_alone(readings: Any, line: Any, beside: Any) -> bool:
 
 @register_jitable
 def believed(
-    readings: Any, line: Any, travel: Any, memory: Any, u: Any, x: Any, gone: Any, wanted: Any
+    readings: Any, line: Any, travel: Any, memory: Any, answered: Any, u: Any, x: Any, gone: Any, wanted: Any
 ) -> float:
     """The reading where it can be believed, NaN where not; `gone` is the voltage's travel since the last.
 
-    `memory` is about how many samples a leg takes. Where the voltage is at a limit `wanted` is the travel
+    `memory` is about how many samples a leg takes, `answered` the voltage that a late reading answers: beside
+    the present one, late readings would look reversed. Where the voltage is at a limit `wanted` is the travel
     that the reference wants.
     """
     if not np.abs(x) < WILDEST:
@@ -285,7 +286,7 @@ def believed(
     middle = _follow(readings, x, gone)
     unit = readings.swing if readings.swing > 0.0 else np.inf
     swings = min(gone / unit, MOST)
-    lines.add(readings.recent, u, middle, max(RECENT * memory, 16.0))
+    lines.add(readings.recent, answered, middle, max(RECENT * memory, 16.0))
     noise = np.sqrt(readings.noise)
     farthest = max(FAR * travel.swing, FAR_WITHIN * readings.swing)
     bound = np.abs(line.gain) * farthest + 8.0 * noise

@@ -70,6 +70,9 @@ CHECK = 2.0
 # midway. Where it moves with more than this fraction of its fastest change it may take more windows.
 STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 4.0, 0.75
 SLEWS, MOST_SLEWING = 0.7, 400.0
+# The way back goes beyond where all began by this part of the way: hysteresis then leaves nothing. On small
+# loops (Rayleigh: branches are parabolas) it is one half.
+BEYOND = 0.5
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
 
@@ -95,7 +98,7 @@ def begin_again(start: Any, settings: Any, u: Any) -> None:
     rest = min(max(0.0, settings.lowest), settings.highest)
     begin(start, rest)
     start.stage, start.voltage, start.from_u, start.target = GO, u, u, rest
-    start.tries = 0.5
+    start.tries, start.way = 0.5, 0.0
     _begin_windows(start)
 
 
@@ -109,6 +112,14 @@ def _go(start: Any, settings: Any, u: Any) -> None:
     if not settings.lowest <= ahead <= settings.highest:
         start.way = -start.way
     start.target = min(max(u + start.way, settings.lowest), settings.highest)
+
+
+@register_jitable
+def _go_back(start: Any, u: Any, target: Any) -> None:
+    """Begin a way that asks nothing."""
+    start.stage, start.samples, start.way = GO, 0.0, 0.0
+    start.from_u, start.target = u, target
+    _begin_windows(start)
 
 
 @register_jitable
@@ -223,18 +234,21 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     sure = rests and np.abs(answer) > SURE * bound and start.told == 0.0 and start.fastest == 0.0
     alike = sure or (start.ways > 0.0 and 1.0 / ALIKE < start.gain / start.gain_before < ALIKE)
     start.from_x = start.now
-    if start.target == start.origin and start.ways == 0.0 and start.tries > 0.0:
-        start.stage, start.samples = SILENT, 0.0
+    if start.way == 0.0:
+        if start.target == start.origin:
+            start.stage, start.samples = SILENT, 0.0
+        else:
+            _go_back(start, u, start.origin)
         return
     if clear and (alike or longest):
         start.stage = DONE
         return
     if longest:
         # Back to where all began: nothing rests at a limit.
-        start.stage, start.samples, start.ways = GO, 0.0, 0.0
+        start.ways = 0.0
         start.tries += 1.0
-        start.from_u, start.target = u, start.origin
-        _begin_windows(start)
+        beyond = start.origin - BEYOND * (u - start.origin)
+        _go_back(start, u, min(max(beyond, settings.lowest), settings.highest))
         return
     start.way *= CHECK if clear and start.ways == 0.0 else 2.0
     start.way = np.sign(start.way) * min(np.abs(start.way), settings.longest)

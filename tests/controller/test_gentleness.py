@@ -99,6 +99,16 @@ def test_a_zero_that_jumps_does_not_move_the_stage() -> None:
     assert np.abs(r - true)[6000:].max() < 1.3 * before
 
 
+def test_ways_for_nothing_leave_the_stage_where_it_was() -> None:
+    """A start that finds no answer goes far; hysteresis would keep a sixth of the farthest way."""
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
+    rng = np.random.default_rng(0)
+    run = drive(driver, pz.SimulatedStage(FS, LOOP), np.ones(20000), lambda *_: rng.normal())
+    assert driver.status.fault == "no response"
+    assert run.x.max() > 4.0
+    assert abs(run.x[run.u == 0.0][-1]) < 0.25
+
+
 def test_a_sensor_that_never_speaks_is_named() -> None:
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=())
     r, stage = np.ones(5000), pz.SimulatedStage(FS, LOOP)

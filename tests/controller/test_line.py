@@ -94,7 +94,7 @@ def test_no_dead_zone_makes_the_line_flat() -> None:
     assert 0.04 < line.gain < 0.08
 
 
-@pytest.mark.parametrize("late", [6, 13])
+@pytest.mark.parametrize("late", [6, 13, 25])
 def test_the_line_is_that_of_the_voltage_that_late_readings_answer(late: int) -> None:
     """Readings of the same samples lie on an ellipse, whose line may fall where the stage rises."""
     fs, frequency = 1000.0, 20.0
@@ -109,3 +109,4 @@ def test_the_line_is_that_of_the_voltage_that_late_readings_answer(late: int) ->
     line = controller.state["line"]
     assert abs(line["gain"] / 0.2 - 1.0) < 0.05
     assert np.abs(missed[-500:]).max() < 0.1
+    assert not any(event.reason.startswith("reversed") for event in controller.events)
