@@ -12,23 +12,18 @@ from piezoest.layout import MEASURED, numbers, record, whole
 
 # Voltages that are remembered.
 MOST = 32
-# The last voltages, and where the last one stands.
-LATE = record(u=numbers(MOST, kind=MEASURED), at=whole(0.0, MOST - 1.0))
+# The last voltages, where the last one stands, and the one that the present reading answers.
+LATE = record(u=numbers(MOST, kind=MEASURED), at=whole(0.0, MOST - 1.0), answered=MEASURED)
 
 
 @register_jitable
-def remember(late: Any, u: Any) -> None:
-    """Remember a voltage that was written."""
-    late.at = late.at + 1.0 if late.at < MOST - 1.0 else 0.0
-    late.u[int(late.at)] = u
-
-
-@register_jitable
-def answered(late: Any, start: Any) -> float:
-    """The voltage that the present reading answers, or the last one that is remembered.
+def remember(late: Any, start: Any, u: Any) -> None:
+    """Remember a voltage that was written, and find the one that is answered, at most the oldest one.
 
     Who was late on the start's ways for its slew is not late on slower ones.
     """
+    late.at = late.at + 1.0 if late.at < MOST - 1.0 else 0.0
+    late.u[int(late.at)] = u
     lag = int(min(start.lag, MOST - 1.0) + 0.5) if start.fastest == 0.0 else 0
     place = int(late.at) - lag
-    return late.u[place if place >= 0 else place + MOST]
+    late.answered = late.u[place if place >= 0 else place + MOST]

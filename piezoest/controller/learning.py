@@ -178,7 +178,7 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
     state.gone = 0.0
     state.since += swings
     if redraw.is_young(state) or not travels.rests(state.reference, moved):
-        lines.add(state.line.now, late.answered(state.late, state.start), x, 1e9)
+        lines.add(state.line.now, state.late.answered, x, 1e9)
     bound = FARTHEST * state.travel.swing
     miss = z - driving.line_z(state) - state.owed
     candidate.judge(state.score, min(max(miss, -bound), bound), swings)
@@ -281,8 +281,7 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
         line.clipped = 1.0
         wanted = moved / np.abs(line.gain)
     memory = redraw.memory(state, settings)
-    answered = late.answered(state.late, state.start)
-    x = reading.believed(state.readings, line, state.travel, memory, answered, u, x, gone, wanted)
+    x = reading.believed(state.readings, line, state.travel, memory, state.late.answered, u, x, gone, wanted)
     _follow_zero(state)
     _watch_voltage(state, settings, gone, moved)
     if state.readings.fault != before:
@@ -351,7 +350,7 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         return
     state.pending = 0.0
     state.u = u
-    late.remember(state.late, u)
+    late.remember(state.late, state.start, u)
     state.r = r if np.abs(r) < WILDEST else state.r
     r = state.r
     if state.stage == SEEK:

@@ -276,7 +276,7 @@ def believed(
 ) -> float:
     """The reading where it can be believed, NaN where not; `gone` is the voltage's travel since the last.
 
-    `memory` is about how many samples a leg takes, `answered` the voltage that a late reading answers: beside
+    `memory` is about how many samples a leg takes, `answered` the voltage that a late reading answers: with
     the present one, late readings would look reversed. Where the voltage is at a limit `wanted` is the travel
     that the reference wants.
     """

@@ -23,7 +23,8 @@ FIRST = 5
 
 START = record(
     stage=whole(0.0, 4.0),
-    # Voltage planned, where all began, the way on from there; whether one way has been answered.
+    # Voltage planned, where all began, the way on from there, zero on one back that asks nothing; how many
+    # ways have been answered.
     voltage=MEASURED, origin=MEASURED, from_u=MEASURED, target=MEASURED, way=NUMBER, ways=COUNT,
     # Samples of the stage; where the reading stood at first and at the last rest, its noise.
     samples=COUNT, zero=MEASURED, from_x=MEASURED, noise=AMOUNT,
@@ -72,7 +73,7 @@ STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 4.0, 0.75
 SLEWS, MOST_SLEWING = 0.7, 400.0
 # The way back goes beyond where all began by this part of the way: hysteresis then leaves nothing. On small
 # loops (Rayleigh: branches are parabolas) it is one half.
-BEYOND = 0.5
+OVERSHOOT = 0.5
 # Windows before the first repetition; then twice as many each time.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
 
@@ -93,33 +94,36 @@ def _begin_windows(start: Any) -> None:
 
 
 @register_jitable
-def begin_again(start: Any, settings: Any, u: Any) -> None:
-    """Start again from a voltage where the stage may not be at rest yet, at the place nearest to 0 V."""
-    rest = min(max(0.0, settings.lowest), settings.highest)
-    begin(start, rest)
-    start.stage, start.voltage, start.from_u, start.target = GO, u, u, rest
-    start.tries, start.way = 0.5, 0.0
+def _go_to(start: Any, u: Any, target: Any) -> None:
+    """Begin a way."""
+    start.stage, start.samples = GO, 0.0
+    start.from_u, start.target = u, target
     _begin_windows(start)
 
 
 @register_jitable
 def _go(start: Any, settings: Any, u: Any) -> None:
     """Begin the next way; back to where there is room if there is none ahead."""
-    start.stage, start.samples = GO, 0.0
-    start.from_u = u
-    _begin_windows(start)
     ahead = u + start.way
     if not settings.lowest <= ahead <= settings.highest:
         start.way = -start.way
-    start.target = min(max(u + start.way, settings.lowest), settings.highest)
+    _go_to(start, u, min(max(u + start.way, settings.lowest), settings.highest))
 
 
 @register_jitable
 def _go_back(start: Any, u: Any, target: Any) -> None:
     """Begin a way that asks nothing."""
-    start.stage, start.samples, start.way = GO, 0.0, 0.0
-    start.from_u, start.target = u, target
-    _begin_windows(start)
+    start.way = 0.0
+    _go_to(start, u, target)
+
+
+@register_jitable
+def begin_again(start: Any, settings: Any, u: Any) -> None:
+    """Start again from a voltage where the stage may not be at rest yet, at the place nearest to 0 V."""
+    rest = min(max(0.0, settings.lowest), settings.highest)
+    begin(start, rest)
+    start.voltage, start.tries = u, 0.5
+    _go_back(start, u, rest)
 
 
 @register_jitable
@@ -247,7 +251,7 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
         # Back to where all began: nothing rests at a limit.
         start.ways = 0.0
         start.tries += 1.0
-        beyond = start.origin - BEYOND * (u - start.origin)
+        beyond = start.origin - OVERSHOOT * (u - start.origin)
         _go_back(start, u, min(max(beyond, settings.lowest), settings.highest))
         return
     start.way *= CHECK if clear and start.ways == 0.0 else 2.0
