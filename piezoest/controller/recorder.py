@@ -39,6 +39,8 @@ LAYOUTS = STATE, record()  # of state and settings, of which there are none
 # after a leg as long, by less after shorter ones. A way back shorter than TURN times the leg before or this
 # one is wiped out where the leg goes on: where models change, the voltage may go back for a moment.
 SHORT, FADES, TURN = 0.05, 0.03, 0.04
+# A leg shorter than this part of the next one says less of its direction than that one does, reversed.
+ALIKE = 0.7
 # First width of a bin, in units; degree of the polynomial; least number of bins with readings.
 NARROW, DEGREE, LEAST = 1e-3, 4, 8
 # The readings must cover this part of a leg, and there must be one for this part of its samples: far from its
@@ -153,9 +155,9 @@ def _reverse(curve: Any, to: Any, u: Any) -> None:
 
 @register_jitable
 def _record(state: Any, curve: Any, other: Any) -> None:
-    """Record a leg; until there is one in the other direction, it stands for both."""
+    """Record a leg; until there is one about as long in the other direction, it stands for both."""
     _draw(state, curve)
-    if state.alone == state.direction:
+    if state.alone == state.direction or other.apart < ALIKE * curve.apart:
         _reverse(curve, other, state.furthest)
 
 

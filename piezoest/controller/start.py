@@ -119,8 +119,8 @@ def _go_back(start: Any, u: Any, target: Any) -> None:
 
 @register_jitable
 def begin_again(start: Any, settings: Any, u: Any) -> None:
-    """Start again from a voltage where the stage may not be at rest yet, at the place nearest to 0 V."""
-    rest = min(max(0.0, settings.lowest), settings.highest)
+    """Start again from a voltage where the stage may not be at rest yet: near 0 V, but not at a limit."""
+    rest = min(max(0.0, settings.lowest + settings.way), settings.highest - settings.way)
     begin(start, rest)
     start.voltage, start.tries = u, 0.5
     _go_back(start, u, rest)

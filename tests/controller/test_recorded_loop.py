@@ -102,6 +102,22 @@ def test_the_first_leg_stands_for_both_directions() -> None:
     assert np.abs(np.diff(state.loop.up.x) + np.diff(state.loop.down.x)).max() > 1e-3
 
 
+def test_a_leg_stands_for_a_much_shorter_one_before_it() -> None:
+    """A small way up, then all the way down: farther up nothing is known but that it is like the way down."""
+    u = np.interp(np.arange(0.0, 3.0, 0.002), np.arange(4), [0.0, 0.5, -1.0, -0.9])
+    x = plays(u)
+    state = recorded(u, x)
+    up, down = state.loop.up, state.loop.down
+    assert up.apart == pytest.approx(down.apart, rel=0.1)
+    back = plays(np.interp(np.arange(0.0, 4.0, 0.002), np.arange(5), [0.0, 0.5, -1.0, 0.5, 0.4]))[1000:1501]
+    own, given = placed(state, -0.9)
+    np.testing.assert_allclose(
+        follows(own, given, np.linspace(-0.9, 0.5, 100)),
+        np.interp(np.linspace(-0.9, 0.5, 100), np.linspace(-1.0, 0.5, 501), back),
+        atol=0.03,
+    )
+
+
 def test_a_direction_that_is_never_recorded_is_the_other_one_reversed() -> None:
     """A sawtooth flies back in a few samples."""
     u = np.concatenate([np.linspace(0.0, 1.0, 200), *[np.linspace(-1.0, 1.0, 400)] * 3, [0.5]])

@@ -196,17 +196,20 @@ FAST, SLOPE, SWEPT = 10_000.0, 0.06, 2.5
 UNIPOLAR, BIASED, BIPOLAR = (0.0, 150.0), (-20.0, 120.0), (-100.0, 100.0)
 
 
-def humming(limits: Any, width: float, hum: float, phase: float = 2.0 * np.pi / 3.0) -> tuple[Any, float]:
-    """A controller behind a triangle on a stage with backlash and 50 Hz on its gauge; its last error [µm]."""
+def humming(limits: Any, width: float, hum: float) -> tuple[Any, float, Any]:
+    """A controller behind a triangle on a stage with backlash and 50 Hz on its gauge.
+
+    Returns it, its last error [µm] and the voltages.
+    """
     driver = pz.AdaptiveFeedforward(FAST, limits=pz.VoltageLimits(*limits), estimators=())
     bias = 0.7 * SLOPE * 0.5 * (limits[0] + limits[1])
     wave = pz.signals.triangle(SWEPT, 5.0, 14, FAST).values + bias
     r = np.concatenate((np.linspace(0.0, wave[0], 1000), wave))
-    seen = hum * np.sin(2.0 * np.pi * 50.0 * np.arange(r.size) / FAST + phase)
+    seen = hum * np.sin(2.0 * np.pi * (50.0 * np.arange(r.size) / FAST + 1.0 / 3.0))
     play = backlash(width)
     stage = SimpleNamespace(step=lambda u: SLOPE * (play(u) / 0.15 + 0.05 * u) / 1.05)
-    x = shared.drive(driver, stage, r, lambda k, x: x + float(seen[k])).x
-    return driver, last_error(r, x, 2000)
+    run = shared.drive(driver, stage, r, lambda k, x: x + float(seen[k]))
+    return driver, last_error(r, run.x, 2000), run.u
 
 
 @pytest.mark.parametrize(
@@ -214,11 +217,15 @@ def humming(limits: Any, width: float, hum: float, phase: float = 2.0 * np.pi / 
     [(UNIPOLAR, 2.0, 0.1), (UNIPOLAR, 5.0, 0.2), (BIASED, 2.0, 0.1), (BIASED, 5.0, 0.2), (BIPOLAR, 2.0, 0.2)],
 )
 def test_a_gain_of_the_wrong_sign_is_doubted(limits: Any, width: float, hum: float) -> None:
-    driver, error = humming(limits, width, hum)
+    driver, error, u = humming(limits, width, hum)
     assert driver.model.line[0] == pytest.approx(SLOPE, rel=0.3)
     assert error < 0.5 * SWEPT
     said = [event.reason for event in driver.events]
     assert any(reason.startswith("false start") for reason in said)
+    # Where it begins again it does not rest at a limit.
+    doubted = next(event.time for event in driver.events if event.reason.startswith("false start"))
+    later = u[int(FAST * doubted) + 10 :]
+    assert np.all((later > limits[0]) & (later < limits[1]))
     assert not any(reason.startswith("out of reach") for reason in said)
 
 
