@@ -105,7 +105,8 @@ def needs_table(document: Document) -> Table:
     for need in document["needs"]:
         names = {row["estimator"]: document["estimators"][row["estimator"]]["name"] for row in need["order"]}
         best, *others = need["order"]
-        alike = [names[row["estimator"]] for row in others if row["p"] >= SURE]
+        # Who did not run everywhere is not named as being as good everywhere.
+        alike = [names[row["estimator"]] for row in others if row["p"] >= SURE and row["everywhere"]]
         worse = [row for row in others if row["p"] < SURE and row["ratio"][0] >= 1.0]
         value = best["value"] or best["others"]
         body.append(

@@ -157,10 +157,12 @@ class Fitter:
         self._plays, self._tells_lag = plays, tells_lag
         # A loop says by itself where it began; only its delay is first that of plays.
         by_plays = plays or self.delay_estimated
-        self._begin(by_plays)
-        if search.drifts(self._log, search.plays(self._log, self.start) if by_plays else self._loop):
-            self._log = replace(self._log, drifts=True)
-            self._begin(by_plays)
+        # Plays that move on the first way alone look like a drift.
+        self._begin(by_plays, once=False)
+        drifts = search.drifts(self._log, search.plays(self._log, self.start) if by_plays else self._loop)
+        self._log = replace(self._log, drifts=drifts)
+        if plays or drifts:
+            self._begin(by_plays, once=plays)
         self.delay = search.best_delay(self._log, self.start) if isinstance(delay, str) else delay
         if self.delay > 0.0:
             self._log = replace(self._log, u=late(self._given, self.delay))
@@ -169,13 +171,13 @@ class Fitter:
         if plays and self.delay_estimated:
             self._refine_delay()
 
-    def _begin(self, plays: bool) -> None:
+    def _begin(self, plays: bool, *, once: bool = True) -> None:
         """Find where plays were before the record; anywhere will do where there are none.
 
         Fits of another delay or start are of no more use.
         """
         first = float(self._log.u[0])
-        self.start = search.best_start(self._log) if plays else Start(first, first)
+        self.start = search.best_start(self._log, once=once) if plays else Start(first, first)
         for name in ("_first", "_loop", "_plain", "_richest"):
             self.__dict__.pop(name, None)
 

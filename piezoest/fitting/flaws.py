@@ -34,6 +34,8 @@ CROSSED = 1.5
 STICK_SLIP = 6
 # Samples on either side of a jump that say how large it is.
 EACH_SIDE = 6
+# A step of a slow gauge takes some of the samples of such means; others are so many of them away, at least.
+SLOW_STEP, ALONE = (4, 16), 3
 # Neighbours on either side that foresee a sample.
 NEIGHBOURS = 3
 # What surprises on either side of a spike, relative to it: largest difference, and least sum, the other way.
@@ -183,7 +185,7 @@ def _of_readings(found: Flaws, u: FloatArray, x: FloatArray, known: BoolArray, u
     off = _bursts(log, lost | unknown)
     spikes, clean = _spikes(log, lost | unknown)
     spikes = _isolated(spikes | off)
-    jumps, sizes = _jumps(log, clean, spikes | lost | unknown)
+    jumps, sizes = _jumps(log, clean, spikes | lost | ~known, unknown)
     alone, dropouts = found.spikes.copy(), found.dropouts.copy()
     alone[place[spikes & known]] = True
     dropouts[place[lost]] = True
@@ -296,25 +298,22 @@ def _isolated(marks: BoolArray) -> BoolArray:
     return out
 
 
-def _jumps(log: _Log, clean: FloatArray, marked: BoolArray) -> tuple[IntArray, FloatArray]:
-    """First samples after a step that stays and that the voltage does not explain, and the steps."""
-    if clean.size < 4 * EACH_SIDE:
-        return np.empty(0, np.int64), np.empty(0)
-    e = surprise(np.diff(clean), log.gain * np.diff(log.late), NEIGHBOURS + 1)
-    size = np.abs(e)
-    limit = UNUSUAL * scale_of(e)
-    explained = np.maximum(log.explained[1:], log.explained[:-1])
-    near = np.convolve(marked, np.ones(5), mode="same")[1:] > 0
-    found = np.flatnonzero((size > np.maximum(limit, explained)) & ~near)
-    found = found[is_peak(size, 4, found)] + 1
-    found = found[(found >= EACH_SIDE) & (found <= clean.size - EACH_SIDE)]
-    steps, scatter = _step_at(clean - log.gain * log.late, found)
-    # What the voltage moves in a sample or two may be a kink of the hysteresis, or a gap that it crosses.
-    about = np.clip(found[:, None] + np.arange(-EACH_SIDE, EACH_SIDE), 0, clean.size - 1)
-    moving = CROSSED * np.max(log.moving[about], axis=1)
-    smallest = np.maximum(max(SMALLEST_JUMP * log.range, 3.0 * log.quantum), moving)
-    stays = np.abs(steps) > np.maximum(np.maximum(smallest, explained[found - 1]), UNUSUAL * scatter)
-    found, steps = found[stays], steps[stays]
+def _jumps(
+    log: _Log, clean: FloatArray, missing: BoolArray, unknown: BoolArray
+) -> tuple[IntArray, FloatArray]:
+    """First samples after a step that stays and that the voltage does not explain, and the steps.
+
+    A gauge with a filter takes some samples for a step: means of so many samples jump as well.
+    """
+    place = np.flatnonzero(~missing)
+    found, steps = _steps(log, clean, unknown, place[:, None])
+    for width in SLOW_STEP:
+        whole = place.size // width * width
+        late, later = _steps(log, clean, unknown, place[:whole].reshape(-1, width))
+        new = np.all(np.abs(late[:, None] - found) > ALONE * width, axis=1)
+        found, steps = np.append(found, late[new]), np.append(steps, later[new])
+    order = np.argsort(found)
+    found, steps = found[order], steps[order]
     onward = np.sign(log.late[found] - log.late[found - 1])
     if found.size >= STICK_SLIP and np.all(steps * onward > 0.0):
         # A stage that moves in steps, always onward, is sticky: no sensor does that.
@@ -322,15 +321,53 @@ def _jumps(log: _Log, clean: FloatArray, marked: BoolArray) -> tuple[IntArray, F
     return found, steps
 
 
-def _step_at(h: FloatArray, found: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Steps between lines through a few samples before and after each place, and how far those scatter."""
+def _steps(log: _Log, clean: FloatArray, unknown: BoolArray, groups: IntArray) -> tuple[IntArray, FloatArray]:
+    """Steps between one group of samples, of which the mean is taken, and the next."""
+    n, width = groups.shape
+    if n < FEWEST_SAMPLES:
+        return np.empty(0, np.int64), np.empty(0)
+    x, u = clean[groups].mean(axis=1), log.late[groups].mean(axis=1)
+    # What the voltage moves between two groups may be a kink of the hysteresis, or a gap that it crosses.
+    travel = log.gain * np.cumsum(np.abs(np.diff(log.late, prepend=log.late[0])))[groups[:, 0]]
+    moving = np.diff(travel, append=travel[-1])
+    explained = width * np.max(log.explained[groups], axis=1) + KINK * moving
+    # What goes on by itself goes further where samples are missing.
+    longer = np.diff(groups.mean(axis=1)) / width
+    e = longer * surprise(np.diff(x) / longer, log.gain * np.diff(u) / longer, NEIGHBOURS + 1)
+    size, explained = np.abs(e), np.maximum(explained[1:], explained[:-1])
+    near = np.convolve(np.any(unknown[groups], axis=1), np.ones(5), mode="same")[1:] > 0
+    found = np.flatnonzero((size > np.maximum(UNUSUAL * scale_of(e), explained)) & ~near)
+    found = found[is_peak(size, 4, found)] + 1
+    found = found[(found >= EACH_SIDE) & (found < n - EACH_SIDE)]
+    skipped = int(width > 1)
+    apart = (groups[found, 0] - groups[found - 1, -1] - 1) / width + skipped
+    steps, scatter = _step_at(x - log.gain * u, found, skipped, apart)
+    about = np.clip(found[:, None] + np.arange(-EACH_SIDE, EACH_SIDE), 0, n - 1)
+    smallest = np.maximum(
+        max(SMALLEST_JUMP * log.range, 3.0 * log.quantum),
+        CROSSED * (1.0 + skipped) * np.max(moving[about], axis=1),
+    )
+    stays = np.abs(steps) > np.maximum(np.maximum(smallest, explained[found - 1]), UNUSUAL * scatter)
+    return groups[found[stays], 0], steps[stays]
+
+
+def _step_at(
+    h: FloatArray, found: IntArray, skipped: int, apart: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Steps between lines through a few samples before and after each place, and how far those scatter.
+
+    `skipped`: samples from each place on that belong to neither side. `apart`: samples between both sides.
+    """
     t = np.arange(EACH_SIDE) + 0.5
     middle = t - t.mean()
     ends, off = [], np.zeros(found.size)
-    for places in (found[:, None] - 1 - np.arange(EACH_SIDE), found[:, None] + np.arange(EACH_SIDE)):
+    for places in (
+        found[:, None] - 1 - np.arange(EACH_SIDE),
+        found[:, None] + skipped + np.arange(EACH_SIDE),
+    ):
         values = h[places]
         mean, slope = values.mean(axis=1), values @ middle / (middle @ middle)
-        ends.append(mean - slope * t.mean())
+        ends.append(mean - slope * (t.mean() + 0.5 * apart))
         off += np.sum((values - mean[:, None] - slope[:, None] * middle) ** 2, axis=1)
     return ends[1] - ends[0], np.sqrt(off / (2.0 * EACH_SIDE - 4.0))
 

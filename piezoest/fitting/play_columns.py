@@ -29,17 +29,33 @@ ACROSS = 0.1
 # A range is about 0 V if its middle is nearer to it than this fraction of its half.
 ABOUT_ZERO = 0.1
 FAR = 1e300
+POINTS = 401  # thresholds among which the widest is looked for
+CLOSE = 1.5  # steps of thresholds, as so many times the first one, that are about as small
 
 
 class Start(NamedTuple):
-    """Where the plays were before the record: at `centre`, as far as the voltage `left` allows [V]."""
+    """Where the plays were before the record: at `centre`, as far as the voltage `left` allows [V].
+
+    `once`: which part it takes of the wider plays that move on the first way alone.
+    """
 
     left: float
     centre: float
+    once: float = 0.0
 
     def states(self, thresholds: FloatArray) -> FloatArray:
         """States of plays [V], shape (n,), that some voltage leaves behind."""
         return np.clip(self.centre, self.left - thresholds, self.left + thresholds)
+
+    def widest(self, low: float, high: float, least: float) -> float:
+        """Threshold of the widest play that a voltage from low to high moves by so much, at least [V].
+
+        Swings move plays of half their range. The first way from rest moves wider ones, once.
+        """
+        thresholds = np.linspace(0.0, high - low, POINTS)
+        states = self.states(thresholds)
+        way = np.maximum(high - thresholds - states, states - low - thresholds)
+        return max(0.5 * (high - low - least), float(np.max(thresholds[way >= least], initial=0.0)))
 
 
 def starts(u: FloatArray) -> list[Start]:
@@ -155,10 +171,14 @@ class PlayColumns:
     def _differences(self, along: FloatArray, across: FloatArray) -> FloatArray:
         """The squares, with roots of their weights: of plays (n,), of a segment and the next (k, n)."""
         n, segments = self.thresholds.size, self.bends.size + 1
-        plays = along[2:, None] * np.diff(np.eye(n), axis=0)[1:]
+        steps = (
+            np.diff(self.thresholds, prepend=0.0) / self.thresholds[min(1, n - 1)] if n > 1 else np.ones(n)
+        )
+        alike = int(np.sum(steps < CLOSE))
+        plays = along[2:, None] * np.diff(np.diag(1.0 / np.maximum(steps, 1.0)), axis=0)[1:]
         apart = across.reshape(-1, 1) * np.kron(np.diff(np.eye(segments), axis=0), np.eye(n)) / np.sqrt(n)
         rows = np.vstack([np.kron(np.eye(segments), plays), apart])
-        return np.asarray((self.thresholds[-1] * n) ** 2 * rows.T @ rows)
+        return np.asarray((self.thresholds[alike - 1] * alike) ** 2 * rows.T @ rows)
 
     def merged(self) -> tuple[PlayColumns, FloatArray]:
         """The same without bends, and how its columns come from these (size, n)."""

@@ -23,6 +23,9 @@ from piezoest.models import Creep
 THRESHOLDS, BENDS = 20, 2
 # The widest play moves by this fraction of the voltage's range.
 MOVES = 0.1
+# Those that move only on the first way from rest are so many times as far apart. So much of them is tried;
+# all of them must make the squares so many times smaller.
+ONCE, PARTS, PRICE = 2.0, (1.0 / 6.0, 1.0 / 3.0, 2.0 / 3.0, 1.0), 8.0
 # Rows by which delays, starts and alphas are compared, and with which smoothness.
 FEW, SMOOTH = 4000, 1e-4
 # A drift is clear if only this part of the squares is left with it.
@@ -45,6 +48,9 @@ def plays(log: Log, start: Start, thresholds: int = THRESHOLDS, bends: int = 0) 
     inner = log.u.min() + 2.0 * log.half * np.arange(1, bends + 1) / (bends + 1)
     visited = (float(log.u.min()), float(log.u.max()))
     laid = (1.0 - MOVES) * log.half * np.arange(thresholds) / max(thresholds - 1, 1)
+    if start.once > 0.0 and thresholds > 1:
+        widest = laid[-1] + start.once * (_widest(log, start) - laid[-1])
+        laid = np.append(laid, np.arange(laid[-1] + ONCE * laid[1], widest, ONCE * laid[1]))
     return PlayColumns(laid, inner, start, visited, moving_of(log.u, laid, inner, start))
 
 
@@ -79,9 +85,26 @@ def _left(found: Regression, drift: bool) -> float:
     return found.all.missed(w) / max(found.all.rows, 1.0)
 
 
-def best_start(log: Log) -> Start:
-    """The start under which plays miss least."""
-    return min(starts(log.u), key=lambda start: missed(log, plays(log, start)))
+def best_start(log: Log, *, once: bool) -> Start:
+    """The start under which plays miss least; with wider ones that move on the first way alone, if allowed.
+
+    Of what those do later on the record tells little: there are only as many as are worth it.
+    """
+
+    def cost(start: Start) -> float:
+        return missed(log, plays(log, start)) * PRICE**start.once
+
+    costs = {start: cost(start) for start in starts(log.u)}
+    rested = [start for start in costs if _widest(log, start) > log.half] if once else []
+    if rested:
+        first = min(rested, key=lambda start: costs[start])
+        costs |= {each: cost(each) for part in PARTS for each in [first._replace(once=part)]}
+    return min(costs, key=lambda start: costs[start])
+
+
+def _widest(log: Log, start: Start) -> float:
+    """Threshold of the widest play that moves at all [V]."""
+    return start.widest(float(log.u.min()), float(log.u.max()), 2.0 * MOVES * log.half)
 
 
 def drifts(log: Log, basis: Basis) -> bool:

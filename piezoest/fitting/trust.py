@@ -102,6 +102,8 @@ class Spread(NamedTuple):
         Samples that this mean remembers.
     stayed : tuple of float
         Range of the mean in the record [V].
+    drift : float
+        What drifts in the record [µm]. Behind it a prediction drifts ever more slowly; the stage may not.
     """
 
     within: float
@@ -117,6 +119,7 @@ class Spread(NamedTuple):
     by_stay: float = 0.0
     memory: float = 1.0
     stayed: tuple[float, float] = (0.0, 0.0)
+    drift: float = 0.0
 
     def along(self, u: FloatArray, later: FloatArray) -> FloatArray:
         """For each voltage, so many lengths of the record after its end, shape (N,)."""
@@ -126,6 +129,7 @@ class Spread(NamedTuple):
         return np.sqrt(
             self.within**2
             + (self.behind * np.log1p(later)) ** 2
+            + (self.drift * (later - np.log1p(later))) ** 2
             + (self.by_volt * beyond) ** 2
             + (self.by_move * faster) ** 2
             + (self.by_stay * _outside(running_mean(u, self.memory), self.stayed)) ** 2
@@ -204,6 +208,7 @@ def spread_of(fitted: Fitted, log: Log, given: FloatArray, delay: float) -> Spre
         by_stay=CREEPS * fitted.regression.line_gain,
         memory=memory,
         stayed=_range(running_mean(given, memory)),
+        drift=float(fitted.w[fitted.design.offset + 1]),
     )
 
 

@@ -1,6 +1,7 @@
 """What to know before using an identified model, in plain sentences."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 
@@ -16,8 +17,8 @@ WORSE_ON_HELD_OUT = 1.5
 # An oscillation makes this part of the residual and is so many times as fast as the swings: a loop that
 # is missed has harmonics of these.
 OSCILLATES, FASTER = 0.75, 15.0
-# An error above so many times the noise floor is not noise.
-ABOVE_NOISE = 1.3
+# An error above so many times the noise floor is not noise; on another log, above so many times the one here.
+ABOVE_NOISE, MISSED = 1.3, 3.0
 
 
 def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
@@ -44,6 +45,22 @@ def beyond_sentences(name: str, learnt_on: LearntOn, u: FloatArray, sample_rate:
         f"{name} goes beyond what was fitted: {', and '.join(left)}. There the model is a guess: let the "
         "fitted part contain such swings."
     ]
+
+
+def other_log_sentences(found: Identification) -> list[str]:
+    """Which other logs the model misses, or all but their offset."""
+    said, usual = [], max(found.held_out.rms, found.noise_floor)
+    for each in found.validations:
+        name, error, about_mean = Path(each.source).name, each.error.rms, each.without_mean.rms
+        if about_mean > MISSED * usual:
+            said.append(
+                f"Other log {name}: the model misses it by {about_mean / usual:.2g} times the held-out error "
+                f"({about_mean:.2g} µm rms without the mean): its gain, delay or loop is another."
+            )
+        elif error > MISSED * usual:
+            offset = float(np.sqrt(error**2 - about_mean**2))
+            said.append(f"Other log {name}: only its offset differs, by {offset:.2g} µm.")
+    return said
 
 
 def _held_out(found: Identification, data: Data) -> list[str]:

@@ -12,9 +12,10 @@ from piezoest.fitting import FORMS, Fitter
 from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.fitting.runs import BoolArray
 from piezoest.fitting.search import checked_delay
-from piezoest.identification.advice import advice_of, beyond_sentences
+from piezoest.identification.advice import advice_of, beyond_sentences, other_log_sentences
 from piezoest.identification.candidate import Candidate
 from piezoest.identification.choice import best_of, reason_for
+from piezoest.identification.clipping import levels
 from piezoest.identification.data import Data, check_excitation, judged, noise_of, prepare
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.repeats import noise_floor
@@ -119,8 +120,9 @@ def identify(
     for each, its in validated:
         _enough("part to validate", each, judged(each, its))
     say("looking at the log")
-    if not np.any(np.isfinite(record.voltage)):
-        raise ValueError(f"{record.source}: voltage has no finite sample: check the column")
+    for name in ("voltage", "displacement"):
+        if not np.any(np.isfinite(getattr(record, name))):
+            raise ValueError(f"{record.source}: {name} has no finite sample: check the column")
     trained = round(train * len(record))
     flaws = flawed(record.voltage, record.displacement)
     counts = judged(record, flaws, trained)
@@ -129,6 +131,8 @@ def identify(
     usable = np.where(flaws.unusable, np.nan, record.displacement)[:trained]
     first = prepare(flaws.without(record.voltage)[:trained], usable)
     noise = noise_of(first)
+    # A value that is rounded is off by the standard deviation of an even distribution.
+    rounding = levels(usable[np.isfinite(usable)])[0] / np.sqrt(12.0)
     found = findings(record)
     check_excitation(first, noise, found)
     of_others = [
@@ -165,7 +169,9 @@ def identify(
         reason=reason_for(known, best),
         whiteness=Whiteness.of(best.residual[best.fit.left_out : trained]),
         # What a model misses by less than the noise, where that was held out, is none.
-        noise_floor=min(noise_floor(record, fallback=noise), best.train.rms, best.held_out.rms),
+        noise_floor=min(
+            noise_floor(record, fallback=max(noise, rounding)), best.train.rms, best.held_out.rms
+        ),
         drift=_slope(best.residual, best.fit.left_out),
         delay_known=told,
         creep_known=tells_creep,
@@ -186,6 +192,7 @@ def identify(
             each.sample_rate,
         )
     ]
+    of_others += other_log_sentences(result)
     return dataclasses.replace(result, advice=(*advice_of(result, first), *of_others))
 
 

@@ -142,7 +142,10 @@ class Oscillation(NamedTuple):
         power[:PEAK] = 0.0
         k = int(np.argmax(power))
         share = float(np.sum(power[max(k - PEAK, 0) : k + PEAK + 1]) / max(float(np.sum(power)), 1e-300))
-        return cls(k * sample_rate / length, share)
+        # Between two frequencies of the spectrum both have some of it.
+        near = np.arange(max(k - 1, 0), min(k + 2, power.size))
+        place = float(near @ np.sqrt(power[near]) / max(np.sum(np.sqrt(power[near])), 1e-300))
+        return cls(place * sample_rate / length, share)
 
 
 def autocorrelation(residual: FloatArray, lags: int) -> FloatArray:

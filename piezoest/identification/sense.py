@@ -324,8 +324,8 @@ def _drift(log: Examined) -> Iterator[Finding]:
         yield note(
             "drift",
             f"The displacement drifts by {log.drift:+.3g} µm between the first turn and the last one, "
-            f"{share:.0f} % of what the voltage moves: creep or temperature; let the stage settle, or fit a "
-            "drift.",
+            f"{share:.0f} % of what the voltage moves: creep or temperature: let the stage settle, or fit a "
+            "drift beside the model, as identify does.",
         )
 
 

@@ -20,6 +20,7 @@ GROUPED = {
     for thousands, decimal in OTHER.items()
 }
 STAMP = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(:\d{2})?([.,]\d+)?\s*(Z|z|[-+]\d{2}(:?\d{2})?)?")
+TIME_OF_DAY = re.compile(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?")
 
 
 class Style(NamedTuple):
@@ -87,8 +88,8 @@ def is_missing(cell: str) -> bool:
 
 
 def is_stamp(cell: str) -> bool:
-    """Whether a cell holds a date with a time of day, as ISO 8601 has them."""
-    return STAMP.fullmatch(cell.strip()) is not None
+    """Whether a cell holds a time of day, with a date before it or not, as ISO 8601 has them."""
+    return any(each.fullmatch(cell.strip()) for each in (STAMP, TIME_OF_DAY))
 
 
 def is_number(cell: str) -> bool:

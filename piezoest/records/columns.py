@@ -177,7 +177,7 @@ def _factor(source: Source, title: str, quantity: str) -> tuple[float, str]:
     if unit and unit not in UNITS[quantity]:
         raise LogError(
             f"{source.path}: column {title!r} has no unit of {quantity}, such as {base}: convert it, or say "
-            f"what one of it is: units {quantity}='2 {base}' where a volt stands for 2 {base}"
+            f"what 1 in it stands for: units={{'{quantity}': '2 {base}'}}, or --units {quantity}='2 {base}'"
         )
     if not unit:
         return 1.0, f"column {title!r}: unit taken as {base}"

@@ -81,15 +81,16 @@ def _cells(path: Path, line: str) -> list[str]:
 
 def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Numbered]]:
     """Delimiter, header and rows; instruments may have written other lines above, units below the header."""
-    first = _cells(path, filled[0][1])
+    first, mark = _cells(path, filled[0][1]), _delimiter(filled[0][1])
     head = [_cells(path, line) for _, line in filled[:LONGEST_PREAMBLE] if line.count('"') % 2 == 0]
     pairs = enumerate(itertools.pairwise(head))
     begins = next((k for k, rows in pairs if len(rows[0]) == len(rows[1]) > 1 and _numeric(*rows)), 0)
-    if begins < 2 or len(head[begins]) == len(first) or len(head) < min(len(filled), LONGEST_PREAMBLE):
+    like_first = len(head[begins]) == len(first) and _delimiter(filled[begins][1]) == mark
+    if begins < 2 or like_first or len(head) < min(len(filled), LONGEST_PREAMBLE):
         header, begins = ([], 0) if _numeric(first) else (first, 1)
         if header and len(head) > 2 and (named := with_units(header, head[1])):
             header, begins = named, 2
-        return _delimiter(filled[0][1]), header, filled[begins:]
+        return mark, header, filled[begins:]
     header = with_units(head[begins - 2], head[begins - 1]) or head[begins - 1]
     if len(header) != len(head[begins]):
         # Nothing says what is what: columns go by their numbers.
@@ -243,6 +244,9 @@ def _stamps(cells: Any) -> Any:
     import pandas as pd
 
     words = pd.Series(cells, dtype=str).str.strip().str.replace(",", ".")
+    # A time of day alone is that of any day.
+    words = words.str.replace(r"^(\d):", r"0\1:", regex=True)
+    words = words.str.replace(r"^(\d\d:)", r"2000-01-01T\1", regex=True)
     return pd.to_datetime(words, format="ISO8601", utc=True, errors="coerce")
 
 

@@ -95,7 +95,8 @@ def scan(where: str, place: str, blocks: Blocks) -> Timing:
         if np.any(steps < 0.0):
             k = int(np.argmax(steps < 0.0))
             raise LogError(
-                f"{at(k)}does not increase: {known.times[k + 1]:.15g} s after {known.times[k]:.15g} s"
+                f"{at(k)}does not increase: {known.times[k + 1]:.15g} s after {known.times[k]:.15g} s; cut "
+                "the log where the clock starts again, or give the sample rate to take rows as even"
             )
         if not count:
             first = int(known.rows[0]), float(known.times[0])

@@ -216,3 +216,17 @@ def test_predicts_what_comes_as_well_as_plain_least_squares(seed: int) -> None:
     mine, other = y - found.continued(u).x, y - columns @ weights
     assert rms(mine[:half]) < 1.1 * rms(other[:half]) + 0.1 * sigma
     assert rms(mine[half:]) < 1.1 * rms(other[half:]) + 0.1 * sigma
+
+
+@pytest.mark.parametrize("ramp", [0, 300])
+def test_wide_plays_that_the_first_way_from_rest_moves_are_fitted(ramp: int) -> None:
+    """A unipolar stage: from 0 V up, plays move that no swing about the middle moves again."""
+    swings = np.concatenate(
+        [a * np.sin(2.0 * np.pi * np.arange(1000) / 1000.0) for a in [20.0, 40.0, 30.0] * 3]
+    )
+    u = np.concatenate([np.linspace(0.0, 40.0, ramp), 40.0 + swings])
+    thresholds = np.linspace(1.0, 60.0, 30)
+    stage = pz.PrandtlIshlinskii(0.08, thresholds, 0.006 * np.exp(-thresholds / 25.0))
+    x = stage.simulate(u, initial_state=np.zeros(30))
+    found = fit(u, x + noise(5e-3, 0, u.size), "plays", delay=0.0)
+    assert rms(found.predict().x - x) < 2e-3

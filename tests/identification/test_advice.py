@@ -131,3 +131,30 @@ def test_creep_is_known_where_the_voltage_rests() -> None:
     rests = np.insert(u, 2050, np.full(1000, u[2050]))
     said = [" ".join(identify(log(v, model.simulate(v))).advice) for v in (u, rests)]
     assert ["Creep is not known" in each for each in said] == [True, False]
+
+
+def test_rounding_is_noise() -> None:
+    found = identify(Record.from_arrays(swings(), np.round(5.0 * PLAYS.simulate(swings())) / 5.0, FS))
+    assert found.noise_floor == pytest.approx(0.2 / np.sqrt(12.0), rel=0.2)
+    assert not any("no model here" in each for each in found.advice)
+
+
+def test_a_stage_of_another_gain_or_offset_is_told_apart() -> None:
+    u = swings()
+    others = [
+        Record.from_arrays(u, factor * PLAYS.simulate(u) + offset + noise(2e-3, 1, u.size), FS, name)
+        for factor, offset, name in ((1.0, 0.0, "same"), (2.0, 0.0, "gain"), (1.0, 2.5, "offset"))
+    ]
+    said = [each for each in identify(log(u, PLAYS.simulate(u)), validate=others).advice if "log" in each]
+    about = {
+        name: [each for each in said if each.startswith(f"Other log {name}")] for name in ("same", "gain")
+    }
+    assert about["same"] == []
+    assert any("misses it" in each for each in about["gain"])
+    assert any("only its offset differs, by 2.5 µm" in each for each in said)
+
+
+def test_a_column_without_a_number_is_refused() -> None:
+    u = swings()
+    with pytest.raises(ValueError, match="displacement has no finite sample"):
+        identify(u, np.full(u.size, np.nan), sample_rate=FS)

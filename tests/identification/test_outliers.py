@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import piezoest as pz
 from piezoest._checks import FloatArray
@@ -156,3 +157,35 @@ def test_where_the_voltage_is_missing_the_displacement_may_turn() -> None:
         flaws = flawed(u, x)
         assert flaws.jumps.size == 0
         assert not flaws.spikes.any()
+
+
+def swinging() -> tuple[FloatArray, FloatArray]:
+    """Swings of several sizes, and a stage that follows them with a loop and a noise of 5 nm."""
+    u = pz.signals.multi_amplitude([20.0, 40.0, 30.0], 1.0, 1, 1000.0).values
+    stage = pz.PrandtlIshlinskii(0.08, np.linspace(1.0, 30.0, 30), np.full(30, 0.002))
+    return u, stage.simulate(u) + 5e-3 * np.random.default_rng(0).standard_normal(u.size)
+
+
+def filtered(x: FloatArray, samples: float) -> FloatArray:
+    keep = np.exp(-1.0 / samples)
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], x - x[0])) + x[0]
+
+
+@pytest.mark.parametrize("how", ["missing", "spike", "two samples", "slow gauge"])
+def test_a_jump_is_found_in_whatever_it_hides(how: str) -> None:
+    u, x = swinging()
+    step = (np.arange(x.size) >= 1300).astype(float)
+    x += filtered(step, 4.0) if how == "slow gauge" else step
+    x[1300] += {"missing": np.nan, "spike": 4.0, "two samples": -0.5, "slow gauge": 0.0}[how]
+    flaws = flawed(u, x)
+    assert flaws.jumps.size == 1
+    assert abs(int(flaws.jumps[0]) - 1300) <= 4
+    assert flaws.jump_sizes[0] == pytest.approx(1.0, abs=0.2)
+
+
+def test_missing_samples_are_no_jumps() -> None:
+    for seed in SEEDS:
+        u, x = zoo_log(seed)[:2]
+        y = x.copy()
+        y[apart(np.random.default_rng(seed), x.size, x.size // 100, 4)] = np.nan
+        assert flawed(u, y).jumps.size <= 1, seed
