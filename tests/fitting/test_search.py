@@ -229,4 +229,4 @@ def test_wide_plays_that_the_first_way_from_rest_moves_are_fitted(ramp: int) -> 
     stage = pz.PrandtlIshlinskii(0.08, thresholds, 0.006 * np.exp(-thresholds / 25.0))
     x = stage.simulate(u, initial_state=np.zeros(30))
     found = fit(u, x + noise(5e-3, 0, u.size), "plays", delay=0.0)
-    assert rms(found.predict().x - x) < 2e-3
+    assert rms(found.predict().x - x) < 4e-3

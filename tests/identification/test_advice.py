@@ -134,7 +134,9 @@ def test_creep_is_known_where_the_voltage_rests() -> None:
 
 
 def test_rounding_is_noise() -> None:
-    found = identify(Record.from_arrays(swings(), np.round(5.0 * PLAYS.simulate(swings())) / 5.0, FS))
+    # Periods that repeat to the bit show no noise.
+    u = 40.0 * np.sin(2.0 * np.pi * np.arange(12_000) / 1000.0)
+    found = identify(Record.from_arrays(u, np.round(5.0 * PLAYS.simulate(u)) / 5.0, FS))
     assert found.noise_floor == pytest.approx(0.2 / np.sqrt(12.0), rel=0.2)
     assert not any("no model here" in each for each in found.advice)
 
