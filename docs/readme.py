@@ -29,7 +29,7 @@ stages are not. So PrandtlIshlinskiiRLS is better there in most rows.
 
 The second table is of the same stage. *Settles*: periods after a change until every further error is below
 1.2 %, and the share of runs that settle; *others settle*: this share on the other stages, where only
-AdaptiveFeedforward settles in every run of the scenarios that repeat. *First*: largest error in the first
+AdaptiveFeedforward settles nearly always, in the scenarios that repeat. *First*: largest error in the first
 period after the change. This is a mean over the kinds of change: after a cold start it is {cold} % for
 AdaptiveFeedforward. *Settled*: largest error in the last half of the periods. *Step*: one sample, called from
 Python. Geometric means over the scenarios of the medians over {seeds} seeds; {machine}, {date}.
