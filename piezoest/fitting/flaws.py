@@ -12,30 +12,19 @@ from piezoest.fitting.bursts import LONGEST as LONGEST_BURST
 from piezoest.fitting.bursts import bursts, wild
 from piezoest.fitting.coordinates import bridged
 from piezoest.fitting.held import held
+from piezoest.fitting.jumps import EACH_SIDE, FEWEST_SAMPLES, KINK, UNUSUAL, jumps_of
 from piezoest.fitting.lost_voltage import delay_of, lost_voltage
 from piezoest.fitting.rests import rests_of
 from piezoest.fitting.rows import dot
 from piezoest.fitting.runs import BoolArray, IntArray, runs
 from piezoest.fitting.surprise import is_peak, scale_of, surprise
 
-FEWEST_SAMPLES = 64
-# A sample that is off by so many standard deviations is no noise, in the longest of logs.
-UNUSUAL = 6.0
-# ... and by so much of the range of the displacement: less does no harm to a fit.
-SMALLEST_SPIKE, SMALLEST_JUMP = 1e-3, 5e-3
+# A spike is at least so much of the range of the displacement: less does no harm to a fit.
+SMALLEST_SPIKE = 1e-3
 PASSES = 4
 # Steps of the voltage explain what happens for some samples, and this much more than their size.
 FORGOTTEN_PER_SAMPLE = 0.98
 EXPLAINED_BY_STEP = 3.0
-# Part of the displacement that the voltage moves in a sample which a kink of the hysteresis may take or give.
-KINK = 0.35
-CROSSED = 1.5
-# So many jumps, all of them in the direction of the motion, are the stage's own.
-STICK_SLIP = 6
-# Samples on either side of a jump that say how large it is.
-EACH_SIDE = 6
-# A step of a slow gauge takes some of the samples of such means; others are so many of them away, at least.
-SLOW_STEP, ALONE = (4, 16), 3
 # Neighbours on either side that foresee a sample.
 NEIGHBOURS = 3
 # What surprises on either side of a spike, relative to it: largest difference, and least sum, the other way.
@@ -185,7 +174,7 @@ def _of_readings(found: Flaws, u: FloatArray, x: FloatArray, known: BoolArray, u
     off = _bursts(log, lost | unknown)
     spikes, clean = _spikes(log, lost | unknown)
     spikes = _isolated(spikes | off)
-    jumps, sizes = _jumps(log, clean, spikes | lost | ~known, unknown)
+    jumps, sizes = jumps_of(log, clean, spikes | lost | ~known, unknown)
     alone, dropouts = found.spikes.copy(), found.dropouts.copy()
     alone[place[spikes & known]] = True
     dropouts[place[lost]] = True
@@ -296,80 +285,6 @@ def _isolated(marks: BoolArray) -> BoolArray:
     for start, end in zip(starts[long], ends[long], strict=True):
         out[start:end] = False
     return out
-
-
-def _jumps(
-    log: _Log, clean: FloatArray, missing: BoolArray, unknown: BoolArray
-) -> tuple[IntArray, FloatArray]:
-    """First samples after a step that stays and that the voltage does not explain, and the steps.
-
-    A gauge with a filter takes some samples for a step: means of so many samples jump as well.
-    """
-    place = np.flatnonzero(~missing)
-    found, steps = _steps(log, clean, unknown, place[:, None])
-    for width in SLOW_STEP:
-        whole = place.size // width * width
-        late, later = _steps(log, clean, unknown, place[:whole].reshape(-1, width))
-        new = np.all(np.abs(late[:, None] - found) > ALONE * width, axis=1)
-        found, steps = np.append(found, late[new]), np.append(steps, later[new])
-    order = np.argsort(found)
-    found, steps = found[order], steps[order]
-    onward = np.sign(log.late[found] - log.late[found - 1])
-    if found.size >= STICK_SLIP and np.all(steps * onward > 0.0):
-        # A stage that moves in steps, always onward, is sticky: no sensor does that.
-        return np.empty(0, np.int64), np.empty(0)
-    return found, steps
-
-
-def _steps(log: _Log, clean: FloatArray, unknown: BoolArray, groups: IntArray) -> tuple[IntArray, FloatArray]:
-    """Steps between one group of samples, of which the mean is taken, and the next."""
-    n, width = groups.shape
-    if n < FEWEST_SAMPLES:
-        return np.empty(0, np.int64), np.empty(0)
-    x, u = clean[groups].mean(axis=1), log.late[groups].mean(axis=1)
-    # What the voltage moves between two groups may be a kink of the hysteresis, or a gap that it crosses.
-    travel = log.gain * np.cumsum(np.abs(np.diff(log.late, prepend=log.late[0])))[groups[:, 0]]
-    moving = np.diff(travel, append=travel[-1])
-    explained = width * np.max(log.explained[groups], axis=1) + KINK * moving
-    # What goes on by itself goes further where samples are missing.
-    longer = np.diff(groups.mean(axis=1)) / width
-    e = longer * surprise(np.diff(x) / longer, log.gain * np.diff(u) / longer, NEIGHBOURS + 1)
-    size, explained = np.abs(e), np.maximum(explained[1:], explained[:-1])
-    near = np.convolve(np.any(unknown[groups], axis=1), np.ones(5), mode="same")[1:] > 0
-    found = np.flatnonzero((size > np.maximum(UNUSUAL * scale_of(e), explained)) & ~near)
-    found = found[is_peak(size, 4, found)] + 1
-    found = found[(found >= EACH_SIDE) & (found < n - EACH_SIDE)]
-    skipped = int(width > 1)
-    apart = (groups[found, 0] - groups[found - 1, -1] - 1) / width + skipped
-    steps, scatter = _step_at(x - log.gain * u, found, skipped, apart)
-    about = np.clip(found[:, None] + np.arange(-EACH_SIDE, EACH_SIDE), 0, n - 1)
-    smallest = np.maximum(
-        max(SMALLEST_JUMP * log.range, 3.0 * log.quantum),
-        CROSSED * (1.0 + skipped) * np.max(moving[about], axis=1),
-    )
-    stays = np.abs(steps) > np.maximum(np.maximum(smallest, explained[found - 1]), UNUSUAL * scatter)
-    return groups[found[stays], 0], steps[stays]
-
-
-def _step_at(
-    h: FloatArray, found: IntArray, skipped: int, apart: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Steps between lines through a few samples before and after each place, and how far those scatter.
-
-    `skipped`: samples from each place on that belong to neither side. `apart`: samples between both sides.
-    """
-    t = np.arange(EACH_SIDE) + 0.5
-    middle = t - t.mean()
-    ends, off = [], np.zeros(found.size)
-    for places in (
-        found[:, None] - 1 - np.arange(EACH_SIDE),
-        found[:, None] + skipped + np.arange(EACH_SIDE),
-    ):
-        values = h[places]
-        mean, slope = values.mean(axis=1), values @ middle / (middle @ middle)
-        ends.append(mean - slope * (t.mean() + 0.5 * apart))
-        off += np.sum((values - mean[:, None] - slope[:, None] * middle) ** 2, axis=1)
-    return ends[1] - ends[0], np.sqrt(off / (2.0 * EACH_SIDE - 4.0))
 
 
 def _dropouts(log: _Log, known: BoolArray) -> BoolArray:

@@ -98,7 +98,8 @@ def best_start(log: Log, *, once: bool) -> Start:
     rested = [start for start in costs if _widest(log, start) > log.half] if once else []
     if rested:
         first = min(rested, key=lambda start: costs[start])
-        costs |= {each: cost(each) for part in PARTS for each in [first._replace(once=part)]}
+        wider = [Start(first.left, first.centre, part) for part in PARTS]
+        costs |= {start: cost(start) for start in wider}
     return min(costs, key=lambda start: costs[start])
 
 
