@@ -93,7 +93,7 @@ def outcome(
     P = T[:, free] @ inverse @ T[:, free].T * noise**2
     if coloured:
         edges = np.append(known[np.linspace(0, r.size, BLOCKS + 1).astype(int)[:-1]], residual.size)
-        J = run.jacobian * problem.weight[:, None]
+        J = problem.left(run.jacobian * problem.weight[:, None])
         g = np.array([onto(J[i:j], residual[i:j]) for i, j in pairwise(edges)]) @ by_q[:, free]
         P = sandwich(g @ (T[:, free] @ inverse).T, np.diag(P), int(free.sum()))
     j = run.jacobian[known[-1]] @ by_q[:, free] * problem.weight[known[-1]]

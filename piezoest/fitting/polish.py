@@ -15,6 +15,7 @@ from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.outcome import outcome
 from piezoest.fitting.problem import Problem
 from piezoest.fitting.regression import Fitted, Log
+from piezoest.fitting.runs import IntArray
 from piezoest.fitting.search import LONGEST_DELAY
 from piezoest.models import ColemanHodgdon
 
@@ -41,18 +42,17 @@ class Polished(NamedTuple):
 
 def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Polished:
     """The optimum near a linear fit; `log.u` is the voltage as it was written, without delay."""
-    w, offset = fitted.w, fitted.design.offset
-    beside = w[offset + 1] * np.arange(log.u.size) / fitted.design.samples
-    for jump, size in zip(log.jumps, w[offset + 2 :], strict=True):
-        beside += size * (np.arange(log.u.size) >= jump)
-    x = np.where(log.counts, log.x - beside, np.nan)
+    w, offset = fitted.w.copy(), fitted.design.offset
+    others, beside = _beside(log, fitted)
+    x = np.where(log.counts, log.x, np.nan)
     varied = coordinates(ColemanHodgdon, () if fit_delay else ("delay",), delayed=True)
     limits = {
         "alpha": (CURVATURES[0] / (2.0 * log.half), CURVATURES[1] / (2.0 * log.half)),
         "ratio": (1.0 / (1.0 - BENT[0]), 1.0 / (1.0 - BENT[1])),
         "delay": (0.0, LONGEST_DELAY),
     }
-    problem = Problem(log.u, x, varied, np.empty(0) if fit_delay else np.array([delay]), limits=limits)
+    held = np.empty(0) if fit_delay else np.array([delay])
+    problem = Problem(log.u, x, varied, held, limits=limits, beside=beside)
     model: Any = fitted.design.model(w)
     place = fitted.design.basis.initial_state(w, model) * model.alpha / model.b
     start = varied.of(model, {"delay": delay, "place": place})
@@ -60,10 +60,19 @@ def polished(log: Log, fitted: Fitted, delay: float, *, fit_delay: bool) -> Poli
     end = outcome(problem, solution.q, coloured=True)
     value = end.value
     found = ColemanHodgdon.from_theta(end.theta[:3], value["offset"])
-    w = w.copy()
     w[: offset + 1] = found.c - 2.0 * found.b, found.b, value["initial_state"], found.offset
+    missed = problem.x - problem.simulate(solution.q)[0].x
+    w[others] = np.linalg.lstsq(beside[log.counts], missed[log.counts], rcond=None)[0]
     errors = dict(zip(end.parameter_names, end.standard_errors.tolist(), strict=True))
     return Polished(
         LoopColumns(found.alpha), w, value["delay"], problem.cost(solution.q), errors,
         problem.gap(solution.q), len(varied.free),
     )  # fmt: skip
+
+
+def _beside(log: Log, fitted: Fitted) -> tuple[IntArray, FloatArray]:
+    """Which columns of a fit are no loop's (m,), and they themselves (N, m): drift and jumps."""
+    others = fitted.used[fitted.used > fitted.design.offset]
+    index = np.arange(log.u.size)
+    ways = np.column_stack([index / fitted.design.samples, index[:, None] >= log.jumps])
+    return others, ways[:, others - fitted.design.offset - 1]

@@ -34,7 +34,9 @@ class Problem:
     `u` (N,): voltage [V], without gaps. `x` (N,): measured displacement [µm], NaN where it is missing.
     `held`: values of the coordinates' held parameters. `decays`: factors exp(-dt/tau_i) of the creep terms.
     `root_weight` (N,): each sample's reciprocal standard deviation, up to a common factor. `prior`: knowledge
-    of the coordinates beside the record. `limits`: narrower bounds of coordinates by name.
+    of the coordinates beside the record. `limits`: narrower bounds of coordinates by name. `beside` (N, m):
+    columns that are fitted beside the model, as a drift is; only least squares over the whole record know
+    of them.
     """
 
     def __init__(
@@ -47,6 +49,7 @@ class Problem:
         root_weight: FloatArray | None = None,
         prior: Prior | None = None,
         limits: Mapping[str, tuple[float, float]] = {},
+        beside: FloatArray | None = None,
     ) -> None:
         known = np.isfinite(x)
         self.u, self.x = u, np.where(known, x, 0.0)
@@ -55,6 +58,7 @@ class Problem:
         self.coordinates, self.held, self.prior = coordinates, held, prior
         self.decays = np.empty(0) if decays is None else decays
         self._limits = limits
+        self._beside = None if beside is None else np.linalg.qr(beside * self.weight[:, None])[0]
         self._q: bytes | None = None
         self._run: tuple[Pass, FloatArray]
 
@@ -76,9 +80,17 @@ class Problem:
             u = late(u, delay)
         return simulation.run(u[:samples], p, s, self.decays, slope=slope), by_q
 
+    def left(self, values: FloatArray) -> FloatArray:
+        """What the columns beside the model leave of weighted values, shape (N,) or (N, k).
+
+        The linear part is solved at every step: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973)
+        413-432.
+        """
+        return values if self._beside is None else values - self._beside @ (self._beside.T @ values)
+
     def residual(self, q: FloatArray) -> FloatArray:
         """Weighted residual (N,), measured less simulated; zero where nothing was measured."""
-        return np.asarray((self.x - self.simulate(q)[0].x) * self.weight)
+        return self.left((self.x - self.simulate(q)[0].x) * self.weight)
 
     def sums(self, run: Pass, rows: slice, loss: str = "linear", scale: float = 1.0) -> tuple[float, Sums]:
         """Half the sum of the losses of a pass over some rows, and sums that have its derivatives by (p, s).
@@ -86,11 +98,11 @@ class Problem:
         A loss is one of `TUNING`, and bends at residuals beyond `scale`.
         """
         weight = self.weight[rows]
-        missed = (self.x[rows] - run.x) * weight
+        missed = self.left((self.x[rows] - run.x) * weight)
         z = (missed / scale) ** 2
         rho, slope, change = bend(loss, z)
         root = np.sqrt(np.maximum(slope + 2.0 * change * z, LEAST_CURVATURE))
-        sums = Sums.of(run.jacobian * (weight * root)[:, None], missed * slope / root)
+        sums = Sums.of(self.left(run.jacobian * (weight * root)[:, None]), missed * slope / root)
         return 0.5 * scale**2 * float(rho.sum()), sums
 
     def about(

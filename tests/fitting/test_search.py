@@ -164,6 +164,22 @@ def test_a_drift_is_fitted_beside_the_model() -> None:
     assert fit(u, x + noise(sigma), "plays").drift == pytest.approx(0.0, abs=5.0 * sigma)
 
 
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_drift_is_fitted_together_with_a_coleman_hodgdon_loop_and_its_delay(seed: int) -> None:
+    """A drift that stays where plays have put it bends the loop."""
+    u = voltage(np.random.default_rng(seed))
+    loop = pz.ColemanHodgdon(0.03, 0.12, 0.0066)
+    x = loop.simulate(np.concatenate([np.linspace(0.0, u[0], 300), u]))[300:]
+    stroke = float(np.ptp(x))
+    sigma = 1e-4 * stroke
+    x = np.interp(np.arange(N) - 2.4, np.arange(N), x) + 0.02 * stroke * T / T[-1]
+    found = fit(u, x + noise(sigma), "coleman-hodgdon", delay="auto")
+    assert rms(found.predict().x - x) < 0.3 * sigma
+    assert found.delay == pytest.approx(2.4, abs=0.01)
+    for name, true in zip(("alpha", "beta", "gamma"), loop.theta, strict=True):
+        assert getattr(found.model, name) == pytest.approx(true, abs=4.0 * found.standard_errors[name])
+
+
 @pytest.mark.parametrize("place", [700, 2600, 3900, 4700])
 def test_a_jump_is_fitted_beside_the_model(place: int) -> None:
     u, x, sigma = drawn(10)
