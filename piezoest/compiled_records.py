@@ -93,6 +93,7 @@ def _field_type(field: named.Field) -> Any:
 
 
 _NUMBER, _WHOLE = ir.DoubleType(), ir.IntType(64)
+_POINTER = ir.PointerType(_NUMBER)
 
 
 @register_default(Fields)
@@ -100,7 +101,7 @@ class FieldsModel(PrimitiveModel):
     """Passed around as a pointer."""
 
     def __init__(self, dmm: Any, fe_type: Any) -> None:
-        super().__init__(dmm, fe_type, ir.PointerType(_NUMBER))
+        super().__init__(dmm, fe_type, _POINTER)
 
 
 @register_default(Numbers)
@@ -108,15 +109,14 @@ class NumbersModel(PrimitiveModel):
     """Passed around as a pointer, with the sizes that are not in its type."""
 
     def __init__(self, dmm: Any, fe_type: Any) -> None:
-        pointer = ir.PointerType(_NUMBER)
         sizes = [_WHOLE] * fe_type.unknown
-        super().__init__(dmm, fe_type, ir.LiteralStructType([pointer, *sizes]) if sizes else pointer)
+        super().__init__(dmm, fe_type, ir.LiteralStructType([_POINTER, *sizes]) if sizes else _POINTER)
 
 
 @unbox(Fields)
 def _from_python(kind: Any, array: Any, c: Any) -> Any:
     """Pointer to the numbers of a NumPy array: its object begins with a head and this pointer."""
-    place = c.builder.bitcast(array, ir.PointerType(ir.PointerType(_NUMBER)))
+    place = c.builder.bitcast(array, ir.PointerType(_POINTER))
     data = c.builder.gep(place, [_WHOLE(object.__basicsize__ // 8)])
     return NativeValue(c.builder.load(data))
 
@@ -162,11 +162,15 @@ def _place(builder: Any, kind: Fields, record: Any, name: str | None) -> Any:
             run_time = functools.reduce(builder.mul, _sizes(builder, kind, record, inner))
         else:
             end = _place(builder, inner, start, None)
-            run_time = builder.sdiv(
-                builder.sub(builder.ptrtoint(end, _WHOLE), builder.ptrtoint(start, _WHOLE)), _WHOLE(8)
-            )
+            run_time = _numbers_between(builder, start, end)
         computed = run_time if computed is None else builder.add(computed, run_time)
     return _at(builder, record, known, computed)
+
+
+def _numbers_between(builder: Any, start: Any, end: Any) -> Any:
+    """How many numbers there are between two pointers."""
+    apart = builder.sub(builder.ptrtoint(end, _WHOLE), builder.ptrtoint(start, _WHOLE))
+    return builder.sdiv(apart, _WHOLE(8))
 
 
 def _at(builder: Any, pointer: Any, known: int, computed: Any) -> Any:
@@ -321,7 +325,7 @@ def _set_item(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 def _room(builder: Any, size: int) -> Any:
     place = cgutils.alloca_once(builder, ir.ArrayType(_NUMBER, size))
-    return builder.bitcast(place, ir.PointerType(_NUMBER))
+    return builder.bitcast(place, _POINTER)
 
 
 def in_the_caller(generator: Callable[..., Any]) -> Callable[[Function], Function]:
@@ -384,10 +388,8 @@ def _nth(typingctx: Any, records: Any, i: Any) -> Any:
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         end = _place(builder, records, args[0], None)
-        size = builder.sub(builder.ptrtoint(end, _WHOLE), builder.ptrtoint(args[0], _WHOLE))
-        bytes_ = builder.bitcast(args[0], ir.PointerType(ir.IntType(8)))
-        place = builder.gep(bytes_, [builder.mul(size, args[1])], inbounds=True)
-        return builder.bitcast(place, ir.PointerType(_NUMBER))
+        size = _numbers_between(builder, args[0], end)
+        return builder.gep(args[0], [builder.mul(size, args[1])], inbounds=True)
 
     return records(records, types.intp), generate
 

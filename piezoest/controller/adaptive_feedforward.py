@@ -10,7 +10,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, measured, moderate, number_or_nan
 from piezoest.compensators.limits import VoltageLimits, resting
-from piezoest.controller import kernel, making, saved, shown, team
+from piezoest.controller import faults, kernel, making, saved, shown, team
 from piezoest.controller.face import Face
 from piezoest.layout import by_name, from_bytes, write
 from piezoest.models import LearntModel
@@ -292,7 +292,7 @@ class AdaptiveFeedforward(Face):
             return
         event = shown.event(state, self._sample_rate, self._options["learnt_on"])
         self._events.append(event)
-        warned = event.action == "fell back" or state["notice"] in shown.WARNINGS
+        warned = event.action == "fell back" or state["notice"] in faults.WARNINGS
         level = logging.WARNING if warned else logging.INFO
         _log.log(level, "%s at %.6g s, %s", event.action, event.time, event.reason)
 

@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.controller import candidate, driving, slots
+from piezoest.controller import candidate, driving, faults, slots
 from piezoest.controller import line as lines
-from piezoest.controller import readings as reading
 from piezoest.controller import travel as travels
 
 # A voltage that may not have been written does not matter below this fraction of a swing.
@@ -34,7 +33,7 @@ def lose_write(state: Any) -> None:
         return
     if state.since > 0.0:
         # Once for all that are lost in a row.
-        reading.notice(state, reading.UNKNOWN)
+        faults.notice(state, faults.UNKNOWN)
     all_models(state)
 
 

@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.controller import candidate, slots
+from piezoest.controller import candidate, faults, slots
 from piezoest.controller import line as lines
-from piezoest.controller import readings as reading
 from piezoest.controller import travel as travels
 
 # The line alone drives until it has seen a leg, or the voltage has come back this fraction of its first way.
@@ -164,7 +163,7 @@ def watch(state: Any, off: Any) -> None:
         _change(state, 0.0)
         state.shaken += 1.0
         if state.shaken == OFTEN:
-            reading.notice(state, reading.SHAKEN)
+            faults.notice(state, faults.SHAKEN)
 
 
 @register_jitable

@@ -5,7 +5,7 @@ from typing import Any
 
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import shown
-from piezoest.controller.readings import FAULTS
+from piezoest.controller.faults import FAULTS
 from piezoest.controller.shown import Candidate, ControllerStatus, Event
 from piezoest.layout import Record
 from piezoest.models import Model

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.controller import driving
-from piezoest.controller import readings as reading
+from piezoest.controller import driving, faults
 from piezoest.controller import travel as travels
 from piezoest.controller.voltage import is_held
 from piezoest.layout import COUNT, FLAG, MEASURED, NUMBER, record
@@ -65,7 +64,7 @@ def watch_rest(state: Any, settings: Any, x: Any, moved: Any) -> None:
     What the stage has crept is wiped out in motion, and the integral alone would keep it for long.
     """
     rest = state.rest
-    if state.readings.fault != reading.NONE:
+    if state.readings.fault != faults.NONE:
         rest.left = 0.0
     if rest.now == 0.0:
         rest.now = 1.0 if travels.rests(state.reference, moved) else 0.0

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.controller import reach
-from piezoest.controller import readings as reading
+from piezoest.controller import faults, reach
 from piezoest.controller import start as starts
 
 # An answer confirms the gain within this factor.
@@ -76,4 +75,4 @@ def _forget(state: Any, settings: Any, answered: Any) -> None:
     state.start.gain_before = answered
     state.unit = state.line.gain = 0.0
     reach.seek_again(state, settings)
-    reading.notice(state, reading.OTHER_GAIN)
+    faults.notice(state, faults.OTHER_GAIN)

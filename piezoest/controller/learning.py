@@ -10,6 +10,7 @@ from piezoest.controller import (
     candidate,
     doubt,
     driving,
+    faults,
     feedback,
     given,
     homing,
@@ -18,6 +19,7 @@ from piezoest.controller import (
     reach,
     redraw,
     slots,
+    zero,
 )
 from piezoest.controller import line as lines
 from piezoest.controller import pace as paces
@@ -43,9 +45,6 @@ WIDE, USUAL = 0.12, 0.4
 # Else in the second leg when it has gone this fraction of the first way, or after it. Their unit is at least
 # this fraction of the way of the start.
 PASSED, SMALLEST = 0.7, 0.25
-# Readings of a moved zero have at least this slope relative to the line's; they are near the reference by
-# so many swings if it has moved, too, or nearer than the line by this factor.
-LEAST_SLOPE, NEAR_IT, NEARER = 0.2, 0.6, 0.5
 # The voltage stands still for this travel of the reference, in swings: it is frozen.
 FROZEN = 0.4
 # What the line misses most is remembered over turns, near which it misses least: this fraction at each.
@@ -111,64 +110,24 @@ def _hand_over(state: Any, settings: Any) -> None:
 
 
 @register_jitable
-def _follow_zero(state: Any) -> None:
-    """Readings run at a distance from the line: their zero has moved, for good or not.
-
-    If the reference has moved with it, or the line is not sure, the line follows at once. Else it holds for
-    long, for the gauge may come back; then the gauge is believed.
-    """
-    readings, line = state.readings, state.line
-    if readings.off < reading.OFF_FOR:
-        return
-    recent = readings.recent
-    jump = recent.mean_x - lines.at(line, recent.mean_u)
-    slope = lines.slope(recent) / line.gain
-    plain = 0.5 < slope < 2.0 and lines.explained(recent) > lines.EXPLAINED
-    sure = reading.is_sure(readings)
-    known = readings.fault == reading.NONE or readings.fault == reading.MOVED
-    if not plain and (sure or not known or slope < LEAST_SLOPE):
-        return
-    miss = np.abs(readings.last - state.r)
-    near = miss < NEAR_IT * np.abs(line.gain) * state.travel.swing
-    # A reference that the line cannot reach, but the readings do, has moved with them.
-    near = near or miss < NEARER * np.abs(lines.at(line, state.u) - state.r)
-    if sure and not near and readings.off < reading.HELD_FOR:
-        if known and readings.off > reading.MOVED_FOR:
-            readings.fault = reading.MOVED
-        return
-    if plain and sure:
-        state.zero += jump
-        reading.notice(state, reading.MOVED)
-    lines.forget(line.now)
-    lines.forget_legs(line)
-    line.centre += jump
-    line.last_centre += jump
-    line.held_centre += jump
-    state.owed -= jump / state.unit
-    readings.off = readings.spikes = 0.0
-    if readings.fault == reading.MOVED:
-        readings.fault = reading.NONE
-
-
-@register_jitable
 def _watch_voltage(state: Any, settings: Any, gone: Any, moved: Any) -> None:
     """An amplifier that does not move its voltage with the reference answers nothing."""
     within = settings.minimum < state.u < settings.maximum
     # The rest of a block that was planned before the reference was reached stands still by right.
     planned = state.travel.turns > 0.0 or state.travel.count > state.block
     state.frozen = state.frozen + moved if gone == 0.0 and within and planned else 0.0
-    if state.frozen > FROZEN * state.reference.swing and state.readings.fault == reading.NONE:
-        state.readings.fault, state.readings.good = reading.NO_RESPONSE, 0.0
+    if state.frozen > FROZEN * state.reference.swing and state.readings.fault == faults.NONE:
+        state.readings.fault, state.readings.good = faults.NO_RESPONSE, 0.0
 
 
 @register_jitable
 def _name_silence(state: Any) -> None:
     """Where no voltage was answered there is no response."""
     silent = state.start.tries >= 1.0 and state.start.stage != starts.DONE
-    fault = reading.NO_RESPONSE if silent else reading.NONE
+    fault = faults.NO_RESPONSE if silent else faults.NONE
     if fault != state.readings.fault:
         state.readings.fault = fault
-        reading.notice(state, fault)
+        faults.notice(state, fault)
 
 
 @register_jitable
@@ -282,18 +241,18 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
         wanted = moved / np.abs(line.gain)
     memory = redraw.memory(state, settings)
     x = reading.believed(state.readings, line, state.travel, memory, state.late.answered, u, x, gone, wanted)
-    _follow_zero(state)
+    zero.follow(state)
     _watch_voltage(state, settings, gone, moved)
     if state.readings.fault != before:
-        reading.notice(state, state.readings.fault)
-        if state.readings.fault != reading.NONE:
+        faults.notice(state, state.readings.fault)
+        if state.readings.fault != faults.NONE:
             driving.drive(state, 0.0)
             redraw.hold(state)
     # At a limit with the stage beyond the reference what is known is wrong.
     beyond = is_held(settings, u, (raw - state.r) * line.gain)
     reach.watch(state, settings, moved)
     far = (beyond and state.railed > BEYOND * state.reference.swing) or redraw.is_young(state)
-    if far and state.readings.fault == reading.NONE:
+    if far and state.readings.fault == faults.NONE:
         redraw.follow(state)
     return x
 
@@ -341,6 +300,53 @@ def _home(state: Any, settings: Any, u: Any, x: Any) -> None:
 
 
 @register_jitable
+def _seek(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """Look for the gain; where it is found all models begin."""
+    paces.follow(state.pace, state.start, u, x)
+    starts.learn(state.start, settings.start, u, x)
+    if state.scale > 0.0:
+        slots.advance(state.candidates, settings.candidates, u)
+    _name_silence(state)
+    if state.start.stage == starts.DONE:
+        paces.conclude(state.pace, state.start, u)
+        _begin_learning(state, settings)
+
+
+@register_jitable
+def _follow(state: Any, settings: Any, r: Any, u: Any) -> tuple[float, float]:
+    """Let line and models follow reference and voltage; how far each has moved."""
+    moved = travels.follow(state.reference, r)
+    redraw.pay(state, settings, moved)
+    gone = travels.follow(state.travel, u)
+    if state.stage == RUN:
+        if state.readings.fault == faults.NONE:
+            redraw.draw(state)
+        doubt.widen(state)
+        doubt.narrow(state)
+    state.gone += gone
+    state.handed += gone
+    if state.scale > 0.0:
+        slots.advance(state.candidates, settings.candidates, u)
+    else:
+        _size_up(state, settings, u)
+    return moved, gone
+
+
+@register_jitable
+def _run(state: Any, settings: Any, u: Any, x: Any, moved: Any, gone: Any) -> float:
+    """Take a reading of the run; NaN where it cannot be believed."""
+    x = _believe(state, settings, u, x, gone, moved)
+    if state.stage == RUN and np.isfinite(x):
+        feedback.follow(state, settings, x)
+    if state.stage == RUN and settings.feedback > 0.0:
+        feedback.watch_rest(state, settings, x, moved)
+    if state.reference.turned_now != 0.0:
+        paces.watch(state, settings)
+    outside.watch(state, settings)
+    return x
+
+
+@register_jitable
 def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     """Learn from a voltage that was written and a reading."""
     state.samples += 1.0
@@ -352,46 +358,18 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     state.u = u
     late.remember(state.late, state.start, u)
     state.r = r if np.abs(r) < WILDEST else state.r
-    r = state.r
     if state.stage == SEEK:
-        paces.follow(state.pace, state.start, u, x)
-        starts.learn(state.start, settings.start, u, x)
-        if state.scale > 0.0:
-            slots.advance(state.candidates, settings.candidates, u)
-        _name_silence(state)
-        if state.start.stage == starts.DONE:
-            paces.conclude(state.pace, state.start, u)
-            _begin_learning(state, settings)
+        _seek(state, settings, u, x)
         return
     if state.stage == HOME:
         _home(state, settings, u, x)
         return
-    moved = travels.follow(state.reference, r)
-    redraw.pay(state, settings, moved)
-    gone = travels.follow(state.travel, u)
-    if state.stage == RUN and state.readings.fault == reading.NONE:
-        redraw.draw(state)
-    if state.stage == RUN:
-        doubt.widen(state)
-        doubt.narrow(state)
-    state.gone += gone
-    state.handed += gone
-    if state.scale > 0.0:
-        slots.advance(state.candidates, settings.candidates, u)
-    else:
-        _size_up(state, settings, u)
+    moved, gone = _follow(state, settings, state.r, u)
     if state.stage == APPROACH:
-        x = _approach(state, settings, r, u, x, gone)
+        x = _approach(state, settings, state.r, u, x, gone)
     else:
-        x = _believe(state, settings, u, x, gone, moved)
-        if state.stage == RUN and np.isfinite(x):
-            feedback.follow(state, settings, x)
-        if state.stage == RUN and settings.feedback > 0.0:
-            feedback.watch_rest(state, settings, x, moved)
-        if state.reference.turned_now != 0.0:
-            paces.watch(state, settings)
-        outside.watch(state, settings)
+        x = _run(state, settings, u, x, moved, gone)
     _learn_from(state, settings, x, moved)
-    if state.stage == RUN and state.readings.fault == reading.NONE and _is_due(state, gone):
+    if state.stage == RUN and state.readings.fault == faults.NONE and _is_due(state, gone):
         state.handed = 0.0
         _hand_over(state, settings)

@@ -4,7 +4,7 @@ from typing import Any
 
 from numba.extending import register_jitable
 
-from piezoest.controller import readings as reading
+from piezoest.controller import faults
 from piezoest.layout import FIXED, FLAG, MEASURED, record
 
 # Whether it was noted, and of which reference [µm] and voltage [V].
@@ -24,4 +24,4 @@ def watch(state: Any, settings: Any) -> None:
     if not (within and allowed.lowest_u <= state.u <= allowed.highest_u):
         outside.told, outside.r, outside.u = 1.0, state.r, state.u
         state.pace.told = state.samples
-        reading.notice(state, reading.OUTSIDE)
+        faults.notice(state, faults.OUTSIDE)

@@ -11,6 +11,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
+from piezoest.controller import faults
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, record
@@ -80,7 +81,7 @@ def watch(state: Any, settings: Any) -> None:
         return
     if pace.fast == 0.0 and pace.period < settings.shortest:
         pace.fast, pace.told = 1.0, state.samples
-        reading.notice(state, reading.FAST)
+        faults.notice(state, faults.FAST)
     elif pace.late == 0.0 and WAVE * state.start.lag > LATE * pace.period:
         pace.late, pace.told = 1.0, state.samples
-        reading.notice(state, reading.LATE)
+        faults.notice(state, faults.LATE)

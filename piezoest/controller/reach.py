@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.controller import feedback
+from piezoest.controller import faults, feedback
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
@@ -35,7 +35,7 @@ def seek_again(state: Any, settings: Any) -> None:
 @register_jitable
 def begin_anew(state: Any, settings: Any) -> None:
     """What the start has found is wrong: say so, and seek again."""
-    reading.notice(state, reading.FALSE_START)
+    faults.notice(state, faults.FALSE_START)
     seek_again(state, settings)
 
 
@@ -65,7 +65,7 @@ def _is_out_of_reach(state: Any, settings: Any) -> bool:
     """Whether the stage stands before the reference at a limit, where the readings agree with the line."""
     left = (state.r - state.readings.last) * state.line.gain
     short = (state.u <= settings.minimum and left < 0.0) or (state.u >= settings.maximum and left > 0.0)
-    fine = state.readings.fault == reading.NONE and state.readings.spikes == 0.0
+    fine = state.readings.fault == faults.NONE and state.readings.spikes == 0.0
     return short and fine and (reading.is_sure(state.readings) or _has_answered(state))
 
 
@@ -79,12 +79,12 @@ def watch(state: Any, settings: Any, moved: Any) -> None:
         state.railed = 0.0
         state.beyond += 1.0
         if state.beyond - 1.0 < SAID * settings.doubling <= state.beyond:
-            reading.notice(state, reading.OUT_OF_REACH)
+            faults.notice(state, faults.OUT_OF_REACH)
         return
     rests = state.u <= settings.minimum or state.u >= settings.maximum
     # Beside a line that was learnt from wrong readings, right ones look reversed, scaled or moved.
     fault = state.readings.fault
-    doubted = fault == reading.NONE or (fault >= reading.REVERSED and fault != reading.SATURATED)
+    doubted = fault == faults.NONE or (fault >= faults.REVERSED and fault != faults.SATURATED)
     state.railed = state.railed + moved if rests and doubted else max(state.railed - moved, 0.0)
     sure = reading.is_sure(state.readings)
     most = RESTED if sure or state.reference.turns < travels.SHOWN else SOON_RESTED

@@ -12,41 +12,11 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.controller import line as lines
+from piezoest.controller.faults import MOVED, NO_RESPONSE, NONE, REVERSED, SATURATED, SCALED
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, NUMBER, record, whole
 
-# Faults: none; no response; response the wrong way round; far too large or too small; the reading stops at a
-# level; the reading's zero has moved.
-NONE, NO_RESPONSE, REVERSED, SCALED, SATURATED, MOVED = (float(i) for i in range(6))
-# What is noted beside: the stage answers otherwise than the user's gain says; a write may have been lost;
-# models shake the stage.
-OTHER_GAIN, UNKNOWN, SHAKEN = 6.0, 7.0, 8.0
-# The reference is near the resonance; so fast that lag passes for hysteresis.
-FAST, LATE = 9.0, 10.0
-# Reference or voltage are outside what the user's model was learnt on.
-OUTSIDE = 11.0
-# The stage does not go as far as the reference.
-OUT_OF_REACH = 12.0
-# What the start has found is wrong.
-FALSE_START = 13.0
-FAULTS = (
-    "",
-    "no response",
-    "reversed",
-    "scaled",
-    "saturated",
-    "zero moved",
-    "gain",
-    "unknown voltage",
-    "shaken",
-    "resonance",
-    "lag",
-    "outside",
-    "out of reach",
-    "false start",
-)
-
 READINGS = record(
-    fault=whole(0.0, 5.0),
+    fault=whole(NONE, MOVED),
     # The last two finite readings, how many came, the voltage's travel since the last one changed.
     before=MEASURED, last=MEASURED, count=COUNT, still=AMOUNT,
     # How far the last two were from the line, and the last one that was not alone; those alone in a row;
@@ -86,10 +56,7 @@ KEPT, ENOUGH = 0.9, 6.0
 # samples, or oscillate.
 MOST, MOST_STILL = 0.03, 0.01
 # For so many swings.
-WEAK_FOR, WRONG_FOR, LARGE_FOR, STOPPED_FOR, OFF_FOR = 0.35, 0.15, 0.15, 0.06, 0.3
-# A zero that has moved has its name after so many swings, for what is late comes back after a turn; it is
-# followed after so many, if the reference has not moved with it.
-MOVED_FOR, HELD_FOR = 0.5, 24.0
+WEAK_FOR, WRONG_FOR, LARGE_FOR, STOPPED_FOR = 0.35, 0.15, 0.15, 0.06
 # For so many swings of a line that has not held.
 SILENT_FOR, REFUTED_FOR = 2.0, 2.0
 # A reading that is the same to the last bit is believed for this travel, in swings.
@@ -123,6 +90,12 @@ def _mean_square(readings: Any, before: Any, square: Any) -> float:
 
 
 @register_jitable
+def _counted(so_far: Any, swings: Any, speaks: Any) -> float:
+    """The travel (or the count) that speaks for something without a break."""
+    return so_far + swings if speaks else 0.0
+
+
+@register_jitable
 def _follow(readings: Any, x: Any, gone: Any) -> float:
     """Take a finite reading; the middle one of the last three."""
     if readings.count == 0.0:
@@ -133,7 +106,7 @@ def _follow(readings: Any, x: Any, gone: Any) -> float:
     change = np.abs(x - readings.last)
     if change > 0.0:
         readings.step = min(readings.step, change) if readings.step > 0.0 else change
-    readings.still = readings.still + min(gone, MOST_STILL * readings.swing) if x == readings.last else 0.0
+    readings.still = _counted(readings.still, min(gone, MOST_STILL * readings.swing), x == readings.last)
     middle = median(x, readings.last, readings.before)
     readings.before, readings.last = readings.last, x
     return middle
@@ -188,14 +161,14 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> N
     share = 1.0 if sure else WEAK_FOR / SILENT_FOR
     weakest = WEAK if sure or not straight else (1.0 / HUGE if line.legs >= TRUSTED else 0.0)
     if known:
-        readings.weak = readings.weak + share * swings if answer < weakest else 0.0
+        readings.weak = _counted(readings.weak, share * swings, answer < weakest)
     wrong = known and explained > SIGNED and slope < WRONG
     share = 1.0 if sure else WRONG_FOR / REFUTED_FOR
-    readings.wrong = readings.wrong + share * swings if wrong else 0.0
+    readings.wrong = _counted(readings.wrong, share * swings, wrong)
     # What is far too large passes for noise.
     plain = straight or (sure and clear and off)
     large = (answer > LARGE * steep if sure else slope > HUGE and line.legs >= TRUSTED) and moved and plain
-    readings.large = readings.large + swings if large else 0.0
+    readings.large = _counted(readings.large, swings, large)
     readings.stopped = 1.0 if stopped else 0.0
     lowest = GOOD if sure else WEAK
     highest = 1.0 / GOOD if sure else HUGE
@@ -226,15 +199,6 @@ def _name(readings: Any) -> float:
         return SATURATED if readings.fault == NONE else readings.fault
     over = OVER_STOPPED if readings.fault == SATURATED else OVER
     return NONE if readings.good > over else readings.fault
-
-
-@register_jitable
-def notice(state: Any, number: Any) -> None:
-    """Note a fault, its end, or what else was noticed, and where it was, for the log."""
-    state.noticed += 1.0
-    state.notice = number
-    state.seen.samples, state.seen.r = state.samples, state.r
-    state.seen.x, state.seen.u = state.readings.last, state.u
 
 
 @register_jitable
@@ -293,12 +257,12 @@ def believed(
     beside = x - lines.at(line, u)
     far = np.abs(beside) > bound
     alone = _is_alone(readings, line, beside)
-    readings.spikes = readings.spikes + 1.0 if far else 0.0
+    readings.spikes = _counted(readings.spikes, 1.0, far)
     off = readings.spikes > IN_A_ROW
     if readings.spikes == IN_A_ROW + 1.0:
         # A jump is no slope.
         lines.forget(readings.recent)
-    readings.off = readings.off + min(wanted / unit, MOST) if off else 0.0
+    readings.off = _counted(readings.off, min(wanted / unit, MOST), off)
     before = readings.fault
     _evidence(readings, line, travel, off, swings)
     readings.fault = _name(readings)

@@ -6,9 +6,8 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import homing, redraw, slots
+from piezoest.controller import faults, homing, redraw, slots
 from piezoest.controller import line as lines
-from piezoest.controller import readings as reading
 from piezoest.controller import travel as travels
 
 # The gain is sought; the voltage goes to where the reference needs it; all is learnt; hysteresis is erased.
@@ -44,7 +43,7 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
     onward = (r - before) / line.gain
     r += state.feedback
     straight = wanted = lines.voltage(line, r - state.owed * kept * state.unit)
-    drives = state.readings.fault == reading.NONE and state.driving > 0.0
+    drives = state.readings.fault == faults.NONE and state.driving > 0.0
     if drives and state.pending > 1.0:
         # Nobody has said yet what became of the last voltage: go on from there, along the line.
         wanted = state.planned + onward

@@ -7,7 +7,7 @@ import numpy as np
 
 from piezoest.controller import kernel, saved
 from piezoest.controller.adaptive_feedforward import AdaptiveFeedforward
-from piezoest.controller.readings import FAULTS
+from piezoest.controller.faults import FAULTS
 from piezoest.controller.shown import STAGES
 from piezoest.export.c_translator import call
 from piezoest.export.c_values import Number, Root, Struct, literal

@@ -12,7 +12,8 @@ from piezoest.bench.zoo.contenders import DEFAULT, contender
 from piezoest.bench.zoo.faults import ANY, FAULTS
 from piezoest.bench.zoo.judging import named, recovery, settled
 from piezoest.bench.zoo.rig import Rig
-from piezoest.controller.shown import MEANINGS, Event
+from piezoest.controller.faults import MEANINGS
+from piezoest.controller.shown import Event
 from tests.bench.shared import rig_with
 
 

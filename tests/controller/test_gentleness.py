@@ -9,7 +9,7 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.bench import zoo
 from piezoest.bench.zoo.running import run_controller
-from piezoest.controller.readings import FAULTS
+from piezoest.controller.faults import FAULTS
 from piezoest.stage import Amplifier
 from tests.controller.shared import LIMITS, LOOP, drive, in_blocks, last_error
 

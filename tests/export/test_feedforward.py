@@ -11,7 +11,7 @@ import pytest
 import piezoest as pz
 from piezoest.bench.zoo import draw
 from piezoest.bench.zoo.faults import NONE
-from piezoest.controller.readings import FAULTS
+from piezoest.controller.faults import FAULTS
 from piezoest.controller.shown import STAGES
 from tests.export.building import compile_strictly, under_sanitizers
 

@@ -1,0 +1,48 @@
+"""What can be wrong, and what else is noted: its numbers in the loop, its names and what they mean."""
+
+from typing import Any
+
+from numba.extending import register_jitable
+
+# What each means to the user. The first five are faults: while there is one nobody learns. The others are
+# noted beside them.
+MEANINGS = {
+    "no response": "the readings do not answer the voltage",
+    "reversed": "the readings go the wrong way",
+    "scaled": "the readings answer far more or far less than before",
+    "saturated": "the readings stand still at a level",
+    "zero moved": "the readings have moved by a constant",
+    "gain": "the stage answers with {gain_before:.3g} µm/V, not {gain:.3g}: the gain is sought",
+    "unknown voltage": "nobody knows what was written, and the line drives until the models have shown again",
+    "shaken": "models made it worse than the line, as where a resonance is shaken: a slower or smoother "
+    "reference helps",
+    "resonance": "the reference, at {frequency:.3g} Hz, is above 5 % of the resonance, where the stage's "
+    "dynamics count as much as hysteresis: slow it down, smooth it, or put a LeadFilter before it",
+    "lag": "the readings are about {lag:.2g} ms late, which at {frequency:.3g} Hz looks like a loop of "
+    "{width:.2g} % of the swing: what is learnt holds at this frequency alone; slow the reference down, or "
+    "read sooner",
+    "outside": "the reference is at {r} µm and the voltage at {u} V, the model that you gave was learnt from "
+    "{displacement} and from {voltage}: the controller learns on, but a model that is to hold there must be "
+    "identified from a log that goes as far",
+    "out of reach": "the reference asks for {wanted:.4g} µm, and the stage is at {there:.4g} µm with the "
+    "voltage at its limit of {limit:.4g} V: keep the reference within what the stage reaches",
+    "false start": "the stage does not go as the start has shown, which was hum or drift: the gain "
+    "is sought again, on longer ways",
+}
+# Their names by their numbers.
+FAULTS = ("", *MEANINGS)
+(
+    NONE, NO_RESPONSE, REVERSED, SCALED, SATURATED, MOVED,
+    OTHER_GAIN, UNKNOWN, SHAKEN, FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START,
+) = (float(number) for number in range(len(FAULTS)))  # fmt: skip
+# Of what is noted beside faults, that which the user is to change.
+WARNINGS = (FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START)
+
+
+@register_jitable
+def notice(state: Any, number: Any) -> None:
+    """Note a fault, its end, or what else was noticed, and where it was, for the log."""
+    state.noticed += 1.0
+    state.notice = number
+    state.seen.samples, state.seen.r = state.samples, state.r
+    state.seen.x, state.seen.u = state.readings.last, state.u
