@@ -239,9 +239,19 @@ def live(r: FloatArray, u: FloatArray, x: FloatArray, turns: int) -> dict[str, R
     def turn(reference: float, displacement: float) -> None:
         estimator.step(inverse.step(reference), displacement)
 
+    controller = pz.AdaptiveFeedforward(SAMPLE_RATE, limits=pz.VoltageLimits(-50.0, 100.0))
+
+    again = controller.copy()
+    stage = pz.PaperStage(SAMPLE_RATE, seed=0)
+    measured = pz.track(r, stage=stage, controller=controller, sample_rate=SAMPLE_RATE).measured
+
+    def whole(reference: float, displacement: float) -> None:
+        again.learn(again.step(reference), displacement)
+
     return {
         "HysteresisRLS.step": single_calls(estimator.step, (u, x), turns),
         "InverseCompensator.step and HysteresisRLS.step": single_calls(turn, (r, x), turns),
+        "AdaptiveFeedforward.step and learn": single_calls(whole, (r, measured), turns),
         "a function that does nothing": single_calls(lambda r, x: None, (r, x), turns),
     }
 

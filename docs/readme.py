@@ -34,6 +34,11 @@ period after the change. This is a mean over the kinds of change: after a cold s
 AdaptiveFeedforward. *Settled*: largest error in the last half of the periods. *Step*: one sample, called from
 Python. Geometric means over the scenarios of the medians over {seeds} seeds; {machine}, {date}.
 
+On your rig the error is larger with a resonance, late readings or backlash. Of {rigs} simulated rigs drawn
+at random, half of them with a fault, the voltage never left its limits; in {share:.0f} % the error was at
+some time clearly larger than that of a straight line, in {end:.1f} % still at the end. See *Safety on unknown
+rigs* in the documentation.
+
 The paper measured {linear_theirs:g} µm with linear feed-forward and {theirs:g} µm with compensation;
 its procedure gives {linear_ours:.2g} µm and {ours:.2g} µm here. On a recording of a real stage with
 {travel:.0f} µm of travel, the error of the identified model is {missed:.2f} µm rms on the half that it has
@@ -44,6 +49,7 @@ not seen, and that of a straight line {line:.2f} µm.
 def figures() -> str:
     """Tables and sentences between the marks."""
     runs, paper, recording = read("table"), read("paper"), read("real_data")
+    rigs = read("safety")["controller"]["all"]
     found = recording["identify"]
     row = {
         entry["quantity"]: entry for entry in paper["tables"] if (entry["table"], entry["row"]) == ("II", ROW)
@@ -55,6 +61,9 @@ def figures() -> str:
         "stages": len(runs["plan"]["stages"]),
         "machine": runs["machine"]["cpu"],
         "date": runs["date"][:10],
+        "rigs": rigs["runs"],
+        "share": 100.0 * rigs["violations"]["ratio"] / rigs["runs"],
+        "end": 100.0 * rigs["violations"]["last_ratio"] / rigs["runs"],
         "linear_theirs": linear["value"],
         "theirs": compensated["value"],
         "linear_ours": linear["ours"],

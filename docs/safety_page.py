@@ -78,7 +78,10 @@ def pieces(document: Document) -> dict[str, str]:
 
 def numbers(document: Document) -> str:
     criteria, first, runs = document["criteria"], document["seed"], document["runs"]
+    broken = document["controller"]["all"]["violations"]
     values = {
+        "share": percent(broken["ratio"] / runs),
+        "share at the end": percent(broken["last_ratio"] / runs),
         "runs": runs,
         "others": document["others"],
         "seeds": f"{first} to {first + runs - 1}",

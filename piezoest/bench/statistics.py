@@ -42,15 +42,15 @@ class Need:
 
 CHANGES = ("amplitude-switch", "amplitude-drop", "gain-step")
 NEEDS = (
-    Need("Anything may come", "typical"),
+    Need("Unknown use: mean over all scenarios", "typical"),
     Need("A start from wrong parameters", "typical", ("cold-start",)),
-    Need("Soon right again after a change of amplitude or gain", "typical", CHANGES),
+    Need("Fast recovery after a change of amplitude or gain", "typical", CHANGES),
     Need("A small first error at such a change", "first", CHANGES),
     Need("The least error once settled, one amplitude", "settled", ("cold-start",)),
     Need("Minor loops and signals that do not repeat", "settled", ("prbs", "random-walk", "two-tone")),
     Need("A gain that drifts", "settled", ("drift",)),
     Need("Long rests", "first", ("dwell",)),
-    Need("A noisy gauge", "settled", ("noise",)),
+    Need("A noisy sensor", "settled", ("noise",)),
 )
 
 

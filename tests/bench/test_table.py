@@ -201,7 +201,7 @@ def test_a_document_sums_up(own: str, tmp_path: Path) -> None:
     assert over[ekf]["settled"][0] < over[still]["settled"][0]
     assert over[ekf]["others"] is not None
     needs = {need["words"]: need for need in document["needs"]}
-    assert needs["Anything may come"]["order"][0]["estimator"] == ekf
+    assert needs["Unknown use: mean over all scenarios"]["order"][0]["estimator"] == ekf
     machine = {"date": "2026-01-01", "machine": {"cpu": "x", "python": "3"}, "versions": {"numpy": "2"}}
     write_html({**document, **machine}, tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
