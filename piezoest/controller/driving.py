@@ -96,7 +96,9 @@ def _faked(state: Any) -> float:
     """
     reference = state.reference
     fastest = travels.in_swings(reference, reference.fastest)
-    late = state.start.lag * max(1.0 / max(reference.usual, 1.0), fastest)
+    # What the start has left of the first leg may be short: the second one counts as it goes on.
+    leg = max(reference.usual, reference.count if reference.turns == 1.0 else 1.0)
+    late = state.start.lag * max(1.0 / leg, fastest)
     return min(late, 1.0) * state.travel.swing
 
 

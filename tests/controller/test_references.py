@@ -81,6 +81,16 @@ def test_what_does_not_repeat_is_followed(r: pz.Signal, part: slice, most: float
         assert np.abs(error).max() < most
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_model_drives_in_the_first_period_at_a_high_rate(seed: int) -> None:
+    """The start leaves little of the first leg, and that says nothing about late readings."""
+    r = pz.signals.triangle(5.0, 5.0, 2, 50_000.0)
+    driver = pz.AdaptiveFeedforward(r.sample_rate, limits=pz.VoltageLimits(minimum=-50.0, maximum=100.0))
+    record = pz.track(r, stage=pz.PaperStage(r.sample_rate, seed=seed), controller=driver)
+    # 0.7 µm where the line drives.
+    assert record.max_error(last_periods=1) < 0.1
+
+
 @pytest.mark.parametrize(("part", "noise"), [(0.1, 1e-3), (0.3, 0.0), (0.4, 1e-3), (0.6, 0.0), (0.85, 1e-3)])
 def test_a_rest_does_not_count_as_a_leg(part: float, noise: float) -> None:
     """A minute is hundreds of legs, in which a stage creeps and a loop is at one side."""
