@@ -127,7 +127,7 @@ def summarise(rows: Sequence[Row], clean: Sequence[Row] = ()) -> Row:
 
 
 def times() -> list[Row]:
-    """Seconds of fits of a long log, by the clock of their thread, and what issue 18 asks for.
+    """Seconds of fits of a long log, by the clock of their thread, and what is asked of them.
 
     Its stage has bends and creep, and its swings differ.
     """

@@ -102,7 +102,12 @@ class Problem:
         z = (missed / scale) ** 2
         rho, slope, change = bend(loss, z)
         root = np.sqrt(np.maximum(slope + 2.0 * change * z, LEAST_CURVATURE))
-        sums = Sums.of(self.left(run.jacobian * (weight * root)[:, None]), missed * slope / root)
+        J = run.jacobian * (weight * root)[:, None]
+        sums = Sums.of(J, missed * slope / root)
+        if self._beside is not None:
+            # As of `left(J)`, which is a large matrix: what is missed holds nothing of the columns any more.
+            known = self._beside.T @ J
+            sums = Sums(sums.gram - known.T @ known, sums.moment, sums.square, sums.rows)
         return 0.5 * scale**2 * float(rho.sum()), sums
 
     def about(
