@@ -13,11 +13,15 @@ from tests.oracle.cases import CASES
 MADE, STORED = storage.read(Path(os.environ.get("PIEZOEST_ORACLE", storage.FILE)))
 # Elsewhere, with the BLAS of another processor, 9e-10 was seen.
 TOLERANCE = 0.0 if storage.home() == MADE else 1e-7
+# The paper's law takes readings of 1e30 as they are: what is left has no digit that rounding does not decide.
+BY_ROUNDING = {"rls/paper/wild"}
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_case(name: str) -> None:
     assert name in STORED, "not in the file: python -m tests.oracle.make_oracle"
+    if TOLERANCE > 0.0 and name in BY_ROUNDING:
+        pytest.skip("the last bit decides, and this is another processor")
     found, old = storage.sampled(CASES[name]()), STORED[name]
     sizes = [values.size for values in found.values()]
     assert sum(sizes) == old.size
