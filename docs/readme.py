@@ -28,11 +28,11 @@ period, the other rows the settled error. The simulated stage of the paper is a 
 stages are not. So PrandtlIshlinskiiRLS is better there in most rows.
 
 The second table is of the same stage. *Settles*: periods after a change until every further error is below
-1.2 %, and the share of runs that settle; *others settle*: this share on the other stages, where only
-AdaptiveFeedforward settles nearly always, in the scenarios that repeat. *First*: largest error in the first
-period after the change. This is a mean over the kinds of change: after a cold start it is {cold} % for
-AdaptiveFeedforward. *Settled*: largest error in the last half of the periods. *Step*: one sample, called from
-Python. Geometric means over the scenarios of the medians over {seeds} seeds; {machine}, {date}.
+1.2 %, and the share of runs that settle; *others settle*: this share on the other stages, in the scenarios
+that repeat. *First*: largest error in the first period after the change. This is a mean over the kinds of
+change: after a cold start it is {cold} % for AdaptiveFeedforward. *Settled*: largest error in the last half
+of the periods. *Step*: one sample, called from Python. Geometric means over the scenarios of the medians over
+{seeds} seeds, {slow} for the slow estimators; {machine}, {date}.
 
 On your rig the error is larger with a resonance, late readings or backlash. Of {rigs} simulated rigs drawn
 at random, half of them with a fault, the voltage never left its limits; in {share:.0f} % the error was at
@@ -58,6 +58,7 @@ def figures() -> str:
     values = {
         "cold": cold_start(runs),
         "seeds": runs["plan"]["seeds"],
+        "slow": runs["plan"]["slow_seeds"],
         "stages": len(runs["plan"]["stages"]),
         "machine": runs["machine"]["cpu"],
         "date": runs["date"][:10],

@@ -76,19 +76,28 @@ def _of_length(h: FloatArray, explained: FloatArray, extent: float, count: int) 
     """First samples of bursts of so many readings."""
     from scipy.ndimage import maximum_filter1d
 
-    first = np.arange(BESIDE, h.size - count - BESIDE + 1)
-    if first.size < BLOCK:
-        return first[:0]
-    before = 0.5 * (h[first - 1] + h[first - 2])
-    after = 0.5 * (h[first + count] + h[first + count + 1])
-    off = np.empty((count, first.size))
+    windows = h.size - count - 2 * BESIDE + 1
+    if windows < BLOCK:
+        return np.empty(0, np.int64)
+
+    def reading(j: int) -> FloatArray:
+        """That many samples after the first one of each window."""
+        return h[BESIDE + j : BESIDE + j + windows]
+
+    before = 0.5 * (reading(-1) + reading(-2))
+    after = 0.5 * (reading(count) + reading(count + 1))
+    off = np.empty((count, windows))
     for j in range(count):
         part = (j + 1.5) / (count + 2.0)
-        off[j] = h[first + j] - (1.0 - part) * before - part * after
-    size, most = np.abs(off).min(axis=0), np.abs(off).max(axis=0)
+        off[j] = np.abs(reading(j) - (1.0 - part) * before - part * after)
+    size = off.min(axis=0)
+    if not np.any(size > SMALLEST * extent):
+        return np.empty(0, np.int64)
     reach = count + 2 * BESIDE
-    moved = maximum_filter1d(explained, reach)[first + count // 2] * count
-    limit = np.maximum(np.maximum(UNUSUAL * scale_of(most, BLOCK), SMALLEST * extent), moved)
-    apart = np.max([np.abs(after - before), np.abs(h[first - 1] - h[first - 2]),
-                    np.abs(h[first + count + 1] - h[first + count])], axis=0)  # fmt: skip
-    return np.asarray(first[(size > limit) & (apart < BACK * size)])
+    middle = BESIDE + count // 2
+    moved = maximum_filter1d(explained, reach)[middle : middle + windows] * count
+    usual = UNUSUAL * scale_of(off.max(axis=0), BLOCK)
+    limit = np.maximum(np.maximum(usual, SMALLEST * extent), moved)
+    apart = np.max([np.abs(after - before), np.abs(reading(-1) - reading(-2)),
+                    np.abs(reading(count + 1) - reading(count))], axis=0)  # fmt: skip
+    return np.flatnonzero((size > limit) & (apart < BACK * size)) + BESIDE

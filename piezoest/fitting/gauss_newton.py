@@ -2,7 +2,8 @@
 
 About any coordinates the displacement is their sensitivities times a step. In one step those in which it is
 linear come to their optimum, for what the others are then. Steps that promise more than they keep are damped:
-D. W. Marquardt, J. SIAM 11 (1963) 431-441.
+D. W. Marquardt, J. SIAM 11 (1963) 431-441. Where the model cannot explain the record, each step leaves about
+the same fraction of the way, and two of them tell which: D. G. Anderson, J. ACM 12 (1965) 547-560.
 """
 
 from collections.abc import Callable
@@ -46,6 +47,7 @@ def single_shooting(
     lower, upper = problem.bounds(start)
     q, damping, more = np.clip(start, lower, upper), 0.0, MORE
     cost, sums = problem.about(q, loss, scale)
+    last: tuple[FloatArray, FloatArray] | None = None
     for passes in range(1, max_iterations):
         if not np.all(np.isfinite([cost, *sums.moment, *sums.gram.flat])):
             # Numbers of a size that no stage has; a stream goes on all the same.
@@ -60,20 +62,30 @@ def single_shooting(
             # Rounding has made the program concave: with damping it is not.
             damping, more = _more(damping, more)
             continue
-        other = np.clip(q + step, lower, upper)
+        farther = step if last is None else _farther(step, last[1], q - last[0], own)
+        other = np.clip(q + np.clip(farther, least, most), lower, upper)
         promised = float(sums.moment @ step - 0.5 * step @ sums.gram @ step)
         ended = promised <= tolerance * cost or float(own @ step**2) <= tolerance**2 * float(own @ q**2)
         other_cost, other_sums = problem.about(other, loss, scale)
         kept = cost - other_cost
-        if not kept >= POOR * promised:
-            damping, more = _more(damping, more)
-        else:
+        good = kept >= POOR * promised
+        if good:
             damping, more = damping / LESS if kept > GOOD * promised else damping, MORE
+        elif last is None:
+            damping, more = _more(damping, more)
+        last = (q, step) if good else None
         if kept >= 0.0:
             q, cost, sums = other, other_cost, other_sums
         if ended:
             return Solution(q, True, "The tolerance is satisfied.", passes + 1)
     return Solution(q, False, "The maximum number of function evaluations is exceeded.", max_iterations)
+
+
+def _farther(step: FloatArray, before: FloatArray, moved: FloatArray, own: FloatArray) -> FloatArray:
+    """The step that would leave nothing, from this one, the one before and how far it has moved (n,)."""
+    change = step - before
+    size = float(own @ change**2)
+    return step - float(own @ (step * change)) / size * (moved + change) if size > 0.0 else step
 
 
 def _more(damping: float, more: float) -> tuple[float, float]:

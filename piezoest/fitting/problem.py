@@ -14,7 +14,7 @@ from piezoest._checks import FloatArray
 from piezoest.fitting.coordinates import Coordinates, late
 from piezoest.fitting.losses import LEAST_CURVATURE, bend
 from piezoest.fitting.program import Sums, checked
-from piezoest.fitting.rows import dot
+from piezoest.fitting.rows import across, dot
 from piezoest.symbolic import Pass
 
 # Step of the derivative by the delay: averages over the corners of the linear interpolation.
@@ -58,7 +58,9 @@ class Problem:
         self.coordinates, self.held, self.prior = coordinates, held, prior
         self.decays = np.empty(0) if decays is None else decays
         self._limits = limits
-        self._beside = None if beside is None else np.linalg.qr(beside * self.weight[:, None])[0]
+        self._beside: FloatArray | None = None
+        if beside is not None and beside.shape[1] > 0:
+            self._beside = np.linalg.qr(beside * self.weight[:, None])[0]
         self._q: bytes | None = None
         self._run: tuple[Pass, FloatArray]
 
@@ -86,7 +88,11 @@ class Problem:
         The linear part is solved at every step: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973)
         413-432.
         """
-        return values if self._beside is None else values - self._beside @ (self._beside.T @ values)
+        if self._beside is None:
+            return values
+        columns = values.reshape(values.shape[0], -1)
+        known = np.einsum("im,mn->in", self._beside, across(self._beside, columns))
+        return np.asarray(values - known.reshape(values.shape))
 
     def residual(self, q: FloatArray) -> FloatArray:
         """Weighted residual (N,), measured less simulated; zero where nothing was measured."""
@@ -106,7 +112,7 @@ class Problem:
         sums = Sums.of(J, missed * slope / root)
         if self._beside is not None:
             # As of `left(J)`, which is a large matrix: what is missed holds nothing of the columns any more.
-            known = self._beside.T @ J
+            known = across(self._beside, J)
             sums = Sums(sums.gram - known.T @ known, sums.moment, sums.square, sums.rows)
         return 0.5 * scale**2 * float(rho.sum()), sums
 

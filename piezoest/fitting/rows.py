@@ -14,10 +14,15 @@ FEW = 64
 
 def gram(rows: FloatArray) -> FloatArray:
     """Columns times columns (n, n) of rows (N, n)."""
+    return across(rows, rows)
+
+
+def across(rows: FloatArray, others: FloatArray) -> FloatArray:
+    """Columns of rows (N, m) times columns of others (N, n), shape (m, n)."""
     whole = rows.shape[0] // FEW * FEW
-    blocks = rows[:whole].reshape(-1, FEW, rows.shape[1])
-    found = np.matmul(blocks.transpose(0, 2, 1), blocks).sum(axis=0)
-    return np.asarray(found + rows[whole:].T @ rows[whole:])
+    a, b = (each[:whole].reshape(-1, FEW, each.shape[1]) for each in (rows, others))
+    found = np.matmul(a.transpose(0, 2, 1), b).sum(axis=0)
+    return np.asarray(found + rows[whole:].T @ others[whole:])
 
 
 def onto(rows: FloatArray, x: FloatArray) -> FloatArray:
