@@ -41,6 +41,17 @@ class TrackingRecord:
         Samples per period of the reference; None if it has none.
     update_interval : int
         Samples that share a row of `parameters` (default 1).
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=4, sample_rate=10_000.0)
+    >>> controller = pz.AdaptiveFeedforward(10_000.0, limits=pz.VoltageLimits(-50.0, 100.0))
+    >>> record = pz.track(r, stage=pz.PaperStage(10_000.0, seed=0), controller=controller)
+    >>> record
+    TrackingRecord(sample_rate=10000.0, period=2000, update_interval=50)
+    >>> record.error.shape, bool(record.max_error(last_periods=1) < 0.05)
+    ((8000,), True)
     """
 
     reference: FloatArray = field(repr=False)

@@ -1,6 +1,6 @@
 """Tables for controllers that take no code: the settled voltage of a periodic reference, and its branches."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +32,9 @@ class Table:
     """
 
     sample_rate: float
-    reference: FloatArray
-    voltage: FloatArray
-    branches: tuple[FloatArray, ...]
+    reference: FloatArray = field(repr=False)
+    voltage: FloatArray = field(repr=False)
+    branches: tuple[FloatArray, ...] = field(repr=False)
 
     def write(self, directory: str | Path) -> tuple[Path, Path]:
         """Write ``waveform.csv`` and ``branches.csv`` into a folder, which is made if need be.
@@ -96,6 +96,17 @@ def table(
     ValueError
         If the reference is not finite, jumps (also from its end to its start), or has a period that
         is no whole number of samples; if no sample rate is known, or the model has no inverse.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> model = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    >>> r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=2, sample_rate=1000.0)
+    >>> found = pz.export.table(model, r)
+    >>> found, len(found.branches)
+    (Table(sample_rate=1000.0), 2)
+    >>> float(found.voltage.max().round(2))
+    37.49
     """
     points = integer("points", points, 2)
     period, rate = _one_period(reference, sample_rate)

@@ -62,6 +62,15 @@ class Fit:
         Drift over the record, fitted together with the model [µm].
     solver : str
         Name of the solver, and the result of the check.
+
+    Examples
+    --------
+    >>> import numpy as np, piezoest as pz
+    >>> u = 40.0 * np.sin(np.linspace(0.0, 60.0, 6000))
+    >>> x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(u)
+    >>> found = pz.fit(u, x, sample_rate=1000.0, model='coleman-hodgdon')
+    >>> found.form, bool(found.held_out < 1e-3)
+    ('coleman-hodgdon', True)
     """
 
     model: Model

@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 class Validation(NamedTuple):
     """Error of a model on another log, from where the start has settled; with and without its mean."""
 
-    source: str
-    error: Misfit
-    without_mean: Misfit
+    source: str  #: File or name of the other log.
+    error: Misfit  #: What the model misses there.
+    without_mean: Misfit  #: The same without its mean: the zero of a sensor is often another one.
 
     @classmethod
     def of(cls, fit: Fit, other: Record, flaws: Flaws) -> Validation:
@@ -90,6 +90,13 @@ class Identification:
         Other logs, predicted.
     advice : tuple of str
         What to know before using it, in plain sentences.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> found = pz.identify(pz.records.example_log())
+    >>> found.chosen, bool(found.held_out.rms < 0.3), found.delay_known
+    ('plays-asymmetric-creep', True, True)
     """
 
     best: Candidate

@@ -31,6 +31,12 @@ def dwell(level: float, duration: float, sample_rate: float) -> Signal:
     ------
     ValueError
         If an argument is out of its range.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> pz.signals.dwell(level=2.0, duration=0.5, sample_rate=1000.0)
+    Signal('dwell', 500 samples at 1000 Hz, amplitude 2)
     """
     sample_rate = positive("sample_rate", sample_rate)
     n = number_of_samples("duration", positive("duration", duration), sample_rate)
@@ -106,6 +112,12 @@ def filtered_steps(
     ------
     ValueError
         If an argument is out of its range, or `dwell_times` and `levels` differ in length.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> pz.signals.filtered_steps([0.0, 2.0, 1.0], 0.1, sample_rate=1000.0, cutoff=50.0)
+    Signal('filtered steps', 300 samples at 1000 Hz, amplitude 2.08889)
     """
     heights = array_1d("levels", levels, minimum_length=1)
     sample_rate = positive("sample_rate", sample_rate)
@@ -277,6 +289,12 @@ def random_walk(
     ------
     ValueError
         If an argument is out of its range.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> pz.signals.random_walk(5.0, bandwidth=20.0, duration=2.0, sample_rate=1000.0, seed=1)
+    Signal('random walk', 2000 samples at 1000 Hz, period 2000 samples, amplitude 5)
     """
     amplitude = non_negative("amplitude", amplitude)
     sample_rate = positive("sample_rate", sample_rate)

@@ -175,6 +175,12 @@ def amplitude_modulated(
     ------
     ValueError
         If an argument is out of its range.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> pz.signals.amplitude_modulated(5.0, 10.0, 1.0, duration=2.0, sample_rate=1000.0, depth=0.5)
+    Signal('amplitude-modulated sine', 2000 samples at 1000 Hz, period 1000 samples, amplitude 4.98461)
     """
     amplitude = non_negative("amplitude", amplitude)
     depth = fraction("depth", depth)

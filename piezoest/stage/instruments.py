@@ -94,6 +94,12 @@ class Amplifier:
     ------
     ValueError
         If a value is out of its range.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> amplifier = pz.Amplifier(minimum=-20.0, maximum=120.0, resolution=0.002, slew_rate=5e4)
+    >>> stage = pz.SimulatedStage(10_000.0, pz.ColemanHodgdon(0.02, 0.12, 0.0036), amplifier=amplifier)
     """
 
     minimum: float = -np.inf
