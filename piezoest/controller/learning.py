@@ -146,9 +146,10 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
     if state.scale > 0.0:
         slots.judge(state.candidates, z, swings, bound)
     if settings.minimum < u < settings.maximum:
-        # No model is to blame for a limit.
+        # No model is to blame for a limit, nor the first one for where the line has left the stage.
         off = (x - state.r) / state.unit
-        candidate.judge(state.outcome, min(max(off, -bound), bound), swings)
+        left = slots.owed(state.candidates, state.driving, state.owed) if state.switches <= 1.0 else 0.0
+        candidate.judge(state.outcome, min(max(off + left, -bound), bound), swings)
         driving.watch(state, np.abs(off))
 
 
