@@ -80,7 +80,7 @@ format: $(VENV)/.installed-lint  ## Mend what lint can mend by itself
 types: $(VENV)/.installed-lint  ## Check the types of package and tests
 	$(BIN)/mypy
 
-layers: $(VENV)/.installed-test  ## Check that modules import only from the floors below them
+layers: $(VENV)/.installed-test  ## Check that modules import only from the layers below them
 	$(BIN)/lint-imports --no-cache
 
 # ---------------------------------------------------------------- documentation
