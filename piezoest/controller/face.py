@@ -5,7 +5,6 @@ from typing import Any
 
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import shown
-from piezoest.controller.faults import FAULTS
 from piezoest.controller.shown import Candidate, ControllerStatus, Event
 from piezoest.layout import Record
 from piezoest.models import Model
@@ -68,17 +67,17 @@ class Face:
     def status(self) -> ControllerStatus:
         """What happened so far, and how it stands: a frozen record.
 
-        ``samples`` learnt from, ``missing`` references, ``stage`` of the work (``"seeking"``,
-        ``"approaching"``, ``"running"``, ``"homing"``), ``driving`` (``"line"``, ``"recorded loop"`` or the
-        name of an estimator), ``fault`` of the readings (empty if none), samples ``saturated`` and
-        ``slewed``, ``switches`` of the model.
+        ``samples`` written, with a reading or without, ``missing`` references, ``stage`` of the work
+        (``"seeking"``, ``"approaching"``, ``"running"``, ``"homing"``), ``driving`` (``"line"``,
+        ``"recorded loop"`` or the name of an estimator), ``fault`` of the readings (empty if none), samples
+        ``saturated`` and ``slewed``, ``switches`` of the model.
         """
         state = self._state
         counted = ("samples", "missing", "saturated", "slewed", "switches")
         return ControllerStatus(
             stage=shown.STAGES[int(state["stage"])],
             driving=self._names[int(state["driving"])],
-            fault=FAULTS[int(state["readings"]["fault"])],
+            fault=shown.fault(state, self._settings),
             **{name: int(state[name]) for name in counted},
         )
 
@@ -88,7 +87,7 @@ class Face:
 
         ``time`` is that of the sample [s]. ``action`` is ``"fell back"`` (a fault: the line drives and nobody
         learns), ``"resumed"`` (it is over) or ``"went on"`` (what moved is followed); ``reason`` begins with
-        the fault's name. Of several in one block the last is kept.
+        the fault's ``name``. Of several in one block the last is kept.
         """
         return tuple(self._events)
 

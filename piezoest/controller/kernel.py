@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
+from piezoest._checks import WILDEST
 from piezoest.compile import Record, Vector, compiled
 from piezoest.controller import candidate, homing, late, redraw, slots
 from piezoest.controller import feedback as feedbacks
@@ -18,7 +19,7 @@ from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
 from piezoest.controller.learning import begin_homing, take
-from piezoest.controller.voltage import RUN, plan
+from piezoest.controller.voltage import RUN, plan, written
 from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, Field, record, whole
 from piezoest.layout import Record as Layout
 
@@ -32,8 +33,9 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         samples=COUNT, missing=COUNT, saturated=COUNT, slewed=COUNT,
         # What it is doing; voltages planned since the last one was written; samples that waited for a block.
         stage=whole(0.0, 3.0), pending=COUNT, block=AMOUNT,
-        # Reference planned for, voltage planned, voltage written.
-        r=MEASURED, planned=MEASURED, u=MEASURED,
+        # Reference planned for, whether there was one; voltage planned, voltage written, whether that has
+        # stood still; samples without a reading.
+        r=MEASURED, asked=FLAG, planned=MEASURED, u=MEASURED, stood=FLAG, silent=COUNT,
         # Farthest way from the start's voltage that was answered; travel of the reference with the voltage at
         # a limit, and with a voltage that stood still; samples of it out of reach.
         confirmed=AMOUNT, railed=AMOUNT, frozen=AMOUNT, beyond=COUNT,
@@ -51,7 +53,7 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
-        noticed=COUNT, notice=whole(0.0, 13.0), shaken=COUNT,
+        noticed=COUNT, notice=whole(0.0, 14.0), shaken=COUNT,
         # When the last one was noted; reference, reading and voltage then.
         seen=record(samples=COUNT, r=MEASURED, x=MEASURED, u=MEASURED),
         # What the line misses, the most of late, what it missed of a swing when it drove; what the stage
@@ -80,8 +82,11 @@ def step(state: Record, settings: Record, r: float) -> Any:
 
 @compiled
 def learn(state: Record, settings: Record, u: float, x: float) -> None:
-    """Learn from one sample."""
-    take(state, settings, state.r, u, x)
+    """Learn from one sample, of the reference planned for last."""
+    if not settings.minimum < state.planned < settings.maximum:
+        # At a limit it is there, whatever a converter or a monitor makes of it.
+        u = written(state, settings, u)
+    take(state, settings, np.nan, u, x)
 
 
 @compiled
@@ -97,8 +102,12 @@ def run(state: Record, settings: Record, r: Vector, u: Vector) -> None:
 def learn_all(state: Record, settings: Record, r: Vector, u: Vector, x: Vector) -> None:
     """Learn from samples that were planned together."""
     state.block = max(0.9 * state.block, len(r) - 1.0)
+    last = state.planned
     for k in range(len(r)):
+        # Of a block only the last voltage that was planned is known.
+        state.planned = u[k] if np.abs(u[k]) < WILDEST else last
         take(state, settings, r[k], u[k], x[k])
+    state.planned = last
     if state.stage == RUN and len(r) > 1:
         redraw.go_on(state, settings)
 

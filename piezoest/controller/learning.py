@@ -18,6 +18,7 @@ from piezoest.controller import (
     outside,
     reach,
     redraw,
+    silence,
     slots,
     zero,
 )
@@ -26,7 +27,7 @@ from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK, is_held
+from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK, is_held, written
 
 # Models are handed over after this fraction of a swing.
 HAND_OVER = 1.0 / 8.0
@@ -110,19 +111,21 @@ def _hand_over(state: Any, settings: Any) -> None:
 
 
 @register_jitable
-def _watch_voltage(state: Any, settings: Any, gone: Any, moved: Any) -> None:
+def _watch_voltage(state: Any, settings: Any, moved: Any) -> None:
     """An amplifier that does not move its voltage with the reference answers nothing."""
     within = settings.minimum < state.u < settings.maximum
     # The rest of a block that was planned before the reference was reached stands still by right.
     planned = state.travel.turns > 0.0 or state.travel.count > state.block
-    state.frozen = state.frozen + moved if gone == 0.0 and within and planned else 0.0
+    state.frozen = state.frozen + moved if state.stood != 0.0 and within and planned else 0.0
     if state.frozen > FROZEN * state.reference.swing and state.readings.fault == faults.NONE:
         state.readings.fault, state.readings.good = faults.NO_RESPONSE, 0.0
 
 
 @register_jitable
-def _name_silence(state: Any) -> None:
-    """Where no voltage was answered there is no response."""
+def _name_silence(state: Any, settings: Any) -> None:
+    """Where no voltage was answered there is no response; without readings nobody can say."""
+    if state.silent > settings.doubling:
+        return
     silent = state.start.tries >= 1.0 and state.start.stage != starts.DONE
     fault = faults.NO_RESPONSE if silent else faults.NONE
     if fault != state.readings.fault:
@@ -226,7 +229,8 @@ def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any, gone: Any) -> f
     known = np.abs(x) < WILDEST
     if known:
         x = _refine(state, settings, u, x)
-    if state.stage == SEEK or state.start.given != 0.0 or not (known or state.start.ahead != 0.0):
+    told = known or state.start.ahead != 0.0
+    if state.stage == SEEK or state.start.given != 0.0 or state.asked == 0.0 or not told:
         return np.nan
     _arrive(state, settings, r, u, gone)
     return x if known else np.nan
@@ -243,7 +247,7 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
     memory = redraw.memory(state, settings)
     x = reading.believed(state.readings, line, state.travel, memory, state.late.answered, u, x, gone, wanted)
     zero.follow(state)
-    _watch_voltage(state, settings, gone, moved)
+    _watch_voltage(state, settings, moved)
     if state.readings.fault != before:
         faults.notice(state, state.readings.fault)
         if state.readings.fault != faults.NONE:
@@ -307,7 +311,7 @@ def _seek(state: Any, settings: Any, u: Any, x: Any) -> None:
     starts.learn(state.start, settings.start, u, x)
     if state.scale > 0.0:
         slots.advance(state.candidates, settings.candidates, u)
-    _name_silence(state)
+    _name_silence(state, settings)
     if state.start.stage == starts.DONE:
         paces.conclude(state.pace, state.start, u)
         _begin_learning(state, settings)
@@ -318,7 +322,8 @@ def _follow(state: Any, settings: Any, r: Any, u: Any) -> tuple[float, float]:
     """Let line and models follow reference and voltage; how far each has moved."""
     moved = travels.follow(state.reference, r)
     redraw.pay(state, settings, moved)
-    gone = travels.follow(state.travel, u)
+    # The noise of a voltage that is measured is no travel.
+    gone = travels.follow(state.travel, written(state, settings, u))
     if state.stage == RUN:
         if state.readings.fault == faults.NONE:
             redraw.draw(state)
@@ -356,9 +361,12 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
             doubt.lose_write(state)
         return
     state.pending = 0.0
+    state.stood = 1.0 if u == state.u else 0.0
     state.u = u
     late.remember(state.late, state.start, u)
-    state.r = r if np.abs(r) < WILDEST else state.r
+    silence.watch(state, settings, x)
+    if np.abs(r) < WILDEST:
+        state.r, state.asked = r, 1.0
     if state.stage == SEEK:
         _seek(state, settings, u, x)
         return

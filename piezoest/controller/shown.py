@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from piezoest.controller import candidate, slots
-from piezoest.controller.faults import FAULTS, MEANINGS
+from piezoest.controller import candidate, faults, silence, slots
 from piezoest.controller.pace import WAVE
 from piezoest.equations import loop_inverse, play_inverse
 from piezoest.layout import Named
@@ -35,6 +34,11 @@ class Event:
     action: str
     reason: str
 
+    @property
+    def name(self) -> str:
+        """Short name of what was noticed, with which the reason begins; empty when it is over."""
+        return self.reason.partition(": ")[0] if ": " in self.reason else ""
+
 
 @dataclass(frozen=True, slots=True)
 class ControllerStatus:
@@ -60,18 +64,26 @@ class Candidate:
     model: Model | None
 
 
+def fault(state: Any, settings: Any) -> str:
+    """Return the name of the readings' fault; empty if there is none."""
+    number = int(state["readings"]["fault"])
+    if number == faults.NONE and silence.is_long(Named(state), Named(settings)):
+        number = int(faults.NO_READINGS)
+    return faults.FAULTS[number]
+
+
 def event(state: Any, sample_rate: float, learnt_on: Any) -> Event:
     """Return what was noticed last."""
     number, seen = state["notice"], state["seen"]
     time = float(seen["samples"]) / sample_rate
-    name = FAULTS[int(number)]
+    name = faults.FAULTS[int(number)]
     if not name:
         return Event(time, "resumed", "the readings follow the voltage again")
     action = "fell back" if number == state["readings"]["fault"] else "went on"
     start = {each: float(state["start"][each]) + 0.0 for each in ("gain", "gain_before")}
     here = {"wanted": seen["r"], "there": seen["x"], "limit": seen["u"]}
     figures = start | here | _pace(state, sample_rate) | _outside(state, learnt_on)
-    return Event(time, action, f"{name}: {MEANINGS[name].format_map(figures)}")
+    return Event(time, action, f"{name}: {faults.MEANINGS[name].format_map(figures)}")
 
 
 def _pace(state: Any, sample_rate: float) -> dict[str, float]:

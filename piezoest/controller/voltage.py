@@ -23,12 +23,25 @@ AHEAD, LATE = 8.0, 3.0
 FOLLOWED = 0.8
 # ... and where the readings have yet to confirm a user's gain, than so many times.
 FIRST_AHEAD = 2.0
+# A voltage is told with an error of at most this fraction of the range: rounding, or that of a monitor.
+OFF = 0.02
 
 
 @register_jitable
 def is_held(settings: Any, u: Any, way: Any) -> bool:
     """Whether a limit holds a voltage back from going a way."""
     return (u <= settings.minimum and way < 0.0) or (u >= settings.maximum and way > 0.0)
+
+
+@register_jitable
+def written(state: Any, settings: Any, u: Any) -> float:
+    """A voltage that was told as written: the planned one if it is near that.
+
+    From a voltage that is told as rounded a small way would be rounded away, and from one that is measured
+    each sample would go on by the error of what measures it.
+    """
+    near = np.abs(state.planned - u) <= OFF * (settings.maximum - settings.minimum)
+    return state.planned if near else u
 
 
 @register_jitable
@@ -55,8 +68,8 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
         learnt = state.reference.last + state.back
         ahead = lines.voltage(line, r - owed * kept * state.unit)
         ahead -= lines.voltage(line, learnt - owed * state.unit)
-        most = (RATE - 1.0) * np.abs(ahead)
-        wanted = min(max(wanted, state.u + ahead - most), state.u + ahead + most)
+        most, here = (RATE - 1.0) * np.abs(ahead), written(state, settings, state.u) + ahead
+        wanted = min(max(wanted, here - most), here + most)
     if not np.abs(wanted) < WILDEST:
         wanted = straight
     room = np.abs(settings.corridor * 0.5 * max(swing, travels.widest(state.reference)) / line.gain)
@@ -73,43 +86,47 @@ def _nearer(state: Any, settings: Any, target: Any) -> float:
     Where a way was answered it may go as fast: else it would never catch a reference that goes to and fro.
     """
     start = state.start
-    span = max(np.abs(state.u - start.origin), state.confirmed)
+    here = written(state, settings, state.u)
+    span = max(np.abs(here - start.origin), state.confirmed)
     doubling = max(settings.doubling, LATE * start.lag)
     end = start.origin + AHEAD * np.sign(target - start.origin) * state.confirmed
-    left = target - state.u
+    left = target - here
     if np.abs(target - start.origin) > np.abs(end - start.origin):
-        left = end - state.u
+        left = end - here
     way = min(span, np.abs(left)) / doubling
     if start.fastest > 0.0:
         way = min(way, FOLLOWED * start.fastest)
-    return state.u + min(max(left, -way), way)
+    return here + min(max(left, -way), way)
 
 
 @register_jitable
 def plan(state: Any, settings: Any, r: Any) -> float:
     """Voltage for the next sample of the reference."""
     state.pending += 1.0
-    if not np.abs(r) < WILDEST:
+    if np.abs(r) < WILDEST:
+        state.asked = 1.0
+    else:
         r = state.r
         state.missing += 1.0
     before, state.r = state.r, r
     if state.stage == SEEK:
         wanted = state.start.voltage
     elif state.stage == APPROACH:
-        target = lines.voltage(state.line, r)
+        # Without any reference the voltage stays where the start has left it.
+        target = lines.voltage(state.line, r) if state.asked != 0.0 else state.u
         if state.start.given != 0.0:
             # The first way says whether the gain is right.
             way = min(FIRST_AHEAD * state.confirmed, settings.start.longest)
             target = state.start.origin + np.sign(state.start.way) * way
         wanted = _nearer(state, settings, target)
     elif state.stage == HOME:
-        wanted = homing.voltage(state.homing, state.u)
+        wanted = homing.voltage(state.homing, written(state, settings, state.u))
     else:
         wanted = _feed_forward(state, settings, r, before)
     if not np.abs(wanted) < WILDEST:
         wanted = state.u
-    step = settings.largest_step
-    slewed = min(max(wanted, state.u - step), state.u + step)
+    step, here = settings.largest_step, written(state, settings, state.u)
+    slewed = min(max(wanted, here - step), here + step)
     given = min(max(slewed, settings.minimum), settings.maximum)
     state.slewed += slewed != wanted
     state.saturated += given != slewed

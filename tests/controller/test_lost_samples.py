@@ -94,3 +94,32 @@ def test_what_is_out_of_reach_is_said_once(size: float) -> None:
     assert [event.reason.split(":")[0] for event in driver.events] == ["out of reach"]
     assert driver.status.fault == ""
     assert np.all(u[-5000:] == 60.0)
+
+
+@pytest.mark.parametrize("given", [{}, {"gain": 0.15}])
+def test_without_a_reference_the_voltage_stays_where_the_start_has_left_it(given: Any) -> None:
+    driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS, **given), pz.SimulatedStage(FS, LOOP)
+    u = np.empty(2000)
+    for k in range(u.size):
+        u[k] = driver.step(None)
+        driver.learn(u[k], stage.step(float(u[k])))
+    assert np.ptp(u[1000:]) == 0.0
+    _, x, _ = shared.drive(driver, stage, TRIANGLE)
+    assert last(x) < 0.05
+
+
+def test_readings_that_do_not_come_are_reported_once_and_so_is_their_return() -> None:
+    driver, _, _ = drive(lambda k, x: None if 4000 < k < 12_000 else x)
+    assert [(event.action, event.name) for event in driver.events] == [
+        ("went on", "no readings"),
+        ("resumed", ""),
+    ]
+    assert driver.events[0].time == pytest.approx(1.8, abs=0.01)
+
+
+def test_a_sensor_that_has_never_given_a_reading_is_reported() -> None:
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
+    for r_k in TRIANGLE[:6000].tolist():
+        driver.learn(driver.step(r_k), None)
+    assert driver.events[0].name == "no readings"
+    assert driver.voltage == 0.0

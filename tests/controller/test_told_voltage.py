@@ -1,0 +1,67 @@
+"""The voltage that `learn` is told: rounded by a converter, or measured by a monitor with errors."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezoest as pz
+from piezoest._checks import FloatArray
+from tests.controller.shared import LIMITS, LOOP
+
+FS = 50_000.0
+RANGE = LIMITS.maximum - LIMITS.minimum
+# So slow beside the sample rate that a sample of it is far less than a step of the converter.
+SINE = 1.0 - pz.signals.sine(1.5, 10.0, 8, FS).values
+
+
+def told(change: Callable[[float], float], r: FloatArray = SINE) -> tuple[Any, FloatArray]:
+    """The controller and its errors where the stage gets a voltage and `learn` is told a changed one."""
+    driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS), pz.SimulatedStage(FS, LOOP)
+    x = np.empty_like(r)
+    for k, r_k in enumerate(r.tolist()):
+        u = driver.step(r_k)
+        x[k] = stage.step(u)
+        driver.learn(change(u), float(x[k]))
+    return driver, np.abs(r - x)
+
+
+def rounded(bits: int) -> Callable[[float], float]:
+    step = RANGE / 2**bits
+    return lambda u: round(u / step) * step
+
+
+@pytest.mark.parametrize(("bits", "most"), [(10, 0.1), (12, 0.03), (16, 0.01)])
+def test_a_voltage_that_a_converter_has_rounded_does_not_stand_still(bits: int, most: float) -> None:
+    driver, error = told(rounded(bits))
+    assert driver.status.stage == "running"
+    assert driver.events == ()
+    assert error[-10_000:].max() < most
+
+
+@pytest.mark.parametrize(
+    ("gain", "offset", "noise"), [(0.99, 0.1, 0.0), (1.01, 0.0, 0.002), (1.0, 0.0, 0.02)]
+)
+def test_a_monitor_may_have_errors(gain: float, offset: float, noise: float) -> None:
+    rng = np.random.default_rng(3)
+    driver, error = told(lambda u: gain * u + offset + noise * rng.standard_normal())
+    assert driver.status.stage == "running"
+    assert driver.events == ()
+    assert error[-10_000:].max() < 0.1
+
+
+def test_a_limit_is_one_whatever_a_converter_makes_of_it() -> None:
+    driver, _ = told(rounded(9), np.full(30_000, 40.0))
+    assert [event.name for event in driver.events] == ["out of reach"]
+
+
+def test_a_slew_rate_is_kept_where_a_sample_of_it_is_less_than_a_step() -> None:
+    limits = pz.VoltageLimits(-60.0, 60.0, slew_rate=1000.0, sample_rate=FS)
+    driver, stage = pz.AdaptiveFeedforward(FS, limits=limits), pz.SimulatedStage(FS, LOOP)
+    change, u = rounded(10), np.empty(50_000)
+    for k in range(u.size):
+        u[k] = driver.step(4.0)
+        driver.learn(change(u[k]), stage.step(float(u[k])))
+    assert np.abs(np.diff(u)).max() < limits.largest_step * (1.0 + 1e-9)
+    assert abs(float(np.asarray(stage.displacement)) - 4.0) < 0.05
