@@ -28,7 +28,8 @@ class TrackingRecord:
     Parameters
     ----------
     reference, voltage, measured, displacement : ndarray, shape (N,)
-        r [µm], u [V], measured x [µm], true x [µm] (the measured one if the true one is unknown).
+        r [µm], u [V], measured x [µm], true x [µm] (the measured one if the true one is unknown). NaN where
+        the stage gave no reading; errors leave these samples out.
     parameters : ndarray, shape (M, n)
         Parameters of the compensator's model, one row for each `update_interval` samples; n = 0 without an
         estimator, or with a controller. If the number of parameters changes, as after a start with another
@@ -116,7 +117,7 @@ class TrackingRecord:
         last_periods : int, optional
             Over the last so many periods only; default the whole record.
         """
-        return float(np.max(np.abs(self.error[self._tail(last_periods)])))
+        return _largest(self.error[self._tail(last_periods)])
 
     def rms_error(self, last_periods: int | None = None) -> float:
         """Root mean square of r - x [µm].
@@ -126,13 +127,13 @@ class TrackingRecord:
         last_periods : int, optional
             Over the last so many periods only; default the whole record.
         """
-        return float(np.sqrt(np.mean(self.error[self._tail(last_periods)] ** 2)))
+        return _rms(self.error[self._tail(last_periods)])
 
     def max_error_per_period(self) -> FloatArray:
         """Largest |r - x| of each whole period [µm], shape (`periods`,)."""
         period = self._period()
         whole = np.abs(self.error[: self.periods * period])
-        return whole.reshape(self.periods, period).max(axis=1)
+        return np.asarray(np.fmax.reduce(whole.reshape(self.periods, period), axis=1))
 
     def table(self) -> str:
         """Text table: largest and rms error of each period, and up to three parameters at its end."""
@@ -143,7 +144,7 @@ class TrackingRecord:
         for k in range(self.periods):
             error = self.error[k * period : (k + 1) * period]
             values = "".join(f"{value:14.5g}" for value in self._row((k + 1) * period - 1)[:shown])
-            lines.append(f"{k + 1:6d}{np.max(np.abs(error)):16.4f}{np.sqrt(np.mean(error**2)):16.4f}{values}")
+            lines.append(f"{k + 1:6d}{_largest(error):16.4f}{_rms(error):16.4f}{values}")
         return "\n".join(lines)
 
     def plot(self, last_periods: int | None = None) -> Figure:
@@ -168,6 +169,17 @@ class TrackingRecord:
         return figure
 
 
+def _largest(error: FloatArray) -> float:
+    """Largest size of the known errors; NaN if none is known."""
+    return float(np.fmax.reduce(np.abs(error)))
+
+
+def _rms(error: FloatArray) -> float:
+    """Root mean square of the known errors; NaN if none is known."""
+    known = error[np.isfinite(error)]
+    return math.sqrt(float(np.mean(known**2))) if known.size else math.nan
+
+
 def draw_series(axes: Any, record: TrackingRecord, part: slice = slice(None)) -> None:
     """Draw reference, displacement and error over time (Fig. 4a, 4b) into Matplotlib axes."""
     axes.plot(record.time[part], record.reference[part], label="reference", color="0.6", lw=2)
@@ -176,7 +188,8 @@ def draw_series(axes: Any, record: TrackingRecord, part: slice = slice(None)) ->
     right = axes.twinx()
     right.plot(record.time[part], record.error[part], label="error", color="C3", lw=0.8)
     right.set_ylabel("error [µm]", color="C3")
-    limit = 1.05 * float(np.max(np.abs(record.error[part]))) or 1.0
+    limit = 1.05 * _largest(record.error[part])
+    limit = limit if limit > 0.0 else 1.0
     right.set_ylim(-limit, limit)
     axes.legend(loc="upper right")
 

@@ -31,6 +31,18 @@ def test_plain_arrays_need_a_rate() -> None:
         pz.track(r, stage=pz.PaperStage(sample_rate=FS), compensator=compensator, sample_rate=100.0)
 
 
+def test_errors_leave_out_missing_readings() -> None:
+    readings = [0.0, 1.0, None, 0.5, None, None, None, None]
+    stage = SimpleNamespace(step=lambda u: readings.pop(0))
+    r = pz.signals.Signal(np.zeros(8), sample_rate=8.0, period=4)
+    record = pz.track(r, stage=stage, compensator=pz.LinearCompensator(pz.LinearGain(1.0)))
+    assert record.max_error() == 1.0
+    assert record.rms_error() == pytest.approx(np.sqrt(1.25 / 3.0))
+    np.testing.assert_equal(record.max_error_per_period(), [1.0, np.nan])
+    assert record.table().splitlines()[1].split() == ["1", "1.0000", "0.6455"]
+    assert record.plot().axes
+
+
 def test_ones_own_parts_are_told_of_no_measurement_by_none() -> None:
     deaf: Any = SimpleNamespace(sample_rate=100.0, step=lambda u: float("nan") if u > 0.0 else None)
 

@@ -34,8 +34,8 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         # What it is doing; voltages planned since the last one was written; samples that waited for a block.
         stage=whole(0.0, 3.0), pending=COUNT, block=AMOUNT,
         # Reference planned for, whether there was one; voltage planned, voltage written, whether that has
-        # stood still; samples without a reading.
-        r=MEASURED, asked=FLAG, planned=MEASURED, u=MEASURED, stood=FLAG, silent=COUNT,
+        # stood still; samples without a reading, the most of late.
+        r=MEASURED, asked=FLAG, planned=MEASURED, u=MEASURED, stood=FLAG, silent=COUNT, gap=AMOUNT,
         # Farthest way from the start's voltage that was answered; travel of the reference with the voltage at
         # a limit, and with a voltage that stood still; samples of it out of reach.
         confirmed=AMOUNT, railed=AMOUNT, frozen=AMOUNT, beyond=COUNT,

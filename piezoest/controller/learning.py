@@ -202,8 +202,8 @@ def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
 
 
 @register_jitable
-def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any) -> None:
-    """The run begins where the voltage has come to the reference, or has tried for long."""
+def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any, told: Any) -> None:
+    """The run begins where a reading has told that the reference is reached, or the way has taken long."""
     start, line = state.start, state.line
     if gone == 0.0:
         # The rest of a block that was planned before the way began.
@@ -211,10 +211,10 @@ def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any) -> None:
     start.samples += 1.0
     target = lines.voltage(line, r)
     there = np.abs(target - u) <= NEAR * np.abs(u - start.origin) or is_held(settings, u, target - u)
-    longest = LONGEST * max(settings.doubling, start.lag)
+    longest = LONGEST * max(settings.doubling, start.lag) + 2.0 * state.gap
     if start.fastest > 0.0:
         longest += 2.0 * np.abs(target - start.origin) / start.fastest
-    if there or start.samples > longest:
+    if (there and told) or start.samples > longest:
         least = np.abs(start.target - start.from_u)
         state.stage = RUN
         lines.begin(line, line.gain, u, lines.at(line, u), least)
@@ -229,10 +229,9 @@ def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any, gone: Any) -> f
     known = np.abs(x) < WILDEST
     if known:
         x = _refine(state, settings, u, x)
-    told = known or state.start.ahead != 0.0
-    if state.stage == SEEK or state.start.given != 0.0 or state.asked == 0.0 or not told:
+    if state.stage == SEEK or state.start.given != 0.0 or state.asked == 0.0:
         return np.nan
-    _arrive(state, settings, r, u, gone)
+    _arrive(state, settings, r, u, gone, known or state.start.ahead != 0.0)
     return x if known else np.nan
 
 

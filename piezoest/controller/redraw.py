@@ -32,7 +32,7 @@ def is_young(state: Any) -> bool:
 @register_jitable
 def _slow(state: Any, settings: Any) -> float:
     """Samples in which the line may follow the readings."""
-    return max(SLOW * settings.doubling, LATE * (state.block + state.start.lag))
+    return max(SLOW * settings.doubling, LATE * (state.block + state.gap + state.start.lag))
 
 
 @register_jitable

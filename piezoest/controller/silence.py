@@ -10,6 +10,8 @@ from piezoest.controller import faults
 
 # It is said after so many times what a doubling takes: about a second.
 SAID = 250.0
+# At each reading the longest gap of late becomes shorter by this factor.
+SHORTER = 0.9
 
 
 @register_jitable
@@ -30,6 +32,7 @@ def watch(state: Any, settings: Any, x: Any) -> None:
     if np.abs(x) < WILDEST:
         if is_long(state, settings):
             faults.notice(state, state.readings.fault)
+        state.gap = max(SHORTER * state.gap, state.silent)
         state.silent = 0.0
         return
     state.silent += 1.0

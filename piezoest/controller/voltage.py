@@ -88,7 +88,7 @@ def _nearer(state: Any, settings: Any, target: Any) -> float:
     start = state.start
     here = written(state, settings, state.u)
     span = max(np.abs(here - start.origin), state.confirmed)
-    doubling = max(settings.doubling, LATE * start.lag)
+    doubling = max(settings.doubling, LATE * start.lag, state.gap)
     end = start.origin + AHEAD * np.sign(target - start.origin) * state.confirmed
     left = target - here
     if np.abs(target - start.origin) > np.abs(end - start.origin):

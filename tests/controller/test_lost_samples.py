@@ -123,3 +123,11 @@ def test_a_sensor_that_has_never_given_a_reading_is_reported() -> None:
         driver.learn(driver.step(r_k), None)
     assert driver.events[0].name == "no readings"
     assert driver.voltage == 0.0
+
+
+def test_between_rare_readings_the_approach_does_not_go_too_far() -> None:
+    r = pz.signals.triangle(3.0, 2.0, 10, 1000.0).values
+    driver, stage = pz.AdaptiveFeedforward(1000.0, limits=LIMITS), pz.PaperStage(1000.0, seed=1)
+    _, x, _ = shared.drive(driver, stage, r, lambda k, x: x if k % 50 == 0 else None)
+    assert np.abs(x).max() < 5.0
+    assert shared.last_error(r, x) < 0.05
