@@ -13,6 +13,7 @@ from piezoest.fitting.design import Design
 from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.fitting.forms import FORMS, Form
 from piezoest.fitting.gaps import remembered
+from piezoest.fitting.jumps import jumps_left
 from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.outliers import lonely, unsettled
 from piezoest.fitting.play_columns import PlayColumns, Start
@@ -30,6 +31,8 @@ UNRELATED = 0.5
 FALLS, OTHER_RUN = "change the sign of one of them", "check that both are of one run and one axis"
 # Times that a start which has not settled is looked for, each without what was found before.
 PASSES = 3
+# A jump beside the motion is one if only this part of the squares is left with it.
+CLEAR_JUMP = 0.7
 SOLVER = "{} through CasADi; SciPy's bounded least squares agrees to {:.0e}"
 
 
@@ -106,7 +109,7 @@ class Fitter:
     The parameters are those of `fit`; without `plays` it is only for kinds that have none, and faster. A
     record that does not tell a lag from a wider loop has none where plays find none.
     `start` says where plays were before the record, `delay` is the one used, and `delay_estimated`,
-    `left_out` and `spikes` are as in `Fit`.
+    `left_out`, `spikes` and `jumps` are as in `Fit`.
     """
 
     def __init__(
@@ -159,6 +162,7 @@ class Fitter:
         by_plays = plays or self.delay_estimated
         # Plays that move on the first way alone look like a drift.
         self._begin(by_plays, once=False)
+        self._find_jumps(by_plays)
         drifts = search.drifts(self._log, search.plays(self._log, self.start) if by_plays else self._loop)
         self._log = replace(self._log, drifts=drifts)
         if plays or drifts:
@@ -180,6 +184,23 @@ class Fitter:
         self.start = search.best_start(self._log, once=once) if plays else Start(first, first)
         for name in ("_first", "_loop", "_plain", "_richest"):
             self.__dict__.pop(name, None)
+
+    def _find_jumps(self, plays: bool) -> None:
+        """Find jumps that are not seen beside the motion of the stage, by what a fit leaves without them."""
+        log, basis = self._log, self._bent_plays if plays else self._loop
+        fitted = search.regression(log, basis).best(search.SMOOTH)
+        residual = np.where(log.counts, log.x - fitted.design.output(log.u, fitted.w), np.nan)
+        # A drift beside it would be halved by any jump.
+        left = search.missed(replace(log, drifts=True), basis)
+        for place in jumps_left(residual, float(np.ptp(log.x[log.counts]))):
+            tried = replace(log, jumps=np.union1d(log.jumps, [place]))
+            now = search.missed(replace(tried, drifts=True), basis)
+            if now < CLEAR_JUMP * left:
+                log, left = tried, now
+        self.jumps = np.setdiff1d(log.jumps, self._log.jumps).astype(np.int64)
+        if self.jumps.size:
+            self._log = log
+            self._begin(plays, once=False)
 
     def _leave_out(self, settle: float | None) -> None:
         """Do without what a first fit shows to be spikes, and a start that has not settled."""
@@ -316,6 +337,7 @@ class Fitter:
             counts=log.counts,
             left_out=self.left_out,
             spikes=self.spikes,
+            jumps=self.jumps,
             drift=float(w[design.offset + 1]),
             solver=SOLVER.format(quadratic_solver(), gap),
             _design=design,

@@ -1,10 +1,12 @@
 """Jumps of a sensor: steps of the displacement that stay and that the voltage does not explain."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.fitting.coordinates import bridged
 from piezoest.fitting.runs import BoolArray, IntArray
 from piezoest.fitting.surprise import is_peak, scale_of, surprise
 
@@ -22,6 +24,8 @@ STICK_SLIP = 6
 EACH_SIDE, FORESEE = 6, 4
 # A step of a slow gauge takes some of the samples of such means; others are so many of them away, at least.
 SLOW_STEP, ALONE = (4, 16), 3
+# At most so many steps of a residual are looked at.
+MOST_LEFT = 6
 
 
 def jumps_of(
@@ -48,6 +52,38 @@ def jumps_of(
         # A stage that moves in steps, always onward, is sticky: no sensor does that.
         return np.empty(0, np.int64), np.empty(0)
     return found, steps
+
+
+@dataclass(frozen=True)
+class _Still:
+    """A log whose voltage explains nothing: what a fit has left of it."""
+
+    late: FloatArray
+    range: float
+    gain: float = 0.0
+    quantum: float = 0.0
+
+    @property
+    def explained(self) -> FloatArray:
+        return np.zeros(self.late.size)
+
+
+def jumps_left(residual: FloatArray, size: float) -> IntArray:
+    """First samples after what may be jumps that a fit has left: the largest steps of its residual, if any.
+
+    A jump of about what the stage moves in a sample is seen only where a fit has taken the motion away.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (N,)
+        What a fit has left [µm]; NaN where a sample does not count.
+    size : float
+        Range of the displacement [µm].
+    """
+    known = np.flatnonzero(np.isfinite(residual))[:, None]
+    still = _Still(np.zeros(residual.size), size)
+    found, steps = _steps(still, bridged(residual), np.zeros(residual.size, np.bool_), known)
+    return found[np.argsort(-np.abs(steps), kind="stable")[:MOST_LEFT]]
 
 
 def _steps(log: Any, clean: FloatArray, unknown: BoolArray, groups: IntArray) -> tuple[IntArray, FloatArray]:

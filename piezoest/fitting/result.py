@@ -10,7 +10,7 @@ from piezoest.fitting import trust
 from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.design import Design
 from piezoest.fitting.forms import FORMS
-from piezoest.fitting.runs import BoolArray
+from piezoest.fitting.runs import BoolArray, IntArray
 from piezoest.models import Model
 
 
@@ -58,6 +58,8 @@ class Fit:
         Samples at the start that were left out, because the stage had not settled.
     spikes : int
         Samples that were left out because they are single and far off.
+    jumps : ndarray, shape (J,), int
+        First samples after jumps of the sensor that are only seen beside the fit: further ones than `flaws`.
     drift : float
         Drift over the record, fitted together with the model [µm].
     solver : str
@@ -86,6 +88,7 @@ class Fit:
     counts: BoolArray = field(repr=False)
     left_out: int
     spikes: int
+    jumps: IntArray
     drift: float
     solver: str
     _design: Design = field(repr=False)

@@ -11,6 +11,7 @@ from piezoest.identification.data import Data, turning_voltages
 from piezoest.identification.residual import Oscillation
 from piezoest.identification.result import Identification
 from piezoest.models import LearntOn
+from piezoest.records.source import counted
 
 DRIFT_WORTH_A_WORD = 0.5
 WORSE_ON_HELD_OUT = 1.5
@@ -77,6 +78,11 @@ def _left_out(found: Identification, data: Data) -> list[str]:
         said.append(
             f"{spikes} of the fitted samples {'is' if spikes == 1 else 'are'} off the rest alone, as spikes "
             "of a sensor are: left out."
+        )
+    if fit.jumps.size:
+        said.append(
+            f"Beside the motion the displacement jumps {counted(fit.jumps.size)}, first at "
+            f"{float(found.record.time[fit.jumps[0]]):.6g} s: fitted with an offset of its own behind."
         )
     return said
 

@@ -195,6 +195,19 @@ def test_a_jump_is_fitted_beside_the_model(place: int) -> None:
     assert rms(found.predict(u).x - without.predict(u).x) < sigma
 
 
+@pytest.mark.parametrize("model", ["plays", "coleman-hodgdon"])
+def test_a_jump_no_larger_than_what_the_stage_moves_in_a_sample_is_found(model: str) -> None:
+    u = pz.signals.triangle(50.0, 1.0, 20, 150.0).values
+    x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(u)
+    jump = 0.7 * float(np.max(np.abs(np.diff(x))))
+    y = x + jump * (np.arange(x.size) >= 900) + 0.02 * jump * np.random.default_rng(0).standard_normal(x.size)
+    found = pz.fit(u, y, sample_rate=150.0, model=model)
+    assert found.jumps.tolist() == [900]
+    left = y - found.predict().x
+    assert abs(left[600:900].mean() - left[900:1200].mean()) < 0.25 * jump
+    assert pz.fit(u, x, sample_rate=150.0, model=model).jumps.size == 0
+
+
 def test_spikes_dropouts_and_gaps_do_not_move_a_fit() -> None:
     u, x, sigma = drawn(11)
     y = x + noise(sigma)
