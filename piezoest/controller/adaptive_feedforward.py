@@ -250,9 +250,10 @@ class AdaptiveFeedforward(Face):
         Parameters
         ----------
         u : float or None, or array_like, shape (N,)
-            Voltage [V] of the last `step`, or the array of the last `run`. None or NaN means that it is
-            unknown whether it was written. If this matters, the straight line drives until the models have
-            proved their accuracy again.
+            Voltage [V] of the last `step`, or the array of the last `run`. As rounded by a converter, or
+            measured with an error below 1 % of the range, it counts as the planned one. None or NaN means
+            that it is unknown whether it was written. If this matters, the straight line drives until the
+            models have proved their accuracy again.
         x : float or None, or array_like, shape (N,)
             Measured displacement [µm]; None, NaN or infinity if there is none. Anything that is not a number
             counts as missing.

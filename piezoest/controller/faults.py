@@ -28,7 +28,7 @@ MEANINGS = {
     "voltage at its limit of {limit:.4g} V: keep the reference within what the stage reaches",
     "false start": "the stage does not go as the start has shown, which was hum or drift: the gain "
     "is sought again, on longer ways",
-    "no readings": "none has come for a second: the models that are known drive on, and nothing is learnt",
+    "no readings": "none has come for {silence:.2g} s: what drives goes on, and nothing is learnt",
 }
 # Their names by their numbers.
 FAULTS = ("", *MEANINGS)

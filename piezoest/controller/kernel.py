@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest._checks import WILDEST
 from piezoest.compile import Record, Vector, compiled
 from piezoest.controller import candidate, homing, late, redraw, slots
 from piezoest.controller import feedback as feedbacks
@@ -33,9 +32,9 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         samples=COUNT, missing=COUNT, saturated=COUNT, slewed=COUNT,
         # What it is doing; voltages planned since the last one was written; samples that waited for a block.
         stage=whole(0.0, 3.0), pending=COUNT, block=AMOUNT,
-        # Reference planned for, whether there was one; voltage planned, voltage written, whether that has
-        # stood still; samples without a reading, the most of late.
-        r=MEASURED, asked=FLAG, planned=MEASURED, u=MEASURED, stood=FLAG, silent=COUNT, gap=AMOUNT,
+        # Reference planned for, whether there was one; voltage planned, voltage written; samples without a
+        # reading, the most of late.
+        r=MEASURED, asked=FLAG, planned=MEASURED, u=MEASURED, silent=COUNT, gap=AMOUNT,
         # Farthest way from the start's voltage that was answered; travel of the reference with the voltage at
         # a limit, and with a voltage that stood still; samples of it out of reach.
         confirmed=AMOUNT, railed=AMOUNT, frozen=AMOUNT, beyond=COUNT,
@@ -83,10 +82,7 @@ def step(state: Record, settings: Record, r: float) -> Any:
 @compiled
 def learn(state: Record, settings: Record, u: float, x: float) -> None:
     """Learn from one sample, of the reference planned for last."""
-    if not settings.minimum < state.planned < settings.maximum:
-        # At a limit it is there, whatever a converter or a monitor makes of it.
-        u = written(state, settings, u)
-    take(state, settings, np.nan, u, x)
+    take(state, settings, np.nan, written(state, settings, u), x)
 
 
 @compiled
@@ -102,12 +98,10 @@ def run(state: Record, settings: Record, r: Vector, u: Vector) -> None:
 def learn_all(state: Record, settings: Record, r: Vector, u: Vector, x: Vector) -> None:
     """Learn from samples that were planned together."""
     state.block = max(0.9 * state.block, len(r) - 1.0)
-    last = state.planned
+    last = len(r) - 1
     for k in range(len(r)):
         # Of a block only the last voltage that was planned is known.
-        state.planned = u[k] if np.abs(u[k]) < WILDEST else last
-        take(state, settings, r[k], u[k], x[k])
-    state.planned = last
+        take(state, settings, r[k], written(state, settings, u[k]) if k == last else u[k], x[k])
     if state.stage == RUN and len(r) > 1:
         redraw.go_on(state, settings)
 

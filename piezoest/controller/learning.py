@@ -27,7 +27,7 @@ from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK, is_held, written
+from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK, is_held
 
 # Models are handed over after this fraction of a swing.
 HAND_OVER = 1.0 / 8.0
@@ -111,12 +111,12 @@ def _hand_over(state: Any, settings: Any) -> None:
 
 
 @register_jitable
-def _watch_voltage(state: Any, settings: Any, moved: Any) -> None:
+def _watch_voltage(state: Any, settings: Any, gone: Any, moved: Any) -> None:
     """An amplifier that does not move its voltage with the reference answers nothing."""
     within = settings.minimum < state.u < settings.maximum
     # The rest of a block that was planned before the reference was reached stands still by right.
     planned = state.travel.turns > 0.0 or state.travel.count > state.block
-    state.frozen = state.frozen + moved if state.stood != 0.0 and within and planned else 0.0
+    state.frozen = state.frozen + moved if gone == 0.0 and within and planned else 0.0
     if state.frozen > FROZEN * state.reference.swing and state.readings.fault == faults.NONE:
         state.readings.fault, state.readings.good = faults.NO_RESPONSE, 0.0
 
@@ -246,7 +246,7 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
     memory = redraw.memory(state, settings)
     x = reading.believed(state.readings, line, state.travel, memory, state.late.answered, u, x, gone, wanted)
     zero.follow(state)
-    _watch_voltage(state, settings, moved)
+    _watch_voltage(state, settings, gone, moved)
     if state.readings.fault != before:
         faults.notice(state, state.readings.fault)
         if state.readings.fault != faults.NONE:
@@ -321,8 +321,7 @@ def _follow(state: Any, settings: Any, r: Any, u: Any) -> tuple[float, float]:
     """Let line and models follow reference and voltage; how far each has moved."""
     moved = travels.follow(state.reference, r)
     redraw.pay(state, settings, moved)
-    # The noise of a voltage that is measured is no travel.
-    gone = travels.follow(state.travel, written(state, settings, u))
+    gone = travels.follow(state.travel, u)
     if state.stage == RUN:
         if state.readings.fault == faults.NONE:
             redraw.draw(state)
@@ -360,7 +359,6 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
             doubt.lose_write(state)
         return
     state.pending = 0.0
-    state.stood = 1.0 if u == state.u else 0.0
     state.u = u
     late.remember(state.late, state.start, u)
     silence.watch(state, settings, x)

@@ -82,6 +82,7 @@ def event(state: Any, sample_rate: float, learnt_on: Any) -> Event:
     action = "fell back" if number == state["readings"]["fault"] else "went on"
     start = {each: float(state["start"][each]) + 0.0 for each in ("gain", "gain_before")}
     here = {"wanted": seen["r"], "there": seen["x"], "limit": seen["u"]}
+    here["silence"] = float(state["silent"]) / sample_rate
     figures = start | here | _pace(state, sample_rate) | _outside(state, learnt_on)
     return Event(time, action, f"{name}: {faults.MEANINGS[name].format_map(figures)}")
 

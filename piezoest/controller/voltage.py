@@ -23,8 +23,9 @@ AHEAD, LATE = 8.0, 3.0
 FOLLOWED = 0.8
 # ... and where the readings have yet to confirm a user's gain, than so many times.
 FIRST_AHEAD = 2.0
-# A voltage is told with an error of at most this fraction of the range: rounding, or that of a monitor.
-OFF = 0.02
+# A voltage that was told as written differs from the planned one by this fraction of the range at most, where
+# it is the same one: rounded by a converter, or measured by a monitor.
+OFF = 0.01
 
 
 @register_jitable
@@ -37,8 +38,8 @@ def is_held(settings: Any, u: Any, way: Any) -> bool:
 def written(state: Any, settings: Any, u: Any) -> float:
     """A voltage that was told as written: the planned one if it is near that.
 
-    From a voltage that is told as rounded a small way would be rounded away, and from one that is measured
-    each sample would go on by the error of what measures it.
+    A small way that goes on from what a converter has rounded would be rounded away again, and the errors of
+    a monitor would add up from sample to sample.
     """
     near = np.abs(state.planned - u) <= OFF * (settings.maximum - settings.minimum)
     return state.planned if near else u
@@ -68,8 +69,8 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
         learnt = state.reference.last + state.back
         ahead = lines.voltage(line, r - owed * kept * state.unit)
         ahead -= lines.voltage(line, learnt - owed * state.unit)
-        most, here = (RATE - 1.0) * np.abs(ahead), written(state, settings, state.u) + ahead
-        wanted = min(max(wanted, here - most), here + most)
+        most = (RATE - 1.0) * np.abs(ahead)
+        wanted = min(max(wanted, state.u + ahead - most), state.u + ahead + most)
     if not np.abs(wanted) < WILDEST:
         wanted = straight
     room = np.abs(settings.corridor * 0.5 * max(swing, travels.widest(state.reference)) / line.gain)
@@ -86,17 +87,16 @@ def _nearer(state: Any, settings: Any, target: Any) -> float:
     Where a way was answered it may go as fast: else it would never catch a reference that goes to and fro.
     """
     start = state.start
-    here = written(state, settings, state.u)
-    span = max(np.abs(here - start.origin), state.confirmed)
+    span = max(np.abs(state.u - start.origin), state.confirmed)
     doubling = max(settings.doubling, LATE * start.lag, state.gap)
     end = start.origin + AHEAD * np.sign(target - start.origin) * state.confirmed
-    left = target - here
+    left = target - state.u
     if np.abs(target - start.origin) > np.abs(end - start.origin):
-        left = end - here
+        left = end - state.u
     way = min(span, np.abs(left)) / doubling
     if start.fastest > 0.0:
         way = min(way, FOLLOWED * start.fastest)
-    return here + min(max(left, -way), way)
+    return state.u + min(max(left, -way), way)
 
 
 @register_jitable
@@ -120,13 +120,13 @@ def plan(state: Any, settings: Any, r: Any) -> float:
             target = state.start.origin + np.sign(state.start.way) * way
         wanted = _nearer(state, settings, target)
     elif state.stage == HOME:
-        wanted = homing.voltage(state.homing, written(state, settings, state.u))
+        wanted = homing.voltage(state.homing, state.u)
     else:
         wanted = _feed_forward(state, settings, r, before)
     if not np.abs(wanted) < WILDEST:
         wanted = state.u
-    step, here = settings.largest_step, written(state, settings, state.u)
-    slewed = min(max(wanted, here - step), here + step)
+    step = settings.largest_step
+    slewed = min(max(wanted, state.u - step), state.u + step)
     given = min(max(slewed, settings.minimum), settings.maximum)
     state.slewed += slewed != wanted
     state.saturated += given != slewed
