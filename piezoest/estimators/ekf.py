@@ -69,6 +69,8 @@ class HysteresisEKF(CompiledEstimator):
     sample rate. `theta` is (alpha, beta, gamma) from (4), and `P` its covariance to first order. `s` and
     `state_covariance` belong to the filter itself.
 
+    Coarse steps of the voltage's converter mislead it as they do `HysteresisRLS`: see the notes there.
+
     Source: D. Simon, Optimal State Estimation (2006), sec. 13.2; the model: Eielsen, Gravdahl
     and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), (2)-(4).
 

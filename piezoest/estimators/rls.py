@@ -80,6 +80,10 @@ class HysteresisRLS(Freezable):
     noise, so that the covariance is well scaled. The regressor is integrated over each
     sample, which keeps the form exact to third order in the change of voltage.
 
+    If a step of the voltage's converter is larger than what the voltage moves in a sample, a resonance
+    answers it over several samples, which this form takes for a wrong loop. Then pass every tenth sample,
+    with a tenth of the sample rate, or use `OutputErrorRLS` or `PrandtlIshlinskiiRLS`.
+
     Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), sec. III B and App. A.
 
     Examples

@@ -116,3 +116,23 @@ def test_it_neither_winds_up_nor_drifts() -> None:
     deviation = (settled - settled[:20].mean(axis=0)) / settled[:20].std(axis=0, ddof=1)
     assert np.max(np.abs(deviation)) < 8.0
     assert np.max(np.abs(np.polyfit(np.linspace(0.0, 1.0, len(settled)), deviation, 1)[0])) < 8.0
+
+
+@pytest.mark.parametrize(
+    ("make", "every", "most"),
+    [(pz.HysteresisRLS, 10, 0.15), (pz.HysteresisEKF, 10, 0.2), (pz.OutputErrorRLS, 1, 0.15)],
+)
+def test_coarse_steps_of_the_voltage(make: Any, every: int, most: float) -> None:
+    """A resonance answers each step over several samples; every tenth sample has the whole answer."""
+    rate, step = 10_000.0, 0.2
+    r = pz.signals.triangle(5.0, 5.0, 6, rate).values
+    estimator, stage = make(rate / every), pz.PaperStage(rate, seed=0)
+    compensator = pz.InverseCompensator(estimator.model)
+    x = np.empty_like(r)
+    for k, r_k in enumerate(r.tolist()):
+        u = round(compensator.step(r_k) / step) * step
+        x[k] = stage.step(u)
+        if k % every == 0:
+            estimator.step(u, float(x[k]))
+            compensator.model = estimator.model
+    assert np.abs(r - x)[-2000:].max() < most
