@@ -76,7 +76,8 @@ def stand_at(state: Any, z: Any) -> None:
 @register_jitable
 def drive(state: Any, number: Any) -> None:
     """Let another model drive, without a bump."""
-    z = _stands(state)
+    # From the reference on: where the corridor held the last one back it stood elsewhere.
+    z = (state.r + state.feedback - state.zero) / state.unit
     state.switches += number != state.driving
     state.driving = number
     stand_at(state, z)

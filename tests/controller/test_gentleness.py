@@ -136,3 +136,12 @@ def test_a_healthy_stage_gets_no_name(seed: int) -> None:
 @pytest.mark.parametrize(("seed", "name"), [(92026, "scaled"), (92020, "reversed"), (92022, "scaled")])
 def test_a_wrong_factor_has_its_name(seed: int, name: str) -> None:
     assert name in named(seed, "sensor-factor")
+
+
+def test_a_model_that_the_corridor_holds_back_gives_way_without_a_step() -> None:
+    """A stage with backlash and late readings: the models are wrong by half the range of the voltage."""
+    rig = zoo.draw(47342)
+    driver, stage, r = pz.AdaptiveFeedforward(rig.sample_rate, limits=rig.limits), rig.stage(), rig.reference
+    u = drive(driver, stage, r).u
+    assert driver.status.switches > 2
+    assert np.abs(np.diff(u)).max() < 0.05 * np.ptp(u)
