@@ -74,13 +74,18 @@ def stand_at(state: Any, z: Any) -> None:
 
 
 @register_jitable
+def stand_at_reference(state: Any) -> None:
+    """Let what drives, a model or the line, go on from the reference at the voltage written."""
+    stand_at(state, (state.r + state.feedback - state.zero) / state.unit)
+
+
+@register_jitable
 def drive(state: Any, number: Any) -> None:
     """Let another model drive, without a bump."""
-    # From the reference on: where the corridor held the last one back it stood elsewhere.
-    z = (state.r + state.feedback - state.zero) / state.unit
     state.switches += number != state.driving
     state.driving = number
-    stand_at(state, z)
+    # Where the corridor held the last one back it stood elsewhere.
+    stand_at_reference(state)
 
 
 @register_jitable

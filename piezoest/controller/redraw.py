@@ -94,4 +94,4 @@ def go_on(state: Any, settings: Any) -> None:
     """After a block: whatever it has changed is owed, so that the voltage goes on from where it is."""
     if not settings.minimum < state.u < settings.maximum:
         return
-    driving.stand_at(state, (state.r + state.feedback - state.zero) / state.unit)
+    driving.stand_at_reference(state)

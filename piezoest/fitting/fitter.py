@@ -188,11 +188,14 @@ class Fitter:
     def _find_jumps(self, plays: bool) -> None:
         """Find jumps that are not seen beside the motion of the stage, by what a fit leaves without them."""
         log, basis = self._log, self._bent_plays if plays else self._loop
-        fitted = search.regression(log, basis).best(search.SMOOTH)
-        residual = np.where(log.counts, log.x - fitted.design.output(log.u, fitted.w), np.nan)
+        residual = _residual(log, search.regression(log, basis).best(search.SMOOTH))
+        places = jumps_left(residual, float(np.ptp(log.x[log.counts])))
+        self.jumps = np.empty(0, np.int64)
+        if not places.size:
+            return
         # A drift beside it would be halved by any jump.
         left = search.missed(replace(log, drifts=True), basis)
-        for place in jumps_left(residual, float(np.ptp(log.x[log.counts]))):
+        for place in places:
             tried = replace(log, jumps=np.union1d(log.jumps, [place]))
             now = search.missed(replace(tried, drifts=True), basis)
             if now < CLEAR_JUMP * left:
@@ -208,8 +211,7 @@ class Fitter:
         if settle is not None:
             self.left_out = int(fraction("settle", settle, 0.0, 0.5 * given.u.size / self._rate) * self._rate)
         for _ in range(PASSES):
-            fitted = self._first.best(search.SMOOTH)
-            residual = np.where(given.counts, given.x - fitted.design.output(given.u, fitted.w), np.nan)
+            residual = _residual(given, self._first.best(search.SMOOTH))
             further = self.left_out if settle is not None else max(unsettled(residual), self.left_out)
             spikes = lonely(residual)
             spikes[:further] = False
@@ -345,6 +347,11 @@ class Fitter:
             _rest=rest,
             _u=self._given,
         )
+
+
+def _residual(log: Log, fitted: Fitted) -> FloatArray:
+    """What a fit has left of a log [µm]; NaN where a sample does not count."""
+    return np.where(log.counts, log.x - fitted.design.output(log.u, fitted.w), np.nan)
 
 
 def _unexplained(u: FloatArray, x: FloatArray) -> float:
