@@ -82,7 +82,9 @@ def stand_at_reference(state: Any) -> None:
 @register_jitable
 def drive(state: Any, number: Any) -> None:
     """Let another model drive, without a bump."""
-    state.switches += number != state.driving
+    if number == state.driving:
+        return
+    state.switches += 1.0
     state.driving = number
     # Where the corridor held the last one back it stood elsewhere.
     stand_at_reference(state)
