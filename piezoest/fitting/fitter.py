@@ -15,7 +15,7 @@ from piezoest.fitting.forms import FORMS, Form
 from piezoest.fitting.gaps import remembered
 from piezoest.fitting.jumps import jumps_left
 from piezoest.fitting.loop_columns import LoopColumns
-from piezoest.fitting.outliers import lonely, unsettled
+from piezoest.fitting.outliers import beside_steps, lonely, unsettled
 from piezoest.fitting.play_columns import PlayColumns, Start
 from piezoest.fitting.polish import Polished, polished
 from piezoest.fitting.regression import Fitted, Log, Regression
@@ -190,6 +190,7 @@ class Fitter:
         log, basis = self._log, self._bent_plays if plays else self._loop
         residual = _residual(log, search.regression(log, basis).best(search.SMOOTH))
         places = jumps_left(residual, float(np.ptp(log.x[log.counts])))
+        places = places[~beside_steps(self._given)[places]]
         self.jumps = np.empty(0, np.int64)
         if not places.size:
             return
@@ -213,7 +214,7 @@ class Fitter:
         for _ in range(PASSES):
             residual = _residual(given, self._first.best(search.SMOOTH))
             further = self.left_out if settle is not None else max(unsettled(residual), self.left_out)
-            spikes = lonely(residual)
+            spikes = lonely(residual) & ~beside_steps(self._given)
             spikes[:further] = False
             counts = given.counts & ~spikes
             counts[:further] = False
@@ -323,6 +324,7 @@ class Fitter:
             parameters = int(trust.free_columns(with_gains).size)
         design, w, rest = _beyond(fitted)
         model = design.model(w)
+        missed = trust.residuals(fitted, log)
         return Fit(
             model=model,
             form=name,
@@ -334,8 +336,8 @@ class Fitter:
             delay_estimated=self.delay_estimated,
             initial_state=_initial_state(design, w, model),
             held_out=fitted.held_out,
-            ahead=fitted.ahead,
-            spread=trust.spread_of(fitted, log, self._given, delay),
+            ahead=trust.error_ahead(fitted, log, missed),
+            spread=trust.spread_of(fitted, log, missed, self._given, delay),
             counts=log.counts,
             left_out=self.left_out,
             spikes=self.spikes,

@@ -5,12 +5,16 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.fitting.runs import BoolArray
 
 # The start is left out as long as it is off by this many robust standard deviations, at most this fraction.
 UNSETTLED, LONGEST_UNSETTLED = 4.0, 0.1
 # A sample is a spike that is off from its neighbours by this many robust standard deviations, and this many
 # times as far as the nearest two are: about a kink they are half as far as the sample itself.
 SPIKE, ALONE = 8.0, 3.0
+# At a step the voltage moves by so many times what it does in the mean, and by this part of its range; so
+# many samples beside it a lag or creep may look like a jump or a spike of the sensor.
+STEP, LEAST_STEP, BESIDE = 8.0, 0.02, 5
 # Standard deviation of a normal distribution whose median is one from zero.
 NORMAL = 1.4826
 
@@ -29,6 +33,13 @@ def unsettled(residual: FloatArray) -> int:
     end = int(known[np.argmax(quiet)]) if np.any(quiet) else longest
     # Twice as long, for what has fallen below the threshold is not yet gone.
     return min(2 * end, longest)
+
+
+def beside_steps(u: FloatArray) -> BoolArray:
+    """Which samples are near a step of a voltage, shape (N,)."""
+    moves = np.abs(np.diff(u, prepend=u[0]))
+    steps = (moves > STEP * np.mean(moves)) & (moves > LEAST_STEP * np.ptp(u))
+    return np.convolve(steps, np.ones(2 * BESIDE + 1), mode="same") > 0.5
 
 
 def lonely(residual: FloatArray) -> Any:

@@ -49,7 +49,8 @@ class Fit:
     held_out : float
         Prediction error of each of five blocks except the first, from a fit to the others [µm rms].
     ahead : float
-        Prediction error of the last two blocks, from a fit to those before them [µm rms].
+        Prediction error of the last two blocks, from a fit to those before them [µm rms]; under voltages and
+        loops that those have seen, if they are a fifth of the blocks.
     spread : Spread
         Distance from the prediction that 95 of 100 readings do not exceed [µm].
     counts : ndarray of bool, shape (N,)

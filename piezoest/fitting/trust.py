@@ -7,6 +7,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.fitting.coordinates import late
+from piezoest.fitting.design import SLOWER
 from piezoest.fitting.loops import newness, running_mean, seen_loops
 from piezoest.fitting.outcome import BLOCKS, sandwich
 from piezoest.fitting.program import RIDGE
@@ -25,6 +26,8 @@ LEVEL = 4.5
 # A voltage beyond a range by less than this fraction of it is as good as in it; a block counts whose voltage
 # is, for this part of it.
 NEARLY, ENOUGH = 0.02, 0.2
+# A loop is as good as seen whose turns are from those of a seen one by less than this part of the range.
+SEEN = 0.1
 # Beyond the range, slopes are known to this fraction of the line's gain; to the second one if the model says
 # itself how a stage goes on.
 BEYOND, FORETOLD = 0.3, 0.1
@@ -129,7 +132,7 @@ class Spread(NamedTuple):
         return np.sqrt(
             self.within**2
             + (self.behind * np.log1p(later)) ** 2
-            + (self.drift * (later - np.log1p(later))) ** 2
+            + (self.drift * (later - SLOWER * np.log1p(later))) ** 2
             + (self.by_volt * beyond) ** 2
             + (self.by_move * faster) ** 2
             + (self.by_stay * _outside(running_mean(u, self.memory), self.stayed)) ** 2
@@ -168,25 +171,39 @@ def _range(u: FloatArray) -> tuple[float, float]:
     return float(u.min()), float(u.max())
 
 
-def spread_of(fitted: Fitted, log: Log, given: FloatArray, delay: float) -> Spread:
+def error_ahead(fitted: Fitted, log: Log, missed: Missed) -> float:
+    """Root mean square of what is missed in the last blocks by the fit of those before [µm].
+
+    Under voltages and loops that those have seen, if they are enough: how a model goes on beyond them says
+    nothing of it within.
+    """
+    first = int(log.folds[EARLIER])
+    before = _range(log.u[:first])
+    new = newness(log.u, before, seen_loops(log.u[:first], before))
+    near = _nearly_in(np.where(np.arange(log.u.size) < first, before[0], log.u), before)
+    told = _where(missed.ahead, near & (new <= SEEN * (before[1] - before[0])))
+    return float(np.sqrt(np.mean(told**2))) if told.any() else fitted.ahead
+
+
+def spread_of(fitted: Fitted, log: Log, missed: Missed, given: FloatArray, delay: float) -> Spread:
     """How far readings are from predictions, as the blocks left out show it.
 
     What comes after the record is like the blocks between others and like those behind all others: the
     geometric mean of both counts, of voltages that the fit without the block has seen. `given` is the
     voltage as it was written; the log has the one that is `delay` samples later.
     """
-    missed, ends = residuals(fitted, log), log.folds
+    ends = log.folds
     blocks = [slice(*each) for each in pairwise(ends[1:])]
     near = np.zeros(log.u.size, bool)
     for block in blocks:
         others = np.delete(log.u, block)
         near[block] = _nearly_in(log.u[block], _range(others))
-    between = _typical(missed.left_out, near)
+    between = _typical(_where(missed.left_out, near))
     if between is None:
         between = float(np.nanquantile(np.abs(missed.left_out), WITHIN))
     first = int(ends[EARLIER])
     near[first:] = _nearly_in(log.u[first:], _range(log.u[:first]))
-    ahead = _typical(missed.ahead, near)
+    ahead = _typical(_where(missed.ahead, near))
     off = max(abs(float(np.nanmean(missed.ahead[block]))) for block in blocks[EARLIER - 1 :])
     basis, visited = fitted.design.basis, _range(log.u)
     before = _range(log.u[:first])
@@ -216,13 +233,16 @@ def _nearly_in(u: FloatArray, visited: tuple[float, float]) -> BoolArray:
     return np.asarray(_beyond(u, visited) <= NEARLY * (visited[1] - visited[0]))
 
 
-def _typical(missed: FloatArray, near: BoolArray) -> float | None:
-    """What is missed at voltages near those that were seen [µm], where there are enough of them."""
+def _where(missed: FloatArray, near: BoolArray) -> FloatArray:
+    """What is missed at voltages near those that were seen [µm]; nothing if they are not enough."""
     known = np.isfinite(missed)
     counts = known & near
-    if np.count_nonzero(counts) <= ENOUGH * np.count_nonzero(known):
-        return None
-    return float(np.quantile(np.abs(missed[counts]), WITHIN))
+    return missed[counts & (np.count_nonzero(counts) > ENOUGH * np.count_nonzero(known))]
+
+
+def _typical(missed: FloatArray) -> float | None:
+    """The size below which nearly all is [µm], None if there is nothing."""
+    return float(np.quantile(np.abs(missed), WITHIN)) if missed.size else None
 
 
 def covariance(fitted: Fitted, log: Log) -> FloatArray:

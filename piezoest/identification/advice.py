@@ -32,7 +32,8 @@ def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
 
 def unsettled_sentence(seconds: float) -> str:
     """That the start was left out, which lasts so long [s]."""
-    return f"The first {seconds:.3g} s do not fit the rest (the stage had not settled): left out."
+    why = "the stage had not settled, or had gone another way before"
+    return f"The first {seconds:.3g} s do not fit the rest ({why}): left out."
 
 
 def beyond_sentences(name: str, learnt_on: LearntOn, u: FloatArray, sample_rate: float) -> list[str]:
@@ -119,8 +120,8 @@ def _creep(found: Identification, data: Data) -> list[str]:
         return []
     has = f"creeps by {100.0 * found.best.creep:.2g} %" if found.best.creep else "has none"
     return [
-        "Creep is not known: all swings of the voltage are alike and it never rests, so creep looks like a "
-        f"wider loop. The model {has}: where the voltage rests it may be off. Record a rest, too."
+        "Creep is not known: all swings of the voltage are alike and it never rests behind one, so creep "
+        f"looks like a wider loop. The model {has}: where the voltage rests it may be off. Record a rest too."
     ]
 
 

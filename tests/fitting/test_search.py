@@ -8,6 +8,8 @@ from scipy.optimize import nnls
 
 import piezoest as pz
 from piezoest._checks import FloatArray
+from piezoest.bench.zoo.families import draw_family
+from piezoest.bench.zoo.logs import REACHES
 from piezoest.fitting import Fit, search
 from tests.fitting.stages import RATE, N, T, noise, play_matrix, rms, stage, voltage
 
@@ -206,6 +208,16 @@ def test_a_jump_no_larger_than_what_the_stage_moves_in_a_sample_is_found(model: 
     left = y - found.predict().x
     assert abs(left[600:900].mean() - left[900:1200].mean()) < 0.25 * jump
     assert pz.fit(u, x, sample_rate=150.0, model=model).jumps.size == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_a_model_misses_at_steps_of_the_voltage_is_no_jump_of_the_sensor(seed: int) -> None:
+    rng, reach = np.random.default_rng(seed), REACHES[0]
+    u = reach.middle + reach.half * np.repeat(rng.uniform(-0.9, 0.9, 10), 300)
+    x = draw_family("bouc-wen", rng, reach, width=0.15, gain=0.1).simulate(u)
+    found = fit(u, x + noise(1e-3 * float(np.ptp(x)), seed, u.size), "plays")
+    assert found.jumps.size == 0
+    assert found.spikes == 0
 
 
 def test_spikes_dropouts_and_gaps_do_not_move_a_fit() -> None:
