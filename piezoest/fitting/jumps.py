@@ -121,17 +121,21 @@ def _step_at(
 ) -> tuple[FloatArray, FloatArray]:
     """Steps between lines through a few samples before and after each place, and how far those scatter.
 
-    `skipped`: samples from each place on that belong to neither side. `apart`: samples between both sides.
+    `skipped`: samples from each place on that belong to neither side. `apart`: samples between both sides; if
+    they are more than a line is drawn through, it leads anywhere, and the means have to step as well.
     """
     t = np.arange(EACH_SIDE) + 0.5
     middle = t - t.mean()
-    ends, off = [], np.zeros(found.size)
+    ends, means, off = [], [], np.zeros(found.size)
     for places in (
         found[:, None] - 1 - np.arange(EACH_SIDE),
         found[:, None] + skipped + np.arange(EACH_SIDE),
     ):
         values = h[places]
         mean, slope = values.mean(axis=1), values @ middle / (middle @ middle)
+        means.append(mean)
         ends.append(mean - slope * (t.mean() + 0.5 * apart))
         off += np.sum((values - mean[:, None] - slope[:, None] * middle) ** 2, axis=1)
-    return ends[1] - ends[0], np.sqrt(off / (2.0 * EACH_SIDE - 4.0))
+    steps, plain = ends[1] - ends[0], means[1] - means[0]
+    steps = np.where((apart > EACH_SIDE) & (np.abs(plain) < np.abs(steps)), plain, steps)
+    return steps, np.sqrt(off / (2.0 * EACH_SIDE - 4.0))

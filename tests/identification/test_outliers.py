@@ -189,3 +189,11 @@ def test_missing_samples_are_no_jumps() -> None:
         y = x.copy()
         y[apart(np.random.default_rng(seed), x.size, x.size // 100, 4)] = np.nan
         assert flawed(u, y).jumps.size <= 1, seed
+
+
+def test_what_a_stage_does_in_a_long_gap_is_no_jump() -> None:
+    for seed in SEEDS:
+        u, x, _, _ = zoo_log(seed)
+        start = int(np.random.default_rng(seed).integers(100, x.size - 500))
+        x[start : start + 200] = np.nan
+        assert not np.any(np.abs(flawed(u, x).jumps - start) <= 200), seed
