@@ -137,5 +137,6 @@ def _step_at(
         ends.append(mean - slope * (t.mean() + 0.5 * apart))
         off += np.sum((values - mean[:, None] - slope[:, None] * middle) ** 2, axis=1)
     steps, plain = ends[1] - ends[0], means[1] - means[0]
-    steps = np.where((apart > EACH_SIDE) & (np.abs(plain) < np.abs(steps)), plain, steps)
-    return steps, np.sqrt(off / (2.0 * EACH_SIDE - 4.0))
+    scatter = np.sqrt(off / (2.0 * EACH_SIDE - 4.0))
+    far = (apart > EACH_SIDE) & (np.abs(plain) < np.abs(steps))
+    return np.where(far, plain, steps), np.where(far, np.sqrt(2.0 / EACH_SIDE), 1.0) * scatter

@@ -59,10 +59,10 @@ def design_of(log: Log, basis: Basis, creep: Creep = NO_CREEP) -> Design:
     return Design(basis, log.sample_rate, log.u.size, creep, log.jumps)
 
 
-def regression(log: Log, basis: Basis, every: int = 1) -> Regression:
+def regression(log: Log, basis: Basis) -> Regression:
     """Sums of a basis without creep."""
     design = design_of(log, basis)
-    return Regression(design, sums_of(design, log, every=every))
+    return Regression(design, sums_of(design, log))
 
 
 def line_gain(log: Log) -> float:
@@ -73,11 +73,7 @@ def line_gain(log: Log) -> float:
 
 def missed(log: Log, basis: Basis) -> float:
     """Mean square that a basis leaves, by some thousand rows."""
-    return _left(_few(log, basis), log.drifts)
-
-
-def _few(log: Log, basis: Basis) -> Regression:
-    return regression(log, basis, max(1, int(np.count_nonzero(log.counts)) // FEW))
+    return _left(regression(log.thinned(FEW), basis), log.drifts)
 
 
 def _left(found: Regression, drift: bool) -> float:
@@ -92,10 +88,11 @@ def best_start(log: Log, *, once: bool) -> Start:
     with them, hardly any start is wrong. Of what the wide ones do later on the record tells little: there are
     only as many as are worth it.
     """
+    log = log.thinned(FEW)
 
     def cost(start: Start) -> float:
         basis = plays(log, start, bends=BENDS)
-        bent = _few(log, basis)
+        bent = regression(log, basis)
         left = _left(bent, log.drifts) * _left(bent.combined(*basis.merged()), log.drifts)
         return float(np.sqrt(left)) * PRICE**start.once
 
@@ -115,7 +112,7 @@ def _widest(log: Log, start: Start) -> float:
 
 def drifts(log: Log, basis: Basis) -> bool:
     """Whether a drift is clear beside a basis."""
-    few = _few(log, basis)
+    few = regression(log.thinned(FEW), basis)
     return _left(few, True) < CLEAR_DRIFT * _left(few, False)
 
 
@@ -160,9 +157,10 @@ def delay_step(log: Log, given: FloatArray, fitted: Fitted, delay: float) -> flo
 
 def best_alpha(log: Log) -> float:
     """alpha [1/V] of the Coleman-Hodgdon model that misses least."""
+    log = log.thinned(FEW)
 
     def cost(logarithm: float) -> float:
-        return missed(log, LoopColumns(float(np.exp(logarithm))))
+        return _left(regression(log, LoopColumns(float(np.exp(logarithm)))), log.drifts)
 
     low, high = np.log(np.array(ALPHAS) / (2.0 * log.half))
     return float(np.exp(_least(cost, np.linspace(low, high, 10), CLOSE_ALPHA)))
