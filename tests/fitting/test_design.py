@@ -224,3 +224,20 @@ def test_how_far_plays_move() -> None:
     # Below 4 V the play of 5 V goes from 0 to 4, from 4 to -5.
     parts = moving_of(u, thresholds, np.array([4.0]), start)
     np.testing.assert_allclose(parts, 2.0 * np.array([[18.0, 13.0, 0.0], [12.0, 2.0, 0.0]]) / 30.0)
+
+
+@pytest.mark.parametrize("basis", ["plays", "loop"])
+def test_a_thinned_log_has_the_rows_of_the_whole_one(basis: str) -> None:
+    """Between turns of the voltage, and in rests, nothing is remembered."""
+    rng = np.random.default_rng(3)
+    u = np.repeat(np.cumsum(rng.standard_normal(400)), rng.integers(1, 30, 400))
+    u = np.interp(np.arange(0.0, u.size, 0.25), np.arange(u.size), u)
+    log = Log(u, u + rng.standard_normal(u.size), rng.random(u.size) < 0.9, RATE, np.array([u.size // 2]))
+    few = log.thinned(500)
+    assert few.u.size < 0.3 * u.size
+    assert 500 <= np.count_nonzero(few.counts) < 1000
+    columns: Basis = LoopColumns(0.3) if basis == "loop" else search.plays(log, Start(3.0, 0.0), bends=2)
+    place = np.flatnonzero(np.isin(log.x, few.x[few.counts]))
+    rows = columns.rows(log.u, columns.begin())[place]
+    np.testing.assert_allclose(columns.rows(few.u, columns.begin())[few.counts], rows, atol=1e-9)
+    assert np.count_nonzero(place < log.jumps[0]) == np.count_nonzero(few.counts[: int(few.jumps[0])])
