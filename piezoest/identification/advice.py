@@ -120,8 +120,8 @@ def _creep(found: Identification, data: Data) -> list[str]:
         return []
     has = f"creeps by {100.0 * found.best.creep:.2g} %" if found.best.creep else "has none"
     return [
-        "Creep is not known: all swings of the voltage are alike and it never rests behind one, so creep "
-        f"looks like a wider loop. The model {has}: where the voltage rests it may be off. Record a rest too."
+        "Creep is not known: all swings of the voltage are alike and no rest follows them, so creep looks "
+        f"like a wider loop. The model {has}: where the voltage rests it may be off. Record a rest, too."
     ]
 
 
