@@ -82,9 +82,7 @@ def stand_at_reference(state: Any) -> None:
 @register_jitable
 def drive(state: Any, number: Any) -> None:
     """Let another model drive, without a bump."""
-    if number == state.driving:
-        return
-    state.switches += 1.0
+    state.switches += number != state.driving
     state.driving = number
     # Where the corridor held the last one back it stood elsewhere.
     stand_at_reference(state)
