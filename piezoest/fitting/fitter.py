@@ -142,6 +142,7 @@ class Fitter:
         self._given = bridged(u)
         if np.ptp(self._given) == 0.0:
             raise ValueError(f"u must move, it stays at {self._given[0]:g} V")
+        self._near_steps = beside_steps(self._given)
         counts &= ~flaws.unusable
         counts = remembered(u, self._given, counts)
         self.delay_estimated = delay == "auto"
@@ -190,7 +191,7 @@ class Fitter:
         log, basis = self._log, self._bent_plays if plays else self._loop
         residual = _residual(log, search.regression(log, basis).best(search.SMOOTH))
         places = jumps_left(residual, float(np.ptp(log.x[log.counts])))
-        places = places[~beside_steps(self._given)[places]]
+        places = places[~self._near_steps[places]]
         self.jumps = np.empty(0, np.int64)
         if not places.size:
             return
@@ -214,7 +215,7 @@ class Fitter:
         for _ in range(PASSES):
             residual = _residual(given, self._first.best(search.SMOOTH))
             further = self.left_out if settle is not None else max(unsettled(residual), self.left_out)
-            spikes = lonely(residual) & ~beside_steps(self._given)
+            spikes = lonely(residual) & ~self._near_steps
             spikes[:further] = False
             counts = given.counts & ~spikes
             counts[:further] = False

@@ -51,17 +51,21 @@ AT_BOUND = 1e-9
 class Missed(NamedTuple):
     """What is missed (N,), NaN where a sample does not count [µm].
 
-    By the fit without the sample's block, and in the last blocks by the one of those before.
+    By the fit without the sample's block, and in the last blocks by the one of those before; whether these
+    had a voltage near it, and how new its loop is to theirs [V].
     """
 
     left_out: FloatArray
     ahead: FloatArray
+    near: BoolArray
+    new: FloatArray
 
 
 def residuals(fitted: Fitted, log: Log) -> Missed:
     """What the fits without each block miss in it."""
     without, ahead = np.full((2, log.u.size), np.nan)
-    later = np.arange(log.u.size) >= log.folds[EARLIER]
+    first = int(log.folds[EARLIER])
+    later, before = np.arange(log.u.size) >= first, _range(log.u[:first])
     for place, rows in fitted.design.blocks(log.u, fitted.w):
         fold, counts = log.fold(place), log.counts[place]
         for k in np.unique(fold[fold > 0]):
@@ -70,7 +74,9 @@ def residuals(fitted: Fitted, log: Log) -> Missed:
             without[place.start + np.flatnonzero(here)] = missed
         missed = log.x[place] - times(rows, fitted.earlier)
         ahead[place] = np.where(counts & later[place], missed, np.nan)
-    return Missed(without, ahead)
+    near = later.copy()
+    near[first:] = _nearly_in(log.u[first:], before)
+    return Missed(without, ahead, near, newness(log.u, before, seen_loops(log.u[:first], before)))
 
 
 class Spread(NamedTuple):
@@ -177,11 +183,8 @@ def error_ahead(fitted: Fitted, log: Log, missed: Missed) -> float:
     Under voltages and loops that those have seen, if they are enough: how a model goes on beyond them says
     nothing of it within.
     """
-    first = int(log.folds[EARLIER])
-    before = _range(log.u[:first])
-    new = newness(log.u, before, seen_loops(log.u[:first], before))
-    near = _nearly_in(np.where(np.arange(log.u.size) < first, before[0], log.u), before)
-    told = _where(missed.ahead, near & (new <= SEEN * (before[1] - before[0])))
+    seen = missed.new <= SEEN * float(np.ptp(log.u[: log.folds[EARLIER]]))
+    told = _where(missed.ahead, missed.near & seen)
     return float(np.sqrt(np.mean(told**2))) if told.any() else fitted.ahead
 
 
@@ -201,13 +204,9 @@ def spread_of(fitted: Fitted, log: Log, missed: Missed, given: FloatArray, delay
     between = _typical(_where(missed.left_out, near))
     if between is None:
         between = float(np.nanquantile(np.abs(missed.left_out), WITHIN))
-    first = int(ends[EARLIER])
-    near[first:] = _nearly_in(log.u[first:], _range(log.u[:first]))
-    ahead = _typical(_where(missed.ahead, near))
+    ahead = _typical(_where(missed.ahead, missed.near))
     off = max(abs(float(np.nanmean(missed.ahead[block]))) for block in blocks[EARLIER - 1 :])
     basis, visited = fitted.design.basis, _range(log.u)
-    before = _range(log.u[:first])
-    new = newness(log.u, before, seen_loops(log.u[:first], before))
     memory = STAYED * log.u.size
     by_line = 0.0 if basis.foretells else NEW if basis.bent or fitted.design.terms else NEW_TO_PLAYS
     by_gain = FORETOLD if basis.foretells else BEYOND
@@ -221,7 +220,7 @@ def spread_of(fitted: Fitted, log: Log, missed: Missed, given: FloatArray, delay
         moved=float(np.max(_moves(given, delay))),
         by_new=by_line * fitted.regression.line_missed / log.half,
         seen=seen_loops(given, visited),
-        usual=float(np.quantile(new[first:], USUAL)),
+        usual=float(np.quantile(missed.new[ends[EARLIER] :], USUAL)),
         by_stay=CREEPS * fitted.regression.line_gain,
         memory=memory,
         stayed=_range(running_mean(given, memory)),
