@@ -67,6 +67,33 @@ def test_a_line_of_units_is_heeded(tmp_path: Path) -> None:
     np.testing.assert_allclose(record.displacement, 1e-3 * DISPLACEMENT)
 
 
+@pytest.mark.parametrize(
+    "above",
+    [
+        "# t[ms] U[mV] x[nm]",
+        "# date\n# t (ms)  U (mV)  x (nm)",
+        "# t U x\n# ms mV nm",
+        "# t [ms], U [mV], x [nm]",
+        "t (ms)  drive voltage (mV)  x (nm)",
+    ],
+)
+def test_names_and_units_above_rows_that_blanks_part(tmp_path: Path, above: str) -> None:
+    file = write(tmp_path / "log.txt", " ", rows_of(str), header="")
+    file.write_text(above + "\n" + file.read_text())
+    record = read_record(file)
+    assert record.sample_rate == pytest.approx(1e3 * RATE)
+    np.testing.assert_allclose(record.voltage, 1e-3 * VOLTAGE)
+    np.testing.assert_allclose(record.displacement, 1e-3 * DISPLACEMENT)
+
+
+@pytest.mark.parametrize("comment", ["# measured by me", "# t x y", "# a b c", "# 1 2 3"])
+def test_a_comment_that_names_no_columns_is_none(tmp_path: Path, comment: str) -> None:
+    file = write(tmp_path / "log.txt", " ", rows_of(str), header="")
+    file.write_text(comment + "\n" + file.read_text())
+    check(file)
+    assert "columns without names" in read_record(file).notes[0]
+
+
 def test_rows_below_other_lines_without_a_header_go_by_number(tmp_path: Path) -> None:
     file = write(tmp_path / "log.csv", ",", rows_of(str), header="")
     file.write_text("Scope\nDate,2026-11-01\n" + file.read_text())
@@ -96,6 +123,14 @@ def german(value: float) -> str:
 @pytest.mark.parametrize("header", ["t,u,x", ""])
 def test_separators_of_thousands(tmp_path: Path, separator: str, write_number: Any, header: str) -> None:
     check(write(tmp_path / "log.csv", separator, rows_of(write_number), header))
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("mark", [".", ","])
+def test_whole_numbers_beside_groups_of_three_are_refused(tmp_path: Path, separator: str, mark: str) -> None:
+    rows = [(str(k), f"{60 + k}", f"{13 * k * k + 400:,}".replace(",", mark)) for k in range(N)]
+    with pytest.raises(ValueError, match="thousands"):
+        read_record(write(tmp_path / "log.csv", separator, rows))
 
 
 def test_a_mark_that_appears_late_is_no_number(tmp_path: Path) -> None:

@@ -34,13 +34,15 @@ WILD = 10.0
 # So few excursions, for each sample, and so few samples in them are wrong; more of them, or so many changes,
 # are the excitation.
 FEW, MOST_LOST, MANY = 0.015, 0.05, 0.1
-# A voltage stands still for so many samples, and times as long as it usually does. It is wrong if the
-# displacement leaves it by so many times as much as it does in most of other stretches of that length, and by
-# this part of its range.
-SHORTEST, UNLIKELY, LEFT, MOST, MOVED = 12, 5.0, 1.5, 0.95, 0.05
+# A voltage stands still for so many samples, and times as long as it usually does. It is wrong if it ends
+# with a step of so many times most of the changes, and if the displacement leaves it by so many times as much
+# as it does in most of other stretches of that length, and by this part of its range.
+SHORTEST, UNLIKELY, CAUGHT_UP, LEFT, MOST, MOVED = 12, 5.0, 3.0, 1.5, 0.95, 0.05
 # ... but for a few samples of the stretch: the displacement may be late.
 MIDDLE = (0.1, 0.9)
 STRETCHES = 100
+# ... and of the changes, most are no greater than this quantile of them.
+USUALLY = 0.9
 
 
 def lost_voltage(u: FloatArray, x: FloatArray) -> BoolArray:
@@ -124,11 +126,21 @@ def _steps(u: FloatArray, extent: float) -> _Steps:
 
 
 def _still(u: FloatArray) -> list[slice]:
-    """Stretches in which the voltage stands still for longer than usual."""
-    same = np.diff(u) == 0.0
-    starts, stops = runs(same)
-    shortest = max(SHORTEST, UNLIKELY * u.size / max(float(np.sum(~same)), 1.0))
-    return [slice(*each) for each in zip(starts, stops + 1, strict=True) if each[1] - each[0] >= shortest]
+    """Stretches in which the voltage stands still for longer than usual, and then catches up by a step.
+
+    Behind a rest it moves on as before: what the displacement does there is a drift, or a jump of the sensor.
+    """
+    changes = np.abs(np.diff(u))
+    moves = changes > 0.0
+    starts, stops = runs(~moves)
+    if not moves.any():
+        return []
+    shortest = max(SHORTEST, UNLIKELY * u.size / float(np.sum(moves)))
+    step = CAUGHT_UP * float(np.quantile(changes[moves], USUALLY))
+    # The last stretch may be stuck for good.
+    ends = np.append(changes, np.inf)[stops] > step
+    stuck = (stops + 1 - starts >= shortest) & ends
+    return [slice(*each) for each in zip(starts[stuck], stops[stuck] + 1, strict=True)]
 
 
 def _excursions(

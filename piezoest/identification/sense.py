@@ -22,6 +22,8 @@ AMPLIFIER_INPUT, LARGEST_INPUT_GAIN = 13.0, 300.0
 LARGEST_VOLTAGE = 2000.0
 # Sample rates [Hz], and how long a swing there and back may take [s].
 RATES, WAVES = (1.0, 1e7), (2e-5, 3600.0)
+# Days as Excel and as MATLAB count them, about now; taken for seconds, samples come faster than this [Hz].
+CALENDARS, TOO_FAST = ((3e4, 8e4), (7e5, 8e5)), 8e4
 # Part of the stroke by which a loop is open the wrong way, in this part of its branches.
 CLOCKWISE, MOST_BRANCHES = 0.015, 0.8
 # Deviation from a straight line, relative to the stroke, that no piezo stage keeps to; a doubtful one.
@@ -134,6 +136,12 @@ def _timing(log: Examined) -> Iterator[Finding]:
     if not low * (1.0 + 1e-6) < log.rate <= high:
         yield doubt(
             "sample rate", f"The sample rate would be {log.rate:.4g} Hz: {doubtful}, or the sample rate."
+        )
+    elif log.rate > TOO_FAST and any(low < log.record.time[0] < high for low, high in CALENDARS):
+        yield doubt(
+            "days",
+            f"Time begins at {log.record.time[0]:.6g}, as a date in days does, and the sample rate would be "
+            f"{log.rate:.4g} Hz: give the unit, as in units time='days'.",
         )
     elif log.wave < WAVES[0] or WAVES[1] < log.wave < np.inf:
         yield doubt(

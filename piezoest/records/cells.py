@@ -14,6 +14,7 @@ SPACED = re.compile(GROUPS.format(SPACES) + r"(?!\d)")
 EXPONENT = r"(?:[eE][-+]?\d+)?"
 PLAIN = re.compile(rf"[-+]?(\d*)([.,])(\d*){EXPONENT}")
 ONE_GROUP = re.compile(GROUPS.format("[.,]") + EXPONENT)
+WHOLE = re.compile(r"[-+]?\d+")
 OTHER = {",": ".", ".": ","}
 GROUPED = {
     thousands: re.compile(rf"{GROUPS.format(re.escape(thousands))}(?:{re.escape(decimal)}\d*)?{EXPONENT}")
@@ -48,6 +49,32 @@ def style_of(cells: Iterable[str]) -> Style:
         _agree(seen.get((OTHER[decimals[0]], "unclear")), seen[decimals[0], "decimal"])
     decimals = decimals or [mark for mark in OTHER if (mark, "unclear") in seen]
     return Style(decimals[0] if len(decimals) == 1 else ".,")
+
+
+class Marks:
+    """Refuses 14.027 beside 986 in a column where no number has fewer or more digits behind its mark.
+
+    It may be 14 027.
+    """
+
+    def __init__(self) -> None:
+        self.marked = self.whole = ""
+        self.sure = False
+
+    def see(self, cell: str) -> None:
+        """Look at a cell of the column."""
+        text = cell.strip()
+        if WHOLE.fullmatch(text):
+            self.whole = self.whole or text
+        elif ONE_GROUP.fullmatch(text):
+            self.marked = self.marked or text
+        else:
+            self.sure = self.sure or PLAIN.fullmatch(text) is not None
+
+    def check(self) -> None:
+        """Raise ValueError if the numbers can be read in two ways."""
+        if not self.sure:
+            _agree(self.marked or None, self.whole or None)
 
 
 def _agree(one: str | None, other: str | None) -> None:

@@ -19,8 +19,8 @@ NAMES = {
 }  # fmt: skip
 UNITS = {
     "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0,
-             "second": 1.0, "seconds": 1.0, "milliseconds": 1e-3, "microseconds": 1e-6, "minutes": 60.0,
-             "hours": 3600.0, "days": 86_400.0},
+             "msec": 1e-3, "usec": 1e-6, "h": 3600.0, "hr": 3600.0, "second": 1.0, "seconds": 1.0,
+             "milliseconds": 1e-3, "microseconds": 1e-6, "minutes": 60.0, "hours": 3600.0, "days": 86_400.0},
     "voltage": {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "kv": 1e3, "millivolts": 1e-3},
     "displacement": {"um": 1.0, "micron": 1.0, "microns": 1.0, "nm": 1e-3, "pm": 1e-6, "mm": 1e3, "m": 1e6,
                      "micrometer": 1.0, "micrometers": 1.0, "micrometre": 1.0, "micrometres": 1.0,
@@ -147,6 +147,16 @@ def split_unit(title: str) -> tuple[str, str]:
     if any(unit in units for units in UNITS.values()):
         return match[1].replace("_", " ").strip(), unit
     return plain.replace("_", " "), ""
+
+
+def known(titles: list[str]) -> bool:
+    """Whether each title names another quantity, by its name or its unit."""
+    split = [split_unit(title) for title in titles]
+    found = [
+        [quantity for quantity in NAMES if name.lower() in NAMES[quantity] or unit in UNITS[quantity]]
+        for name, unit in split
+    ]
+    return all(found) and len({quantities[0] for quantities in found}) == len(titles)
 
 
 def titled(name: str, unit: str) -> str:

@@ -3,7 +3,9 @@
 import csv
 import io
 import itertools
+import re
 import warnings
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.records.cells import MISSING, Style, is_missing, is_number, is_stamp, number, style_of
-from piezoest.records.columns import titled, with_units
+from piezoest.records import cells as written
+from piezoest.records.cells import MISSING, Style, is_missing, is_number, is_stamp, number
+from piezoest.records.columns import known, titled, with_units
 from piezoest.records.lines import COMMENTS, Lines, chunks, encoding_of, sample_lines
 from piezoest.records.source import LogError, Rows, Source, finite, floats, shown
 
@@ -22,6 +25,8 @@ MOST_BLANK = 0.1
 HEAD_LINES, STAMP_ROWS = 10_000, 100
 # Lines that instruments write above the header, at most.
 LONGEST_PREAMBLE = 200
+# Lines that are looked at together.
+PART = 500
 
 
 Numbered = tuple[int, str]  # a line and its number in the file
@@ -47,11 +52,9 @@ def layout_of(path: Path) -> Layout:
     lines = itertools.chain.from_iterable(
         enumerate(text.split("\n"), first) for first, text, _ in chunks(path, encoding, 1000)
     )
-    head = [
-        (place, line)
-        for place, line in itertools.islice(lines, HEAD_LINES)
-        if not line.lstrip().startswith(COMMENTS)
-    ]
+    head, comments = [], []
+    for place, line in itertools.islice(lines, HEAD_LINES):
+        (comments if line.lstrip().startswith(COMMENTS) else head).append((place, line))
     filled = [(place, line) for place, line in head if line.strip()]
     if not filled:
         raise LogError(f"{path}: the file is empty")
@@ -59,6 +62,7 @@ def layout_of(path: Path) -> Layout:
     delimiter, header, rows = _table(path, filled)
     if not rows:
         raise LogError(f"{path}: no rows below the header")
+    header = header or _named_in_comment(path, comments, rows[0], delimiter)
     texts = [line for _, line in rows]
     stamps: dict[int, Any] = {}
     if any(":" in line for line in texts[:STAMP_ROWS]):
@@ -88,6 +92,8 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
     like_first = len(head[begins]) == len(first) and _delimiter(filled[begins][1]) == mark
     if begins < 2 or like_first or len(head) < min(len(filled), LONGEST_PREAMBLE):
         header, begins = ([], 0) if _numeric(first) else (first, 1)
+        if header and len(head) > 1 and len(header) != len(head[1]):
+            header = _titles(path, filled[0][1], mark, len(head[1]))
         if header and len(head) > 2 and (named := with_units(header, head[1])):
             header, begins = named, 2
         return mark, header, filled[begins:]
@@ -98,22 +104,65 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
     return _delimiter(filled[begins][1]), header, filled[begins:]
 
 
+def _named_in_comment(path: Path, comments: list[Numbered], row: Numbered, delimiter: str) -> list[str]:
+    """Names of columns in the last comment above the first row, or the last but one with units below them.
+
+    So NumPy's savetxt writes them.
+    """
+    width, signs = len(split(path, [row[1]], delimiter)[0]), "".join(COMMENTS)
+    above = [
+        _titles(path, line.lstrip().lstrip(signs), delimiter, width)
+        for place, line in comments
+        if place < row[0]
+    ]
+    names = above[-1] if above else []
+    if len(above) > 1 and (named := with_units(above[-2], names)):
+        names = named
+    return names if len(names) == width and known(names) else []
+
+
+def _titles(path: Path, line: str, delimiter: str, width: int) -> list[str]:
+    """Names of columns in a line, parted as the rows are or in another way that gives as many, known ones."""
+    text = line.strip()
+    ways = [split(path, [text], mark)[0] for mark in (delimiter, _delimiter(text))]
+    # Names may hold single blanks, as in ``time (s)``.
+    ways += [re.split(r"\s+(?![(\[])", text), re.split(r"\s{2,}|\t", text)]
+    fit = [[cell.strip() for cell in way] for way in ways if len(way) == width]
+    return next(filter(known, fit), fit[0] if fit else ways[0])
+
+
 def _numeric(*rows: list[str]) -> bool:
     return all(is_number(cell) for row in rows for cell in row)
 
 
 def _style(path: Path, lines: list[str], delimiter: str) -> Style:
     # Where commas stand between numbers, one with a comma has quotation marks.
-    mark = '"' if delimiter == "," else ","
-    if not any(mark in line for line in lines):
+    points, commas = (any(mark in line for line in lines) for mark in (".", '"' if delimiter == "," else ","))
+    if not points and not commas:
         # Without any mark in the beginning, either may come later.
-        return Style("." if delimiter == "," or any("." in line for line in lines) else ".,")
+        return Style("." if delimiter == "," else ".,")
     try:
-        return style_of(cell for row in split(path, lines, delimiter) for cell in row)
+        style = Style(".")
+        if commas:
+            style = written.style_of(cell for row in split(path, lines, delimiter) for cell in row)
+        if not style.thousands:
+            _check_columns(path, lines, delimiter)
+        return style
     except LogError:
         raise
     except ValueError as error:
         raise LogError(f"{path}: {error}") from None
+
+
+def _check_columns(path: Path, lines: list[str], delimiter: str) -> None:
+    """Refuse columns whose numbers can be read in two ways; in parts, which need less memory."""
+    columns: defaultdict[int, written.Marks] = defaultdict(written.Marks)
+    for start in range(0, len(lines), PART):
+        for row in split(path, lines[start : start + PART], delimiter):
+            for i, cell in enumerate(row):
+                columns[i].see(cell)
+    for column in columns.values():
+        column.check()
 
 
 def split(path: Path, lines: list[str], delimiter: str) -> list[list[str]]:

@@ -109,6 +109,11 @@ def with_rest() -> Log:
     return log(u)
 
 
+def jump_in_rest() -> Log:
+    u, x, rate = with_rest()
+    return u, x + 1.2 * (np.arange(N) >= 3000), rate
+
+
 # name: (the log, name of the finding, a phrase of its sentence)
 FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "nm taken for um": (lambda: times(x=1e3), "too large", "nm taken for µm"),
@@ -166,6 +171,7 @@ FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "a spike of the voltage": (stands(1570, 1571, u=90.0), "wrong voltage", "1 sample "),
     "a voltage of zero": (stands(3600, 3630, u=0.0), "wrong voltage", "30 samples"),
     "a voltage that stands still": (stands(2900, 3100, u=np.nan), "wrong voltage", "at 2.9 s"),
+    "a jump of the sensor in a rest": (jump_in_rest, "jumps", "jumps once"),
     "a long rest": (with_rest, "rests", "rests once"),
     "a strong drift": (with_(lambda u, x: (u, x + 0.4 * T)), "drift", "drifts by +3"),
 }
@@ -188,6 +194,19 @@ def test_missing_readings_hide_nothing() -> None:
     x[1500:4500] = np.nan
     record = Record(np.arange(u.size) / rate, u, x, rate, skipped=3000)
     assert [found.name for found in findings(record)] == ["clockwise", "missing"]
+
+
+def test_a_date_in_days_is_no_time_in_seconds() -> None:
+    """MATLAB counts days; 100 Hz would be 8.6 MHz."""
+    u, x, _ = log()
+    days = 739_948.4 + 10.0 * T / 86_400.0
+    record = Record(days, u, x, (N - 1) / (days[-1] - days[0]))
+    assert next(found.name for found in findings(record)) == "days"
+
+
+def test_a_jump_in_a_rest_leaves_the_voltage_alone() -> None:
+    u, x, _ = jump_in_rest()
+    assert not flawed(u, x).voltage.any()
 
 
 def test_flaws_say_where() -> None:
