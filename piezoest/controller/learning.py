@@ -55,7 +55,7 @@ FARTHEST = 3.0
 
 
 @register_jitable
-def _begin_learning(state: Any, settings: Any) -> None:
+def _begin_learning(state: Any) -> None:
     """The gain is known: all models begin with the line through the present point."""
     start = state.start
     if state.unit * start.gain <= 0.0:
@@ -300,7 +300,7 @@ def _home(state: Any, settings: Any, u: Any, x: Any) -> None:
     if recent.count > 0.0:
         here = recent.mean_x + line.gain * (u - recent.mean_u)
     starts.rest_at(start, settings.start, u, here, line.gain)
-    _begin_learning(state, settings)
+    _begin_learning(state)
 
 
 @register_jitable
@@ -313,7 +313,7 @@ def _seek(state: Any, settings: Any, u: Any, x: Any) -> None:
     _name_silence(state, settings)
     if state.start.stage == starts.DONE:
         paces.conclude(state.pace, state.start, u)
-        _begin_learning(state, settings)
+        _begin_learning(state)
 
 
 @register_jitable

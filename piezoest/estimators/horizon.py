@@ -1,6 +1,5 @@
 """Moving-horizon estimation: the output-error problem on a sliding window, on CasADi."""
 
-import time
 from collections.abc import Iterable
 from typing import Any
 
@@ -91,7 +90,7 @@ class MovingHorizon(Hopping):
     'updated'
     """
 
-    __slots__ = ("_hop", "_message", "_seconds", "_window")
+    __slots__ = ("_hop", "_message", "_window")
 
     def __init__(
         self,
@@ -140,7 +139,7 @@ class MovingHorizon(Hopping):
             "u": kernel.NOTHING, "x": kernel.NOTHING, **self._held_at(q, np.diag(deviation**2)),
         }  # fmt: skip
         self._begin(self._arguments, kernel.layout(q.size, m, self._window, noise), values)
-        self._message, self._seconds = "", float("nan")
+        self._message = ""
 
     def _rules(self, state: Any) -> Iterable[Rule]:
         yield no_more_than(state["samples"], state["missing"])
@@ -211,7 +210,7 @@ class MovingHorizon(Hopping):
 
     def _solve(self) -> None:
         """Fit the window, move the arrival cost on by a hop; without success hold what is held."""
-        began, state = time.perf_counter(), self._state
+        state = self._state
         u, x, first = self._in_order()
         known = u != kernel.NOTHING
         if not known.any():
@@ -235,7 +234,6 @@ class MovingHorizon(Hopping):
         if failed:
             state[...] = kept
             state["failures"] += 1.0
-        self._seconds = time.perf_counter() - began
 
     def _fit(self, problem: Problem, points: Any, leaving: int) -> str:
         """Solve, hold what is good, and move the arrival cost on; returns the solver's words."""
@@ -311,15 +309,10 @@ class MovingHorizon(Hopping):
         """What the solver said last; empty before the first solve, and not saved."""
         return self._message
 
-    @property
-    def last_solve_seconds(self) -> float:
-        """Time that the last solve took [s]; NaN before the first."""
-        return self._seconds
-
     def reset(self) -> None:
         """Return to the state after construction."""
         super().reset()
-        self._message, self._seconds = "", float("nan")
+        self._message = ""
 
 
 def _arrival_cost(problem: Problem, q: FloatArray, k: int, walk: FloatArray) -> tuple[FloatArray, Prior]:

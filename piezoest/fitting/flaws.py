@@ -104,13 +104,6 @@ class Flaws(NamedTuple):
             self.repeated[:end],
         )
 
-    @property
-    def stretch(self) -> IntArray:
-        """Number of the stretch between jumps that each sample lies in, from 0, shape (N,)."""
-        starts = np.zeros(self.spikes.size, dtype=np.int64)
-        starts[self.jumps] = 1
-        return np.cumsum(starts)
-
 
 def flawed(u: Any, x: Any) -> Flaws:
     """Find spikes, jumps, dropouts and rests in a log.

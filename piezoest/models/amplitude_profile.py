@@ -70,26 +70,6 @@ class AmplitudeProfile:
         values = [float(np.interp(swing, self.swings, self.theta[:, i])) for i in range(3)]
         return ColemanHodgdon(*values)
 
-    def swing_for(self, amplitude: float) -> float:
-        """Size of swing [V] that moves the stage by an amplitude to both sides.
-
-        Parameters
-        ----------
-        amplitude : float
-            [µm].
-
-        Raises
-        ------
-        ValueError
-            If the profile is empty, or amplitude is not above zero.
-        """
-        r = positive("amplitude", amplitude) * np.sin(np.linspace(0.0, 6.0 * np.pi, 1500))
-        swing = float(self.swings[-1]) if self.swings.size else 1.0
-        for _ in range(5):
-            u = self.at(swing).invert(r)[500:]
-            swing = float(np.max(u) - np.min(u))
-        return swing
-
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe dictionary; its ``"model"`` is that of the largest swing."""
         data: dict[str, Any] = {

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
-from piezoest._checks import FloatArray, array_1d, finite, integer, non_negative, positive
+from piezoest._checks import FloatArray, array_1d, finite, integer, positive
 from piezoest.signals._arguments import number_of_samples
 
 # An increment is a jump when it is both a visible part of the range and out of proportion to what
@@ -241,9 +241,7 @@ def smooth_rise(n: int) -> FloatArray:
     return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 
 
-def check_continuity(
-    values: ArrayLike, sample_rate: float | None = None, name: str = "signal", *, allowed_step: float = 0.0
-) -> None:
+def check_continuity(values: ArrayLike, sample_rate: float | None = None, name: str = "signal") -> None:
     """Refuse samples with jumps, which the Coleman-Hodgdon model cannot take.
 
     The model is defined for continuous inputs with a bounded derivative (paper, below (1)): "not unfiltered
@@ -268,9 +266,6 @@ def check_continuity(
         Hz, for the time in the message.
     name : str
         What the message calls the values.
-    allowed_step : float
-        Steps up to this size, in the unit of the values, always pass: the step of a quantiser, for a
-        recorded signal that moves by only a few of them.
 
     Raises
     ------
@@ -279,12 +274,11 @@ def check_continuity(
         (N,) or not finite.
     """
     values = array_1d(name, values)
-    allowed_step = non_negative("allowed_step", allowed_step)
     if values.size < 3:
         return
     increments = np.abs(np.diff(values))
     extent = float(np.ptp(values))
-    candidates = np.flatnonzero(increments > max(JUMP_FRACTION_OF_RANGE * extent, allowed_step))
+    candidates = np.flatnonzero(increments > JUMP_FRACTION_OF_RANGE * extent)
     if candidates.size == 0:
         return
     padding = np.full(NEIGHBOURS_ON_EACH_SIDE, np.nan)
