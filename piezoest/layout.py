@@ -25,7 +25,7 @@ import functools
 import importlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self, cast
 
 import numpy as np
 
@@ -276,6 +276,13 @@ class Copied:
     """What has a state of its own, which its copies do not share."""
 
     __slots__ = ()
+
+    #: Attributes with machine code. It is neither copied nor pickled: None there means "look it up again".
+    _machine_code: ClassVar[tuple[str, ...]] = ()
+
+    def __getstate__(self) -> Any:
+        kept, slots = cast(Any, super().__getstate__())
+        return kept, {**slots, **dict.fromkeys(self._machine_code)}
 
     def copy(self) -> Self:
         """Return an independent one in the same state."""

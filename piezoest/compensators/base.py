@@ -1,7 +1,7 @@
 """What linear and inverse feed-forward share: the model's inverse, limits, gradual change of the model."""
 
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -45,6 +45,8 @@ class Compensator(Copied):
         "_layouts", "_limits", "_loops", "_model", "_options", "_projected", "_sample_rate", "_settings",
         "_start", "_state", "_waiting",
     )  # fmt: skip
+
+    _machine_code: ClassVar[tuple[str, ...]] = ("_loops",)
 
     _layouts: tuple[Record, Record]
     _loops: tuple[Any, Any] | None
@@ -102,11 +104,6 @@ class Compensator(Copied):
     def layouts(self) -> tuple[Record, Record]:
         """Layouts of `state` and `settings`, see `piezoest.compensators.inverse_kernel`."""
         return self._layouts
-
-    def __getstate__(self) -> Any:
-        # Machine code is not pickled: it is looked up again.
-        kept, slots = cast(Any, super().__getstate__())
-        return kept, {**slots, "_loops": None}
 
     def reset(self, voltage: float | None = None, displacement: float | None = None) -> None:
         """Return to the state after construction, with the model given there.

@@ -1,10 +1,9 @@
 """Adaptive feed-forward as one object: it takes a reference, returns a voltage, and learns from readings."""
 
-import copy
 import dataclasses
 import logging
 from collections import deque
-from typing import Any, Self, cast
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -95,6 +94,8 @@ class AdaptiveFeedforward(Face):
     """
 
     __slots__ = ("_loops", "_options", "_planned", "_start")
+
+    _machine_code: ClassVar[tuple[str, ...]] = ("_loops",)
 
     _loops: tuple[Any, ...] | None
     _planned: FloatArray | None
@@ -297,19 +298,7 @@ class AdaptiveFeedforward(Face):
         level = logging.WARNING if warned else logging.INFO
         _log.log(level, "%s at %.6g s, %s", event.action, event.time, event.reason)
 
-    # ------------------------------------------------------------ copies and files
-
-    def copy(self) -> Self:
-        """Return an independent controller in the same state."""
-        return copy.deepcopy(self)
-
-    def __copy__(self) -> Self:
-        return self.copy()
-
-    def __getstate__(self) -> Any:
-        # Machine code is not pickled: it is looked up again.
-        kept, own = cast(Any, super().__getstate__())
-        return kept, {**own, "_loops": None}
+    # ------------------------------------------------------------ files
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as a JSON-safe dictionary; `from_dict` continues with identical numbers."""

@@ -6,11 +6,11 @@ from typing import Any
 from piezoest.compensators.limits import VoltageLimits
 from piezoest.controller import shown
 from piezoest.controller.shown import Candidate, ControllerStatus, Event
-from piezoest.layout import Record
+from piezoest.layout import Copied, Record
 from piezoest.models import Model
 
 
-class Face:
+class Face(Copied):
     """All that can be read of a controller."""
 
     __slots__ = (

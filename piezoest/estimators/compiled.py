@@ -1,7 +1,7 @@
 """What estimators whose samples go through compiled functions share."""
 
 from collections.abc import Iterable
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -39,6 +39,7 @@ class CompiledEstimator(EstimatorBase):
     #: Functions within ``kernel.sample`` that no model depends on: a controller leaves them out.
     unneeded: ClassVar[tuple[Any, ...]] = ()
 
+    _machine_code: ClassVar[tuple[str, ...]] = ("_step_loop", "_run_loop")
     _places: ClassVar[dict[str, tuple[str, ...]]] = {"P": ("law", "P")}
 
     _settings_layout: Record
@@ -51,11 +52,6 @@ class CompiledEstimator(EstimatorBase):
         self._settings_layout = layout
         self._settings = new(layout, **values)
         self._step_loop = self._run_loop = None
-
-    def __getstate__(self) -> Any:
-        # Machine code is not pickled: it is looked up again.
-        kept, slots = cast(Any, super().__getstate__())
-        return kept, {**slots, "_step_loop": None, "_run_loop": None}
 
     @property
     def settings(self) -> Any:

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable
-from typing import Any, Protocol, cast
+from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,6 +90,8 @@ class SimulatedStage(Copied):
         "_state", "_step_loop", "_temperature", "_temperature_law",
     )  # fmt: skip
 
+    _machine_code: ClassVar[tuple[str, ...]] = ("_step_loop", "_run_loop")
+
     def __init__(
         self,
         sample_rate: float,
@@ -150,11 +152,6 @@ class SimulatedStage(Copied):
             gauge=self._gauge._settings(fs),
         )
         self._rest = new(state_layout, mechanics=(offset, 0.0), gauge=self._gauge._rest(offset, fs))
-
-    def __getstate__(self) -> Any:
-        # Machine code is neither copied nor pickled: it is looked up again.
-        kept, slots = cast(Any, super().__getstate__())
-        return kept, {**slots, "_step_loop": None, "_run_loop": None}
 
     def __repr__(self) -> str:
         """Class, sample rate and kind of hysteresis."""
