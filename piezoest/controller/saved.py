@@ -15,21 +15,14 @@ from piezoest.layout import FIXED, NUMBER, Kind, Numbers, Record, by_name
 
 FORMAT = 8
 _FIELDS = (
-    "controller", "format", "sample_rate", "limits", "corridor", "gain", "feedback", "resonance",
-    "learnt_on", "estimators", "state", "models", "planned", "events",
+    "sample_rate", "limits", "corridor", "gain", "feedback", "resonance", "learnt_on", "estimators", "state",
+    "models", "planned", "events",
 )  # fmt: skip
 
 
 def check_head(name: str, data: Any) -> None:
     """Refuse what is no dictionary of a controller of this version."""
-    instance("data", data, dict, "a dictionary that to_dict() gave")
-    if "controller" not in data:
-        raise ValueError(f"data has no 'controller': pass what {name}.to_dict() gave")
-    if data["controller"] != name:
-        raise ValueError(f"data is of a {data['controller']!r}, not of a {name}")
-    if data.get("format") != FORMAT:
-        raise ValueError(f"data has format {data.get('format')!r}, this version reads {FORMAT}")
-    fields("data", data, _FIELDS)
+    saved_state.check_head("controller", name, FORMAT, data, _FIELDS)
 
 
 def read_limits(data: Any) -> VoltageLimits:

@@ -369,7 +369,8 @@ class EstimatorBase(Copied, ABC):
             If the dictionary is of another class or format, a field is missing or unknown, an argument is
             refused, or the state is none that the estimator can have been in.
         """
-        saved_state.check_head(cls.__name__, _FORMAT, data, cls._saved_too)
+        needed = ("arguments", "state", "pending", *cls._saved_too)
+        saved_state.check_head("estimator", cls.__name__, _FORMAT, data, needed)
         estimator: Self = saved_state.construct(cls, data["arguments"])
         estimator._load(
             saved_state.check(data["state"], estimator._layout, estimator._start, estimator._rules)

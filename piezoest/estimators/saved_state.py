@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from piezoest._checks import FloatArray, fields, finite
+from piezoest._checks import FloatArray, fields, finite, instance
 from piezoest.layout import ABSENT, Kind, Record, leaves
 
 # Least argument other than zero, and the reciprocal of the largest.
@@ -114,17 +114,16 @@ def is_covariance(P: FloatArray, definite: bool) -> bool:
     return bool(np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0] >= -INDEFINITE)
 
 
-def check_head(name: str, version: int, data: Any, more: tuple[str, ...]) -> None:
-    """Refuse a dictionary that is not of the class `name` and this version's format."""
-    if not isinstance(data, dict):
-        raise ValueError(f"data must be a dictionary that to_dict() gave, got {type(data).__name__}")
-    if "estimator" not in data:
-        raise ValueError(f"data has no 'estimator': pass what {name}.to_dict() gave")
-    if data["estimator"] != name:
-        raise ValueError(f"data is of a {data['estimator']!r}, not of a {name}")
+def check_head(key: str, name: str, version: int, data: Any, needed: Iterable[str]) -> None:
+    """Refuse a dictionary that is not of the class `name`, given at `key`, and this version's format."""
+    instance("data", data, dict, "a dictionary that to_dict() gave")
+    if key not in data:
+        raise ValueError(f"data has no {key!r}: pass what {name}.to_dict() gave")
+    if data[key] != name:
+        raise ValueError(f"data is of a {data[key]!r}, not of a {name}")
     if data.get("format") != version:
         raise ValueError(f"data has format {data.get('format')!r}, this version reads {version}")
-    fields("data", data, ("estimator", "format", "arguments", "state", "pending", *more))
+    fields("data", data, (key, "format", *needed))
 
 
 def construct(cls: Any, arguments: Any) -> Any:
