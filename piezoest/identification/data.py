@@ -11,7 +11,7 @@ from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.gaps import remembered
 from piezoest.fitting.runs import BoolArray
 from piezoest.fitting.surprise import noise_in
-from piezoest.identification.examined import FEWEST_TURNS
+from piezoest.identification.examined import FEWEST_SAMPLES, FEWEST_TURNS
 from piezoest.identification.sense import Finding
 from piezoest.models import ColemanHodgdon, LinearGain
 from piezoest.records import Record
@@ -68,6 +68,15 @@ def judged(record: Record, flaws: Flaws, trained: int = 0) -> BoolArray:
     u, counts = flaws.without(record.voltage), record.usable & ~flaws.unusable
     whole, later = bridged(u), np.arange(counts.size) >= trained
     return remembered(u, whole, counts & ~later) | remembered(u, whole, counts & later)
+
+
+def check_enough(part: str, log: str, usable: int) -> None:
+    """Refuse a log in which a part, named in words, has too few usable samples."""
+    if usable < FEWEST_SAMPLES:
+        raise ValueError(
+            f"the {part} of {log} has {counted(usable, 'usable sample')}, at least {FEWEST_SAMPLES} are "
+            "needed: record longer"
+        )
 
 
 def noise_of(data: Data) -> float:

@@ -13,7 +13,8 @@ from piezoest.identification.loop_direction import Loop, loop_of
 from piezoest.records import Record
 from piezoest.signals.turns import TURN, turns
 
-FEWEST_TURNS = 2
+# What a log must have; the samples also in each part that a model is fitted to or judged on.
+FEWEST_SAMPLES, FEWEST_TURNS = 50, 2
 # Part of the displacement's scatter that a line in the voltage must not leave, if they belong together.
 UNRELATED = 0.5
 

@@ -16,7 +16,7 @@ from piezoest.identification.advice import advice_of, beyond_sentences, other_lo
 from piezoest.identification.candidate import Candidate
 from piezoest.identification.choice import best_of, reason_for
 from piezoest.identification.clipping import levels
-from piezoest.identification.data import Data, check_excitation, judged, noise_of, prepare
+from piezoest.identification.data import Data, check_enough, check_excitation, judged, noise_of, prepare
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.repeats import noise_floor
 from piezoest.identification.residual import Misfit, Whiteness
@@ -25,9 +25,7 @@ from piezoest.identification.sense import Finding, findings
 from piezoest.models import LearntOn
 from piezoest.records import Record
 from piezoest.records.as_record import as_record
-from piezoest.records.source import counted
 
-FEWEST_SAMPLES = 50
 # A parameter that is not known to this fraction of itself was not excited by the record.
 LARGEST_RELATIVE_ERROR = 0.5
 
@@ -118,7 +116,7 @@ def identify(
     others = [as_record(each) for each in logs]
     validated = [(each, flawed(each.voltage, each.displacement)) for each in others]
     for each, its in validated:
-        _enough("part to validate", each, judged(each, its))
+        check_enough("part to validate", each.source, int(np.count_nonzero(judged(each, its))))
     say("looking at the log")
     for name in ("voltage", "displacement"):
         if not np.any(np.isfinite(getattr(record, name))):
@@ -126,8 +124,8 @@ def identify(
     trained = round(train * len(record))
     flaws = flawed(record.voltage, record.displacement)
     counts = judged(record, flaws, trained)
-    _enough("fitted part", record, counts[:trained])
-    _enough("held-out part", record, counts[trained:])
+    check_enough("fitted part", record.source, int(np.count_nonzero(counts[:trained])))
+    check_enough("held-out part", record.source, int(np.count_nonzero(counts[trained:])))
     usable = np.where(flaws.unusable, np.nan, record.displacement)[:trained]
     first = prepare(flaws.without(record.voltage)[:trained], usable)
     noise = noise_of(first)
@@ -198,15 +196,6 @@ def identify(
 
 def _doubts(found: Sequence[Finding]) -> list[str]:
     return [each.sentence for each in found if each.severity == "doubt"]
-
-
-def _enough(name: str, record: Record, counts: BoolArray) -> None:
-    usable = int(np.count_nonzero(counts))
-    if usable < FEWEST_SAMPLES:
-        raise ValueError(
-            f"the {name} of {record.source} has {counted(usable, 'usable sample')}, at least "
-            f"{FEWEST_SAMPLES} are needed: record longer"
-        )
 
 
 def _candidate(fitter: Fitter, name: str, record: Record, flaws: Flaws, counts: BoolArray) -> Candidate:

@@ -9,12 +9,11 @@ import numpy as np
 
 from piezoest.fitting.held import repeats
 from piezoest.identification.clipping import flat_tops, levels
-from piezoest.identification.examined import FEWEST_TURNS, Examined
+from piezoest.identification.examined import FEWEST_SAMPLES, FEWEST_TURNS, Examined
 from piezoest.identification.feedback_in_log import answer
 from piezoest.records import Record
 from piezoest.records.source import counted
 
-FEWEST_SAMPLES = 50
 MOST_MISSING = 0.1
 # What stages do: gain [µm/V] and stroke [µm]. Inputs of amplifiers, up to some 12 V, have greater gains.
 GAINS, STROKES = (1e-3, 30.0), (0.05, 2500.0)

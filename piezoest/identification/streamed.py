@@ -18,8 +18,9 @@ from piezoest.fitting.search import BENDS, checked_delay, plays
 from piezoest.identification.advice import delay_sentences, unsettled_sentence
 from piezoest.identification.candidate import left_out_error
 from piezoest.identification.choice import simplest
-from piezoest.identification.data import check_excitation, noise_of, prepare
+from piezoest.identification.data import check_enough, check_excitation, noise_of, prepare
 from piezoest.identification.drawing import Drawn
+from piezoest.identification.examined import FEWEST_SAMPLES
 from piezoest.identification.lag import tells_lag
 from piezoest.identification.parts import Part, Progress, parts, pieces
 from piezoest.identification.residual import Misfit
@@ -29,7 +30,6 @@ from piezoest.models import LearntOn, Model
 from piezoest.records import Record, RecordStream
 from piezoest.records.source import counted
 
-FEWEST_SAMPLES = 50
 # Points kept for figures, and for how far plays move.
 MOST_POINTS = 20_000
 
@@ -361,12 +361,7 @@ class _Judge:
     def misfit(self, *, held_out: bool, of_line: bool = False) -> Misfit:
         """Return the error so far, of the model or of the line, in the fitted part or behind it."""
         squares, largest, count = self._sums[int(held_out), int(of_line)]
-        if count < FEWEST_SAMPLES:
-            name = "held-out part" if held_out else "fitted part"
-            raise ValueError(
-                f"the {name} of the log has {counted(int(count), 'usable sample')}, at least "
-                f"{FEWEST_SAMPLES} are needed: record longer"
-            )
+        check_enough("held-out part" if held_out else "fitted part", "the log", int(count))
         return Misfit(float(np.sqrt(squares / count)), float(largest))
 
     def thinned(self, log: RecordStream) -> Record:
