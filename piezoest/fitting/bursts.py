@@ -21,13 +21,7 @@ MOST, RARE = 0.02, 0.02
 
 
 def wild(u: FloatArray, x: FloatArray) -> BoolArray:
-    """Readings so far beyond the range of the others that no stage moves there, shape (N,).
-
-    Parameters
-    ----------
-    u, x : ndarray, shape (N,)
-        Voltage [V] and displacement [µm], NaN where they are missing.
-    """
+    """Readings [µm] so far beyond the range of the others that no stage moves there, shape (N,)."""
     known = np.isfinite(x)
     low, high = np.quantile(x[known], [RARE, 1.0 - RARE])
     beyond = np.where(known, np.maximum(low - x, x - high), 0.0)
@@ -48,16 +42,9 @@ def bursts(
 ) -> tuple[IntArray, IntArray]:
     """Stretches [start, end) of a few samples that are all off by far, after which all is as it was.
 
-    Parameters
-    ----------
-    h : ndarray, shape (N,)
-        Displacement less what a straight line makes of the voltage, without gaps [µm].
-    explained : ndarray, shape (N,)
-        What the voltage may do to a sample [µm].
-    extent : float
-        Range of the displacement [µm].
-    stuck : ndarray, shape (N,), bool
-        Samples that are known to be wrong.
+    `h` (N,): displacement less what a straight line makes of the voltage, without gaps [µm]. `explained`
+    (N,): what the voltage may do to a sample [µm]. `extent`: range of the displacement [µm]. `stuck` (N,):
+    samples that are known to be wrong.
     """
     starts, ends = np.empty((2, 0), np.int64)
     for count in range(SHORTEST, LONGEST + 1):

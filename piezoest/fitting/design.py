@@ -85,27 +85,13 @@ class Basis(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """All columns: the model's, creep gains and creep at the start, offset, drift and jumps.
+    """All columns: the model's, creep gains and creep at the start, offset, drift and jumps."""
 
-    Parameters
-    ----------
-    basis : Basis
-        The model's own columns.
-    sample_rate : float
-        [Hz].
-    samples : int
-        Length of the record, over which a drift counts by one.
-    creep : Creep
-        Terms that the model's columns go through, with the gains known so far.
-    jumps : ndarray
-        First samples behind jumps of the displacement.
-    """
-
-    basis: Basis
-    sample_rate: float
-    samples: int
-    creep: Creep = NO_CREEP
-    jumps: FloatArray = field(default_factory=lambda: np.empty(0))
+    basis: Basis  # the model's own columns
+    sample_rate: float  # [Hz]
+    samples: int  # length of the record, over which a drift counts by one
+    creep: Creep = NO_CREEP  # terms that the model's columns go through, with the gains known so far
+    jumps: FloatArray = field(default_factory=lambda: np.empty(0))  # first samples behind the sensor's jumps
 
     @property
     def terms(self) -> int:

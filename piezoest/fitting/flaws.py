@@ -42,32 +42,18 @@ JUMPED = 0.2
 
 
 class Flaws(NamedTuple):
-    """What in a log belongs to no stage.
+    """What in a log belongs to no stage. Marks of samples have shape (N,)."""
 
-    Parameters
-    ----------
-    spikes, dropouts : ndarray, shape (N,), bool
-        Samples of the displacement that are off alone or up to six together, or beyond all others as error
-        codes are; samples at which the reading stands still while the voltage moves.
-    jumps : ndarray, shape (J,), int
-        First samples after a step of the displacement that no step of the voltage explains.
-    jump_sizes : ndarray, shape (J,)
-        [µm].
-    rests : ndarray, shape (R, 2), int
-        Stretches [start, end) in which the voltage stands still.
-    voltage : ndarray, shape (N,), bool
-        Samples of the voltage that the displacement does not answer: spikes, zeros, and those at which the
-        column stands still while the stage moves.
-    repeated : ndarray, shape (N,), bool
-        Samples that repeat the reading before, where the sensor measures less often than the log has samples.
-    """
-
+    # Displacement that is off, alone or up to six samples together, or beyond all others as error codes are.
     spikes: BoolArray
-    dropouts: BoolArray
-    jumps: IntArray
-    jump_sizes: FloatArray
-    rests: IntArray
+    dropouts: BoolArray  # the reading stands still while the voltage moves
+    jumps: IntArray  # first samples after steps that no step of the voltage explains, (J,)
+    jump_sizes: FloatArray  # [µm], (J,)
+    rests: IntArray  # stretches [start, end) in which the voltage stands still, (R, 2)
+    # Voltage that the displacement does not answer: spikes, zeros, and a column that stands still while the
+    # stage moves.
     voltage: BoolArray
+    # Repetitions of the reading before, where the sensor measures less often than the log has samples.
     repeated: BoolArray
 
     @property
@@ -76,23 +62,11 @@ class Flaws(NamedTuple):
         return self.spikes | self.dropouts | self.voltage | self.repeated
 
     def without(self, u: FloatArray) -> FloatArray:
-        """The voltage with NaN where it is wrong.
-
-        Parameters
-        ----------
-        u : ndarray, shape (N,)
-            [V].
-        """
+        """The voltage [V] with NaN where it is wrong."""
         return np.where(self.voltage, np.nan, u)
 
     def before(self, end: int) -> Flaws:
-        """Those of the first samples.
-
-        Parameters
-        ----------
-        end : int
-            How many samples.
-        """
+        """Those of the first `end` samples."""
         jumps, rests = self.jumps < end, self.rests[:, 0] < end
         return Flaws(
             self.spikes[:end],
@@ -106,25 +80,11 @@ class Flaws(NamedTuple):
 
 
 def flawed(u: Any, x: Any) -> Flaws:
-    """Find spikes, jumps, dropouts and rests in a log.
+    """Find spikes, jumps, dropouts and rests in an evenly sampled log.
 
-    Parameters
-    ----------
-    u, x : array_like, shape (N,)
-        Voltage [V], displacement [µm]; NaN where a sample is missing. Evenly sampled.
+    Voltage [V] and displacement [µm] are NaN where a sample is missing. Nothing is found where fewer than 64
+    samples are known, or one of the two never moves. ValueError if they are not numbers of one shape (N,).
 
-    Returns
-    -------
-    Flaws
-        Nothing in it where fewer than 64 samples are known, or voltage or displacement never move.
-
-    Raises
-    ------
-    ValueError
-        If the arrays are not numbers of one shape (N,).
-
-    Examples
-    --------
     >>> import numpy as np
     >>> from piezoest.fitting.flaws import flawed
     >>> u = 10.0 * np.sin(np.linspace(0.0, 40.0, 4000))

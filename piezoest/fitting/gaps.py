@@ -18,11 +18,7 @@ ENOUGH = 0.5
 def remembered(u: FloatArray, bridged: FloatArray, counts: BoolArray) -> BoolArray:
     """Of the samples that count, those at which no turn in a gap is remembered; all of them if those are few.
 
-    Parameters
-    ----------
-    u, bridged : ndarray, shape (N,)
-        Voltage, NaN where it is missing, and with straight lines there [V].
-    counts : ndarray, shape (N,), bool
+    `u`: voltage, NaN where it is missing [V]; `bridged`: the same with straight lines there.
     """
     known = counts & ~forgotten(u, bridged)
     return known if np.count_nonzero(known) > ENOUGH * np.count_nonzero(counts) else counts
@@ -32,12 +28,7 @@ def forgotten(u: FloatArray, bridged: FloatArray) -> BoolArray:
     """Samples behind a gap of the voltage at which a turn in the gap may still be remembered.
 
     In a gap the voltage may have turned. What a stage remembers of that is wiped out when the voltage has
-    gone as far, both ways.
-
-    Parameters
-    ----------
-    u, bridged : ndarray, shape (N,)
-        Voltage, NaN where it is missing, and with straight lines there [V].
+    gone as far, both ways. `u` and `bridged` are as in `remembered`.
     """
     found = np.zeros(u.size, dtype=np.bool_)
     starts, ends = runs(~np.isfinite(u))

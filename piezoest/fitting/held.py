@@ -17,12 +17,9 @@ FEWEST_READINGS = 64
 
 
 def repeats(u: FloatArray, x: FloatArray) -> int:
-    """How many times in a row each reading stands where all are held alike; 1 if they are not.
+    """How many times in a row each reading [µm] stands where all are held alike; 1 if they are not.
 
-    Parameters
-    ----------
-    u, x : ndarray, shape (N,)
-        Voltage [V] and displacement [µm]. Where the voltage stands as long, the stage stands still.
+    Where the voltage [V] stands as long, the stage stands still.
     """
     changed = np.flatnonzero(np.diff(x) != 0.0)
     if changed.size < FEWEST_CHANGES:
@@ -47,12 +44,7 @@ def held(u: FloatArray, x: FloatArray) -> BoolArray:
     """Which samples only repeat the reading before, shape (N,); none if the log is of no slow sensor.
 
     Of a reading that stands far longer than the others, as that of a sensor that is lost does, one sample is
-    taken in the usual time.
-
-    Parameters
-    ----------
-    u, x : ndarray, shape (N,)
-        Voltage [V] and displacement [µm], NaN where they are missing.
+    taken in the usual time. Voltage [V] and displacement [µm] are NaN where they are missing.
     """
     nothing = np.zeros(x.size, dtype=np.bool_)
     known = np.flatnonzero(np.isfinite(u) & np.isfinite(x))

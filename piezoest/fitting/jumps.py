@@ -71,14 +71,8 @@ class _Still:
 def jumps_left(residual: FloatArray, size: float) -> IntArray:
     """First samples after what may be jumps that a fit has left: the largest steps of its residual, if any.
 
-    A jump of about what the stage moves in a sample is seen only where a fit has taken the motion away.
-
-    Parameters
-    ----------
-    residual : ndarray, shape (N,)
-        What a fit has left [µm]; NaN where a sample does not count.
-    size : float
-        Range of the displacement [µm].
+    A jump of about what the stage moves in a sample is seen only where a fit has taken the motion away. The
+    residual [µm] is NaN where a sample does not count; `size` is the range of the displacement [µm].
     """
     known = np.flatnonzero(np.isfinite(residual))[:, None]
     still = _Still(np.zeros(residual.size), size)

@@ -20,15 +20,10 @@ REMEMBERED = 1.0
 
 
 def loops_of(u: FloatArray, visited: tuple[float, float]) -> FloatArray:
-    """The last two remembered turns at each voltage, shape (N, 2) [V].
+    """The last two remembered turns at each sample of a voltage without gaps, shape (N, 2) [V].
 
-    Parameters
-    ----------
-    u : ndarray, shape (N,)
-        Without gaps [V].
-    visited : tuple of float
-        A range; beyond it the voltage is taken as at its end. Where only one turn is remembered, the other
-        one is an end of it.
+    Beyond the range `visited` the voltage is taken as at its end. Where only one turn is remembered, the
+    other one is an end of it.
     """
     low, high = visited
     loops = np.empty((u.size, 2))
@@ -66,15 +61,7 @@ def newness(u: FloatArray, visited: tuple[float, float], seen: FloatArray) -> Fl
 
 
 def running_mean(u: FloatArray, memory: float) -> FloatArray:
-    """Mean of the voltage so far that forgets with a time constant, shape (N,) [V].
-
-    Parameters
-    ----------
-    u : ndarray, shape (N,)
-        [V]; it begins at the first one.
-    memory : float
-        The time constant [samples].
-    """
+    """Mean of the voltage so far, shape (N,) [V], that forgets with a time constant of `memory` samples."""
     mean = np.array(u)
     _average(np.exp(-1.0 / memory), mean)
     return mean

@@ -46,13 +46,7 @@ USUALLY = 0.9
 
 
 def lost_voltage(u: FloatArray, x: FloatArray) -> BoolArray:
-    """Samples whose voltage is wrong, shape (N,).
-
-    Parameters
-    ----------
-    u, x : ndarray, shape (N,)
-        Voltage [V] and displacement [µm], NaN where they are missing; at least 64 samples are known.
-    """
+    """Samples whose voltage [V] is wrong, shape (N,); NaN is missing, and at least 64 samples are known."""
     rows = (u == 0.0) & (x == 0.0)
     if np.mean(rows) < FEW:
         x = np.where(rows, np.nan, x)
@@ -87,10 +81,7 @@ def _lost(u: FloatArray, x: FloatArray, unseen: BoolArray) -> BoolArray:
 def delay_of(u: FloatArray, x: FloatArray) -> int:
     """Samples by which bends of the displacement come after those of the voltage; 0 if that does not show.
 
-    Parameters
-    ----------
-    u, x : ndarray, shape (N,)
-        Voltage [V] and displacement [µm] without gaps.
+    Both are without gaps.
     """
     size = min(u.size, 200_000)
     bent_u, bent_x = np.diff(u[:size], 2), np.diff(x[:size], 2)

@@ -69,31 +69,17 @@ def starts(u: FloatArray) -> list[Start]:
 
 @dataclass(frozen=True, slots=True)
 class PlayColumns:
-    """Plays of given thresholds, cut at bends into segments that add up to them.
+    """Plays of given thresholds, cut at bends into segments that add up to them."""
 
-    Parameters
-    ----------
-    thresholds : ndarray, shape (n,)
-        [V], rising from zero, which is the voltage itself.
-    bends : ndarray, shape (k,)
-        Voltages at which slopes may change [V].
-    start : Start
-        Where the plays were before the first sample.
-    visited : tuple of float
-        Range of the voltage of the record that is fitted [V].
-    moving : ndarray, shape (k + 1, n)
-        How far each play goes in it within each segment, relative to the voltage's whole way divided by the
-        number of segments.
-    moved : int, optional
-        How many of the plays moved in it; those beyond begin in its middle, so that they move one after
-        the other as the voltage goes further on either side.
-    """
-
-    thresholds: FloatArray
-    bends: FloatArray
-    start: Start
-    visited: tuple[float, float]
+    thresholds: FloatArray  # [V], (n,), rising from zero, which is the voltage itself
+    bends: FloatArray  # voltages at which slopes may change [V], (k,)
+    start: Start  # where the plays were before the first sample
+    visited: tuple[float, float]  # range of the voltage of the record that is fitted [V]
+    # How far each play goes in it within each segment, relative to the voltage's whole way divided by the
+    # number of segments, (k + 1, n).
     moving: FloatArray
+    # How many of the plays moved in it; those beyond begin in its middle, so that they move one after the
+    # other as the voltage goes further on either side.
     moved: int | None = None
 
     @property

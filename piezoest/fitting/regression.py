@@ -30,30 +30,14 @@ DRIFT = 1e-2
 
 @dataclass(frozen=True)
 class Log:
-    """What is fitted.
+    """What is fitted."""
 
-    Parameters
-    ----------
-    u : ndarray, shape (N,)
-        Voltage without gaps [V].
-    x : ndarray, shape (N,)
-        Displacement [µm].
-    counts : ndarray of bool, shape (N,)
-        Which samples count.
-    sample_rate : float
-        [Hz].
-    jumps : ndarray
-        First samples behind jumps of the displacement.
-    drifts : bool
-        Whether it drifts so much that starts, delays and alphas are compared beside a drift.
-    """
-
-    u: FloatArray
-    x: FloatArray
-    counts: Any
-    sample_rate: float
-    jumps: FloatArray
-    drifts: bool = False
+    u: FloatArray  # voltage without gaps [V], (N,)
+    x: FloatArray  # displacement [µm], (N,)
+    counts: Any  # which samples count, (N,)
+    sample_rate: float  # [Hz]
+    jumps: FloatArray  # first samples behind jumps of the displacement
+    drifts: bool = False  # so much that starts, delays and alphas are compared beside a drift
 
     @property
     def middle(self) -> float:
@@ -107,36 +91,16 @@ def add(sums: list[Sums], rows: FloatArray, x: FloatArray, counts: Any, fold: In
 
 @dataclass(frozen=True)
 class Fitted:
-    """A regression's best coefficients.
+    """A regression's best coefficients."""
 
-    Parameters
-    ----------
-    regression : Regression
-        What they belong to.
-    w : ndarray, shape (columns,)
-        All of them.
-    smoothness : float
-        How much unevenness cost.
-    used : ndarray
-        Columns that were fitted.
-    held_out : float
-        Root of the mean square of what all blocks but the first miss under the fit of the others [µm].
-    without : list of ndarray
-        Coefficients of the fit without each of them.
-    ahead : float
-        The same of the blocks behind the first `EARLIER`, under the fit of those [µm].
-    earlier : ndarray
-        Coefficients of the fit of the first `EARLIER` blocks.
-    """
-
-    regression: Regression
-    w: FloatArray
-    smoothness: float
-    used: IntArray
-    held_out: float
-    without: list[FloatArray]
-    ahead: float
-    earlier: FloatArray
+    regression: Regression  # what they belong to
+    w: FloatArray  # all of them, (columns,)
+    smoothness: float  # how much unevenness cost
+    used: IntArray  # columns that were fitted
+    held_out: float  # rms of what all blocks but the first miss under the fit of the others [µm]
+    without: list[FloatArray]  # coefficients of the fit without each of them
+    ahead: float  # the same of the blocks behind the first `EARLIER`, under the fit of those [µm]
+    earlier: FloatArray  # coefficients of the fit of the first `EARLIER` blocks
 
     @property
     def design(self) -> Design:

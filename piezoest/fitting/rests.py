@@ -18,13 +18,7 @@ STANDS, BENT, LONGER_IN_NOISE = 0.1, 6.0, 5
 
 
 def rests_of(u: FloatArray) -> IntArray:
-    """Stretches [start, end) in which a voltage without gaps stands still, shape (R, 2).
-
-    Parameters
-    ----------
-    u : ndarray, shape (N,)
-        [V].
-    """
+    """Stretches [start, end) in which a voltage [V] without gaps stands still, shape (R, 2)."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     extent = float(np.ptp(u))

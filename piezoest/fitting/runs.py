@@ -9,11 +9,6 @@ IntArray = np.ndarray[Any, np.dtype[np.int64]]
 
 
 def runs(marks: BoolArray) -> tuple[IntArray, IntArray]:
-    """Starts and ends [start, end) of the stretches in which marks are set.
-
-    Parameters
-    ----------
-    marks : ndarray, shape (N,), bool
-    """
+    """Starts and ends [start, end) of the stretches in which marks are set."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], marks, [False]))))
     return edges[::2], edges[1::2]

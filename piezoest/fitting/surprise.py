@@ -21,12 +21,8 @@ BENDS, TRAINED_ON = 2, 10_000
 def surprise(y: FloatArray, inputs: FloatArray, each_side: int) -> FloatArray:
     """What the neighbours of each value, and an input about it, do not foresee of it, shape (N,).
 
-    Parameters
-    ----------
-    y, inputs : ndarray, shape (N,)
-        Values, and the bends of what drives them, in the same unit.
-    each_side : int
-        Neighbours on either side that are asked; as many values at both ends are not judged: zero.
+    `inputs` are the bends of what drives the values, in the same unit. So many neighbours are asked on either
+    side; as many values at both ends are not judged: zero.
     """
     # Single samples all over the log: a stretch of it might be a rest.
     rows = np.arange(each_side, y.size - each_side, max(1, y.size // TRAINED_ON))
@@ -63,17 +59,7 @@ def noise_in(third: FloatArray) -> float:
 
 
 def is_peak(size: FloatArray, reach: int, found: IntArray) -> BoolArray:
-    """Whether no value within so many samples is greater, for each place.
-
-    Parameters
-    ----------
-    size : ndarray, shape (N,)
-        Values.
-    reach : int
-        Samples on either side.
-    found : ndarray, shape (M,), int
-        Places.
-    """
+    """For each place `found`, whether no value within `reach` samples on either side is greater."""
     about = np.clip(found[:, None] + np.arange(-reach, reach + 1), 0, size.size - 1)
     return np.asarray(size[found] >= np.max(size[about], axis=1))
 
@@ -102,12 +88,8 @@ def _robust(A: FloatArray, b: FloatArray) -> FloatArray:
 def scale_of(e: FloatArray, block: int = BLOCK) -> FloatArray:
     """Standard deviation about each sample, shape (N,): of the log, or of where it is greater.
 
-    Parameters
-    ----------
-    e : ndarray, shape (N,)
-        What is not foreseen; at least as many samples as in a block.
-    block : int
-        Samples for which a scale holds. What stands out in a quarter of them does not make it greater.
+    `e` is what is not foreseen, of at least `block` samples: so long a scale holds. What stands out in a
+    quarter of them does not make it greater.
     """
     size: FloatArray = np.abs(e)
     whole = float(np.quantile(size[:: max(1, size.size // 100_000)], QUANTILE)) / NORMAL_QUANTILE

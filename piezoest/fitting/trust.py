@@ -80,54 +80,24 @@ def residuals(fitted: Fitted, log: Log) -> Missed:
 
 
 class Spread(NamedTuple):
-    """How far a reading may be from a prediction: half of the interval that holds 95 of 100 [µm].
+    """How far a reading may be from a prediction: half of the interval that holds 95 of 100 [µm]."""
 
-    Parameters
-    ----------
-    within : float
-        In the record.
-    behind : float
-        More behind the record, times ln(1 + time since its end / its length): the level wanders.
-    by_volt : float
-        More for each volt by which the voltage has gone beyond its range: the slope there is known roughly
-        only, and the stage remembers it [µm/V].
-    visited : tuple of float
-        That range [V].
-    by_move : float
-        More for each volt by which the voltage has moved further within the delay than in the record [µm/V].
-    delay : float
-        Samples by which the displacement lags the voltage.
-    moved : float
-        How far the voltage moves in the record within the delay [V].
-    by_new : float
-        More for each volt by which the loops of the voltage are new [µm/V].
-    seen : ndarray, shape (M, 2), optional
-        The loops of the record, by their last two turns [V].
-    usual : float
-        How new the loops of its last blocks are to those before [V]: the blocks show what that does.
-    by_stay : float
-        More for each volt by which the voltage's running mean leaves that of the record [µm/V].
-    memory : float
-        Samples that this mean remembers.
-    stayed : tuple of float
-        Range of the mean in the record [V].
-    drift : float
-        What drifts in the record [µm]. Behind it a prediction drifts ever more slowly; the stage may not.
-    """
-
-    within: float
-    behind: float
+    within: float  # in the record
+    behind: float  # more behind it, times ln(1 + time since its end / its length): the level wanders
+    # More for each volt by which the voltage has gone beyond its range: the slope there is known roughly
+    # only, and the stage remembers it [µm/V].
     by_volt: float
-    visited: tuple[float, float]
-    by_move: float = 0.0
-    delay: float = 0.0
-    moved: float = 0.0
-    by_new: float = 0.0
-    seen: FloatArray | None = None
-    usual: float = 0.0
-    by_stay: float = 0.0
-    memory: float = 1.0
-    stayed: tuple[float, float] = (0.0, 0.0)
+    visited: tuple[float, float]  # that range [V]
+    by_move: float = 0.0  # more for each volt moved further within the delay than in the record [µm/V]
+    delay: float = 0.0  # samples by which the displacement lags the voltage
+    moved: float = 0.0  # how far the voltage moves in the record within the delay [V]
+    by_new: float = 0.0  # more for each volt by which the loops of the voltage are new [µm/V]
+    seen: FloatArray | None = None  # the loops of the record, by their last two turns [V], (M, 2)
+    usual: float = 0.0  # how new the loops of its last blocks are to those before them [V]
+    by_stay: float = 0.0  # more for each volt by which the voltage's running mean leaves the record's [µm/V]
+    memory: float = 1.0  # samples that this mean remembers
+    stayed: tuple[float, float] = (0.0, 0.0)  # range of the mean in the record [V]
+    # What drifts in the record [µm]. Behind it a prediction drifts ever more slowly; the stage may not.
     drift: float = 0.0
 
     def along(self, u: FloatArray, later: FloatArray) -> FloatArray:

@@ -16,17 +16,7 @@ AS_WELL, STILL = 1.5, 4.0
 
 
 def interval(best: Candidate, candidates: Iterable[Candidate], u: FloatArray | None) -> Prediction:
-    """Prediction of the best kind along a voltage, or along the record; wider by how far others are from it.
-
-    Parameters
-    ----------
-    best : Candidate
-        The chosen one.
-    candidates : iterable of Candidate
-        All of them.
-    u : ndarray, shape (N,), optional
-        Voltage [V]; by default the record's.
-    """
+    """Prediction of the best kind along a voltage [V], or the record; wider by how far others are from it."""
     own, apart = _along(best, u), [np.zeros(1)]
     for each in candidates:
         if each is best or each.cross_validated > STILL * best.cross_validated:

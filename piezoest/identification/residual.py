@@ -105,31 +105,16 @@ class Whiteness:
 
 
 class Oscillation(NamedTuple):
-    """The strongest oscillation of a residual.
+    """The strongest oscillation of a residual."""
 
-    Parameters
-    ----------
-    frequency : float
-        [Hz].
-    share : float
-        Part of the residual's square that it makes.
-    """
-
-    frequency: float
-    share: float
+    frequency: float  # [Hz]
+    share: float  # part of the residual's square that it makes
 
     @classmethod
     def of(cls, residual: FloatArray, sample_rate: float) -> Oscillation:
         """Look for the strongest one; NaN counts as absent.
 
         The spectrum is the mean of those of `SEGMENTS` parts (Welch, 1967).
-
-        Parameters
-        ----------
-        residual : ndarray, shape (N,)
-            [µm].
-        sample_rate : float
-            [Hz].
         """
         from scipy import signal
 
