@@ -102,7 +102,7 @@ def set_model(state: Any, settings: Any, model: Any, hysteretic: bool) -> bool:
     if found:
         change_model(state, settings, new)
     else:
-        # Who proposes, learns: the corridor stays, also around the model before.
+        # The estimator learns in the loop, even if this model is useless: the corridor stays.
         corridor.hand_over(state.corridor)
     return bool(found)
 

@@ -4,6 +4,9 @@ The model is simulated along the voltage that was written. Its error is the erro
 had if this model had computed the voltage. Estimator and model work in units in which the line has gain one
 and the voltage swings from about -1 to 1, so nothing need be known of the stage beforehand. Their output is
 z = (x - zero)/unit, a voltage. For the recorded loop the recorder takes the place of the estimator.
+
+The voltage must not jump when another model begins to drive. The offset that prevents this is what the model
+*owes*, as z. It is paid, that is decays to zero, while the reference travels.
 """
 
 from typing import Any
@@ -25,7 +28,7 @@ PEAK = 2.5
 BLOCKS, BLOCK = 5, 0.2
 
 # Weight and mean square of the misses, the largest of late; the largest miss in each block, the present block
-# first; travel in the present block; where the model stands, what changes of it owe.
+# first; travel in the present block; where the model stands, and what it owes.
 SCORE = record(
     weight=AMOUNT, square=AMOUNT, peak=AMOUNT, peaks=numbers(BLOCKS, kind=AMOUNT), block=AMOUNT, z=MEASURED,
     owed=NUMBER,

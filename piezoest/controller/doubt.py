@@ -1,4 +1,4 @@
-"""Where what is known may be of no use: the line drives, and all models have to show again."""
+"""Where what is known may be of no use: the line drives until the models have proved themselves again."""
 
 from typing import Any
 

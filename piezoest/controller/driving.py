@@ -1,4 +1,7 @@
-"""Which model drives, the line or a candidate, by their recent errors; the voltage changes gradually."""
+"""Which model drives, the line or a candidate, by their recent errors.
+
+The voltage changes gradually from one to the next; `piezoest.controller.candidate` says what a model *owes*.
+"""
 
 from typing import Any
 
@@ -11,8 +14,8 @@ from piezoest.controller import travel as travels
 
 # The line alone drives until it has seen a leg, or the voltage has come back this fraction of its first way.
 BACK = 0.5
-# What a change of model owes is paid within this fraction of a swing of the reference: faster, a loop through
-# the models would feed a resonance.
+# What a model owes is paid within this fraction of a swing of the reference. If it were paid faster, a loop
+# through the models would feed a resonance.
 PAID = 1.0 / 4.0
 # ... of the leg so far, which counts for at least this fraction of the swing.
 LEAST_LEG = 0.1
@@ -29,7 +32,7 @@ TRIP = 2.0
 # No model may miss more than the line has. That bound follows the line down at once, and up by this factor
 # each time, for the stage may have changed. It is at least so many swings: hysteresis lets no line be better.
 SLOWLY_UP, AT_LEAST = 1.05, 0.05
-# So often is no chance: it is said, once.
+# After so many of these sudden falls an event says so, once: so many are no chance.
 OFTEN = 3.0
 # Misses below this fraction of a swing are all alike.
 ALIKE = 5e-4
@@ -112,8 +115,9 @@ def _faked(state: Any) -> float:
 def _choose(state: Any, settings: Any) -> float:
     """The model with the smallest recent error, if it is clearly better than the present one.
 
-    Who learns from late readings is right about them: the line gets what the models lose by that. The
-    recorded loop knows nothing of where the reference leaves it, however good it was before.
+    Models that learn from late readings predict these well, but not the stage: what is faked by that is added
+    to their misses, and taken off the line's. The recorded loop is of no use where the reference leaves it,
+    however good it was before.
     """
     faked = _faked(state)
     line = max(candidate.missed(state.score) - faked, 0.0)

@@ -20,7 +20,7 @@ LATE = record(u=numbers(MOST, kind=MEASURED), at=whole(0.0, MOST - 1.0), answere
 def remember(late: Any, start: Any, u: Any) -> None:
     """Remember a voltage that was written, and find the one that is answered, at most the oldest one.
 
-    Who was late on the start's ways for its slew is not late on slower ones.
+    A stage that was late at the start because it is slow to slew is not late on slower ways.
     """
     late.at = late.at + 1.0 if late.at < MOST - 1.0 else 0.0
     late.u[int(late.at)] = u

@@ -17,7 +17,7 @@ ALLOWED = record(lowest_r=FIXED, highest_r=FIXED, lowest_u=FIXED, highest_u=FIXE
 def watch(state: Any, settings: Any) -> None:
     """Note the first sample that is outside."""
     outside, allowed = state.outside, settings.allowed
-    # Of two warnings in a block one would be lost.
+    # A block notes one event: of two warnings in it the first would be lost.
     if outside.told != 0.0 or state.samples <= state.pace.told + state.block:
         return
     within = allowed.lowest_r <= state.r <= allowed.highest_r

@@ -61,7 +61,7 @@ def follow(pace: Any, start: Any, u: Any, x: Any) -> None:
 
 @register_jitable
 def conclude(pace: Any, start: Any, u: Any) -> None:
-    """How late the readings are: if two ways do not agree, as on the one less late, and nobody is warned."""
+    """Note how late the readings are. Where two ways disagree the smaller delay counts, without a warning."""
     _end(pace, start, u)
     alike = start.ways == 0.0 or (pace.now < ALIKE * pace.before and pace.before < ALIKE * pace.now)
     start.lag = pace.now if alike else min(pace.now, pace.before)
@@ -76,7 +76,7 @@ def watch(state: Any, settings: Any) -> None:
     wide = min(pace.length, reference.leg) > LEAST * pace.widest
     pace.period = pace.leg + reference.usual
     pace.leg, pace.length = reference.usual, reference.leg
-    # Of two warnings in a block one would be lost.
+    # A block notes one event: of two warnings in it the first would be lost.
     if reference.turns < FIRST_LEGS or not wide or state.samples <= pace.told + state.block:
         return
     if pace.fast == 0.0 and pace.period < settings.shortest:

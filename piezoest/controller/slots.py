@@ -1,8 +1,9 @@
 """The candidates of a controller beside the straight line: up to four estimators and the recorded loop.
 
 They are a chain: a ``model`` with its estimator, see `piezoest.controller.candidate`, and the ``others``,
-which are None behind the last. What compiled code does for all of them stands here; nothing is compiled for
-None: a test for that stands alone, as no other would be seen through.
+which are None behind the last. What compiled code does for all of them stands here. Where the chain has
+ended, nothing is compiled: Numba drops a branch whose test is ``slots is not None`` and nothing else, so
+these tests are never joined to others.
 """
 
 from collections.abc import Iterator

@@ -149,7 +149,7 @@ def _settle_rest(start: Any, settings: Any, u: Any) -> None:
             first[j] = first[j - 1]
             j -= 1
         first[j] = value
-    # The farthest one may be wrong.
+    # The farthest one may be wrong: the noise is what the others scatter.
     start.noise = 0.6 * min(first[FIRST - 1] - first[1], first[FIRST - 2] - first[0])
     rest_at(start, settings, u, first[FIRST // 2], start.given * settings.gain)
 
@@ -232,7 +232,7 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     bound = _clear(start, FEW_STEPS if longest else STEPS)
     clear = u != start.from_u and np.abs(answer) > bound
     rests = start.windows <= AT_ONCE and np.abs(start.mean - start.now) < CLOSE * np.abs(answer)
-    # Who comes more slowly than the voltage went may still be on the way: a slow amplifier, or a lag.
+    # An answer slower than the voltage may not be complete yet: a slow amplifier, or a lag.
     change = start.change / np.abs(start.gain) if start.gain != 0.0 else 0.0
     start.fastest = change if change < SLOW * np.abs(u - start.from_u) / settings.ramp else 0.0
     sure = rests and np.abs(answer) > SURE * bound and start.told == 0.0 and start.fastest == 0.0

@@ -32,7 +32,7 @@ MODEL = record(a=PARAMETER, b=PARAMETER, c=PARAMETER, offset=PARAMETER, w_h=NUMB
 def layout(n: int, m: int, window: int, noise: float) -> Any:
     """State of n coordinates and m parameters; `window` in samples, `noise` the least that is assumed [µm].
 
-    `mean` and `root` are the arrival cost's, see `fit.Prior`; u and x are rings.
+    `mean` and `root` are the arrival cost's, see `piezoest.fitting.problem.Prior`; u and x are rings.
     """
     ring = numbers(Length("window", window), kind=MEASURED)
     return record(

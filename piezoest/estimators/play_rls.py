@@ -98,7 +98,7 @@ class PrandtlIshlinskiiRLS(Freezable):
         "a_dwell_moves_nothing": "At a dwell creep shows, and its gains are learnt; no slope moves.",
         "works_in_the_ring": "Its model has another number of parameters than the loop's first one.",
         "a_missing_sample_changes_nothing_but_itself": "Samples are taken in windows of travel, and "
-        "weights near zero differ by more than parts of themselves.",
+        "after a gap weights near zero differ by more than the relative tolerance.",
     }
 
     def __init__(
