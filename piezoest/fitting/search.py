@@ -179,7 +179,10 @@ def _least(cost: Callable[[float], float], grid: FloatArray, close: float) -> fl
 
 def creep_times(log: Log) -> FloatArray:
     """Time constants a decade apart that a record can tell [s]."""
-    shortest, longest = SHORTEST_CREEP / log.sample_rate, LONGEST_CREEP * log.u.size / log.sample_rate
+    fastest = float(np.quantile(np.abs(np.diff(log.u)), 0.99))
+    across = 2.0 * log.half / max(fastest, 1e-300)
+    shortest = max(SHORTEST_CREEP, 0.05 * across) / log.sample_rate
+    longest = LONGEST_CREEP * log.u.size / log.sample_rate
     terms = min(MOST_TERMS, int(np.log10(max(longest / shortest, 1.0))) + 1)
     return np.asarray(longest / 10.0 ** np.arange(terms)[::-1])
 
