@@ -32,7 +32,8 @@ TRIP = 2.0
 # No model may miss more than the line has. That bound follows the line down at once, and up by this factor
 # each time, for the stage may have changed. It is at least so many swings: hysteresis lets no line be better.
 SLOWLY_UP, AT_LEAST = 1.05, 0.05
-# After so many of these sudden falls an event says so, once: so many are no chance.
+# After so many of these sudden falls an event says so, once: so many are no chance, unless models drive well
+# for long between them.
 OFTEN = 3.0
 # Misses below this fraction of a swing are all alike.
 ALIKE = 5e-4
@@ -170,7 +171,12 @@ def _disappoints(state: Any) -> bool:
 @register_jitable
 def watch(state: Any, off: Any) -> None:
     """Fall back to the line at once where the stage is farther off than it ever was under the line."""
-    most = TRIP * state.line_peak * travels.widest(state.travel) + 3.0 * _floor(state)
+    wide = travels.widest(state.travel)
+    if not wide > 0.0:
+        return
+    # The bound of the last change of model may come from a quiet stretch: the line misses more by now.
+    peak = max(state.line_peak, _at_most(state.score.peak / wide, state.line_peak))
+    most = TRIP * peak * wide + 3.0 * _floor(state)
     if state.driving > 0.0 and off > most and state.since > CALM:
         _change(state, 0.0)
         state.shaken += 1.0
@@ -206,4 +212,6 @@ def reconsider(state: Any, settings: Any) -> None:
     elif chosen > 0.0 and state.since > SHOWN * state.patience:
         # It has driven well for long.
         state.patience = max(0.5 * state.patience, PATIENCE)
+        if 0.0 < state.shaken < OFTEN:
+            state.shaken -= 1.0
         state.since = PROVEN

@@ -40,14 +40,19 @@ def begin_anew(state: Any, settings: Any) -> None:
 
 
 @register_jitable
+def _ways(start: Any) -> float:
+    """How far the ways of the start have led."""
+    return max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
+
+
+@register_jitable
 def is_refuted(state: Any, gone: Any, answer: Any) -> bool:
     """Whether the answer to a way from where all began speaks against the sign of the gain.
 
     Hum or drift may have passed for the answer to the short ways of the start, but less so for that to a
     longer one.
     """
-    start = state.start
-    ways = max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
+    start, ways = state.start, _ways(state.start)
     noise = starts.CLEAR * max(start.noise, np.sqrt(state.readings.noise))
     clear = np.abs(answer) > max(noise, AGAINST * np.abs(start.gain) * ways)
     return clear and np.abs(gone) > LONGER * ways and answer * gone * start.gain < 0.0
@@ -57,7 +62,9 @@ def is_refuted(state: Any, gone: Any, answer: Any) -> bool:
 def _has_answered(state: Any) -> bool:
     """Whether the stage has gone from where all began about as the line says, if much less far."""
     gone, answer = state.u - state.start.origin, state.readings.last - state.start.zero
-    return answer * gone * state.line.gain > ANSWERED * (state.line.gain * gone) ** 2
+    # Over a way as short as those of the start, hum, drift or ringing may pass for an answer again.
+    shown = answer * gone * state.line.gain > ANSWERED * (state.line.gain * gone) ** 2
+    return shown and np.abs(gone) > LONGER * _ways(state.start)
 
 
 @register_jitable

@@ -12,6 +12,7 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.controller import line as lines
+from piezoest.controller import travel as travels
 from piezoest.controller.faults import MOVED, NO_RESPONSE, NONE, REVERSED, SATURATED, SCALED
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, NUMBER, record, whole
 
@@ -252,7 +253,7 @@ def believed(
     swings = min(gone / unit, MOST)
     lines.add(readings.recent, answered, middle, max(RECENT * memory, 16.0))
     noise = np.sqrt(readings.noise)
-    farthest = max(FAR * travel.swing, FAR_WITHIN * readings.swing)
+    farthest = max(FAR * travel.swing, FAR_WITHIN * max(readings.swing, travels.widest(travel)))
     bound = np.abs(line.gain) * farthest + 8.0 * noise
     beside = x - lines.at(line, u)
     far = np.abs(beside) > bound
