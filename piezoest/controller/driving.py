@@ -29,6 +29,8 @@ SEEN, CALM = 0.6, 0.1
 SHOWN, PROVEN = 4.0, 1.0
 # A model that drives falls back at once where the stage misses by so many times what the line has missed.
 TRIP = 2.0
+# ... unless the line would miss by so many times more: small legs make it flat, and a wide one follows.
+WORSE = 1.5
 # No model may miss more than the line has. That bound follows the line down at once, and up by this factor
 # each time, for the stage may have changed. It is at least so many swings: hysteresis lets no line be better.
 SLOWLY_UP, AT_LEAST = 1.05, 0.05
@@ -169,7 +171,7 @@ def _disappoints(state: Any) -> bool:
 
 
 @register_jitable
-def watch(state: Any, off: Any) -> None:
+def watch(state: Any, off: Any, line_off: Any) -> None:
     """Fall back to the line at once where the stage is farther off than it ever was under the line."""
     wide = travels.widest(state.travel)
     if not wide > 0.0:
@@ -177,7 +179,7 @@ def watch(state: Any, off: Any) -> None:
     # The bound of the last change of model may come from a quiet stretch: the line misses more by now.
     peak = max(state.line_peak, _at_most(state.score.peak / wide, state.line_peak))
     most = TRIP * peak * wide + 3.0 * _floor(state)
-    if state.driving > 0.0 and off > most and state.since > CALM:
+    if state.driving > 0.0 and off > most and line_off < WORSE * off and state.since > CALM:
         _change(state, 0.0)
         state.shaken += 1.0
         if state.shaken == OFTEN:

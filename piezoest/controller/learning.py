@@ -153,7 +153,7 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
         off = (x - state.r) / state.unit
         left = slots.owed(state.candidates, state.driving, state.owed) if state.switches <= 1.0 else 0.0
         candidate.judge(state.outcome, min(max(off + left, -bound), bound), swings)
-        driving.watch(state, np.abs(off))
+        driving.watch(state, np.abs(off), np.abs(miss))
 
 
 @register_jitable

@@ -4,10 +4,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import piezoest as pz
+from piezoest.bench.zoo.families import Reach, draw_family
 from tests.controller import shared
-from tests.controller.shared import LIMITS, drive, last_error
+from tests.controller.shared import LIMITS, drive, in_blocks, last_error
 
 FS, FAST, SLOW = 2000.0, 5000.0, 1000.0
 # Its small loops close: those of a Coleman-Hodgdon stage wander for many periods.
@@ -54,6 +56,21 @@ def test_noise_of_a_reference_at_rest_is_no_scan() -> None:
         driver.learn(u, stage.step(u) + 1e-3 * rng.normal())
         gains.append(float(driver.state["line"]["gain"]))
     assert np.abs(np.array(gains[wave.size :]) / gains[wave.size - 1] - 1.0).max() < 0.05
+
+
+def test_a_long_walk_is_left_to_the_models() -> None:
+    """The line, which small legs make flat, would go far too far on the next wide leg."""
+    a = 1.0 - np.exp(-0.004)
+    walk = np.random.default_rng(2).standard_normal(230_000)
+    for _ in range(2):
+        walk = lfilter([a], [1.0, a - 1.0], walk)
+    r = 4.0 * np.tanh(walk / (1.5 * walk.std()))
+    reach = Reach(-100.0, 100.0)
+    model = draw_family("preisach", np.random.default_rng(2), reach, width=0.15, gain=0.07)
+    stage = pz.SimulatedStage(FS, model, gauge=pz.Gauge(noise=3e-4), seed=2)
+    driver = pz.AdaptiveFeedforward(FS, limits=pz.VoltageLimits(minimum=-100.0, maximum=100.0))
+    x = in_blocks(driver, stage, r, 10)[1]
+    assert np.sqrt(np.mean((r - x)[150_000:] ** 2)) < 0.04
 
 
 LATE, BEHIND_A_TURN = slice(-5000, None), slice(1000, None)
