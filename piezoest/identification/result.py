@@ -219,7 +219,8 @@ class Identification:
         Parameters
         ----------
         u : array_like, shape (N,), optional
-            Voltage [V]; by default this record's.
+            Voltage [V]; by default this record's. Before another one the stage rests at 0 V, and the sensor
+            has the zero of this record: a shift by another history or day is not in the interval.
         """
         return interval(self.best, self.candidates, u)
 

@@ -52,7 +52,8 @@ def layout_of(path: Path) -> Layout:
     lines = itertools.chain.from_iterable(
         enumerate(text.split("\n"), first) for first, text, _ in chunks(path, encoding, 1000)
     )
-    head, comments = [], []
+    head: list[Numbered] = []
+    comments: list[Numbered] = []
     for place, line in itertools.islice(lines, HEAD_LINES):
         (comments if line.lstrip().startswith(COMMENTS) else head).append((place, line))
     filled = [(place, line) for place, line in head if line.strip()]
