@@ -143,6 +143,11 @@ def test_a_mark_that_appears_late_is_no_number(tmp_path: Path) -> None:
         read_record(write(tmp_path / "log.csv", ";", rows))
 
 
+def day_first(stamp: str) -> str:
+    day, time = stamp.split("T")
+    return ".".join(part.lstrip("0") for part in reversed(day.split("-"))) + " " + time.replace(".", ",")
+
+
 @pytest.mark.parametrize(
     "write_stamp",
     [
@@ -152,6 +157,7 @@ def test_a_mark_that_appears_late_is_no_number(tmp_path: Path) -> None:
         lambda text_: text_[:-3] + "+01:00",
         lambda text_: text_[:-3].replace(".", ",") + "-0530",
         lambda text_: text_.replace("-", "/"),
+        day_first,
         lambda text_: text_.partition("T")[2],
     ],
 )

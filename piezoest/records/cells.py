@@ -21,6 +21,8 @@ GROUPED = {
     for thousands, decimal in OTHER.items()
 }
 STAMP = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(:\d{2})?([.,]\d+)?\s*(Z|z|[-+]\d{2}(:?\d{2})?)?")
+# 22.11.2026 10:00:00,005: with points the day stands first.
+DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4}) +(\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?)")
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?")
 
 
@@ -116,7 +118,7 @@ def is_missing(cell: str) -> bool:
 
 def is_stamp(cell: str) -> bool:
     """Whether a cell holds a time of day, with a date before it or not, as ISO 8601 has them."""
-    return any(each.fullmatch(cell.strip()) for each in (STAMP, TIME_OF_DAY))
+    return any(each.fullmatch(cell.strip()) for each in (STAMP, DAY_FIRST, TIME_OF_DAY))
 
 
 def is_number(cell: str) -> bool:

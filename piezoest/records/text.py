@@ -289,11 +289,17 @@ class Text(Source):
         return finite(values)
 
 
+def _year_first(stamp: re.Match[str]) -> str:
+    day, month, year, time = stamp.groups()
+    return f"{year}-{month:0>2}-{day:0>2}T{'0' * (time[1] == ':')}{time}"
+
+
 def _stamps(cells: Any) -> Any:
     """Series of times, in UTC where a time zone is given."""
     import pandas as pd
 
-    words = pd.Series(cells, dtype=str).str.strip().str.replace(",", ".")
+    words = pd.Series(cells, dtype=str).str.strip()
+    words = words.str.replace(written.DAY_FIRST, _year_first, regex=True).str.replace(",", ".")
     # A time of day alone is that of any day.
     words = words.str.replace(r"^(\d):", r"0\1:", regex=True)
     words = words.str.replace(r"^(\d\d:)", r"2000-01-01T\1", regex=True)
