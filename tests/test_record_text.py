@@ -38,6 +38,14 @@ def check(path: Path) -> None:
     assert record.sample_rate == pytest.approx(RATE)
 
 
+def check_thousandths(path: Path) -> None:
+    """Check a file with times in ms, voltages in mV and displacements in nm."""
+    record = read_record(path)
+    assert record.sample_rate == pytest.approx(1e3 * RATE)
+    np.testing.assert_allclose(record.voltage, 1e-3 * VOLTAGE)
+    np.testing.assert_allclose(record.displacement, 1e-3 * DISPLACEMENT)
+
+
 PREAMBLE = "Oscilloscope DSO-X\nDate,2026-11-01\nSample rate,1000\n\n"
 
 
@@ -61,10 +69,7 @@ def test_lines_of_an_instrument_above_the_rows(tmp_path: Path, above: str) -> No
 def test_a_line_of_units_is_heeded(tmp_path: Path) -> None:
     file = write(tmp_path / "log.csv", ",", rows_of(str), header="")
     file.write_text("time,voltage,displacement\nms,mV,nm\n" + file.read_text())
-    record = read_record(file)
-    assert record.sample_rate == pytest.approx(1e3 * RATE)
-    np.testing.assert_allclose(record.voltage, 1e-3 * VOLTAGE)
-    np.testing.assert_allclose(record.displacement, 1e-3 * DISPLACEMENT)
+    check_thousandths(file)
 
 
 @pytest.mark.parametrize(
@@ -75,18 +80,16 @@ def test_a_line_of_units_is_heeded(tmp_path: Path) -> None:
         "# t U x\n# ms mV nm",
         "# t [ms], U [mV], x [nm]",
         "t (ms)  drive voltage (mV)  x (nm)",
+        '# a 5" stage\n# t[ms] U[mV] x[nm]',
     ],
 )
 def test_names_and_units_above_rows_that_blanks_part(tmp_path: Path, above: str) -> None:
     file = write(tmp_path / "log.txt", " ", rows_of(str), header="")
     file.write_text(above + "\n" + file.read_text())
-    record = read_record(file)
-    assert record.sample_rate == pytest.approx(1e3 * RATE)
-    np.testing.assert_allclose(record.voltage, 1e-3 * VOLTAGE)
-    np.testing.assert_allclose(record.displacement, 1e-3 * DISPLACEMENT)
+    check_thousandths(file)
 
 
-@pytest.mark.parametrize("comment", ["# measured by me", "# t x y", "# a b c", "# 1 2 3"])
+@pytest.mark.parametrize("comment", ["# measured by me", "# t x y", '# a 5" stage', "# a b c", "# 1 2 3"])
 def test_a_comment_that_names_no_columns_is_none(tmp_path: Path, comment: str) -> None:
     file = write(tmp_path / "log.txt", " ", rows_of(str), header="")
     file.write_text(comment + "\n" + file.read_text())

@@ -172,14 +172,14 @@ def _disappoints(state: Any) -> bool:
 
 @register_jitable
 def watch(state: Any, off: Any, line_off: Any) -> None:
-    """Fall back to the line at once where the stage is farther off than it ever was under the line."""
+    """Fall back to the line at once where the stage is farther off than the line would be, and has been."""
     wide = travels.widest(state.travel)
-    if not wide > 0.0:
+    if state.driving == 0.0 or not wide > 0.0:
         return
     # The bound of the last change of model may come from a quiet stretch: the line misses more by now.
     peak = max(state.line_peak, _at_most(state.score.peak / wide, state.line_peak))
     most = TRIP * peak * wide + 3.0 * _floor(state)
-    if state.driving > 0.0 and off > most and line_off < WORSE * off and state.since > CALM:
+    if off > most and line_off < WORSE * off and state.since > CALM:
         _change(state, 0.0)
         state.shaken += 1.0
         if state.shaken == OFTEN:

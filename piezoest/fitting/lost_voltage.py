@@ -41,7 +41,7 @@ SHORTEST, UNLIKELY, CAUGHT_UP, LEFT, MOST, MOVED = 12, 5.0, 3.0, 1.5, 0.95, 0.05
 # ... but for a few samples of the stretch: the displacement may be late.
 MIDDLE = (0.1, 0.9)
 STRETCHES = 100
-# ... and of the changes, most are no greater than this quantile of them.
+# Most changes of the voltage are no larger than this quantile of them.
 USUALLY = 0.9
 
 

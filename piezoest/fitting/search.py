@@ -36,8 +36,10 @@ LONGEST_DELAY, CLOSE = 10.0, 0.02
 REFINED = 3
 # Gauss-Newton steps of the creep gains, the relative change at which they have settled, the least of them.
 STEPS, SETTLED, LEAST_CREEP = 10, 1e-3, 1e-3
-# Creep terms are a decade apart, from so many samples to so many times the record.
+# Creep terms are a decade apart, from so many samples to so many times the record. None is shorter than this
+# part of the time across the range at about the highest speed: it could not be told from a delay.
 SHORTEST_CREEP, LONGEST_CREEP, MOST_TERMS = 20.0, 1.0, 4
+PART_OF_WAY, HIGHEST_SPEED = 0.05, 0.99  # the speed as a quantile
 # Range of alpha times the range of the voltage, and how closely its logarithm is found: what ends in the
 # optimum of all parameters begins there.
 ALPHAS, CLOSE_ALPHA = (0.03, 300.0), 0.03
@@ -179,9 +181,9 @@ def _least(cost: Callable[[float], float], grid: FloatArray, close: float) -> fl
 
 def creep_times(log: Log) -> FloatArray:
     """Time constants a decade apart that a record can tell [s]."""
-    fastest = float(np.quantile(np.abs(np.diff(log.u)), 0.99))
+    fastest = float(np.quantile(np.abs(np.diff(log.u)), HIGHEST_SPEED))
     across = 2.0 * log.half / max(fastest, 1e-300)
-    shortest = max(SHORTEST_CREEP, 0.05 * across) / log.sample_rate
+    shortest = max(SHORTEST_CREEP, PART_OF_WAY * across) / log.sample_rate
     longest = LONGEST_CREEP * log.u.size / log.sample_rate
     terms = min(MOST_TERMS, int(np.log10(max(longest / shortest, 1.0))) + 1)
     return np.asarray(longest / 10.0 ** np.arange(terms)[::-1])

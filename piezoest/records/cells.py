@@ -65,13 +65,15 @@ class Marks:
 
     def see(self, cell: str) -> None:
         """Look at a cell of the column."""
+        if self.sure:
+            return
         text = cell.strip()
         if WHOLE.fullmatch(text):
             self.whole = self.whole or text
         elif ONE_GROUP.fullmatch(text):
             self.marked = self.marked or text
         else:
-            self.sure = self.sure or PLAIN.fullmatch(text) is not None
+            self.sure = PLAIN.fullmatch(text) is not None
 
     def check(self) -> None:
         """Raise ValueError if the numbers can be read in two ways."""
@@ -117,7 +119,7 @@ def is_missing(cell: str) -> bool:
 
 
 def is_stamp(cell: str) -> bool:
-    """Whether a cell holds a time of day, with a date before it or not, as ISO 8601 has them."""
+    """Whether a cell holds a time of day, or one behind a date: of ISO 8601, or with the day first."""
     return any(each.fullmatch(cell.strip()) for each in (STAMP, DAY_FIRST, TIME_OF_DAY))
 
 

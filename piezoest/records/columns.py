@@ -149,7 +149,7 @@ def split_unit(title: str) -> tuple[str, str]:
     return plain.replace("_", " "), ""
 
 
-def known(titles: list[str]) -> bool:
+def distinct(titles: list[str]) -> bool:
     """Whether each title names another quantity, by its name or its unit."""
     split = [split_unit(title) for title in titles]
     found = [

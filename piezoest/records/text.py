@@ -13,9 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.records import cells as written
-from piezoest.records.cells import MISSING, Style, is_missing, is_number, is_stamp, number
-from piezoest.records.columns import known, titled, with_units
+from piezoest.records.cells import (
+    DAY_FIRST,
+    MISSING,
+    Marks,
+    Style,
+    is_missing,
+    is_number,
+    is_stamp,
+    number,
+    style_of,
+)
+from piezoest.records.columns import distinct, titled, with_units
 from piezoest.records.lines import COMMENTS, Lines, chunks, encoding_of, sample_lines
 from piezoest.records.source import LogError, Rows, Source, finite, floats, shown
 
@@ -111,15 +120,13 @@ def _named_in_comment(path: Path, comments: list[Numbered], row: Numbered, delim
     So NumPy's savetxt writes them.
     """
     width, signs = len(split(path, [row[1]], delimiter)[0]), "".join(COMMENTS)
-    above = [
-        _titles(path, line.lstrip().lstrip(signs), delimiter, width)
-        for place, line in comments
-        if place < row[0]
-    ]
+    # In a comment a quotation mark need not be closed.
+    last = [line.lstrip().lstrip(signs).replace('"', "") for place, line in comments if place < row[0]][-2:]
+    above = [_titles(path, line, delimiter, width) for line in last]
     names = above[-1] if above else []
-    if len(above) > 1 and (named := with_units(above[-2], names)):
+    if len(above) > 1 and (named := with_units(above[0], names)):
         names = named
-    return names if len(names) == width and known(names) else []
+    return names if len(names) == width and distinct(names) else []
 
 
 def _titles(path: Path, line: str, delimiter: str, width: int) -> list[str]:
@@ -129,7 +136,7 @@ def _titles(path: Path, line: str, delimiter: str, width: int) -> list[str]:
     # Names may hold single blanks, as in ``time (s)``.
     ways += [re.split(r"\s+(?![(\[])", text), re.split(r"\s{2,}|\t", text)]
     fit = [[cell.strip() for cell in way] for way in ways if len(way) == width]
-    return next(filter(known, fit), fit[0] if fit else ways[0])
+    return next(filter(distinct, fit), fit[0] if fit else ways[0])
 
 
 def _numeric(*rows: list[str]) -> bool:
@@ -145,7 +152,7 @@ def _style(path: Path, lines: list[str], delimiter: str) -> Style:
     try:
         style = Style(".")
         if commas:
-            style = written.style_of(cell for row in split(path, lines, delimiter) for cell in row)
+            style = style_of(cell for row in split(path, lines, delimiter) for cell in row)
         if not style.thousands:
             _check_columns(path, lines, delimiter)
         return style
@@ -157,7 +164,7 @@ def _style(path: Path, lines: list[str], delimiter: str) -> Style:
 
 def _check_columns(path: Path, lines: list[str], delimiter: str) -> None:
     """Refuse columns whose numbers can be read in two ways; in parts, which need less memory."""
-    columns: defaultdict[int, written.Marks] = defaultdict(written.Marks)
+    columns: defaultdict[int, Marks] = defaultdict(Marks)
     for start in range(0, len(lines), PART):
         for row in split(path, lines[start : start + PART], delimiter):
             for i, cell in enumerate(row):
@@ -299,7 +306,7 @@ def _stamps(cells: Any) -> Any:
     import pandas as pd
 
     words = pd.Series(cells, dtype=str).str.strip()
-    words = words.str.replace(written.DAY_FIRST, _year_first, regex=True).str.replace(",", ".")
+    words = words.str.replace(DAY_FIRST, _year_first, regex=True).str.replace(",", ".")
     # A time of day alone is that of any day.
     words = words.str.replace(r"^(\d):", r"0\1:", regex=True)
     words = words.str.replace(r"^(\d\d:)", r"2000-01-01T\1", regex=True)
