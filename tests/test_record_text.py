@@ -1,7 +1,7 @@
 """Text logs as instruments and spreadsheets write them: marks in numbers, time stamps, packed files."""
 
 import gzip
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +19,15 @@ START = np.datetime64("2026-11-22T10:00:00", "ns")
 STAMPS = [str(START + np.timedelta64(round(1e9 * t), "ns")) for t in TIME]
 
 
-def write(path: Path, separator: str, rows: list[tuple[str, str, str]], header: str = "t,u,x") -> Path:
+def write(path: Path, separator: str, rows: Sequence[tuple[str, ...]], header: str = "t,u,x") -> Path:
     lines = [header.replace(",", separator), *(separator.join(row) for row in rows)]
     path.write_text("\n".join(line for line in lines if line) + "\n", encoding="utf-8")
     return path
 
 
-def rows_of(write_number: Callable[[float], str]) -> list[tuple[str, str, str]]:
+def rows_of(write_number: Callable[[float], str]) -> list[tuple[str, ...]]:
     columns = (TIME, VOLTAGE, DISPLACEMENT)
-    return [tuple(map(write_number, row)) for row in zip(*columns, strict=True)]  # type: ignore[misc]
+    return [tuple(map(write_number, row)) for row in zip(*columns, strict=True)]
 
 
 def check(path: Path) -> None:
@@ -57,6 +57,8 @@ PREAMBLE = "Oscilloscope DSO-X\nDate,2026-11-01\nSample rate,1000\n\n"
         "Instrument: Scope 3000\ntime,voltage,displacement\ns,V,um",
         "Scope of the laboratory\nt (s),u (volts),position (micrometers)",
         "time,voltage,displacement\n[s],[V],",
+        "s,V,um\ntime,voltage,displacement",
+        "SCOPE-A,1234,Waveform\nSegment,TrigTime,Since\ntime,voltage,displacement",
         "% from MATLAB\n  % t u x",
     ],
 )
@@ -81,6 +83,8 @@ def test_a_line_of_units_is_heeded(tmp_path: Path) -> None:
         "# t [ms], U [mV], x [nm]",
         "t (ms)  drive voltage (mV)  x (nm)",
         '# a 5" stage\n# t[ms] U[mV] x[nm]',
+        "t{ms} U{mV} x<nm>",
+        "t U x\n# ms mV nm",
     ],
 )
 def test_names_and_units_above_rows_that_blanks_part(tmp_path: Path, above: str) -> None:
@@ -89,12 +93,59 @@ def test_names_and_units_above_rows_that_blanks_part(tmp_path: Path, above: str)
     check_thousandths(file)
 
 
-@pytest.mark.parametrize("comment", ["# measured by me", "# t x y", '# a 5" stage', "# a b c", "# 1 2 3"])
+COMMENTS = (
+    "# measured by me", "# t x y", '# a 5" stage', "# a b c", "# 1 2 3", "# fs = 10",
+    "# voltage and position",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("comment", COMMENTS)
 def test_a_comment_that_names_no_columns_is_none(tmp_path: Path, comment: str) -> None:
     file = write(tmp_path / "log.txt", " ", rows_of(str), header="")
     file.write_text(comment + "\n" + file.read_text())
     check(file)
     assert "columns without names" in read_record(file).notes[0]
+
+
+@pytest.mark.parametrize("other", ["r[nm]", "temperature[K]"])
+def test_names_in_a_comment_with_one_column_more(tmp_path: Path, other: str) -> None:
+    file = write(tmp_path / "log.txt", " ", [("7.5", *row) for row in rows_of(str)], header="")
+    file.write_text(f"# {other} t[ms] U[mV] x[nm]\n" + file.read_text())
+    check_thousandths(file)
+
+
+def test_two_voltages_in_a_comment_are_asked_for(tmp_path: Path) -> None:
+    file = write(tmp_path / "log.txt", " ", rows_of(str), header="")
+    file.write_text("# set[V] monitor[V] x[um]\n" + file.read_text())
+    with pytest.raises(ValueError, match="could all be the voltage"):
+        read_record(file, sample_rate=10.0)
+
+
+GCS = """# REM E-727
+# SEPARATOR = 44
+# DIM = 2
+# SAMPLE_TIME = 0.005
+#
+# NAME1 = Actual Position of Axis 1
+# NAME0 = Output Voltage of channel 1
+# END_HEADER
+"""
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        GCS,
+        "# fs = 200 Hz\nu,x\n",
+        "% Sample rate [kHz]: 0.2\n% u [V], x [um]\n",
+        "# dt = 5 ms\nvoltage,position of stage\n",
+    ],
+)
+def test_sample_rate_in_a_comment(tmp_path: Path, above: str) -> None:
+    file = write(tmp_path / "log.csv", ",", [row[1:] for row in rows_of(str)], header="")
+    file.write_text(above + file.read_text())
+    check(file)
+    assert "as the file states it" in read_record(file).notes[0]
 
 
 def test_rows_below_other_lines_without_a_header_go_by_number(tmp_path: Path) -> None:
@@ -201,7 +252,7 @@ def test_every_bit_of_a_number_and_what_stands_between(tmp_path: Path, separator
     rows[100] = (rows[100][0], word, "N/A")
     rows[200] = (rows[200][0], " 1e400 ", "-inf")
     rows[300] = (rows[300][0], '"2.5"', "NaN")
-    file = write(tmp_path / "log.csv", separator, rows)  # type: ignore[arg-type]
+    file = write(tmp_path / "log.csv", separator, rows)
     lines = file.read_text().splitlines()
     lines[2000:2000] = ["# the amplifier was off", "", ""]
     file.write_text("\n".join(lines) + "\n\n# end\n")
@@ -220,4 +271,4 @@ def test_every_bit_of_a_number_and_what_stands_between(tmp_path: Path, separator
         assert (stream.sample_rate, stream.count()) == (record.sample_rate, 3000)
     rows[2500] = (rows[2500][0], "text", "1")
     with pytest.raises(ValueError, match="line 2502, column 'u': 'text' is not a number"):
-        read_record(write(file, separator, rows))  # type: ignore[arg-type]
+        read_record(write(file, separator, rows))

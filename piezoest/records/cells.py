@@ -98,7 +98,7 @@ def _separates_thousands(text: str) -> str:
 
 
 def _without_spaces(cell: str) -> str:
-    text = cell.strip()
+    text = cell.strip().replace("\N{MINUS SIGN}", "-")
     return re.sub(SPACES, "", text) if SPACED.match(text) else text
 
 

@@ -10,12 +10,17 @@ from piezoest.records.source import LogError, Source, counted, shown
 # Names by which logs call the quantities, in lower case; the unit stands beside them.
 NAMES = {
     "time": ("time", "t", "timestamp", "time stamp", "datetime", "seconds", "elapsed", "zeit"),
-    "voltage": ("voltage", "u", "v", "volt", "volts", "vin", "drive", "input", "control voltage", "spannung"),
+    "voltage": (
+        "voltage", "u", "v", "volt", "volts", "vin", "drive", "input", "control voltage", "output voltage",
+        "piezo voltage", "spannung",
+    ),
     "displacement": (
         "displacement", "x", "y", "w", "disp", "position", "pos", "measured", "measurement", "output",
-        "sensor", "gauge", "weg",
+        "sensor", "gauge", "weg", "actual position", "current position",
     ),
-    "reference": ("reference", "ref", "r", "setpoint", "target", "desired"),
+    "reference": (
+        "reference", "ref", "r", "setpoint", "target", "desired", "target position", "commanded position",
+    ),
 }  # fmt: skip
 UNITS = {
     "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0,
@@ -29,6 +34,10 @@ UNITS = {
 }  # fmt: skip
 UNITS["reference"] = UNITS["displacement"]
 BASE_UNITS = {"time": "s", "voltage": "V", "displacement": "µm", "reference": "µm"}
+# Sentences have such words, names of columns have not.
+LITTLE_WORDS = frozenset(
+    ("a", "and", "are", "at", "by", "for", "from", "in", "is", "of", "on", "the", "to", "with", "und", "vs")
+)
 # More than these are counted in a message, not listed.
 MOST_LISTED = 40
 
@@ -105,13 +114,14 @@ def _find(source: Source, quantity: str, name: str) -> int:
 
 def _guess(source: Source, quantity: str) -> int:
     split = [split_unit(title) for title in source.titles]
-    found = [i for i, (name, _) in enumerate(split) if name.lower() in NAMES[quantity]]
+    found = [i for i, (name, _) in enumerate(split) if _is_called(name, quantity)]
     if not found and quantity == "reference":
         return _guess(source, "displacement")
     if not found:
-        known = {name for names in NAMES.values() for name in names}
         found = [
-            i for i, (name, unit) in enumerate(split) if unit in UNITS[quantity] and name.lower() not in known
+            i
+            for i, (name, unit) in enumerate(split)
+            if unit in UNITS[quantity] and not any(_is_called(name, other) for other in NAMES)
         ]
     if len(found) == 1:
         return found[0]
@@ -140,7 +150,7 @@ def _listed(source: Source) -> str:
 def split_unit(title: str) -> tuple[str, str]:
     """Split ``drive_mV``, ``pos [nm]``, ``t (ms)``, ``x/µm`` into name and unit in lower case."""
     plain = _plain(title.strip())
-    match = re.fullmatch(r"(.+?)\s*(?:\[(\w+)\]|\((\w+)\)|[/_\s.]\s*([^\W_]+))", plain)
+    match = re.fullmatch(r"(.+?)\s*(?:[\[({<](\w+)[\])}>]|[/_\s.]\s*([^\W_]+))", plain)
     if match is None:
         return plain, ""
     unit = next(group for group in match.groups()[1:] if group).lower()
@@ -149,14 +159,27 @@ def split_unit(title: str) -> tuple[str, str]:
     return plain.replace("_", " "), ""
 
 
-def distinct(titles: list[str]) -> bool:
-    """Whether each title names another quantity, by its name or its unit."""
-    split = [split_unit(title) for title in titles]
-    found = [
-        [quantity for quantity in NAMES if name.lower() in NAMES[quantity] or unit in UNITS[quantity]]
-        for name, unit in split
-    ]
-    return all(found) and len({quantities[0] for quantities in found}) == len(titles)
+def names_columns(titles: list[str]) -> bool:
+    """Whether titles are names of columns, and not the words of a sentence.
+
+    They are if each is a quantity of its own, or if voltage and displacement are among them.
+    """
+    found = [_quantity(title) for title in titles]
+    if None not in found and len(set(found)) == len(titles):
+        return True
+    return {"voltage", "displacement"}.issubset(found) and LITTLE_WORDS.isdisjoint(map(str.lower, titles))
+
+
+def _quantity(title: str) -> str | None:
+    """Quantity that a title stands for, by its name or else by its unit."""
+    name, unit = split_unit(title)
+    by_name = (quantity for quantity in NAMES if _is_called(name, quantity))
+    return next(by_name, next((quantity for quantity in NAMES if unit in UNITS[quantity]), None))
+
+
+def _is_called(name: str, quantity: str) -> bool:
+    """Whether the quantity is called so, or so with what it is of: ``position of axis 1``."""
+    return name.lower().partition(" of ")[0] in NAMES[quantity]
 
 
 def titled(name: str, unit: str) -> str:

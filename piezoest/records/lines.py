@@ -14,6 +14,7 @@ from typing import Any, BinaryIO, NamedTuple, cast
 
 import numpy as np
 
+from piezoest.records.comments import COMMENTS
 from piezoest.records.source import LogError, check_size
 
 # Bytes for recognising the encoding.
@@ -27,7 +28,6 @@ CONTROL = frozenset(range(32)) - frozenset(b"\t\n\v\f\r\x1a\x1b")
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 PACKED = b"\x1f\x8b"
 # A line that is blank or a comment, in a text that begins with the end of a line.
-COMMENTS = ("#", "%")
 SPECIAL = re.compile(r"\n[^\S\n]*(?:[#%]|\n|\Z)")
 
 

@@ -211,8 +211,9 @@ def read_record(
     path : str or Path
         File with one row per sample; the format is recognised. In text files, delimiter (comma, semicolon,
         tab, blank), decimal comma, separators of thousands, time stamps of ISO 8601 and header are
-        recognised too, with lines of an instrument above the header or of units below it; lines that begin
-        with # or % are comments, and gzip may have packed them (``.csv.gz``).
+        recognised too, with lines of an instrument above the header or of units below it, and gzip may have
+        packed them (``.csv.gz``). Lines that begin with # or % are comments; names of columns in the last
+        one above the rows are used, and so are the names in a GCS array of Physik Instrumente.
         Of a spreadsheet the first sheet with a table of numbers is read, of LabVIEW's files and TDMS all
         channels.
         Of HDF5 and MATLAB files every vector is a column, and so is every column of a matrix (``data:1``,
@@ -228,7 +229,8 @@ def read_record(
     sample_rate : float, optional
         [Hz]; if given, the rows are taken as evenly spaced and the column of time is ignored. Left out, and
         without a column of time, a number called ``fs`` or ``sample_rate`` in a MATLAB, HDF5 or NumPy file is
-        taken, or such an entry of a Parquet file's metadata.
+        taken, or such an entry of a Parquet file's metadata, or of a comment above text: ``# fs = 10 kHz``,
+        ``# dt = 0.1 ms``.
 
     Returns
     -------

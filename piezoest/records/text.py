@@ -24,8 +24,9 @@ from piezoest.records.cells import (
     number,
     style_of,
 )
-from piezoest.records.columns import distinct, titled, with_units
-from piezoest.records.lines import COMMENTS, Lines, chunks, encoding_of, sample_lines
+from piezoest.records.columns import names_columns, titled, with_units
+from piezoest.records.comments import COMMENTS, bare, numbered_names, rate_in
+from piezoest.records.lines import Lines, chunks, encoding_of, sample_lines
 from piezoest.records.source import LogError, Rows, Source, finite, floats, shown
 
 # Blank lines among the others: more are the way the file is written, fewer are samples that were lost.
@@ -53,6 +54,7 @@ class Layout(NamedTuple):
     skip_blank: bool  # whether blank lines are the way it is written, and not samples that were lost
     style: Style  # how numbers are written
     stamps: dict[int, Any]  # the first time stamp of the columns that hold such
+    sample_rate: float | None = None  # that its comments state [Hz]
 
 
 def layout_of(path: Path) -> Layout:
@@ -72,7 +74,11 @@ def layout_of(path: Path) -> Layout:
     delimiter, header, rows = _table(path, filled)
     if not rows:
         raise LogError(f"{path}: no rows below the header")
-    header = header or _named_in_comment(path, comments, rows[0], delimiter)
+    above = [line for place, line in comments if place < rows[0][0]]
+    if not header:
+        header = _named_in_comments(path, above, rows[0][1], delimiter)
+    elif below := [line for place, line in comments if filled[-len(rows) - 1][0] < place < rows[0][0]]:
+        header = with_units(header, _titles(path, bare(below[-1]), delimiter, len(header))) or header
     texts = [line for _, line in rows]
     stamps: dict[int, Any] = {}
     if any(":" in line for line in texts[:STAMP_ROWS]):
@@ -82,7 +88,8 @@ def layout_of(path: Path) -> Layout:
                     stamps[i] = _stamps([cell])[0]
     width, skip_blank = len(header or _cells(path, texts[0])), between > MOST_BLANK * len(filled)
     style = _style(path, texts, delimiter)
-    return Layout(path, encoding, delimiter, header, width, rows[0][0], skip_blank, style, stamps)
+    begins, rate = rows[0][0], rate_in(above)
+    return Layout(path, encoding, delimiter, header, width, begins, skip_blank, style, stamps, rate)
 
 
 def _delimiter(line: str) -> str:
@@ -100,6 +107,7 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
     pairs = enumerate(itertools.pairwise(head))
     begins = next((k for k, rows in pairs if len(rows[0]) == len(rows[1]) > 1 and _numeric(*rows)), 0)
     like_first = len(head[begins]) == len(first) and _delimiter(filled[begins][1]) == mark
+    like_first &= begins < 2 or names_columns(first) or not names_columns(head[begins - 1])
     if begins < 2 or like_first or len(head) < min(len(filled), LONGEST_PREAMBLE):
         header, begins = ([], 0) if _numeric(first) else (first, 1)
         if header and len(head) > 1 and len(header) != len(head[1]):
@@ -107,26 +115,27 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
         if header and len(head) > 2 and (named := with_units(header, head[1])):
             header, begins = named, 2
         return mark, header, filled[begins:]
-    header = with_units(head[begins - 2], head[begins - 1]) or head[begins - 1]
+    upper, lower = head[begins - 2 : begins]
+    header = with_units(upper, lower) or with_units(lower, upper) or lower
     if len(header) != len(head[begins]):
         # Nothing says what is what: columns go by their numbers.
         header = [str(k + 1) for k in range(len(head[begins]))]
     return _delimiter(filled[begins][1]), header, filled[begins:]
 
 
-def _named_in_comment(path: Path, comments: list[Numbered], row: Numbered, delimiter: str) -> list[str]:
-    """Names of columns in the last comment above the first row, or the last but one with units below them.
+def _named_in_comments(path: Path, comments: list[str], row: str, delimiter: str) -> list[str]:
+    """Names of columns: one a comment, or all in the last one, or in the last but one with units below.
 
-    So NumPy's savetxt writes them.
+    NumPy's savetxt writes them in the last.
     """
-    width, signs = len(split(path, [row[1]], delimiter)[0]), "".join(COMMENTS)
-    # In a comment a quotation mark need not be closed.
-    last = [line.lstrip().lstrip(signs).replace('"', "") for place, line in comments if place < row[0]][-2:]
-    above = [_titles(path, line, delimiter, width) for line in last]
+    width = len(split(path, [row], delimiter)[0])
+    if len(numbered := numbered_names(comments)) == width:
+        return numbered
+    above = [_titles(path, bare(line), delimiter, width) for line in comments[-2:]]
     names = above[-1] if above else []
     if len(above) > 1 and (named := with_units(above[0], names)):
         names = named
-    return names if len(names) == width and distinct(names) else []
+    return names if len(names) == width and names_columns(names) else []
 
 
 def _titles(path: Path, line: str, delimiter: str, width: int) -> list[str]:
@@ -136,7 +145,7 @@ def _titles(path: Path, line: str, delimiter: str, width: int) -> list[str]:
     # Names may hold single blanks, as in ``time (s)``.
     ways += [re.split(r"\s+(?![(\[])", text), re.split(r"\s{2,}|\t", text)]
     fit = [[cell.strip() for cell in way] for way in ways if len(way) == width]
-    return next(filter(distinct, fit), fit[0] if fit else ways[0])
+    return next(filter(names_columns, fit), fit[0] if fit else ways[0])
 
 
 def _numeric(*rows: list[str]) -> bool:
@@ -194,6 +203,7 @@ class Text(Source):
     def __init__(self, layout: Layout, names: list[str], titles: list[str]) -> None:
         super().__init__(layout.path, names, titles, layout.width)
         self.layout = layout
+        self.sample_rate = layout.sample_rate
         self.size = layout.path.stat().st_size
 
     def lines(self, rows: int) -> Iterator[Lines]:

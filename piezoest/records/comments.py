@@ -1,0 +1,41 @@
+"""What the comments above the rows of a text file state: names of the columns, and the sample rate."""
+
+import re
+
+from piezoest.records.source import RATES, stated_rate
+
+COMMENTS = ("#", "%")
+# A line ``sample rate [kHz]: 10`` or ``SAMPLE_TIME = 5e-05``, with the unit beside the name or the number.
+ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.\deE]+)\s*(\w*)\s*")
+PERIODS = ("dt", "ts", "sample_time", "sampling_time", "sample_period", "sampling_period", "sample_interval")
+# What the units are in Hz and in s.
+OF_RATES = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6}
+OF_PERIODS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+# A line ``NAME0 = Actual Position of Axis 1``, of which Physik Instrumente's GCS arrays have one a column.
+NUMBERED_NAME = re.compile(r"\s*NAME(\d+)\s*=\s*(\S.*?)\s*")
+
+
+def bare(comment: str) -> str:
+    """Comment without its sign and without quotation marks, which need not be closed there."""
+    return comment.lstrip().lstrip("".join(COMMENTS)).replace('"', "")
+
+
+def rate_in(comments: list[str]) -> float | None:
+    """Sample rate that comments state [Hz]; None if they state none, or several."""
+    found = set()
+    for comment in comments:
+        if (entry := ENTRY.fullmatch(bare(comment))) is None:
+            continue
+        name, unit = entry[1].lower().replace(" ", "_"), (entry[2] or entry[4]).lower()
+        number = stated_rate(entry[3])
+        if number is not None and name in RATES and unit in OF_RATES:
+            found.add(number * OF_RATES[unit])
+        elif number is not None and name in PERIODS and unit in OF_PERIODS:
+            found.add(1.0 / (number * OF_PERIODS[unit]))
+    return found.pop() if len(found) == 1 else None
+
+
+def numbered_names(comments: list[str]) -> list[str]:
+    """Names of columns that have a line each, in the order of their numbers."""
+    found = [entry for comment in comments if (entry := NUMBERED_NAME.fullmatch(bare(comment)))]
+    return [entry[2] for entry in sorted(found, key=lambda entry: int(entry[1]))]
