@@ -328,7 +328,9 @@ def _follow(state: Any, settings: Any, r: Any, u: Any) -> tuple[float, float]:
         doubt.widen(state)
         doubt.narrow(state)
     state.gone += gone
-    state.handed += gone
+    if not travels.dithers(state.reference, moved, np.sqrt(state.readings.noise)):
+        # Noise around a rest is no travel: a model that it has taught would shake the stage.
+        state.handed += gone
     if state.scale > 0.0:
         slots.advance(state.candidates, settings.candidates, u)
     else:

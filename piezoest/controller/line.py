@@ -20,8 +20,8 @@ POINTS = record(
 # Legs of late in one direction, and their length in all [µm].
 LEGS = record(length=DISTANCE, points=POINTS)
 # The line; the one before the last turn, and before the one before; the gain it began with; whether the
-# voltage was at a limit since the last turn; legs so far, those of late that agreed with it; length of the
-# first leg when it was looked at last [V], of the longest leg of late [µm]; direction of the last leg;
+# voltage was at a limit since the last turn; legs so far, those of late that agreed with it; length of this
+# leg when it was looked at last [V], of the longest leg of late [µm]; direction of the last leg;
 # points of this leg, of those before it, and of both directions together.
 LINE = record(
     gain=NUMBER, centre=NUMBER, last_gain=NUMBER, last_centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER,
@@ -49,6 +49,8 @@ LEFT, KEPT, FADES = 1.0 / 3.0, 2.0, 0.95
 # Before so many legs only the last two count, which may lead from rest to where the reference is; and of them
 # the last one alone, if the mean square of the one before is so many times larger.
 SETTLED, UNLIKE = 4.0, 6.0
+# A leg that has become so many times as long as when it was looked at last is looked at again.
+GROWN = 2.0
 # A leg agrees with the line within this factor; one shorter than this fraction of the longest says nothing.
 ALIKE, SHORT = 1.6, 0.3
 
@@ -210,17 +212,23 @@ def turn(line: Any, direction: Any, leg: Any) -> None:
     else:
         _take(line.down, now, leg, kept)
         _through_both(line, line.down, line.up, direction, leg)
-    line.clipped = 0.0
+    line.clipped = line.looked = 0.0
     forget(now)
 
 
 @register_jitable
 def grow(line: Any, leg: Any) -> bool:
-    """Before there was a turn: draw the line each time the first leg has become twice as long."""
-    now = line.now
-    if line.legs > 0.0 or leg < 2.0 * line.looked or now.count < 16.0:
+    """Draw the line each time the first leg has grown, or a later one has outgrown those of late.
+
+    A later one only if that makes the line steeper: small legs are flatter, and a flat line leads too far.
+    """
+    now, later = line.now, line.legs >= SETTLED
+    looked = max(line.looked, line.longest / np.abs(line.gain)) if later else line.looked
+    if 0.0 < line.legs < SETTLED or leg < GROWN * looked or now.count < 16.0:
         return False
     line.looked = leg
+    if later and (explained(now) < EXPLAINED or spread(now) < np.abs(line.gain)):
+        return False
     _draw(line, now, 0.0)
     return True
 

@@ -18,8 +18,9 @@ from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, NUMBER, record, w
 
 READINGS = record(
     fault=whole(NONE, MOVED),
-    # The last two finite readings, how many came, the voltage's travel since the last one changed.
-    before=MEASURED, last=MEASURED, count=COUNT, still=AMOUNT,
+    # The last two finite readings, how many came; the voltage of the last one, and how far it has gone since
+    # the reading changed: now, and farthest.
+    before=MEASURED, last=MEASURED, count=COUNT, voltage=MEASURED, gone=NUMBER, still=AMOUNT,
     # How far the last two were from the line, and the last one that was not alone; those alone in a row;
     # mean square of what changes from one to the next [µm²].
     beside_before=NUMBER, beside_last=NUMBER, beside_kept=NUMBER, alone=COUNT, changes=AMOUNT,
@@ -98,7 +99,7 @@ def _counted(so_far: Any, swings: Any, speaks: Any) -> float:
 
 @register_jitable
 def _follow(readings: Any, x: Any, gone: Any) -> float:
-    """Take a finite reading; the middle one of the last three."""
+    """Take a finite reading; the middle one of the last three. `gone`: how far the voltage went meanwhile."""
     if readings.count == 0.0:
         readings.before = readings.last = x
     readings.count += 1.0
@@ -107,7 +108,13 @@ def _follow(readings: Any, x: Any, gone: Any) -> float:
     change = np.abs(x - readings.last)
     if change > 0.0:
         readings.step = min(readings.step, change) if readings.step > 0.0 else change
-    readings.still = _counted(readings.still, min(gone, MOST_STILL * readings.swing), x == readings.last)
+    if x != readings.last:
+        readings.gone = readings.still = 0.0
+    else:
+        # Not its whole travel: the noise of a reference that rests goes nowhere.
+        most = MOST_STILL * readings.swing
+        readings.gone += min(max(gone, -most), most)
+        readings.still = max(readings.still, np.abs(readings.gone))
     middle = median(x, readings.last, readings.before)
     readings.before, readings.last = readings.last, x
     return middle
@@ -248,7 +255,8 @@ def believed(
     if not np.abs(x) < WILDEST:
         return np.nan
     _size_up(readings, line, travel)
-    middle = _follow(readings, x, gone)
+    middle = _follow(readings, x, u - readings.voltage)
+    readings.voltage = u
     unit = readings.swing if readings.swing > 0.0 else np.inf
     swings = min(gone / unit, MOST)
     lines.add(readings.recent, answered, middle, max(RECENT * memory, 16.0))

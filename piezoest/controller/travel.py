@@ -12,13 +12,15 @@ from piezoest.layout import COUNT, DISTANCE, FLAG, MEASURED, SIGN, record
 
 # Direction of travel, furthest value in it, where this leg began, length of the last leg; size of a usual
 # swing, least one before two turns were seen; turns so far, the last value, whether it has just turned;
-# samples of this leg, those since the furthest value, and those of the last leg; the farthest way back since
-# then; the largest change of late from one sample to the next; the extremes of late; whether each of the last
-# two legs, this one and the last, is no longer than the one before it.
+# samples of this leg, those since it went on clearly, those of the last leg, and of the one before; the
+# farthest way back since then, and where it was then; the largest change of late from one sample to the next;
+# the extremes of late; whether each of the last two legs, this one and the last, is no longer than the one
+# before it.
 TRAVEL = record(
     direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE, swing=DISTANCE, least=DISTANCE,
     turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, waits=COUNT, usual=COUNT,
-    back=DISTANCE, fastest=DISTANCE, highest=MEASURED, lowest=MEASURED, nested=FLAG,
+    past=COUNT, back=DISTANCE, mark=MEASURED, fastest=DISTANCE, highest=MEASURED, lowest=MEASURED,
+    nested=FLAG,
 )  # fmt: skip
 
 # A way back of this fraction of a swing is a turn; so many turns show a swing. Before, a smaller one is: the
@@ -42,9 +44,9 @@ FADES = 0.1
 @register_jitable
 def begin(travel: Any, value: Any, least: Any) -> None:
     """Begin, or start again, at a value; no swing is smaller than `least` until two turns were seen."""
-    travel.furthest = travel.turned = travel.last = travel.highest = travel.lowest = value
+    travel.mark = travel.furthest = travel.turned = travel.last = travel.highest = travel.lowest = value
     travel.direction = travel.leg = travel.turns = travel.back = 0.0
-    travel.count = travel.waits = travel.usual = travel.fastest = 0.0
+    travel.count = travel.waits = travel.usual = travel.past = travel.fastest = 0.0
     travel.swing = travel.least = least
 
 
@@ -61,21 +63,23 @@ def follow(travel: Any, value: Any) -> float:
     if travel.direction * way >= 0.0:
         if travel.direction == 0.0:
             travel.direction = np.sign(way)
-        if way != 0.0:
-            travel.waits = travel.back = 0.0
         travel.furthest = value
+        # The drift of a small scan is no way on.
+        if np.abs(value - travel.mark) > SMALL * travel.swing:
+            travel.waits = travel.back = 0.0
+            travel.mark = value
     elif np.abs(way) > (TURN if travel.turns >= SHOWN else FIRST_TURN) * travel.swing:
         leg = np.abs(travel.furthest - travel.turned)
         travel.turns += 1.0
         swing = max(leg, travel.leg, LEAST * travel.swing, travel.least if travel.turns < SHOWN else 0.0)
         travel.turned_now = 1.0
         travel.fastest *= SLOWER
-        travel.usual = travel.count
+        travel.past, travel.usual = travel.usual, travel.count
         travel.count = travel.waits = travel.back = 0.0
         travel.nested = 1.0 if leg <= (1.0 + LONGER) * travel.leg else 0.0
         travel.swing, travel.leg = swing, leg
         travel.turned = travel.furthest
-        travel.furthest = value
+        travel.furthest = travel.mark = value
         travel.direction = -travel.direction
         travel.highest += FADES * (max(travel.turned, value) - travel.highest)
         travel.lowest += FADES * (min(travel.turned, value) - travel.lowest)
@@ -88,12 +92,18 @@ def follow(travel: Any, value: Any) -> float:
 
 
 @register_jitable
+def _smallest(travel: Any, noise: Any) -> float:
+    """The way to and fro that is no noise."""
+    return max(SMALL * travel.swing, NOISE * noise)
+
+
+@register_jitable
 def is_over(travel: Any, noise: Any) -> bool:
     """Whether what goes on behind a wide leg is too small for a turn; `noise` is that of a reading."""
     if travel.waits <= LONG * max(travel.usual, travel.count - travel.waits, 8.0):
         return False
     fro = travel.back - np.abs(travel.last - travel.furthest)
-    return fro > max(SMALL * travel.swing, NOISE * noise)
+    return fro > _smallest(travel, noise)
 
 
 @register_jitable
@@ -123,8 +133,11 @@ def progress(travel: Any, gone: Any) -> float:
 
 @register_jitable
 def rests(travel: Any, gone: Any) -> bool:
-    """Whether a leg has taken long, and the last sample has gone no farther: a rest is no part of a leg."""
-    late = travel.count > LONG * max(travel.usual, 8.0)
+    """Whether a leg has taken long, and the last sample has gone no farther: a rest is no part of a leg.
+
+    Of steps up and one step back again the way up takes much longer.
+    """
+    late = travel.count > LONG * max(travel.usual, travel.past, 8.0)
     return late and (gone == 0.0 or travel.furthest != travel.last)
 
 
@@ -132,3 +145,9 @@ def rests(travel: Any, gone: Any) -> bool:
 def in_swings(travel: Any, gone: Any) -> float:
     """A distance as a fraction of a usual swing."""
     return min(gone / travel.swing, 1.0) if travel.swing > 0.0 else 0.0
+
+
+@register_jitable
+def dithers(travel: Any, gone: Any, noise: Any) -> bool:
+    """Whether a signal at rest moves to and fro by no more than noise."""
+    return gone > 0.0 and rests(travel, gone) and travel.back <= _smallest(travel, noise)
