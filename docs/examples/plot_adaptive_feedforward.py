@@ -13,7 +13,7 @@ import piezoest as pz
 
 fs = 10_000.0  # Hz
 r = pz.signals.triangle(amplitude=5.0, frequency=5.0, periods=20, sample_rate=fs)  # µm
-limits = pz.VoltageLimits(minimum=-50.0, maximum=100.0)  # V: the only thing it is told
+limits = pz.VoltageLimits(minimum=-50.0, maximum=100.0)  # V: with the sample rate all that it is told
 broken = (1.9, 2.5)  # s: the sensor repeats its last reading
 
 # %%

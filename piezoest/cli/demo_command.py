@@ -66,7 +66,7 @@ def _print_demo(result: Demo) -> None:
         "Adaptive compensation reduces the settled error of linear feed-forward by "
         f"{100.0 * result.reduction(ADAPTIVE):.1f} %, AdaptiveFeedforward by "
         f"{100.0 * result.reduction(CONTROLLER):.1f} % ({result.seconds:.1f} s for the four runs).",
-        f"AdaptiveFeedforward is told nothing but the limits of the voltage, {LIMITS.minimum:g} V to "
-        f"{LIMITS.maximum:g} V. Here {ESTIMATOR.__name__} is its only estimator, which compiles sooner than "
+        "AdaptiveFeedforward is told only the sample rate and the limits of the voltage, "
+        f"{LIMITS.minimum:g} V to {LIMITS.maximum:g} V. Here {ESTIMATOR.__name__} is its only estimator, which compiles sooner than "
         "those that it has by default.",
     )
