@@ -67,6 +67,6 @@ def _print_demo(result: Demo) -> None:
         f"{100.0 * result.reduction(ADAPTIVE):.1f} %, AdaptiveFeedforward by "
         f"{100.0 * result.reduction(CONTROLLER):.1f} % ({result.seconds:.1f} s for the four runs).",
         "AdaptiveFeedforward is told only the sample rate and the limits of the voltage, "
-        f"{LIMITS.minimum:g} V to {LIMITS.maximum:g} V. Here {ESTIMATOR.__name__} is its only estimator, which compiles sooner than "
-        "those that it has by default.",
+        f"{LIMITS.minimum:g} V to {LIMITS.maximum:g} V. Here {ESTIMATOR.__name__} is its only estimator, "
+        "which compiles sooner than those that it has by default.",
     )
