@@ -31,13 +31,14 @@ The second table is of the same stage. *Settles*: periods after a change until e
 1.2 %, and the share of runs that settle; *others settle*: this share on the other stages, in the scenarios
 that repeat. *First*: largest error in the first period after the change. This is a mean over the kinds of
 change: after a cold start it is {cold} % for AdaptiveFeedforward. *Settled*: largest error in the last half
-of the periods. *Step*: one sample, called from Python. Geometric means over the scenarios of the medians over
-{seeds} seeds, {slow} for the slow estimators; {machine}, {date}.
+of the periods. *Step*: one sample, called from Python; for AdaptiveFeedforward one `step` and one `learn`.
+Geometric means over the scenarios of the medians over {seeds} seeds, {slow} for the slow estimators;
+{machine}, {date}.
 
-On your rig the error is larger with a resonance, late readings or backlash. Of {rigs} simulated rigs drawn
-at random, half of them with a fault, the voltage never left its limits; in {share:.0f} % the error was at
-some time clearly larger than that of a straight line, in {end:.1f} % still at the end. See *Safety on unknown
-rigs* in the documentation.
+With a resonance, late readings or backlash the error on your rig is larger, and it takes longer to settle. Of
+{rigs} simulated rigs drawn at random, half of them with a fault, the voltage never left its limits; in
+{share:.0f} % the error was at some time clearly larger than that of a straight line, and in {end:.1f} % it
+was so at the end. See *Safety on unknown rigs* in the documentation.
 
 The paper measured {linear_theirs:g} µm with linear feed-forward and {theirs:g} µm with compensation;
 its procedure gives {linear_ours:.2g} µm and {ours:.2g} µm here. On a recording of a real stage with

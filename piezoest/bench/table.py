@@ -131,7 +131,7 @@ def write(rows: Sequence[Row], folder: Path, format: str | None = None) -> pd.Da
 
 
 def costs(estimators: Iterable[str], given: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Time of each estimator's step on a recorded cold start; empty for one that fails or dies."""
+    """Time of a step of each estimator on a cold start, of a controller on its own; empty if it fails."""
     return dict(one_by_one(partial(_cost, given), estimators, lambda text: (text, {})))
 
 
@@ -140,7 +140,9 @@ def _cost(given: dict[str, Any], text: str) -> tuple[str, dict[str, Any]]:
     case = SCENARIOS["cold-start"].build(0, **given)
     try:
         made = partial(candidate(text), case.sample_rate, case.start)
-        return text, {"step_us": 1e6 * cost.step_seconds(made, follow(case, LINEAR))}
+        # On the voltages of another loop a controller would only seek the gain.
+        record = follow(case, text if hasattr(made(), "learn") else LINEAR)
+        return text, {"step_us": 1e6 * cost.step_seconds(made, record)}
     except Exception:
         return text, {}
 
