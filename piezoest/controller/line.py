@@ -49,7 +49,7 @@ LEFT, KEPT, FADES = 1.0 / 3.0, 2.0, 0.95
 # Before so many legs only the last two count, which may lead from rest to where the reference is; and of them
 # the last one alone, if the mean square of the one before is so many times larger.
 SETTLED, UNLIKE = 4.0, 6.0
-# A leg that has become so many times as long as when it was looked at last is looked at again.
+# A leg is looked at again when it has become so many times as long.
 GROWN = 2.0
 # A leg agrees with the line within this factor; one shorter than this fraction of the longest says nothing.
 ALIKE, SHORT = 1.6, 0.3

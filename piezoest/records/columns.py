@@ -113,16 +113,12 @@ def _find(source: Source, quantity: str, name: str) -> int:
 
 
 def _guess(source: Source, quantity: str) -> int:
-    split = [split_unit(title) for title in source.titles]
-    found = [i for i, (name, _) in enumerate(split) if _is_called(name, quantity)]
+    names = [split_unit(title)[0] for title in source.titles]
+    found = [i for i, name in enumerate(names) if _is_called(name, quantity)]
     if not found and quantity == "reference":
         return _guess(source, "displacement")
     if not found:
-        found = [
-            i
-            for i, (name, unit) in enumerate(split)
-            if unit in UNITS[quantity] and not any(_is_called(name, other) for other in NAMES)
-        ]
+        found = [i for i, title in enumerate(source.titles) if _quantity(title) == quantity]
     if len(found) == 1:
         return found[0]
     if found:
@@ -149,7 +145,7 @@ def _listed(source: Source) -> str:
 
 def split_unit(title: str) -> tuple[str, str]:
     """Split ``drive_mV``, ``pos [nm]``, ``t (ms)``, ``x/µm`` into name and unit in lower case."""
-    plain = _plain(title.strip())
+    plain = with_u(title.strip())
     match = re.fullmatch(r"(.+?)\s*(?:[\[({<](\w+)[\])}>]|[/_\s.]\s*([^\W_]+))", plain)
     if match is None:
         return plain, ""
@@ -192,12 +188,12 @@ def with_units(names: list[str], below: list[str]) -> list[str]:
     """Names with the units of the line below them; no names if that line holds anything else."""
     units = [cell.strip(" []()") for cell in below]
     known = {unit for units in UNITS.values() for unit in units}
-    if not any(units) or not all(unit == "" or _plain(unit).lower() in known for unit in units):
+    if not any(units) or not all(unit == "" or with_u(unit).lower() in known for unit in units):
         return []
     return [titled(*named) for named in zip(names, units, strict=True)] if len(names) == len(units) else []
 
 
-def _plain(text: str) -> str:
+def with_u(text: str) -> str:
     """With u for the signs of micro, one of which is what a wrong encoding leaves of them."""
     return text.replace("µ", "u").replace("μ", "u").replace("\N{REPLACEMENT CHARACTER}", "u")
 
@@ -220,7 +216,7 @@ def _factor(source: Source, title: str, quantity: str) -> tuple[float, str]:
 def _stated_factor(quantity: str, text: str) -> tuple[float, str]:
     """Factor of a unit that was given, such as ``nm`` or, for a sensor's volts, ``0.2 um``."""
     match = re.fullmatch(
-        r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)?\s*([^\W\d_]+)\s*", _plain(str(text))
+        r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)?\s*([^\W\d_]+)\s*", with_u(str(text))
     )
     known = UNITS[quantity]
     if match is None or match[2].lower() not in known:

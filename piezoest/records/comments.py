@@ -2,6 +2,7 @@
 
 import re
 
+from piezoest.records.columns import UNITS, with_u
 from piezoest.records.source import RATES, stated_rate
 
 COMMENTS = ("#", "%")
@@ -10,7 +11,7 @@ ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.
 PERIODS = ("dt", "ts", "sample_time", "sampling_time", "sample_period", "sampling_period", "sample_interval")
 # What the units are in Hz and in s.
 OF_RATES = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6}
-OF_PERIODS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+OF_PERIODS = {"": 1.0, **UNITS["time"]}
 # A line ``NAME0 = Actual Position of Axis 1``, of which Physik Instrumente's GCS arrays have one a column.
 NUMBERED_NAME = re.compile(r"\s*NAME(\d+)\s*=\s*(\S.*?)\s*")
 
@@ -22,17 +23,19 @@ def bare(comment: str) -> str:
 
 def rate_in(comments: list[str]) -> float | None:
     """Sample rate that comments state [Hz]; None if they state none, or several."""
-    found = set()
-    for comment in comments:
-        if (entry := ENTRY.fullmatch(bare(comment))) is None:
-            continue
-        name, unit = entry[1].lower().replace(" ", "_"), (entry[2] or entry[4]).lower()
-        number = stated_rate(entry[3])
-        if number is not None and name in RATES and unit in OF_RATES:
-            found.add(number * OF_RATES[unit])
-        elif number is not None and name in PERIODS and unit in OF_PERIODS:
-            found.add(1.0 / (number * OF_PERIODS[unit]))
+    found = {_rate_of(entry) for comment in comments if (entry := ENTRY.fullmatch(bare(comment)))} - {None}
     return found.pop() if len(found) == 1 else None
+
+
+def _rate_of(entry: re.Match[str]) -> float | None:
+    """Sample rate that an entry states [Hz], itself or by its period; None if it is another entry."""
+    name, unit = entry[1].lower().replace(" ", "_"), with_u(entry[2] or entry[4]).lower()
+    number = stated_rate(entry[3])
+    if number is not None and name in RATES and unit in OF_RATES:
+        return stated_rate(number * OF_RATES[unit])
+    if number is not None and name in PERIODS and unit in OF_PERIODS:
+        return stated_rate(1.0 / number / OF_PERIODS[unit])
+    return None
 
 
 def numbered_names(comments: list[str]) -> list[str]:

@@ -106,7 +106,7 @@ def test_a_rest_with_a_coarse_sensor_is_no_fault() -> None:
     rng, wave = np.random.default_rng(0), pz.signals.triangle(5.0, 5.0, 8, FS).values
     r = np.concatenate((wave, 1.0 + 3e-4 * rng.normal(size=60_000)))
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
-    stage = pz.SimulatedStage(FS, LOOP, gauge=pz.stage.Gauge(noise=2e-4, resolution=5e-3))
+    stage = pz.SimulatedStage(FS, LOOP, gauge=pz.Gauge(noise=2e-4, resolution=5e-3))
     x = drive(driver, stage, r).x
     assert driver.events == ()
     assert last_error(r, x) < 0.1
