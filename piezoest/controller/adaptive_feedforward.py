@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from piezoest._checks import FloatArray, array_1d, measured, moderate, number_or_nan
+from piezoest._checks import FloatArray, array_1d, finite, measured, moderate, number_or_nan
 from piezoest.compensators.limits import VoltageLimits, resting
 from piezoest.controller import faults, kernel, making, saved, shown, team
 from piezoest.controller.face import Face
@@ -156,6 +156,38 @@ class AdaptiveFeedforward(Face):
         else:
             kernel.begin_at.of(*self._layouts)(self._state, self._settings, u, x)
         self._compiled()  # before a live loop, not at its first sample
+
+    def resume(self, voltage: float, displacement: float) -> None:
+        """Continue after a pause, during which the voltage changed or the stage moved, with what was learnt.
+
+        Use it the next day, after `from_dict`, or when a program that had to stop goes on. The voltage then
+        moves smoothly from where it is to the reference. The straight line drives until the models have
+        proved their accuracy again. If other voltages acted meanwhile, `home` erases their effect.
+
+        Parameters
+        ----------
+        voltage : float
+            Voltage at which the stage rests now [V], within the limits.
+        displacement : float
+            Reading of the sensor there [µm].
+
+        Raises
+        ------
+        ValueError
+            If the voltage is outside the limits, or the displacement is not a number.
+
+        Examples
+        --------
+        >>> import piezoest as pz
+        >>> limits = pz.VoltageLimits(minimum=-50.0, maximum=100.0)
+        >>> saved = pz.AdaptiveFeedforward(10_000.0, limits=limits, gain=0.2).to_dict()
+        >>> controller = pz.AdaptiveFeedforward.from_dict(saved)
+        >>> controller.resume(voltage=0.0, displacement=3.2)
+        """
+        u = resting(self._limits, finite("voltage", voltage))
+        x = measured("displacement", displacement)
+        self._planned = None
+        kernel.resume.of(*self._layouts)(self._state, self._settings, u, x)
 
     def _compiled(self) -> tuple[Any, ...]:
         """Machine code: to plan and to learn from a sample, a block; to home."""

@@ -35,6 +35,8 @@ def lose_write(state: Any) -> None:
         # Once for all that are lost in a row.
         faults.notice(state, faults.UNKNOWN)
     all_models(state)
+    # The line goes on from the planned voltage: from the last known one it would go back and forth.
+    state.owed -= state.line.gain * (state.planned - state.u) / state.unit
 
 
 @register_jitable

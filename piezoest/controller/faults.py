@@ -28,16 +28,18 @@ MEANINGS = {
     "voltage at its limit of {limit:.4g} V: keep the reference within what the stage reaches",
     "false start": "the stage does not go as the start has shown, which was hum or drift: the gain "
     "is sought again, on longer ways",
+    "feedback": "it shook the stage, and its gain is halved: a smaller one helps",
     "no readings": "none has come for {silence:.2g} s: what drives goes on, and nothing is learnt",
 }
 # Their names by their numbers.
 FAULTS = ("", *MEANINGS)
 (
     NONE, NO_RESPONSE, REVERSED, SCALED, SATURATED, MOVED,
-    OTHER_GAIN, UNKNOWN, SHAKEN, FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START, NO_READINGS,
+    OTHER_GAIN, UNKNOWN, SHAKEN, FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START, FEEDBACK,
+    NO_READINGS,
 ) = (float(number) for number in range(len(FAULTS)))  # fmt: skip
 # Of what is noted beside faults, that which the user is to change.
-WARNINGS = (FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START, NO_READINGS)
+WARNINGS = (FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START, FEEDBACK, NO_READINGS)
 
 
 @register_jitable

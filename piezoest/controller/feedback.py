@@ -12,10 +12,15 @@ from numba.extending import register_jitable
 from piezoest.controller import driving, faults
 from piezoest.controller import travel as travels
 from piezoest.controller.voltage import is_held
-from piezoest.layout import COUNT, FLAG, MEASURED, NUMBER, record
+from piezoest.layout import COUNT, FLAG, MEASURED, NUMBER, SIGN, record
 
 # No sample corrects more than this fraction of an error, of one that is answered late less.
 FASTEST = 0.25
+# A correction that goes back and forth so many times within a leg, by this fraction of a swing each time, and
+# within so many times what it takes to correct an error, shakes the stage: its gain is halved.
+SHAKES, BACK_AND_FORTH, QUICK = 8.0, 0.005, 3.0
+# Where the correction turned last, its way since, samples since; such turns in a row; halvings so far.
+SHAKING = record(turned=NUMBER, way=SIGN, samples=COUNT, count=COUNT, halved=COUNT)
 # A rest is over where the reference has gone so far from it, in swings.
 OVER = 0.02
 # Whether the reference rests, and where. Behind a rest: turns left to look at; samples since the first one,
@@ -28,12 +33,43 @@ TURNS, KNOWN = 3.0, 0.5
 @register_jitable
 def follow(state: Any, settings: Any, x: Any) -> None:
     """Take a believed reading; a sensor that lies can drive it no farther than the corridor."""
-    share = min(settings.feedback, FASTEST / (1.0 + state.block + state.start.lag))
-    growth = share * (state.r - x)
+    gain = settings.feedback * 0.5**state.shaking.halved
+    share = min(gain, FASTEST / (1.0 + state.block + state.start.lag))
+    growth = share * (state.late.answered_r - x)
     if is_held(settings, state.u, growth * state.line.gain):
         # At a limit it would only wind up.
         return
     state.feedback = _within(state, settings, state.feedback + growth)
+    if share > 0.0:
+        _calm(state, 1.0 / share)
+
+
+@register_jitable
+def _noise(state: Any) -> float:
+    """Noise of the readings as it was at rest, if it was seen: what is shaken would pass for noise."""
+    return state.start.noise if state.start.told == 0.0 else np.sqrt(state.readings.noise)
+
+
+@register_jitable
+def _calm(state: Any, slow: Any) -> None:
+    """Halve the gain of a correction that shakes the stage: it takes `slow` samples to correct an error.
+
+    Integral feedback is stable below twice damping times resonance, which nobody has told.
+    """
+    shaking = state.shaking
+    shaking.samples += 1.0
+    gone = state.feedback - shaking.turned
+    if state.reference.turned_now != 0.0:
+        shaking.count = 0.0
+    if gone * shaking.way > 0.0:
+        shaking.turned = state.feedback
+    elif np.abs(gone) > max(BACK_AND_FORTH * state.reference.swing, _noise(state)):
+        shaking.count = shaking.count + 1.0 if shaking.samples < QUICK * slow else 0.0
+        shaking.turned, shaking.way, shaking.samples = state.feedback, np.sign(gone), 0.0
+        if shaking.count > SHAKES:
+            shaking.halved += 1.0
+            shaking.count = 0.0
+            faults.notice(state, faults.FEEDBACK)
 
 
 @register_jitable

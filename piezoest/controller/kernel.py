@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
+from piezoest._checks import WILDEST
 from piezoest.compile import Record, Vector, compiled
 from piezoest.controller import candidate, homing, late, redraw, slots
 from piezoest.controller import feedback as feedbacks
@@ -17,8 +18,8 @@ from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.learning import begin_homing, take
-from piezoest.controller.voltage import RUN, plan, written
+from piezoest.controller.learning import begin_homing, go_on_at_rest, take
+from piezoest.controller.voltage import RUN, SEEK, plan, written
 from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, Field, record, whole
 from piezoest.layout import Record as Layout
 
@@ -48,11 +49,11 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         # Whether the reference goes on small behind a wide way.
         small=FLAG,
         # Correction of the reference by feedback [µm], and that of the voltage planned.
-        feedback=NUMBER, back=NUMBER, rest=feedbacks.REST,
+        feedback=NUMBER, back=NUMBER, rest=feedbacks.REST, shaking=feedbacks.SHAKING,
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
         # Faults noted so far, counting their ends, and the last one.
-        noticed=COUNT, notice=whole(0.0, 14.0), shaken=COUNT,
+        noticed=COUNT, notice=whole(0.0, 15.0), shaken=COUNT,
         # When the last one was noted; reference, reading and voltage then.
         seen=record(samples=COUNT, r=MEASURED, x=MEASURED, u=MEASURED),
         # What the line misses, the most of late, what it missed of a swing when it drove; what the stage
@@ -113,6 +114,12 @@ def _begin(state: Any, settings: Any, u: Any) -> None:
     state.start.given = 1.0 if settings.start.gain != 0.0 else 0.0
 
 
+@register_jitable
+def _rest_at(state: Any, settings: Any, u: Any, x: Any) -> None:
+    starts.rest_at(state.start, settings.start, u, x, settings.start.gain)
+    state.start.told = 1.0
+
+
 @compiled
 def begin(state: Record, settings: Record, u: float) -> None:
     """Begin with a state of zeros, at rest at a voltage."""
@@ -123,8 +130,21 @@ def begin(state: Record, settings: Record, u: float) -> None:
 def begin_at(state: Record, settings: Record, u: float, x: float) -> None:
     """Begin with a state of zeros, at rest at a voltage where the sensor reads x."""
     _begin(state, settings, u)
-    starts.rest_at(state.start, settings.start, u, x, settings.start.gain)
-    state.start.told = 1.0
+    _rest_at(state, settings, u, x)
+
+
+@compiled
+def resume(state: Record, settings: Record, u: float, x: float) -> Any:
+    """Go on at rest at a voltage where the sensor reads x, with what was learnt before; whether it can."""
+    if not (settings.minimum <= u <= settings.maximum and np.abs(x) < WILDEST):
+        return False
+    if state.unit != 0.0:
+        go_on_at_rest(state, settings, u, x)
+        return True
+    state.stage, state.pending, state.asked = SEEK, 0.0, 0.0
+    _begin(state, settings, u)
+    _rest_at(state, settings, u, x)
+    return True
 
 
 @compiled

@@ -1,7 +1,8 @@
-"""The voltage that a late reading answers: readings come after what a delay or a lag holds back.
+"""What a late reading answers: readings come after what a delay or a lag holds back.
 
 The line through voltages and readings of the same samples would be too flat where readings are late, and
-beside its place; from a quarter of a period on it would point the wrong way.
+beside its place; from a quarter of a period on it would point the wrong way. Feedback would take what the
+reference has gone meanwhile for an error.
 """
 
 from typing import Any
@@ -10,20 +11,32 @@ from numba.extending import register_jitable
 
 from piezoest.layout import MEASURED, numbers, record, whole
 
-# Voltages that are remembered.
+# Samples that are remembered.
 MOST = 32
-# The last voltages, where the last one stands, and the one that the present reading answers.
-LATE = record(u=numbers(MOST, kind=MEASURED), at=whole(0.0, MOST - 1.0), answered=MEASURED)
+# The last voltages and references, where the last ones stand, and those that the present reading answers.
+LATE = record(
+    u=numbers(MOST, kind=MEASURED), r=numbers(MOST, kind=MEASURED), at=whole(0.0, MOST - 1.0),
+    answered=MEASURED, answered_r=MEASURED,
+)  # fmt: skip
 
 
 @register_jitable
-def remember(late: Any, start: Any, u: Any) -> None:
-    """Remember a voltage that was written, and find the one that is answered, at most the oldest one.
+def rest(late: Any, u: Any, r: Any) -> None:
+    """All has rested for longer than anything is late."""
+    for i in range(MOST):
+        late.u[i], late.r[i] = u, r
+    late.answered, late.answered_r = u, r
+
+
+@register_jitable
+def remember(late: Any, start: Any, u: Any, r: Any) -> None:
+    """Remember what was written and wanted, and find what is answered, at most the oldest one.
 
     A stage that was late at the start because it is slow to slew is not late on slower ways.
     """
     late.at = late.at + 1.0 if late.at < MOST - 1.0 else 0.0
-    late.u[int(late.at)] = u
+    late.u[int(late.at)], late.r[int(late.at)] = u, r
     lag = int(min(start.lag, MOST - 1.0) + 0.5) if start.fastest == 0.0 else 0
     place = int(late.at) - lag
-    late.answered = late.u[place if place >= 0 else place + MOST]
+    place = place if place >= 0 else place + MOST
+    late.answered, late.answered_r = late.u[place], late.r[place]

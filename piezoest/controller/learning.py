@@ -282,9 +282,16 @@ def begin_homing(state: Any, settings: Any, amplitude: Any, turn: Any, cycles: A
 
 
 @register_jitable
+def _begin_again(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """Begin the way to the reference from a voltage where the stage stands at x; the gain is known."""
+    starts.rest_at(state.start, settings.start, u, x, state.line.gain)
+    _begin_learning(state)
+
+
+@register_jitable
 def _home(state: Any, settings: Any, u: Any, x: Any) -> None:
     """Follow the sweep; behind it the way to the reference begins, or the gain is sought."""
-    start, line, recent = state.start, state.line, state.readings.recent
+    line, recent = state.line, state.readings.recent
     if state.scale > 0.0:
         slots.advance(state.candidates, settings.candidates, u)
         slots.learn(state.candidates, settings.candidates, u, np.nan)
@@ -294,13 +301,25 @@ def _home(state: Any, settings: Any, u: Any, x: Any) -> None:
         return
     if state.unit == 0.0:
         state.stage = SEEK
-        starts.begin_again(start, settings.start, u)
+        starts.begin_again(state.start, settings.start, u)
         return
     here = lines.at(line, u)
     if recent.count > 0.0:
         here = recent.mean_x + line.gain * (u - recent.mean_u)
-    starts.rest_at(start, settings.start, u, here, line.gain)
-    _begin_learning(state)
+    _begin_again(state, settings, u, here)
+
+
+@register_jitable
+def go_on_at_rest(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """Go on at rest at a voltage where the sensor reads x; the gain is known."""
+    state.u = state.planned = u
+    state.pending = state.asked = state.frozen = 0.0
+    late.rest(state.late, u, state.r)
+    doubt.all_models(state)
+    feedback.forget(state)
+    if state.scale > 0.0:
+        slots.advance(state.candidates, settings.candidates, u)
+    _begin_again(state, settings, u, x)
 
 
 @register_jitable
@@ -362,10 +381,10 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         return
     state.pending = 0.0
     state.u = u
-    late.remember(state.late, state.start, u)
-    silence.watch(state, settings, x)
     if np.abs(r) < WILDEST:
         state.r, state.asked = r, 1.0
+    late.remember(state.late, state.start, u, state.r)
+    silence.watch(state, settings, x)
     if state.stage == SEEK:
         _seek(state, settings, u, x)
         return

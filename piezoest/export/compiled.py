@@ -173,6 +173,7 @@ class CompiledFeedforward:
         self._library.step.argtypes, self._library.step.restype = (real,), real
         self._library.learn.argtypes = (real, real)
         self._library.anew.argtypes = (real,)
+        self._library.resume.argtypes = (real, real)
         self._library.home.argtypes = (real, real, real)
         self.reset()
 
@@ -193,6 +194,27 @@ class CompiledFeedforward:
             self._library.begin()
         elif not self._library.anew(voltage):
             raise ValueError(f"voltage must lie within the limits, got {voltage:g} V")
+
+    def resume(self, voltage: float, displacement: float) -> None:
+        """Continue from rest with what was learnt; see `AdaptiveFeedforward.resume`.
+
+        Parameters
+        ----------
+        voltage : float
+            Voltage at which the stage rests [V].
+        displacement : float
+            Reading of the sensor there [µm].
+
+        Raises
+        ------
+        ValueError
+            If the voltage is not within the limits, or the displacement is not a number.
+        """
+        if not self._library.resume(number_or_nan(voltage), number_or_nan(displacement)):
+            raise ValueError(
+                f"voltage must lie within the limits, and displacement be a number, got {voltage} V and "
+                f"{displacement} µm"
+            )
 
     def step(self, r: float | None) -> float:
         """Voltage for the next sample of the reference.

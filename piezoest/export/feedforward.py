@@ -35,6 +35,7 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
 
     step, learn = call_of(kernel.step, "r"), call_of(kernel.learn, "u", "x")
     begin = call_of(kernel.begin, "voltage")
+    resume = call_of(kernel.resume, "voltage", "displacement")
     turn = f"frequency * {literal(1.0 / controller.sample_rate, file.single)}"
     home = call_of(kernel.home, "amplitude", turn, "cycles")
     begun = ""
@@ -62,12 +63,13 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
             "start": file.start(now.layout, now.values),
             "begun": begun,
             "anew": "begun" if begun else "start",
-            "functions": file.text(f"{step} {learn} {begin} {home}"),
+            "functions": file.text(f"{step} {learn} {begin} {resume} {home}"),
             "minimum": literal(limits.minimum, file.single),
             "maximum": literal(limits.maximum, file.single),
             "step": step,
             "learn": learn,
             "begin": begin,
+            "resume": resume,
             "home": home,
         },
         learns=bool(estimators),

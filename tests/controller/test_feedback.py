@@ -151,3 +151,35 @@ def test_a_staircase_keeps_its_correction_and_a_square_wave_its_steps() -> None:
             error.append(abs(r_k - x))
         plateaus = np.array(error[WAVE.size :]).reshape(-1, length)
         assert plateaus[1:, soon:].max() < within
+
+
+@pytest.mark.parametrize("gain", [400.0, 2000.0])
+def test_a_gain_that_shakes_the_stage_is_halved_until_it_does_not(gain: float) -> None:
+    """Integral feedback is stable below twice damping times resonance, here 126/s."""
+    fs = 1e4
+    r = np.tile(pz.signals.sine(3.0, 10.0, 1, fs).values, 20)
+    driver = pz.AdaptiveFeedforward(fs, limits=LIMITS, feedback=gain)
+    stage = pz.SimulatedStage(fs, LOOP, mechanics=pz.MassSpringDamper(500.0, 0.02))
+    x = shared.drive(driver, stage, r).x
+    assert last_error(r, x) < 0.05
+    names = [event.name for event in driver.events]
+    assert set(names) == {"feedback"}
+    assert gain / 2.0 ** (len(names) - 1) > 60.0  # what rings when it is small enough may halve it again
+
+
+def test_readings_that_are_late_do_not_pass_for_an_error() -> None:
+    fs, late, errors = 1e4, 20, []
+    r = np.tile(pz.signals.sine(3.0, 10.0, 1, fs).values, 20)
+    for feedback in (None, 20.0):
+        driver, stage = (
+            pz.AdaptiveFeedforward(fs, limits=LIMITS, feedback=feedback),
+            pz.SimulatedStage(fs, LOOP),
+        )
+        seen = [0.0] * late
+
+        def read(k: int, x: float, seen: Any = seen) -> float:
+            seen.append(x)
+            return float(seen[k])
+
+        errors.append(last_error(r, shared.drive(driver, stage, r, read).x))
+    assert errors[1] < 1.2 * errors[0]

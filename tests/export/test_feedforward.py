@@ -113,6 +113,19 @@ def test_a_gain_that_is_known_need_not_be_right(gain: float) -> None:
 
 
 @pytest.mark.parametrize("begin", [0, 2500])
+def test_it_resumes(begin: int) -> None:
+    library = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=())
+    board, own = pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem")
+    drive(library, board, own, count=begin)
+    for each in (library, board):
+        each.resume(10.0, 2.0)
+    drive(library, board, own, count=1500)
+    for wrong in ((101.0, 0.0), (np.nan, 0.0), (0.0, np.nan), (0.0, 1e30)):
+        with pytest.raises(ValueError, match="voltage must"):
+            board.resume(*wrong)
+
+
+@pytest.mark.parametrize("begin", [0, 2500])
 def test_it_homes(begin: int) -> None:
     library = pz.AdaptiveFeedforward(FS, limits=pz.VoltageLimits(-100.0, 100.0, 2e4, FS), estimators=())
     board, own = pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem")

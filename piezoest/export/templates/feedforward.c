@@ -21,6 +21,11 @@ int @name@_reset(@name@_state *state, @real@ voltage)
     return 1;
 }
 
+int @name@_resume(@name@_state *state, @real@ voltage, @real@ displacement)
+{
+    return @resume@;
+}
+
 @real@ @name@_step(@name@_state *state, @real@ r)
 {
     return @step@;

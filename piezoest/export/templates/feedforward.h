@@ -15,6 +15,11 @@ void @name@_init(@name@_state *state);
  * unless it is within the limits, @limits@. */
 int @name@_reset(@name@_state *state, @real@ voltage);
 
+/* Go on with all that was learnt, with the stage at rest at a voltage [V] where the sensor reads a displacement
+ * [um], as after a start of the board. Returns 0, and changes nothing, unless the voltage is within the limits
+ * and the displacement a number. */
+int @name@_resume(@name@_state *state, @real@ voltage, @real@ displacement);
+
 /* Voltage [V], within the limits, for the next sample of the reference r [um]; NaN or infinity holds the last
  * one. */
 @real@ @name@_step(@name@_state *state, @real@ r);

@@ -4,6 +4,7 @@ static @name@_state state;
 
 void begin(void) { @name@_init(&state); }
 int anew(@real@ voltage) { return @name@_reset(&state, voltage); }
+int resume(@real@ voltage, @real@ displacement) { return @name@_resume(&state, voltage, displacement); }
 @real@ step(@real@ r) { return @name@_step(&state, r); }
 void learn(@real@ u, @real@ x) { @name@_learn(&state, u, x); }
 int home(@real@ amplitude, @real@ frequency, @real@ cycles)
