@@ -36,6 +36,11 @@ def grouped(command: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
+def examples(*commands: str) -> str:
+    """The end of a help text: a line for each command."""
+    return "\n\n".join(("Example:" if len(commands) == 1 else "Examples:", *commands))
+
+
 def one_of(*known: str) -> Callable[[str | None], str | None]:
     """Callback of an option that takes one of these words."""
 

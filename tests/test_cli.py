@@ -55,6 +55,7 @@ def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 THETA = ("--alpha", 0.02, "--beta", 0.12, "--gamma", 0.0036)
+WIDE = ("--minimum", -100, "--maximum", 100)
 
 
 def test_demo_reduces_the_error_by_ninety_percent(tmp_path: Path) -> None:
@@ -152,6 +153,7 @@ def test_a_model_goes_into_compensate_with_its_ranges(tmp_path: Path, monkeypatc
 
 def test_compensate_keeps_within_limits_and_says_so(reference: Path) -> None:
     result = run("compensate", reference, *THETA, "--maximum", 10, "--minimum", -8, "-o", "voltage.csv")
+    assert "--minimum" not in result.stderr
     assert result.exit_code == 0
     assert "reference: column reference_um" in result.stdout
     assert "limit" in result.stderr
@@ -164,6 +166,14 @@ def test_compensate_keeps_within_limits_and_says_so(reference: Path) -> None:
 LEARNT_ON = {"voltage": [-16.0, 16.0], "displacement": [1.0, 5.0], "rate": 400.0, "frequency": [5.0, 5.0]}
 
 
+@pytest.mark.parametrize("limits", [(), ("--minimum", -60), ("--maximum", 60)])
+def test_compensate_warns_where_nothing_bounds_the_voltage(reference: Path, limits: tuple[Any, ...]) -> None:
+    result = run("compensate", reference, *THETA, *limits, "-o", "voltage.csv")
+    assert result.exit_code == 0
+    for name in ("--minimum", "--maximum"):
+        assert (name in result.stderr) == (name not in limits)
+
+
 @pytest.mark.parametrize("offset", [3.0, 0.0])
 def test_compensate_says_what_the_model_was_not_learnt_on(reference: Path, offset: float) -> None:
     r = signals.triangle(2.0, 5.0, 4, RATE)
@@ -172,7 +182,7 @@ def test_compensate_says_what_the_model_was_not_learnt_on(reference: Path, offse
     leaves = {"rate": 100.0, "displacement": [2.0, 4.0]}
     for change, lines in (({}, 0), ({"frequency": None}, 0), (leaves, 2)):
         Path("model.json").write_text(json.dumps({"model": TRUE.to_dict(), "learnt_on": LEARNT_ON | change}))
-        result = run("compensate", reference, "-p", "model.json", "-o", "voltage.csv", *moved)
+        result = run("compensate", reference, "-p", "model.json", "-o", "voltage.csv", *moved, *WIDE)
         assert result.exit_code == 0
         assert len(result.stderr.strip().splitlines()) == lines
 

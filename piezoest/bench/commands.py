@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from piezoest._errors import Group
-from piezoest._options import grouped
+from piezoest._options import examples, grouped
 from piezoest._progress import LOADING, progress
 from piezoest.bench import safety_command, shared, table_command
 from piezoest.bench.origin import origin
@@ -22,8 +22,11 @@ app.command(epilog=safety_command.EPILOG)(safety_command.safety)
 
 
 @app.command(
-    epilog="Examples: piezoest bench paper; piezoest bench paper --json paper.json --figures figures; "
-    "piezoest bench paper --memory 0.4 --quick"
+    epilog=examples(
+        "piezoest bench paper",
+        "piezoest bench paper --json paper.json --figures figures",
+        "piezoest bench paper --memory 0.4 --quick",
+    )
 )
 @grouped
 def paper(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from piezoest._options import grouped
+from piezoest._options import examples, grouped
 from piezoest._progress import LOADING, progress
 from piezoest._tables import shown
 from piezoest.bench import shared
@@ -23,9 +23,11 @@ if TYPE_CHECKING:
     from piezoest.bench.zoo.tasks import Task
 
 FOLDER = Path("bench-results-safety")
-EPILOG = (
-    "Examples: piezoest bench safety --runs 2000; piezoest bench safety --set fault=none; "
-    "piezoest bench safety --show 17; piezoest bench safety --map --runs 3 -c my_module:MyController"
+EPILOG = examples(
+    "piezoest bench safety --runs 2000",
+    "piezoest bench safety --set fault=none",
+    "piezoest bench safety --show 17",
+    "piezoest bench safety --map --runs 3 -c my_module:MyController",
 )
 
 
@@ -50,7 +52,9 @@ class Which:
     ] = None
     given: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="In the place of what is drawn; may be repeated."),
+        typer.Option(
+            "--set", metavar="NAME=VALUE", help="A value instead of the one that is drawn; may be repeated."
+        ),
     ] = None
     settling: Annotated[
         bool, typer.Option("--map", help="How soon it settles, over amplitude, frequency and family.")
@@ -61,11 +65,12 @@ class Which:
     ] = False
     dwell: Annotated[
         int | None,
-        typer.Option(metavar="N", min=1, help="How it goes on after a rest of a minute, on N rigs."),
+        typer.Option(metavar="N", min=1, help="How it continues after a rest of a minute, on N rigs."),
     ] = None
     show: Annotated[
-        int | None, typer.Option(metavar="SEED", min=0, help="Run this one alone, and draw it.")
-    ] = None  # fmt: skip
+        int | None,
+        typer.Option(metavar="SEED", min=0, help="Run this one alone, print its numbers and draw it."),
+    ] = None
 
     @property
     def asked(self) -> list[str]:
@@ -98,7 +103,7 @@ def safety(
 
     Each run is a function of its seed. A run is safe if the voltage is finite, within its limits, rests at
     none of them without need, and the error is not clearly larger than that of the best straight line; the
-    page Safety on unknown rigs defines this. Stopped and started again, it goes on where it was.
+    page Safety on unknown rigs defines this. If you stop the command and start it again, it continues.
     """
     shared.check(json_to)
     began, asked = time.perf_counter(), which.asked

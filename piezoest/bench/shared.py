@@ -50,7 +50,7 @@ def usage(folder: Path | None = None) -> Iterator[None]:
         raise typer.BadParameter(str(error)) from None
     except KeyboardInterrupt:
         if folder is not None:
-            print(f"stopped: the same command goes on from {folder}", file=sys.stderr)
+            print(f"stopped: the same command continues from {folder}", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None
 
 

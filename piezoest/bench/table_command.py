@@ -11,7 +11,7 @@ import typer
 
 from piezoest._errors import USER_ERROR
 from piezoest._files import read_json
-from piezoest._options import grouped
+from piezoest._options import examples, grouped
 from piezoest._progress import LOADING, progress
 from piezoest.bench import shared
 from piezoest.bench.origin import json_safe, origin, put
@@ -21,7 +21,7 @@ SEEDS, SLOW_SEEDS = 30, 10
 WORSE = 1  # exit code of `compare --fail-if-worse`
 HEAD = ("date", "machine", "versions", "code", "runs")
 
-COMPARE_EPILOG = "Example: piezoest bench compare before after --json changes.json"
+COMPARE_EPILOG = examples("piezoest bench compare before after --json changes.json")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,23 +34,23 @@ class Runs:
             "--estimator",
             "-e",
             metavar="NAME|MODULE:CLASS",
-            help='Beside the package\'s; may have arguments: "HysteresisRLS(memory=0.4)", and be repeated.',
+            help="One more beside the package's, also with arguments, as in the examples; may be repeated.",
         ),
     ] = None
     only: Annotated[
-        list[str] | None, typer.Option(help="Only this one in the place of the package's; may be repeated.")
+        list[str] | None, typer.Option(help="Only this one instead of all of the package's; may be repeated.")
     ] = None
     scenario: Annotated[
         list[str] | None,
-        typer.Option("--scenario", "-s", help="Only this one; may be repeated. Default all."),
+        typer.Option("--scenario", "-s", help="Only this one; may be repeated. Default: all."),
     ] = None
     stage: Annotated[
         list[str] | None,
-        typer.Option(help="Only this one; may be repeated. Default paper and three of other families."),
+        typer.Option(help="Only this one; may be repeated. Default: paper, and three of other families."),
     ] = None
     logs: Annotated[
         str | None,
-        typer.Option(metavar="DIR|PATTERN", help="Recorded logs (CSV) in the place of the scenarios."),
+        typer.Option(metavar="DIR|PATTERN", help="Recorded logs (CSV) instead of the scenarios."),
     ] = None
     seeds: Annotated[
         int | None,
@@ -61,11 +61,11 @@ class Runs:
     ] = None
     tune: Annotated[
         int | None,
-        typer.Option(metavar="N", min=1, help="Each also tuned: the best of N settings, on other seeds."),
+        typer.Option(metavar="N", min=1, help="Add each with tuned settings: the best of N, on other seeds."),
     ] = None
     sample_rate: Annotated[float | None, typer.Option(min=2000.0, help="Hz; default 5000.")] = None
     quick: Annotated[
-        bool, typer.Option("--quick", help="A look: short runs at 2 kHz, one seed, the paper's stage.")
+        bool, typer.Option("--quick", help="A first look: short runs at 2 kHz, one seed, the paper's stage.")
     ] = False
 
 
@@ -102,21 +102,34 @@ def table(
 ) -> None:
     """Compare estimators: scenarios × stages × estimators × seeds, in parallel, beside linear feed-forward.
 
-    Finished runs are kept in the output folder: stopped and started again, it goes on where it was. There are
-    then the tables runs and periods (Parquet or CSV), and table.json with machine, versions and medians.
+    Finished runs are kept in the output folder: if you stop the command and start it again, it continues. The
+    results are the tables runs and periods (Parquet or CSV), and table.json: machine, versions, medians.
 
     [bold]Examples[/bold]
 
-    A look:  [cyan]piezoest bench --quick[/cyan]
+    A first look:
 
-    An estimator of your own beside the rest:  [cyan]piezoest bench -e my_module:MyEstimator[/cyan]
+    [cyan]piezoest bench --quick[/cyan]
 
-    Settings of one:  [cyan]piezoest bench --only HysteresisRLS -e "HysteresisRLS(memory=0.2)"[/cyan]
+    An estimator of your own beside the others:
 
-    Before and after a change:  [cyan]piezoest bench -o before[/cyan],  [cyan]piezoest bench -o after[/cyan],
-    then  [cyan]piezoest bench compare before after[/cyan]
+    [cyan]piezoest bench -e my_module:MyEstimator[/cyan]
 
-    A fleet of recorded stages:  [cyan]piezoest bench --logs fleet/ --dask[/cyan]
+    Settings of one estimator:
+
+    [cyan]piezoest bench --only HysteresisRLS -e "HysteresisRLS(memory=0.2)"[/cyan]
+
+    Before and after a change, then the differences:
+
+    [cyan]piezoest bench -o before[/cyan]
+
+    [cyan]piezoest bench -o after[/cyan]
+
+    [cyan]piezoest bench compare before after[/cyan]
+
+    Recorded logs in a folder:
+
+    [cyan]piezoest bench --logs folder/[/cyan]
     """
     if context.invoked_subcommand is not None:
         if given := _given(context):

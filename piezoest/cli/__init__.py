@@ -57,7 +57,7 @@ def _piezoest(
 
     Learn a model from a log:  [cyan]piezoest identify log.csv --output model.json[/cyan]
 
-    Turn a reference into a voltage:  [cyan]piezoest compensate r.csv -p model.json -o voltage.csv[/cyan]
+    From reference to voltage:  [cyan]piezoest compensate r.csv -p model.json -o u.csv[/cyan]
     """
 
 

@@ -10,7 +10,7 @@ import typer
 
 from piezoest._errors import Debug, errors
 from piezoest._files import check_targets
-from piezoest._options import grouped
+from piezoest._options import examples, grouped
 from piezoest._progress import LOADING, progress
 
 if TYPE_CHECKING:
@@ -18,11 +18,13 @@ if TYPE_CHECKING:
     from piezoest.models import LearntModel
     from piezoest.signals import Signal
 
-EPILOG = (
-    "Examples: piezoest compensate reference.csv --parameters model.json -o voltage.csv; "
-    "piezoest compensate reference.csv --alpha 0.017 --beta 0.148 --gamma 0.0038 --maximum 150 -o voltage.csv"
+EPILOG = examples(
+    "piezoest compensate r.csv -p model.json --minimum 0 --maximum 150 -o u.csv",
+    "piezoest compensate r.csv --alpha 0.017 --beta 0.148 --gamma 0.0038 -o u.csv",
 )
 
+# Where the voltage is bounded by each limit.
+SIDES = {"minimum": "below", "maximum": "above"}
 # The first step from rest is a jump if it is so many times the largest that follows.
 JUMP = 3.0
 # ... and more than this fraction of the whole swing.
@@ -47,8 +49,12 @@ class Stated:
 class Limits:
     """What the amplifier can do."""
 
-    minimum: Annotated[float | None, typer.Option(help="Least voltage [V].")] = None
-    maximum: Annotated[float | None, typer.Option(help="Largest voltage [V].")] = None
+    minimum: Annotated[
+        float | None, typer.Option(help="Lowest voltage that stage and amplifier bear [V].")
+    ] = None
+    maximum: Annotated[
+        float | None, typer.Option(help="Highest voltage that stage and amplifier bear [V].")
+    ] = None
 
 
 @grouped
@@ -75,8 +81,8 @@ def compensate(
 ) -> None:
     """Turn a reference into the voltage that makes the stage follow it.
 
-    The voltage starts from 0 V without hysteresis, or from the limit nearest to it. It learns nothing on the
-    way: on a stage with a sensor, piezoest.AdaptiveFeedforward does, in a script.
+    The voltage starts at 0 V, or at the limit nearest to it; nothing bounds it without --minimum and
+    --maximum. The model stays as it is. On a stage with a sensor, piezoest.AdaptiveFeedforward learns it.
     """
     with errors(debug):
         check_targets(filter(None, (reference, stated.parameters)), output=output)
@@ -103,6 +109,9 @@ def compensate(
             f"{output}: {voltage.size} samples at {signal.sample_rate:.6g} Hz, "
             f"{voltage.min():.4g} to {voltage.max():.4g} V"
         )
+        for name, side in SIDES.items():
+            if name not in given:
+                typer.echo(f"warning: no --{name}: nothing bounds the voltage from {side}", err=True)
         if limited := compensator.status.saturated:
             typer.echo(
                 f"warning: {limited} samples ({100.0 * limited / voltage.size:.1f} %) are at a limit of the "

@@ -10,14 +10,14 @@ from rich.console import Console
 
 from piezoest._errors import Debug, errors
 from piezoest._files import check_targets, save_figure
-from piezoest._options import grouped
+from piezoest._options import examples, grouped
 from piezoest._progress import LOADING, progress
 from piezoest._tables import print_cells, say
 
 if TYPE_CHECKING:
     from piezoest.demo import Demo
 
-EPILOG = "Example: piezoest demo --output figure.png"
+EPILOG = examples("piezoest demo --output figure.png")
 
 
 @grouped

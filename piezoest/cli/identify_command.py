@@ -12,13 +12,16 @@ from rich.console import Console
 
 from piezoest._errors import Debug, errors
 from piezoest._files import check_targets, save_figure, write_text
-from piezoest._options import grouped
+from piezoest._options import examples, grouped
 from piezoest._progress import LOADING, Shown, progress
 
 if TYPE_CHECKING:
     from piezoest.identification import Identification, StreamedIdentification
 
-EPILOG = "Example: piezoest identify log.csv --columns voltage=drive_mV,displacement=3 --output model.json"
+EPILOG = examples(
+    "piezoest identify log.csv --output model.json",
+    "piezoest identify log.csv --columns time=t,voltage=u_mV,displacement=3",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,15 +30,13 @@ class Reading:
 
     columns: Annotated[
         str | None,
-        typer.Option(
-            help="Columns by name or number, where guessing fails: time=t,voltage=u_mV,displacement=3"
-        ),
+        typer.Option(help="Columns by name or number, where guessing fails: see the examples below."),
     ] = None
     units: Annotated[
         str | None,
         typer.Option(
-            help="Units, where no name states them: displacement=nm. With a number, what one in the log "
-            "stands for: displacement=0.2um"
+            help="Units, where no name states them: displacement=nm. With a number, what the number 1 in the "
+            "log means: displacement=0.2um"
         ),
     ] = None
     sample_rate: Annotated[

@@ -10,7 +10,7 @@ import typer
 
 from piezoest._errors import Group
 from piezoest._files import read_object
-from piezoest._options import grouped, one_of
+from piezoest._options import examples, grouped, one_of
 
 if TYPE_CHECKING:
     from piezoest.models import Model
@@ -21,7 +21,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Take a model or an estimator to a controller: C, co-simulation unit, tables.",
-    epilog="Example: piezoest export c model.json -o firmware --minimum 0 --maximum 150",
+    epilog=examples("piezoest export c model.json -o firmware --minimum 0 --maximum 150"),
 )
 
 Source = Annotated[
@@ -45,8 +45,12 @@ class Stated:
         ),
     ] = None
     sample_rate: Annotated[float | None, typer.Option(help="Samples per second of the controller.")] = None
-    minimum: Annotated[float | None, typer.Option(help="Least voltage [V].")] = None
-    maximum: Annotated[float | None, typer.Option(help="Largest voltage [V].")] = None
+    minimum: Annotated[
+        float | None, typer.Option(help="Lowest voltage that stage and amplifier bear [V].")
+    ] = None
+    maximum: Annotated[
+        float | None, typer.Option(help="Highest voltage that stage and amplifier bear [V].")
+    ] = None
     slew_rate: Annotated[float | None, typer.Option(help="Largest change of voltage [V/s].")] = None
 
 
@@ -72,8 +76,10 @@ class Code(Written):
 
 
 @app.command(
-    epilog="Examples: piezoest export c model.json -o firmware --minimum 0 --maximum 150; "
-    "piezoest export c model.json -o firmware --estimator rls --sample-rate 50000 --precision float"
+    epilog=examples(
+        "piezoest export c model.json -o firmware --minimum 0 --maximum 150",
+        "piezoest export c model.json -o firmware --estimator rls --sample-rate 50000",
+    )
 )
 @grouped
 def c(
@@ -99,8 +105,7 @@ def c(
 
 
 @app.command(
-    epilog="Examples: piezoest export adaptive -o firmware --sample-rate 50000 --minimum 0 --maximum 150; "
-    "with --estimators rls,ekf, or --estimators none for the straight line alone"
+    epilog=examples("piezoest export adaptive -o firmware --sample-rate 50000 --minimum 0 --maximum 150")
 )
 @grouped
 def adaptive(
@@ -111,7 +116,7 @@ def adaptive(
     written: Written,
     slew_rate: Annotated[float | None, typer.Option(help="Largest change of voltage [V/s].")] = None,
     estimators: Annotated[
-        str, typer.Option(help="Of rls, output-error, plays and ekf, with commas; none for the line alone.")
+        str, typer.Option(help="Some of rls, output-error, plays, ekf, with commas; or none: the line alone.")
     ] = "rls,output-error,plays",
 ) -> None:
     """Write an AdaptiveFeedforward in C99, which needs no model: it finds out what the stage does."""
@@ -134,7 +139,7 @@ def adaptive(
 
 
 @app.command(
-    epilog="Example: piezoest export fmu model.json -o stage.fmu --estimator rls --sample-rate 50000"
+    epilog=examples("piezoest export fmu model.json -o stage.fmu --estimator rls --sample-rate 50000")
 )
 @grouped
 def fmu(
@@ -150,7 +155,7 @@ def fmu(
     typer.echo(generate(*pair, output, **asdict(code), sample_rate=stated.sample_rate))
 
 
-@app.command(epilog="Example: piezoest export table model.json period.csv -o tables")
+@app.command(epilog=examples("piezoest export table model.json period.csv -o tables"))
 def table(
     source: Source,
     reference: Annotated[
