@@ -27,6 +27,10 @@ SPEED = {
     "estimator": "estimator", "settles": "settles [periods]", "first": "first [%]", "settled": "settled [%]",
     "step\n[µs]": "step [µs]",
 }  # fmt: skip
+# What a dash means in the tables of speed.
+UNSETTLED = (
+    "in *settles*, fewer than half of the runs settle; in other columns, it was not run there, or not timed."
+)
 
 
 def read(name: str) -> Document:
@@ -50,8 +54,8 @@ def write_page(page: Any, app: Any = None) -> None:
             write_text(path, text)
 
 
-def table(title: str, heading: Iterable[str], body: Iterable[Iterable[Any]]) -> str:
-    """A csv-table; ✗ in bold."""
+def table(title: str, heading: Iterable[str], body: Iterable[Iterable[Any]], dash: str = "") -> str:
+    """A csv-table; ✗ in bold. `dash`: what a dash means in it, for the line below a table that has one."""
     rows = [[f"**{text}**" if text.endswith("✗") else text for text in map(shown, row)] for row in body]
     if not rows:
         return f"*{title}: none.*\n"
@@ -59,12 +63,17 @@ def table(title: str, heading: Iterable[str], body: Iterable[Iterable[Any]]) -> 
     writer = csv.writer(written, lineterminator="\n", quoting=csv.QUOTE_ALL)
     writer.writerows([[name.replace("\n", " ") for name in heading], *rows])
     header, _, lines = written.getvalue().partition("\n")
-    return f".. csv-table:: {title}\n   :header: {header}\n   :widths: auto\n\n{indent(lines, '   ')}"
+    text = f".. csv-table:: {title}\n   :header: {header}\n   :widths: auto\n\n{indent(lines, '   ')}"
+    if not any("—" in cell for row in rows for cell in row):
+        return text
+    if not dash:
+        raise ValueError(f"table {title or header!r}: say what a dash means in it")
+    return f"{text}\n.. rst-class:: legend\n\n—: {dash}\n"
 
 
-def table_of(title: str, rows: Iterable[Any], columns: Columns | None = None) -> str:
+def table_of(title: str, rows: Iterable[Any], columns: Columns | None = None, dash: str = "") -> str:
     """A csv-table with a line for each row; without columns, the keys of the rows are the headings."""
-    return table(title, *cells_of(rows, columns))
+    return table(title, *cells_of(rows, columns), dash)
 
 
 def part_of(of: Table, columns: Mapping[str, str]) -> Table:

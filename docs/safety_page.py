@@ -3,42 +3,30 @@
 from page_parts import Document, of_all, percent, replacements, shown, table, table_of
 
 from piezoest._tables import Columns
+from piezoest.bench.zoo.words import CHANGES, CRITERIA, DRAWN, MODES, SPANS
 
 GROUPS = {"all": "all", "healthy": "healthy", "often": "called often"}
 WHO = {
     "controller": "controller", "no_corridor": "without corridor", "line": "without candidates",
     "parts": "by hand",
 }  # fmt: skip
-MODES = {"from the start": "from-start", "for a time": "transient", "until the end": "permanent"}
-CRITERIA = {
-    "failed": "error raised", "not finite": "voltage not finite", "outside the limits": "outside the limits",
-    "rests at a limit": "rests at a limit", "ratio": "ratio above 1", "cycle_ratio": "any cycle above 1",
-    "last_ratio": "last cycle above 1",
-}  # fmt: skip
-DRAWN = {
-    "family": "family of the hysteresis", "reference": "reference", "fault": "fault",
-    "mode": "time of the fault", "mechanics": "mechanics", "limits": "limits of the voltage [V]",
-}  # fmt: skip
-SPANS = {
-    "amplitude": "amplitude of the reference [µm]", "frequency": "frequency of the reference [Hz]",
-    "gain": "gain [µm/V]", "width": "width of the loop, relative to the stroke",
-    "sample_rate": "sample rate [Hz]", "delay": "delay of the readings [samples]",
-    "block": "samples in a block", "sensor_noise": "noise of the readings [µm]",
-    "creep": "creep per decade of time, relative to the displacement",
-}  # fmt: skip
 PLACE = {"amplitude [µm]": "amplitude", "frequency [Hz]": "frequency"}
-CHANGES = {
-    "cold start": "cold-start", "60 % of the amplitude": "switch", "20 %": "drop", "100 %": "switch-back",
-    "gain changes by 30 %": "gain-step",
-}  # fmt: skip
+
+NO_RUN = "no such run."
+
+
+def fault(row: Document) -> str:
+    """Its fault, and when this is present."""
+    return f"{row['fault']} {MODES.get(row['mode'], '')}".strip()
+
+
 WORST: Columns = {
-    "seed": lambda row: str(row["seed"]), "family": "family", "reference": "reference", "fault": "fault",
-    "time": "mode", "ratio": "ratio", "last cycle": "last_ratio", "at a limit [quarter swings]": "rail",
-    "drove last": "driver", "error": "failure",
+    "seed": lambda row: str(row["seed"]), "family": "family", "reference": "reference", "fault": fault,
+    "ratio": "ratio", "last cycle": "last_ratio", "at a limit [quarter swings]": "rail",
+    "drove last": lambda row: row["failure"] or row["driver"],
 }  # fmt: skip
 TOLD: Columns = {
-    "fault": "fault",
-    "time": "mode",
+    "fault": fault,
     "right name": lambda row: of_all(row["named"], row["to_name"]),
     "after [periods]": "named_periods",
     "as before in the first cycle": lambda row: of_all(row["recovered_first"], row["to_recover"]),
@@ -48,7 +36,7 @@ DWELL: Columns = {
     "creep": "creep", "feedback": "feedback", "noise": "noise",
     "as before in the first period": lambda row: of_all(row["kept"], row["runs"]),
     "first": "first", "second": "second", "third": "third", "largest first": "largest",
-    "travel": "excursion", "longest travel": "farthest",
+    "distance": "excursion", "largest distance": "farthest",
 }  # fmt: skip
 
 
@@ -69,6 +57,7 @@ def pieces(document: Document) -> dict[str, str]:
             "Faults that got their right name, and errors that were as before",
             (row for row in mine["by_mode"] if row["to_name"] or row["to_recover"]),
             TOLD,
+            "it is not judged: a fault without a name, one that lasts until the end, or too few cycles.",
         ),
         **settling(document),
         "singles": singles(document["singles"]),
@@ -96,7 +85,8 @@ def numbers(document: Document) -> str:
 def drawn(of: Document) -> str:
     """Names with their runs, and spans of numbers."""
     body = [
-        (title, "; ".join(f"{each} {n}" for each, n in of[name].items())) for name, title in DRAWN.items()
+        (title, "; ".join(f"{MODES.get(each, each)} {n}" for each, n in of[name].items()))
+        for name, title in DRAWN.items()
     ]
     body += [(title, " to ".join(map(shown, of["spans"][name]))) for name, title in SPANS.items()]
     title = "What is drawn: names with their runs, or smallest and largest number"
@@ -136,32 +126,41 @@ def cell(row: Document | None) -> str:
     return f"{shown(row['ratio'])}; {row['over']}/{row['judged']}" if row and row["judged"] else "—"
 
 
+def above(row: Document | None) -> str:
+    """Share of runs above 1, without its unit."""
+    return f"{100.0 * row['over'] / row['judged']:.0f}" if row and row["judged"] else "—"
+
+
 def by(document: Document, column: str, name: str, more: Columns | None = None) -> str:
     """The controller beside the straight line alone."""
     line = {row[column]: row for row in document["line"][f"by_{column}"]}
     beside = {"without candidates": lambda row: cell(line.get(row[column]))}
     columns = {name: column, "controller": cell, **(more or {}), **beside}
     title = f"By {name}: median of the ratio; runs above 1"
-    return table_of(title, document["controller"][f"by_{column}"], columns)
+    return table_of(title, document["controller"][f"by_{column}"], columns, NO_RUN)
 
 
 def modes(rows: list[Document]) -> Columns:
     """A column of the controller's ratio for each time of a fault."""
     cells = {(row["fault"], row["mode"]): cell(row) for row in rows}
-    return {said: lambda row, mode=mode: cells.get((row["fault"], mode), "—") for said, mode in MODES.items()}
+    return {said: lambda row, mode=mode: cells.get((row["fault"], mode), "—") for mode, said in MODES.items()}
 
 
 def crossed(mine: Document) -> str:
-    """Each family with each reference."""
+    """Share of runs above 1 of each family with each reference."""
     rows = {(row["family"], row["reference"]): row for row in mine["by_family_and_reference"]}
     below = {row["reference"]: row for row in mine["by_reference"]}
     body = [
-        [row["family"], *(cell(rows.get((row["family"], each))) for each in below), cell(row)]
+        [row["family"], *(above(rows.get((row["family"], each))) for each in below), above(row)]
         for row in mine["by_family"]
     ]
-    last = ["all", *map(cell, below.values()), ""]
-    title = "By family and reference: median of the ratio; runs above 1"
-    return table(title, ["family", *below, "all"], [*body, last])
+    last = [
+        "all",
+        *map(above, below.values()),
+        above(mine["all"] | {"over": mine["all"]["violations"]["ratio"]}),
+    ]
+    title = "By family and reference: runs with a ratio above 1, in % of all"
+    return table(title, ["family", *below, "all"], [*body, last], NO_RUN)
 
 
 def found(document: Document) -> str:
@@ -180,7 +179,7 @@ def found(document: Document) -> str:
         title = f"cells with a settled error of at most {alone['allowed']:g} times that of the best estimator"
         lines[title] = alone["kept"], len(alone["cells"])
     if cells := document["map"] and document["map"]["cells"]:
-        kept = {f"cells that settle soon: {title}": cells["kept"][name] for title, name in CHANGES.items()}
+        kept = {f"cells that settle soon: {title}": cells["kept"][name] for name, title in CHANGES.items()}
         lines |= {title: (count, cells["asked"]) for title, count in kept.items()}
     return table(
         "The other questions, in short", ["", "yes"], ([name, of_all(*of)] for name, of in lines.items())
@@ -194,7 +193,7 @@ def settling(document: Document) -> dict[str, str]:
         "by_place": ("required", PLACE),
         "other_places": ("not required", PLACE),
     }
-    shares: Columns = {each: lambda row, name=name: percent(row[name]) for each, name in CHANGES.items()}
+    shares: Columns = {each: lambda row, name=name: percent(row[name]) for name, each in CHANGES.items()}
     texts = {}
     for part, (asked, names) in parts.items():
         rows = document["map"][part] if document["map"] else []
@@ -211,5 +210,7 @@ def singles(alone: Document | None) -> str:
     }
     families, references = (list(dict.fromkeys(key[k] for key in cells)) for k in (0, 1))
     body = [[family, *(cells.get((family, each), "—") for each in references)] for family in families]
-    title = "Settled error relative to the amplitude, median; its ratio to that of the best single estimator"
-    return table(title, ["family", *references], body)
+    title = (
+        "Settled error (last three cycles) relative to the amplitude; its ratio to that of the best estimator"
+    )
+    return table(title, ["family", *references], body, NO_RUN)

@@ -14,7 +14,6 @@ import typer
 
 from piezoest._options import examples, grouped
 from piezoest._progress import LOADING, progress
-from piezoest._tables import shown
 from piezoest.bench import shared
 from piezoest.bench.origin import origin, put
 
@@ -185,19 +184,20 @@ def _campaign(which: Which, name: str, given: dict[str, Any]) -> Campaign:
 def _show(controller: str, seed: int, given: dict[str, Any], folder: Path) -> None:
     """Run one seed again, print its row and draw it."""
     from piezoest.bench.executors import quiet
-    from piezoest.bench.zoo import draw, traced
+    from piezoest.bench.zoo import draw, traced, words
     from piezoest.bench.zoo.contenders import contender
     from piezoest.bench.zoo.figure import write_figure
 
     rig = draw(seed, **given)
     with quiet():  # its events are printed
         row, both = traced(rig, contender(controller))
-    for name, value in row.items():
-        typer.echo(f"{name:>16} {shown(value)}")
+    said = words.one_run(row)
+    width = max(map(len, said))
+    for name, value in said.items():
+        typer.echo(f"{name:<{width}}  {value}")
     for event in both.events:
-        said = ("name", "action", "reason")
-        parts = [str(getattr(event, name)) for name in said if getattr(event, name, None)]
-        typer.echo(f"{event.time:>15.4g}s {': '.join(parts)}")
+        parts = [str(getattr(event, name, None) or "") for name in ("action", "reason")]
+        typer.echo(f"At {event.time:.4g} s {': '.join(filter(None, parts))}")
     path = folder / f"run-{seed}.png"
     write_figure(rig, row, both, path)
     typer.echo(f"Figure: {path}")

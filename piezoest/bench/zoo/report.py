@@ -5,26 +5,33 @@ from typing import Any
 
 from piezoest._tables import print_rows, say, shown
 from piezoest.bench.zoo.settling import ENOUGH, SEGMENTS, SOON
+from piezoest.bench.zoo.words import CHANGES, CRITERIA, MODES, RATIOS
 
 KEY = (
-    "Ratio: largest error after two swings, over the largest of 1.5 times that of the straight line, three "
-    "times the noise and 0.2 % of the swing; rms: the same of root mean squares; cycle: the largest of all "
-    "cycles, each with the line's error in that very cycle; last: of the last cycle; "
-    "after: from two swings after a transient fault, or after the beginning of one that stays. The line is "
-    "the worse one of two: that drawn in hindsight, and that learnt leg by leg. At a limit: the voltage "
-    "rests there for more than a quarter swing though the line's lies well within."
+    "Ratio: largest error from two swings after the start, divided by the largest of 1.5 times the error "
+    "of the straight line, three times the noise and 0.2 % of the swing. Any cycle: the largest of the "
+    "ratios of single cycles, each with the line's error in that cycle. After a fault: from two swings "
+    "after the end of a temporary fault, or after the beginning of one that stays. The line is the worse "
+    "of two: the best in hindsight, and one that is learnt from leg to leg. At a limit: the voltage rests "
+    "there for more than a quarter of a swing although the line's voltage is well within."
 )
+UNITS = {"amplitude": "amplitude\n[µm]", "frequency": "frequency\n[Hz]"}
+DWELLS = {
+    "runs": "runs", "as\nbefore": "kept", "first": "first", "second": "second", "third": "third",
+    "largest\nfirst": "largest", "distance": "excursion", "largest\ndistance": "farthest",
+}  # fmt: skip
 
 
 def print_summary(summary: dict[str, Any], console: Any) -> None:
     """Print what runs say together. `summary`: from `piezoest.bench.zoo.summary.summarise`."""
     healthy, heads = summary["healthy"], (f"of {summary['runs']}", f"of {summary['healthy_runs']} healthy")
     violations = [
-        {"criterion": name, heads[0]: count, heads[1]: healthy[name]}
-        for name, count in summary["violations"].items()
+        {"criterion": said, heads[0]: summary["violations"][name], heads[1]: healthy[name]}
+        for name, said in CRITERIA.items()
     ]
     print_rows(console, "Violations", violations)
-    print_rows(console, "Ratios", [{"": name, **each} for name, each in summary["quantiles"].items()])
+    ratios = [{"ratio": said, **summary["quantiles"][name]} for name, said in RATIOS.items()]
+    print_rows(console, "Quantiles of the ratio", ratios)
     references = sorted({row["reference"] for row in summary["by_family"]})
     crossed: dict[str, dict[str, str]] = {}
     for row in summary["by_family"]:
@@ -36,27 +43,28 @@ def print_summary(summary: dict[str, Any], console: Any) -> None:
     print_rows(console, "Runs with a ratio above 1, of all", crossed.values(), columns)
     print_rows(
         console, "By fault: runs with a ratio above 1, in the last cycle, or at a limit", summary["by_fault"],
-        {"fault": _fault, "runs": "runs", "over": "over", "last": "over_last", "limit": "at_limit",
-         "median": "ratio"},
+        {"fault": _fault, "runs": "runs", "ratio\nabove 1": "over", "last\ncycle": "over_last",
+         "at a\nlimit": "at_limit", "median\nratio": "ratio"},
     )  # fmt: skip
     print_rows(
         console, "Faults named, in how many periods; as good as before within three cycles",
         [row for row in summary["by_fault"] if row["to_name"] or row["to_recover"]],
-        {"fault": _fault, "named": lambda row: _of(row["named"], row["to_name"]), "in": "named_periods",
-         "back": lambda row: _of(row["recovered_soon"], row["to_recover"])},
+        {"fault": _fault, "right\nname": lambda row: _of(row["named"], row["to_name"]),
+         "after\n[periods]": "named_periods",
+         "as\nbefore": lambda row: _of(row["recovered_soon"], row["to_recover"])},
     )  # fmt: skip
     print_rows(
         console, "The worst", summary["worst"],
         {"seed": lambda row: str(row["seed"]), "rig": lambda row: f"{row['family']}, {row['reference']}",
-         "fault": _fault, "ratio": "ratio", "last": "last_ratio", "limit": "rail",
-         "drove": lambda row: row["failure"] or row["driver"] or "nobody"},
+         "fault": _fault, "ratio": "ratio", "last\ncycle": "last_ratio", "at a\nlimit": "rail",
+         "drove\nlast": lambda row: row["failure"] or row["driver"] or "nobody"},
     )  # fmt: skip
     say(console, KEY, f"Controller: {shown(summary['microseconds'])} µs per sample, median.")
 
 
 def _fault(row: dict[str, Any]) -> str:
     """Its kind and its time."""
-    return ", ".join(dict.fromkeys([row["fault"], row["mode"]]))
+    return ", ".join([row["fault"], *([MODES[row["mode"]]] if row["mode"] in MODES else [])])
 
 
 def _of(count: int, runs: int) -> str:
@@ -70,15 +78,17 @@ def _narrow(name: str) -> str:
 
 def print_map(summary: dict[str, Any], console: Any) -> None:
     """Print shares of runs that settled soon, of those that are asked for."""
-    changes = [name for name, _, _ in SEGMENTS]
     cells = summary["cells"]
+    changes = {CHANGES[name].replace(" ", "\n"): name for name, _, _ in SEGMENTS}
     title = f"Cells with at least {100.0 * ENOUGH:g} % of the runs settled within {SOON} periods"
-    print_rows(console, title, [{"asked for": cells["asked"], **cells["kept"]}])
+    kept = {head: cells["kept"][name] for head, name in changes.items()}
+    print_rows(console, title, [{"required": cells["asked"], **kept}])
     for table, names in (("by_family", ("family",)), ("by_place", ("amplitude", "frequency"))):
-        columns: Any = {name: name for name in names} | {name: partial(_settled, name) for name in changes}
+        columns: Any = {UNITS.get(name, name): name for name in names}
+        columns |= {head: partial(_settled, name) for head, name in changes.items()}
         title = f"Settled within {SOON} periods [%], and median of the periods"
         print_rows(console, title, summary[table], columns)
-    _print_runs(summary, console, "others")
+    _print_runs(summary, console, **{"not required": "others"})
 
 
 def _settled(change: str, row: dict[str, Any]) -> str:
@@ -91,23 +101,25 @@ def print_contest(summary: dict[str, Any], console: Any) -> None:
         console,
         "Median settled error relative to the amplitude, that of the best single estimator, and their ratio",
         summary["cells"],
-    )
-    _print_runs(summary, console, "seeds", "kept", "allowed")
+        {"family": "family", "reference": "reference", "settled": "settled", "best one": "best",
+         "its error": "best_settled", "ratio": "ratio"},
+    )  # fmt: skip
+    _print_runs(summary, console, **{"seeds": "seeds", f"ratio of at most {summary['allowed']:g}": "kept"})
 
 
 def print_dwells(summary: dict[str, Any], console: Any) -> None:
     """Print how a controller goes on after a long rest."""
-    for table in ("groups", "by_family"):
-        print_rows(
-            console,
-            f"After a rest of {summary['duration']:g} s: largest errors over what is allowed, medians; way "
-            "of the voltage in it over its swing",
-            summary[table],
-        )
+    title = (
+        f"After a rest of {summary['duration']:g} s: largest error of each period, relative to its bound "
+        "(medians), and distance of the voltage during the rest, relative to its swing"
+    )
+    for table, names in (("groups", ("creep", "feedback", "noise")), ("by_family", ("family",))):
+        print_rows(console, title, summary[table], {**{name: name for name in names}, **DWELLS})
     print_rows(console, "The worst", summary["worst"])
-    _print_runs(summary, console, "kept")
+    _print_runs(summary, console, **{"as before": "kept"})
 
 
-def _print_runs(summary: dict[str, Any], console: Any, *names: str) -> None:
-    """How many runs there were, and some more numbers."""
-    print_rows(console, "Runs", [{name: summary[name] for name in ("runs", "failures", *names)}])
+def _print_runs(summary: dict[str, Any], console: Any, **more: str) -> None:
+    """How many runs there were, and some more numbers by what they are called."""
+    said = {"runs": "runs", "error raised": "failures", **more}
+    print_rows(console, "Runs", [{head: summary[name] for head, name in said.items()}])
