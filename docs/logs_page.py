@@ -26,7 +26,11 @@ PART: Columns = {
     "median coverage": lambda row: percent(row["covered"]),
     "median time [s]": "seconds",
 }
-TIMES: Columns = {"fit": "fit", "time [s]": "seconds", "asked": lambda row: f"at most {row['asked']:g}"}
+TIMES: Columns = {
+    "fit": "fit",
+    "time [s]": lambda row: f"{row['seconds']:.3g}{' ✗' * (row['seconds'] > row['asked'])}",
+    "target [s]": lambda row: f"at most {row['asked']:g}",
+}
 GROUPS = {"clean": "nothing that the model lacks", "all": "anything"}
 SCORES: Columns = {
     "added": lambda row: GROUPS[row["logs_with"]],
@@ -37,10 +41,10 @@ SCORES: Columns = {
     "largest": "largest",
 }
 WORST: Columns = {
-    "seed": "seed", "family": "family", "voltage": "voltage",
+    "seed": "seed", "stage, voltage": lambda row: f"{row['family']}, {row['voltage']}",
     "added": lambda row: ", ".join(f"{name} {size:.2g}" for name, size in row["added"].items()),
     "chosen": "chosen_name", "best": "best_name",
-    **{RATIOS[name]: name for name in ("best", "nnls", "line")},
+    RATIOS["best"]: "best",
     RATIOS["stroke"]: lambda row: percent(row["stroke"]),
 }  # fmt: skip
 

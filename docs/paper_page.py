@@ -6,6 +6,9 @@ from importlib import resources
 from page_parts import Document, replacements, table
 
 from piezoest.bench import paper_report as report
+from piezoest.bench.paper import SETTLED
+
+UNSETTLED = "it does not settle in the first half of the run."
 
 
 def pieces(document: Document) -> dict[str, str]:
@@ -15,8 +18,8 @@ def pieces(document: Document) -> dict[str, str]:
         for k, number in enumerate(report.TITLES, 1)
     }
     return tables | {
-        "adaptation": table(report.TRANSIENTS, *report.transients(document["adaptation"])),
-        "memory": table(document["memory"][0]["row"], *report.memories(document["memory"])),
+        "adaptation": table(report.TRANSIENTS, *report.transients(document["adaptation"]), UNSETTLED),
+        "memory": table(document["memory"][0]["row"], *report.memories(document["memory"]), UNSETTLED),
         "verdict": table(report.WITHIN, *report.verdict(entries)),
         "stage": table("Where the numbers of the stage come from", ["part", "source"], origins()),
         "numbers": numbers(document),
@@ -38,6 +41,7 @@ def numbers(document: Document) -> str:
         "seconds": f"{document['seconds']:.0f} s",
         "memory": f"{conditions['memory_s']:g} s",
         "seed": conditions["seed"],
+        "settled": f"{SETTLED:g}",
         "start": f"α = {start['alpha']:g}, β = {start['beta']:g}, γ = {start['gamma']:g}",
         "start gain": f"{conditions['linear_start']['gain']:g} µm/V",
     }

@@ -15,7 +15,7 @@ TITLES = {
     "III": "Table III: largest stationary error with the parameters of another amplitude",
 }
 WITHIN = "Numbers within their bounds"
-TRANSIENTS = "Adaptation: largest error [µm] of each period, and periods until it is settled"
+TRANSIENTS = "Adaptation: largest error [µm] of each period, and periods until it is stationary"
 HEADINGS = {
     "alpha": "α\n[1/V]", "beta": "β\n[µm/V]", "gamma": "γ\n[µm/V²]", "K": "K\n[µm/V]",
     "linear_max_error": "linear\n[µm]", "linear_relative_error": "linear\n[%]",
@@ -23,7 +23,7 @@ HEADINGS = {
     "error_reduction": "reduction\n[%]",
 }  # fmt: skip
 CALIBRATION, HELD_OUT = "calibration", "held out"
-KEY = "✓ within its bound, ✗ outside; numbers without a mark have none."
+KEY = "✓: the deviation from the paper is within the bound in the line below, ✗: it is not."
 
 
 def use_of(entry: Entry) -> str:
@@ -32,7 +32,7 @@ def use_of(entry: Entry) -> str:
 
 
 def table(entries: Iterable[Entry], number: str) -> Table:
-    """Heading and body of Table I, II or III: for each row a line of the paper, of ours, of the ratios.
+    """Heading and body of Table I, II or III: for each row lines of the paper, of ours, of ratios and bounds.
 
     `number`: ``"I"``, ``"II"`` or ``"III"``.
     """
@@ -47,6 +47,7 @@ def table(entries: Iterable[Entry], number: str) -> Table:
             [row, "paper", *(f"{entry['value']:g}" for entry in ordered)],
             [use_of(first), "ours", *(_digits(entry["ours"]) for entry in ordered)],
             ["", "ratio", *(_ratio(entry) for entry in ordered)],
+            ["", "bound", *(_bound(entry) for entry in ordered)],
         ]
     return ["reference", "", *(HEADINGS[quantity] for quantity in quantities)], body
 
@@ -62,14 +63,14 @@ def verdict(entries: Sequence[Entry]) -> Table:
 
 
 def transients(adaptation: Iterable[dict[str, Any]]) -> Table:
-    """Largest error of the first periods, and when a row has settled."""
+    """Largest error of the first periods, and when a row is stationary."""
     first: Columns = {
         name: lambda run, k=k: f"{run['max_error_um'][k]:.3f}"  # type: ignore[misc]
         for k, name in enumerate(("first", "second", "third"))
     }
     stationary: Columns = {"stationary": lambda run: f"{run['stationary_max_error_um']:.3f}"}
     ends: Columns = {"reference": "row", "": "compensation"}
-    return cells_of(adaptation, {**ends, **first, **stationary, "settled\nafter": _settling})
+    return cells_of(adaptation, {**ends, **first, **stationary, "stationary\nafter": _settling})
 
 
 def memories(runs: Iterable[dict[str, Any]]) -> Table:
@@ -82,7 +83,7 @@ def memories(runs: Iterable[dict[str, Any]]) -> Table:
         "memory\n[s]": lambda run: f"{run['memory_s']:g}",
         "in\nperiods": lambda run: f"{run['memory_s'] / run['period_s']:g}",
         "largest\nerror [µm]": lambda run: _digits(run["stationary_max_error_um"]),
-        "settled\nafter": _settling,
+        "stationary\nafter": _settling,
     }
     return cells_of(runs, {**columns, **parameters})
 
@@ -96,7 +97,7 @@ def print_report(document: dict[str, Any], console: Any) -> None:
     """Print the tables, the transients, the sweep and how many numbers are within their bounds."""
     for number, title in TITLES.items():
         heading, body = table(document["tables"], number)
-        print_cells(console, title, heading, body, texts=(0, 1), group=3, style=_style)
+        print_cells(console, title, heading, body, texts=(0, 1), group=4, style=_style)
     say(console, KEY)
     print_cells(console, TRANSIENTS, *transients(document["adaptation"]), texts=(0, 1))
     if document["memory"]:
@@ -119,6 +120,14 @@ def _style(cell: str) -> str:
 def _digits(value: float) -> str:
     """Three digits, as the paper prints them."""
     return f"{value:#.3g}".rstrip(".")
+
+
+def _bound(entry: Entry) -> str:
+    """Largest deviation that passes; points are those of a number in per cent."""
+    bound = entry["bound"]
+    if bound is None:
+        return ""
+    return f"±{bound:g} points" if entry["quantity"] == "error_reduction" else f"±{100.0 * bound:g} %"
 
 
 def _ratio(entry: Entry) -> str:
