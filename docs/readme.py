@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import typer
-from page_parts import DOCS, NEEDS, cold_start, part_of, read, speed_table
+from page_parts import DOCS, NEEDS, UNSETTLED, cold_start, part_of, read, speed_table
 
 import piezoest as pz
 from piezoest._files import save_figure, write_text
@@ -33,7 +33,7 @@ that repeat. *First*: largest error in the first period after the change. This i
 change: after a cold start it is {cold} % for AdaptiveFeedforward. *Settled*: largest error in the last half
 of the periods. *Step*: one sample, called from Python; for AdaptiveFeedforward one `step` and one `learn`.
 Geometric means over the scenarios of the medians over {seeds} seeds, {slow} for the slow estimators;
-{machine}, {date}.
+{machine}, {date}. A dash: {dash}
 
 With a resonance, late readings or backlash the error on your rig is larger, and it takes longer to settle. Of
 {rigs} simulated rigs drawn at random, half of them with a fault, the voltage never left its limits; in
@@ -41,8 +41,8 @@ With a resonance, late readings or backlash the error on your rig is larger, and
 was so at the end. See *Safety on unknown rigs* in the documentation.
 
 The paper measured {linear_theirs:g} µm with linear feed-forward and {theirs:g} µm with compensation;
-its procedure gives {linear_ours:.2g} µm and {ours:.2g} µm here. On a recording of a real stage with
-{travel:.0f} µm of travel, the error of the identified model is {missed:.2f} µm rms on the half that it has
+its procedure gives {linear_ours:.2g} µm and {ours:.2g} µm here. On a recording of a real stage that
+moves by {stroke:.0f} µm, the error of the identified model is {missed:.2f} µm rms on the half that it has
 not seen, and that of a straight line {line:.2f} µm.
 """
 
@@ -58,6 +58,7 @@ def figures() -> str:
     linear, compensated = row["linear_max_error"], row["compensated_max_error"]
     values = {
         "cold": cold_start(runs),
+        "dash": UNSETTLED,
         "seeds": runs["plan"]["seeds"],
         "slow": runs["plan"]["slow_seeds"],
         "stages": len(runs["plan"]["stages"]),
@@ -70,7 +71,7 @@ def figures() -> str:
         "theirs": compensated["value"],
         "linear_ours": linear["ours"],
         "ours": compensated["ours"],
-        "travel": recording["displacement_um"],
+        "stroke": recording["displacement_um"],
         "missed": found["held_out"]["rms_um"],
         "line": found["line_held_out"]["rms_um"],
     }

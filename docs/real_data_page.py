@@ -16,6 +16,7 @@ def pieces(document: Document) -> dict[str, str]:
                 "standard error": lambda row: f"± {row[2]:.1g}" if row[2] > 0.0 else "—",
                 "unit": lambda row: row[3],
             },
+            "it has no standard error.",
         ),
         "models": table_of(
             "Error of the simulated displacement [µm rms, last column: largest]",
@@ -45,7 +46,7 @@ def numbers(document: Document) -> str:
         "samples": document["samples"],
         "rate": f"{document['sample_rate_Hz']:g} Hz",
         "voltage": f"{document['voltage_V'][0]:.2g} to {document['voltage_V'][1]:.2g} V",
-        "travel": f"{document['displacement_um']:.0f} µm",
+        "stroke": f"{document['displacement_um']:.0f} µm",
         "noise": f"{found['noise_floor_um']:.2f} µm",
         "interval": f"{found['interval_um']:.2f} µm",
         "covered": percent(found["covered"]),

@@ -2,13 +2,15 @@
 
 import re
 
-from page_parts import NEEDS, Document, cold_start, part_of, replacements, speed_table, table
+from page_parts import NEEDS, UNSETTLED, Document, cold_start, part_of, replacements, speed_table, table
 
 from piezoest._tables import Columns, cells_of
 from piezoest.bench import report
+from piezoest.bench.metrics import SETTLED
 from piezoest.bench.scenarios import UNREPEATED
 
 SOURCES = ("table", "policies")
+LATE = "fewer than half of the runs settle; in parentheses, fewer than 95 % of them. Empty: not run."
 
 
 def pieces(runs: Document, policies: Document) -> dict[str, str]:
@@ -16,19 +18,19 @@ def pieces(runs: Document, policies: Document) -> dict[str, str]:
         "numbers": substitutions("table", runs)
         + substitutions("policies", policies)
         + replacements("cold", {"start": f"{cold_start(runs)} %"}),
-        "overview": linked(report.overview_table(runs)),
-        "speed": linked(speed_table(runs)),
+        "overview": linked(report.overview_table(runs), UNSETTLED),
+        "speed": linked(speed_table(runs), UNSETTLED),
         "needs": linked(part_of(report.needs_table(runs), NEEDS)),
         "margins": linked(report.needs_table(runs)),
-        "settles": linked(settles(runs)),
+        "settles": linked(settles(runs), LATE),
         "scenarios": table("", ["scenario", "what happens"], runs["scenarios"].items()),
         "stages": linked(stages(runs)),
         "tuned": linked(tuned(runs)),
-        "policies": linked(settles(policies)),
+        "policies": linked(settles(policies), LATE),
     }
 
 
-def linked(of: report.Table) -> str:
+def linked(of: report.Table, dash: str = "") -> str:
     """A table whose estimators are links, but not within code; no line ends before a bracket."""
     names = re.compile(r"\b(AdaptiveFeedforward|BatchFit|MovingHorizon|\w+(?:RLS|EKF|UKF))\b")
 
@@ -39,7 +41,7 @@ def linked(of: report.Table) -> str:
             else names.sub(r":class:`~piezoest.\1`", cell).replace(" (", "\N{NO-BREAK SPACE}(")
         )
 
-    return table("", of[0], (map(link, row) for row in of[1]))
+    return table("", of[0], (map(link, row) for row in of[1]), dash)
 
 
 def by_estimator(document: Document, columns: list[str], cells: dict[tuple[str, str], str]) -> report.Table:
@@ -62,9 +64,13 @@ def settles(document: Document) -> report.Table:
 
 
 def short(name: str) -> str:
-    """Arguments alone, where a name is a call of the estimator that all others are too."""
+    """Memory and policies alone, where a name is a call of the estimator that all others are too."""
     call = name.removeprefix("HysteresisRLS(")
-    return name if call == name else f"``{call.removesuffix(')').replace(',', ', ')}``"
+    if call == name:
+        return name
+    given = call.removesuffix(")").replace("policies=(", "").replace("offset=True", "").replace("()", "")
+    given = re.sub(r"\)$", "", given) if "policies=(" in call else given
+    return f"``{', '.join(part for part in given.split(',') if part)}``"
 
 
 def periods(quantiles: list[float | None]) -> str:
@@ -103,6 +109,7 @@ def substitutions(prefix: str, document: Document) -> str:
         "minutes": f"{document['seconds'] / 60.0:.0f} minutes",
         "runs": document["runs"],
         "seeds": plan["seeds"],
+        "level": report.percent(SETTLED) + " %",
         "slow": plan["slow_seeds"],
         "rate": f"{conditions['sample_rate']:g} Hz",
         "stages": ", ".join(plan["stages"][1:]) or "none",

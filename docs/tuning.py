@@ -140,7 +140,7 @@ def draw(document: Document) -> None:
     ):
         for name in list(rows[0])[1:]:
             axes.plot([row[x] for row in rows], [row[name] for row in rows], "o-", label=name)
-        axes.set(xlabel=x, ylabel="largest settled error [nm]", title=title, ylim=(0.0, None))
+        axes.set(xlabel=x, ylabel="largest error of the last 2 periods [nm]", title=title, ylim=(0.0, None))
     for axes in (first, middle, last):
         axes.grid(alpha=0.3, which="both")
         axes.legend(fontsize="small")

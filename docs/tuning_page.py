@@ -4,9 +4,9 @@ from page_parts import Document, replacements, table_of
 
 TITLES = {
     "memories": "Errors after the gain has fallen by 20 %",
-    "noises": "Largest settled error [nm]",
+    "noises": "Largest error of the last two periods [nm]",
     "excitation": "Largest error [nm] of a frozen model; the columns are the signals it is used on",
-    "delays": "Largest settled error [nm]",
+    "delays": "Largest error of the last two periods [nm]",
 }
 
 

@@ -55,7 +55,7 @@ def _print_demo(result: Demo) -> None:
         first = (f"{e:.3f}" for e in record.max_error_per_period()[:4])
         body.append((name, *first, f"{record.max_error(SETTLED_PERIODS):.4f}"))
     title = f"Largest error [µm]: {AMPLITUDE:g} µm at {FREQUENCY:g} Hz, simulated stage"
-    heading = ("compensation", *(f"period {period}" for period in range(1, 5)), "settled")
+    heading = ("compensation", *(f"period {period}" for period in range(1, 5)), f"last {SETTLED_PERIODS}")
     print_cells(console, title, heading, body)
     adaptive = result.records[ADAPTIVE]
     changes = zip(adaptive.parameter_names, adaptive.theta[0], adaptive.theta[-1], strict=True)

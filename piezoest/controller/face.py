@@ -67,10 +67,11 @@ class Face(Copied):
     def status(self) -> ControllerStatus:
         """What happened so far, and how it stands: a frozen record.
 
-        ``samples`` written, with a reading or without, ``missing`` references, ``stage`` of the work
-        (``"seeking"``, ``"approaching"``, ``"running"``, ``"homing"``), ``driving`` (``"line"``,
-        ``"recorded loop"`` or the name of an estimator), ``fault`` of the readings (empty if none), samples
-        ``saturated`` and ``slewed``, ``switches`` of the model.
+        ``samples`` written, with a reading or without, ``missing`` references, ``stage``: the
+        phase of the work, not the piezo stage (``"seeking"``, ``"approaching"``, ``"running"``,
+        ``"homing"``), ``driving`` (``"line"``, ``"recorded loop"`` or the name of an estimator), ``fault`` of
+        the readings (empty if none), samples whose voltage was limited by the range (``saturated``) or by the
+        slew rate (``slewed``), ``switches`` of the model.
         """
         state = self._state
         counted = ("samples", "missing", "saturated", "slewed", "switches")

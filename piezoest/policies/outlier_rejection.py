@@ -25,7 +25,7 @@ class OutlierRejection(Policy):
     A change of x is accepted up to 20 times the usual change plus three times the change that the present
     slope explains. If x stays at a new level, the level is accepted after 2 ms; what is usual stays known.
     A reading that is exactly constant while the voltage travels more than 0.5 % of a swing is that of a
-    saturated converter or a dead sensor.
+    converter at the end of its range or of a dead sensor.
     Source: rules of this library.
     """
 
