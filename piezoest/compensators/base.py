@@ -29,6 +29,14 @@ class CompensatorStatus:
         Samples without a usable reference: the voltage was held.
     projected : bool
         Whether the model set last was inadmissible and its nearest admissible one is used.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> compensator = pz.LinearCompensator(pz.LinearGain(0.15), pz.VoltageLimits(0.0, 10.0))
+    >>> u = compensator.run([0.0, 1.0, 2.0])
+    >>> compensator.status.saturated  # the third voltage would be 13.3 V
+    1
     """
 
     samples: int

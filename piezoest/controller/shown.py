@@ -28,6 +28,12 @@ class Event:
         ``"fell back"`` (to a line, for the readings are at fault), ``"resumed"`` or ``"went on"``.
     reason : str
         Why, with the figures.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> pz.Event(0.5, "fell back", "no response: the readings stand still").name
+    'no response'
     """
 
     time: float

@@ -56,6 +56,14 @@ class Status:
         or ``"rejected"``.
     outliers : int
         Measurements that were rejected as impossible.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> estimator = pz.HysteresisRLS(1000.0)
+    >>> estimator.step(1.0, None)
+    >>> estimator.status.missing
+    1
     """
 
     samples: int
@@ -84,6 +92,14 @@ class Trace:
         Innovation and its variance, if asked for.
     P : ndarray or None, shape (M, n, n)
         Covariance, if asked for.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> u = pz.signals.triangle(35.0, 5.0, 4, 1000.0).values
+    >>> x = pz.ColemanHodgdon(0.02, 0.12, 0.0036).simulate(u)
+    >>> pz.HysteresisRLS(1000.0).run(u, x, every=100).theta.shape
+    (8, 4)
     """
 
     index: np.ndarray[Any, np.dtype[np.int64]] = field(repr=False)

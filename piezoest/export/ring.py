@@ -135,6 +135,13 @@ class Controller(Ring):
     Notes
     -----
     A loop of ``x = stage.step(u); u = controller.step(r, x)`` is `piezoest.track`, bit for bit.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> model = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    >>> controller = pz.export.Controller(pz.HysteresisRLS(1000.0), pz.InverseCompensator(model))
+    >>> u = controller.step(0.1, 0.0)  # reference and reading [µm], voltage [V]
     """
 
     __slots__ = ("_compensator", "_estimator", "_interval", "_voltage", "_waited")

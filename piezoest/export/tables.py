@@ -27,7 +27,7 @@ class Table:
     reference, voltage : ndarray, shape (N,)
         One period [µm], [V].
     branches : tuple of ndarray, each of shape (points, 2)
-        Displacement [µm] and voltage [V] along each way from one turning point of the reference to
+        Displacement [µm] and voltage [V] along each leg from one turning point of the reference to
         the next, at even steps of displacement, in the order of time.
     """
 

@@ -34,6 +34,13 @@ class AmplitudeProfile:
     -----
     Source: Eielsen, Gravdahl and Pettersen, Rev. Sci. Instrum. 83, 085001 (2012), last paragraph of
     sec. IV: parameters scheduled by the reference's amplitude.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> profile = pz.AmplitudeProfile(swings=[20.0, 60.0], theta=[[0.03, 0.13, 0.006], [0.02, 0.15, 0.004]])
+    >>> profile.swings
+    array([20., 60.])
     """
 
     swings: FloatArray

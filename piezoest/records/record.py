@@ -43,6 +43,12 @@ class Record:
     ------
     ValueError
         If the arrays are not of one shape (N,), or the sample rate is not above zero.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> pz.Record.from_arrays([0.0, 1.0, 2.0], [0.0, 0.13, 0.27], sample_rate=1000.0)
+    Record(sample_rate=1000.0, source='record', skipped=0, notes=())
     """
 
     time: FloatArray = field(repr=False)
@@ -318,6 +324,14 @@ def read_reference(
         If the file cannot be read.
     ValueError
         As `read_record`; also if the reference has gaps, which a voltage cannot have.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> r = pz.signals.sine(5.0, 5.0, 2, 1000.0)
+    >>> pz.records.write_columns("reference.csv", {"time_s": r.time, "reference_um": r.values})
+    >>> pz.records.read_reference("reference.csv").sample_rate
+    1000.0
     """
     return named_reference(path, column, sample_rate)[0]
 

@@ -39,6 +39,16 @@ def write_columns(path: str | Path, columns: Mapping[str, Any], *, allow_nan: bo
         must be.
     ImportError
         If writing the format needs a package of the extra ``formats`` that is not installed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import piezoest as pz
+    >>> pz.records.write_columns("voltage.csv", {"time_s": [0.0, 0.001], "voltage_V": [0.0, 1.5]})
+    >>> print(Path("voltage.csv").read_text().strip())
+    time_s,voltage_V
+    0,0
+    0.001,1.5
     """
     writer = writer_for(path)
     arrays = {name: array_1d(name, values, allow_nan=True) for name, values in columns.items()}

@@ -28,6 +28,12 @@ def write_report(found: Found, path: str | Path) -> None:
         If `found` is of another kind.
     OSError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> found = pz.identify(pz.records.example_log(), model="line")
+    >>> pz.report.write_report(found, "report.html")
     """
     if not isinstance(found, Identification | StreamedIdentification):
         raise ValueError(f"found must come from identify or identify_stream, got {type(found).__name__}")

@@ -46,6 +46,13 @@ class Page:
         Heading, and title of the window.
     subtitle : str
         The line below it.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> page = pz.report.Page("My stage", "measured on Monday")
+    >>> page.table(["amplitude [µm]", "error [µm]"], [["5", "0.04"]])
+    >>> page.write("report.html")
     """
 
     __slots__ = ("_parts", "_title")

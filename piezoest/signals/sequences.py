@@ -68,6 +68,12 @@ def from_array(
     ------
     ValueError
         If `values` is not of shape (N,), empty, or holds NaN or infinity.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> pz.signals.from_array([0.0, 0.1, 0.2, 0.1], sample_rate=1000.0, period=4)
+    Signal('array', 4 samples at 1000 Hz, period 4 samples, amplitude 0.2)
     """
     return Signal(array_1d("values", values, minimum_length=1), sample_rate, period, name)
 
@@ -204,6 +210,12 @@ def prbs(
     -----
     Eielsen, Gravdahl and Pettersen (2012), Sec. IV: "a length of 38 750 samples, a bandwidth of 40 Hz, a ±5
     µm range, and was filtered by a second-order low-pass Butterworth filter with a 10 Hz cut-off frequency".
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> pz.signals.prbs(periods=2)
+    Signal('PRBS', 77500 samples at 50000 Hz, period 38750 samples, amplitude 5.44962)
     """
     amplitude = non_negative("amplitude", amplitude)
     periods = integer("periods", periods, 1)
@@ -248,6 +260,12 @@ def maximal_length_sequence(bits: int) -> FloatArray:
     ------
     ValueError
         If `bits` is not a whole number from 2 to 20.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> print(pz.signals.maximal_length_sequence(3))
+    [ 1.  1.  1. -1.  1. -1. -1.]
     """
     bits = integer("bits", bits, 2)
     if bits > 20:

@@ -272,6 +272,14 @@ def check_continuity(values: ArrayLike, sample_rate: float | None = None, name: 
     ValueError
         If there is a jump; the message says where, and what to do instead. If `values` is not of shape
         (N,) or not finite.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> pz.signals.check_continuity(pz.signals.sine(5.0, 5.0, 2, 1000.0))
+    >>> pz.signals.check_continuity([0.0, 0.0, 5.0, 5.0, 5.0, 5.0])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ValueError: signal jumps by 5 ...
     """
     values = array_1d(name, values)
     if values.size < 3:

@@ -329,6 +329,12 @@ def chirp(
     ------
     ValueError
         If an argument is out of its range.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> pz.signals.chirp(5.0, start_frequency=1.0, stop_frequency=50.0, duration=2.0, sample_rate=1000.0)
+    Signal('linear chirp', 2000 samples at 1000 Hz, amplitude 5)
     """
     amplitude = non_negative("amplitude", amplitude)
     sample_rate = positive("sample_rate", sample_rate)

@@ -150,6 +150,12 @@ class Gauge:
     ------
     ValueError
         If a value is out of its range.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> gauge = pz.Gauge(noise=0.001, delay=2, resolution=0.0005)
+    >>> stage = pz.SimulatedStage(1000.0, hysteresis=pz.ColemanHodgdon(0.02, 0.12, 0.0036), gauge=gauge)
     """
 
     noise: float = 0.0

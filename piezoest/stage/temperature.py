@@ -41,6 +41,13 @@ class TemperatureLaw:
     field falls, domain walls move more easily, and less of the response lags. With 0.25 %/K and -0.5 %/K the
     stage of the paper gains about 0.1 % a kelvin at 5 µm, where plays make a quarter to a third of the
     displacement, and its loop becomes thinner.
+
+    Examples
+    --------
+    >>> import piezoest as pz
+    >>> warming = {"temperature": [[0.0, 20.0], [60.0, 30.0]]}  # s, °C
+    >>> law, hysteresis = pz.TemperatureLaw(gain=0.002), pz.ColemanHodgdon(0.02, 0.12, 0.0036)
+    >>> stage = pz.SimulatedStage(1000.0, hysteresis=hysteresis, temperature_law=law, **warming)
     """
 
     reference: float = 20.0
