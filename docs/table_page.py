@@ -10,7 +10,7 @@ from piezoest.bench.metrics import SETTLED
 from piezoest.bench.scenarios import UNREPEATED
 
 SOURCES = ("table", "policies")
-LATE = "fewer than half of the runs settle; in parentheses, fewer than 95 % of them. Empty: not run."
+LATE = "fewer than half of the runs settle; in parentheses, fewer than 95 % of them."
 
 
 def pieces(runs: Document, policies: Document) -> dict[str, str]:
@@ -22,7 +22,7 @@ def pieces(runs: Document, policies: Document) -> dict[str, str]:
         "speed": linked(speed_table(runs), UNSETTLED),
         "needs": linked(part_of(report.needs_table(runs), NEEDS)),
         "margins": linked(report.needs_table(runs)),
-        "settles": linked(settles(runs), LATE),
+        "settles": linked(settles(runs), f"{LATE} Empty: not run."),
         "scenarios": table("", ["scenario", "what happens"], runs["scenarios"].items()),
         "stages": linked(stages(runs)),
         "tuned": linked(tuned(runs)),

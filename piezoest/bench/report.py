@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from piezoest._tables import Columns, cells_of, number, print_cells, say
-from piezoest.bench.metrics import DIVERGED
+from piezoest.bench.metrics import DIVERGED, SETTLED
 from piezoest.bench.origin import machine_of
 from piezoest.bench.recorded import LEARNT
 from piezoest.records.source import counted
@@ -16,8 +16,9 @@ Cells = list[str]
 Table = tuple[Cells, list[Cells]]
 
 KEY = (
-    "Largest errors in % of the amplitude. settles: periods until every further error is below 1.2 %, the "
-    "median, and the share of runs that settle. first: in the first period after the change. settled: in the "
+    "Largest errors in % of the amplitude. settles: periods until every further error is below "
+    f"{100.0 * SETTLED:g} %, the median, and the share of runs that settle. first: in the first period after "
+    "the change. settled: in the "
     "last half of the periods; the same for references that do not repeat, and on stages of other families. "
     "Geometric means over the scenarios of the medians over the seeds. step: one sample from Python."
 )
