@@ -3,7 +3,7 @@
 from functools import partial
 from typing import Any
 
-from piezoest._tables import print_rows, say, shown
+from piezoest._tables import Columns, print_rows, say, shown
 from piezoest.bench.zoo.settling import ENOUGH, SEGMENTS, SOON
 from piezoest.bench.zoo.words import CHANGES, CRITERIA, MODES, RATIOS
 
@@ -15,10 +15,18 @@ KEY = (
     "of two: the best in hindsight, and one that is learnt from leg to leg. At a limit: the voltage rests "
     "there for more than a quarter of a swing although the line's voltage is well within."
 )
+WAYS = {"creep": "creep", "feedback": "feed-\nback", "noise": "noise"}
 UNITS = {"amplitude": "amplitude\n[µm]", "frequency": "frequency\n[Hz]"}
-DWELLS = {
-    "runs": "runs", "as\nbefore": "kept", "first": "first", "second": "second", "third": "third",
-    "largest\nfirst": "largest", "distance": "excursion", "largest\ndistance": "farthest",
+
+
+def _percent(column: str, row: dict[str, Any]) -> float | None:
+    return None if row[column] is None else round(100.0 * row[column], 1)
+
+
+DWELLS: Columns = {
+    "runs": "runs", "as\nbefore": "kept", "first": "first", "second": "second",
+    "largest\nfirst": "largest", "moved\n[%]": partial(_percent, "excursion"),
+    "most\n[%]": partial(_percent, "farthest"),
 }  # fmt: skip
 
 
@@ -79,7 +87,8 @@ def _narrow(name: str) -> str:
 def print_map(summary: dict[str, Any], console: Any) -> None:
     """Print shares of runs that settled soon, of those that are asked for."""
     cells = summary["cells"]
-    changes = {CHANGES[name].replace(" ", "\n"): name for name, _, _ in SEGMENTS}
+    said = {name: CHANGES[name].replace(" %", "\N{NO-BREAK SPACE}%") for name, _, _ in SEGMENTS}
+    changes = {each.replace(" ", "\n"): name for name, each in said.items()}
     title = f"Cells with at least {100.0 * ENOUGH:g} % of the runs settled within {SOON} periods"
     kept = {head: cells["kept"][name] for head, name in changes.items()}
     print_rows(console, title, [{"required": cells["asked"], **kept}])
@@ -111,10 +120,12 @@ def print_dwells(summary: dict[str, Any], console: Any) -> None:
     """Print how a controller goes on after a long rest."""
     title = (
         f"After a rest of {summary['duration']:g} s: largest error of each period, relative to its bound "
-        "(medians), and distance of the voltage during the rest, relative to its swing"
+        "(medians), and how far the voltage moved during the rest, in % of its swing"
     )
-    for table, names in (("groups", ("creep", "feedback", "noise")), ("by_family", ("family",))):
-        print_rows(console, title, summary[table], {**{name: name for name in names}, **DWELLS})
+    for table, names in (("groups", tuple(WAYS)), ("by_family", ("family",))):
+        print_rows(
+            console, title, summary[table], {**{WAYS.get(name, name): name for name in names}, **DWELLS}
+        )
     print_rows(console, "The worst", summary["worst"])
     _print_runs(summary, console, **{"as before": "kept"})
 
