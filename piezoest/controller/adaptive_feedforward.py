@@ -58,7 +58,8 @@ class AdaptiveFeedforward(Face):
         learnt on by more than 5 %. Give at most one of the three.
     feedback : float, optional
         Integral gain of a feedback from plausible readings [1/s], as in `IntegralFeedback`. Its correction
-        is at most half the corridor's width plus three times the noise. Default: no feedback.
+        is at most half the corridor's width plus three times the noise. It must be below twice damping times
+        resonance [rad/s]; where it makes the stage oscillate it is halved. Default: no feedback.
     resonance : float, optional
         Lowest resonance of the stage [Hz]. An event warns, once, when the reference is above 5 % of it.
         Default: unknown, no warning.
