@@ -18,7 +18,8 @@ from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.learning import begin_homing, go_on_at_rest, take
+from piezoest.controller.beginning import begin_homing, go_on_at_rest
+from piezoest.controller.learning import take
 from piezoest.controller.voltage import RUN, SEEK, plan, written
 from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, Field, record, whole
 from piezoest.layout import Record as Layout

@@ -7,13 +7,13 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.controller import (
+    beginning,
     candidate,
     doubt,
     driving,
     faults,
     feedback,
     given,
-    homing,
     late,
     outside,
     reach,
@@ -52,28 +52,6 @@ FROZEN = 0.4
 REMEMBERED = 0.7
 # No miss counts for more than so many swings.
 FARTHEST = 3.0
-
-
-@register_jitable
-def _begin_learning(state: Any) -> None:
-    """The gain is known: all models begin with the line through the present point."""
-    start = state.start
-    if state.unit * start.gain <= 0.0:
-        state.scale, state.unit = 0.0, start.gain
-        state.zero = start.now - start.gain * start.voltage
-    least = np.abs(start.target - start.from_u)
-    lines.begin(state.line, start.gain, start.voltage, start.now, least)
-    travels.begin(state.reference, state.r, least * np.abs(start.gain))
-    travels.begin(state.travel, start.voltage, least)
-    state.stage = APPROACH
-    start.samples = 0.0
-    state.confirmed = max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
-    state.gone = state.handed = 0.0
-    state.railed, state.patience = 0.0, driving.PATIENCE
-    state.owed = state.small = 0.0
-    reading.forget(state.readings)
-    # The last readings may be as old as the start is long.
-    state.readings.before = state.readings.last = start.now
 
 
 @register_jitable
@@ -269,60 +247,6 @@ def _is_due(state: Any, gone: Any) -> bool:
 
 
 @register_jitable
-def begin_homing(state: Any, settings: Any, amplitude: Any, turn: Any, cycles: Any) -> bool:
-    """Begin to erase what hysteresis remembers; whether it can be."""
-    if not homing.begin(state.homing, settings, state.u, amplitude, turn, cycles):
-        return False
-    if state.unit != 0.0:
-        doubt.all_models(state)
-    state.stage = HOME
-    feedback.forget(state)
-    reading.forget(state.readings)
-    return True
-
-
-@register_jitable
-def _begin_again(state: Any, settings: Any, u: Any, x: Any) -> None:
-    """Begin the way to the reference from a voltage where the stage stands at x; the gain is known."""
-    starts.rest_at(state.start, settings.start, u, x, state.line.gain)
-    _begin_learning(state)
-
-
-@register_jitable
-def _home(state: Any, settings: Any, u: Any, x: Any) -> None:
-    """Follow the sweep; behind it the way to the reference begins, or the gain is sought."""
-    line, recent = state.line, state.readings.recent
-    if state.scale > 0.0:
-        slots.advance(state.candidates, settings.candidates, u)
-        slots.learn(state.candidates, settings.candidates, u, np.nan)
-    if np.abs(x) < WILDEST:
-        lines.add(recent, u, reading.middle(state.readings, x), settings.doubling)
-    if not homing.follow(state.homing):
-        return
-    if state.unit == 0.0:
-        state.stage = SEEK
-        starts.begin_again(state.start, settings.start, u)
-        return
-    here = lines.at(line, u)
-    if recent.count > 0.0:
-        here = recent.mean_x + line.gain * (u - recent.mean_u)
-    _begin_again(state, settings, u, here)
-
-
-@register_jitable
-def go_on_at_rest(state: Any, settings: Any, u: Any, x: Any) -> None:
-    """Go on at rest at a voltage where the sensor reads x; the gain is known."""
-    state.u = state.planned = u
-    state.pending = state.asked = state.frozen = 0.0
-    late.rest(state.late, u, state.r)
-    doubt.all_models(state)
-    feedback.forget(state)
-    if state.scale > 0.0:
-        slots.advance(state.candidates, settings.candidates, u)
-    _begin_again(state, settings, u, x)
-
-
-@register_jitable
 def _seek(state: Any, settings: Any, u: Any, x: Any) -> None:
     """Look for the gain; where it is found all models begin."""
     paces.follow(state.pace, state.start, u, x)
@@ -332,7 +256,7 @@ def _seek(state: Any, settings: Any, u: Any, x: Any) -> None:
     _name_silence(state, settings)
     if state.start.stage == starts.DONE:
         paces.conclude(state.pace, state.start, u)
-        _begin_learning(state)
+        beginning.begin_learning(state)
 
 
 @register_jitable
@@ -389,7 +313,7 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         _seek(state, settings, u, x)
         return
     if state.stage == HOME:
-        _home(state, settings, u, x)
+        beginning.home(state, settings, u, x)
         return
     moved, gone = _follow(state, settings, state.r, u)
     if state.stage == APPROACH:

@@ -1,0 +1,90 @@
+"""Where all models begin: the gain has been found, a sweep is over, or the stage has rested."""
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from piezoest._checks import WILDEST
+from piezoest.controller import doubt, driving, feedback, homing, late, slots
+from piezoest.controller import line as lines
+from piezoest.controller import readings as reading
+from piezoest.controller import start as starts
+from piezoest.controller import travel as travels
+from piezoest.controller.voltage import APPROACH, HOME, SEEK
+
+
+@register_jitable
+def begin_learning(state: Any) -> None:
+    """The gain is known: all models begin with the line through the present point."""
+    start = state.start
+    if state.unit * start.gain <= 0.0:
+        state.scale, state.unit = 0.0, start.gain
+        state.zero = start.now - start.gain * start.voltage
+    least = np.abs(start.target - start.from_u)
+    lines.begin(state.line, start.gain, start.voltage, start.now, least)
+    travels.begin(state.reference, state.r, least * np.abs(start.gain))
+    travels.begin(state.travel, start.voltage, least)
+    state.stage = APPROACH
+    start.samples = 0.0
+    state.confirmed = max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
+    state.gone = state.handed = 0.0
+    state.railed, state.patience = 0.0, driving.PATIENCE
+    state.owed = state.small = 0.0
+    reading.forget(state.readings)
+    # The last readings may be as old as the start is long.
+    state.readings.before = state.readings.last = start.now
+
+
+@register_jitable
+def begin_homing(state: Any, settings: Any, amplitude: Any, turn: Any, cycles: Any) -> bool:
+    """Begin to erase what hysteresis remembers; whether it can be."""
+    if not homing.begin(state.homing, settings, state.u, amplitude, turn, cycles):
+        return False
+    if state.unit != 0.0:
+        doubt.all_models(state)
+    state.stage = HOME
+    feedback.forget(state)
+    reading.forget(state.readings)
+    return True
+
+
+@register_jitable
+def _begin_again(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """Begin the way to the reference from a voltage where the stage stands at x; the gain is known."""
+    starts.rest_at(state.start, settings.start, u, x, state.line.gain)
+    begin_learning(state)
+
+
+@register_jitable
+def home(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """Follow the sweep; behind it the way to the reference begins, or the gain is sought."""
+    line, recent = state.line, state.readings.recent
+    if state.scale > 0.0:
+        slots.advance(state.candidates, settings.candidates, u)
+        slots.learn(state.candidates, settings.candidates, u, np.nan)
+    if np.abs(x) < WILDEST:
+        lines.add(recent, u, reading.middle(state.readings, x), settings.doubling)
+    if not homing.follow(state.homing):
+        return
+    if state.unit == 0.0:
+        state.stage = SEEK
+        starts.begin_again(state.start, settings.start, u)
+        return
+    here = lines.at(line, u)
+    if recent.count > 0.0:
+        here = recent.mean_x + line.gain * (u - recent.mean_u)
+    _begin_again(state, settings, u, here)
+
+
+@register_jitable
+def go_on_at_rest(state: Any, settings: Any, u: Any, x: Any) -> None:
+    """Go on at rest at a voltage where the sensor reads x; the gain is known."""
+    state.u = state.planned = u
+    state.pending = state.asked = state.frozen = 0.0
+    late.rest(state.late, u, state.r)
+    doubt.all_models(state)
+    feedback.forget(state)
+    if state.scale > 0.0:
+        slots.advance(state.candidates, settings.candidates, u)
+    _begin_again(state, settings, u, x)
