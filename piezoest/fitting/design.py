@@ -168,12 +168,8 @@ class Along:
         rows = np.empty((u.size, design.columns))
         rows[:, : design.basis.size] = design.basis.rows(u, self._state)
         if design.terms:
-            driven = np.empty((u.size, followed + 1))
-            driven[:, :-1] = rows[:, :followed]
-            driven[:, -1] = 0.0 if self._w is None else times(rows[:, :followed], self._w)
-            each = np.empty((u.size, design.terms))
-            _add_creep(driven, design.creep.gains, self._decays, self._z, each)
-            rows[:, :followed], rows[:, design.gains] = driven[:, :-1], each
+            drive = np.zeros(u.size) if self._w is None else times(rows[:, :followed], self._w)
+            _add_creep(rows, drive, design.creep.gains, self._decays, self._z, design.gains.start)
             age = (index + 1.0) / design.sample_rate
             past = np.outer(age, 1.0 / design.creep.time_constants)
             # Numbers below the normal range would make all that follows a hundred times slower.
@@ -187,15 +183,16 @@ class Along:
 
 
 @compiled
-def _add_creep(driven: Matrix, gains: Vector, decays: Vector, z: Matrix, each: Matrix) -> None:
-    """Add to each column but the last what creep makes of it; `each` is what unit terms make of the last."""
-    last = driven.shape[1] - 1
-    for k in range(driven.shape[0]):
+def _add_creep(rows: Matrix, drive: Vector, gains: Vector, decays: Vector, z: Matrix, first: int) -> None:
+    """Add to each followed column what creep makes of it; from `first` on stands what it makes of `drive`."""
+    followed = z.shape[1] - 1
+    for k in range(rows.shape[0]):
         for j in range(gains.size):
             rest = 1.0 - decays[j]
-            for i in range(last + 1):
-                z[j, i] += rest * (driven[k, i] - z[j, i])
-            each[k, j] = z[j, last]
+            for i in range(followed):
+                z[j, i] += rest * (rows[k, i] - z[j, i])
+            z[j, followed] += rest * (drive[k] - z[j, followed])
+            rows[k, first + j] = z[j, followed]
         for j in range(gains.size):
-            for i in range(last):
-                driven[k, i] += gains[j] * z[j, i]
+            for i in range(followed):
+                rows[k, i] += gains[j] * z[j, i]

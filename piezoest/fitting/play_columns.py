@@ -124,14 +124,12 @@ class PlayColumns:
 
     def rows(self, u: FloatArray, state: FloatArray) -> FloatArray:
         """Columns along a voltage."""
-        n, edges = self.thresholds.size, self._edges
-        plays = np.empty((u.size, n))
+        plays = np.empty((u.size, self.thresholds.size))
         _plays(u, self.thresholds, state, plays)
         if self.bends.size == 0:
             return plays
         rows = np.empty((u.size, self.size))
-        for s, (low, high) in enumerate(pairwise(edges)):
-            rows[:, s * n : (s + 1) * n] = np.clip(plays, low, high) - np.clip(0.0, low, high)
+        _segments(plays, self._edges, rows)
         return rows
 
     def lower(self, gain: float) -> FloatArray:
@@ -261,3 +259,15 @@ def _plays(u: Vector, thresholds: Vector, y: Vector, plays: Matrix) -> None:
         for i in range(y.size):
             y[i] = play(y[i], u[k], thresholds[i])
             plays[k, i] = y[i]
+
+
+@compiled
+def _segments(plays: Matrix, edges: Vector, rows: Matrix) -> None:
+    """How far each play is within each segment, from where it is at 0 V; segment by segment."""
+    n = plays.shape[1]
+    for k in range(plays.shape[0]):
+        for s in range(edges.size - 1):
+            low, high = edges[s], edges[s + 1]
+            zero = min(max(0.0, low), high)
+            for i in range(n):
+                rows[k, s * n + i] = min(max(plays[k, i], low), high) - zero

@@ -105,11 +105,13 @@ class Problem:
         """
         weight = self.weight[rows]
         missed = self.left((self.x[rows] - run.x) * weight)
-        z = (missed / scale) ** 2
-        rho, slope, change = bend(loss, z)
-        root = np.sqrt(np.maximum(slope + 2.0 * change * z, LEAST_CURVATURE))
-        J = run.jacobian * (weight * root)[:, None]
-        sums = Sums.of(J, missed * slope / root)
+        rho = z = (missed / scale) ** 2
+        if loss != "linear":
+            rho, slope, change = bend(loss, z)
+            root = np.sqrt(np.maximum(slope + 2.0 * change * z, LEAST_CURVATURE))
+            weight, missed = weight * root, missed * slope / root
+        J = run.jacobian * weight[:, None]
+        sums = Sums.of(J, missed)
         if self._beside is not None:
             # As of `left(J)`, which is a large matrix: what is missed holds nothing of the columns any more.
             known = across(self._beside, J)

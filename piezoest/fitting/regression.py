@@ -85,8 +85,11 @@ def sums_of(design: Design, log: Log, w: FloatArray | None = None) -> list[Sums]
 def add(sums: list[Sums], rows: FloatArray, x: FloatArray, counts: Any, fold: IntArray) -> None:
     """Add to the sums of its block every row that counts, if the block has sums."""
     for k in range(fold[0], min(fold[-1] + 1, len(sums))):
-        taken = np.flatnonzero((fold == k) & counts)
-        sums[k] = sums[k].plus(Sums.of(rows[taken], x[taken]))
+        own = slice(*np.searchsorted(fold, (k, k + 1)))
+        each, wanted, taken = rows[own], x[own], counts[own]
+        if not np.all(taken):
+            each, wanted = each[taken], wanted[taken]
+        sums[k] = sums[k].plus(Sums.of(each, wanted))
 
 
 @dataclass(frozen=True)
