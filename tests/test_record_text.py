@@ -1,5 +1,6 @@
 """Text logs as instruments and spreadsheets write them: marks in numbers, time stamps, packed files."""
 
+import datetime
 import gzip
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -213,6 +214,10 @@ def day_first(stamp: str) -> str:
         lambda text_: text_.replace("-", "/"),
         day_first,
         lambda text_: text_.partition("T")[2],
+        lambda text_: f"11/22/2026 {text_[11:-6]} AM",
+        lambda text_: f"22/11/2026 {text_[11:-6]}",
+        lambda text_: f"{text_[11:-6]}am",
+        lambda text_: text_[14:],
     ],
 )
 @pytest.mark.parametrize("header", ["t_ms,u,x", "When,u,x", ""])
@@ -224,6 +229,29 @@ def test_time_stamps(tmp_path: Path, write_stamp: Callable[[str], str], header: 
     file = write(tmp_path / "log.csv", ";", rows, header)
     check(file)
     assert not any("'t" in note for note in read_record(file).notes)
+
+
+@pytest.mark.parametrize(
+    ("start", "written"),
+    [
+        ("2026-11-22T23:59:59.8", "%H:%M:%S.%f"),
+        ("2026-11-22T23:59:59.8", "%I:%M:%S.%f %p"),
+        ("2026-11-22T11:59:59.8", "%m/%d/%Y %I:%M:%S.%f %p"),
+        ("2026-11-22T10:59:59.8", "%M:%S.%f"),
+    ],
+)
+def test_time_goes_on_where_the_clock_begins_anew(tmp_path: Path, start: str, written: str) -> None:
+    stamps = [(datetime.datetime.fromisoformat(start) + datetime.timedelta(seconds=t)) for t in TIME]
+    rows = [(stamp.strftime(written), *row[1:]) for stamp, row in zip(stamps, rows_of(str), strict=True)]
+    file = write(tmp_path / "log.csv", ",", rows)
+    check(file)
+    assert any("line 42: the clock" in note for note in read_record(file).notes) == ("/" not in written)
+    stream = stream_record(file, rows=7)
+    np.testing.assert_allclose(np.concatenate([block.time for block in stream]), TIME, atol=1e-12)
+    # Elsewhere it was set, and nothing says by how much.
+    write(file, ",", rows[:30] + rows[:30])
+    with pytest.raises(ValueError, match="does not increase"):
+        read_record(file)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])

@@ -1,8 +1,10 @@
-"""What a cell of a text file holds: a number, as this file writes numbers, or a time stamp."""
+"""What a cell of a text file holds: a number, as this file writes numbers, or none."""
 
 import re
 from collections.abc import Iterable
 from typing import NamedTuple
+
+from piezoest.records.stamps import is_stamp
 
 WORDS = ("nan", "-", "--", "na", "n/a", "#n/a", "null", "none", "missing")
 MISSING = sorted({"", *WORDS, *map(str.upper, WORDS), *map(str.capitalize, WORDS), "NaN"})
@@ -20,10 +22,6 @@ GROUPED = {
     thousands: re.compile(rf"{GROUPS.format(re.escape(thousands))}(?:{re.escape(decimal)}\d*)?{EXPONENT}")
     for thousands, decimal in OTHER.items()
 }
-STAMP = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(:\d{2})?([.,]\d+)?\s*(Z|z|[-+]\d{2}(:?\d{2})?)?")
-# 22.11.2026 10:00:00,005: with points the day stands first.
-DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4}) +(\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?)")
-TIME_OF_DAY = re.compile(r"\d{1,2}:\d{2}:\d{2}([.,]\d+)?")
 
 
 class Style(NamedTuple):
@@ -116,11 +114,6 @@ def number(cell: str, style: Style) -> float:
 def is_missing(cell: str) -> bool:
     """Whether a cell says that there is no number."""
     return cell.strip().lower() in ("", *WORDS)
-
-
-def is_stamp(cell: str) -> bool:
-    """Whether a cell holds a time of day, or one behind a date: of ISO 8601, or with the day first."""
-    return any(each.fullmatch(cell.strip()) for each in (STAMP, DAY_FIRST, TIME_OF_DAY))
 
 
 def is_number(cell: str) -> bool:

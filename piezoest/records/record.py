@@ -216,7 +216,7 @@ def read_record(
     ----------
     path : str or Path
         File with one row per sample; the format is recognised. In text files, delimiter (comma, semicolon,
-        tab, blank), decimal comma, separators of thousands, time stamps of ISO 8601 and header are
+        tab, blank), decimal comma, separators of thousands, time stamps and header are
         recognised too, with lines of an instrument above the header or of units below it, and gzip may have
         packed them (``.csv.gz``). Lines that begin with # or % are comments; names of columns in the last
         one above the rows are used, and so are the names in a GCS array of Physik Instrumente.

@@ -50,6 +50,12 @@ class Source(abc.ABC):
 
     def __init__(self, path: Path, names: list[str], titles: list[str], width: int) -> None:
         self.path, self.names, self.titles, self.width = path, names, titles, width
+        self.notes: list[str] = []  # what had to be assumed to read it, as far as it is read
+
+    def note(self, said: str) -> None:
+        """Say once what had to be assumed."""
+        if said not in self.notes:
+            self.notes.append(said)
 
     @abc.abstractmethod
     def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:

@@ -61,12 +61,10 @@ class RecordStream:
         As `read_record`.
     """
 
-    __slots__ = ("_chosen", "_held", "_positions", "_rows", "_source", "_timing", "notes", "sample_rate")
+    __slots__ = ("_chosen", "_held", "_positions", "_rows", "_said", "_source", "_timing", "sample_rate")
 
     #: [Hz].
     sample_rate: float
-    #: What had to be assumed or converted to read the log, in plain sentences.
-    notes: tuple[str, ...]
 
     def __init__(
         self,
@@ -100,7 +98,7 @@ class RecordStream:
             self._timing = scan(str(source.path), source.place, lambda: self._times(progress))
             sample_rate = self._timing.sample_rate
         self.sample_rate = positive("sample_rate", sample_rate)
-        self.notes = (*notes, *_notes(source, self._chosen), *(self._timing.notes if self._timing else ()))
+        self._said = (*notes, *_notes(source, self._chosen), *(self._timing.notes if self._timing else ()))
 
     def __repr__(self) -> str:
         return f"RecordStream({str(self.path)!r}, {self.sample_rate:g} Hz)"
@@ -109,6 +107,11 @@ class RecordStream:
     def path(self) -> Path:
         """The file."""
         return self._source.path
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What had to be assumed or converted to read the log, as far as it is read, in plain sentences."""
+        return (*self._said, *self._source.notes)
 
     @property
     def whole(self) -> str:

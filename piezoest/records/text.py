@@ -13,21 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.records.cells import (
-    DAY_FIRST,
-    MISSING,
-    Marks,
-    Style,
-    is_missing,
-    is_number,
-    is_stamp,
-    number,
-    style_of,
-)
+from piezoest.records.cells import MISSING, Marks, Style, is_missing, is_number, number, style_of
 from piezoest.records.columns import names_columns, titled, with_units
 from piezoest.records.comments import COMMENTS, bare, numbered_names, rate_in
 from piezoest.records.lines import Lines, chunks, encoding_of, sample_lines
 from piezoest.records.source import LogError, Rows, Source, finite, floats, shown
+from piezoest.records.stamps import Clock, Onward, is_stamp, times_of
 
 # Blank lines among the others: more are the way the file is written, fewer are samples that were lost.
 MOST_BLANK = 0.1
@@ -53,7 +44,7 @@ class Layout(NamedTuple):
     begins: int  # number of the first line with a sample
     skip_blank: bool  # whether blank lines are the way it is written, and not samples that were lost
     style: Style  # how numbers are written
-    stamps: dict[int, Any]  # the first time stamp of the columns that hold such
+    stamps: dict[int, Clock]  # of the columns that hold time stamps
     sample_rate: float | None = None  # that its comments state [Hz]
 
 
@@ -80,12 +71,12 @@ def layout_of(path: Path) -> Layout:
     elif below := [line for place, line in comments if filled[-len(rows) - 1][0] < place < rows[0][0]]:
         header = with_units(header, _titles(path, bare(below[-1]), delimiter, len(header))) or header
     texts = [line for _, line in rows]
-    stamps: dict[int, Any] = {}
+    stamps: dict[int, Clock] = {}
     if any(":" in line for line in texts[:STAMP_ROWS]):
         for row in split(path, texts[:STAMP_ROWS], delimiter):
             for i, cell in enumerate(row):
                 if i not in stamps and is_stamp(cell):
-                    stamps[i] = _stamps([cell])[0]
+                    stamps[i] = Clock.of(cell)
     width, skip_blank = len(header or _cells(path, texts[0])), between > MOST_BLANK * len(filled)
     style = _style(path, texts, delimiter)
     begins, rate = rows[0][0], rate_in(above)
@@ -217,8 +208,17 @@ class Text(Source):
 
     def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:
         """Yield blocks of at most so many rows."""
+        clocks = {
+            k: Onward(self.layout.stamps[i].turn) for k, i in enumerate(positions) if i in self.layout.stamps
+        }
         for block in self.lines(rows):
-            yield from self.cut(block, self.values(block, positions), rows)
+            values = self.values(block, positions)
+            for k, clock in clocks.items():
+                values[k], anew = clock(values[k])
+                for row in anew:
+                    hours = f"{clock.turn / 3600.0:g} h"
+                    self.note(f"line {block.numbers[row]}: the clock begins anew, taken as {hours} later")
+            yield from self.cut(block, values, rows)
 
     def cut(self, block: Lines, values: list[FloatArray], rows: int) -> Iterator[Rows]:
         """Yield what was read of lines in blocks of at most so many rows."""
@@ -280,9 +280,12 @@ class Text(Source):
         return rows
 
     def _column(self, block: Lines, position: int, cells: Any) -> FloatArray:
-        origin, bad, what = self.layout.stamps.get(position), -1, "a number"
-        if origin is not None:
-            values, what = floats(_stamps(cells), origin), "a time stamp such as 2026-11-22 10:00:00.005"
+        clock, bad, what = self.layout.stamps.get(position), -1, "a number"
+        if clock is not None:
+            values, what = (
+                floats(times_of(cells), clock.origin),
+                "a time stamp such as 2026-11-22 10:00:00.005",
+            )
             unknown = np.flatnonzero(np.isnan(values)).tolist()
             bad = next((k for k in unknown if not is_missing(str(cells[k]))), -1)
         elif isinstance(cells, list):
@@ -304,23 +307,6 @@ class Text(Source):
                 f"not {what}"
             )
         return finite(values)
-
-
-def _year_first(stamp: re.Match[str]) -> str:
-    day, month, year, time = stamp.groups()
-    return f"{year}-{month:0>2}-{day:0>2}T{'0' * (time[1] == ':')}{time}"
-
-
-def _stamps(cells: Any) -> Any:
-    """Series of times, in UTC where a time zone is given."""
-    import pandas as pd
-
-    words = pd.Series(cells, dtype=str).str.strip()
-    words = words.str.replace(DAY_FIRST, _year_first, regex=True).str.replace(",", ".")
-    # A time of day alone is that of any day.
-    words = words.str.replace(r"^(\d):", r"0\1:", regex=True)
-    words = words.str.replace(r"^(\d\d:)", r"2000-01-01T\1", regex=True)
-    return pd.to_datetime(words, format="ISO8601", utc=True, errors="coerce")
 
 
 def open_text(path: Path) -> Text:

@@ -1,0 +1,88 @@
+"""Time stamps in the cells of a text file: of an hour, of a day, or behind a date."""
+
+import re
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from piezoest._checks import FloatArray
+
+HALF = r"(\s*[AaPp]\.?[Mm]\.?)"
+# 2026-11-22T10:00:00.005+01:00, as ISO 8601 has it.
+ISO = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(:\d{2})?([.,]\d+)?\s*(Z|z|[-+]\d{2}(:?\d{2})?)?")
+# 22.11.2026 10:00:00,005 and 11/22/2026 10:00:00.005 AM, and a date of ISO 8601 before AM or PM.
+DATE = r"(\d{1,2})([./])(\d{1,2})\2(\d{4}),?\s+"
+DATED = re.compile(
+    rf"(?:{DATE}|\d{{4}}[-/]\d{{2}}[-/]\d{{2}}\s+)\d{{1,2}}:\d{{2}}(:\d{{2}}([.,]\d+)?)?{HALF}?"
+)
+OF_DAY = re.compile(rf"\d{{1,2}}:\d{{2}}:\d{{2}}([.,]\d+)?{HALF}?")
+OF_HOUR = re.compile(r"\d{1,2}:\d{2}[.,]\d+")  # minutes and seconds: with two parts, only a fraction tells
+TURNS = {OF_DAY: 86_400.0, OF_HOUR: 3600.0}
+# A clock that begins anew stands so near its beginning, in parts of a turn; elsewhere it was set.
+NEAR = 1.0 / 24.0
+
+
+def is_stamp(cell: str) -> bool:
+    """Whether a cell holds a time of day, minutes and seconds, or a time behind a date."""
+    return any(each.fullmatch(cell.strip()) for each in (ISO, DATED, *TURNS))
+
+
+def times_of(cells: Any) -> Any:
+    """Series of times, in UTC where a time zone is given; NaT where a cell holds none."""
+    import pandas as pd
+
+    words = pd.Series(cells, dtype=str).str.strip()
+    words = words.str.replace(rf"(\d{{1,2}})(:[\d:.,]+){HALF}$", _of_24_hours, regex=True)
+    words = words.str.replace(rf"^{DATE}", _year_first, regex=True).str.replace(",", ".")
+    words = words.str.replace(r"^(\d{1,2}:\d\d\.\d+)$", r"00:\1", regex=True)
+    words = words.str.replace(r"(^|[T ])(\d):", r"\g<1>0\2:", regex=True)
+    # A time of day alone is that of any day.
+    words = words.str.replace(r"^(\d\d:)", r"2000-01-01T\1", regex=True)
+    return pd.to_datetime(words, format="ISO8601", utc=True, errors="coerce")
+
+
+def _of_24_hours(stamp: re.Match[str]) -> str:
+    hour, rest, half = stamp.groups()
+    if not 1 <= int(hour) <= 12:
+        return stamp[0]
+    return f"{int(hour) % 12 + 12 * (half.strip()[0] in 'Pp'):02d}{rest}"
+
+
+def _year_first(date: re.Match[str]) -> str:
+    """Date of ISO 8601: with points the day stands first, with slashes the month, if it can be one."""
+    first, mark, second, year = date.groups()
+    day, month = (first, second) if mark == "." or int(first) > 12 else (second, first)
+    return f"{year}-{month:0>2}-{day:0>2}T"
+
+
+class Clock(NamedTuple):
+    """A column of time stamps."""
+
+    origin: Any  # its first time
+    turn: float  # after which it begins anew [s]; infinite behind a date
+
+    @classmethod
+    def of(cls, cell: str) -> "Clock":
+        """Clock whose first time stands in a cell."""
+        turns = (turn for pattern, turn in TURNS.items() if pattern.fullmatch(cell.strip()))
+        return cls(times_of([cell])[0], next(turns, np.inf))
+
+
+class Onward:
+    """Times of a clock that go on where it begins anew, block by block."""
+
+    def __init__(self, turn: float) -> None:
+        self.turn, self._last, self._added = turn, np.nan, 0.0
+
+    def __call__(self, times: FloatArray) -> tuple[FloatArray, list[int]]:
+        """Times that go on [s], and which of them are the first ones of a new turn."""
+        known = np.flatnonzero(np.isfinite(times))
+        if not known.size or np.isinf(self.turn):
+            return times, []
+        left = np.diff(times[known], prepend=self._last) + self.turn
+        anew = (left >= 0.0) & (left < NEAR * self.turn)
+        added = self._added + self.turn * np.cumsum(anew)
+        onward = times.copy()
+        onward[known] += added
+        self._last, self._added = float(times[known[-1]]), float(added[-1])
+        return onward, known[anew].tolist()
