@@ -254,6 +254,32 @@ def test_time_goes_on_where_the_clock_begins_anew(tmp_path: Path, start: str, wr
         read_record(file)
 
 
+@pytest.mark.parametrize("separator", [",", " "])
+@pytest.mark.parametrize("footer", ["End of file", "\nMean: 1 2 3\nMax,4,5,6", "t,u,x", "\x1a", "-----"])
+def test_a_footer_is_left_out_and_said(tmp_path: Path, separator: str, footer: str) -> None:
+    rows = rows_of(str)
+    file = write(tmp_path / "log.txt", separator, [*rows, (footer,)])
+    check(file)
+    stream = stream_record(file, sample_rate=RATE, rows=7)
+    assert sum(block.time.size for block in stream) == stream.count() == N
+    for notes in (stream.notes, read_record(file).notes):
+        assert sum(" is no row" in note for note in notes) == 1
+    # A row behind it: the log is torn there, and does not end.
+    write(file, separator, [*rows[:40], (footer,), *rows[40:]])
+    with pytest.raises(ValueError, match=r"is not a number|fields"):
+        read_record(file)
+
+
+def test_a_long_footer_in_a_file_of_several_blocks(tmp_path: Path) -> None:
+    rows = [(f"{k / 10:.1f}", "1.5", "1.25") for k in range(1160)]
+    file = write(tmp_path / "log.csv", ",", [*rows, ("mean", "1.5", "1.25"), *[("-" * 20,)] * 19])
+    assert len(file.read_text()) > 1 << 14 > len(file.read_text()) - 400  # the first block ends within
+    assert len(read_record(file)) == sum(block.time.size for block in stream_record(file, rows=1)) == 1160
+    write(file, ",", [*rows, *[("end",)] * 21])
+    with pytest.raises(ValueError, match="'end' is not a number"):
+        read_record(file)
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
 def test_encodings_and_packed_text(tmp_path: Path, encoding: str) -> None:
     lines = ["t_s;u_V;Weg [µm]", *(";".join(row) for row in rows_of(lambda value: f"{value:.3f}"))]

@@ -8,7 +8,7 @@ import gzip
 import io
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple, cast
 
@@ -23,6 +23,8 @@ HEAD_BYTES = 1 << 16
 LONGEST_LINE = 1 << 20
 # Bytes that are read at a time, at least and at most, and about those of a row.
 FEWEST_BYTES, MOST_BYTES, BYTES_OF_A_ROW = 1 << 14, 1 << 20, 32
+# Lines that a program writes behind the last row, at most.
+LONGEST_FOOTER = 20
 # Characters that no text has, unless as UTF-16.
 CONTROL = frozenset(range(32)) - frozenset(b"\t\n\v\f\r\x1a\x1b")
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
@@ -47,6 +49,10 @@ class Lines(NamedTuple):
     def all(cls, first: int, text: str, done: int) -> Lines:
         """All lines of a text."""
         return cls(np.arange(first, first + text.count("\n") + 1), text, done)
+
+    def __add__(self, other: Any) -> Lines:
+        """Lines with those behind them."""
+        return Lines(np.append(self.numbers, other.numbers), f"{self.text}\n{other.text}", other.done)
 
 
 @contextlib.contextmanager
@@ -123,3 +129,30 @@ def sample_lines(path: Path, encoding: str, begins: int, skip_blank: bool, rows:
                 blank.append((number, ""))
         if kept:
             yield Lines.of(kept, done)
+
+
+def without_footer(
+    blocks: Iterable[Lines], is_row: Callable[[str], bool], left_out: Callable[[int, str], object]
+) -> Iterator[Lines]:
+    """Lines but a few behind the last row, of which `left_out` is told the number and text of the first.
+
+    Where the first line is no row either, rows cannot be told from other lines, and all are left.
+    """
+    held: Lines | None = None
+    known = False
+    for block in blocks:
+        known = known or (held is None and is_row(block.text.partition("\n")[0]))
+        if held is not None and block.numbers.size > LONGEST_FOOTER:
+            yield held
+            held = block
+        else:
+            held = block if held is None else held + block
+    if held is None:
+        return
+    lines = held.text.split("\n")
+    kept = next((k for k in range(len(lines), 0, -1) if lines[k - 1].strip() and is_row(lines[k - 1])), 0)
+    footer = [k for k in range(kept, len(lines)) if lines[k].strip()]
+    if known and 0 < len(footer) <= LONGEST_FOOTER:
+        left_out(int(held.numbers[footer[0]]), lines[footer[0]])
+        held = Lines(held.numbers[:kept], "\n".join(lines[:kept]), held.done)
+    yield held

@@ -16,7 +16,7 @@ from piezoest._checks import FloatArray
 from piezoest.records.cells import MISSING, Marks, Style, is_missing, is_number, number, style_of
 from piezoest.records.columns import names_columns, titled, with_units
 from piezoest.records.comments import COMMENTS, bare, numbered_names, rate_in
-from piezoest.records.lines import Lines, chunks, encoding_of, sample_lines
+from piezoest.records.lines import Lines, chunks, encoding_of, sample_lines, without_footer
 from piezoest.records.source import LogError, Rows, Source, finite, floats, shown
 from piezoest.records.stamps import Clock, Onward, is_stamp, times_of
 
@@ -200,7 +200,16 @@ class Text(Source):
     def lines(self, rows: int) -> Iterator[Lines]:
         """Lines with samples."""
         layout = self.layout
-        return sample_lines(layout.path, layout.encoding, layout.begins, layout.skip_blank, rows)
+        found = sample_lines(layout.path, layout.encoding, layout.begins, layout.skip_blank, rows)
+        return without_footer(found, self._is_row, self._left_out)
+
+    def _is_row(self, line: str) -> bool:
+        """Whether a line begins with a number, as rows do."""
+        delimiter = None if self.layout.delimiter == " " else self.layout.delimiter
+        return is_number(line.strip().split(delimiter, 1)[0].strip(' "'))
+
+    def _left_out(self, place: int, line: str) -> None:
+        self.note(f"line {place}: {shown(line)!r} is no row, the log is taken to end before it")
 
     def count(self, positions: Sequence[int]) -> int:
         """Number of rows, for which the file is read."""
