@@ -188,6 +188,22 @@ def test_whole_numbers_beside_groups_of_three_are_refused(tmp_path: Path, separa
         read_record(write(tmp_path / "log.csv", separator, rows))
 
 
+def test_groups_of_three_that_appear_late_are_refused(tmp_path: Path) -> None:
+    rows = [(str(k), "60", str(k % 990)) for k in range(10_100)]
+    file = write(tmp_path / "log.csv", ";", rows)
+    assert not any("comma" in note for note in read_record(file).notes)
+    rows[10_050] = ("10050", "60", "1,234")
+    with pytest.raises(ValueError, match="'1,234' beside '0'"):
+        read_record(write(file, ";", rows))
+
+
+def test_a_comma_that_only_may_be_for_decimals_is_said(tmp_path: Path) -> None:
+    rows = [(str(k), "60", f"{1234 + k:,}") for k in range(N)]
+    assert any("'1,234'" in note for note in read_record(write(tmp_path / "log.csv", ";", rows)).notes)
+    rows[9] = ("9", "60", "1,5")
+    assert not any("'1,234'" in note for note in read_record(write(tmp_path / "log.csv", ";", rows)).notes)
+
+
 def test_a_mark_that_appears_late_is_no_number(tmp_path: Path) -> None:
     # 1,234 would be 1234 or 1.234, and the rows before say nothing of it.
     rows = [(f"{k / 10:.1f}", "1.5", "1") for k in range(10_100)]
@@ -280,7 +296,7 @@ def test_a_long_footer_in_a_file_of_several_blocks(tmp_path: Path) -> None:
         read_record(file)
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1"])
 def test_encodings_and_packed_text(tmp_path: Path, encoding: str) -> None:
     lines = ["t_s;u_V;Weg [µm]", *(";".join(row) for row in rows_of(lambda value: f"{value:.3f}"))]
     plain, packed = tmp_path / "log.csv", tmp_path / "log.csv.gz"

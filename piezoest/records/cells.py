@@ -29,6 +29,7 @@ class Style(NamedTuple):
 
     decimal: str = "."  # ``"."``, ``","``, or ``".,"`` where both stand for decimals
     thousands: str = ""  # ``","``, ``"."``, or empty if neither separates thousands
+    guessed: str = ""  # a number such as 1,234 whose comma is only taken for decimals; empty if others tell
 
 
 def style_of(cells: Iterable[str]) -> Style:
@@ -47,6 +48,8 @@ def style_of(cells: Iterable[str]) -> Style:
     decimals = [mark for mark in OTHER if (mark, "decimal") in seen]
     if len(decimals) == 1:
         _agree(seen.get((OTHER[decimals[0]], "unclear")), seen[decimals[0], "decimal"])
+    if not decimals and (".", "unclear") not in seen and (",", "unclear") in seen:
+        return Style(",", guessed=seen[",", "unclear"])
     decimals = decimals or [mark for mark in OTHER if (mark, "unclear") in seen]
     return Style(decimals[0] if len(decimals) == 1 else ".,")
 

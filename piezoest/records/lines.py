@@ -28,6 +28,7 @@ LONGEST_FOOTER = 20
 # Characters that no text has, unless as UTF-16.
 CONTROL = frozenset(range(32)) - frozenset(b"\t\n\v\f\r\x1a\x1b")
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+UNMARKED = {"utf-16-le": 1, "utf-16-be": 0}  # and which byte of two is zero in Latin letters
 PACKED = b"\x1f\x8b"
 # A line that is blank or a comment, in a text that begins with the end of a line.
 SPECIAL = re.compile(r"\n[^\S\n]*(?:[#%]|\n|\Z)")
@@ -78,6 +79,10 @@ def encoding_of(path: Path) -> str:
     raw = beginning(path, HEAD_BYTES)
     if raw.startswith(UTF_16):
         return "utf-16"
+    for encoding, zeros in UNMARKED.items():
+        # Nearly all letters and digits have a zero beside them.
+        if raw[zeros::2].count(0) > 0.9 * len(raw) / 2 and CONTROL.isdisjoint(raw[1 - zeros :: 2]):
+            return encoding
     if CONTROL.intersection(raw[:4096]):
         raise LogError(
             f"{path}: this is not a text file: save the log as CSV, or name it by its format "

@@ -154,7 +154,7 @@ def _style(path: Path, lines: list[str], delimiter: str) -> Style:
         if commas:
             style = style_of(cell for row in split(path, lines, delimiter) for cell in row)
         if not style.thousands:
-            _check_columns(path, lines, delimiter)
+            _check_columns(path, lines, delimiter, defaultdict(Marks))
         return style
     except LogError:
         raise
@@ -162,15 +162,17 @@ def _style(path: Path, lines: list[str], delimiter: str) -> Style:
         raise LogError(f"{path}: {error}") from None
 
 
-def _check_columns(path: Path, lines: list[str], delimiter: str) -> None:
+def _check_columns(path: Path, lines: list[str], delimiter: str, columns: defaultdict[int, Marks]) -> None:
     """Refuse columns whose numbers can be read in two ways; in parts, which need less memory."""
-    columns: defaultdict[int, Marks] = defaultdict(Marks)
     for start in range(0, len(lines), PART):
         for row in split(path, lines[start : start + PART], delimiter):
             for i, cell in enumerate(row):
                 columns[i].see(cell)
-    for column in columns.values():
-        column.check()
+    try:
+        for column in columns.values():
+            column.check()
+    except ValueError as error:
+        raise LogError(f"{path}: {error}") from None
 
 
 def split(path: Path, lines: list[str], delimiter: str) -> list[list[str]]:
@@ -196,6 +198,9 @@ class Text(Source):
         self.layout = layout
         self.sample_rate = layout.sample_rate
         self.size = layout.path.stat().st_size
+        self._marks: defaultdict[int, Marks] = defaultdict(Marks)
+        if layout.style.guessed:
+            self.note(f"{layout.style.guessed!r} and the like: the comma is taken for decimals, no thousands")
 
     def lines(self, rows: int) -> Iterator[Lines]:
         """Lines with samples."""
@@ -237,6 +242,7 @@ class Text(Source):
 
     def values(self, block: Lines, positions: Sequence[int]) -> list[FloatArray]:
         """Columns of lines; ValueError that names line and column if a cell holds something else."""
+        self._check_marks(block)
         table = self._table(block)
         if table is not None and all(
             i in self.layout.stamps or table[i].dtype.kind in "fiu" for i in positions
@@ -246,6 +252,14 @@ class Text(Source):
             rows = self._rows(block)
             cells = {i: [row[i].strip() if i < len(row) else "" for row in rows] for i in positions}
         return [self._column(block, i, cells[i]) for i in positions]
+
+    def _check_marks(self, block: Lines) -> None:
+        """Refuse numbers that can be read in two ways where the lines by which marks are known had none."""
+        if self.layout.style.decimal != ".,":
+            return
+        lines = block.text.split("\n")
+        marked = any(mark in block.text for mark in ".,")
+        _check_columns(self.path, lines if marked else lines[:PART], self.layout.delimiter, self._marks)
 
     def _table(self, block: Lines) -> Any:
         """DataFrame of lines, with text in columns that hold something else; None if that cannot be."""
