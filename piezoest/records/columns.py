@@ -38,6 +38,12 @@ BASE_UNITS = {"time": "s", "voltage": "V", "displacement": "µm", "reference": "
 LITTLE_WORDS = frozenset(
     ("a", "and", "are", "at", "by", "for", "from", "in", "is", "of", "on", "the", "to", "with", "und", "vs")
 )
+# Asked where all is in volts, as in the files of oscilloscopes.
+OF_TWO_VOLTAGES = (
+    ", and none is a displacement: name the stage's and the sensor's, and say what 1 in the sensor's column "
+    "stands for, such as columns={{'voltage': '{0}', 'displacement': '{1}'}}, units={{'displacement': "
+    "'0.2 µm'}}, or --columns 'voltage={0},displacement={1}' --units displacement='0.2 µm'"
+)
 # More than these are counted in a message, not listed.
 MOST_LISTED = 40
 
@@ -77,6 +83,10 @@ def choose(
         title = source.titles[index] if source.titles else str(index + 1)
         taken = (1.0, "") if not source.titles and not named else None
         factor = stated.get(quantity) or taken or _factor(source, title, quantity)
+        if quantity in stated and (unit := split_unit(title)[1]) and unit not in UNITS[quantity]:
+            # Of 1 V and 1 mV one may be meant where the other is written.
+            said = f"column {title!r}: 1 {unit} in it is taken as {factor[0]:g} {BASE_UNITS[quantity]}"
+            factor = factor[0], said
         chosen[quantity] = Column(index, title, *factor)
     indices = [column.position for column in chosen.values()]
     for quantity, column in chosen.items():
@@ -123,8 +133,10 @@ def _guess(source: Source, quantity: str) -> int:
         return found[0]
     if found:
         titles = ", ".join(shown(source.names[i]) for i in found[:MOST_LISTED])
+        both = quantity == "voltage" and not has_column(source, "displacement")
         raise LogError(
-            f"{source.path}: the columns {titles} could all be the {quantity}: name the one that is"
+            f"{source.path}: the columns {titles} could all be the {quantity}"
+            + (OF_TWO_VOLTAGES.format(*(names[i] for i in found)) if both else ": name the one that is")
         )
     if quantity == "time" and source.no_rate:
         raise LogError(

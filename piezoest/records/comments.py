@@ -1,5 +1,6 @@
-"""What the comments above the rows of a text file state: names of the columns, and the sample rate."""
+"""What comments and other lines above the rows of a text file state: names of columns, the sample rate."""
 
+import itertools
 import re
 
 from piezoest.records.columns import UNITS, with_u
@@ -8,7 +9,10 @@ from piezoest.records.source import RATES, stated_rate
 COMMENTS = ("#", "%")
 # A line ``sample rate [kHz]: 10`` or ``SAMPLE_TIME = 5e-05``, with the unit beside the name or the number.
 ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.\deE]+)\s*(\w*)\s*")
-PERIODS = ("dt", "ts", "sample_time", "sampling_time", "sample_period", "sampling_period", "sample_interval")
+PERIODS = (
+    "dt", "ts", "sample_time", "sampling_time", "sample_period", "sampling_period", "sample_interval",
+    "increment", "tinc",
+)  # fmt: skip
 # What the units are in Hz and in s.
 OF_RATES = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6}
 OF_PERIODS = {"": 1.0, **UNITS["time"]}
@@ -19,6 +23,15 @@ NUMBERED_NAME = re.compile(r"\s*NAME(\d+)\s*=\s*(\S.*?)\s*")
 def bare(comment: str) -> str:
     """Comment without its sign and without quotation marks, which need not be closed there."""
     return comment.lstrip().lstrip("".join(COMMENTS)).replace('"', "")
+
+
+def entries_in(lines: list[list[str]]) -> list[str]:
+    """Entries in the cells of lines: one in a cell, or with the number in the cell behind it or below."""
+    found = [cell for line in lines for cell in line]
+    found += [f"{line[0]} = {line[1]}" for line in lines if len(line) > 1]
+    for upper, lower in itertools.pairwise(lines):
+        found += [f"{name} = {value}" for name, value in zip(upper, lower, strict=False)]
+    return found
 
 
 def rate_in(comments: list[str]) -> float | None:

@@ -235,8 +235,8 @@ def read_record(
     sample_rate : float, optional
         [Hz]; if given, the rows are taken as evenly spaced and the column of time is ignored. Left out, and
         without a column of time, a number called ``fs`` or ``sample_rate`` in a MATLAB, HDF5 or NumPy file is
-        taken, or such an entry of a Parquet file's metadata, or of a comment above text: ``# fs = 10 kHz``,
-        ``# dt = 0.1 ms``.
+        taken, or such an entry of a Parquet file's metadata, or of a line above text: ``# fs = 10 kHz``,
+        ``Sample Interval,1e-4``.
 
     Returns
     -------

@@ -98,7 +98,10 @@ class RecordStream:
             self._timing = scan(str(source.path), source.place, lambda: self._times(progress))
             sample_rate = self._timing.sample_rate
         self.sample_rate = positive("sample_rate", sample_rate)
-        self._said = (*notes, *_notes(source, self._chosen), *(self._timing.notes if self._timing else ()))
+        timing = self._timing.notes if self._timing else ()
+        if self._timing is not None and source.sample_rate is not None:
+            timing = (*timing, *_ignored(source.sample_rate, self._timing.sample_rate))
+        self._said = (*notes, *_notes(source, self._chosen), *timing)
 
     def __repr__(self) -> str:
         return f"RecordStream({str(self.path)!r}, {self.sample_rate:g} Hz)"
@@ -298,6 +301,13 @@ def _contradicted(
     if abs(rate / sample_rate - 1.0) < SAME_RATE:
         return []
     return [f"column {column.title!r} has {rate:.4g} Hz, it is ignored: {sample_rate:g} Hz was given"]
+
+
+def _ignored(stated: float, found: float) -> list[str]:
+    """What to say where a file states another sample rate than its column of time has."""
+    if abs(found / stated - 1.0) < SAME_RATE:
+        return []
+    return [f"the file states {stated:g} Hz, which is ignored: time has {found:.4g} Hz"]
 
 
 def _only_time(given: Mapping[str, str]) -> dict[str, str]:

@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.records import scopes
 from piezoest.records.cells import MISSING, Marks, Style, is_missing, is_number, number, style_of
 from piezoest.records.columns import names_columns, titled, with_units
-from piezoest.records.comments import COMMENTS, bare, numbered_names, rate_in
+from piezoest.records.comments import COMMENTS, bare, entries_in, numbered_names, rate_in
 from piezoest.records.lines import Lines, chunks, encoding_of, sample_lines, without_footer
 from piezoest.records.source import LogError, Rows, Source, finite, floats, shown
 from piezoest.records.stamps import Clock, Onward, is_stamp, times_of
@@ -45,7 +46,7 @@ class Layout(NamedTuple):
     skip_blank: bool  # whether blank lines are the way it is written, and not samples that were lost
     style: Style  # how numbers are written
     stamps: dict[int, Clock]  # of the columns that hold time stamps
-    sample_rate: float | None = None  # that its comments state [Hz]
+    sample_rate: float | None = None  # that lines above the rows state [Hz]
 
 
 def layout_of(path: Path) -> Layout:
@@ -66,10 +67,12 @@ def layout_of(path: Path) -> Layout:
     if not rows:
         raise LogError(f"{path}: no rows below the header")
     above = [line for place, line in comments if place < rows[0][0]]
+    preamble = _lines_of_cells(path, filled[: len(filled) - len(rows)][:LONGEST_PREAMBLE])
     if not header:
         header = _named_in_comments(path, above, rows[0][1], delimiter)
     elif below := [line for place, line in comments if filled[-len(rows) - 1][0] < place < rows[0][0]]:
         header = with_units(header, _titles(path, bare(below[-1]), delimiter, len(header))) or header
+    header = scopes.with_stated_units(header, preamble)
     texts = [line for _, line in rows]
     stamps: dict[int, Clock] = {}
     if any(":" in line for line in texts[:STAMP_ROWS]):
@@ -79,7 +82,7 @@ def layout_of(path: Path) -> Layout:
                     stamps[i] = Clock.of(cell)
     width, skip_blank = len(header or _cells(path, texts[0])), between > MOST_BLANK * len(filled)
     style = _style(path, texts, delimiter)
-    begins, rate = rows[0][0], rate_in(above)
+    begins, rate = rows[0][0], rate_in([*above, *entries_in(preamble)])
     return Layout(path, encoding, delimiter, header, width, begins, skip_blank, style, stamps, rate)
 
 
@@ -91,10 +94,16 @@ def _cells(path: Path, line: str) -> list[str]:
     return [cell.strip() for cell in split(path, [line], _delimiter(line))[0]]
 
 
+def _lines_of_cells(path: Path, lines: list[Numbered]) -> list[list[str]]:
+    return [_cells(path, line) for _, line in lines if line.count('"') % 2 == 0]
+
+
 def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Numbered]]:
     """Delimiter, header and rows; instruments may have written other lines above, units below the header."""
     first, mark = _cells(path, filled[0][1]), _delimiter(filled[0][1])
-    head = [_cells(path, line) for _, line in filled[:LONGEST_PREAMBLE] if line.count('"') % 2 == 0]
+    head = _lines_of_cells(path, filled[:LONGEST_PREAMBLE])
+    if (known := scopes.heading(head)) is not None:
+        return mark, known[0], filled[known[1] :]
     pairs = enumerate(itertools.pairwise(head))
     begins = next((k for k, rows in pairs if len(rows[0]) == len(rows[1]) > 1 and _numeric(*rows)), 0)
     like_first = len(head[begins]) == len(first) and _delimiter(filled[begins][1]) == mark

@@ -1,0 +1,103 @@
+"""CSV files of oscilloscopes, which measure volts: which channel is what, and of which unit, is asked for."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from piezoest.records import read_record
+
+N = 60
+RATE = 500.0
+TIME = np.arange(N) / RATE - 0.02
+VOLTAGE = np.round(5.0 + 4.0 * np.sin(np.arange(N) / 9.0), 4)
+SENSOR = np.round(0.5 * VOLTAGE, 4)
+SCALE = 2.0  # [µm/V]
+
+ROWS = [f"{t:.6e},{u},{x}" for t, u, x in zip(TIME, VOLTAGE, SENSOR, strict=True)]
+SEQUENCE = [f"{k},{u},{x}" for k, (u, x) in enumerate(zip(VOLTAGE, SENSOR, strict=True))]
+BARE = [f"{u},{x}" for u, x in zip(VOLTAGE, SENSOR, strict=True)]
+TEKTRONIX = [
+    "Model,MSO2024", "", "Horizontal Units,S,", "Sample Interval,2e-03,", f"Record Length,{N},",
+    "Gating,0.0% to 100.0%,", "Vertical Units,V,V", "Label,,", "TIME,CH1,CH2",
+]  # fmt: skip
+SIGLENT = [
+    f"Record Length,Analog:{N}", "Vertical Units,CH1:V,CH2:V", "Horizontal Units,s", "Source,CH1,CH2",
+    "Second,Volt,Volt",
+]  # fmt: skip
+BESIDE = [
+    f"Record Length,{N},", "Sample Interval,2e-3,", ",,", "Source,CH{},", "Vertical Units,V,",
+    "Horizontal Units,s,", *[",,"] * (N - 6),
+]  # fmt: skip
+
+
+def beside(channel: int, values: np.ndarray) -> list[str]:
+    lines = (line.format(channel) for line in BESIDE)
+    return [f"{line},{t:017.12f},{v:10.5f}," for line, t, v in zip(lines, TIME, values, strict=True)]
+
+
+TWO_BESIDE = [a + b for a, b in zip(beside(1, VOLTAGE), beside(2, SENSOR), strict=True)]
+QUOTED = [
+    f'"{a[:13]}",{N},"Points",{row}' for a, row in zip(["Record Length", *[""] * N], ROWS, strict=False)
+]
+
+
+@pytest.mark.parametrize(
+    ("lines", "channels"),
+    [
+        (["X,CH1,CH2,Start,Increment,", "Sequence,Volt,Volt,0.0,2e-3,", *(f"{r}," for r in SEQUENCE)], "CH"),
+        (["X,CH1,CH2,Start,Increment", "Sequence,Volt,Volt,0.0,2e-3", *(f"{r},," for r in SEQUENCE)], "CH"),
+        (["CH1(V),CH2(V),t0 = -2e-02, tInc = 2e-03,", *(f"{row},," for row in BARE)], "CH"),
+        (["CH1V,CH2V,t0 =-2e-02, tInc = 2e-03,", *BARE], "CH"),
+        (["x-axis,1,2", "second,Volt,Volt", *ROWS], ""),
+        ([*TEKTRONIX, *ROWS], "CH"),
+        ([*SIGLENT, *ROWS], "CH"),
+        (TWO_BESIDE, "CH"),
+        (QUOTED, "CH"),
+    ],
+    ids=["rigol", "rigol, padded", "rigol, increment", "rigol, V", "keysight", "tektronix", "siglent",
+         "tektronix, beside", "tektronix, quoted"],
+)  # fmt: skip
+def test_channels_in_volts_are_asked_for(tmp_path: Path, lines: list[str], channels: str) -> None:
+    file = tmp_path / "scope.csv"
+    file.write_bytes("\r\n".join([*lines, ""]).encode())
+    named = {"voltage": f"{channels}1", "displacement": f"{channels}2"}
+    with pytest.raises(ValueError, match="could all be the voltage, and none is a displacement") as caught:
+        read_record(file)
+    assert str(named) in str(caught.value)
+    with pytest.raises(ValueError, match="no unit of displacement"):
+        read_record(file, columns=named)
+    record = read_record(file, columns=named, units={"displacement": f"{SCALE} um"})
+    assert record.sample_rate == pytest.approx(RATE)
+    np.testing.assert_allclose(record.voltage, VOLTAGE)
+    np.testing.assert_allclose(record.displacement, SCALE * SENSOR)
+    assert any("1 v" in note and "taken as 2 µm" in note for note in record.notes)
+
+
+def test_one_channel_beside_its_lines_is_no_log(tmp_path: Path) -> None:
+    file = tmp_path / "F0000CH1.CSV"
+    file.write_text("\n".join(beside(1, VOLTAGE)))
+    with pytest.raises(ValueError, match="no column for displacement found"):
+        read_record(file)
+
+
+def test_a_sensor_in_millivolts_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "pico.csv"
+    file.write_text("\n".join(["Time,Channel A,Channel B", "(s),(V),(mV)", "", *ROWS]))
+    named = {"voltage": "Channel A", "displacement": "Channel B"}
+    record = read_record(file, columns=named, units={"displacement": "2 nm"})
+    np.testing.assert_allclose(record.displacement, 2e-3 * SENSOR)
+    assert "column 'Channel B [mV]': 1 mv in it is taken as 0.002 µm" in record.notes
+
+
+def test_a_stated_rate_that_time_does_not_have_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    for rate, said in ((500, 0), (1000, 1)):
+        file.write_text(
+            "\n".join([f"Sample rate,{rate} Hz", "", "time [s],voltage [V],position [um]", *ROWS])
+        )
+        record = read_record(file)
+        assert record.sample_rate == pytest.approx(RATE)
+        assert sum("is ignored: time has 500 Hz" in note for note in record.notes) == said
+    file.write_text("\n".join(["Sample rate,10 kHz", "", "voltage [V],position [um]", *BARE]))
+    assert read_record(file).sample_rate == 10_000.0
