@@ -71,7 +71,7 @@ def test_channels_in_volts_are_asked_for(tmp_path: Path, lines: list[str], chann
     assert record.sample_rate == pytest.approx(RATE)
     np.testing.assert_allclose(record.voltage, VOLTAGE)
     np.testing.assert_allclose(record.displacement, SCALE * SENSOR)
-    assert any("1 v" in note and "taken as 2 µm" in note for note in record.notes)
+    assert any("1 in it is taken as 2 µm" in note for note in record.notes)
 
 
 def test_one_channel_beside_its_lines_is_no_log(tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ def test_a_sensor_in_millivolts_is_said(tmp_path: Path) -> None:
     named = {"voltage": "Channel A", "displacement": "Channel B"}
     record = read_record(file, columns=named, units={"displacement": "2 nm"})
     np.testing.assert_allclose(record.displacement, 2e-3 * SENSOR)
-    assert "column 'Channel B [mV]': 1 mv in it is taken as 0.002 µm" in record.notes
+    assert "column 'Channel B [mV]': 1 in it is taken as 0.002 µm" in record.notes
 
 
 def test_a_stated_rate_that_time_does_not_have_is_said(tmp_path: Path) -> None:
@@ -101,3 +101,10 @@ def test_a_stated_rate_that_time_does_not_have_is_said(tmp_path: Path) -> None:
         assert sum("is ignored: time has 500 Hz" in note for note in record.notes) == said
     file.write_text("\n".join(["Sample rate,10 kHz", "", "voltage [V],position [um]", *BARE]))
     assert read_record(file).sample_rate == 10_000.0
+
+
+def test_columns_that_are_called_start_and_increment_are_no_mark_of_a_scope(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    rows = [f"{row},1,2" for row in ROWS]
+    file.write_text("\n".join(["time [s],voltage [V],position [um],Start,Increment", *rows]))
+    assert len(read_record(file)) == N

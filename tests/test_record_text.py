@@ -280,6 +280,9 @@ def test_a_footer_is_left_out_and_said(tmp_path: Path, separator: str, footer: s
     assert sum(block.time.size for block in stream) == stream.count() == N
     for notes in (stream.notes, read_record(file).notes):
         assert sum(" is no row" in note for note in notes) == 1
+    # Whole numbers in it say nothing of the marks in rows.
+    write(file, separator, [*((t, "1.125", "2.250") for t, *_ in rows), ("Mean:", "1", "2")])
+    assert len(read_record(file)) == N
     # A row behind it: the log is torn there, and does not end.
     write(file, separator, [*rows[:40], (footer,), *rows[40:]])
     with pytest.raises(ValueError, match=r"is not a number|fields"):

@@ -85,7 +85,7 @@ def choose(
         factor = stated.get(quantity) or taken or _factor(source, title, quantity)
         if quantity in stated and (unit := split_unit(title)[1]) and unit not in UNITS[quantity]:
             # Of 1 V and 1 mV one may be meant where the other is written.
-            said = f"column {title!r}: 1 {unit} in it is taken as {factor[0]:g} {BASE_UNITS[quantity]}"
+            said = f"column {title!r}: 1 in it is taken as {factor[0]:g} {BASE_UNITS[quantity]}"
             factor = factor[0], said
         chosen[quantity] = Column(index, title, *factor)
     indices = [column.position for column in chosen.values()]

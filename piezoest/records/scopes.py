@@ -5,7 +5,7 @@ import re
 from piezoest.records.columns import titled, with_units
 
 # Rigol: ``X,CH1,CH2,Start,Increment`` above ``Sequence,Volt,Volt,0.0,2e-05``.
-START, INCREMENT = "start", "increment"
+START, INCREMENT, SEQUENCE = "start", "increment", "sequence"
 # Tektronix: lines of a name and of what it is for each channel, above the rows or in the columns beside them.
 FIRST, SOURCE, HORIZONTAL, VERTICAL = "record length", "source", "horizontal units", "vertical units"
 CHANNEL = re.compile(r"^(CH\d)V$")  # Rigol: ``CH1V,CH2V,t0 = 0.0, tInc = 2e-05``
@@ -17,7 +17,7 @@ def heading(lines: list[list[str]]) -> tuple[list[str], int] | None:
     first = [cell.lower() for cell in lines[0]]
     if first[0] == FIRST and len(first) > BESIDE + 1:
         return _beside(lines, first), 0
-    if {START, INCREMENT}.issubset(first) and len(lines) > 1:
+    if {START, INCREMENT}.issubset(first) and len(lines) > 1 and lines[1][0].lower() == SEQUENCE:
         count = first.index(START)
         return [titled(*named) for named in zip(lines[0][:count], lines[1], strict=False)], 2
     return None

@@ -17,7 +17,7 @@ from piezoest.records import scopes
 from piezoest.records.cells import MISSING, Marks, Style, is_missing, is_number, number, style_of
 from piezoest.records.columns import names_columns, titled, with_units
 from piezoest.records.comments import COMMENTS, bare, entries_in, numbered_names, rate_in
-from piezoest.records.lines import Lines, chunks, encoding_of, sample_lines, without_footer
+from piezoest.records.lines import LONGEST_FOOTER, Lines, chunks, encoding_of, sample_lines, without_footer
 from piezoest.records.source import LogError, Rows, Source, finite, floats, shown
 from piezoest.records.stamps import Clock, Onward, is_stamp, times_of
 
@@ -81,7 +81,7 @@ def layout_of(path: Path) -> Layout:
                 if i not in stamps and is_stamp(cell):
                     stamps[i] = Clock.of(cell)
     width, skip_blank = len(header or _cells(path, texts[0])), between > MOST_BLANK * len(filled)
-    style = _style(path, texts, delimiter)
+    style = _style(path, _without_footer(texts, delimiter), delimiter)
     begins, rate = rows[0][0], rate_in([*above, *entries_in(preamble)])
     return Layout(path, encoding, delimiter, header, width, begins, skip_blank, style, stamps, rate)
 
@@ -146,6 +146,17 @@ def _titles(path: Path, line: str, delimiter: str, width: int) -> list[str]:
     ways += [re.split(r"\s+(?![(\[])", text), re.split(r"\s{2,}|\t", text)]
     fit = [[cell.strip() for cell in way] for way in ways if len(way) == width]
     return next(filter(names_columns, fit), fit[0] if fit else ways[0])
+
+
+def _is_row(line: str, delimiter: str) -> bool:
+    """Whether a line begins with a number, as rows do."""
+    return is_number(line.strip().split(None if delimiter == " " else delimiter, 1)[0].strip(' "'))
+
+
+def _without_footer(lines: list[str], delimiter: str) -> list[str]:
+    """Lines but the last ones that are no rows; all of them if they are many."""
+    ends = range(len(lines), max(len(lines) - LONGEST_FOOTER, 0), -1)
+    return lines[: next((k for k in ends if _is_row(lines[k - 1], delimiter)), len(lines))]
 
 
 def _numeric(*rows: list[str]) -> bool:
@@ -218,9 +229,7 @@ class Text(Source):
         return without_footer(found, self._is_row, self._left_out)
 
     def _is_row(self, line: str) -> bool:
-        """Whether a line begins with a number, as rows do."""
-        delimiter = None if self.layout.delimiter == " " else self.layout.delimiter
-        return is_number(line.strip().split(delimiter, 1)[0].strip(' "'))
+        return _is_row(line, self.layout.delimiter)
 
     def _left_out(self, place: int, line: str) -> None:
         self.note(f"line {place}: {shown(line)!r} is no row, the log is taken to end before it")
