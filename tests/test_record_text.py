@@ -234,6 +234,7 @@ def day_first(stamp: str) -> str:
         lambda text_: f"22/11/2026 {text_[11:-6]}",
         lambda text_: f"{text_[11:-6]}am",
         lambda text_: text_[14:],
+        lambda text_: text_[15:],
     ],
 )
 @pytest.mark.parametrize("header", ["t_ms,u,x", "When,u,x", ""])

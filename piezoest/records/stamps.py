@@ -11,13 +11,14 @@ HALF = r"(\s*[AaPp]\.?[Mm]\.?)"
 # 2026-11-22T10:00:00.005+01:00, as ISO 8601 has it.
 ISO = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(:\d{2})?([.,]\d+)?\s*(Z|z|[-+]\d{2}(:?\d{2})?)?")
 # 22.11.2026 10:00:00,005 and 11/22/2026 10:00:00.005 AM, and a date of ISO 8601 before AM or PM.
-DATE = r"(\d{1,2})([./])(\d{1,2})\2(\d{4}),?\s+"
-DATED = re.compile(
-    rf"(?:{DATE}|\d{{4}}[-/]\d{{2}}[-/]\d{{2}}\s+)\d{{1,2}}:\d{{2}}(:\d{{2}}([.,]\d+)?)?{HALF}?"
-)
+DATE = r"(\d{1,2})([./])(\d{1,2})\2(\d{4})[,.]?\s+"
+ISO_DATE = r"(\d{4}[-/]\d{2}[-/]\d{2})\s+"
+TIME = rf"(\d{{1,2}})(:\d{{2}}(?::\d{{2}}(?:[.,]\d+)?)?){HALF}?"
+DATED, PARTS = (re.compile(rf"(?:{DATE}|{ISO_DATE}){often}{TIME}") for often in ("", "?"))
 OF_DAY = re.compile(rf"\d{{1,2}}:\d{{2}}:\d{{2}}([.,]\d+)?{HALF}?")
 OF_HOUR = re.compile(r"\d{1,2}:\d{2}[.,]\d+")  # minutes and seconds: with two parts, only a fraction tells
 TURNS = {OF_DAY: 86_400.0, OF_HOUR: 3600.0}
+DAY = "2000-01-01T"
 # A clock that begins anew stands so near its beginning, in parts of a turn; elsewhere it was set.
 NEAR = 1.0 / 24.0
 
@@ -31,28 +32,31 @@ def times_of(cells: Any) -> Any:
     """Series of times, in UTC where a time zone is given; NaT where a cell holds none."""
     import pandas as pd
 
-    words = pd.Series(cells, dtype=str).str.strip()
-    words = words.str.replace(rf"(\d{{1,2}})(:[\d:.,]+){HALF}$", _of_24_hours, regex=True)
-    words = words.str.replace(rf"^{DATE}", _year_first, regex=True).str.replace(",", ".")
-    words = words.str.replace(r"^(\d{1,2}:\d\d\.\d+)$", r"00:\1", regex=True)
-    words = words.str.replace(r"(^|[T ])(\d):", r"\g<1>0\2:", regex=True)
+    words = pd.Series(cells, dtype=str).fillna("").str.strip().str.replace(",", ".", regex=False)
     # A time of day alone is that of any day.
-    words = words.str.replace(r"^(\d\d:)", r"2000-01-01T\1", regex=True)
+    words = words.mask(words.str.match(r"\d\d:\d\d:[\d.]+$"), DAY + words)
+    times = pd.to_datetime(words, format="ISO8601", utc=True, errors="coerce")
+    other = times.isna() & (words != "")
+    if not other.any():
+        return times
+    words[other] = [_as_iso(word) for word in words[other]]
     return pd.to_datetime(words, format="ISO8601", utc=True, errors="coerce")
 
 
-def _of_24_hours(stamp: re.Match[str]) -> str:
-    hour, rest, half = stamp.groups()
-    if not 1 <= int(hour) <= 12:
-        return stamp[0]
-    return f"{int(hour) % 12 + 12 * (half.strip()[0] in 'Pp'):02d}{rest}"
-
-
-def _year_first(date: re.Match[str]) -> str:
-    """Date of ISO 8601: with points the day stands first, with slashes the month, if it can be one."""
-    first, mark, second, year = date.groups()
-    day, month = (first, second) if mark == "." or int(first) > 12 else (second, first)
-    return f"{year}-{month:0>2}-{day:0>2}T"
+def _as_iso(word: str) -> str:
+    """Time stamp as ISO 8601 has it: with points the day stands first, with slashes the month if it can."""
+    parts = PARTS.fullmatch(f"00:{'0' * (word[1] == ':')}{word}" if OF_HOUR.fullmatch(word) else word)
+    if parts is None:
+        return ""
+    first, mark, second, year, date, hour, rest, half = parts.groups()
+    if half is not None:
+        if not 1 <= int(hour) <= 12:
+            return ""
+        hour = str(int(hour) % 12 + 12 * (half.strip()[0] in "Pp"))
+    if year is not None:
+        day, month = (first, second) if mark == "." or int(first) > 12 else (second, first)
+        date = f"{year}-{month:0>2}-{day:0>2}"
+    return f"{date}T{hour:0>2}{rest}" if date else f"{DAY}{hour:0>2}{rest}"
 
 
 class Clock(NamedTuple):
