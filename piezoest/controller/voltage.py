@@ -6,7 +6,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import driving, faults, homing, redraw, slots
+from piezoest.controller import doubt, driving, faults, homing, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import travel as travels
 
@@ -59,8 +59,9 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
     straight = wanted = lines.voltage(line, r - state.owed * kept * state.unit)
     drives = state.readings.fault == faults.NONE and state.driving > 0.0
     if drives and state.pending > 1.0:
-        # Nobody has said yet what became of the last voltage: go on from there, to the line and along it.
-        left = driving.kept(state.reference, np.abs(onward * line.gain), swing)
+        # Nobody has said yet what became of the last voltage: go on along the line, and soon on it.
+        far = np.abs(state.planned - state.u) > doubt.NOTHING * state.travel.swing
+        left = driving.kept(state.reference, np.abs(onward * line.gain), swing) if far else 1.0
         wanted += left * (state.planned + onward - wanted)
     elif drives:
         owed = slots.owed(state.candidates, state.driving, 0.0)
