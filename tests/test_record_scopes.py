@@ -108,3 +108,16 @@ def test_columns_that_are_called_start_and_increment_are_no_mark_of_a_scope(tmp_
     rows = [f"{row},1,2" for row in ROWS]
     file.write_text("\n".join(["time [s],voltage [V],position [um],Start,Increment", *rows]))
     assert len(read_record(file)) == N
+
+
+def test_an_increment_above_the_rows_is_no_time_unless_it_is_rigols(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text("\n".join(["Voltage step,0.5", "Increment,0.5", "voltage [V],position [um]", *BARE]))
+    with pytest.raises(ValueError, match="sample rate"):
+        read_record(file)
+
+
+def test_a_length_padded_by_a_spreadsheet_is_a_line_as_any_other(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text("\n".join([f"Record Length,{N},,,,", "time [s],voltage [V],position [um]", *ROWS]))
+    np.testing.assert_array_equal(read_record(file).displacement, SENSOR)

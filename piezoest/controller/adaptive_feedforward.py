@@ -58,8 +58,8 @@ class AdaptiveFeedforward(Face):
         learnt on by more than 5 %. Give at most one of the three.
     feedback : float, optional
         Integral gain of a feedback from plausible readings [1/s], as in `IntegralFeedback`. Its correction
-        is at most half the corridor's width plus three times the noise. It must be below twice damping times
-        resonance [rad/s]; where it makes the stage oscillate it is halved. Default: no feedback.
+        is at most half the corridor's width plus three times the noise. It must be far below twice damping
+        times resonance [rad/s]; where it makes the stage oscillate it is halved. Default: no feedback.
     resonance : float, optional
         Lowest resonance of the stage [Hz]. An event warns, once, when the reference is above 5 % of it.
         Default: unknown, no warning.
@@ -159,11 +159,12 @@ class AdaptiveFeedforward(Face):
         self._compiled()  # before a live loop, not at its first sample
 
     def resume(self, voltage: float, displacement: float) -> None:
-        """Continue after a pause, during which the voltage changed or the stage moved, with what was learnt.
+        """Continue from rest with what was learnt.
 
         Use it the next day, after `from_dict`, or when a program that had to stop goes on. The voltage then
         moves smoothly from where it is to the reference. The straight line drives until the models have
-        proved their accuracy again. If other voltages acted meanwhile, `home` erases their effect.
+        proved their accuracy again. The voltage is taken to have gone straight to where it is now; if it went
+        to and fro meanwhile, `home` erases what that has left.
 
         Parameters
         ----------

@@ -6,7 +6,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import doubt, driving, feedback, homing, late, slots
+from piezoest.controller import doubt, driving, faults, feedback, homing, late, slots
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
@@ -80,8 +80,7 @@ def home(state: Any, settings: Any, u: Any, x: Any) -> None:
 @register_jitable
 def go_on_at_rest(state: Any, settings: Any, u: Any, x: Any) -> None:
     """Go on at rest at a voltage where the sensor reads x; the gain is known."""
-    state.u = state.planned = u
-    state.pending = state.asked = state.frozen = 0.0
+    state.readings.fault = faults.NONE
     late.rest(state.late, u, state.r)
     doubt.all_models(state)
     feedback.forget(state)

@@ -28,6 +28,7 @@ def all_models(state: Any) -> None:
 @register_jitable
 def lose_write(state: Any) -> None:
     """Nobody knows whether the voltage was written: it is the planned one, or still the last one."""
+    single = state.pending > 0.0
     state.pending = 0.0
     if np.abs(state.planned - state.u) < NOTHING * state.travel.swing:
         return
@@ -35,7 +36,13 @@ def lose_write(state: Any) -> None:
         # Once for all that are lost in a row.
         faults.notice(state, faults.UNKNOWN)
     all_models(state)
-    # The line goes on from the planned voltage: from the last known one it would go back and forth.
+    if single:
+        go_on_from_planned(state)
+
+
+@register_jitable
+def go_on_from_planned(state: Any) -> None:
+    """Let the line go on from the planned voltage: from the last known one it would go back and forth."""
     state.owed -= state.line.gain * (state.planned - state.u) / state.unit
 
 

@@ -28,7 +28,7 @@ MEANINGS = {
     "voltage at its limit of {limit:.4g} V: keep the reference within what the stage reaches",
     "false start": "the stage does not go as the start has shown, which was hum or drift: the gain "
     "is sought again, on longer ways",
-    "feedback": "it shook the stage, and its gain is halved: a smaller one helps",
+    "feedback": "it goes back and forth, and its gain is halved: the gain is too large, or the readings hum",
     "no readings": "none has come for {silence:.2g} s: what drives goes on, and nothing is learnt",
 }
 # Their names by their numbers.

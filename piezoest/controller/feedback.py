@@ -12,15 +12,19 @@ from numba.extending import register_jitable
 from piezoest.controller import driving, faults
 from piezoest.controller import travel as travels
 from piezoest.controller.voltage import is_held
-from piezoest.layout import COUNT, FLAG, MEASURED, NUMBER, SIGN, record
+from piezoest.layout import AMOUNT, COUNT, FLAG, MEASURED, NUMBER, SIGN, record
 
 # No sample corrects more than this fraction of an error, of one that is answered late less.
 FASTEST = 0.25
 # A correction that goes back and forth so many times within a leg, by this fraction of a swing each time, and
-# within so many times what it takes to correct an error, shakes the stage: its gain is halved.
-SHAKES, BACK_AND_FORTH, QUICK = 8.0, 0.005, 3.0
-# Where the correction turned last, its way since, samples since; such turns in a row; halvings so far.
-SHAKING = record(turned=NUMBER, way=SIGN, samples=COUNT, count=COUNT, halved=COUNT)
+# within so many times what it takes to correct an error, shakes the stage: its gain is halved. But not if the
+# last way is below this part of the first one: the stage rings by itself, as behind a step.
+SHAKES, BACK_AND_FORTH, QUICK, LASTS = 8.0, 0.003, 3.0, 0.9
+# Where the correction turned last, and before, its way since, samples since; such turns in a row, how far the
+# first of them went; halvings so far.
+SHAKING = record(
+    turned=NUMBER, before=NUMBER, way=SIGN, samples=COUNT, count=COUNT, size=AMOUNT, halved=COUNT
+)
 # A rest is over where the reference has gone so far from it, in swings.
 OVER = 0.02
 # Whether the reference rests, and where. Behind a rest: turns left to look at; samples since the first one,
@@ -59,17 +63,26 @@ def _calm(state: Any, slow: Any) -> None:
     shaking = state.shaking
     shaking.samples += 1.0
     gone = state.feedback - shaking.turned
-    if state.reference.turned_now != 0.0:
-        shaking.count = 0.0
     if gone * shaking.way > 0.0:
         shaking.turned = state.feedback
     elif np.abs(gone) > max(BACK_AND_FORTH * state.reference.swing, _noise(state)):
+        size = np.abs(shaking.turned - shaking.before)
+        shaking.before, shaking.turned = shaking.turned, state.feedback
         shaking.count = shaking.count + 1.0 if shaking.samples < QUICK * slow else 0.0
-        shaking.turned, shaking.way, shaking.samples = state.feedback, np.sign(gone), 0.0
-        if shaking.count > SHAKES:
-            shaking.halved += 1.0
+        shaking.way, shaking.samples = np.sign(gone), 0.0
+        if shaking.count == 1.0:
+            shaking.size = size
+        elif shaking.count > SHAKES:
             shaking.count = 0.0
-            faults.notice(state, faults.FEEDBACK)
+            if size > LASTS * shaking.size:
+                shaking.halved += 1.0
+                faults.notice(state, faults.FEEDBACK)
+
+
+@register_jitable
+def turn(state: Any) -> None:
+    """The reference has turned: what the correction does in each leg shakes nothing."""
+    state.shaking.count = 0.0
 
 
 @register_jitable
@@ -83,6 +96,7 @@ def _within(state: Any, settings: Any, correction: Any) -> float:
 def forget(state: Any) -> None:
     """Forget the correction."""
     state.feedback = state.rest.now = state.rest.left = 0.0
+    state.shaking.turned = state.shaking.before = state.shaking.way = state.shaking.count = 0.0
 
 
 @register_jitable

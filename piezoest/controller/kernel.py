@@ -10,7 +10,7 @@ from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.compile import Record, Vector, compiled
-from piezoest.controller import candidate, homing, late, redraw, slots
+from piezoest.controller import candidate, doubt, homing, late, redraw, slots
 from piezoest.controller import feedback as feedbacks
 from piezoest.controller import line as lines
 from piezoest.controller import outside as outsides
@@ -106,6 +106,8 @@ def learn_all(state: Record, settings: Record, r: Vector, u: Vector, x: Vector) 
         take(state, settings, r[k], written(state, settings, u[k]) if k == last else u[k], x[k])
     if state.stage == RUN and len(r) > 1:
         redraw.go_on(state, settings)
+        if state.driving == 0.0 and not np.abs(u[last]) < WILDEST:
+            doubt.go_on_from_planned(state)
 
 
 @register_jitable
@@ -116,8 +118,8 @@ def _begin(state: Any, settings: Any, u: Any) -> None:
 
 
 @register_jitable
-def _rest_at(state: Any, settings: Any, u: Any, x: Any) -> None:
-    starts.rest_at(state.start, settings.start, u, x, settings.start.gain)
+def _rest_at(state: Any, settings: Any, u: Any, x: Any, gain: Any) -> None:
+    starts.rest_at(state.start, settings.start, u, x, gain)
     state.start.told = 1.0
 
 
@@ -131,7 +133,7 @@ def begin(state: Record, settings: Record, u: float) -> None:
 def begin_at(state: Record, settings: Record, u: float, x: float) -> None:
     """Begin with a state of zeros, at rest at a voltage where the sensor reads x."""
     _begin(state, settings, u)
-    _rest_at(state, settings, u, x)
+    _rest_at(state, settings, u, x, settings.start.gain)
 
 
 @compiled
@@ -139,12 +141,15 @@ def resume(state: Record, settings: Record, u: float, x: float) -> Any:
     """Go on at rest at a voltage where the sensor reads x, with what was learnt before; whether it can."""
     if not (settings.minimum <= u <= settings.maximum and np.abs(x) < WILDEST):
         return False
-    if state.unit != 0.0:
+    state.u = state.planned = u
+    state.pending = state.asked = state.frozen = state.silent = 0.0
+    if state.unit != 0.0 and state.stage != SEEK:
         go_on_at_rest(state, settings, u, x)
         return True
-    state.stage, state.pending, state.asked = SEEK, 0.0, 0.0
-    _begin(state, settings, u)
-    _rest_at(state, settings, u, x)
+    state.stage = SEEK
+    starts.begin(state.start, u)
+    # A gain that was refuted is not tried again.
+    _rest_at(state, settings, u, x, state.start.given * settings.start.gain)
     return True
 
 

@@ -291,6 +291,7 @@ def _run(state: Any, settings: Any, u: Any, x: Any, moved: Any, gone: Any) -> fl
         feedback.watch_rest(state, settings, x, moved)
     if state.reference.turned_now != 0.0:
         paces.watch(state, settings)
+        feedback.turn(state)
     outside.watch(state, settings)
     return x
 
@@ -299,14 +300,14 @@ def _run(state: Any, settings: Any, u: Any, x: Any, moved: Any, gone: Any) -> fl
 def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     """Learn from a voltage that was written and a reading."""
     state.samples += 1.0
+    if np.abs(r) < WILDEST:
+        state.r, state.asked = r, 1.0
     if not np.abs(u) < WILDEST:
         if state.stage == RUN:
             doubt.lose_write(state)
         return
     state.pending = 0.0
     state.u = u
-    if np.abs(r) < WILDEST:
-        state.r, state.asked = r, 1.0
     late.remember(state.late, state.start, u, state.r)
     silence.watch(state, settings, x)
     if state.stage == SEEK:

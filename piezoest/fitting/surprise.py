@@ -71,9 +71,8 @@ def _robust(A: FloatArray, b: FloatArray) -> FloatArray:
     for _ in range(5):
         off = np.abs(b - times(A, weights))
         scale = float(np.quantile(off, QUANTILE)) / NORMAL_QUANTILE
-        before, used = used, off <= 4.0 * scale
-        settled = np.any(weights) and np.array_equal(used, before)
-        if settled or not np.any(b) or np.sum(used) < 2 * weights.size:
+        used = off <= 4.0 * scale
+        if not np.any(b) or np.sum(used) < 2 * weights.size:
             break
         # A column that hardly moves above the noise would else get any weight.
         likely = max(scale, 1e-6 * float(np.max(np.abs(b)))) ** 2 * np.eye(weights.size)

@@ -10,8 +10,7 @@ COMMENTS = ("#", "%")
 # A line ``sample rate [kHz]: 10`` or ``SAMPLE_TIME = 5e-05``, with the unit beside the name or the number.
 ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.\deE]+)\s*(\w*)\s*")
 PERIODS = (
-    "dt", "ts", "sample_time", "sampling_time", "sample_period", "sampling_period", "sample_interval",
-    "increment", "tinc",
+    "dt", "ts", "sample_time", "sampling_time", "sample_period", "sampling_period", "sample_interval", "tinc",
 )  # fmt: skip
 # What the units are in Hz and in s.
 OF_RATES = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6}

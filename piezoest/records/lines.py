@@ -55,6 +55,12 @@ class Lines(NamedTuple):
         """Lines with those behind them."""
         return Lines(np.append(self.numbers, other.numbers), f"{self.text}\n{other.text}", other.done)
 
+    def split(self, last: int) -> tuple[Lines, Lines]:
+        """All but the last lines, and these."""
+        before, *behind = self.text.rsplit("\n", last)
+        first = Lines(self.numbers[:-last], before, self.done)
+        return first, Lines(self.numbers[-last:], "\n".join(behind), self.done)
+
 
 @contextlib.contextmanager
 def unpacked(path: Path) -> Iterator[tuple[BinaryIO, BinaryIO]]:
@@ -147,11 +153,10 @@ def without_footer(
     known = False
     for block in blocks:
         known = known or (held is None and is_row(block.text.partition("\n")[0]))
-        if held is not None and block.numbers.size > LONGEST_FOOTER:
-            yield held
-            held = block
-        else:
-            held = block if held is None else held + block
+        held = block if held is None else held + block
+        if held.numbers.size > 2 * LONGEST_FOOTER:
+            done, held = held.split(LONGEST_FOOTER)
+            yield done
     if held is None:
         return
     lines = held.text.split("\n")
@@ -160,4 +165,5 @@ def without_footer(
     if known and 0 < len(footer) <= LONGEST_FOOTER:
         left_out(int(held.numbers[footer[0]]), lines[footer[0]])
         held = Lines(held.numbers[:kept], "\n".join(lines[:kept]), held.done)
-    yield held
+    if held.numbers.size:
+        yield held

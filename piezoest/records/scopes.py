@@ -1,6 +1,7 @@
 """Columns in the CSV files of oscilloscopes, which measure volts, whatever stands for them."""
 
 import re
+from itertools import pairwise
 
 from piezoest.records.columns import titled, with_units
 
@@ -15,12 +16,19 @@ BESIDE = 3  # columns of a name, a value and its unit
 def heading(lines: list[list[str]]) -> tuple[list[str], int] | None:
     """Names of columns and number of lines above the rows; None if no oscilloscope is known by them."""
     first = [cell.lower() for cell in lines[0]]
-    if first[0] == FIRST and len(first) > BESIDE + 1:
+    if first[0] == FIRST and any(first[BESIDE:]):
         return _beside(lines, first), 0
     if {START, INCREMENT}.issubset(first) and len(lines) > 1 and lines[1][0].lower() == SEQUENCE:
         count = first.index(START)
         return [titled(*named) for named in zip(lines[0][:count], lines[1], strict=False)], 2
     return None
+
+
+def entries(lines: list[list[str]]) -> list[str]:
+    """Entries that say the sample period where it stands below its name."""
+    pairs = ((above, below) for above, below in pairwise(lines) if below[0].lower() == SEQUENCE)
+    cells = (each for pair in pairs for each in zip(*pair, strict=False))
+    return [f"dt = {value}" for name, value in cells if name.lower() == INCREMENT]
 
 
 def with_stated_units(header: list[str], lines: list[list[str]]) -> list[str]:
@@ -38,6 +46,8 @@ def _beside(lines: list[list[str]], first: list[str]) -> list[str]:
     for number, (start, end) in enumerate(zip(starts, [*starts[1:], len(first)], strict=True), 1):
         stated = {line[start].lower(): line[start + 1] for line in lines if len(line) > start + 1}
         data = [k for k in range(start + BESIDE, end) if first[k]]
+        if not data:
+            continue
         names = [
             f"time {number}" if number > 1 else "time",
             *(f"CH{number + k}" for k in range(len(data) - 1)),

@@ -18,6 +18,7 @@ DATED, PARTS = (re.compile(rf"(?:{DATE}|{ISO_DATE}){often}{TIME}") for often in 
 OF_DAY = re.compile(rf"\d{{1,2}}:\d{{2}}:\d{{2}}([.,]\d+)?{HALF}?")
 OF_HOUR = re.compile(r"\d{1,2}:\d{2}[.,]\d+")  # minutes and seconds: with two parts, only a fraction tells
 TURNS = {OF_DAY: 86_400.0, OF_HOUR: 3600.0}
+SLASHES = re.compile(r"(\d{1,2})/(\d{1,2})/\d{4}")
 DAY = "2000-01-01T"
 # A clock that begins anew stands so near its beginning, in parts of a turn; elsewhere it was set.
 NEAR = 1.0 / 24.0
@@ -28,8 +29,11 @@ def is_stamp(cell: str) -> bool:
     return any(each.fullmatch(cell.strip()) for each in (ISO, DATED, *TURNS))
 
 
-def times_of(cells: Any) -> Any:
-    """Series of times, in UTC where a time zone is given; NaT where a cell holds none."""
+def times_of(cells: Any, day_first: bool = False) -> Any:
+    """Series of times, in UTC where a time zone is given; NaT where a cell holds none.
+
+    `day_first`: whether 12/11/2026 is in November.
+    """
     import pandas as pd
 
     words = pd.Series(cells, dtype=str).fillna("").str.strip().str.replace(",", ".", regex=False)
@@ -39,12 +43,12 @@ def times_of(cells: Any) -> Any:
     other = times.isna() & (words != "")
     if not other.any():
         return times
-    words[other] = [_as_iso(word) for word in words[other]]
+    words[other] = [_as_iso(word, day_first) for word in words[other]]
     return pd.to_datetime(words, format="ISO8601", utc=True, errors="coerce")
 
 
-def _as_iso(word: str) -> str:
-    """Time stamp as ISO 8601 has it: with points the day stands first, with slashes the month if it can."""
+def _as_iso(word: str, day_first: bool) -> str:
+    """Time stamp as ISO 8601 has it: with points the day stands first."""
     parts = PARTS.fullmatch(f"00:{'0' * (word[1] == ':')}{word}" if OF_HOUR.fullmatch(word) else word)
     if parts is None:
         return ""
@@ -54,7 +58,7 @@ def _as_iso(word: str) -> str:
             return ""
         hour = str(int(hour) % 12 + 12 * (half.strip()[0] in "Pp"))
     if year is not None:
-        day, month = (first, second) if mark == "." or int(first) > 12 else (second, first)
+        day, month = (first, second) if mark == "." or day_first else (second, first)
         date = f"{year}-{month:0>2}-{day:0>2}"
     return f"{date}T{hour:0>2}{rest}" if date else f"{DAY}{hour:0>2}{rest}"
 
@@ -64,12 +68,17 @@ class Clock(NamedTuple):
 
     origin: Any  # its first time
     turn: float  # after which it begins anew [s]; infinite behind a date
+    day_first: bool  # whether the day stands first in a date with slashes
+    guessed: str  # a date that does not tell; empty if it does
 
     @classmethod
     def of(cls, cell: str) -> "Clock":
         """Clock whose first time stands in a cell."""
         turns = (turn for pattern, turn in TURNS.items() if pattern.fullmatch(cell.strip()))
-        return cls(times_of([cell])[0], next(turns, np.inf))
+        slashes = SLASHES.match(cell.strip())
+        first, second = map(int, slashes.groups()) if slashes else (0, 13)
+        guessed = cell.strip() if max(first, second) <= 12 and first != second else ""
+        return cls(times_of([cell], first > 12)[0], next(turns, np.inf), first > 12, guessed)
 
 
 class Onward:

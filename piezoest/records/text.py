@@ -82,7 +82,7 @@ def layout_of(path: Path) -> Layout:
                     stamps[i] = Clock.of(cell)
     width, skip_blank = len(header or _cells(path, texts[0])), between > MOST_BLANK * len(filled)
     style = _style(path, _without_footer(texts, delimiter), delimiter)
-    begins, rate = rows[0][0], rate_in([*above, *entries_in(preamble)])
+    begins, rate = rows[0][0], rate_in([*above, *entries_in(preamble), *scopes.entries(preamble)])
     return Layout(path, encoding, delimiter, header, width, begins, skip_blank, style, stamps, rate)
 
 
@@ -221,6 +221,9 @@ class Text(Source):
         self._marks: defaultdict[int, Marks] = defaultdict(Marks)
         if layout.style.guessed:
             self.note(f"{layout.style.guessed!r} and the like: the comma is taken for decimals, no thousands")
+        for clock in layout.stamps.values():
+            if clock.guessed:
+                self.note(f"{clock.guessed!r} and the like: the month is taken to stand first")
 
     def lines(self, rows: int) -> Iterator[Lines]:
         """Lines with samples."""
@@ -249,7 +252,7 @@ class Text(Source):
                 values[k], anew = clock(values[k])
                 for row in anew:
                     hours = f"{clock.turn / 3600.0:g} h"
-                    self.note(f"line {block.numbers[row]}: the clock begins anew, taken as {hours} later")
+                    self.note(f"line {block.numbers[row]}: the clock starts again at zero, {hours} are added")
             yield from self.cut(block, values, rows)
 
     def cut(self, block: Lines, values: list[FloatArray], rows: int) -> Iterator[Rows]:
@@ -324,7 +327,7 @@ class Text(Source):
         clock, bad, what = self.layout.stamps.get(position), -1, "a number"
         if clock is not None:
             values, what = (
-                floats(times_of(cells), clock.origin),
+                floats(times_of(cells, clock.day_first), clock.origin),
                 "a time stamp such as 2026-11-22 10:00:00.005",
             )
             unknown = np.flatnonzero(np.isnan(values)).tolist()

@@ -162,6 +162,24 @@ def test_a_controller_that_knows_nothing_resumes_as_if_reset() -> None:
     np.testing.assert_array_equal(u[0], u[1])
 
 
+def test_it_resumes_from_a_fault_without_it() -> None:
+    driver, stage = learnt()
+    drive(driver, stage, np.tile(SINE, 2), lambda k, x: 1.0)
+    assert driver.status.fault != ""
+    driver.resume(0.0, float(stage.run(np.linspace(driver.voltage, 0.0, 100))[-1]))
+    assert driver.status.fault == ""
+
+
+def test_a_write_that_is_lost_within_a_block_does_not_widen_the_corridor() -> None:
+    driver, stage = learnt()
+    before = float(driver.state["widest"])
+    u = driver.run(SINE[:60])
+    x = stage.run(u)
+    u[10] = np.nan
+    driver.learn(u, x)
+    assert driver.state["widest"] < 1.5 * before
+
+
 @pytest.mark.parametrize(
     "wrong", [(70.0, 0.0), (np.nan, 0.0), (None, 0.0), (0.0, None), (0.0, np.inf), (0.0, 1e30)]
 )
