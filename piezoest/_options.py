@@ -9,6 +9,10 @@ from typing import Any, get_type_hints
 
 import typer
 
+# Limits of a voltage, of whatever command.
+LOWEST = typer.Option(help="Lowest voltage that stage and amplifier bear [V].")
+HIGHEST = typer.Option(help="Highest voltage that stage and amplifier bear [V].")
+
 
 def grouped(command: Callable[..., None]) -> Callable[..., None]:
     """The command as typer reads it: fields of the dataclasses among its arguments become options.

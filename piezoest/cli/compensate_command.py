@@ -10,7 +10,7 @@ import typer
 
 from piezoest._errors import Debug, errors
 from piezoest._files import check_targets
-from piezoest._options import examples, grouped
+from piezoest._options import HIGHEST, LOWEST, examples, grouped
 from piezoest._progress import LOADING, progress
 
 if TYPE_CHECKING:
@@ -49,12 +49,8 @@ class Stated:
 class Limits:
     """What the amplifier can do."""
 
-    minimum: Annotated[
-        float | None, typer.Option(help="Lowest voltage that stage and amplifier bear [V].")
-    ] = None
-    maximum: Annotated[
-        float | None, typer.Option(help="Highest voltage that stage and amplifier bear [V].")
-    ] = None
+    minimum: Annotated[float | None, LOWEST] = None
+    maximum: Annotated[float | None, HIGHEST] = None
 
 
 @grouped

@@ -26,11 +26,17 @@ def all_models(state: Any) -> None:
 
 
 @register_jitable
+def matters(state: Any) -> bool:
+    """Whether it matters if the planned voltage was written, or the last known one is still there."""
+    return np.abs(state.planned - state.u) >= NOTHING * state.travel.swing
+
+
+@register_jitable
 def lose_write(state: Any) -> None:
     """Nobody knows whether the voltage was written: it is the planned one, or still the last one."""
     single = state.pending > 0.0
     state.pending = 0.0
-    if np.abs(state.planned - state.u) < NOTHING * state.travel.swing:
+    if not matters(state):
         return
     if state.since > 0.0:
         # Once for all that are lost in a row.

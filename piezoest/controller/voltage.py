@@ -60,8 +60,8 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
     drives = state.readings.fault == faults.NONE and state.driving > 0.0
     if drives and state.pending > 1.0:
         # Nobody has said yet what became of the last voltage: go on along the line, and soon on it.
-        far = np.abs(state.planned - state.u) > doubt.NOTHING * state.travel.swing
-        left = driving.kept(state.reference, np.abs(onward * line.gain), swing) if far else 1.0
+        moved = np.abs(onward * line.gain)
+        left = driving.kept(state.reference, moved, swing) if doubt.matters(state) else 1.0
         wanted += left * (state.planned + onward - wanted)
     elif drives:
         owed = slots.owed(state.candidates, state.driving, 0.0)

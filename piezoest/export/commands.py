@@ -10,7 +10,7 @@ import typer
 
 from piezoest._errors import Group
 from piezoest._files import read_object
-from piezoest._options import examples, grouped, one_of
+from piezoest._options import HIGHEST, LOWEST, examples, grouped, one_of
 
 if TYPE_CHECKING:
     from piezoest.models import Model
@@ -45,12 +45,8 @@ class Stated:
         ),
     ] = None
     sample_rate: Annotated[float | None, typer.Option(help="Samples per second of the controller.")] = None
-    minimum: Annotated[
-        float | None, typer.Option(help="Lowest voltage that stage and amplifier bear [V].")
-    ] = None
-    maximum: Annotated[
-        float | None, typer.Option(help="Highest voltage that stage and amplifier bear [V].")
-    ] = None
+    minimum: Annotated[float | None, LOWEST] = None
+    maximum: Annotated[float | None, HIGHEST] = None
     slew_rate: Annotated[float | None, typer.Option(help="Largest change of voltage [V/s].")] = None
 
 
@@ -111,8 +107,8 @@ def c(
 def adaptive(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for header and source.")],
     sample_rate: Annotated[float, typer.Option(help="Samples per second of the controller.")],
-    minimum: Annotated[float, typer.Option(help="Lowest voltage that stage and amplifier bear [V].")],
-    maximum: Annotated[float, typer.Option(help="Highest voltage that stage and amplifier bear [V].")],
+    minimum: Annotated[float, LOWEST],
+    maximum: Annotated[float, HIGHEST],
     written: Written,
     slew_rate: Annotated[float | None, typer.Option(help="Largest change of voltage [V/s].")] = None,
     estimators: Annotated[

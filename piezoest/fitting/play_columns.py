@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -128,7 +127,11 @@ class PlayColumns:
         _plays(u, self.thresholds, state, plays)
         if self.bends.size == 0:
             return plays
-        rows = np.empty((u.size, self.size))
+        return self._by_segments(plays)
+
+    def _by_segments(self, plays: FloatArray) -> FloatArray:
+        """How far plays (N, n) are within each segment, from where they are at 0 V: (N, segments n)."""
+        rows = np.empty((plays.shape[0], plays.shape[1] * (self.bends.size + 1)))
         _segments(plays, self._edges, rows)
         return rows
 
@@ -202,8 +205,8 @@ class PlayColumns:
         density = slopes[:, -max(1, round(LAST * n)) :].mean(axis=1, keepdims=True) / step
         added = np.repeat(GOES_ON * density * widest / BEYOND, BEYOND, axis=1)
         wider = replace(self, thresholds=np.concatenate([self.thresholds, more]), moved=n)
-        rest = [np.clip(wider.begin()[n:], a, b) - np.clip(0.0, a, b) for a, b in pairwise(self._edges)]
-        return wider, np.hstack([slopes, added]).ravel(), float(np.sum(added * rest))
+        rest = self._by_segments(wider.begin()[None, n:])
+        return wider, np.hstack([slopes, added]).ravel(), float(np.sum(added * rest.reshape(added.shape)))
 
     def initial_state(self, w: FloatArray, model: Any) -> FloatArray | None:
         """States of the model's plays [V]."""
@@ -263,7 +266,7 @@ def _plays(u: Vector, thresholds: Vector, y: Vector, plays: Matrix) -> None:
 
 @compiled
 def _segments(plays: Matrix, edges: Vector, rows: Matrix) -> None:
-    """How far each play is within each segment, from where it is at 0 V; segment by segment."""
+    """The same, into `rows`."""
     n = plays.shape[1]
     for k in range(plays.shape[0]):
         for s in range(edges.size - 1):

@@ -142,6 +142,11 @@ def sample_lines(path: Path, encoding: str, begins: int, skip_blank: bool, rows:
             yield Lines.of(kept, done)
 
 
+def end_of_rows(lines: list[str], is_row: Callable[[str], bool]) -> int:
+    """Number of lines up to the last row: those behind it are a footer; zero if none is a row."""
+    return next((k for k in range(len(lines), 0, -1) if lines[k - 1].strip() and is_row(lines[k - 1])), 0)
+
+
 def without_footer(
     blocks: Iterable[Lines], is_row: Callable[[str], bool], left_out: Callable[[int, str], object]
 ) -> Iterator[Lines]:
@@ -160,7 +165,7 @@ def without_footer(
     if held is None:
         return
     lines = held.text.split("\n")
-    kept = next((k for k in range(len(lines), 0, -1) if lines[k - 1].strip() and is_row(lines[k - 1])), 0)
+    kept = end_of_rows(lines, is_row)
     footer = [k for k in range(kept, len(lines)) if lines[k].strip()]
     if known and 0 < len(footer) <= LONGEST_FOOTER:
         left_out(int(held.numbers[footer[0]]), lines[footer[0]])

@@ -17,7 +17,15 @@ from piezoest.records import scopes
 from piezoest.records.cells import MISSING, Marks, Style, is_missing, is_number, number, style_of
 from piezoest.records.columns import names_columns, titled, with_units
 from piezoest.records.comments import COMMENTS, bare, entries_in, numbered_names, rate_in
-from piezoest.records.lines import LONGEST_FOOTER, Lines, chunks, encoding_of, sample_lines, without_footer
+from piezoest.records.lines import (
+    LONGEST_FOOTER,
+    Lines,
+    chunks,
+    encoding_of,
+    end_of_rows,
+    sample_lines,
+    without_footer,
+)
 from piezoest.records.source import LogError, Rows, Source, finite, floats, shown
 from piezoest.records.stamps import Clock, Onward, is_stamp, times_of
 
@@ -155,8 +163,8 @@ def _is_row(line: str, delimiter: str) -> bool:
 
 def _without_footer(lines: list[str], delimiter: str) -> list[str]:
     """Lines but the last ones that are no rows; all of them if they are many."""
-    ends = range(len(lines), max(len(lines) - LONGEST_FOOTER, 0), -1)
-    return lines[: next((k for k in ends if _is_row(lines[k - 1], delimiter)), len(lines))]
+    before, last = lines[:-LONGEST_FOOTER], lines[-LONGEST_FOOTER:]
+    return before + last[: end_of_rows(last, lambda line: _is_row(line, delimiter)) or len(last)]
 
 
 def _numeric(*rows: list[str]) -> bool:
