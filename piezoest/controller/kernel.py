@@ -147,6 +147,8 @@ def resume(state: Record, settings: Record, u: float, x: float) -> Any:
         go_on_at_rest(state, settings, u, x)
         return True
     state.stage = SEEK
+    # What was seen of a way that is broken off says nothing.
+    state.pace.count = 0.0
     starts.begin(state.start, u)
     # A gain that was refuted is not tried again.
     _rest_at(state, settings, u, x, state.start.given * settings.start.gain)

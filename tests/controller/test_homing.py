@@ -292,6 +292,7 @@ CALL = st.one_of(
     ),
     slew_rate=st.sampled_from([None, 1e3]),
 )
+@hypothesis.example(calls=[("resume", 1.0, -6e-170)], before=50, known={}, slew_rate=None)
 @hypothesis.settings(derandomize=True, deadline=None, max_examples=150)
 def test_whatever_is_called_the_voltage_is_finite_and_within_limits(
     calls: list[Any], before: int, known: dict[str, Any], slew_rate: float | None
