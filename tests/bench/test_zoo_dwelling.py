@@ -63,14 +63,9 @@ def test_a_line_goes_on_as_before_and_a_jump_is_seen() -> None:
 
 
 def test_what_breaks_is_a_row() -> None:
-    def broken(sample_rate: float, limits: Any, feedback: float = 0.0) -> Any:
-        raise RuntimeError("no idea")
-
-    dwell = Dwell(3, True, 1.0)
-    row = dwell.play(broken)
-    assert row["failure"] == "RuntimeError: no idea"
-    (task,) = tasks.tasks("parts", [dwell])
-    died = tasks.died(task)
+    (task,) = tasks.tasks("parts", [Dwell(3, True, 1.0)])
+    row, died = tasks.carry_out(task), tasks.died(task)
+    assert "unexpected keyword argument 'feedback'" in row["failure"]
     assert died["failure"] == "the process died"
     found = summarise_dwells([row, died])
     assert found["failures"] == 2

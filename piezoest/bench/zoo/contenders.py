@@ -61,32 +61,18 @@ class Parts:
 def contender(name: str) -> Factory:
     """Maker of a controller.
 
-    `name`: "parts", a class of the package, or a class or function of one's own as ``module:name``. It is
-    called as ``name(sample_rate, limits=limits)``. Or the default controller, changed: "line" has no
-    candidate beside the line, "no-corridor" leaves the voltage all its room, and the name of an estimator has
-    no other estimator, but the recorded loop.
+    `name`: "parts", a name in `CHANGED`, a class of the package, or a class or function of one's own as
+    ``module:name``.
     """
-    found = _found(name)
-    if inspect.isclass(found) and (missing := [each for each in NEEDED if not hasattr(found, each)]):
-        lacks = " and no ".join(missing)
-        raise ValueError(
-            f"{name} has no {lacks}: it is no controller of the zoo, which has {', '.join(NEEDED)}"
-        )
-    return functools.partial(_made, found)
-
-
-def _made(make: Any, sample_rate: float, limits: Any, **options: Any) -> Any:
-    return make(sample_rate, limits=limits, **options)
-
-
-def _found(name: str) -> Any:
     if name == PARTS:
         return Parts
     if name in CHANGED:
         return functools.partial(piezoest.AdaptiveFeedforward, **CHANGED[name])
-    if ":" in name:
-        return imported(name)
-    if not hasattr(piezoest, name):
+    if ":" not in name and not hasattr(piezoest, name):
         known = ", ".join((PARTS, *CHANGED))
         raise ValueError(f"controller {name}: choose {known}, a class of piezoest, or module:name")
-    return getattr(piezoest, name)
+    found: Any = imported(name) if ":" in name else getattr(piezoest, name)
+    if inspect.isclass(found) and (missing := [each for each in NEEDED if not hasattr(found, each)]):
+        lacks = " and no ".join(missing)
+        raise ValueError(f"{name} has no {lacks}: it is no controller, which has {', '.join(NEEDED)}")
+    return found

@@ -68,4 +68,4 @@ def _compared(controller: str, rows: Sequence[Row]) -> dict[str, Any]:
     best = min((name for name in CANDIDATES if name in medians), key=medians.__getitem__)
     ratio = own / medians[best] if np.isfinite(own) else np.inf
     found = {"settled": own, "best": best, "best_settled": medians[best], "ratio": ratio}
-    return dict(json_safe(found))
+    return json_safe(found)

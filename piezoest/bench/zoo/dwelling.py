@@ -45,41 +45,35 @@ class Dwell:
     def play(self, factory: Factory) -> Row:
         """Let a controller rest, and go on.
 
-        `factory` takes ``feedback=``, too. Returns ``settled``: median of the largest errors of the last
-        three periods before; ``allowed``: 1.2 times the largest of it, three times the noise and 0.2 % of the
-        swing; ``first``, ``second``, ``third``: largest errors of the periods after, all [µm]; ``kept``:
-        whether the first is allowed; ``excursion``: how far the voltage went in the rest, over its swing
-        before.
+        Returns ``settled``: median of the largest errors of the last three periods before; ``allowed``: 1.2
+        times the largest of it, three times the noise and 0.2 % of the swing; ``first``, ``second``,
+        ``third``: largest errors of the periods after, all [µm]; ``kept``: whether the first is allowed;
+        ``excursion``: how far the voltage went in the rest, over its swing before.
         """
         rig, rest, drawn = dwell_rig(self)
-        row: Row = {**rig.to_dict(), **drawn, "duration": self.duration, "failure": None}
         options = {"feedback": drawn["feedback"]} if self.feedback else {}
-        try:
-            controller = factory(rig.sample_rate, rig.limits, **options)
-            with np.errstate(all="ignore"):
-                run, _ = run_controller(rig, controller)
-        except Exception as error:
-            return dict(json_safe({**row, "failure": f"{type(error).__name__}: {error}"}))
+        run, _ = run_controller(rig, factory(rig.sample_rate, limits=rig.limits, **options))
         off, cycle, u = np.abs(run.error), rig.plain.cycle, run.voltage
         level = settled(off[: rest.start], cycle) or 0.0
         allowed = BACK * max(level, NOISES * rig.noise, 2.0 * NEGLIGIBLE * rig.plain.amplitude)
         after = off[rest.stop : rest.stop + len(PERIODS) * cycle].reshape(-1, cycle).max(axis=1).tolist()
         swing = float(np.ptp(u[rest.start - cycle : rest.start]))
         gone = float(np.max(np.abs(u[rest] - u[rest.start - 1])))
-        row |= {"settled": level, "allowed": allowed, **dict(zip(PERIODS, after, strict=True))}
-        row |= {
-            "kept": after[0] <= allowed,
-            "excursion": gone / swing if swing > 0.0 else None,
-            "events": "; ".join(
-                event.reason.partition(":")[0] for event in getattr(controller, "events", ())
-            ),
-        }
-        return dict(json_safe(row))
+        return json_safe(
+            {
+                **self.drawn(),
+                "settled": level,
+                "allowed": allowed,
+                **dict(zip(PERIODS, after, strict=True)),
+                "kept": after[0] <= allowed,
+                "excursion": gone / swing if swing > 0.0 else None,
+            }
+        )
 
     def drawn(self) -> Row:
         """What the rig is, and the rest."""
         rig, _, drawn = dwell_rig(self)
-        return {**rig.to_dict(), **drawn, "duration": self.duration}
+        return {**rig.to_dict(), **drawn, "duration": self.duration, "failure": None}
 
 
 def dwells(seeds: Sequence[int], duration: float = DURATION) -> list[Dwell]:
@@ -125,7 +119,7 @@ def summarise_dwells(rows: Iterable[Row]) -> dict[str, Any]:
             {"seed": row["seed"], "feedback": row["feedback"], "ratio": _ratio(row)} for row in broken[:10]
         ],
     }
-    return dict(json_safe(summary))
+    return json_safe(summary)
 
 
 def _ratio(row: Row, period: str = "first") -> float:

@@ -42,10 +42,10 @@ class Reach:
         """Half of the range [V]."""
         return 0.5 * (self.high - self.low)
 
-    def cycle(self, points: int = POINTS) -> FloatArray:
+    def cycle(self) -> FloatArray:
         """Voltage from rest to the upper limit, and down and up twice: the last two swings are the loop."""
-        up = np.linspace(self.low, self.high, points)
-        start = np.linspace(0.0, self.high, points)
+        up = np.linspace(self.low, self.high, POINTS)
+        start = np.linspace(0.0, self.high, POINTS)
         return np.concatenate((start, up[::-1], up, up[::-1], up))
 
 
@@ -105,38 +105,24 @@ def _relays(rng: Any, reach: Reach) -> Make:
 
 def _paper(rng: Any, reach: Reach) -> Make:
     model: Any = PaperStage().hysteresis
-    stretch = reach.half / rng.uniform(40.0, 100.0)
-    return partial(_plays, thresholds=stretch * model.thresholds, weights=model.weights / model.gain)
-
-
-def _plays(gain: float, share: float, thresholds: FloatArray, weights: FloatArray) -> PrandtlIshlinskii:
-    return PrandtlIshlinskii(gain, thresholds, gain * share * weights)
+    thresholds = reach.half / rng.uniform(40.0, 100.0) * model.thresholds
+    weights = model.weights / model.gain
+    return lambda gain, share: PrandtlIshlinskii(gain, thresholds, gain * share * weights)
 
 
 def _preisach(rng: Any, reach: Reach) -> Make:
     thresholds = reach.half * rng.uniform(0.5, 0.9) * (np.arange(PLAYS) + 0.5) / PLAYS
-    narrow = reach.half * rng.uniform(0.15, 0.4)
-    return partial(
-        _bell,
-        thresholds=thresholds,
-        weights=np.exp(-thresholds / narrow),
-        centre=reach.middle + reach.half * rng.uniform(-0.3, 0.3),
-        width=reach.half * rng.uniform(0.4, 1.0),
+    weights = np.exp(-thresholds / (reach.half * rng.uniform(0.15, 0.4)))
+    centre = reach.middle + reach.half * rng.uniform(-0.3, 0.3)
+    width = reach.half * rng.uniform(0.4, 1.0)
+    return lambda gain, share: Preisach(
+        gain, thresholds, gain * share * weights / weights.sum(), centre, width
     )
 
 
-def _bell(
-    gain: float, share: float, thresholds: FloatArray, weights: FloatArray, centre: float, width: float
-) -> Preisach:
-    return Preisach(gain, thresholds, gain * share * weights / weights.sum(), centre, width)
-
-
 def _coleman_hodgdon(rng: Any, reach: Reach) -> Make:
-    return partial(_ratio, a=rng.uniform(0.8, 4.0) / reach.half)
-
-
-def _ratio(gain: float, share: float, a: float) -> ColemanHodgdon:
-    return ColemanHodgdon.from_loop(a, max(share, 1e-9) * gain, gain)
+    a = rng.uniform(0.8, 4.0) / reach.half
+    return lambda gain, share: ColemanHodgdon.from_loop(a, max(share, 1e-9) * gain, gain)
 
 
 # `preisach` is a sum of plays under a bell: of the play estimators' own family, and no independent witness;
@@ -154,26 +140,18 @@ def draw_family(family: str, rng: np.random.Generator, reach: Reach, *, width: f
     u = reach.cycle()
     for _ in range(TRIES):
         make = FAMILIES[family](rng, reach)
-        line, loop = make(gain=1.0, share=0.0).simulate(u), make(gain=1.0, share=1.0).simulate(u)
+        line, loop = (make(gain=1.0, share=share).simulate(u) for share in (0.0, 1.0))
         h = loop - line
-        stroke, opening, range_h = np.ptp(line[-POINTS:]), _opening(h), h[-1] - h[-POINTS]
+        # Falling branch over the rising one that follows, at its widest; the cycle comes back on its grid.
+        opening = float(np.max(h[-2 * POINTS : -POINTS][::-1] - h[-POINTS:]))
+        stroke, range_h = np.ptp(line[-POINTS:]), h[-1] - h[-POINTS]
         if opening <= width * range_h:
             continue
         share = width * stroke / (opening - width * range_h)
         x = line + share * h
         slope = (x[-1] - x[-POINTS]) / (u[-1] - u[-POINTS])
-        if np.all(_slopes(u, x) > STEEP * slope):
+        du, dx = np.diff(u), np.diff(x)
+        moved = du != 0.0
+        if np.all(dx[moved] / du[moved] > STEEP * slope):
             return make(gain=gain / slope, share=share)
     raise ValueError(f"no {family} with a loop of {100.0 * width:.1f} % of its stroke was found")
-
-
-def _opening(h: FloatArray) -> float:
-    """Falling branch over the rising one that follows, at its widest; the cycle comes back on its grid."""
-    falling, rising = h[-2 * POINTS : -POINTS][::-1], h[-POINTS:]
-    return float(np.max(falling - rising))
-
-
-def _slopes(u: FloatArray, x: FloatArray) -> FloatArray:
-    du = np.diff(u)
-    moved = du != 0.0
-    return np.diff(x)[moved] / du[moved]

@@ -11,7 +11,6 @@ from piezoest.bench.zoo.judging import Both
 from piezoest.bench.zoo.rig import Rig
 
 POINTS = 20_000  # that are drawn, at most
-LINE, LEARNT, RUN = "#0072B2", "#009E73", "#D55E00"
 
 
 def write_figure(rig: Rig, row: Row, both: Both, path: Path) -> None:
@@ -27,12 +26,8 @@ def write_figure(rig: Rig, row: Row, both: Both, path: Path) -> None:
     )
     way, voltage, error = (panels[name] for name in ("way", "voltage", "error"))
     way.plot(time, fitted.reference[::every], color="k", lw=0.6, label="reference")
-    drawn = (
-        ("line in hindsight", fitted, LINE),
-        ("learnt line", learnt, LEARNT),
-        ("controller", both.run, RUN),
-    )
-    for name, run, colour in drawn:
+    runs = {"line in hindsight": fitted, "learnt line": learnt, "controller": both.run}
+    for (name, run), colour in zip(runs.items(), ("#0072B2", "#009E73", "#D55E00"), strict=True):
         if run is None:
             continue
         style = {"color": colour, "lw": 0.7}
@@ -44,26 +39,22 @@ def write_figure(rig: Rig, row: Row, both: Both, path: Path) -> None:
         panels["last"].plot(np.arange(run.error.size)[last] / rig.sample_rate, run.error[last], **style)
     way.legend(loc="upper right", fontsize=8)
     for axes in (way, voltage, error):
-        axes.axvline(row["judged_from"] or 0.0, color="0.5", lw=0.8)
+        axes.axvline(rig.judged_from / rig.sample_rate, color="0.5", lw=0.8)
         if rig.fault.mode != "none":
             axes.axvspan(row["fault_start"], row["fault_stop"], color="0.9", zorder=0)
-        axes.set_xlabel("time [s]")
-    way.set_ylabel("displacement [µm]")
-    voltage.set_ylabel("voltage [V]")
-    error.set_ylabel("error [µm]")
-    panels["loop"].set(xlabel="voltage [V]", ylabel="displacement [µm]")
-    panels["last"].set(xlabel="time [s]", title="error of the last two cycles", ylabel="[µm]")
-    _zoom(error, row, both)
+    for axes, x, y in (
+        (way, "time [s]", "displacement [µm]"),
+        (voltage, "time [s]", "voltage [V]"),
+        (error, "time [s]", "error [µm]"),
+        (panels["loop"], "voltage [V]", "displacement [µm]"),
+        (panels["last"], "time [s]", "error of the last two cycles [µm]"),
+    ):
+        axes.set(xlabel=x, ylabel=y)
+    # The errors that are judged, not those of the start.
+    if both.run is not None and (largest := max(row["worst"] or 0.0, row["line_worst"] or 0.0)) > 0.0:
+        error.set_ylim(-1.2 * largest, 1.2 * largest)
     said = row.get("failure") or row.get("named") or "nothing said"
     figure.suptitle(
         f"seed {rig.seed}: {rig.family}, {rig.plain.kind}, fault {rig.fault.kind} {rig.fault.mode}; {said}"
     )
     save_figure(figure, path, dpi=100, metadata={"Software": None})
-
-
-def _zoom(axes: Any, row: Row, both: Both) -> None:
-    """Show the errors that are judged, not those of the start."""
-    judged = [row.get("worst"), row.get("line_worst")]
-    largest = max([each for each in judged if each] or [0.0])
-    if both.run is not None and largest > 0.0:
-        axes.set_ylim(-1.2 * largest, 1.2 * largest)

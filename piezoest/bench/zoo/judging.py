@@ -8,7 +8,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.bench.origin import json_safe
 from piezoest.bench.store import Row
-from piezoest.bench.zoo.faults import NONE, PERMANENT, TRANSIENT
+from piezoest.bench.zoo.faults import PERMANENT, TRANSIENT
 from piezoest.bench.zoo.line import FittedLine, fit_line, run_learnt_line, run_line
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Factory, Traces, run_controller
@@ -17,24 +17,20 @@ LAST = 3  # cycles that a settled error is taken over, and the least number afte
 BACK = 1.2  # of the settled error
 ALLOWED, NOISES, NEGLIGIBLE = 1.5, 3.0, 0.002  # of the line's error, of the noise, of the swing
 AT_LIMIT, WITHIN = 1e-6, 0.01  # of the voltage's range: on a limit, and clearly within both
-ERRORS = ("worst", "rms", "line_worst", "line_rms", "learnt_worst", "learnt_rms", "ratio", "ratio_rms")
+ERRORS = ("worst", "line_worst", "learnt_worst", "ratio")
 
 
 def named(rig: Rig, controller: Any) -> dict[str, Any]:
-    """What a controller said: names of faults, how soon after the fault, and what drove at last."""
-    events = list(getattr(controller, "events", ()))
+    """What a controller said: names of faults, how soon after the fault the right one, what drove at last."""
     status = getattr(controller, "status", {})
     if not isinstance(status, dict):
         status = {name: getattr(status, name) for name in getattr(status, "__dataclass_fields__", {})}
     fault, start = rig.fault, rig.fault.start / rig.sample_rate
-    said = [(float(event.time), _name(event)) for event in events]
-    later = [(time - start, name) for time, name in said if time >= start] if fault.kind != NONE else []
-    right = [time for time, name in later if name in fault.names]
+    said = [(float(event.time), _name(event)) for event in getattr(controller, "events", ())]
+    right = [time - start for time, name in said if time >= start and name in fault.names]
     return {
-        "events": len(events),
+        "events": len(said),
         "named": "; ".join(dict.fromkeys(name for _, name in said)),
-        "named_first": later[0][1] if later else None,
-        "named_after": later[0][0] if later else None,
         "named_right": bool(right) if fault.names else None,
         "named_periods": right[0] * rig.plain.frequency if right else None,
         "driver": next(
@@ -55,10 +51,9 @@ def recovery(rig: Rig, error: FloatArray, floor: float) -> dict[str, Any]:
     """How soon after a transient fault the error is as small as before.
 
     `error` (N,): absolute errors of the run [µm]. `floor`: error that is small anyway [µm]. Returns
-    ``recovery``: whether it is judged: after a transient fault, where the reference repeats itself and goes
-    on for three cycles. ``recovered``: the cycle, from the fault's end on, in which the largest error is
-    below 1.2 times the settled one before the fault; None if none is. Without a settled error before, for the
-    fault was there at the start, it is the one at the end.
+    ``recovery``: whether it is judged, which needs three more cycles of a reference that repeats itself.
+    ``recovered``: the first cycle after the fault whose largest error is below 1.2 times the settled one
+    before it, or at the end if the fault was there at the start; None if there is no such cycle.
     """
     fault, cycle, first = rig.fault, rig.plain.cycle, rig.judged_from
     after = [error[begin : begin + cycle].max() for begin in range(fault.stop, error.size - cycle + 1, cycle)]
@@ -128,19 +123,13 @@ def _after(rig: Rig) -> slice:
 def _compared(
     name: str, error: FloatArray, errors_line: Sequence[FloatArray], floor: float
 ) -> dict[str, Any]:
-    """Worst and rms error of a part; the larger ones of the lines, and the learnt one's; both ratios."""
+    """`ERRORS` of a part: of the controller, of the worse line and of the learnt one; and the ratio."""
+    names = [f"{name}{column}" for column in ERRORS]
     if error.size == 0:
-        return dict.fromkeys(f"{name}{column}" for column in ERRORS)
-    found = {}
-    for column, of in (("worst", np.max), ("rms", _rms)):
-        found[f"{name}{column}"] = float(of(error))
-        found[f"{name}line_{column}"] = max(float(of(each)) for each in errors_line)
-        found[f"{name}learnt_{column}"] = float(of(errors_line[-1]))
-    ratio = [
-        found[f"{name}{column}"] / max(ALLOWED * found[f"{name}line_{column}"], floor)
-        for column in ("worst", "rms")
-    ]
-    return {**found, f"{name}ratio": ratio[0], f"{name}ratio_rms": ratio[1]}
+        return dict.fromkeys(names)
+    worst, *of_lines = (float(np.max(each)) for each in (error, *errors_line))
+    line = max(of_lines)
+    return dict(zip(names, (worst, line, of_lines[-1], worst / max(ALLOWED * line, floor)), strict=True))
 
 
 def _in_each_cycle(
@@ -153,10 +142,6 @@ def _in_each_cycle(
         np.maximum.reduceat(each, range(0, each.size, cycle)) for each in (error, *errors_line)
     )
     return float(np.max(worst / np.maximum(ALLOWED * np.maximum(*of_lines), floor)))
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _rail(rig: Rig, run: Traces, lines: Lines) -> Any:
@@ -193,6 +178,7 @@ def play(rig: Rig, factory: Factory) -> Row:
     return traced(rig, factory)[0]
 
 
+@np.errstate(all="ignore")
 def traced(rig: Rig, factory: Factory) -> tuple[Row, Both]:
     """Let a controller drive a rig, and judge it beside straight lines."""
     line = fit_line(rig)
@@ -201,13 +187,10 @@ def traced(rig: Rig, factory: Factory) -> tuple[Row, Both]:
     run: Traces | None = None
     controller: Any = None
     try:
-        controller = factory(rig.sample_rate, rig.limits)
-        with np.errstate(all="ignore"):
-            run, seconds = run_controller(rig, controller)
-            row |= judge(rig, run, lines)
-            row |= named(rig, controller)
+        controller = factory(rig.sample_rate, limits=rig.limits)
+        run, seconds = run_controller(rig, controller)
+        row |= judge(rig, run, lines) | named(rig, controller)
         row["microseconds"] = 1e6 * seconds / run.reference.size
     except Exception as error:
         row["failure"] = f"{type(error).__name__}: {error}"
-    row = dict(json_safe(row))
-    return row, Both(run, lines, tuple(getattr(controller, "events", ())))
+    return json_safe(row), Both(run, lines, tuple(getattr(controller, "events", ())))

@@ -49,12 +49,17 @@ def fit_line(rig: Rig) -> FittedLine:
     # What is wrong from the start is what the controller knows as well; the rest comes later.
     zero_0 = float(zero[0])
     r = plain.values + (zero_0 if rig.fault.kind == "zero-off-shifted" else 0.0)
-    slope = factor * rig.gain
     x_0 = float(np.ravel(rig.model.simulate(np.array([rig.reach.middle])))[0])
-    line = FittedLine(slope, factor * (x_0 - rig.gain * rig.reach.middle) + zero_0)
-    twin = _Twin(rig, factor, zero_0)
+    line = FittedLine(factor * rig.gain, factor * (x_0 - rig.gain * rig.reach.middle) + zero_0)
+    stage = rig.stage(healthy=True)
+
+    def twin(u: FloatArray) -> FloatArray:
+        stage.reset()
+        stage.run(u)
+        return factor * np.asarray(stage.displacement) + zero_0
+
     for cycles, rounds in ((CYCLES, ROUNDS), (r.size // plain.cycle + 1, LAST_ROUNDS)):
-        line = _improved(line, twin, r[: plain.begins + cycles * plain.cycle], rounds)
+        line = _improved(rig, line, twin, r[: plain.begins + cycles * plain.cycle], rounds)
     return line
 
 
@@ -73,51 +78,37 @@ def slope_of(u: FloatArray, x: FloatArray) -> float:
     return float(np.sum(du * x) / np.sum(du * du))
 
 
-class _Twin:
-    """The stage without its faults, in the gauge's coordinates."""
+def _improved(
+    rig: Rig, line: FittedLine, twin: Callable[[FloatArray], FloatArray], r: FloatArray, rounds: int
+) -> FittedLine:
+    """The line under which the twin misses a reference least, of those that so many rounds find.
 
-    def __init__(self, rig: Rig, factor: float, zero: float) -> None:
-        self._rig, self._factor, self._zero = rig, factor, zero
-        self._stage = rig.stage(healthy=True)
-        self.slope = factor * rig.gain
-        self.judged = slice(rig.plain.begins + rig.plain.cycle // 4, None)
-        self.close = CLOSE * rig.plain.amplitude
-
-    def clip(self, u: FloatArray | float) -> FloatArray:
-        """Voltage within the limits."""
-        return np.clip(u, self._rig.reach.low, self._rig.reach.high)
-
-    def run(self, u: FloatArray) -> FloatArray:
-        """Displacement from rest."""
-        self._stage.reset()
-        self._stage.run(u)
-        return self._factor * np.asarray(self._stage.displacement) + self._zero
-
-
-def _improved(line: FittedLine, twin: _Twin, r: FloatArray, rounds: int) -> FittedLine:
-    """The line under which the twin misses a reference least, of those that so many rounds find."""
-    middle = float(np.mean(r[twin.judged]))
+    `twin`: displacement in the gauge's coordinates for voltages, from rest.
+    """
+    slope, low, high = rig.coordinates[0] * rig.gain, rig.reach.low, rig.reach.high
+    judged = slice(rig.plain.begins + rig.plain.cycle // 4, None)
+    middle = float(np.mean(r[judged]))
     before: tuple[float, float] | None = None
     best, least = line, np.inf
     for _ in range(rounds):
-        u = twin.clip(line.voltage(r))
-        x = twin.run(u)
-        missed = float(np.sqrt(np.mean((r - x)[twin.judged] ** 2)))
+        u = np.clip(line.voltage(r), low, high)
+        x = twin(u)
+        missed = float(np.sqrt(np.mean((r - x)[judged] ** 2)))
         if missed < least:
             best, least = line, missed
-        u, x = u[twin.judged], x[twin.judged]
+        u, x = u[judged], x[judged]
         mean_u, mean_x = float(u.mean()), float(x.mean())
         gain = slope_of(u, x) if np.any(u != mean_u) else line.gain
-        near = abs(middle - mean_x) < twin.close and abs(gain / line.gain - 1.0) < CLOSE
-        if near or gain * twin.slope <= 0.0:
+        near = abs(middle - mean_x) < CLOSE * rig.plain.amplitude and abs(gain / line.gain - 1.0) < CLOSE
+        if near or gain * slope <= 0.0:
             break
         # Where the mean comes to depends on the way there: a secant finds the voltage that brings it home.
-        steep = twin.slope
+        steep = slope
         if before is not None and mean_u != before[0]:
             steep = (mean_x - before[1]) / (mean_u - before[0])
-            steep = twin.slope * float(np.clip(steep / twin.slope, SLOWEST, FASTEST))
+            steep = slope * float(np.clip(steep / slope, SLOWEST, FASTEST))
         before = mean_u, mean_x
-        line = FittedLine(gain, middle - gain * float(twin.clip(mean_u + (middle - mean_x) / steep)))
+        line = FittedLine(gain, middle - gain * float(np.clip(mean_u + (middle - mean_x) / steep, low, high)))
     return best
 
 
@@ -135,7 +126,9 @@ def run_learnt_line(rig: Rig, hindsight: FittedLine) -> tuple[Traces, int]:
         true[part] = stage.displacement
         last, past = told(slice(max(0, end - LEGS * _leg(rig)), end), x, true)
         if line is None and last.size:
-            line, knows = _first(rig, u[past[0]], x[last[0]]), end
+            # The known gain through the first reading.
+            gain = rig.coordinates[0] * rig.gain
+            line, knows = FittedLine(gain, float(x[last[0]] - gain * u[past[0]])), end
         elif line is not None:
             line = _redrawn(rig, line, u[past], x[last], hindsight.gain)
         done = end
@@ -166,12 +159,6 @@ def _oracle(rig: Rig) -> Callable[[slice, FloatArray, FloatArray], tuple[Any, An
         return k[good], past[good]
 
     return told
-
-
-def _first(rig: Rig, u: float, x: float) -> FittedLine:
-    """The known gain through a reading."""
-    gain = rig.coordinates[0] * rig.gain
-    return FittedLine(gain, float(x - gain * u))
 
 
 def _redrawn(rig: Rig, line: FittedLine, u: FloatArray, x: FloatArray, hindsight: float) -> FittedLine:

@@ -27,11 +27,6 @@ class Reference:
     begins: int  # samples of the way from rest to its beginning
 
     @property
-    def two_swings(self) -> int:
-        """Samples that two swings over the whole range take, from wherever."""
-        return round(1.5 * self.cycle)
-
-    @property
     def repeats(self) -> bool:
         """Whether each cycle is like the one before."""
         return self.kind in REPEATING

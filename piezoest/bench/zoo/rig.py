@@ -16,12 +16,7 @@ from piezoest.stage import Amplifier, Gauge, SimulatedStage
 
 # Mechanics by name: natural frequency [Hz] and damping. The lag is a stage so damped that only its slow pole
 # is left: a first-order low-pass.
-MECHANICS: dict[str, tuple[float, float]] = {
-    "none": (0.0, 0.0),
-    "200 Hz": (200.0, 0.01),
-    "400 Hz": (400.0, 0.01),
-    "780 Hz": (780.0, 0.02),
-}
+MECHANICS = {"none": (0.0, 0.0), "200 Hz": (200.0, 0.01), "400 Hz": (400.0, 0.01), "780 Hz": (780.0, 0.02)}
 DAMPING = 0.01  # of a resonance that is given as its frequency
 LAG_DAMPING = 2.0
 SLOW_POLE = LAG_DAMPING - (LAG_DAMPING**2 - 1.0) ** 0.5  # of the lag, relative to its natural frequency
@@ -91,11 +86,8 @@ class Rig:
     @property
     def gain_factor(self) -> FloatArray:
         """By what the fault has changed the gain, shape (N,)."""
-        n, schedule = self.plain.values.size, faults.gain_schedule(self)
-        if schedule is None:
-            return np.ones(n)
-        times, factors = zip(*schedule, strict=True)
-        return np.interp(np.arange(n) / self.sample_rate, times, factors)
+        times, factors = zip(*(faults.gain_schedule(self) or [[0.0, 1.0]]), strict=True)
+        return np.interp(np.arange(self.plain.values.size) / self.sample_rate, times, factors)
 
     @property
     def noise(self) -> float:
@@ -113,7 +105,7 @@ class Rig:
     @property
     def learning(self) -> int:
         """Samples that learning may take: two swings, and the block at whose end the first reading comes."""
-        return self.plain.two_swings + (self.block if self.block > 1 else 0)
+        return round(1.5 * self.plain.cycle) + (self.block if self.block > 1 else 0)
 
     def seen(self, true: FloatArray) -> FloatArray:
         """True displacements, shape (N,) [µm], in the gauge's coordinates."""
@@ -127,7 +119,7 @@ class Rig:
             fs,
             self.model,
             creep=Creep.logarithmic(own.creep, shortest=0.01, longest=10.0) if own.creep else None,
-            mechanics=self._mechanics(),
+            mechanics=MassSpringDamper(*own.resonance) if own.resonance[0] else None,
             amplifier=Amplifier(
                 self.reach.low, self.reach.high, resolution=own.volts, slew_rate=own.slew_rate
             ),
@@ -142,10 +134,6 @@ class Rig:
         if own.hum:
             stage = FaultyStage(stage, own.hum, seed=self.seed, reading=hum)
         return faults.faulty_stage(stage, self)
-
-    def _mechanics(self) -> MassSpringDamper | None:
-        frequency, damping = self.around.resonance
-        return MassSpringDamper(frequency, damping) if frequency else None
 
     def to_dict(self) -> dict[str, Any]:
         """All that was drawn, flat: columns of a row."""

@@ -10,7 +10,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo.rig import Rig
 
-Factory = Callable[..., Any]  # factory(sample_rate, limits) is a controller
+Factory = Callable[..., Any]  # factory(sample_rate, limits=limits) is a controller
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +29,7 @@ class Traces:
         return self.reference - self.displacement
 
 
+@np.errstate(all="ignore")
 def run_controller(rig: Rig, controller: Any) -> tuple[Traces, float]:
     """Let a controller drive a rig, by samples or by blocks; with the time that it took [s]."""
     r, stage, clock, seconds = rig.reference, rig.stage(), time.perf_counter, 0.0

@@ -15,6 +15,7 @@ import numpy as np
 
 from piezoest import signals
 from piezoest._checks import FloatArray
+from piezoest.bench.metrics import SETTLED, settles
 from piezoest.bench.origin import json_safe
 from piezoest.bench.store import Row
 from piezoest.bench.zoo.drawing import draw
@@ -27,7 +28,7 @@ from piezoest.bench.zoo.summary import failures, grouped
 
 AMPLITUDES = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # µm
 FREQUENCIES = (1.0, 3.0, 10.0, 30.0)  # Hz
-SETTLED, NOISES = 0.012, 3.0
+NOISES = 3.0
 PERIOD, SLOWEST = 1000, 4000.0  # samples in a period, and Hz of the sample rate, at least
 REACH = 100.0  # V, to both sides
 GAINS = (0.05, 0.5)  # µm/V
@@ -57,46 +58,29 @@ class Cell:
     seed: int  # of what is drawn
 
     def play(self, factory: Factory) -> Row:
-        """Run a controller over it.
-
-        Returns with ``segments``: for each its name, the periods until it settled (None if it did not), the
-        largest error of its last period [µm] and what was allowed. ``asked``: see `asked`.
-        """
-        rig = cell_rig(self)
-        row: Row = {**asdict(self), "gain": rig.gain, "width": rig.width, "block": rig.block,
-                               "noise": rig.noise, "mechanics": rig.around.mechanics, "asked": asked(rig),
-                               "failure": None, "segments": []}  # fmt: skip
-        try:
-            controller = factory(rig.sample_rate, rig.limits)
-            with np.errstate(all="ignore"):
-                run, _ = run_controller(rig, controller)
-        except Exception as error:
-            return {**row, "failure": f"{type(error).__name__}: {error}"}
+        """Run a controller over it; with the periods until it settled in each segment, None if it did not."""
+        rig, row = cell_rig(self), self.drawn()
+        run, _ = run_controller(rig, factory(rig.sample_rate, limits=rig.limits))
         worst = np.abs(run.error).reshape(-1, rig.plain.cycle).max(axis=1)
         first = 0
         for name, factor, periods in SEGMENTS:
             allowed = max(SETTLED * factor * self.amplitude, NOISES * rig.noise)
             part = worst[first : first + periods]
-            late = np.flatnonzero(~(part <= allowed))
-            after = int(late[-1]) + 1 if late.size else 0
-            row["segments"].append(
-                {
-                    "change": name,
-                    "periods": after if after < periods else None,
-                    "error": float(part[-1]),
-                    "allowed": allowed,
-                }
-            )
+            found = {"periods": settles(part, allowed), "error": float(part[-1]), "allowed": allowed}
+            row["segments"].append({"change": name, **found})
             first += periods
-        return dict(json_safe(row))
+        return json_safe(row)
 
     def drawn(self) -> Row:
-        """The place."""
-        return {**asdict(self), "segments": [], "asked": True}
+        """The place, and what was drawn."""
+        rig = cell_rig(self)
+        return {**asdict(self), "gain": rig.gain, "width": rig.width, "block": rig.block, "noise": rig.noise,
+                "mechanics": rig.around.mechanics, "asked": asked(rig), "failure": None,
+                "segments": []}  # fmt: skip
 
 
 def tidy_cells(rows: Iterable[Row]) -> Iterator[Row]:
-    """A row for each change of each run of the map. `rows`: from `Cell.play`."""
+    """A row for each change of each run of the map."""
     for row in rows:
         place = {name: value for name, value in row.items() if name != "segments"}
         for segment in row["segments"] or [{}]:

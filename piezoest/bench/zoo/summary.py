@@ -9,9 +9,7 @@ from piezoest.bench.origin import json_safe
 from piezoest.bench.store import Row
 
 QUANTILES = (0.5, 0.9, 0.95, 0.99, 1.0)
-RATIOS = (
-    "ratio", "ratio_rms", "cycle_ratio", "last_ratio", "last_ratio_rms", "after_ratio", "after_ratio_rms",
-)  # fmt: skip
+RATIOS = ("ratio", "cycle_ratio", "last_ratio", "after_ratio")
 BACK = 3  # cycles until a fault is forgotten
 
 
@@ -72,7 +70,7 @@ def summarise(rows: Iterable[Row], worst: int = 10) -> dict[str, Any]:
         "worst": [{name: row.get(name) for name in columns} for row in ranked[:worst]],
         "microseconds": median(values(rows, "microseconds")),
     }
-    return dict(json_safe(summary))
+    return json_safe(summary)
 
 
 def _badness(row: Row) -> float:
@@ -90,8 +88,7 @@ def counts(rows: Sequence[Row]) -> dict[str, Any]:
     """Runs over the ratio or at a limit; faults to be named that were; errors that were as before."""
     ratios, asked = values(rows, "ratio"), values(rows, "named_right")
     back = [row["recovered"] for row in rows if row.get("recovery")]
-    over = {"over": "ratio", "over_rms": "ratio_rms", "over_last": "last_ratio", "over_after": "after_ratio",
-            "at_limit": "rests at a limit"}  # fmt: skip
+    over = {"over": "ratio", "over_last": "last_ratio", "at_limit": "rests at a limit"}
     return {
         "runs": len(rows),
         "judged": len(ratios),

@@ -1,9 +1,9 @@
-"""The runs of a campaign: what each is, the key it is kept under, and what happens if its process dies."""
+"""The runs of a campaign: what each is, the key it is kept under, and what happens if it fails."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 from piezoest.bench.executors import in_processes, quiet
 from piezoest.bench.origin import code_of, json_safe
@@ -12,16 +12,6 @@ from piezoest.bench.zoo.contenders import contender
 from piezoest.bench.zoo.drawing import draw
 from piezoest.bench.zoo.judging import play
 from piezoest.bench.zoo.running import Factory
-
-
-class Played(Protocol):
-    """What a run is: `Drawn`, a `settling.Cell` of the map or a long rest, a `dwelling.Dwell`."""
-
-    def play(self, factory: Factory) -> Row:
-        """Let a controller do it."""
-
-    def drawn(self) -> Row:
-        """What is known of it before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,24 +35,29 @@ class Task(Keyed):
     """One run."""
 
     controller: str  # as `piezoest.bench.zoo.contenders.contender` reads it
-    of: Any  # `Played`
+    of: Any  # what is played: `Drawn`, a `settling.Cell` of the map, or a long rest, a `dwelling.Dwell`
     code: str  # fingerprint of what is run
 
 
 @quiet()
 def carry_out(task: Task) -> Row:
-    """Run a task."""
-    known = {"key": task.key, "controller": task.controller}
-    return {**known, **task.of.play(contender(task.controller))}
+    """Run a task; what it raises is its ``failure``."""
+    try:
+        return _row(task, task.of.play(contender(task.controller)))
+    except Exception as error:
+        return _row(task, {**task.of.drawn(), "failure": f"{type(error).__name__}: {error}"})
 
 
 def died(task: Task) -> Row:
     """Row of a task whose process died over it."""
-    row = {"key": task.key, "controller": task.controller, **task.of.drawn()}
-    return dict(json_safe({**row, "failure": "the process died"}))
+    return _row(task, {**task.of.drawn(), "failure": "the process died"})
 
 
-def tasks(controller: str, of: Iterable[Played]) -> list[Task]:
+def _row(task: Task, found: Row) -> Row:
+    return json_safe({"key": task.key, "controller": task.controller, **found})
+
+
+def tasks(controller: str, of: Iterable[Any]) -> list[Task]:
     """Runs of a controller."""
     code = code_of(controller)
     return [Task(controller, each, code) for each in of]

@@ -48,11 +48,6 @@ ONE_RUN = {
 
 def one_run(row: dict[str, Any]) -> dict[str, str]:
     """Numbers of a run that are known, by the words for them."""
-    row = {name: value for name, value in row.items() if value is not None and value != ""}
-    if row["fault"] == "none":
-        row = {
-            name: value for name, value in row.items() if name not in ("mode", "fault_start", "fault_stop")
-        }
-    else:
-        row["mode"] = MODES[row["mode"]]
-    return {said: shown(row[name]) for name, said in ONE_RUN.items() if name in row}
+    left_out = ("mode", "fault_start", "fault_stop") if row["fault"] == "none" else ()
+    known = [name for name in ONE_RUN if row.get(name) not in (None, "") and name not in left_out]
+    return {ONE_RUN[name]: shown(MODES.get(row[name], row[name])) for name in known}
