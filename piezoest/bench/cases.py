@@ -31,18 +31,12 @@ AMPLITUDE = 5.0  # µm, of the scenarios with one amplitude
 
 
 def make_stage(
-    name: str,
-    sample_rate: float,
-    *,
-    seed: int,
-    noise: float | None = None,
-    gain_schedule: Any = None,
-    creep: bool = True,
+    name: str, sample_rate: float, *, seed: int, noise: float | None = None, gain_schedule: Any = None
 ) -> SimulatedStage:
     """Make a stage at rest; the same arguments give the same stage, its noise included."""
     if name not in STAGES:
         raise ValueError(f"stage must be one of {', '.join(STAGES)}, got {name!r}")
-    paper = PaperStage(sample_rate, seed, noise=noise, gain_schedule=gain_schedule, creep=creep)
+    paper = PaperStage(sample_rate, seed, noise=noise, gain_schedule=gain_schedule)
     if name == PAPER:
         return paper
     rng = np.random.default_rng([seed, *name.encode()])
@@ -50,7 +44,7 @@ def make_stage(
     return SimulatedStage(
         sample_rate,
         draw_family(name, rng, REACH, width=float(rng.uniform(*WIDTH)), gain=GAIN),
-        creep=Creep.logarithmic(CREEP, shortest=0.01, longest=10.0) if creep else None,
+        creep=Creep.logarithmic(CREEP, shortest=0.01, longest=10.0),
         amplifier=Amplifier(REACH.low, REACH.high),
         gauge=Gauge(noise=gauge.noise, resolution=gauge.resolution),
         gain_schedule=gain_schedule,
@@ -77,7 +71,6 @@ class Conditions:
     # Updates of the compensator's model in a period of the wave; the default is one in eight milliseconds at
     # 5 Hz.
     updates: int = 25
-    creep: bool = True  # whether the stage creeps
     stage: str = PAPER  # name in `STAGES`
 
     @property
@@ -112,9 +105,8 @@ class Case:
         """Stage at rest; every one of the same case is identical, its noise included."""
         given, schedule = self.conditions, self.gain_schedule
         return make_stage(
-            given.stage, self.sample_rate, seed=self.seed, noise=given.noise, gain_schedule=schedule,
-            creep=given.creep,
-        )  # fmt: skip
+            given.stage, self.sample_rate, seed=self.seed, noise=given.noise, gain_schedule=schedule
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,23 +133,18 @@ class Draft:
     ) -> Case:
         """Make the case from a drawn start, off by up to `spread`; `rest` are other fields of `Case`."""
         instance("reference", reference, Signal, "a Signal: make one of values, sample rate and period")
-        given = self.conditions
+        given, rng = self.conditions, self.rng
         options = {"change": 0, "amplitude": self.amplitude, "conditions": given, **rest}
+        start = None
+        while start is None or not start.is_admissible:
+            start = ColemanHodgdon.from_theta(RIGHT_MODEL.theta * (1.0 + rng.uniform(-spread, spread, 3)))
         return Case(
             scenario=self.scenario,
             seed=self.seed,
             reference=reference,
             period=given.period if period is None else period,
-            start=drawn_start(self.rng, spread),
-            linear_start=LinearGain(RIGHT_GAIN.gain * (1.0 + float(self.rng.uniform(-spread, spread)))),
+            start=start,
+            linear_start=LinearGain(RIGHT_GAIN.gain * (1.0 + float(rng.uniform(-spread, spread)))),
             update_interval=max(1, round(given.period / given.updates)),
             **options,
         )
-
-
-def drawn_start(rng: np.random.Generator, spread: float) -> ColemanHodgdon:
-    """Start model with each parameter off by up to `spread`; drawn again until it is admissible."""
-    while True:
-        model = ColemanHodgdon.from_theta(RIGHT_MODEL.theta * (1.0 + rng.uniform(-spread, spread, 3)))
-        if model.is_admissible:
-            return model

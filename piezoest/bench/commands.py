@@ -16,7 +16,7 @@ app = typer.Typer(
     cls=Group, rich_markup_mode="rich", context_settings={"help_option_names": ["-h", "--help"]}
 )
 
-app.callback(invoke_without_command=True)(table_command.table)
+app.callback(invoke_without_command=True, epilog=table_command.EPILOG)(table_command.table)
 app.command(epilog=table_command.COMPARE_EPILOG)(table_command.compare)
 app.command(epilog=safety_command.EPILOG)(safety_command.safety)
 
@@ -25,21 +25,16 @@ app.command(epilog=safety_command.EPILOG)(safety_command.safety)
     epilog=examples(
         "piezoest bench paper",
         "piezoest bench paper --json paper.json --figures figures",
-        "piezoest bench paper --memory 0.4 --quick",
+        "piezoest bench paper --quick",
     )
 )
 @grouped
 def paper(
     json_to: shared.Json = None,
     figures: Annotated[
-        Path | None, typer.Option("--figures", metavar="DIR", help="Write Figs. 3 to 5 and two more as PNG.")
-    ] = None,
-    memory: Annotated[
-        float | None,
+        Path | None,
         typer.Option(
-            min=0.01,
-            max=20.0,
-            help="Memory of the estimator, in seconds; the paper names none. Default: the calibration's.",
+            "--figures", metavar="DIR", file_okay=False, help="Write Figs. 3 to 5 and two more as PNG."
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Start of the random numbers of the stage.")] = 0,
@@ -53,20 +48,13 @@ def paper(
     calibrated to the rows marked calibration; it has never seen those marked held out.
     """
     shared.check(json_to, html)
-    if figures is not None and (figures.exists() and not figures.is_dir()):
-        raise typer.BadParameter(f"{figures} is not a folder", param_hint="--figures")
     began = time.perf_counter()
     with shared.usage(), progress("runs", lines=True) as say:
         say(LOADING)
-        from piezoest.bench.paper import MEMORIES, MEMORY, run_paper
+        from piezoest.bench.paper import MEMORIES, run_paper
+        from piezoest.bench.paper_report import print_report
 
-        result = run_paper(
-            memory=MEMORY if memory is None else memory,
-            memories=() if quick else MEMORIES,
-            seed=seed,
-            workers=jobs,
-            progress=say.done,
-        )
+        result = run_paper(() if quick else MEMORIES, seed=seed, workers=jobs, progress=say.done)
     document = {"suite": "paper", **origin(began), **result.to_dict()}
     shared.write_html(document, html)
     if figures is not None:
@@ -74,6 +62,4 @@ def paper(
         from piezoest.bench.paper_figures import drawings
 
         write_figures(drawings(result), figures, quiet=json_to == "-")
-    from piezoest.bench.paper_report import print_report
-
     shared.show(document, json_to, print_report)

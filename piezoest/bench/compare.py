@@ -14,18 +14,16 @@ from piezoest.bench.statistics import LEVEL, signed_rank
 
 RUN = ["stage", "scenario", "estimator", "seed"]
 QUANTITIES = ("typical", "settled", "worst", "settles")
-RELEVANT = 0.01  # a median change by less is none, however sure it is
+RELEVANT = 1.01  # ratio: a smaller median change is none, however sure it is
 ALL = "all scenarios"
 
 
-def compare(
-    first: pd.DataFrame, second: pd.DataFrame, *, level: float = LEVEL, relevant: float = RELEVANT
-) -> dict[str, Any]:
+def compare(first: pd.DataFrame, second: pd.DataFrame) -> dict[str, Any]:
     """Compare the runs of two campaigns with the same settings, pair by pair.
 
     Returns for each estimator and number the pairs, how many changed, the median ratio of these, p, q (p with
-    the other comparisons allowed for) and a verdict: "same" (to the last bit), "within noise", "negligible",
-    "better", "worse", or "too few seeds", where not even a change of all pairs would be told from noise.
+    the other comparisons allowed for) and a verdict; at "too few seeds" not even a change of all pairs would
+    be told from noise.
     """
     both = first.merge(second, on=RUN, suffixes=("", "_after"))
     rows = [
@@ -34,13 +32,13 @@ def compare(
         for (scenario, estimator), pairs in _groups(both)
         for quantity in QUANTITIES
     ]
-    _judge(rows, level, relevant)
+    _judge(rows)
     rows.sort(key=lambda row: (row["scenario"] != ALL, row["q"] is None, row["q"] or 0.0))
     return {
-        "level": level,
-        "relevant": relevant,
+        "level": LEVEL,
+        "relevant": RELEVANT,
         "pairs": len(both),
-        "rows": [dict(json_safe(row)) for row in rows],
+        "rows": json_safe(rows),
         "counts": dict(Counter(row["verdict"] for row in rows)),
         "notes": _notes(first, second, both),
     }
@@ -89,7 +87,7 @@ def _test(d: FloatArray) -> dict[str, Any]:
     }
 
 
-def _judge(rows: list[dict[str, Any]], level: float, relevant: float) -> None:
+def _judge(rows: list[dict[str, Any]]) -> None:
     """Allow for the number of comparisons, and give each its verdict.
 
     What is the same to the last bit does not count among them: under the hypothesis of no change the signs of
@@ -98,20 +96,19 @@ def _judge(rows: list[dict[str, Any]], level: float, relevant: float) -> None:
     from scipy.stats import false_discovery_control
 
     tested = [row for row in rows if row["p"] is not None]
-    if tested:
-        for row, q in zip(tested, false_discovery_control([row["p"] for row in tested]), strict=True):
-            row["q"] = float(q)
+    for row, q in zip(tested, false_discovery_control([row["p"] for row in tested]), strict=True):
+        row["q"] = float(q)
     for row in rows:
-        row["verdict"] = _verdict(row, level, relevant)
+        row["verdict"] = _verdict(row)
 
 
-def _verdict(row: dict[str, Any], level: float, relevant: float) -> str:
+def _verdict(row: dict[str, Any]) -> str:
     if row["p"] is None:
         return "same"
-    if row["q"] > level:
+    if row["q"] > LEVEL:
         # The least p that so many pairs can have.
-        return "too few seeds" if 2.0 ** (1 - row["changed"]) > level else "within noise"
-    if 1.0 / (1.0 + relevant) < row["ratio"] < 1.0 + relevant:
+        return "too few seeds" if 2.0 ** (1 - row["changed"]) > LEVEL else "within noise"
+    if 1.0 / RELEVANT < row["ratio"] < RELEVANT:
         return "negligible"
     return "better" if row["ratio"] < 1.0 else "worse"
 

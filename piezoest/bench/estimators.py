@@ -60,12 +60,10 @@ def is_slow(text: str) -> bool:
 
 
 def candidate(text: str) -> Callable[..., Any]:
-    """Maker of new estimators from their description.
+    """Maker of new estimators from their description: ``make(sample_rate, initial_model)``.
 
     `text`: ``HysteresisRLS``, ``my_module:MyEstimator``, or either with keyword arguments as in
-    ``HysteresisRLS(memory=0.4, policies=(NormBound(), DeadZone()))``: numbers, strings, tuples, and the
-    policies of `piezoest.policies`. Returns ``make(sample_rate, initial_model)``, a new estimator or
-    controller; what its class does not take is left out.
+    ``HysteresisRLS(memory=0.4, policies=(NormBound(), DeadZone()))``. What a class does not take is left out.
     """
     name = name_of(text)
     cls = class_of(name)
@@ -83,20 +81,17 @@ def candidate(text: str) -> Callable[..., Any]:
 
 def class_of(name: str) -> type:
     """Class of the package, or of one's own as ``module:Class``."""
-    module_name, separator, class_name = name.partition(":")
-    if not separator:
+    if ":" not in name:
         known = found()
         if name not in known:
             raise ValueError(f"{name}: choose one of {', '.join(known)}, or name your own as module:Class")
         return known[name]
-    if not (module_name and class_name):
-        raise ValueError(f"an estimator of one's own must read like module:Class, got {name!r}")
     cls = imported(name)
     if not inspect.isclass(cls):
-        raise ValueError(f"{name}: {class_name} is no class")
+        raise ValueError(f"{name} is no class")
     needed = ("step", "learn") if hasattr(cls, "learn") else ("step", "model")
     if missing := [each for each in needed if not hasattr(cls, each)]:
-        raise ValueError(f"{name}: {class_name} has no {' and no '.join(missing)}: see piezoest.Estimator")
+        raise ValueError(f"{name} has no {' and no '.join(missing)}: see piezoest.Estimator")
     return cls
 
 
@@ -105,10 +100,9 @@ def _arguments(text: str) -> dict[str, Any]:
     try:
         # What comes before the parenthesis may be module:Class, which is no Python.
         call = ast.parse("_" + text[text.index("(") :].strip(), mode="eval").body
-        match call:
-            case ast.Call(func=ast.Name()):
-                return _keywords(call)
-        raise ValueError("write it as Name(argument=value, ...)")
+        if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name)):
+            raise ValueError("write it as Name(argument=value, ...)")
+        return _keywords(call)
     except (SyntaxError, TypeError, ValueError) as error:
         raise ValueError(f"{text}: {error.msg if isinstance(error, SyntaxError) else error}") from None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import typer
@@ -30,7 +30,6 @@ WIDTH = 6.0  # inches: letters of ten points are read on a telephone too
 GREY = "0.55"
 FARTHEST = 50.0  # times the best one's error, where the colours end
 
-Place = Literal["outside lower center", "outside upper center"]
 Document = dict[str, Any]  # from `piezoest.bench.table.describe`
 
 
@@ -138,13 +137,9 @@ def profile(document: Document) -> Figure:
 
     names = [row["estimator"] for row in best_first(document)]
     stage = document["plan"]["stages"][0]
-    columns = {(cell["stage"], cell["scenario"]): None for cell in document["cells"]}
-    scenarios = [scenario for where, scenario in columns if where in (stage, "")]
-    settled = {
-        (cell["scenario"], cell["estimator"]): cell["settled"][0]
-        for cell in document["cells"]
-        if cell["stage"] in (stage, "")
-    }
+    cells = [cell for cell in document["cells"] if cell["stage"] in (stage, "")]
+    scenarios = list(dict.fromkeys(cell["scenario"] for cell in cells))
+    settled = {(cell["scenario"], cell["estimator"]): cell["settled"][0] for cell in cells}
     table = np.array(
         [[settled.get((scenario, name), np.nan) for scenario in scenarios] for name in names], dtype=float
     )
@@ -173,10 +168,14 @@ def adaptation(document: Document) -> Figure:
     for axes, scenario in zip(panels, scenarios, strict=False):
         mine = [cell for cell in cells if cell["scenario"] == scenario]
         for cell in (cell for cell in mine if cell["estimator"] in style):
-            _transient(axes, cell, document["estimators"][cell["estimator"]]["name"], style)
+            errors: list[Any] = [None if error is None else 100.0 * error for error in cell["transient"]]
+            looks = {**style[cell["estimator"]], "lw": 1.2, "ms": 3.5}
+            if cell["estimator"] == LINEAR:
+                looks |= {"marker": None, "ls": "--", "zorder": 1}
+            name = document["estimators"][cell["estimator"]]["name"]
+            axes.plot(range(1, len(errors) + 1), errors, label=name, **looks)
         axes.axhline(100.0 * SETTLED, color="0.3", ls=":", lw=1)
-        seconds = mine[0]["period"]
-        axes.set(title=scenario, xlabel=f"period ({seconds:.3g} s each)", yscale="log")
+        axes.set(title=scenario, xlabel=f"period ({mine[0]['period']:.3g} s each)", yscale="log")
         _plain_numbers(axes.yaxis)
         axes.grid(alpha=0.3)
         axes.xaxis.get_major_locator().set_params(integer=True)
@@ -188,15 +187,7 @@ def adaptation(document: Document) -> Figure:
     return figure
 
 
-def _transient(axes: Axes, cell: Document, name: str, style: dict[str, dict[str, Any]]) -> None:
-    errors: list[Any] = [None if error is None else 100.0 * error for error in cell["transient"]]
-    looks: dict[str, Any] = {**style[cell["estimator"]], "lw": 1.2, "ms": 3.5}
-    if cell["estimator"] == LINEAR:
-        looks |= {"marker": None, "ls": "--", "zorder": 1}
-    axes.plot(range(1, len(errors) + 1), errors, label=name, **looks)
-
-
-def _legend(figure: Figure, axes: Axes, columns: int, place: Place = "outside lower center") -> None:
+def _legend(figure: Figure, axes: Axes, columns: int, place: Any = "outside lower center") -> None:
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc=place, ncols=columns, frameon=False)
 

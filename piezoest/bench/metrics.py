@@ -12,32 +12,31 @@ SETTLED = 0.012  # of the amplitude: the level at which the paper's own method s
 LEAST_SETTLED = 5  # periods of which a settled error is taken, at least
 DIVERGED = 1.5  # times linear feed-forward's error
 
-IntArray = np.ndarray[tuple[int], np.dtype[np.int64]]
-
 
 def measure(record: TrackingRecord, linear: TrackingRecord, case: Case) -> dict[str, Any]:
-    """Numbers of a run beside linear feed-forward's; errors in µm.
+    """Numbers of a run, from the change on; errors in µm.
 
-    ``settles``: periods after the change until the largest error of every further one is below 1.2 % of the
-    amplitude, None if the last one is not. ``first``, ``worst``: largest error of the first period after the
-    change, and of all. ``typical``: geometric mean of the largest errors of all periods after the change,
-    which counts how soon an estimator adapts and where it ends alike. ``settled``: largest error of the last
-    half of the periods, of at least five. ``diverged``: whether the largest error after the run's first
-    period exceeds one and a half times that of linear feed-forward. ``errors``: largest error of each period
-    after the change.
+    ``errors``: largest error of each period. ``settles``: periods until every further one is below 1.2 % of
+    the amplitude, None if the last one is not. ``first``, ``worst``, ``typical``: the first of the errors,
+    the largest one, and their geometric mean. ``settled``: largest error of the last half of the periods, of
+    at least five. ``diverged``: whether the largest error after the run's first period exceeds one and a half
+    times that of linear feed-forward.
     """
-    error, linear_error = np.abs(record.error), np.abs(linear.error)
-    edges = period_edges(case.change, case.period, error.size)
+    error = np.abs(record.error)
+    # First samples of the whole periods from the change on, and the end of the last.
+    most = int((error.size - case.change) / case.period) + 2
+    edges = np.rint(case.change + case.period * np.arange(most)).astype(np.int64)
+    edges = edges[edges <= error.size]
     periods = edges.size - 1
     if periods <= LEAST_SETTLED:
         raise ValueError(
             f"{max(periods, 0)} periods after the change are too few: a settled error takes {LEAST_SETTLED} "
             "after those in which the run settles"
         )
-    errors = largest(error, edges)
+    errors = np.maximum.reduceat(error[: edges[-1]], edges[:-1])
     tail = slice(int(edges[-1 - max(LEAST_SETTLED, periods // 2)]), int(edges[-1]))
     begins = round(case.period)  # the first period is a start from wrong parameters
-    ours, theirs = float(np.max(error[begins:])), float(np.max(linear_error[begins:]))
+    ours, theirs = float(np.max(error[begins:])), float(np.max(np.abs(linear.error)[begins:]))
     with np.errstate(divide="ignore"):
         typical = float(np.exp(np.mean(np.log(errors))))
     return {
@@ -47,8 +46,6 @@ def measure(record: TrackingRecord, linear: TrackingRecord, case: Case) -> dict[
         "typical": typical,
         "settled": float(np.max(error[tail])),
         "settled_rms": float(np.sqrt(np.mean(error[tail] ** 2))),
-        "linear_settled": float(np.max(linear_error[tail])),
-        "linear_worst": float(np.max(linear_error[case.change :])),
         "diverged": not ours <= DIVERGED * theirs,  # written so that NaN diverges
         "errors": errors.tolist(),
     }
@@ -61,14 +58,3 @@ def settles(errors: FloatArray, level: float) -> int | None:
         return 0
     periods = int(above[-1]) + 1
     return periods if periods < errors.size else None
-
-
-def period_edges(change: int, period: float, size: int) -> IntArray:
-    """First samples of the whole periods from the change on, and the end of the last."""
-    edges = np.rint(change + period * np.arange(int((size - change) / period) + 2)).astype(np.int64)
-    return edges[edges <= size]
-
-
-def largest(error: FloatArray, edges: IntArray) -> FloatArray:
-    """Largest value between each two edges."""
-    return np.maximum.reduceat(error[: edges[-1]], edges[:-1])

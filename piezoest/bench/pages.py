@@ -13,22 +13,16 @@ HEADINGS = {"overview": "Errors", "adaptation": "Adaptation", "settled": "Where 
 
 def write_html(document: Document, path: str | Path) -> None:
     """Write a result of `piezoest bench` as one page that needs no network."""
-    suite = document.get("suite")
-    if suite not in PAGES:
-        raise ValueError(
-            f"there is no page for the suite {suite!r}: pass what piezoest bench writes with --json"
-        )
-    machine = document.get("machine", {})
-    parts = [str(document.get("date", ""))[:10], str(machine.get("cpu", "")), str(machine.get("python", ""))]
-    page = Page(f"piezoest bench: {suite}", ", ".join(part for part in parts if part))
-    PAGES[suite](page, document)
-    page.footer(", ".join(f"{name} {version}" for name, version in document.get("versions", {}).items()))
+    suite, machine = document["suite"], document["machine"]
+    page = Page(f"piezoest bench: {suite}", f"{document['date'][:10]}, {machine['cpu']}, {machine['python']}")
+    (_paper if suite == "paper" else _table)(page, document)
+    page.footer(", ".join(f"{name} {version}" for name, version in document["versions"].items()))
     page.write(path)
 
 
 def _table(page: Page, document: Document) -> None:
     page.table(*report.overview_table(document))
-    page.text(report.key(document))
+    page.text(report.LOGS_KEY if report.on_logs(document) else report.KEY)
     page.advice(f"Failed: {failure}" for failure in document["failures"])
     if document["needs"] and not report.on_logs(document):
         page.heading("Which estimator")
@@ -53,6 +47,3 @@ def _paper(page: Page, document: Document) -> None:
     if document["memory"]:
         page.heading("Memory of the estimator")
         page.table(*paper_report.memories(document["memory"]))
-
-
-PAGES = {"table": _table, "paper": _paper}

@@ -19,7 +19,6 @@ from typing import Any, Literal
 import numpy as np
 
 from piezoest import signals
-from piezoest._checks import integer, positive
 from piezoest.bench.executors import in_processes
 from piezoest.bench.metrics import settles
 from piezoest.bench.paper_tables import PRBS_ROW, Published, crossed_row, published, triangle_row
@@ -28,8 +27,6 @@ from piezoest.estimators.rls import HysteresisRLS
 from piezoest.models import ColemanHodgdon, LinearGain
 from piezoest.stage import PaperStage, SimulatedStage
 from piezoest.tracking import TrackingRecord, track
-
-Compensation = Literal["linear", "inverse"]
 
 SAMPLE_RATE = 50_000.0  # Hz, the paper's
 UPDATE_INTERVAL = 50  # samples between two models of the compensator: 1 ms
@@ -86,7 +83,7 @@ class Experiment:
     seed: int  # start of the random numbers of the stage's noise
 
     @property
-    def compensation(self) -> Compensation:
+    def compensation(self) -> str:
         """What the model is used for."""
         return "linear" if isinstance(self.model, LinearGain) else "inverse"
 
@@ -188,8 +185,8 @@ def last_periods(record: TrackingRecord, periods: int) -> TrackingRecord:
 
 def quantities(inverse: Run, linear: Run | None = None) -> dict[str, float]:
     """Numbers of a row of the tables, by the names that they have there."""
-    found = dict(zip(("alpha", "beta", "gamma"), inverse.parameters, strict=True))
-    found |= {
+    found = {
+        **dict(zip(("alpha", "beta", "gamma"), inverse.parameters, strict=True)),
         "compensated_max_error": inverse.max_error,
         "compensated_relative_error": inverse.relative_error,
     }
@@ -207,7 +204,6 @@ def quantities(inverse: Run, linear: Run | None = None) -> dict[str, float]:
 class PaperResult:
     """The paper's experiment, run again."""
 
-    memory: float  # of the estimator [s]
     seed: int  # start of the random numbers of the stage's noise
     # Both compensations by the row's name, parameters estimated while running.
     linear: dict[str, Run] = field(repr=False)
@@ -235,7 +231,7 @@ class PaperResult:
             "conditions": {
                 "stage": "PaperStage",
                 "seed": self.seed,
-                "memory_s": self.memory,
+                "memory_s": MEMORY,
                 "sample_rate_hz": SAMPLE_RATE,
                 "update_interval_samples": UPDATE_INTERVAL,
                 "stationary_periods": STATIONARY_PERIODS,
@@ -250,23 +246,12 @@ class PaperResult:
 
 
 def run_paper(
-    *,
-    memory: float = MEMORY,
-    memories: Iterable[float] = MEMORIES,
-    seed: int = 0,
-    workers: int | None = None,
-    progress: Callable[[int, int], None] = lambda done, of: None,
+    memories: Iterable[float], *, seed: int, workers: int | None, progress: Callable[[int, int], None]
 ) -> PaperResult:
-    """Run the paper's experiment on the simulated stage, and one row with further memories.
-
-    A script that calls this with other `workers` than 1 needs ``if __name__ == "__main__":``.
-    """
-    memory, seed = positive("memory", memory), integer("seed", seed)
-    sweep = sorted({positive("memories", value) for value in memories} - {memory})
-
-    inverse = {r: Experiment(r, START, memory, seed) for r in REFERENCES}
-    linear = {r: Experiment(r, START_GAIN, memory, seed) for r in REFERENCES}
-    swept = {value: Experiment(SWEPT, START, value, seed) for value in sweep}
+    """Run the paper's experiment on the simulated stage, and one row with further memories."""
+    inverse = {r: Experiment(r, START, MEMORY, seed) for r in REFERENCES}
+    linear = {r: Experiment(r, START_GAIN, MEMORY, seed) for r in REFERENCES}
+    swept = {value: Experiment(SWEPT, START, value, seed) for value in memories}
     # The longest first, so that no process waits for the last one.
     first = sorted([*inverse.values(), *linear.values(), *swept.values()], key=lambda e: -e.seconds)
     runs: dict[Experiment, Run] = {}
@@ -277,26 +262,20 @@ def run_paper(
             progress(len(runs), len(first) + len(CROSSED))
 
     make(first)
-    crossed = {
-        crossed_row(applied.amplitude, applied.frequency, found_for.amplitude): Experiment(
-            applied, _model(runs[inverse[found_for]]), None, seed
-        )
-        for applied, found_for in CROSSED
-    }
+    crossed = {}
+    for applied, found_for in CROSSED:
+        # A mean of admissible parameters is admissible unless they wander.
+        model = ColemanHodgdon(*runs[inverse[found_for]].parameters).nearest_admissible()
+        row = crossed_row(applied.amplitude, applied.frequency, found_for.amplitude)
+        crossed[row] = Experiment(applied, model, None, seed)
     make(list(crossed.values()))
     by_memory = {value: runs[experiment] for value, experiment in swept.items()}
     if by_memory:
-        by_memory[memory] = runs[inverse[SWEPT]]
+        by_memory[MEMORY] = runs[inverse[SWEPT]]
     return PaperResult(
-        memory=memory,
         seed=seed,
         linear={r.name: runs[experiment] for r, experiment in linear.items()},
         inverse={r.name: runs[experiment] for r, experiment in inverse.items()},
         crossed={row: runs[experiment] for row, experiment in crossed.items()},
         sweep=dict(sorted(by_memory.items())),
     )
-
-
-def _model(run: Run) -> ColemanHodgdon:
-    # A mean of admissible parameters is admissible unless they wander.
-    return ColemanHodgdon(*run.parameters).nearest_admissible()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from piezoest.bench.figures import WIDTH, new_figure
-from piezoest.bench.paper import PRBS, SETTLED, SWEPT, PaperResult, Run, last_periods
+from piezoest.bench.paper import MEMORY, PRBS, SETTLED, SWEPT, PaperResult, Run, last_periods
 from piezoest.models import ColemanHodgdon
 from piezoest.tracking import draw_map, draw_series
 
@@ -85,7 +85,7 @@ def adaptation(result: PaperResult) -> Figure:
     axes[0].set_ylabel("largest error of the period [µm]")
     _legend(figure, columns=2)
     figure.suptitle(
-        f"Memory {result.memory:g} s; ringed: first period that stays within\n"
+        f"Memory {MEMORY:g} s; ringed: first period that stays within\n"
         f"{100.0 * (SETTLED - 1.0):.0f} % of the stationary error",
         fontsize="medium",
     )
@@ -99,7 +99,7 @@ def error_against_memory(result: PaperResult) -> Figure:
     figure = new_figure(WIDTH, 5.6)
     left, right = figure.subplots(2, 1, sharex=True)
     left.loglog(memory, [run.max_error for run in runs], "o-")
-    left.loglog(result.memory, result.sweep[result.memory].max_error, "o", ms=11.0, mfc="none", color="C3")
+    left.loglog(MEMORY, result.sweep[MEMORY].max_error, "o", ms=11.0, mfc="none", color="C3")
     left.set(ylabel="largest stationary error [µm]")
     times = [np.nan if run.settling_time is None else run.settling_time for run in runs]
     right.semilogx(memory, times, "o-")

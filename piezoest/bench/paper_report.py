@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from piezoest._tables import Columns, cells_of, print_cells, say
+from piezoest._tables import print_cells, say
 from piezoest.bench.origin import machine_of
 from piezoest.bench.report import Table
 
@@ -64,28 +64,22 @@ def verdict(entries: Sequence[Entry]) -> Table:
 
 def transients(adaptation: Iterable[dict[str, Any]]) -> Table:
     """Largest error of the first periods, and when a row is stationary."""
-    first: Columns = {
-        name: lambda run, k=k: f"{run['max_error_um'][k]:.3f}"  # type: ignore[misc]
-        for k, name in enumerate(("first", "second", "third"))
-    }
-    stationary: Columns = {"stationary": lambda run: f"{run['stationary_max_error_um']:.3f}"}
-    ends: Columns = {"reference": "row", "": "compensation"}
-    return cells_of(adaptation, {**ends, **first, **stationary, "stationary\nafter": _settling})
+    body = [
+        [run["row"], run["compensation"], *(f"{error:.3f}" for error in run["max_error_um"][:3]),
+         f"{run['stationary_max_error_um']:.3f}", _settling(run)]
+        for run in adaptation
+    ]  # fmt: skip
+    return ["reference", "", "first", "second", "third", "stationary", "stationary\nafter"], body
 
 
 def memories(runs: Iterable[dict[str, Any]]) -> Table:
     """What the memory of the estimator does to error and settling."""
-    parameters: Columns = {
-        name: lambda run, k=k: _digits(run["parameters"][k])  # type: ignore[misc]
-        for k, name in enumerate("αβγ")
-    }
-    columns: Columns = {
-        "memory\n[s]": lambda run: f"{run['memory_s']:g}",
-        "in\nperiods": lambda run: f"{run['memory_s'] / run['period_s']:g}",
-        "largest\nerror [µm]": lambda run: _digits(run["stationary_max_error_um"]),
-        "stationary\nafter": _settling,
-    }
-    return cells_of(runs, {**columns, **parameters})
+    body = [
+        [f"{run['memory_s']:g}", f"{run['memory_s'] / run['period_s']:g}",
+         _digits(run["stationary_max_error_um"]), _settling(run), *map(_digits, run["parameters"])]
+        for run in runs
+    ]  # fmt: skip
+    return ["memory\n[s]", "in\nperiods", "largest\nerror [µm]", "stationary\nafter", *"αβγ"], body
 
 
 def _settling(run: dict[str, Any]) -> str:

@@ -23,8 +23,6 @@ PRBS_BOUNDS: Bounds = {
 }  # fmt: skip
 TABLE_III_BOUNDS: Bounds = {"compensated_max_error": 0.20}
 
-IN_POINTS = "error_reduction"
-
 
 @dataclass(frozen=True, slots=True)
 class Published:
@@ -49,7 +47,7 @@ class Published:
     def deviation(self, ours: float) -> float:
         """Deviation of `ours`, relative to the value or in points of per cent."""
         difference = ours - self.value
-        return difference if self.quantity == IN_POINTS else difference / self.value
+        return difference if self.quantity == "error_reduction" else difference / self.value
 
 
 PRBS_ROW = "Filtered PRBS"

@@ -53,13 +53,11 @@ def numbers(path: Path, estimator: str | None) -> dict[str, Any]:
     first = prepare(data.u[:learnt], data.measured()[:learnt])
     if first.extent == 0.0 or not np.any(first.counts) or not np.any(data.counts[learnt:]):
         raise ValueError(f"{path}: there is nothing to learn from, or nothing to predict")
-    line = first.line()
-    line_error = _missed(line, data, learnt)
-    error = line_error
+    error = line_error = _missed(first.line(), data, learnt)
     if estimator is not None:
         error = _missed(_learn(estimator, first, sample_rate), data, learnt)
     largest = [float(np.max(segment)) for segment in np.array_split(error, min(SEGMENTS, error.size))]
-    settled, line_settled = float(np.max(error)), float(np.max(line_error))
+    settled = float(np.max(error))
     return {
         "amplitude": 0.5 * float(np.ptp(data.x[data.counts])),
         "period": error.size / SEGMENTS / sample_rate,
@@ -68,9 +66,7 @@ def numbers(path: Path, estimator: str | None) -> dict[str, Any]:
         "typical": math.exp(float(np.mean(np.log(np.maximum(largest, 1e-300))))),
         "settled": settled,
         "settled_rms": float(np.sqrt(np.mean(error**2))),
-        "linear_settled": line_settled,
-        "linear_worst": line_settled,
-        "diverged": not settled <= DIVERGED * line_settled,
+        "diverged": not settled <= DIVERGED * float(np.max(line_error)),
         "errors": largest,
     }
 

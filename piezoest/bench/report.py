@@ -39,11 +39,6 @@ def on_logs(document: Document) -> bool:
     return not any(cell["stage"] for cell in document["cells"])
 
 
-def key(document: Document) -> str:
-    """What the numbers of a campaign mean."""
-    return LOGS_KEY if on_logs(document) else KEY
-
-
 def best_first(document: Document) -> list[Document]:
     """Rows of the overview, the estimator that adapts best first, and last those that nothing is known of."""
     return sorted(document["overview"], key=lambda row: row["typical"][0] if row["typical"] else math.inf)
@@ -122,15 +117,10 @@ def needs_table(document: Document) -> Table:
     return heading, body
 
 
-def print_table(document: Document, console: Any, *, scenarios: bool = False) -> None:
-    """Print a campaign. `scenarios`: a table for each scenario and stage too."""
-    if scenarios:
-        for scenario, stage in dict.fromkeys((cell["scenario"], cell["stage"]) for cell in document["cells"]):
-            where = f"{scenario}, {stage}" if stage else scenario
-            title = f"{where}: {document['scenarios'][scenario]}"
-            print_cells(console, title, *scenario_table(document, scenario, stage))
+def print_table(document: Document, console: Any) -> None:
+    """Print a campaign."""
     plan, count = document["plan"], len(document["scenarios"])
-    if on_logs(document):
+    if logs := on_logs(document):
         title, rate = counted(count, "log"), ""
     else:
         title = f"{counted(count, 'scenario')}, {counted(plan['seeds'], 'seed')}, stage {plan['stages'][0]}"
@@ -139,7 +129,7 @@ def print_table(document: Document, console: Any, *, scenarios: bool = False) ->
     names = document["estimators"]
     say(
         console,
-        key(document),
+        LOGS_KEY if logs else KEY,
         f"{counted(document['runs'], 'run')}{rate}; {machine_of(document)}.",
         *(
             f"{names[row['estimator']]['name']}: {row['diverged']} of {row['runs']} runs diverge."
@@ -151,7 +141,7 @@ def print_table(document: Document, console: Any, *, scenarios: bool = False) ->
         say(
             console,
             f"A run diverges if it fails, or if its largest error exceeds {DIVERGED:g} times that of "
-            + ("a straight line." if on_logs(document) else "linear feed-forward after the first period."),
+            + ("a straight line." if logs else "linear feed-forward after the first period."),
         )
     failed = [*document["failures"], *document["tracebacks"]]
     say(console, *(f"failed: {failure}" for failure in failed), style="red")

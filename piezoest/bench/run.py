@@ -29,7 +29,7 @@ LINEAR_MEMORY = 2.0  # periods
 COLUMNS: dict[str, type] = {
     "key": str, "stage": str, "scenario": str, "estimator": str, "seed": int, "failure": str,
     "amplitude": float, "period": float, "settles": int, "first": float, "worst": float, "typical": float,
-    "settled": float, "settled_rms": float, "linear_settled": float, "linear_worst": float, "diverged": bool,
+    "settled": float, "settled_rms": float, "diverged": bool,
 }  # fmt: skip
 
 
@@ -61,7 +61,7 @@ def play(task: Task) -> Row:
     except (Exception, SystemExit) as error:
         row["failure"] = f"{type(error).__name__}: {error}"
         row["traceback"] = traceback.format_exc()
-    return dict(json_safe(row))
+    return json_safe(row)
 
 
 def crashed(task: Task) -> Row:

@@ -78,23 +78,14 @@ class Which:
         return [name for name, chosen in given.items() if chosen]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Written:
-    """Where results go."""
-
-    output: Annotated[
-        Path,
-        typer.Option(
-            "--output", "--out", "-o", metavar="DIR", help="Folder of the results, and of finished runs."
-        ),
-    ] = FOLDER
-    table: shared.Format = None
-
-
 @grouped
 def safety(
     which: Which,
-    written: Written,
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", metavar="DIR", help="Folder of the results, and of finished runs."),
+    ] = FOLDER,
+    table: shared.Format = None,
     jobs: shared.Processes = None,
     json_to: shared.Json = None,
 ) -> None:
@@ -109,6 +100,8 @@ def safety(
     with shared.usage():
         with progress("", lines=True) as say:
             say(LOADING)
+            import pandas as pd
+
             from piezoest.bench import tables
             from piezoest.bench.store import played
             from piezoest.bench.zoo import contenders, tasks
@@ -117,22 +110,20 @@ def safety(
             contenders.contender(name)
             given = _given(which.given or [])
         if which.show is not None:
-            _show(name, which.show, given, written.output)
+            _show(name, which.show, given, output)
             return
         with progress("", lines=True) as say:
             say("drawing")
             campaign = _campaign(which, name, given)
-            format = tables.checked_format(written.table)
-        with shared.usage(written.output), progress("runs", lines=True) as say:
-            rows = played(campaign.tasks, written.output, tasks.over_cores(jobs), say.done)
-    document = {"suite": "safety", **origin(began), "controller": name, "given": given}
-    tables.write_table(
-        tables.table_of(campaign.rows(rows)),
-        written.output / f"{asked[0] if asked else 'runs'}.{format}",
-    )
-    document |= campaign.summarise(rows)
-    put(document, written.output / f"{asked[0] if asked else 'safety'}.json")
-    shared.show(document, json_to, campaign.print, f"Results: {written.output}")
+            format = tables.checked_format(table)
+        with shared.usage(output), progress("runs", lines=True) as say:
+            rows = played(campaign.tasks, output, tasks.over_cores(jobs), say.done)
+    found = {"suite": "safety", **origin(began), "controller": name, "given": given}
+    document = {**found, **campaign.summarise(rows)}
+    frame = pd.DataFrame(list(campaign.rows(rows)))
+    tables.write_table(frame, output / f"{asked[0] if asked else 'runs'}.{format}")
+    put(document, output / f"{asked[0] if asked else 'safety'}.json")
+    shared.show(document, json_to, campaign.print, f"Results: {output}")
 
 
 def _given(pairs: list[str]) -> dict[str, Any]:

@@ -1,10 +1,9 @@
 """What runs say of estimators: means with their intervals, orders, and whether a difference is beyond chance.
 
-Runs are paired: the same scenario, stage and seed have the same start, noise and moment of change, so
-that what a seed brings with it cancels. What is compared is the logarithm of the ratio of two errors,
-averaged over scenarios and stages for each seed, for the seeds are what is independent. The test is
-Wilcoxon's signed ranks. That many comparisons are made at a time is allowed for: by Holm's correction where
-estimators are put in order, by the false discovery rate where two campaigns are compared.
+Runs with the same scenario, stage and seed are paired, so that what a seed brings with it cancels. The
+logarithm of the ratio of two errors, averaged over scenarios and stages for each seed, is put to Wilcoxon's
+signed-rank test. Many comparisons are allowed for: by Holm's correction where estimators are put in order, by
+the false discovery rate where two campaigns are compared.
 
 F. Wilcoxon, Biometrics Bulletin 1 (1945) 80-83; S. Holm, Scandinavian Journal of Statistics 6 (1979) 65-70;
 Y. Benjamini, Y. Hochberg, Journal of the Royal Statistical Society B 57 (1995) 289-300.
@@ -34,10 +33,6 @@ class Need:
     words: str  # what is wanted
     quantity: str  # error that should be small
     scenarios: tuple[str, ...] = ()  # where it is taken; empty for all
-
-    def applies(self, scenarios: Sequence[str]) -> bool:
-        """Whether a campaign has the scenarios."""
-        return set(self.scenarios) <= set(scenarios)
 
 
 CHANGES = ("amplitude-switch", "amplitude-drop", "gain-step")
@@ -79,23 +74,24 @@ def over_scenarios(frame: pd.DataFrame, quantity: str) -> float:
 
 def interval(frame: pd.DataFrame, quantity: str) -> list[float]:
     """The same, and the 95 % interval that other seeds would lie in, by the bootstrap over the seeds."""
-    values = logarithms(frame, quantity).to_numpy()
-    found = math.exp(float(np.mean(np.nanmedian(values, axis=1))))
+    return _interval(logarithms(frame, quantity).to_numpy())
+
+
+def _interval(values: FloatArray) -> list[float]:
+    """Geometric mean of medians over the seeds, and its 95 % interval. `values`: a column for each seed."""
     seeds = values.shape[1]
-    rng = np.random.default_rng(0)
-    drawn = values[:, rng.integers(0, seeds, (RESAMPLED, seeds))]
+    drawn = values[:, np.random.default_rng(0).integers(0, seeds, (RESAMPLED, seeds))]
     means = np.nanmean(np.nanmedian(drawn, axis=2), axis=0)
-    low, high = np.exp(np.quantile(means, (0.025, 0.975)))
-    return [found, float(low), float(high)]
+    found = np.mean(np.nanmedian(values, axis=1))
+    return [math.exp(value) for value in (found, *np.quantile(means, (0.025, 0.975)))]
 
 
 def order(frame: pd.DataFrame, need: Need, stages: Sequence[str]) -> list[dict[str, Any]]:
     """Estimators in order of a need, the best first, each compared with the best by the runs they share.
 
-    `frame`: runs, from `relative`. `stages`: of the campaign; an estimator that ran on the first one only is
-    ordered by that. Returns ``value`` with its interval on the first stage and ``others`` on the rest;
-    ``ratio`` to the best with its interval, and ``p``, allowed for the number of comparisons (Holm). The
-    order is that of all stages among estimators that ran on all, and of the first stage beside them.
+    `frame`: runs, from `relative`. `stages`: of the campaign; who ran on the first one only is never the
+    best. Returns ``value`` with its interval on the first stage and ``others`` on the rest; ``ratio`` to the
+    best with its interval, and ``p``, allowed for the number of comparisons (Holm).
     """
     there = frame[frame["scenario"].isin(need.scenarios)] if need.scenarios else frame
     runs = {str(name): group for name, group in there.groupby("estimator", sort=False) if name != LINEAR}
@@ -113,12 +109,11 @@ def order(frame: pd.DataFrame, need: Need, stages: Sequence[str]) -> list[dict[s
                 "everywhere": name in everywhere,
                 "value": interval(first, need.quantity) if len(first) else None,
                 "others": interval(others, need.quantity) if len(others) else None,
-                "ratio": _ratio(d),
+                "ratio": _interval(d[np.newaxis]),
                 "p": 1.0 if name == best else signed_rank(d),
             }
         )
-    corrected = holm([row["p"] for row in found])
-    for row, p in zip(found, corrected, strict=True):
+    for row, p in zip(found, holm([row["p"] for row in found]), strict=True):
         row["p"] = p
     return sorted(found, key=lambda row: (row["ratio"][0], row["estimator"] != best))
 
@@ -127,14 +122,6 @@ def _by_seed(ours: pd.DataFrame, theirs: pd.DataFrame, quantity: str) -> FloatAr
     """Mean logarithm of the ratio of two estimators' errors, for each seed that both have."""
     difference = logarithms(ours, quantity) - logarithms(theirs, quantity)
     return difference.mean(axis=0).dropna().to_numpy()
-
-
-def _ratio(d: FloatArray) -> list[float]:
-    """Median ratio and its 95 % interval, by the bootstrap."""
-    rng = np.random.default_rng(0)
-    drawn = np.median(d[rng.integers(0, d.size, (RESAMPLED, d.size))], axis=1)
-    low, high = np.quantile(drawn, (0.025, 0.975))
-    return [math.exp(float(np.median(d))), math.exp(float(low)), math.exp(float(high))]
 
 
 def holm(p: Sequence[float]) -> list[float]:

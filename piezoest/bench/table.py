@@ -1,7 +1,8 @@
 """The table of runs: scenarios × stages × estimators × seeds, planned, and summed up in one document."""
 
 import math
-from collections.abc import Iterable, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from piezoest.bench import cost, tables
+from piezoest.bench import tables
 from piezoest.bench.cases import PAPER, STAGES, STRANGERS, Conditions
 from piezoest.bench.estimators import KNOWN, LINEAR, PAPERS, candidate, is_slow
 from piezoest.bench.executors import in_processes, on_dask, one_by_one
@@ -20,6 +21,7 @@ from piezoest.bench.run import COLUMNS, Task, crashed, follow, play
 from piezoest.bench.scenarios import SCENARIOS, UNREPEATED
 from piezoest.bench.statistics import NEEDS, QUANTITIES, interval, order, relative
 from piezoest.bench.store import Row
+from piezoest.tracking import TrackingRecord
 
 RUNS, PERIODS, DOCUMENT = "runs", "periods", "table.json"
 PERIOD_COLUMNS: dict[str, type] = {
@@ -28,6 +30,8 @@ PERIOD_COLUMNS: dict[str, type] = {
 # Under a minute with all estimators on two cores, compiled.
 QUICK: dict[str, Any] = {"sample_rate": 2000.0, "before": 2, "after": 6, "rest": 0.5, "drift": 1.5}
 DIGITS = 4  # significant, of the numbers of a document
+# One timed pass takes about so long: where a whole record takes longer, its beginning is timed.
+PASS_SECONDS, PASSES, LEAST_SAMPLES = 0.4, 3, 200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +93,7 @@ class Plan:
 
 
 def over_cores(processes: int | None = None) -> Any:
-    """Run tasks in processes of this machine. `processes`: how many; default one for each core."""
+    """Run tasks in processes of this machine, one for each core by default."""
     return partial(in_processes, play, processes=processes, crashed=crashed)
 
 
@@ -142,23 +146,49 @@ def _cost(given: dict[str, Any], text: str) -> tuple[str, dict[str, Any]]:
         made = partial(candidate(text), case.sample_rate, case.start)
         # On the voltages of another loop a controller would only seek the gain.
         record = follow(case, text if hasattr(made(), "learn") else LINEAR)
-        return text, {"step_us": 1e6 * cost.step_seconds(made, record)}
+        return text, {"step_us": 1e6 * _step_seconds(made, record)}
     except Exception:
         return text, {}
 
 
-def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Sum up a finished campaign.
+def _step_seconds(new: Callable[[], Any], record: TrackingRecord) -> float:
+    """Time of one sample by `step` from Python [s], of new estimators or controllers; median of three passes.
 
-    `times`: from `costs`. Returns JSON-safe; errors relative to the amplitude. ``cells``: of each estimator,
-    stage and scenario the median over the seeds and the 5 and 95 % quantiles; ``overview``: of each estimator
-    the geometric mean over the scenarios that repeat of the medians, on the first stage, with the 95 %
-    interval that the seeds leave, and the settled error on the other stages (``others``) and on scenarios
-    that do not repeat (``unrepeated``); ``needs``: the estimators in order for each need, compared pair by
-    pair.
+    A controller answers to the reference, and learns from what was recorded.
+    """
+    columns = (record.reference, record.voltage, record.measured)
+    rows = list(zip(*(values.tolist() for values in columns), strict=True))
+    trial = rows[: max(LEAST_SAMPLES, len(rows) // 10)]
+    _pass(new(), trial)  # loads what is compiled
+    seconds = _pass(new(), trial)
+    rows = rows[: max(len(trial), math.ceil(len(trial) * PASS_SECONDS / max(seconds, 1e-9)))]
+    return float(np.median([_pass(new(), rows) for _ in range(PASSES)])) / len(rows)
+
+
+def _pass(made: Any, rows: list[tuple[float, float, float]]) -> float:
+    """Time of a loop of steps, with the model asked for at its end."""
+    step, learn = made.step, getattr(made, "learn", None)
+    began = time.perf_counter()
+    if learn is None:
+        for _, u, x in rows:
+            step(u, x)
+    else:
+        for r, u, x in rows:
+            step(r)
+            learn(u, x)
+    _ = made.model
+    return time.perf_counter() - began
+
+
+def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """Sum up a finished campaign, errors relative to the amplitude. `times`: from `costs`.
+
+    ``cells``: of each estimator, stage and scenario the median over the seeds and the 5 and 95 % quantiles.
+    ``overview``: of each estimator the geometric means, with 95 % intervals, of the medians in scenarios that
+    repeat, on the first stage; and the settled error on the other stages (``others``) and in scenarios that
+    do not repeat (``unrepeated``). ``needs``: the estimators in order for each need.
     """
     frame = relative(tables.table_of(rows, COLUMNS))
-    names = plan.everything
     errors: dict[tuple[str, str, str], list[list[float]]] = {}
     for row in rows:
         if row["failure"] is None and row["stage"] in ("", plan.stages[0]):
@@ -168,7 +198,7 @@ def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) 
         _cell(key, group, errors.get(key, []))
         for key, group in frame.groupby(["stage", "scenario", "estimator"], sort=False)
     ]
-    overview = [_overview(frame, text, plan) for text in names]
+    overview = [_overview(frame, text, plan) for text in plan.everything]
     document = {
         "suite": "table",
         "code": fingerprint(),
@@ -180,7 +210,7 @@ def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) 
         },
         "estimators": {
             text: {"name": label(text, plan.tuned), "slow": is_slow(text), **times.get(text, {})}
-            for text in names
+            for text in plan.everything
         },
         "runs": len(rows),
         "overview": overview,
@@ -188,7 +218,7 @@ def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) 
         "needs": [
             {**asdict(need), "order": order(frame[~frame["estimator"].isin(plan.tuned)], need, plan.stages)}
             for need in NEEDS
-            if need.applies(plan.scenarios)
+            if set(need.scenarios) <= set(plan.scenarios)
         ],
         "failures": [
             f"{row['scenario']}, {row['stage']}, seed {row['seed']}, {row['estimator']}: {row['failure']}"
@@ -198,22 +228,25 @@ def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) 
         "all_failed": [row["estimator"] for row in overview if row["failures"] == row["runs"] > 0],
         "tracebacks": list(dict.fromkeys(row["traceback"] for row in rows if row.get("traceback")))[:5],
     }
-    return dict(json_safe(document, DIGITS))
+    return json_safe(document, DIGITS)
 
 
 def _cell(key: Any, group: pd.DataFrame, errors: Sequence[Sequence[float]]) -> Row:
-    stage, scenario, estimator = key
     return {
-        "stage": stage,
-        "scenario": scenario,
-        "estimator": estimator,
-        "runs": len(group),
-        "failures": int(group["failure"].notna().sum()),
-        "diverged": int(group["diverged"].sum()),
+        **dict(zip(("stage", "scenario", "estimator"), key, strict=True)),
+        **_counts(group),
         "settled_runs": int(np.isfinite(group["settles"]).sum()),
         "period": float(group["period"].median()),
         **{name: _quantiles(group[name]) for name in (*QUANTITIES, "settles")},
         "transient": np.median(errors, axis=0).tolist() if errors else [],
+    }
+
+
+def _counts(group: pd.DataFrame) -> dict[str, int]:
+    return {
+        "runs": len(group),
+        "failures": int(group["failure"].notna().sum()),
+        "diverged": int(group["diverged"].sum()),
     }
 
 
@@ -230,9 +263,7 @@ def _overview(frame: pd.DataFrame, estimator: str, plan: Plan) -> Row:
     unrepeated = mine[~repeated & at_home]
     return {
         "estimator": estimator,
-        "runs": len(mine),
-        "failures": int(mine["failure"].notna().sum()),
-        "diverged": int(mine["diverged"].sum()),
+        **_counts(mine),
         "first_runs": len(first),
         "settled_runs": int(np.isfinite(first["settles"]).sum()),
         "settles": _quantiles(first["settles"]) if len(first) else None,

@@ -18,9 +18,16 @@ from piezoest.bench.origin import json_safe, origin, put
 
 FOLDER, QUICK_FOLDER = Path("bench-results"), Path("bench-results-quick")
 SEEDS, SLOW_SEEDS = 30, 10
-WORSE = 1  # exit code of `compare --fail-if-worse`
 HEAD = ("date", "machine", "versions", "code", "runs")
 
+EPILOG = examples(
+    "piezoest bench --quick",
+    "piezoest bench -e my_module:MyEstimator",
+    'piezoest bench --only HysteresisRLS -e "HysteresisRLS(memory=0.2)"',
+    "piezoest bench -o after",
+    "piezoest bench compare before after",
+    "piezoest bench --logs folder/",
+)
 COMPARE_EPILOG = examples("piezoest bench compare before after --json changes.json")
 
 
@@ -54,10 +61,7 @@ class Runs:
     ] = None
     seeds: Annotated[
         int | None,
-        typer.Option(min=1, help=f"Runs of each; default {SEEDS}, of slow estimators {SLOW_SEEDS}."),
-    ] = None
-    slow_seeds: Annotated[
-        int | None, typer.Option(min=1, help="Runs of each slow estimator, on the first stage only.")
+        typer.Option(min=1, help=f"Runs of each; default {SEEDS}. Of slow estimators at most {SLOW_SEEDS}."),
     ] = None
     tune: Annotated[
         int | None,
@@ -70,24 +74,8 @@ class Runs:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shown:
-    """Where results go, and how they are shown."""
-
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="DIR", help=f"Folder of the results; default {FOLDER}."),
-    ] = None
-    table: shared.Format = None
-    scenarios: Annotated[bool, typer.Option("--by-scenario", help="Print each scenario's table.")] = False
-    figures: Annotated[
-        Path | None, typer.Option("--figures", metavar="DIR", help="Draw the figures, as PNG.")
-    ] = None
-    html: shared.Html = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Where:
-    """On what the runs are made."""
+class How:
+    """On what the runs are made, and where results go."""
 
     jobs: shared.Processes = None
     dask: Annotated[bool, typer.Option("--dask", help="Run on Dask, on this machine's cores.")] = False
@@ -95,69 +83,49 @@ class Where:
         str | None, typer.Option(metavar="ADDRESS", help="Run on a Dask cluster: tcp://10.0.0.1:8786.")
     ] = None
 
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help=f"Folder of the results; default {FOLDER}."),
+    ] = None
+    table: shared.Format = None
+    figures: Annotated[
+        Path | None,
+        typer.Option("--figures", metavar="DIR", file_okay=False, help="Draw the figures, as PNG."),
+    ] = None
+    html: shared.Html = None
+
 
 @grouped
-def table(
-    context: typer.Context, runs: Runs, shown: Shown, where: Where, json_to: shared.Json = None
-) -> None:
+def table(context: typer.Context, runs: Runs, how: How, json_to: shared.Json = None) -> None:
     """Compare estimators: scenarios × stages × estimators × seeds, in parallel, beside linear feed-forward.
 
     Finished runs are kept in the output folder: if you stop the command and start it again, it continues. The
     results are the tables runs and periods (Parquet or CSV), and table.json: machine, versions, medians.
-
-    [bold]Examples[/bold]
-
-    A first look:
-
-    [cyan]piezoest bench --quick[/cyan]
-
-    An estimator of your own beside the others:
-
-    [cyan]piezoest bench -e my_module:MyEstimator[/cyan]
-
-    Settings of one estimator:
-
-    [cyan]piezoest bench --only HysteresisRLS -e "HysteresisRLS(memory=0.2)"[/cyan]
-
-    Before and after a change, then the differences:
-
-    [cyan]piezoest bench -o before[/cyan]
-
-    [cyan]piezoest bench -o after[/cyan]
-
-    [cyan]piezoest bench compare before after[/cyan]
-
-    Recorded logs in a folder:
-
-    [cyan]piezoest bench --logs folder/[/cyan]
     """
     if context.invoked_subcommand is not None:
-        if given := _given(context):
-            raise typer.BadParameter(
-                f"{', '.join(given)} belong to the table of runs: write them after "
-                f"{context.invoked_subcommand}, if it has them, or leave it out"
-            )
+        sources = map(context.get_parameter_source, context.params)
+        if any(source is not None and source.name == "COMMANDLINE" for source in sources):
+            raise typer.BadParameter(f"write options after {context.invoked_subcommand}, if it has them")
         return
 
-    shared.check(json_to, shown.html)
-    folder = shown.output or (QUICK_FOLDER if runs.quick else FOLDER)
-    began = time.perf_counter()
-    document = _run(runs, where, folder, shown.table, began)
-    put(document, folder / "table.json")
-    shared.write_html(document, shown.html)
-    if shown.figures is not None:
-        from piezoest.bench.figures import drawings, write_figures
-
-        write_figures(drawings(document), shown.figures, quiet=json_to == "-")
+    shared.check(json_to, how.html)
+    folder = how.output or (QUICK_FOLDER if runs.quick else FOLDER)
     from piezoest.bench.report import print_table
 
-    tables = partial(print_table, scenarios=shown.scenarios)
-    shared.show(document, json_to, tables, f"Tables and table.json: {folder}")
+    began = time.perf_counter()
+    document = _run(runs, how, folder, began)
+    put(document, folder / "table.json")
+    shared.write_html(document, how.html)
+    if how.figures is not None:
+        from piezoest.bench.figures import drawings, write_figures
+
+        write_figures(drawings(document), how.figures, quiet=json_to == "-")
+    shared.show(document, json_to, print_table, f"Tables and table.json: {folder}")
     if document["all_failed"]:
         raise typer.Exit(USER_ERROR)
 
 
-def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: float) -> dict[str, Any]:
+def _run(runs: Runs, how: How, folder: Path, began: float) -> dict[str, Any]:
     """Run what is missing, write the tables, and sum them up."""
     with shared.usage(folder):
         with progress("", lines=True) as say:
@@ -167,13 +135,11 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
             from piezoest.bench.store import played
             from piezoest.bench.tuning import tune
 
-            tables.checked_format(format)
+            tables.checked_format(how.table)
             plan = _plan(runs)
-        execute = (
-            table.over_dask(where.scheduler, where.jobs, plan.estimators)
-            if where.dask or where.scheduler is not None
-            else table.over_cores(where.jobs)
-        )
+        execute = table.over_cores(how.jobs)
+        if how.dask or how.scheduler is not None:
+            execute = table.over_dask(how.scheduler, how.jobs, plan.estimators)
         play = partial(played, folder=folder, execute=execute)
         tuned: list[dict[str, Any]] = []
         if runs.tune is not None:
@@ -184,7 +150,7 @@ def _run(runs: Runs, where: Where, folder: Path, format: str | None, began: floa
             plan = dataclasses.replace(plan, tuned=tuple(dict.fromkeys(chosen)))
         with progress("runs", lines=True) as say:
             rows = play(plan.tasks(), progress=say.done)
-        table.write(rows, folder, format)
+        table.write(rows, folder, how.table)
         with progress("", lines=True) as say, quiet():
             say("timing each estimator alone")
             times = {} if runs.logs else table.costs(plan.everything[1:], plan.given)
@@ -211,7 +177,7 @@ def _plan(runs: Runs) -> Any:
         scenarios=(*(runs.scenario or ([] if runs.logs else SCENARIOS)), *logs),
         stages=tuple(runs.stage or ([PAPER] if runs.quick else [PAPER, *STRANGERS])),
         seeds=seeds,
-        slow_seeds=runs.slow_seeds or min(seeds, SLOW_SEEDS),
+        slow_seeds=min(seeds, SLOW_SEEDS),
         given=given,
     )
 
@@ -220,15 +186,7 @@ def _plan(runs: Runs) -> Any:
 def compare(
     before: Annotated[Path, typer.Argument(metavar="A", help="Folder of a campaign.")],
     after: Annotated[Path, typer.Argument(metavar="B", help="Folder of another.")],
-    level: Annotated[
-        float,
-        typer.Option(min=0.0, max=1.0, help="Allowed share of false alarms among the reported changes."),
-    ] = 0.05,
-    relevant: Annotated[float, typer.Option(min=0.0, help="Least relative change that counts.")] = 0.01,
     everything: Annotated[bool, typer.Option("--all", help="Print what did not change too.")] = False,
-    fail_if_worse: Annotated[
-        bool, typer.Option("--fail-if-worse", help=f"Exit with {WORSE} if something became worse.")
-    ] = False,
     json_to: shared.Json = None,
 ) -> None:
     """What changed from campaign A to campaign B, and whether beyond the noise.
@@ -239,20 +197,16 @@ def compare(
     shared.check(json_to)
     from piezoest.bench import compare as comparison
     from piezoest.bench import tables
+    from piezoest.bench.report import print_changes
     from piezoest.bench.run import COLUMNS
     from piezoest.bench.table import RUNS
 
     documents = _read(before), _read(after)
     comparison.check_conditions(*documents)
     sides = [tables.read_table(folder, RUNS, COLUMNS) for folder in (before, after)]
-    found = comparison.compare(*sides, level=level, relevant=relevant)
     heads = ({name: document[name] for name in HEAD} for document in documents)
-    document = {"suite": "changes", **dict(zip("AB", heads, strict=True)), **found}
-    from piezoest.bench.report import print_changes
-
+    document = {"suite": "changes", **dict(zip("AB", heads, strict=True)), **comparison.compare(*sides)}
     shared.show(document, json_to, partial(print_changes, everything=everything))
-    if fail_if_worse and document["counts"].get("worse"):
-        raise typer.Exit(WORSE)
 
 
 def _read(folder: Path) -> dict[str, Any]:
@@ -264,13 +218,3 @@ def _read(folder: Path) -> dict[str, Any]:
         case {"conditions": {}, **rest} as document if all(name in rest for name in HEAD):
             return dict(document)
     raise ValueError(f"{path} is not what piezoest bench writes")
-
-
-def _given(context: typer.Context) -> list[str]:
-    """Options of the table that were written before a command."""
-    found = []
-    for parameter in context.command.params:
-        source = context.get_parameter_source(str(parameter.name))
-        if source is not None and source.name == "COMMANDLINE":
-            found.append(parameter.opts[0])
-    return found

@@ -26,10 +26,8 @@ def checked_format(format: str | None) -> str:
     return format
 
 
-def table_of(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, type] | None = None) -> pd.DataFrame:
-    """Table of rows; without columns, of all that is in them."""
-    if columns is None:
-        return pd.DataFrame(list(rows))
+def table_of(rows: Iterable[Mapping[str, Any]], columns: Mapping[str, type]) -> pd.DataFrame:
+    """Table of rows, as `TYPES`; what is not in a row is missing."""
     cells = [[row.get(name) for name in columns] for row in rows]
     return pd.DataFrame(cells, columns=list(columns)).astype(_types(columns))
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -35,21 +34,7 @@ def value_at(values: Values, position: float) -> Any:
     return min(int(value), high - 1) if isinstance(values, range) else float(f"{value:.3g}")
 
 
-@dataclass(frozen=True, slots=True)
-class Tunable:
-    """An estimator and what may be tuned of it."""
-
-    default: str  # as `piezoest.bench.estimators.candidate` reads it
-    template: str = ""  # the same with ``{…}`` for each value
-    space: Space = field(default_factory=dict)  # from the names in the template
-
-    def text(self, point: Sequence[float]) -> str:
-        """Description of the estimator at a point of its space."""
-        places = zip(self.space.items(), point, strict=True)
-        return self.template.format(**{name: repr(value_at(of, position)) for (name, of), position in places})
-
-
-# All know of the offset alike; what else may be turned, and how far.
+# Descriptions with ``{…}`` for each value, where these are not just arguments; what may be turned, how far.
 FILTER: Space = {"drift": (0.02, 5.0), "mismatch": (0.02, 5.0), "uncertainty": (0.1, 1.0)}
 NOISE = (5e-4, 1e-2)
 
@@ -77,30 +62,32 @@ SPACES: dict[str, tuple[str, Space]] = {
 }
 
 
-def tunable(text: str) -> Tunable:
-    """What may be tuned of an estimator; one of one's own, or with arguments, is taken as it stands."""
+def tunable(text: str) -> tuple[str, Space]:
+    """Template and space of an estimator; one of one's own, or with arguments, is taken as it stands."""
     name = name_of(text)
     if ":" in name or ("(" in text and text != KNOWN.get(name)):
-        return Tunable(text)
+        return text, {}
     template, space = SPACES.get(name, ("", {}))
     arguments = [f"{value}={{{value}}}" for value in space]
     if "offset=True" in text:
         arguments.append("offset=True")
-    return Tunable(text, template or f"{name}({', '.join(arguments)})", space)
+    return template or f"{name}({', '.join(arguments)})", space
 
 
-def draws(tunable: Tunable, number: int, seed: int) -> list[str]:
-    """The default, then descriptions all over its space: a Sobol sequence, shifted at random."""
+def draws(text: str, number: int) -> list[str]:
+    """An estimator, then others all over its space: a Sobol sequence, shifted at random, alike for all."""
     from scipy.stats import qmc
 
     if integer("number", number, 1) & (number - 1):
         raise ValueError(f"number of draws must be a power of two, got {number}")
-    if not tunable.space:
-        return [tunable.default]
-    sequence = qmc.Sobol(len(tunable.space), scramble=False)
-    shift = np.random.default_rng(seed).random(len(tunable.space))
-    points = (sequence.random_base2(number.bit_length() - 1) + shift) % 1.0
-    return list(dict.fromkeys([tunable.default, *(tunable.text(point) for point in points)]))
+    template, space = tunable(text)
+    shift = np.random.default_rng(SHIFT).random(len(space))
+    points = (qmc.Sobol(len(space), scramble=False).random_base2(number.bit_length() - 1) + shift) % 1.0
+    found = [text]
+    for point in points:
+        values = {name: repr(value_at(space[name], at)) for name, at in zip(space, point, strict=True)}
+        found.append(template.format(**values))
+    return list(dict.fromkeys(found))
 
 
 def tune(
@@ -114,9 +101,7 @@ def tune(
     `play`: rows of tasks. Slow ones are left out. Returns trials with their scores, geometric means of the
     typical errors relative to the amplitude, and the ``chosen`` one.
     """
-    spaces = [each for text in estimators if not is_slow(text) and (each := tunable(text)).space]
-    # The same points for all: two with the same space get the same settings.
-    trials = {each.default: draws(each, number, SHIFT) for each in spaces}
+    trials = {text: draws(text, number) for text in estimators if not is_slow(text) and tunable(text)[1]}
     tasks = [
         Task(scenario, text, seed, {**given, "stage": PAPER}, code_of(text))
         for seed in TRAINING_SEEDS
@@ -125,17 +110,11 @@ def tune(
     ]
     runs = relative(table_of(play(tasks), COLUMNS))
     scores = {str(text): over_scenarios(group, "typical") for text, group in runs.groupby("estimator")}
-    found = []
-    for each in spaces:
-        scored: list[dict[str, Any]] = [
-            {"estimator": text, "score": scores[text]} for text in trials[each.default]
-        ]
-        found.append(
-            {
-                "default": each.default,
-                "space": {name: str(values) for name, values in each.space.items()},
-                "trials": scored,
-                "chosen": min(scored, key=lambda trial: trial["score"])["estimator"],
-            }
-        )
-    return found
+    return [
+        {
+            "default": default,
+            "trials": [{"estimator": text, "score": scores[text]} for text in texts],
+            "chosen": min(texts, key=scores.__getitem__),
+        }
+        for default, texts in trials.items()
+    ]

@@ -98,7 +98,7 @@ def test_every_row_adapts_and_settles(document: Any) -> None:
 def test_wrong_usage(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     no_folder = tmp_path / "no" / "paper.json"
-    for arguments in (("--json", no_folder), ("--figures", tmp_path / "file"), ("--memory", 0)):
+    for arguments in (("--json", no_folder), ("--figures", tmp_path / "file")):
         assert command("paper", *arguments).exit_code == 2
 
 

@@ -3,8 +3,6 @@
 import dataclasses
 import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -202,12 +200,12 @@ def test_a_document_sums_up(own: str, tmp_path: Path) -> None:
     assert over[ekf]["others"] is not None
     needs = {need["words"]: need for need in document["needs"]}
     assert needs["Unknown use: mean over all scenarios"]["order"][0]["estimator"] == ekf
-    machine = {"date": "2026-01-01", "machine": {"cpu": "x", "python": "3"}, "versions": {"numpy": "2"}}
-    write_html({**document, **machine}, tmp_path / "page.html")
+    write_html({**document, **MACHINE}, tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert (page.count("<table>"), page.count("data:image/png")) == (2 + 4, 4)
-    with pytest.raises(ValueError, match="no page for the suite"):
-        write_html({"suite": "other"}, tmp_path / "page.html")
+
+
+MACHINE = {"date": "2026-01-01", "machine": {"cpu": "x", "python": "3"}, "versions": {"numpy": "2"}}
 
 
 def write_log(path: Path, seed: int) -> None:
@@ -233,11 +231,10 @@ def test_recorded_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for linear, derivative, plays in (rows[:3], rows[3:6]):
         # Of a triangle on the stage the loop is a tenth of the range.
         assert 0.0 < plays["settled"] < derivative["settled"] < 0.5 * linear["settled"]
-        assert derivative["linear_settled"] == linear["settled"]
         assert len(derivative["errors"]) == recorded.SEGMENTS
     document = table.describe(rows, asked, {})
     assert {row["estimator"]: row["failures"] for row in document["overview"]}["HysteresisRLS"] == 1
-    write_html(document, "logs.html")  # which has no stage to speak of
+    write_html({**document, **MACHINE}, "logs.html")  # which has no stage to speak of
     asked = _plan(Runs(logs="fleet"))
     assert "HysteresisRLS" in asked.estimators
     assert "AdaptiveFeedforward" not in asked.estimators  # it needs a stage
@@ -254,7 +251,7 @@ SHORT = ("--scenario", "cold-start", "--scenario", "noise", "--quick", "--only",
 
 def test_command_end_to_end(own: str, tmp_path: Path) -> None:
     asked = (*SHORT, "-e", f"{own}:Broken", "--seeds", 2, "--table", "csv")
-    result = bench(*asked, "--by-scenario", "--json", "a.json", "--figures", "figures")
+    result = bench(*asked, "--json", "a.json", "--figures", "figures")
     assert result.exit_code == 1, result.output  # one estimator has failed in all its runs
     assert "12 of 12 runs" in result.stderr
     assert all(len(line) <= 80 for line in result.stdout.splitlines() if "─" in line)
@@ -277,7 +274,7 @@ def test_command_end_to_end(own: str, tmp_path: Path) -> None:
 
 def test_compare_with_itself_finds_no_change(own: str) -> None:
     assert bench(*SHORT, "-o", "one").exit_code == 0
-    result = bench("compare", "one", "one", "--fail-if-worse", "--json", "c.json")
+    result = bench("compare", "one", "one", "--json", "c.json")
     assert result.exit_code == 0, result.output
     document = json.loads(Path("c.json").read_text(encoding="utf-8"))
     assert set(document["counts"]) == {"same"}
@@ -294,7 +291,7 @@ def test_compare_with_itself_finds_no_change(own: str) -> None:
         (("-e", "./mine.py:Mine"), "mine:Mine"),
         (("--stage", "best"), "choose one of"),
         (("--json", "nowhere/a.json"), "there is no folder"),
-        (("--quick", "paper"), "--quick belong to the table"),
+        (("--quick", "paper"), "write options after paper"),
     ],
 )
 def test_command_refuses_wrong_words(own: str, arguments: tuple[str, ...], words: str) -> None:
@@ -325,7 +322,7 @@ def test_tuning_finds_settings_on_other_seeds(own: str, tmp_path: Path) -> None:
     assert min(ekf["trials"], key=lambda trial: trial["score"])["estimator"] == ekf["chosen"]
     assert rls["default"] == "HysteresisRLS" == rls["trials"][0]["estimator"]
     with pytest.raises(ValueError, match="power of two"):
-        tuning.draws(tuning.tunable(texts[0]), 3, 0)
+        tuning.draws(texts[0], 3)
 
 
 def test_a_store_keeps_the_first_row_of_each_key_and_goes_on(tmp_path: Path) -> None:
@@ -347,35 +344,3 @@ def test_a_file_that_is_no_store_is_named(tmp_path: Path) -> None:
     path.write_text("no rows" * 1000)
     with pytest.raises(OSError, match=r"runs\.sqlite: file is not a database"), opened(path):
         pass
-
-
-APPEND = """
-import sys
-from pathlib import Path
-
-from piezoest.bench.store import append, opened, row_of
-
-path, name = Path(sys.argv[1]), sys.argv[2]
-keys = [f"{name}{k}" for k in range(500)]
-with opened(path) as file:
-    print("open", flush=True)
-    sys.stdin.readline()
-    for k, key in enumerate(keys):
-        assert append(file, {"key": key, "text": name * (k % 997)})
-    for k, key in enumerate(keys):
-        assert row_of(file, key) == {"key": key, "text": name * (k % 997)}
-"""
-
-
-def test_two_processes_append_to_one_store(tmp_path: Path) -> None:
-    path = tmp_path / "runs.sqlite"
-    command = [sys.executable, "-c", APPEND, str(path)]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    workers = [subprocess.Popen([*command, name], **pipes) for name in "xy"]  # type: ignore[call-overload]
-    for worker in workers:
-        worker.stdout.readline()
-    for worker in workers:
-        worker.stdin.write("\n")
-        worker.stdin.flush()
-    assert [worker.communicate() and worker.returncode for worker in workers] == [0, 0]
-    assert kept(path) == 1000

@@ -251,8 +251,6 @@ def test_a_process_that_dies_is_a_failure(own: str, tmp_path: Path) -> None:
         (["-c", "parts", "--set", "colour"], "write it as name=value"),
         (["-c", "parts", "--set", "colour=red"], "choose one of amplitude"),
         (["-c", "parts", "--map", "--set", "gain=1"], "--map draws its rigs itself"),
-        (["--singles", "--set", "gain=1"], "--singles draws its rigs itself"),
-        (["--singles", "--map"], "leave out --set, and all but one of the maps"),
         (["--dwell", 2, "--map"], "leave out --set, and all but one of the maps"),
         (["--dwell", 2, "--set", "gain=1"], "--dwell draws its rigs itself"),
     ],

@@ -96,5 +96,3 @@ def test_a_clean_log_of_a_family() -> None:
         assert not log.spikes.any()
     with pytest.raises(ValueError, match="family must be one of"):
         logs.draw(0, family="unheard-of")
-    with pytest.raises(ValueError, match="kind must be one of triangle"):
-        draw_voltage("square", 10, 1.0, np.random.default_rng(0))

@@ -21,7 +21,7 @@ def after(rig: Rig, *said: tuple[float, str]) -> dict[str, Any]:
     """What is found where faults are named some periods after the beginning of the fault."""
     start = rig.fault.start / rig.sample_rate
     events = [Event(start + periods / 10.0, "fell back", f"{name}: so it is") for periods, name in said]
-    return named(rig, SimpleNamespace(events=events, status={"driving": "line"}))
+    return named(rig, SimpleNamespace(events=events, status=SimpleNamespace(driving="line")))
 
 
 def test_the_right_name_counts_and_how_soon() -> None:

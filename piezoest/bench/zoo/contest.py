@@ -53,16 +53,12 @@ def summarise_contest(rows: Iterable[Row], controller: str) -> dict[str, Any]:
     }
 
 
-def _relative(row: Row) -> float:
-    """Settled error over the amplitude; infinite where there is none."""
-    settled = row.get("settled")
-    return np.inf if settled is None else max(settled / row["amplitude"], FLOOR)
-
-
 def _compared(controller: str, rows: Sequence[Row]) -> dict[str, Any]:
     errors: dict[str, list[float]] = {}
     for row in rows:
-        errors.setdefault(row["controller"], []).append(_relative(row))
+        settled = row.get("settled")
+        relative = np.inf if settled is None else max(settled / row["amplitude"], FLOOR)
+        errors.setdefault(row["controller"], []).append(relative)
     medians = {name: float(np.median(each)) for name, each in errors.items()}
     own = medians[controller]
     best = min((name for name in CANDIDATES if name in medians), key=medians.__getitem__)

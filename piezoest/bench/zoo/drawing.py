@@ -55,13 +55,10 @@ class _Draw:
 
 
 def draw(seed: int, **given: Any) -> Rig:
-    """Draw a rig and what it is to do.
+    """Draw a rig and what it is to do: a function of the seed, and of what is given instead of being drawn.
 
-    `seed`: the rig is a function of it alone, and of what is given. `**given`: in the place of what would be
-    drawn, by its column: family, limits ("±100", "0..150", "0..10", "-20..120"), gain, width, sample_rate,
-    reference, amplitude, frequency, waves, mechanics, delay, noise, resolution, volts, slew, creep, hum,
-    drift, fault, mode, block. `slew` is relative to the fastest change that the reference needs. ValueError
-    if a name is unknown, or a value impossible.
+    Names that may be given are those that are picked below. `limits` is a name of `REACHES`; `slew` is
+    relative to the fastest change that the reference needs.
     """
     pick = _Draw(integer("seed", seed), given)
     rng = pick.rng

@@ -1,9 +1,7 @@
 """Whether a controller goes on after a long rest as it did before.
 
-A healthy rig follows a wave until it has settled, rests for a minute at a point of the wave, exactly or with
-noise in the reference, and follows the wave again: with feedback and without. In the very first period its
-largest error is to be as it was. The stage may creep: what it does meanwhile is not judged, but how far the
-voltage goes.
+A healthy rig follows a wave, rests for a minute at a point of it, exactly or with noise in the reference, and
+follows it again, with feedback and without. In the very first period its largest error is to be as it was.
 """
 
 from collections.abc import Iterable, Sequence

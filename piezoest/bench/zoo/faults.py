@@ -35,8 +35,7 @@ class Fault:
     def names(self) -> tuple[str, ...]:
         """What a controller is to call it; empty if it need not be noticed.
 
-        Of what is there from the start only a stage that does not answer can be noticed: else the readings
-        have never been different.
+        Of what is there from the start only a stage that does not answer can be noticed.
         """
         kind = FAULTS.get(self.kind, Kind())
         if self.mode == START:
@@ -218,10 +217,9 @@ def gain_schedule(rig: Rig) -> list[list[float]] | None:
 
 
 def coordinates(rig: Rig) -> tuple[float, FloatArray]:
-    """Factor and zero (N,) [µm] of the gauge, where it alone says where the reference is.
+    """Factor and zero (N,) [µm] of the gauge, in whose coordinates the reference is.
 
-    A reference is in the coordinates of the gauge. A gauge that has been wrong from the start, or whose zero
-    has moved for good, is right by definition; one that was right and goes wrong is not.
+    A gauge that has been wrong from the start, or whose zero has moved for good, is right by definition.
     """
     fault, n = rig.fault, rig.plain.values.size
     zero = np.zeros(n)

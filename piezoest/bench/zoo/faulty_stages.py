@@ -33,9 +33,6 @@ class FaultyStage:
     reading: Callable[[FaultyStage, FloatArray], Any] = lambda own, x: x
 
     def __post_init__(self) -> None:
-        self._begin()
-
-    def _begin(self) -> None:
         self.random = np.random.default_rng(self.seed)
         self._count = 0  # index of the next sample
         self._held: Any = None  # what stands still meanwhile
@@ -74,11 +71,6 @@ class FaultyStage:
         read = self._read(self.stage.run(self._voltage(u, on)), on)
         self._count += u.size
         return read
-
-    def reset(self) -> None:
-        """Go back to the start, with the same random numbers."""
-        self.stage.reset()
-        self._begin()
 
 
 class FrozenAmplifier(FaultyStage):

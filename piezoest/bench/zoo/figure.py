@@ -42,14 +42,12 @@ def write_figure(rig: Rig, row: Row, both: Both, path: Path) -> None:
         axes.axvline(rig.judged_from / rig.sample_rate, color="0.5", lw=0.8)
         if rig.fault.mode != "none":
             axes.axvspan(row["fault_start"], row["fault_stop"], color="0.9", zorder=0)
-    for axes, x, y in (
-        (way, "time [s]", "displacement [µm]"),
-        (voltage, "time [s]", "voltage [V]"),
-        (error, "time [s]", "error [µm]"),
-        (panels["loop"], "voltage [V]", "displacement [µm]"),
-        (panels["last"], "time [s]", "error of the last two cycles [µm]"),
-    ):
-        axes.set(xlabel=x, ylabel=y)
+    labels = {
+        "way": "displacement [µm]", "voltage": "voltage [V]", "error": "error [µm]",
+        "loop": "displacement [µm]", "last": "error of the last two cycles [µm]",
+    }  # fmt: skip
+    for name, label in labels.items():
+        panels[name].set(xlabel="voltage [V]" if name == "loop" else "time [s]", ylabel=label)
     # The errors that are judged, not those of the start.
     if both.run is not None and (largest := max(row["worst"] or 0.0, row["line_worst"] or 0.0)) > 0.0:
         error.set_ylim(-1.2 * largest, 1.2 * largest)

@@ -23,8 +23,6 @@ ERRORS = ("worst", "line_worst", "learnt_worst", "ratio")
 def named(rig: Rig, controller: Any) -> dict[str, Any]:
     """What a controller said: names of faults, how soon after the fault the right one, what drove at last."""
     status = getattr(controller, "status", {})
-    if not isinstance(status, dict):
-        status = {name: getattr(status, name) for name in getattr(status, "__dataclass_fields__", {})}
     fault, start = rig.fault, rig.fault.start / rig.sample_rate
     said = [(float(event.time), _name(event)) for event in getattr(controller, "events", ())]
     right = [time - start for time, name in said if time >= start and name in fault.names]
@@ -33,10 +31,7 @@ def named(rig: Rig, controller: Any) -> dict[str, Any]:
         "named": "; ".join(dict.fromkeys(name for _, name in said)),
         "named_right": bool(right) if fault.names else None,
         "named_periods": right[0] * rig.plain.frequency if right else None,
-        "driver": next(
-            (_short(status[key]) for key in ("driving", "driver", "drives", "model") if key in status), None
-        ),
-        "status": "; ".join(f"{key}={_short(value)}" for key, value in status.items()),
+        "driver": status.get("model") if isinstance(status, dict) else getattr(status, "driving", None),
     }
 
 
@@ -57,8 +52,7 @@ def recovery(rig: Rig, error: FloatArray, floor: float) -> dict[str, Any]:
     """
     fault, cycle, first = rig.fault, rig.plain.cycle, rig.judged_from
     after = [error[begin : begin + cycle].max() for begin in range(fault.stop, error.size - cycle + 1, cycle)]
-    asked = fault.mode == TRANSIENT and rig.plain.repeats and len(after) >= LAST
-    if not asked:
+    if fault.mode != TRANSIENT or not rig.plain.repeats or len(after) < LAST:
         return {"recovery": False, "recovered": None}
     level = settled(error[first : fault.start] if first < fault.start else error[first:], cycle)
     small = np.flatnonzero(np.array(after) < BACK * max(level or 0.0, floor))
@@ -69,10 +63,6 @@ def _name(event: Any) -> str:
     """The fault's name where a reason begins with it, else what was done."""
     head = str(getattr(event, "reason", "")).partition(":")
     return head[0] if head[1] else str(getattr(event, "name", None) or getattr(event, "action", ""))
-
-
-def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)[:80]
 
 
 class Lines(NamedTuple):
@@ -91,11 +81,10 @@ def judge(rig: Rig, run: Traces, lines: Lines) -> dict[str, Any]:
     floor = max(NOISES * rig.noise * abs(rig.coordinates[0]), NEGLIGIBLE * swing)
     error = np.abs(run.error)
     errors_line = [np.abs(each.error) for each in (lines.fitted, lines.learnt)]
-    finite = bool(np.all(np.isfinite(run.voltage)))
-    low, high = rig.reach.low, rig.reach.high
+    u = run.voltage
     row: dict[str, Any] = {
-        "finite": finite,
-        "within_limits": bool(np.all((run.voltage >= low) & (run.voltage <= high))),
+        "finite": bool(np.all(np.isfinite(u))),
+        "within_limits": bool(np.all((u >= rig.reach.low) & (u <= rig.reach.high))),
         "rail": _rail(rig, run, lines)[first:].max(initial=0) / (0.125 * rig.plain.wave),
         "swing": swing,
         "noise": rig.noise,
@@ -103,21 +92,18 @@ def judge(rig: Rig, run: Traces, lines: Lines) -> dict[str, Any]:
         "judged_from": first / rig.sample_rate,
     }
     row["rests_at_rail"] = bool(row["rail"] > 1.0)
-    last = min(cycle, n - first)
-    windows = {"": slice(first, n), "last_": slice(n - last, n), "after_": _after(rig)}
-    for name, window in windows.items():
-        row |= _compared(name, error[window], [each[window] for each in errors_line], floor)
+    windows = {"": first, "last_": max(first, n - cycle), "after_": _after(rig)}
+    for name, start in windows.items():
+        row |= _compared(name, error[start:], [each[start:] for each in errors_line], floor)
     row["cycle_ratio"] = _in_each_cycle(cycle, error[first:], [each[first:] for each in errors_line], floor)
     return {**row, "settled": settled(error[first:], cycle), **recovery(rig, error, floor)}
 
 
-def _after(rig: Rig) -> slice:
-    """After the end of a transient fault, or the beginning of one that stays, and time to learn."""
+def _after(rig: Rig) -> int:
+    """First sample after a transient fault, or the beginning of one that stays, and time to learn."""
     n, fault = rig.plain.values.size, rig.fault
-    if fault.mode not in (TRANSIENT, PERMANENT):
-        return slice(n, n)
-    over = fault.stop if fault.mode == TRANSIENT else fault.start
-    return slice(min(over + rig.learning, n), n)
+    over = {TRANSIENT: fault.stop, PERMANENT: fault.start}.get(fault.mode, n)
+    return min(over + rig.learning, n)
 
 
 def _compared(

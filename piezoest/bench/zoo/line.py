@@ -1,13 +1,11 @@
 """What a controller has to be better than: two straight lines.
 
-One is the best line for the healthy stage, held throughout: drawn in hindsight. u = (r - centre)/gain, where
-displacement = gain u + centre is the least-squares line of a healthy twin that is driven over the same
-reference; in the coordinates of the gauge.
+One is the best line for the healthy stage, drawn in hindsight: u = (r - centre)/gain, where displacement =
+gain u + centre is the least-squares line of a healthy twin that is driven over the same reference.
 
-The other is the line that an honest user could have had at each moment. Its gain is known, its zero is that
-of the first true reading; until then it rests. After each leg it is drawn anew through the true readings of
-the last two. It drives a twin of the rig with the same noise and faults. An oracle says which readings are
-true, and how late they are: while there are none, the line is held.
+The other is learnt. Its gain is known, its zero is that of the first true reading; until then it rests. After
+each leg it is drawn anew through the true readings of the last two. An oracle says which readings are true,
+and how late they are: while there are none, the line is held. See docs/safety.rst.
 """
 
 from collections.abc import Callable

@@ -49,14 +49,8 @@ class Relays(Loop):
         """Numbers by name; `sums` holds, row by row, the weight of all cells below and left of a corner."""
         sums = np.zeros((self.levels + 1, self.levels + 1))
         sums[1:, 1:] = self.weights.cumsum(axis=0).cumsum(axis=1)
-        return {
-            "gain": self.gain,
-            "share": self.share,
-            "low": self.low,
-            "high": self.high,
-            "levels": self.levels,
-            "sums": sums.ravel(),
-        }
+        own = {name: getattr(self, name) for name in ("gain", "share", "low", "high", "levels")}
+        return {**own, "sums": sums.ravel()}
 
     def stage_layouts(self, settings: dict[str, Any]) -> tuple[Record, Record]:
         """Layouts of state: turns and the weight that is up at each; and settings."""

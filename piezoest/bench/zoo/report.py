@@ -5,7 +5,7 @@ from typing import Any
 
 from piezoest._tables import Columns, print_rows, say, shown
 from piezoest.bench.zoo.settling import ENOUGH, SEGMENTS, SOON
-from piezoest.bench.zoo.words import CHANGES, CRITERIA, MODES, RATIOS
+from piezoest.bench.zoo.words import CHANGES, CRITERIA, RATIOS, fault
 
 KEY = (
     "Ratio: largest error from two swings after the start, divided by the largest of 1.5 times the error "
@@ -23,6 +23,11 @@ def _percent(column: str, row: dict[str, Any]) -> float | None:
     return None if row[column] is None else round(100.0 * row[column], 1)
 
 
+WORST: Columns = {
+    "seed": lambda row: str(row["seed"]), "rig": lambda row: f"{row['family']}, {row['reference']}",
+    "fault": fault, "ratio": "ratio", "last\ncycle": "last_ratio", "at a\nlimit": "rail",
+    "drove\nlast": lambda row: row["failure"] or row["driver"] or "nobody",
+}  # fmt: skip
 DWELLS: Columns = {
     "runs": "runs", "as\nbefore": "kept", "first": "first", "second": "second",
     "largest\nfirst": "largest", "moved\n[%]": partial(_percent, "excursion"),
@@ -51,28 +56,18 @@ def print_summary(summary: dict[str, Any], console: Any) -> None:
     print_rows(console, "Runs with a ratio above 1, of all", crossed.values(), columns)
     print_rows(
         console, "By fault: runs with a ratio above 1, in the last cycle, or at a limit", summary["by_fault"],
-        {"fault": _fault, "runs": "runs", "ratio\nabove 1": "over", "last\ncycle": "over_last",
+        {"fault": fault, "runs": "runs", "ratio\nabove 1": "over", "last\ncycle": "over_last",
          "at a\nlimit": "at_limit", "median\nratio": "ratio"},
     )  # fmt: skip
     print_rows(
         console, "Faults named, in how many periods; as good as before within three cycles",
         [row for row in summary["by_fault"] if row["to_name"] or row["to_recover"]],
-        {"fault": _fault, "right\nname": lambda row: _of(row["named"], row["to_name"]),
+        {"fault": fault, "right\nname": lambda row: _of(row["named"], row["to_name"]),
          "after\n[periods]": "named_periods",
          "as\nbefore": lambda row: _of(row["recovered_soon"], row["to_recover"])},
     )  # fmt: skip
-    print_rows(
-        console, "The worst", summary["worst"],
-        {"seed": lambda row: str(row["seed"]), "rig": lambda row: f"{row['family']}, {row['reference']}",
-         "fault": _fault, "ratio": "ratio", "last\ncycle": "last_ratio", "at a\nlimit": "rail",
-         "drove\nlast": lambda row: row["failure"] or row["driver"] or "nobody"},
-    )  # fmt: skip
+    print_rows(console, "The worst", summary["worst"], WORST)
     say(console, KEY, f"Controller: {shown(summary['microseconds'])} µs per sample, median.")
-
-
-def _fault(row: dict[str, Any]) -> str:
-    """Its kind and its time."""
-    return ", ".join([row["fault"], *([MODES[row["mode"]]] if row["mode"] in MODES else [])])
 
 
 def _of(count: int, runs: int) -> str:

@@ -1,9 +1,8 @@
 """How soon a controller settles: over amplitude, frequency and family, after each kind of change.
 
-A run goes through `SEGMENTS`: a cold start, smaller and much smaller waves, the first ones again, and a gain
-that steps. It is settled from the period on after which the largest error of each stays within 1.2 % of the
-amplitude, or three times the noise. The stage has a resonance. Settling soon is asked for where the reference
-is slow beside it, and large beside the noise.
+A run goes through `SEGMENTS`. It is settled from the period on after which the largest error of each stays
+within 1.2 % of the amplitude, or three times the noise. The stage has a resonance. Settling soon is asked for
+where the reference is slow beside it, and large beside the noise.
 """
 
 import itertools
@@ -14,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from piezoest import signals
-from piezoest._checks import FloatArray
 from piezoest.bench.metrics import SETTLED, settles
 from piezoest.bench.origin import json_safe
 from piezoest.bench.store import Row
@@ -106,7 +104,11 @@ def cell_rig(cell: Cell) -> Rig:
         hum=0.0, drift=0.0, fault="none",
         block=int(rng.choice([10, 50])) * period // PERIOD,
     )  # fmt: skip
-    values = _values(cell, period)
+    parts = [
+        signals.triangle(factor * cell.amplitude, cell.frequency, periods, rig.sample_rate).values
+        for _, factor, periods in SEGMENTS
+    ]
+    values = np.concatenate(parts)
     begins = values.size - SEGMENTS[-1][2] * period
     size = float(rng.choice([0.7, 1.3])) if FREE * cell.amplitude < 0.6 * gain * REACH else 1.3
     return replace(
@@ -114,14 +116,6 @@ def cell_rig(cell: Cell) -> Rig:
         plain=Reference("triangle", values, cell.amplitude, 0.0, cell.frequency, float(period), period, 0),
         fault=Fault("gain-step", begins, values.size, size, lasting=True),
     )
-
-
-def _values(cell: Cell, period: int) -> FloatArray:
-    parts = [
-        signals.triangle(factor * cell.amplitude, cell.frequency, periods, period * cell.frequency).values
-        for _, factor, periods in SEGMENTS
-    ]
-    return np.concatenate(parts)
 
 
 def asked(rig: Rig) -> bool:

@@ -46,6 +46,11 @@ ONE_RUN = {
 }  # fmt: skip
 
 
+def fault(row: dict[str, Any]) -> str:
+    """The kind of a row's fault, and its time."""
+    return ", ".join([row["fault"], *([MODES[row["mode"]]] if row["mode"] in MODES else [])])
+
+
 def one_run(row: dict[str, Any]) -> dict[str, str]:
     """Numbers of a run that are known, by the words for them."""
     left_out = ("mode", "fault_start", "fault_stop") if row["fault"] == "none" else ()
