@@ -88,7 +88,6 @@ layers: $(VENV)/.installed-test  ## Check that modules import only from the laye
 docs: $(VENV)/.installed-docs  ## Build the documentation into docs/_build/html; a warning is an error
 	rm -rf docs/generated
 	$(BIN)/sphinx-build -W --keep-going -n -q -b html docs docs/_build/html
-	$(BIN)/python docs/check_links.py docs/_build/html
 	@echo "open docs/_build/html/index.html"
 
 docs-live: $(VENV)/.installed-docs-live  ## Serve the documentation and rebuild it on every change
@@ -116,7 +115,6 @@ figures: $(VENV)/.installed-bench  ## Make the numbers and figures of the docume
 	$(BIN)/python benchmarks/logs.py --logs 200 --seed 5000 --json docs/data/logs.json
 	$(BIN)/python benchmarks/controller.py --json docs/data/controller.json
 	$(BIN)/python benchmarks/target/target.py --json docs/data/target.json
-	$(BIN)/python docs/controller_page.py
 	$(BIN)/python benchmarks/speed.py --json docs/data/speed.json --figure docs/figures/speed.png
 	$(BIN)/python docs/tuning.py
 	$(BIN)/python docs/real_data.py

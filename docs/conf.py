@@ -61,14 +61,12 @@ html_sidebars: dict[str, list[str]] = {"*": []}
 sphinx_gallery_conf = {
     "examples_dirs": "examples",
     "gallery_dirs": "gallery",
-    "filename_pattern": r"plot_",
     "within_subsection_order": "FileNameSortKey",
     "abort_on_example_error": True,
     "download_all_examples": False,
     "capture_repr": (),
     "show_memory": False,
     "show_signature": False,
-    "plot_gallery": True,
 }
 
 

@@ -1,13 +1,8 @@
-"""Tables and numbers of the page `controller`, from docs/data/controller.json and target.json.
+"""Tables and numbers of the page `controller`, from docs/data/controller.json and target.json."""
 
-The figure is drawn by python docs/controller_page.py
-"""
+from page_parts import Document, of_all, percent, replacements, table_of
 
-from page_parts import DOCS, Document, of_all, percent, read, replacements, table_of
-
-from piezoest._files import save_figure
 from piezoest._tables import Columns
-from piezoest.bench.figures import new_figure
 
 NEAR = 0.01  # relative difference of settled errors
 SOURCES = ("controller", "target")
@@ -47,22 +42,3 @@ def pieces(parity: Document, target: Document) -> dict[str, str]:
         ),
         "target": table_of("On a Cortex-M4F", loads, TARGET),
     }
-
-
-def draw() -> None:
-    rows = [row for row in read("target")["rows"] if row["precision"] == "float"]
-    figure = new_figure(6, 3)
-    axes = figure.subplots()
-    names = [row["controller"] for row in rows]
-    longest, mean = ([100.0 * row[f"load_{name}"] for row in rows] for name in ("largest", "mean"))
-    axes.barh(names, longest, color="C0", alpha=0.4, label="longest step")
-    axes.barh(names, mean, color="C0", height=0.4, label="mean")
-    axes.axvline(50.0, color="0.4", ls="--", lw=1)
-    axes.set(xlabel="time of a step [% of a sample at 50 kHz]", xlim=(0, None))
-    axes.invert_yaxis()
-    axes.legend(loc="lower right")
-    save_figure(figure, DOCS / "figures" / "controller" / "load.png", dpi=130)
-
-
-if __name__ == "__main__":
-    draw()

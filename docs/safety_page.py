@@ -3,7 +3,8 @@
 from page_parts import Document, of_all, percent, replacements, shown, table, table_of
 
 from piezoest._tables import Columns
-from piezoest.bench.zoo.words import CHANGES, CRITERIA, DRAWN, MODES, SPANS
+from piezoest.bench.zoo.report import DWELLS, WORST
+from piezoest.bench.zoo.words import CHANGES, CRITERIA, DRAWN, MODES, SPANS, fault
 
 GROUPS = {"all": "all", "healthy": "healthy", "often": "called often"}
 WHO = {
@@ -14,17 +15,6 @@ PLACE = {"amplitude [µm]": "amplitude", "frequency [Hz]": "frequency"}
 
 NO_RUN = "no such run."
 
-
-def fault(row: Document) -> str:
-    """Its fault, and when this is present."""
-    return f"{row['fault']} {MODES.get(row['mode'], '')}".strip()
-
-
-WORST: Columns = {
-    "seed": lambda row: str(row["seed"]), "family": "family", "reference": "reference", "fault": fault,
-    "ratio": "ratio", "last cycle": "last_ratio", "at a limit [quarter swings]": "rail",
-    "drove last": lambda row: row["failure"] or row["driver"],
-}  # fmt: skip
 TOLD: Columns = {
     "fault": fault,
     "right name": lambda row: of_all(row["named"], row["to_name"]),
@@ -32,12 +22,7 @@ TOLD: Columns = {
     "as before in the first cycle": lambda row: of_all(row["recovered_first"], row["to_recover"]),
     "in the first three": lambda row: of_all(row["recovered_soon"], row["to_recover"]),
 }
-DWELL: Columns = {
-    "creep": "creep", "feedback": "feedback", "noise": "noise",
-    "as before in the first period": lambda row: of_all(row["kept"], row["runs"]),
-    "first": "first", "second": "second", "third": "third", "largest first": "largest",
-    "distance": "excursion", "largest distance": "farthest",
-}  # fmt: skip
+DWELL: Columns = {"creep": "creep", "feedback": "feedback", "noise": "noise", **DWELLS}
 
 
 def pieces(document: Document) -> dict[str, str]:
@@ -188,16 +173,13 @@ def found(document: Document) -> str:
 
 def settling(document: Document) -> dict[str, str]:
     """Share of runs that settled soon after each change, by family and by place of the map."""
-    parts: dict[str, tuple[str, Columns]] = {
-        "by_family": ("required", {"family": "family"}),
-        "by_place": ("required", PLACE),
-        "other_places": ("not required", PLACE),
-    }
     shares: Columns = {each: lambda row, name=name: percent(row[name]) for name, each in CHANGES.items()}
     texts = {}
-    for part, (asked, names) in parts.items():
+    for part in ("by_family", "by_place", "other_places"):
         rows = document["map"][part] if document["map"] else []
+        asked = "not required" if part == "other_places" else "required"
         title = f"Runs that settled within {document['criteria']['soon']} periods, where this is {asked}"
+        names = {"family": "family"} if part == "by_family" else PLACE
         texts[f"map_{part}"] = table_of(title, rows, {**names, "runs": "runs", **shares})
     return texts
 

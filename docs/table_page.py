@@ -35,11 +35,9 @@ def linked(of: report.Table, dash: str = "") -> str:
     names = re.compile(r"\b(AdaptiveFeedforward|BatchFit|MovingHorizon|\w+(?:RLS|EKF|UKF))\b")
 
     def link(cell: str) -> str:
-        return (
-            cell
-            if "``" in cell
-            else names.sub(r":class:`~piezoest.\1`", cell).replace(" (", "\N{NO-BREAK SPACE}(")
-        )
+        if "``" in cell:
+            return cell
+        return names.sub(r":class:`~piezoest.\1`", cell).replace(" (", "\N{NO-BREAK SPACE}(")
 
     return table("", of[0], (map(link, row) for row in of[1]), dash)
 
