@@ -37,8 +37,8 @@ class Found:
     chosen: str
     predictions: dict[str, np.ndarray]
     held_out: dict[str, float]  # its own account of them [µm rms]
-    lower: np.ndarray | None = None
-    upper: np.ndarray | None = None
+    lower: np.ndarray
+    upper: np.ndarray
     errors: dict[str, float] = field(default_factory=dict)  # standard errors of a Coleman-Hodgdon model
     theta: np.ndarray | None = None
 
@@ -156,9 +156,8 @@ def judged(log: Log, trained: int, found: Found) -> Row:
     row: Row = {
         "chosen": rms(missed[found.chosen]), "chosen_name": found.chosen, "best_name": best,
         "best": min(rms(missed[name]) for name in (found.chosen, best)), "own": found.held_out[found.chosen],
+        "coverage": coverage(log, trained, found.lower, found.upper),
     }  # fmt: skip
-    if found.lower is not None and found.upper is not None:
-        row["coverage"] = coverage(log, trained, found.lower, found.upper)
     if log.family == FAMILY and found.theta is not None:
         row["z"] = scores(log, found)
     return row

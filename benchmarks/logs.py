@@ -11,6 +11,7 @@ A log takes about a second.
 
 import json
 import time
+import timeit
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -146,18 +147,11 @@ def times() -> list[Row]:
         ("Coleman-Hodgdon", 0.2, fit("coleman-hodgdon")),
         ("all kinds, with cross-validation", 10.0, lambda: pz.identify(u, x, sample_rate=rate, train=0.9)),
     )
-    return [{"fit": name, "asked": asked, "seconds": median_time(run)} for name, asked, run in work]
-
-
-def median_time(run: Callable[[], Any]) -> float:
-    """Seconds of a call after one to warm up."""
-    run()
-    taken = []
-    for _ in range(ROUNDS):
-        began = time.thread_time()
-        run()
-        taken.append(time.thread_time() - began)
-    return float(np.median(taken))
+    found = []
+    for name, asked, run in work:
+        _, *taken = timeit.repeat(run, timer=time.thread_time, repeat=1 + ROUNDS, number=1)  # one to warm up
+        found.append({"fit": name, "asked": asked, "seconds": float(np.median(taken))})
+    return found
 
 
 def played(what: str, work: Callable[[int], Row], seeds: Sequence[int], workers: int | None) -> list[Row]:

@@ -28,6 +28,7 @@ from piezoest.bench.zoo import contenders, dwelling, judging, settling, tasks
 from piezoest.bench.zoo.contest import contest, summarise_contest
 from piezoest.bench.zoo.summary import counts, grouped, summarise, values
 from piezoest.bench.zoo.tasks import Task, over_cores
+from piezoest.bench.zoo.words import DRAWN, SPANS
 
 Row = dict[str, Any]
 Count = Annotated[int, typer.Option(min=1)]
@@ -38,8 +39,6 @@ CONTROLLERS = {
 }  # fmt: skip
 # A leg is half a wave of the reference. Called less often, or told later, nobody can follow it closely.
 CALLS, LATE = 16.0, 1.0 / 16.0
-FEATURES = ("family", "reference", "fault", "mode", "mechanics")
-SPANS = ("amplitude", "frequency", "gain", "width", "sample_rate", "delay", "block", "sensor_noise", "creep")
 # Levels of the curve of a distribution; many where it ends, which is what matters.
 LEVELS = (*np.linspace(0.0, 0.9, 46), *np.linspace(0.9, 0.99, 19)[1:], *np.linspace(0.99, 1.0, 21)[1:])
 # Columns of the tables about each contender.
@@ -97,10 +96,9 @@ def summed_up(rows: Sequence[Row]) -> Row:
 
 def drawn(rows: Sequence[Row]) -> Row:
     """What was drawn, counted: names with their runs, numbers with their range."""
-    names = {name: [row[name] for row in rows] for name in FEATURES}
-    names["limits"] = [f"{row['low']:g} to {row['high']:g}" for row in rows]
+    marked = [{**row, "limits": f"{row['low']:g} to {row['high']:g}"} for row in rows]
     return {
-        **{name: dict(sorted(Counter(of).items())) for name, of in names.items()},
+        **{name: dict(sorted(Counter(row[name] for row in marked).items())) for name in DRAWN},
         "spans": {name: [min(row[name] for row in rows), max(row[name] for row in rows)] for name in SPANS},
     }
 

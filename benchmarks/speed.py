@@ -240,9 +240,7 @@ def live(r: FloatArray, u: FloatArray, x: FloatArray, turns: int) -> dict[str, R
         estimator.step(inverse.step(reference), displacement)
 
     controller = pz.AdaptiveFeedforward(SAMPLE_RATE, limits=pz.VoltageLimits(-50.0, 100.0))
-
-    again = controller.copy()
-    stage = pz.PaperStage(SAMPLE_RATE, seed=0)
+    again, stage = controller.copy(), pz.PaperStage(SAMPLE_RATE, seed=0)
     measured = pz.track(r, stage=stage, controller=controller, sample_rate=SAMPLE_RATE).measured
 
     def whole(reference: float, displacement: float) -> None:
