@@ -88,6 +88,7 @@ layers: $(VENV)/.installed-test  ## Check that modules import only from the laye
 docs: $(VENV)/.installed-docs  ## Build the documentation into docs/_build/html; a warning is an error
 	rm -rf docs/generated
 	$(BIN)/sphinx-build -W --keep-going -n -q -b html docs docs/_build/html
+	$(BIN)/python docs/check_links.py docs/_build/html
 	@echo "open docs/_build/html/index.html"
 
 docs-live: $(VENV)/.installed-docs-live  ## Serve the documentation and rebuild it on every change

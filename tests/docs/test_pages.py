@@ -1,4 +1,4 @@
-"""README and documentation: their numbers are those of docs/data, and tests that they name are there."""
+"""README and documentation: their numbers are those of docs/data, their links and tests are there."""
 
 import importlib
 import re
@@ -20,6 +20,30 @@ def test_readme_has_the_figures_of_the_data(monkeypatch: pytest.MonkeyPatch) -> 
     readme = program("readme", monkeypatch)
     _, inside, _ = readme.parts((ROOT / "README.md").read_text(encoding="utf-8"))
     assert inside == readme.figures(), "run python docs/readme.py"
+
+
+GOOD = (
+    '<html><body id="top"><a href="other.html#there">x</a><a href="https://example.org">y</a></body></html>'
+)
+LINKS = {
+    '<a href="none.html">': "none.html does not exist",
+    '<a href="other.html#gone">': "other.html#gone: no such anchor",
+    '<a href="#lost">': "#lost: no such anchor",
+    '<img src="none.png">': "none.png does not exist",
+    '<script src="https://cdn.example.org/x.js"></script>': "x.js comes from elsewhere",
+    '<link rel="stylesheet" href="//cdn.example.org/x.css">': "x.css comes from elsewhere",
+}
+
+
+def test_links_that_lead_nowhere_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = program("check_links", monkeypatch).broken
+    (tmp_path / "other.html").write_text('<p id="there">z</p>', encoding="utf-8")
+    (tmp_path / "index.html").write_text(GOOD, encoding="utf-8")
+    assert list(broken(tmp_path)) == []
+    (tmp_path / "index.html").write_text(GOOD + "".join(LINKS), encoding="utf-8")
+    found = list(broken(tmp_path))
+    assert len(found) == len(LINKS)
+    assert all(said.endswith(end) for said, end in zip(found, LINKS.values(), strict=True))
 
 
 def test_tests_that_pages_name_are_there() -> None:
