@@ -1,103 +1,59 @@
-from . import export, models, policies, records, report, signals
-from ._version import __version__
-from .compensators import (
-    CompensatorStatus,
-    IntegralFeedback,
-    InverseCompensator,
-    LeadFilter,
-    LinearCompensator,
-    VoltageLimits,
-)
-from .controller.adaptive_feedforward import AdaptiveFeedforward
-from .controller.shown import Event
-from .estimators.bank import EstimatorBank
-from .estimators.base import Estimator, Status, Trace
-from .estimators.batch import BatchFit
-from .estimators.batch_result import BatchFitResult
-from .estimators.ekf import HysteresisEKF
-from .estimators.filterpy_baselines import FilterPyEKF, FilterPyUKF
-from .estimators.horizon import MovingHorizon
-from .estimators.output_error import OutputErrorRLS
-from .estimators.play_rls import PrandtlIshlinskiiRLS
-from .estimators.recursive_least_squares import RecursiveLeastSquares
-from .estimators.rls import HysteresisRLS
-from .fitting import Fit, fit
-from .identification import (
-    Identification,
-    StreamedIdentification,
-    identify,
-    identify_stream,
-)
-from .models import (
-    AmplitudeProfile,
-    ColemanHodgdon,
-    Creep,
-    LinearGain,
-    MassSpringDamper,
-    PrandtlIshlinskii,
-    Preisach,
-)
-from .records import Record, RecordStream, read_record, stream_record
-from .signals import Signal
-from .stage import Amplifier, Gauge, PaperStage, PreisachStage, SimulatedStage, TemperatureLaw
-from .tracking import TrackingRecord, track
-from .warming import warmup
+# Each name is imported as itself: a stub shows nothing else to others.
+from . import export as export
+from . import models as models
+from . import policies as policies
+from . import records as records
+from . import report as report
+from . import signals as signals
+from ._version import __version__ as __version__
+from .compensators import CompensatorStatus as CompensatorStatus
+from .compensators import IntegralFeedback as IntegralFeedback
+from .compensators import InverseCompensator as InverseCompensator
+from .compensators import LeadFilter as LeadFilter
+from .compensators import LinearCompensator as LinearCompensator
+from .compensators import VoltageLimits as VoltageLimits
+from .controller.adaptive_feedforward import AdaptiveFeedforward as AdaptiveFeedforward
+from .controller.shown import Event as Event
+from .estimators.bank import EstimatorBank as EstimatorBank
+from .estimators.base import Estimator as Estimator
+from .estimators.base import Status as Status
+from .estimators.base import Trace as Trace
+from .estimators.batch import BatchFit as BatchFit
+from .estimators.batch_result import BatchFitResult as BatchFitResult
+from .estimators.ekf import HysteresisEKF as HysteresisEKF
+from .estimators.filterpy_baselines import FilterPyEKF as FilterPyEKF
+from .estimators.filterpy_baselines import FilterPyUKF as FilterPyUKF
+from .estimators.horizon import MovingHorizon as MovingHorizon
+from .estimators.output_error import OutputErrorRLS as OutputErrorRLS
+from .estimators.play_rls import PrandtlIshlinskiiRLS as PrandtlIshlinskiiRLS
+from .estimators.recursive_least_squares import RecursiveLeastSquares as RecursiveLeastSquares
+from .estimators.rls import HysteresisRLS as HysteresisRLS
+from .fitting import Fit as Fit
+from .fitting import fit as fit
+from .identification import Identification as Identification
+from .identification import StreamedIdentification as StreamedIdentification
+from .identification import identify as identify
+from .identification import identify_stream as identify_stream
+from .models import AmplitudeProfile as AmplitudeProfile
+from .models import ColemanHodgdon as ColemanHodgdon
+from .models import Creep as Creep
+from .models import LinearGain as LinearGain
+from .models import MassSpringDamper as MassSpringDamper
+from .models import PrandtlIshlinskii as PrandtlIshlinskii
+from .models import Preisach as Preisach
+from .records import Record as Record
+from .records import RecordStream as RecordStream
+from .records import read_record as read_record
+from .records import stream_record as stream_record
+from .signals import Signal as Signal
+from .stage import Amplifier as Amplifier
+from .stage import Gauge as Gauge
+from .stage import PaperStage as PaperStage
+from .stage import PreisachStage as PreisachStage
+from .stage import SimulatedStage as SimulatedStage
+from .stage import TemperatureLaw as TemperatureLaw
+from .tracking import TrackingRecord as TrackingRecord
+from .tracking import track as track
+from .warming import warmup as warmup
 
-__all__ = [
-    "AdaptiveFeedforward",
-    "Amplifier",
-    "AmplitudeProfile",
-    "BatchFit",
-    "BatchFitResult",
-    "ColemanHodgdon",
-    "CompensatorStatus",
-    "Creep",
-    "Estimator",
-    "EstimatorBank",
-    "Event",
-    "FilterPyEKF",
-    "FilterPyUKF",
-    "Gauge",
-    "OutputErrorRLS",
-    "HysteresisEKF",
-    "HysteresisRLS",
-    "Fit",
-    "Identification",
-    "IntegralFeedback",
-    "InverseCompensator",
-    "LeadFilter",
-    "LinearCompensator",
-    "LinearGain",
-    "MassSpringDamper",
-    "MovingHorizon",
-    "PaperStage",
-    "PrandtlIshlinskii",
-    "PrandtlIshlinskiiRLS",
-    "Preisach",
-    "PreisachStage",
-    "Record",
-    "RecordStream",
-    "RecursiveLeastSquares",
-    "Signal",
-    "SimulatedStage",
-    "Status",
-    "StreamedIdentification",
-    "TemperatureLaw",
-    "Trace",
-    "TrackingRecord",
-    "VoltageLimits",
-    "__version__",
-    "export",
-    "fit",
-    "identify",
-    "identify_stream",
-    "models",
-    "policies",
-    "read_record",
-    "records",
-    "report",
-    "signals",
-    "stream_record",
-    "track",
-    "warmup",
-]
+__all__: list[str]
