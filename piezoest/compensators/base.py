@@ -1,11 +1,13 @@
 """What linear and inverse feed-forward share: the model's inverse, limits, gradual change of the model."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from piezoest._checks import FloatArray, array_1d, instance, integer, measured, number_or_nan, positive
+from piezoest.compensators import corridor
 from piezoest.compensators import inverse_kernel as kernel
 from piezoest.compensators.limits import VoltageLimits, resting
 from piezoest.layout import Copied, Named, Record, new
@@ -205,7 +207,7 @@ class Compensator(Copied):
             # Out of range its inverse gives no number.
             nearest = getattr(model, "nearest_admissible", None)
             if nearest is None or not model.is_in_range:
-                kernel.keep(self._named()[0])
+                corridor.hand_over(self._named()[0].corridor)  # the corridor stays
                 return
             model = nearest()
         before, self._model = self._model, model
@@ -262,18 +264,13 @@ class Compensator(Copied):
         )
 
     def step(self, r: float | None) -> float:
-        """Voltage for the next sample of the reference.
+        """Voltage [V] for the next sample of the reference, within the limits.
 
         Parameters
         ----------
         r : float
             Reference displacement [µm]; NaN, infinity and anything that is not a number hold the last
             voltage.
-
-        Returns
-        -------
-        float
-            Voltage [V], within the limits.
         """
         if type(r) is not float:
             r = number_or_nan(r)
@@ -288,17 +285,12 @@ class Compensator(Copied):
         return self._loops
 
     def run(self, r: Any) -> FloatArray:
-        """Voltages for a whole reference; continues from the current state, as a loop of `step`.
+        """Voltages [V], shape (N,), for a whole reference: the same as a loop of `step` from here on.
 
         Parameters
         ----------
         r : array_like, shape (N,)
             Reference displacement [µm]; NaN holds the last voltage.
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Voltage [V], within the limits.
 
         Raises
         ------
@@ -315,7 +307,7 @@ class Compensator(Copied):
         return u
 
 
-class AroundCompensator(Copied):
+class AroundCompensator(Copied, ABC):
     """What is put around a feed-forward compensator, and shows its model, limits and status."""
 
     __slots__ = ("_compensator",)
@@ -351,3 +343,18 @@ class AroundCompensator(Copied):
     def status(self) -> CompensatorStatus:
         """What happened to the samples so far."""
         return self._compensator.status
+
+    def reset(self, voltage: float | None = None, displacement: float | None = None) -> None:
+        """Return to the state after construction, at rest.
+
+        Parameters
+        ----------
+        voltage, displacement : float, optional
+            Where the stage rests [V] and [µm], see `InverseCompensator.reset`.
+        """
+        self._compensator.reset(voltage, displacement)
+        self._begin()
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Begin with nothing seen."""

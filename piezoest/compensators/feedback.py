@@ -53,9 +53,12 @@ class IntegralFeedback(AroundCompensator):
         super().__init__(compensator)
         check_rate(self.limits, sample_rate)
         self._step_gain = positive("gain", gain) / positive("sample_rate", sample_rate)
-        self._integral = 0.0
+        self._begin()
         # One wild reading winds nothing up.
         self._reach = float(compensator.state["corridor"]["least"]) / corridor.LEAST
+
+    def _begin(self) -> None:
+        self._integral = 0.0
 
     @property
     def integral(self) -> float:
@@ -63,21 +66,15 @@ class IntegralFeedback(AroundCompensator):
         return self._integral
 
     def step(self, r: float | None, x: float | None) -> float:
-        """Voltage for the next sample.
+        """Voltage [V] for the next sample, within the compensator's limits.
 
         Parameters
         ----------
         r : float
-            Reference displacement [µm]; NaN, infinity and anything that is not a number hold the last
-            voltage.
+            Reference displacement [µm], as in `InverseCompensator.step`.
         x : float or None
             Displacement measured last [µm]; None, NaN, infinity or anything that is not a number if there
             is none.
-
-        Returns
-        -------
-        float
-            Voltage [V], within the compensator's limits.
         """
         r, x = number_or_nan(r), number_or_nan(x)
         if math.isfinite(x) and math.isfinite(r):
@@ -85,14 +82,3 @@ class IntegralFeedback(AroundCompensator):
             if growth * self._compensator.limited <= 0.0:
                 self._integral += growth
         return self._compensator.step(r + self._integral)
-
-    def reset(self, voltage: float | None = None, displacement: float | None = None) -> None:
-        """Return to the state after construction, at rest.
-
-        Parameters
-        ----------
-        voltage, displacement : float, optional
-            Where the stage rests [V] and [µm], see `InverseCompensator.reset`.
-        """
-        self._compensator.reset(voltage, displacement)
-        self._integral = 0.0

@@ -140,11 +140,6 @@ def begin(state: Any, settings: Any, u: float, slope: float, x: float | None) ->
     corridor.begin(state.corridor, settings, u, expected + state.owed, slope)
 
 
-def keep(state: Any) -> None:
-    """Go on with the model before, as the one proposed is none: the corridor stays."""
-    corridor.hand_over(state.corridor)
-
-
 def go_on(state: Any, settings: Any, expected: float, stays: bool) -> None:
     """Go on with other numbers of an inverse, where those before expected and owed a displacement."""
     if not stays:

@@ -99,55 +99,32 @@ class LeadFilter(AroundCompensator):
             1.0 / omega if smoothing is None else positive("smoothing", smoothing),
             1.0 / positive("sample_rate", sample_rate),
         )
-        self._settings, self._state = new(SETTINGS, **coefficients), new(STATE)
+        self._settings = new(SETTINGS, **coefficients)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._state = new(STATE)
 
     def step(self, r: float | None) -> float:
-        """Voltage for the next sample of the reference.
+        """Voltage [V] for the next sample of the reference, within the limits.
 
         Parameters
         ----------
         r : float
-            Reference displacement [µm]; NaN, infinity and anything that is not a number hold the last
-            voltage.
-
-        Returns
-        -------
-        float
-            Voltage [V], within the limits.
+            As in `InverseCompensator.step`.
         """
         step = _step.of(STATE, SETTINGS)
         lead = step(self._state, self._settings, r if type(r) is float else number_or_nan(r))
         return self._compensator.step(lead)
 
     def run(self, r: Any) -> FloatArray:
-        """Voltages for a whole reference; continues from the current state, as a loop of `step`.
+        """Voltages [V], shape (N,), for a whole reference: the same as a loop of `step` from here on.
 
         Parameters
         ----------
         r : array_like, shape (N,)
-            Reference displacement [µm]; NaN holds the last voltage.
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Voltage [V], within the limits.
-
-        Raises
-        ------
-        ValueError
-            If r is not a 1-D array of numbers.
+            As in `InverseCompensator.run`.
         """
         lead = array_1d("r", r, allow_nan=True).copy()
         _run.of(STATE, SETTINGS)(self._state, self._settings, lead)
         return self._compensator.run(lead)
-
-    def reset(self, voltage: float | None = None, displacement: float | None = None) -> None:
-        """Return to the state after construction, at rest.
-
-        Parameters
-        ----------
-        voltage, displacement : float, optional
-            Where the stage rests [V] and [µm], see `InverseCompensator.reset`.
-        """
-        self._compensator.reset(voltage, displacement)
-        self._state = new(STATE)

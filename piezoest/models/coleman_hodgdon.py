@@ -123,17 +123,12 @@ class ColemanHodgdon(FreeRunning):
         return self.beta, self.offset
 
     def nearest_admissible(self, margin: float = admissible.NEAREST_MARGIN) -> Self:
-        """Nearest admissible model, each parameter measured relative to its own value.
+        """Nearest admissible model, each parameter measured relative to its own value; itself if it is one.
 
         Parameters
         ----------
         margin : float
             Distance kept from the faces of the set, relative to gamma (default 1e-6).
-
-        Returns
-        -------
-        ColemanHodgdon
-            This model itself if it is admissible.
 
         Raises
         ------
@@ -238,7 +233,7 @@ class ColemanHodgdon(FreeRunning):
         return {"gain": self.c, "a": self.a, "b": self.b}
 
     def simulate(self, u: FloatArray, *, initial_state: float = 0.0, allow_jumps: bool = False) -> FloatArray:
-        """Displacement for a voltage record, exact between samples (u taken monotone there).
+        """Displacement [µm], shape (N,), for a voltage record; exact if u is monotone between samples.
 
         Parameters
         ----------
@@ -248,11 +243,6 @@ class ColemanHodgdon(FreeRunning):
             w_h [µm] at the first sample.
         allow_jumps : bool
             Take jumps between samples as fast monotone changes instead of refusing them.
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Displacement [µm].
 
         Raises
         ------
@@ -267,7 +257,7 @@ class ColemanHodgdon(FreeRunning):
         return x
 
     def invert(self, r: FloatArray, *, initial_state: float = 0.0, allow_jumps: bool = False) -> FloatArray:
-        """Voltage under which the model follows a reference exactly (14), (C7), (C10).
+        """Voltage [V], shape (N,), under which the model follows a reference exactly (14), (C7), (C10).
 
         Parameters
         ----------
@@ -275,11 +265,6 @@ class ColemanHodgdon(FreeRunning):
             Reference displacement [µm].
         initial_state, allow_jumps
             As in `simulate`.
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Voltage [V]; ``simulate(invert(r))`` is r.
 
         Raises
         ------

@@ -145,32 +145,22 @@ class FreeRunning(Model):
         """
 
     def simulate(self, u: FloatArray) -> FloatArray:
-        """Displacement for a voltage record, from rest at 0 V.
+        """Displacement [µm], shape (N,), for a voltage record, from rest at 0 V.
 
         Parameters
         ----------
         u : array_like, shape (N,)
             Voltage [V].
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Displacement [µm].
         """
         raise NotImplementedError
 
     def invert(self, r: FloatArray) -> FloatArray:
-        """Voltage under which the model follows a reference exactly, from rest at 0 V.
+        """Voltage [V], shape (N,), under which the model follows a reference exactly, from rest at 0 V.
 
         Parameters
         ----------
         r : array_like, shape (N,)
             Reference displacement [µm].
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Voltage [V].
 
         Raises
         ------

@@ -204,7 +204,7 @@ class PrandtlIshlinskii(Model):
     def simulate(
         self, u: FloatArray, *, initial_state: FloatArray | None = None, sample_rate: float | None = None
     ) -> FloatArray:
-        """Displacement for a voltage record; exact for a voltage held over each sample.
+        """Displacement [µm], shape (N,), for a voltage record; exact for a voltage held over each sample.
 
         Parameters
         ----------
@@ -215,11 +215,6 @@ class PrandtlIshlinskii(Model):
             relative to their gains [µm]; zeros if not given.
         sample_rate : float, optional
             [Hz]; needed with creep only, and there the model's own if not given.
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Displacement [µm].
 
         Raises
         ------
@@ -234,7 +229,7 @@ class PrandtlIshlinskii(Model):
     def invert(
         self, r: FloatArray, *, initial_state: FloatArray | None = None, sample_rate: float | None = None
     ) -> FloatArray:
-        """Voltage under which the model follows a reference exactly.
+        """Voltage [V], shape (N,), under which the model follows a reference exactly.
 
         Parameters
         ----------
@@ -243,22 +238,15 @@ class PrandtlIshlinskii(Model):
         initial_state, sample_rate
             As in `simulate`.
 
-        Returns
-        -------
-        ndarray, shape (N,)
-            Voltage [V]; ``simulate(invert(r))`` is r.
-
         Raises
         ------
         ValueError
-            If the model is not admissible, r is not a finite 1-D array, no input can leave
-            `initial_state` behind, the sample rate is missing, or the voltage is too large for a number.
+            As in `simulate`, and if the model is not admissible or the voltage is too large for a number.
         """
         if not self.is_admissible:
             raise ValueError(
                 f"the model has no inverse, its lowest slope is {self._rising.min():g} µm/V, its creep gains "
-                f"sum to {self._creep_gains.sum():g}: gain and gain + weights[0] + … + weights[i] must be "
-                "above zero with every bend, and the negative creep gains above -1 in sum"
+                f"sum to {self._creep_gains.sum():g}: {self.remedy}, and negative creep gains above -1 in sum"
             )
         u = array_1d("r", r).copy()
         self._through(_invert, u, initial_state, sample_rate)

@@ -110,31 +110,20 @@ class Preisach(Model):
         """How the model sits in a `SimulatedStage`: see `piezoest.stage.kernel.hysteresis_layouts`."""
         return {name: getattr(self, name) for name in ("gain", "thresholds", "weights", "centre", "width")}
 
-    def simulate(self, u: FloatArray, *, initial_state: FloatArray | None = None) -> FloatArray:
-        """Displacement for a voltage record; exact, whatever the sample rate.
+    def simulate(self, u: FloatArray) -> FloatArray:
+        """Displacement [µm], shape (N,), for a voltage record from rest; exact, whatever the sample rate.
 
         Parameters
         ----------
         u : array_like, shape (N,)
             Voltage [V].
-        initial_state : array_like, shape (n,), optional
-            Play states [V] before the first sample; zeros if not given.
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Displacement [µm].
 
         Raises
         ------
         ValueError
-            If u is not a finite 1-D array or `initial_state` has another length.
+            If u is not a finite 1-D array.
         """
-        x = array_1d("u", u).copy()
-        n = self.thresholds.size
-        y = np.zeros(n) if initial_state is None else array_1d("initial_state", initial_state).copy()
-        if y.size != n:
-            raise ValueError(f"initial_state must hold {n} play states, got {y.size}")
+        x, y = array_1d("u", u).copy(), np.zeros(self.thresholds.size)
         _simulate(x, y, self.gain, self.thresholds, self.weights, self.centre, self.width, self.offset)
         return x
 
