@@ -20,7 +20,6 @@ EXAMPLES: dict[str, Callable[[], Signal]] = {
     "sine": lambda: signals.sine(5.0, 5.0, 3, 10_000.0),
     "amplitude_modulated": lambda: signals.amplitude_modulated(5.0, 5.0, 0.5, 4.0, 10_000.0),
     "multi_amplitude": lambda: signals.multi_amplitude([2.5, 7.5, 0.0, 5.0], 5.0, 2, 10_000.0),
-    "multi_amplitude of sines": lambda: signals.multi_amplitude([1.0, 5.0], 7.0, 3, 1000.0, shape="sine"),
     "filtered_steps": lambda: signals.filtered_steps([1.0, -2.0, 3.0], 0.2, 10_000.0),
     "chirp": lambda: signals.chirp(5.0, 1.0, 20.0, 2.0, 10_000.0),
     "prbs": lambda: signals.prbs(periods=2, sample_rate=10_000.0),
@@ -86,7 +85,7 @@ def test_phase_does_not_drift_when_the_frequency_does_not_divide_the_sample_rate
 
 
 def test_multi_amplitude_changes_at_zero() -> None:
-    r = signals.multi_amplitude([2.5, 7.5], 5.0, [2, 3], FS, smoothing=0.1)
+    r = signals.multi_amplitude([2.5, 7.5], 5.0, [2, 3], FS)
     n = 10_000
     assert (len(r), r.period, r.values[2 * n]) == (5 * n, n, 0.0)
     assert np.max(np.abs(r.values[: 2 * n])) == pytest.approx(2.5 * 0.96875)
@@ -226,7 +225,6 @@ def test_jumps_are_refused_and_nothing_else(name: str) -> None:
         (lambda: signals.triangle(1.0, 5.0, 1, FS, smoothing=1.5), "smoothing"),
         (lambda: signals.triangle(1.0, 5.0, 1, FS, continuity=9), "continuity"),
         (lambda: signals.multi_amplitude([1.0, 2.0], 5.0, [1], FS), "periods"),
-        (lambda: signals.multi_amplitude([1.0], 5.0, 1, FS, shape="saw"), "shape"),  # type: ignore[arg-type]
         (lambda: signals.filtered_steps([1.0, 2.0], [0.1, 0.0], FS), "dwell_times"),
         (lambda: signals.prbs(start="middle"), "start"),  # type: ignore[arg-type]
         (lambda: signals.maximal_length_sequence(40), "bits"),

@@ -147,7 +147,6 @@ def prbs(
     bits: int = 5,
     chip_rate: float = 40.0,
     cutoff: float = 10.0,
-    order: int = 2,
     start: Literal["sequence", "zero"] = "sequence",
 ) -> Signal:
     """Pseudo-random binary signal through a Butterworth low-pass, periodic.
@@ -171,8 +170,6 @@ def prbs(
         Chips per second, Hz.
     cutoff : float
         −3 dB frequency of the low-pass, Hz, below half the sample rate.
-    order : int
-        Of the low-pass.
     start : {"sequence", "zero"}
         Begin with the first chip, in general away from zero, or at the sample nearest to zero on the
         first rise through zero (the same periodic signal, begun later).
@@ -204,7 +201,7 @@ def prbs(
             f"{chip_rate:g} Hz: use {sample_rate / max(chip, 1):.10g}"
         )
     steps = amplitude * np.repeat(maximal_length_sequence(bits), chip)
-    cycle = _periodic_low_pass(steps, cutoff, order, sample_rate)
+    cycle = _periodic_low_pass(steps, cutoff, 2, sample_rate)
     if start == "zero":
         rise = int(np.flatnonzero((cycle <= 0.0) & (np.roll(cycle, -1) > 0.0))[0]) if amplitude else 0
         cycle = np.roll(cycle, -rise)

@@ -12,7 +12,6 @@ from piezoest._checks import FloatArray, array_1d, finite, fraction, integer, no
 from piezoest.signals._arguments import below_half, number_of_samples
 from piezoest.signals.signal import Signal
 
-Shape = Literal["triangle", "sine"]
 HIGHEST_CONTINUITY = 8  # above it the corner's coefficients cancel, and the corner hardly changes
 
 
@@ -81,9 +80,9 @@ def triangle(
     frequency = below_half("frequency", frequency, sample_rate)
     n = number_of_samples("periods", positive("periods", periods) / frequency, sample_rate)
     _, turns = _turns(n, frequency, sample_rate, finite("phase", phase))
-    wave = _unit_wave(turns, "triangle", smoothing, continuity)
+    wave = _unit_triangle(turns, smoothing, continuity)
     if exact_peak:
-        wave /= _unit_wave(np.array([0.25]), "triangle", smoothing, continuity)
+        wave /= _unit_triangle(np.array([0.25]), smoothing, continuity)
     return Signal(amplitude * wave, sample_rate, sample_rate / frequency, "triangle")
 
 
@@ -123,11 +122,8 @@ def amplitude_modulated(
     duration: float,
     sample_rate: float,
     depth: float = 0.5,
-    shape: Shape = "sine",
-    smoothing: float = 0.1,
-    continuity: int = 3,
 ) -> Signal:
-    """Wave whose amplitude swings between `amplitude` and (1 − depth)·`amplitude`.
+    """Sine wave whose amplitude swings between `amplitude` and (1 − depth)·`amplitude`.
 
     The envelope is amplitude·(1 − depth·(1 − cos(2π·modulation_frequency·t))/2); it starts at its largest,
     the wave starts at zero, rising. The period is the common one of wave and envelope, None if their
@@ -145,10 +141,6 @@ def amplitude_modulated(
         Hz.
     depth : float
         0 (no modulation) to 1 (down to nothing).
-    shape : {"sine", "triangle"}
-        Of the wave.
-    smoothing, continuity
-        As in `triangle`.
 
     Raises
     ------
@@ -170,9 +162,8 @@ def amplitude_modulated(
     _, turns = _turns(n, frequency, sample_rate)
     _, envelope_turns = _turns(n, modulation_frequency, sample_rate)
     envelope = amplitude * (1.0 - depth * 0.5 * (1.0 - np.cos(2.0 * np.pi * envelope_turns)))
-    values = envelope * _unit_wave(turns, shape, smoothing, continuity)
     period = _common_period(frequency, modulation_frequency, sample_rate)
-    return Signal(values, sample_rate, period, f"amplitude-modulated {shape}")
+    return Signal(envelope * np.sin(2.0 * np.pi * turns), sample_rate, period, "amplitude-modulated sine")
 
 
 def multi_amplitude(
@@ -180,11 +171,8 @@ def multi_amplitude(
     frequency: float,
     periods: int | Sequence[int],
     sample_rate: float,
-    shape: Shape = "triangle",
-    smoothing: float = 0.1,
-    continuity: int = 3,
 ) -> Signal:
-    """Wave that changes its amplitude at zero crossings.
+    """`triangle` that changes its amplitude at zero crossings.
 
     Each amplitude lasts for a whole number of periods, which begin and end at zero: the values are continuous
     at every change, the slope is not. The period of the signal is that of one wave, although the amplitude
@@ -228,8 +216,8 @@ def multi_amplitude(
     n = number_of_samples("periods", float(counts.sum()) / frequency, sample_rate)
     cycle, turns = _turns(n, frequency, sample_rate)
     segment = np.searchsorted(np.cumsum(counts), cycle, side="right")
-    values = levels[np.minimum(segment, levels.size - 1)] * _unit_wave(turns, shape, smoothing, continuity)
-    return Signal(values, sample_rate, sample_rate / frequency, f"multi-amplitude {shape}")
+    values = levels[np.minimum(segment, levels.size - 1)] * _unit_triangle(turns)
+    return Signal(values, sample_rate, sample_rate / frequency, "multi-amplitude triangle")
 
 
 def two_tone(amplitudes: ArrayLike, frequencies: ArrayLike, duration: float, sample_rate: float) -> Signal:
@@ -319,14 +307,10 @@ def _turns(n: int, frequency: float, sample_rate: float, phase: float = 0.0) -> 
     return cycle, (rest / sample_rate + phase) % 1.0
 
 
-def _unit_wave(turns: FloatArray, shape: Shape, smoothing: float, continuity: int) -> FloatArray:
-    """Return the wave of nominal amplitude 1 at phases in [0, 1), zero and rising at 0."""
+def _unit_triangle(turns: FloatArray, smoothing: float = 0.1, continuity: int = 3) -> FloatArray:
+    """Return the triangle of nominal amplitude 1 at phases in [0, 1), zero and rising at 0."""
     smoothing = fraction("smoothing", smoothing)
     continuity = integer("continuity", continuity, 1, HIGHEST_CONTINUITY)
-    if shape == "sine":
-        return np.asarray(np.sin(2.0 * np.pi * turns))
-    if shape != "triangle":
-        raise ValueError(f"shape must be 'triangle' or 'sine', got {shape!r}")
     # Distances in periods: to the maximum at phase 1/4 (0 to 1/2), and to the nearer extremum (0 to 1/4).
     from_top = np.abs((turns + 0.25) % 1.0 - 0.5)
     distance = np.minimum(from_top, 0.5 - from_top)
