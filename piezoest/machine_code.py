@@ -25,7 +25,7 @@ from typing import Any
 import llvmlite
 import numba
 from numba.core import config
-from numba.core.caching import CompileResultCacheImpl, _Cache
+from numba.core.caching import CompileResultCacheImpl
 from numba.core.serialize import dumps
 from numba.misc.appdirs import user_cache_dir
 
@@ -163,8 +163,8 @@ def _own_source(path: str) -> str:
     return "" if Path(path) in sources() else hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
-class MachineCode(_Cache):  # type: ignore[misc]
-    """Machine code of one function in one file for each signature, which says what it was made of.
+class MachineCode:
+    """Machine code of one function in one file for each signature: what Numba asks of a cache.
 
     A file begins with the fingerprint of what it was made of and what it holds, so that one made of other
     sources, by another Numba or for another processor, and one that is damaged, are all compiled again.
@@ -225,12 +225,3 @@ class MachineCode(_Cache):  # type: ignore[misc]
     def cache_path(self) -> str:
         """Folder of the files."""
         return str(folder())
-
-    def enable(self) -> None:
-        """Do nothing: it always is."""
-
-    def disable(self) -> None:
-        """Do nothing: it always is."""
-
-    def flush(self) -> None:
-        """Do nothing: files that no longer fit are written over."""

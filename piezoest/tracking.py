@@ -98,9 +98,6 @@ class TrackingRecord:
             )
         return self.period
 
-    def _row(self, sample: int) -> FloatArray:
-        return self.parameters[sample // self.update_interval]
-
     def _tail(self, last_periods: int | None) -> slice:
         if last_periods is None:
             return slice(None)
@@ -143,7 +140,8 @@ class TrackingRecord:
         lines = [f"{'period':>6}{'max error [µm]':>16}{'rms error [µm]':>16}{names}"]
         for k in range(self.periods):
             error = self.error[k * period : (k + 1) * period]
-            values = "".join(f"{value:14.5g}" for value in self._row((k + 1) * period - 1)[:shown])
+            row = self.parameters[((k + 1) * period - 1) // self.update_interval]
+            values = "".join(f"{value:14.5g}" for value in row[:shown])
             lines.append(f"{k + 1:6d}{_largest(error):16.4f}{_rms(error):16.4f}{values}")
         return "\n".join(lines)
 

@@ -2,7 +2,6 @@
 
 import operator
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -147,7 +146,7 @@ def test_signal_arithmetic() -> None:
     both, broken = r + 3 * r, signals.sine(1.0, 7.0, 2, 1000.0).repeat(2)
     for result, values, period in (
         (2 * r, 2.0 * r.values, 200.0), (r * np.float64(2.0), 2.0 * r.values, 200.0),
-        (-r, -r.values, 200.0), (r.shifted(3.0), r.values + 3.0, 200.0),
+        (-r, -r.values, 200.0),
         (r + 40.0, r.values + 40.0, 200.0), (40 + r, r.values + 40.0, 200.0),
         (r - np.uint8(3), r.values - 3.0, 200.0), (3.0 - r, 3.0 - r.values, 200.0),
         (r.repeat(3), np.tile(r.values, 3), 200.0), (both, [*r.values, *(3.0 * r.values)], 200.0),
@@ -247,13 +246,11 @@ def test_amplitude_modulated_envelope() -> None:
     assert np.max(np.abs(r.values[4900:5100])) == pytest.approx(1.0, rel=0.01)
 
 
-@pytest.mark.parametrize("method", ["linear", "logarithmic"])
-def test_chirp_sweeps_from_start_to_stop(method: Any) -> None:
-    r = signals.chirp(1.0, 2.0, 32.0, 10.0, 10_000.0, method=method)
+def test_chirp_sweeps_from_start_to_stop() -> None:
+    r = signals.chirp(1.0, 2.0, 32.0, 10.0, 10_000.0)
     rises = np.flatnonzero((r.values[:-1] < 0.0) & (r.values[1:] >= 0.0)) / 10_000.0
     frequency, middle = 1.0 / np.diff(rises), 0.5 * (rises[1:] + rises[:-1])
-    expected = 2.0 + 3.0 * middle if method == "linear" else 2.0 * 16.0 ** (middle / 10.0)
-    np.testing.assert_allclose(frequency, expected, rtol=0.03)
+    np.testing.assert_allclose(frequency, 2.0 + 3.0 * middle, rtol=0.03)
 
 
 def test_filtered_steps_reach_their_levels() -> None:

@@ -30,15 +30,6 @@ def between(p, low, high):
 
 
 @register_jitable
-def segment(p, low, high):
-    """The part of p between two bends, counted from zero; all segments add up to p.
-
-    `PrandtlIshlinskiiRLS` keeps what zero has.
-    """
-    return between(p, low, high) - between(0.0, low, high)
-
-
-@register_jitable
 def bent(p, slope, bends, changes, column, columns):
     """slope p + sum_j changes[j, column] dead_zone(p, bends[j]); `changes` is flat, in row order."""
     x = slope * p

@@ -103,7 +103,8 @@ def sample_regressor(u_0, u_1):
     Returns (du, |du| u, |du|): |u'|u integrates exactly. With the mean displacement w over
     the sample (trapezoidal rule, error of third order in du), w_1 - w_0 =
     -alpha w |du| + beta du + gamma |du| u + delta |du|. The last term carries the offset: with
-    the loop's centre at (u_c, x_c), (1) stays linear with delta = alpha x_c - gamma u_c.
+    the loop's centre at (u_c, x_c), (1) stays linear with delta = alpha x_c - gamma u_c, so that
+    the offset of x = c u + w_h + x_0 is delta/alpha.
     """
     du = u_1 - u_0
     _, rise, moment = regressor(0.0, 0.5 * (u_0 + u_1), du)
@@ -143,9 +144,3 @@ def inverse_increment(w_h, dr, a, b, c):
         decayed = -z * relative_decay(z)  # exp(-z) - 1
         z = z - (z + e * decayed - d) / (1.0 - e * (1.0 + decayed) + _TINY)
     return s * z / a
-
-
-@register_jitable
-def offset_from_rate_parameters(alpha, delta):
-    """Offset x_0 [µm] of x = c u + w_h + x_0, from the parameter delta of |u'| [µm/V]."""
-    return delta / alpha

@@ -29,22 +29,7 @@ def lead_coefficients(
 ) -> dict[str, float]:
     """Settings of `lead_step`: pole, gain of a difference [1/s], c1 [s], c2 [s²].
 
-    Parameters
-    ----------
-    natural_frequency : float
-        omega/(2 pi) [Hz].
-    damping_ratio : float
-        zeta, zero or more.
-    delay : float
-        [s].
-    smoothing : float
-        Time constant of the smoothed difference [s].
-    dt : float
-        Length of a sample [s].
-
-    Returns
-    -------
-    dict of float
+    omega/(2 pi) [Hz], zeta, delay [s], time constant of the smoothed difference [s], length of a sample [s].
     """
     omega = 2.0 * math.pi * natural_frequency
     lag, damped = delay - 0.5 * dt, 2.0 * damping_ratio / omega

@@ -15,19 +15,8 @@ from numpy.typing import NDArray
 def mechanics_coefficients(natural_frequency: float, damping_ratio: float, dt: float) -> NDArray[np.float64]:
     """Exact discretisation over `dt` [s] of (5) for f held: (a11, a12, a21, a22, b1, b2).
 
-    Parameters
-    ----------
-    natural_frequency : float
-        omega/(2 pi) [Hz].
-    damping_ratio : float
-        zeta, zero or more.
-    dt : float
-        Length of the step [s].
-
-    Returns
-    -------
-    ndarray, shape (6,)
-        The step is x <- a11 x + a12 v + b1 f, v <- a21 x + a22 v + b2 f, v in µm/s.
+    `natural_frequency` is omega/(2 pi) [Hz], `damping_ratio` zeta, zero or more. The step is
+    x <- a11 x + a12 v + b1 f, v <- a21 x + a22 v + b2 f, with v in µm/s.
     """
     omega = 2.0 * math.pi * natural_frequency
     # exp(A dt) = e^(-zeta omega dt) (cosh(q) I + sinh(q)/q (A + zeta omega I) dt), where q

@@ -123,13 +123,7 @@ class CompiledEstimator(EstimatorBase):
         return int(self._row.size)
 
     def theta_of(self, rows: FloatArray) -> FloatArray:
-        """Parameters (…, n) of rows of that history.
-
-        Parameters
-        ----------
-        rows : ndarray, shape (…, row_size)
-            As ``kernel.write_row`` wrote them.
-        """
+        """Parameters (…, n) of rows (…, row_size) of that history, as ``kernel.write_row`` wrote them."""
         return rows
 
     @property

@@ -72,9 +72,6 @@ def settings_layout(n: int, *, hysteretic: bool) -> Layout:
     )  # fmt: skip
 
 
-# ---------------------------------------------------------------- one sample
-
-
 @inlined
 def from_first_voltage(state: Any, u: Any) -> Any:
     """Voltage less the first one, where there is an offset."""
@@ -250,9 +247,6 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     state.last = UPDATED
 
 
-# ---------------------------------------------------------------- the model handed out
-
-
 @inlined
 def _offset(state: Any, settings: Any, slope: Any) -> Any:
     """Offset of the loop of this slope [µm]; the start's where it is not estimated."""
@@ -314,9 +308,6 @@ def proposed(state: Any, settings: Any, model: Any) -> None:
 def write_model(state: Any, settings: Any, model: Any) -> float:
     """Write the model as known now into settings of its inverse; what became of them, see `model_writing`."""
     return write_loop(state, settings, settings.least is not None, model)
-
-
-# ---------------------------------------------------------------- what loops keep of a sample
 
 
 @inlined

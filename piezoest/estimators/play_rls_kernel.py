@@ -207,9 +207,6 @@ def _regrid(law: Any, plays: Any, window: Any, settings: Any, half_width: Any) -
     _constrain(law, len(settings.relative_bends) + 1)
 
 
-# ---------------------------------------------------------------- samples
-
-
 @register_jitable
 def start(state: Any, settings: Any) -> None:
     """Grid and parameters in use of a state that is new."""

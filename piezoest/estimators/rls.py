@@ -250,7 +250,7 @@ class HysteresisRLS(Freezable):
         base, or ``errors=False``, they are those of `P`.
         """
         if "errors" not in self._followed or self._state["law"]["updates"] == 0.0:
-            return np.sqrt(np.fmax(np.diag(self.P), 0.0))
+            return super().standard_errors
         C = self._state["error_covariance"]
         pole = float(self._settings["low_pole"])
         if self._settings["differenced"]:

@@ -85,9 +85,6 @@ def settings_layout(n: int, *, has_loop: bool, high_pass: bool, policies: Field)
     )  # fmt: skip
 
 
-# ---------------------------------------------------------------- one sample
-
-
 @inlined
 def _decay(state: Any, settings: Any) -> Any:
     """alpha [1/V] as estimated, kept to what its model may have."""
@@ -187,9 +184,6 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     _adapt(state, settings, z)
 
 
-# ---------------------------------------------------------------- the model
-
-
 @register_jitable
 def is_admissible(theta: Any, scale: Any) -> Any:
     """1.0 if the Coleman-Hodgdon parameters theta need not be moved."""
@@ -232,7 +226,7 @@ def _offset(state: Any, settings: Any, theta: Any) -> Any:
         return settings.start.offset
     c = theta[2] / theta[0]
     origin = state.centre.x - c * state.centre.u
-    offset = equations.offset_from_rate_parameters(theta[0], theta[3])
+    offset = theta[3] / theta[0]
     trust = trust_in_levels(state, settings)
     if trust > 0.0:
         levels = 0.0  # the start's, until a whole period is known
@@ -282,9 +276,6 @@ def proposed(state: Any, settings: Any, model: Any) -> None:
 def write_model(state: Any, settings: Any, model: Any) -> float:
     """Write the model as known now into settings of its inverse; what became of them, see `model_writing`."""
     return write_loop(state, settings, settings.loop is not None, model)
-
-
-# ---------------------------------------------------------------- what loops keep of a sample
 
 
 @inlined

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from piezoest._checks import FloatArray, fields, finite, instance
-from piezoest.layout import ABSENT, Kind, Record, leaves
+from piezoest.layout import Kind, Record, by_name, leaves
 
 # Least argument other than zero, and the reciprocal of the largest.
 SMALLEST_ARGUMENT = 1e-20
@@ -45,7 +45,7 @@ def no_more_than(samples: Any, *counters: Any) -> Rule:
 
 def _read(saved: Any, layout: Record, state: Any, path: str) -> None:
     """Write saved numbers into a state, if names and shapes are its own."""
-    kept = [name for name, field in layout.fields if field != ABSENT and not _is_idle(field)]
+    kept = by_name(layout, state)
     fields(path, saved, kept)
     for name in kept:
         field, value = layout.by_name[name], saved[name]
@@ -53,10 +53,6 @@ def _read(saved: Any, layout: Record, state: Any, path: str) -> None:
             _read(value, field, state[name], f"{path}[{name!r}]")
         else:
             state[name] = _as_numbers(value, state[name].shape, f"{path}[{name!r}]")
-
-
-def _is_idle(field: Any) -> bool:
-    return bool(getattr(getattr(field, "kind", field), "idle", False))
 
 
 def _as_numbers(value: Any, shape: tuple[int, ...], path: str) -> Any:

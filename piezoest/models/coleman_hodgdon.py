@@ -226,8 +226,6 @@ class ColemanHodgdon(FreeRunning):
         """(a, b, c) (4)."""
         return self.a, self.b, self.c
 
-    # ------------------------------------------------------------ forward and inverse
-
     def stage_settings(self) -> dict[str, Any]:
         """How the model sits in a `SimulatedStage`: see `piezoest.stage.kernel.hysteresis_layouts`."""
         return {"gain": self.c, "a": self.a, "b": self.b}

@@ -40,9 +40,9 @@ class Preisach(Model):
 
     Notes
     -----
-    Made for simulation: it has no `invert`. `theta` holds gain, thresholds, weights, centre and
-    width. Sources: I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991; M.
-    Brokate, J. Sprekels, Hysteresis and Phase Transitions, Springer 1996, sec. 2.4.
+    Made for simulation: it has no `invert`, and `theta` is empty. Sources: I. D. Mayergoyz, Mathematical
+    Models of Hysteresis, Springer 1991; M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, Springer
+    1996, sec. 2.4.
 
     Examples
     --------
@@ -82,24 +82,6 @@ class Preisach(Model):
             f"Preisach(gain={self.gain:.4g}, {self.thresholds.size} thresholds, centre={self.centre:.4g}, "
             f"width={self.width:.4g}, offset={self.offset:.4g})"
         )
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Names of the entries of `theta`."""
-        indices = range(self.thresholds.size)
-        plays = (*(f"thresholds[{i}]" for i in indices), *(f"weights[{i}]" for i in indices))
-        return ("gain", *plays, "centre", "width")
-
-    @property
-    def parameter_units(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Units of the entries of `theta`."""
-        n = self.thresholds.size
-        return ("µm/V",) + ("V",) * n + ("µm/V",) * n + ("V", "V")
-
-    @property
-    def theta(self) -> FloatArray:
-        """Gain, thresholds, weights, centre and width in one vector, shape (3 + 2n,)."""
-        return np.concatenate(([self.gain], self.thresholds, self.weights, [self.centre, self.width]))
 
     @property
     def is_admissible(self) -> bool:

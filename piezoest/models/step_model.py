@@ -174,9 +174,6 @@ class _Inverse:
         return state, record(gain=FIXED, offset=NUMBER, constants=constants)
 
 
-# ---------------------------------------------------------------- compiled
-
-
 @register_jitable
 def deform(own: Any, settings: Any, u: Any) -> Any:
     """Displacement without offset after the next voltage."""

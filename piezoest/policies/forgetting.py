@@ -23,6 +23,11 @@ def check_memory(memory: float, unit: str = "period") -> None:
         raise ValueError(f"unit must be 'period' or 'second', got {unit!r}")
 
 
+def weight_over(step: float, memory: float) -> float:
+    """Weight that the past keeps over a step: exp(-step/memory), at least 0.001."""
+    return max(float(np.exp(-step / memory)), LEAST_WEIGHT)
+
+
 @dataclass(frozen=True, slots=True)
 class Forgetting(Policy):
     """Exponential forgetting: data of age t weigh exp(-t / memory) (A4).
@@ -46,19 +51,9 @@ class Forgetting(Policy):
         if self.memory != np.inf:
             positive("memory", self.memory)
 
-    def factor(self, step: float) -> float:
-        """Weight that the past keeps over one step: exp(-step/memory), at least 0.001.
-
-        Parameters
-        ----------
-        step : float
-            Time between samples, in the unit of `memory`.
-        """
-        return max(float(np.exp(-step / self.memory)), LEAST_WEIGHT)
-
     def law(self, at: Conditions) -> dict[str, float]:
         """Factor over a step, and rate, of the law."""
-        return {"forgetting": self.factor(at.step), "rate": 1.0 / self.memory}
+        return {"forgetting": weight_over(at.step, self.memory), "rate": 1.0 / self.memory}
 
 
 class InUnits:

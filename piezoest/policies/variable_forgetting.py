@@ -7,7 +7,7 @@ from piezoest._checks import fraction, positive
 from piezoest.compile import inlined
 from piezoest.equations import innovation_energy, least_squares
 from piezoest.policies.base import Conditions, Policy
-from piezoest.policies.forgetting import Forgetting, InUnits, Unit, check_memory
+from piezoest.policies.forgetting import InUnits, Unit, check_memory, weight_over
 from piezoest.policies.periodic_forgetting import weight
 
 
@@ -48,7 +48,7 @@ class VariableForgetting(InUnits, Policy):  # type: ignore[override]
 
     def numbers(self, at: Conditions) -> dict[str, float]:
         """Memories in periods, usual and shortest, zero where they are in time; and the least factor then."""
-        least = Forgetting(self.shortest * self.memory).factor(at.step)
+        least = weight_over(at.step, self.shortest * self.memory)
         return {"periods": self.periods, "shortest": self.shortest, "least": least}
 
 

@@ -73,13 +73,12 @@ def filtered_steps(
     dwell_times: ArrayLike,
     sample_rate: float,
     cutoff: float = 10.0,
-    order: int = 2,
     start: float = 0.0,
     periods: int | None = None,
 ) -> Signal:
     """Low-pass a sequence of steps with a Butterworth filter.
 
-    The second-order filter overshoots each step by 4.3 %; order 1 does not overshoot.
+    The filter is of second order; it overshoots each step by 4.3 %.
 
     Parameters
     ----------
@@ -91,8 +90,6 @@ def filtered_steps(
         Hz.
     cutoff : float
         −3 dB frequency, Hz, below half the sample rate.
-    order : int
-        Of the filter.
     start : float
         Level at which the filter rests before the first step, µm; without effect if `periods` is given.
     periods : int, optional
@@ -133,10 +130,10 @@ def filtered_steps(
         from scipy.signal import sosfilt
 
         start = finite("start", start)
-        values = start + sosfilt(_butterworth(cutoff, order, sample_rate), steps - start)
+        values = start + sosfilt(_butterworth(cutoff, sample_rate), steps - start)
         return Signal(values, sample_rate, None, "filtered steps")
     n = integer("periods", periods, 1)
-    cycle = _periodic_low_pass(steps, cutoff, order, sample_rate)
+    cycle = _periodic_low_pass(steps, cutoff, sample_rate)
     return Signal(np.tile(cycle, n), sample_rate, float(steps.size), "filtered steps")
 
 
@@ -201,7 +198,7 @@ def prbs(
             f"{chip_rate:g} Hz: use {sample_rate / max(chip, 1):.10g}"
         )
     steps = amplitude * np.repeat(maximal_length_sequence(bits), chip)
-    cycle = _periodic_low_pass(steps, cutoff, 2, sample_rate)
+    cycle = _periodic_low_pass(steps, cutoff, sample_rate)
     if start == "zero":
         rise = int(np.flatnonzero((cycle <= 0.0) & (np.roll(cycle, -1) > 0.0))[0]) if amplitude else 0
         cycle = np.roll(cycle, -rise)
@@ -291,7 +288,7 @@ def random_walk(
     return Signal(curve * (amplitude / np.max(np.abs(curve))), sample_rate, float(n), "random walk")
 
 
-def _periodic_low_pass(cycle: FloatArray, cutoff: float, order: int, sample_rate: float) -> FloatArray:
+def _periodic_low_pass(cycle: FloatArray, cutoff: float, sample_rate: float) -> FloatArray:
     """One period of the filter's response to `cycle` repeated for ever.
 
     The state at the start of a period is the one that the filter has again at its end: z = A^N z + z₁, with
@@ -299,7 +296,7 @@ def _periodic_low_pass(cycle: FloatArray, cutoff: float, order: int, sample_rate
     """
     from scipy.signal import sosfilt
 
-    sections = _butterworth(cutoff, order, sample_rate)
+    sections = _butterworth(cutoff, sample_rate)
     shape = (sections.shape[0], 2)
     silence = np.zeros_like(cycle)
     forced = sosfilt(sections, cycle, zi=np.zeros(shape))[1].ravel()
@@ -308,9 +305,8 @@ def _periodic_low_pass(cycle: FloatArray, cutoff: float, order: int, sample_rate
     return np.asarray(sosfilt(sections, cycle, zi=state.reshape(shape))[0], dtype=np.float64)
 
 
-def _butterworth(cutoff: float, order: int, sample_rate: float) -> FloatArray:
+def _butterworth(cutoff: float, sample_rate: float) -> FloatArray:
     from scipy.signal import butter
 
     cutoff = below_half("cutoff", cutoff, sample_rate)
-    order = integer("order", order, 1)
-    return np.asarray(butter(order, cutoff, fs=sample_rate, output="sos"), dtype=np.float64)
+    return np.asarray(butter(2, cutoff, fs=sample_rate, output="sos"), dtype=np.float64)

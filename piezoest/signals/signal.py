@@ -26,9 +26,8 @@ class Signal:
     """Samples with a sample rate, and a period if there is one.
 
     Behaves as an array where one is wanted (`np.asarray(signal)`, `signal - x`, slices, iteration in plain
-    floats). `signal.then(other)` and `signal + other` append; `2 * signal` scales; `signal + 40.0`, as
-    `signal.shifted(40.0)`, adds an offset; `signal.with_lead_in(0.2)` begins at rest. Signals compare by
-    identity.
+    floats). `signal.then(other)` and `signal + other` append; `2 * signal` scales; `signal + 40.0` adds
+    an offset; `signal.with_lead_in(0.2)` begins at rest. Signals compare by identity.
 
     Parameters
     ----------
@@ -184,9 +183,9 @@ class Signal:
         return Signal(np.concatenate([way, self.values]), self.sample_rate, self.period, self.name)
 
     def __add__(self, other: object) -> Signal:
-        """Append another signal (`then`), or add a number to every value (`shifted`)."""
+        """Append another signal (`then`), or add a number to every value."""
         if isinstance(other, Real):
-            return self.shifted(finite("offset", other))
+            return Signal(self.values + finite("offset", other), self.sample_rate, self.period, self.name)
         if not isinstance(other, Signal):
             return NotImplemented
         return self.then(other)
@@ -195,15 +194,11 @@ class Signal:
 
     def __sub__(self, offset: object) -> Signal:
         """Subtract a number from every value."""
-        if not isinstance(offset, Real):
-            return NotImplemented
-        return self.shifted(-finite("offset", offset))
+        return self + -finite("offset", offset) if isinstance(offset, Real) else NotImplemented
 
     def __rsub__(self, offset: object) -> Signal:
         """Subtract every value from a number; `np.float64(2) - signal` is NumPy's, a plain array."""
-        if not isinstance(offset, Real):
-            return NotImplemented
-        return -self + offset
+        return -self + offset if isinstance(offset, Real) else NotImplemented
 
     def __mul__(self, factor: object) -> Signal:
         """Scale by a number; `np.float64(2) * signal` is NumPy's product, a plain array."""
@@ -215,21 +210,6 @@ class Signal:
 
     def __neg__(self) -> Signal:
         return self * -1.0
-
-    def shifted(self, offset: float) -> Signal:
-        """Return the signal plus a constant.
-
-        Parameters
-        ----------
-        offset : float
-            Added to every value, in its unit.
-
-        Raises
-        ------
-        ValueError
-            If `offset` is not a finite number.
-        """
-        return Signal(self.values + finite("offset", offset), self.sample_rate, self.period, self.name)
 
 
 def check_continuity(values: ArrayLike, sample_rate: float | None = None, name: str = "signal") -> None:

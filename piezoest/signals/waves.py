@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Literal
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -188,10 +187,6 @@ def multi_amplitude(
         Whole periods for each amplitude.
     sample_rate : float
         Hz.
-    shape : {"triangle", "sine"}
-        Of the wave.
-    smoothing, continuity
-        As in `triangle`.
 
     Raises
     ------
@@ -199,13 +194,9 @@ def multi_amplitude(
         If an argument is out of its range, or `periods` and `amplitudes` differ in length.
     """
     levels = array_1d("amplitudes", amplitudes, minimum_length=1)
-    if np.any(levels < 0.0):
-        worst = int(levels.argmin())
-        raise ValueError(f"amplitudes must be zero or more, got {levels[worst]:g} at index {worst}")
-    if np.ndim(periods) == 0:
-        counts = np.full(levels.size, integer("periods", periods, 1))
-    else:
-        counts = np.array([integer(f"periods[{i}]", count, 1) for i, count in enumerate(np.asarray(periods))])
+    non_negative("amplitudes", levels.min())
+    given = np.full(levels.size, periods) if np.ndim(periods) == 0 else np.asarray(periods)
+    counts = np.array([integer("periods", count, 1) for count in given])
     if counts.size != levels.size:
         raise ValueError(
             f"periods must have one entry for each of the {levels.size} amplitudes, got {counts.size}: "
@@ -258,9 +249,8 @@ def chirp(
     stop_frequency: float,
     duration: float,
     sample_rate: float,
-    method: Literal["linear", "logarithmic"] = "linear",
 ) -> Signal:
-    """Sine whose frequency runs from `start_frequency` to `stop_frequency`, without a period.
+    """Sine whose frequency runs evenly from `start_frequency` to `stop_frequency`, without a period.
 
     Parameters
     ----------
@@ -270,8 +260,6 @@ def chirp(
         Hz, below half the sample rate, in either order.
     duration, sample_rate
         As in `amplitude_modulated`.
-    method : {"linear", "logarithmic"}
-        The same number of hertz, or of octaves, in every second.
 
     Raises
     ------
@@ -282,7 +270,7 @@ def chirp(
     --------
     >>> import piezoest as pz
     >>> pz.signals.chirp(5.0, start_frequency=1.0, stop_frequency=50.0, duration=2.0, sample_rate=1000.0)
-    Signal('linear chirp', 2000 samples at 1000 Hz, amplitude 5)
+    Signal('chirp', 2000 samples at 1000 Hz, amplitude 5)
     """
     amplitude = non_negative("amplitude", amplitude)
     sample_rate = positive("sample_rate", sample_rate)
@@ -290,14 +278,8 @@ def chirp(
     stop = below_half("stop_frequency", stop_frequency, sample_rate)
     duration = positive("duration", duration)
     t = np.arange(number_of_samples("duration", duration, sample_rate)) / sample_rate
-    if method not in ("linear", "logarithmic"):
-        raise ValueError(f"method must be 'linear' or 'logarithmic', got {method!r}")
-    if method == "linear" or start == stop:
-        turns = start * t + (stop - start) * t * t / (2.0 * duration)
-    else:
-        rate = np.log(stop / start) / duration
-        turns = start * np.expm1(rate * t) / rate
-    return Signal(amplitude * np.sin(2.0 * np.pi * (turns % 1.0)), sample_rate, None, f"{method} chirp")
+    turns = start * t + (stop - start) * t * t / (2.0 * duration)
+    return Signal(amplitude * np.sin(2.0 * np.pi * (turns % 1.0)), sample_rate, None, "chirp")
 
 
 def _turns(n: int, frequency: float, sample_rate: float, phase: float = 0.0) -> tuple[FloatArray, FloatArray]:
