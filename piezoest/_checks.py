@@ -186,15 +186,8 @@ def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: 
         raise ValueError(f"{name} must be an array, got None")
     array = as_floats(name, value)
     if array.ndim != 1:
-        shape = array.shape
-        hint = ""
-        if len(shape) == 2 and shape[1] == 1:
-            hint = f": pass {name}[:, 0]"
-        elif len(shape) == 2 and shape[0] == 1:
-            hint = f": pass {name}[0]"
-        elif len(shape) == 0:
-            hint = ": use step() for single samples, or pass an array"
-        raise ValueError(f"{name} must have shape (N,), got {shape}{hint}")
+        hint = "use step() for single samples" if array.ndim == 0 else f"pass {name}.ravel(), or a part of it"
+        raise ValueError(f"{name} must have shape (N,), got {array.shape}: {hint}")
     if array.size < minimum_length:
         raise ValueError(f"{name} needs at least {minimum_length} samples, got {array.size}")
     if not allow_nan:

@@ -70,13 +70,10 @@ class Compensator(Copied):
         sample_rate: float | None = None,
         hand_over: HandOver = "path",
     ) -> None:
-        if limits is None:
-            limits = VoltageLimits()
-        elif not isinstance(limits, VoltageLimits):
-            raise ValueError(f"limits must be VoltageLimits(minimum, maximum), got {limits!r}")
-        self._limits = limits
+        limits = instance("limits", limits, VoltageLimits | None, "VoltageLimits(minimum, maximum)")
+        self._limits: VoltageLimits = limits or VoltageLimits()
         self._sample_rate = (
-            limits.sample_rate if sample_rate is None else positive("sample_rate", sample_rate)
+            self._limits.sample_rate if sample_rate is None else positive("sample_rate", sample_rate)
         )
         transfer_samples = integer("transfer_samples", transfer_samples)
         if method not in ("closed-form", "bogacki-shampine"):
@@ -84,9 +81,7 @@ class Compensator(Copied):
         if hand_over not in ("path", "place"):
             raise ValueError(f"hand_over must be 'path' or 'place', got {hand_over!r}")
         self._options = {
-            "minimum": limits.minimum,
-            "maximum": limits.maximum,
-            "largest_step": limits.largest_step,
+            **{name: getattr(self._limits, name) for name in ("minimum", "maximum", "largest_step")},
             "decay": np.exp(-1.0 / transfer_samples) if transfer_samples else 0.0,
             "integrated": method == "bogacki-shampine",
             "by_path": hand_over == "path",
@@ -254,14 +249,8 @@ class Compensator(Copied):
     @property
     def status(self) -> CompensatorStatus:
         """What happened to the samples so far."""
-        state = self._state
-        return CompensatorStatus(
-            samples=int(state["samples"]),
-            saturated=int(state["saturated"]),
-            slewed=int(state["slewed"]),
-            missing=int(state["missing"]),
-            projected=self._projected,
-        )
+        counts = {name: int(self._state[name]) for name in ("samples", "saturated", "slewed", "missing")}
+        return CompensatorStatus(**counts, projected=self._projected)
 
     def step(self, r: float | None) -> float:
         """Voltage [V] for the next sample of the reference, within the limits.

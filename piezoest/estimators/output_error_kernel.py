@@ -172,10 +172,7 @@ def start_covariance(P: Any, start_b: Any, spread: Any) -> None:
     equations.walk_covariance(start_b, 1.0, Q)
     for i in range(SIZE):
         for j in range(SIZE):
-            P[i, j] = 0.0
-    for i in range(3):
-        for j in range(3):
-            P[i, j] = Q[i, j] * spread
+            P[i, j] = Q[i, j] * spread if i < 3 and j < 3 else 0.0
 
 
 @register_jitable

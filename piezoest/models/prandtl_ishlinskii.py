@@ -111,11 +111,6 @@ class PrandtlIshlinskii(Model):
         )
 
     @property
-    def is_plain(self) -> bool:
-        """Whether it has neither creep nor bends."""
-        return self.creep is None and self.bends.size == 0
-
-    @property
     def parameter_names(self) -> tuple[str, ...]:  # type: ignore[override]
         """Names of the entries of `theta`."""
         indices, terms = range(self.thresholds.size), range(self._creep_gains.size)
@@ -195,7 +190,7 @@ class PrandtlIshlinskii(Model):
         ValueError
             If it has bends, or creep of its own.
         """
-        if not self.is_plain:
+        if self.creep is not None or self.bends.size:
             raise ValueError(
                 "hysteresis must have neither bends nor creep of its own: pass creep=model.creep to the stage"
             )

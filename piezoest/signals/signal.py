@@ -215,19 +215,12 @@ class Signal:
 def check_continuity(values: ArrayLike, sample_rate: float | None = None, name: str = "signal") -> None:
     """Refuse samples with jumps, which the Coleman-Hodgdon model cannot take.
 
-    The model is defined for continuous inputs with a bounded derivative (paper, below (1)): "not unfiltered
-    steps and square-waves". Samples are never continuous, so the test is one of proportion. The increment
-    between two samples is a jump if it is
-
-    - larger than 5 % of the peak-to-peak range, and
-    - alone: fewer than three of the five increments before it and the five after it reach a twentieth
-      of its size (at the ends of the record: fewer than all, if there are only one or two).
-
-    A rise therefore has to spread over at least four samples. Coarse sampling passes, because there
-    neighbouring increments are alike: a sine of 50 samples a period, even of 5, or white noise. So do a
-    dwell followed by a ramp and a quantised slow signal (steps below 5 % of the range). Square waves,
-    staircases of up to 20 steps, unfiltered PRBS and single-sample spikes are refused: the increments
-    around theirs are zero or small. Where the signal starts from is not judged.
+    The model is defined for continuous inputs with a bounded derivative (paper, below (1)). Samples are never
+    continuous, so the test is one of proportion: the increment between two samples is a jump if it is larger
+    than 5 % of the peak-to-peak range, and alone. That is, fewer than three of the five increments before it
+    and the five after it reach a twentieth of its size. Coarse sampling passes, also white noise, because
+    there neighbouring increments are alike. Square waves, staircases of up to 20 steps, unfiltered PRBS and
+    spikes are refused. Where the signal starts from is not judged.
 
     Parameters
     ----------

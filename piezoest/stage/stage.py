@@ -243,7 +243,7 @@ class SimulatedStage(Copied):
             factor = _values("gain_schedule", "factor", self._schedule, times)
         if self._temperature is not None:
             temperature = _values("temperature", "temperature", self._temperature, times)
-            g, shape = self._temperature_law.factors(temperature)
+            g, shape = self._temperature_law._factors(temperature)
             factor = factor * g
         return factor, shape
 

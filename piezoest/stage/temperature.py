@@ -58,14 +58,8 @@ class TemperatureLaw:
         for name in ("reference", "gain", "hysteresis"):
             object.__setattr__(self, name, finite(name, getattr(self, name)))
 
-    def factors(self, temperature: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Factors g and h, each of shape (N,).
-
-        Parameters
-        ----------
-        temperature : ndarray, shape (N,)
-            [°C].
-        """
+    def _factors(self, temperature: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Factors g and h for temperatures (N,) [°C]."""
         rates = self.gain, self.hysteresis
         g, h = (thermal_factor(temperature, self.reference, rate) for rate in rates)
         return g, h

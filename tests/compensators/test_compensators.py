@@ -130,7 +130,7 @@ CREEPING = pz.PrandtlIshlinskii(0.1, [1.0], [0.2], creep=pz.Creep([0.1], [1.0]))
     [
         (made(pz.VoltageLimits, 1.0, -1.0), "minimum must be below maximum"),
         (made(pz.VoltageLimits, 0.0, "100"), "maximum must be a number of volts, got '100'"),
-        (made(limits=(0, 5)), r"limits must be VoltageLimits\(minimum, maximum\), got \(0, 5\)"),
+        (made(limits=(0, 5)), r"limits must be VoltageLimits\(minimum, maximum\), got tuple"),
         (made(pz.InverseCompensator, pz.ColemanHodgdon(0.021, 0.147, 0.02)), "nearest_admissible"),
         (made(pz.InverseCompensator, CREEPING), "sample_rate"),
         (made(pz.LinearCompensator, pz.LinearGain(0.0)), "its gain must not be zero"),
