@@ -212,6 +212,11 @@ class OutputErrorRLS(Freezable):
         return (*self._initial.parameter_names, "offset")
 
     @property
+    def decays(self) -> FloatArray:
+        """Decays of the bank [1/V], shape (members,)."""
+        return np.array(self._settings["decays"])
+
+    @property
     def K(self) -> FloatArray:
         """Last gain, in `theta` per innovation, shape (4,)."""
         return np.asarray(self._jacobian(self._row) @ self._state["law"]["gain"] / self._initial.c)

@@ -93,7 +93,7 @@ def test_refuses_wrong_arguments(kind: Any) -> None:
     u, x = record(0.2)
     estimator = kind(RATE)
     for given, words in (
-        ((u[:, None], x), r"u must have shape \(N,\).*pass u\[:, 0\]"),
+        ((u[:, None], x), r"u must have shape \(N,\).*pass u\.ravel\(\)"),
         ((u, x.reshape(2, -1)), r"x must have shape \(N,\)"),
         ((1.0, x), r"u must have shape \(N,\)"),
         ((u, x[:-1]), "u and x must have the same length"),
