@@ -16,11 +16,13 @@ the function that comes back goes by just these arguments, unchecked, which is f
 
 import functools
 import inspect
+import re
 from collections.abc import Callable
 from typing import Annotated, Any, TypeVar
 
 from numba import njit, types
 from numba.core import config
+from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
 from numba.extending import register_jitable
 
@@ -62,6 +64,21 @@ def inlined(function: Function) -> Function:
     return register_jitable(forceinline=True)(function)
 
 
+def _cause(message: str) -> str:
+    """The innermost reason, with its place, of a message of Numba, which nests those of all callers."""
+    plain = re.sub(r"\x1b\[\d*m", "", message)
+    found = re.search(r'([^\n]+)\n\s*\n\s*File "([^"]+)", line (\d+):', plain)
+    if found is None:
+        return plain
+    reason, file, line = found.groups()
+    hint = (
+        " (None, for it is absent from the layout: ask `is None` first)"
+        if re.search(r"\bnone\b", reason)
+        else ""
+    )
+    return f"{reason.strip()}{hint}, {file}, line {line}"
+
+
 def is_marked(function: Any) -> bool:
     """Whether compiled code can call a function: whether `inlined` or `register_jitable` marks it."""
     context: Any = cpu_target.typing_context
@@ -75,13 +92,15 @@ def is_marked(function: Any) -> bool:
 class Compiled:
     """A function that is compiled for the layouts of its records, see `compiled`."""
 
-    __name__: str
-
     def __init__(self, function: Callable[..., Any]) -> None:
         if "<locals>" in function.__qualname__:
             raise TypeError(f"{function.__qualname__} must stand at module level to be compiled and kept")
         self.function = function
-        functools.update_wrapper(self, function)
+        self.__name__, self.__doc__, self.__module__ = (
+            function.__name__,
+            function.__doc__,
+            function.__module__,
+        )
         self._arguments = [
             _ARGUMENTS.get(parameter.annotation)
             for parameter in inspect.signature(function).parameters.values()
@@ -106,7 +125,11 @@ class Compiled:
         if _config.DISABLE_JIT:
             return functools.partial(self._as_python, layouts)
         kinds = [record_type(next(records)) if kind is None else kind for kind in self._arguments]
-        return self.dispatcher.compile(tuple(kinds))
+        try:
+            return self.dispatcher.compile(tuple(kinds))
+        except TypingError as error:
+            error.add_note(f"{self.__name__} is not compiled: {_cause(str(error))}")
+            raise
 
     def _as_python(self, layouts: tuple[named.Record, ...], *arguments: Any) -> Any:
         records = iter(layouts)

@@ -2,6 +2,7 @@
 
 import operator
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ EXAMPLES: dict[str, Callable[[], Signal]] = {
     "sine": lambda: signals.sine(5.0, 5.0, 3, 10_000.0),
     "amplitude_modulated": lambda: signals.amplitude_modulated(5.0, 5.0, 0.5, 4.0, 10_000.0),
     "multi_amplitude": lambda: signals.multi_amplitude([2.5, 7.5, 0.0, 5.0], 5.0, 2, 10_000.0),
+    "multi_amplitude of sines": lambda: signals.multi_amplitude([1.0, 5.0], 7.0, 3, 1000.0, shape="sine"),
     "filtered_steps": lambda: signals.filtered_steps([1.0, -2.0, 3.0], 0.2, 10_000.0),
     "chirp": lambda: signals.chirp(5.0, 1.0, 20.0, 2.0, 10_000.0),
     "prbs": lambda: signals.prbs(periods=2, sample_rate=10_000.0),
@@ -84,7 +86,7 @@ def test_phase_does_not_drift_when_the_frequency_does_not_divide_the_sample_rate
 
 
 def test_multi_amplitude_changes_at_zero() -> None:
-    r = signals.multi_amplitude([2.5, 7.5], 5.0, [2, 3], FS)
+    r = signals.multi_amplitude([2.5, 7.5], 5.0, [2, 3], FS, smoothing=0.1)
     n = 10_000
     assert (len(r), r.period, r.values[2 * n]) == (5 * n, n, 0.0)
     assert np.max(np.abs(r.values[: 2 * n])) == pytest.approx(2.5 * 0.96875)
@@ -146,7 +148,7 @@ def test_signal_arithmetic() -> None:
     both, broken = r + 3 * r, signals.sine(1.0, 7.0, 2, 1000.0).repeat(2)
     for result, values, period in (
         (2 * r, 2.0 * r.values, 200.0), (r * np.float64(2.0), 2.0 * r.values, 200.0),
-        (-r, -r.values, 200.0),
+        (-r, -r.values, 200.0), (r.shifted(3.0), r.values + 3.0, 200.0),
         (r + 40.0, r.values + 40.0, 200.0), (40 + r, r.values + 40.0, 200.0),
         (r - np.uint8(3), r.values - 3.0, 200.0), (3.0 - r, 3.0 - r.values, 200.0),
         (r.repeat(3), np.tile(r.values, 3), 200.0), (both, [*r.values, *(3.0 * r.values)], 200.0),
@@ -224,6 +226,7 @@ def test_jumps_are_refused_and_nothing_else(name: str) -> None:
         (lambda: signals.triangle(1.0, 5.0, 1, FS, smoothing=1.5), "smoothing"),
         (lambda: signals.triangle(1.0, 5.0, 1, FS, continuity=9), "continuity"),
         (lambda: signals.multi_amplitude([1.0, 2.0], 5.0, [1], FS), "periods"),
+        (lambda: signals.multi_amplitude([1.0], 5.0, 1, FS, shape="saw"), "shape"),  # type: ignore[arg-type]
         (lambda: signals.filtered_steps([1.0, 2.0], [0.1, 0.0], FS), "dwell_times"),
         (lambda: signals.prbs(start="middle"), "start"),  # type: ignore[arg-type]
         (lambda: signals.maximal_length_sequence(40), "bits"),
@@ -246,11 +249,13 @@ def test_amplitude_modulated_envelope() -> None:
     assert np.max(np.abs(r.values[4900:5100])) == pytest.approx(1.0, rel=0.01)
 
 
-def test_chirp_sweeps_from_start_to_stop() -> None:
-    r = signals.chirp(1.0, 2.0, 32.0, 10.0, 10_000.0)
+@pytest.mark.parametrize("method", ["linear", "logarithmic"])
+def test_chirp_sweeps_from_start_to_stop(method: Any) -> None:
+    r = signals.chirp(1.0, 2.0, 32.0, 10.0, 10_000.0, method=method)
     rises = np.flatnonzero((r.values[:-1] < 0.0) & (r.values[1:] >= 0.0)) / 10_000.0
     frequency, middle = 1.0 / np.diff(rises), 0.5 * (rises[1:] + rises[:-1])
-    np.testing.assert_allclose(frequency, 2.0 + 3.0 * middle, rtol=0.03)
+    expected = 2.0 + 3.0 * middle if method == "linear" else 2.0 * 16.0 ** (middle / 10.0)
+    np.testing.assert_allclose(frequency, expected, rtol=0.03)
 
 
 def test_filtered_steps_reach_their_levels() -> None:

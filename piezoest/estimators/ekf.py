@@ -29,8 +29,15 @@ class HysteresisEKF(CompiledEstimator):
 
     Parameters
     ----------
-    sample_rate, initial_model, uncertainty, noise
-        As in `HysteresisRLS`; the uncertainty is that of a, b and c, or of the gain.
+    sample_rate : float
+        [Hz].
+    initial_model : ColemanHodgdon or LinearGain, optional
+        Initial model; a model of the same kind is estimated. Default
+        ``ColemanHodgdon(0.02, 0.12, 0.0036)``, a common stack actuator.
+    uncertainty : float
+        Standard deviation of each initial parameter (a, b, c or the gain), relative to its value.
+    noise : float
+        Standard deviation of the displacement's noise [µm].
     drift : float
         Random walk of each parameter, relative to its initial value, per root second. It sets the
         memory of the filter; 0 for constant parameters.

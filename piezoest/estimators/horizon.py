@@ -90,7 +90,7 @@ class MovingHorizon(Hopping):
     'updated'
     """
 
-    __slots__ = ("_hop", "_window")
+    __slots__ = ("_hop", "_message", "_window")
 
     def __init__(
         self,
@@ -139,6 +139,7 @@ class MovingHorizon(Hopping):
             "u": kernel.NOTHING, "x": kernel.NOTHING, **self._held_at(q, np.diag(deviation**2)),
         }  # fmt: skip
         self._begin(self._arguments, kernel.layout(q.size, m, self._window, noise), values)
+        self._message = ""
 
     def _rules(self, state: Any) -> Iterable[Rule]:
         yield no_more_than(state["samples"], state["missing"])
@@ -179,6 +180,8 @@ class MovingHorizon(Hopping):
         numbers = {"a": a, "b": b, "c": c, "offset": model.offset, **more}
         return {"theta": theta[:m], "P": 0.5 * (P + P.T), "model": numbers}
 
+    # ------------------------------------------------------------ samples
+
     def _sample(self, u: float, x: float) -> None:
         kernel.step.of(self._layout)(self._state, u, x)
         if int(self._state["samples"]) % self._hop == 0:
@@ -194,6 +197,8 @@ class MovingHorizon(Hopping):
         if at_end:
             self._solve()
         return y
+
+    # ------------------------------------------------------------ the solve
 
     def _in_order(self) -> tuple[FloatArray, FloatArray, int]:
         """Voltage and displacement of the window, oldest first, and its first sample's number."""
@@ -222,16 +227,16 @@ class MovingHorizon(Hopping):
         kept = state.copy()
         try:
             with np.errstate(all="ignore"):
-                self._fit(problem, points, leaving)
+                self._message = self._fit(problem, points, leaving)
             failed = not np.all(np.isfinite(np.frombuffer(state)))
-        except (ValueError, np.linalg.LinAlgError):
-            failed = True
+        except (ValueError, np.linalg.LinAlgError) as error:
+            self._message, failed = str(error), True
         if failed:
             state[...] = kept
             state["failures"] += 1.0
 
-    def _fit(self, problem: Problem, points: Any, leaving: int) -> None:
-        """Solve, hold what is good, and move the arrival cost on."""
+    def _fit(self, problem: Problem, points: Any, leaving: int) -> str:
+        """Solve, hold what is good, and move the arrival cost on; returns the solver's words."""
         state, q = self._state, self._state["q"].copy()
         found = single_shooting(problem, q, "linear", 1.0, self._arguments["max_iterations"], TOLERANCE)
         good = self._accepts(problem, found)
@@ -247,6 +252,7 @@ class MovingHorizon(Hopping):
             residual = problem.residual(q)
             chi = np.sqrt(float(residual @ residual) / count)
             state["noise"] = max(self._arguments["noise"], state["noise"] * chi)
+        return found.message
 
     def _accepts(self, problem: Problem, found: Solution) -> bool:
         """Hold what was found, if it is any good."""
@@ -277,6 +283,8 @@ class MovingHorizon(Hopping):
         if np.all(np.isfinite(prior.root)) and np.all(np.isfinite(prior.mean)):
             fill(state, self._layout, {"q": follower, "mean": prior.mean, "root": prior.root})
 
+    # ------------------------------------------------------------ methods of all estimators
+
     @property
     def model(self) -> FreeRunning:
         """Admissible model as held: of the last good solve, its slope at least 1 % of the start's."""
@@ -295,6 +303,16 @@ class MovingHorizon(Hopping):
     def failures(self) -> int:
         """Solves that failed, after which the last good model was held."""
         return int(self._state["failures"])
+
+    @property
+    def solver_message(self) -> str:
+        """What the solver said last; empty before the first solve, and not saved."""
+        return self._message
+
+    def reset(self) -> None:
+        """Return to the state after construction."""
+        super().reset()
+        self._message = ""
 
 
 def _arrival_cost(problem: Problem, q: FloatArray, k: int, walk: FloatArray) -> tuple[FloatArray, Prior]:

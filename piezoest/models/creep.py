@@ -98,23 +98,39 @@ class Creep(AsFields):
         """
         return np.exp(-1.0 / (positive("sample_rate", sample_rate) * self.time_constants))
 
-    def simulate(self, w: FloatArray, *, sample_rate: float) -> FloatArray:
-        """x_creep [µm] at the end of each sample, shape (N,), from rest at zero.
+    def simulate(
+        self, w: FloatArray, *, sample_rate: float, initial_state: FloatArray | None = None
+    ) -> FloatArray:
+        """x_creep at the end of each sample, for w held over the sample.
 
         Parameters
         ----------
         w : array_like, shape (N,)
-            Displacement without creep [µm]; held over each sample.
+            Displacement without creep [µm].
         sample_rate : float
             [Hz].
+        initial_state : array_like, shape (n,), optional
+            z_i [µm] before the first sample; zeros if not given.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            What creep adds to the displacement [µm].
 
         Raises
         ------
         ValueError
-            If w is not a finite 1-D array.
+            If w is not a finite 1-D array, or `initial_state` has another length than the gains.
         """
         x = array_1d("w", w).copy()
-        _simulate(x, np.zeros(self.gains.size), self.gains, self.decays(sample_rate))
+        z = (
+            np.zeros(self.gains.size)
+            if initial_state is None
+            else array_1d("initial_state", initial_state).copy()
+        )
+        if z.size != self.gains.size:
+            raise ValueError(f"initial_state must hold {self.gains.size} values, got {z.size}")
+        _simulate(x, z, self.gains, self.decays(sample_rate))
         return x
 
 

@@ -55,23 +55,35 @@ class MassSpringDamper(AsFields):
         dt = 1.0 / positive("sample_rate", sample_rate)
         return mechanics_coefficients(self.natural_frequency, self.damping_ratio, dt)
 
-    def simulate(self, f: FloatArray, *, sample_rate: float) -> FloatArray:
-        """Displacement [µm] at the end of each sample, shape (N,), from rest at zero.
+    def simulate(
+        self, f: FloatArray, *, sample_rate: float, initial_state: FloatArray | None = None
+    ) -> FloatArray:
+        """Displacement at the end of each sample, for f held over the sample.
 
         Parameters
         ----------
         f : array_like, shape (N,)
-            Displacement that the stage would take without inertia [µm]; held over each sample.
+            Displacement that the stage would take without inertia [µm].
         sample_rate : float
             [Hz].
+        initial_state : array_like, shape (2,), optional
+            Displacement [µm] and velocity [µm/s] before the first sample; zeros if not given.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Displacement [µm].
 
         Raises
         ------
         ValueError
-            If f is not a finite 1-D array.
+            If f is not a finite 1-D array, or `initial_state` has not two entries.
         """
         x = array_1d("f", f).copy()
-        _simulate(x, np.zeros(2), self.coefficients(sample_rate))
+        state = np.zeros(2) if initial_state is None else array_1d("initial_state", initial_state).copy()
+        if state.size != 2:
+            raise ValueError(f"initial_state must hold displacement and velocity, got {state.size} values")
+        _simulate(x, state, self.coefficients(sample_rate))
         return x
 
 

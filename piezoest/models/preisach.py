@@ -40,9 +40,9 @@ class Preisach(Model):
 
     Notes
     -----
-    Made for simulation: it has no `invert`, and `theta` is empty. Sources: I. D. Mayergoyz, Mathematical
-    Models of Hysteresis, Springer 1991; M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, Springer
-    1996, sec. 2.4.
+    Made for simulation: it has no `invert`. `theta` holds gain, thresholds, weights, centre and
+    width. Sources: I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991; M.
+    Brokate, J. Sprekels, Hysteresis and Phase Transitions, Springer 1996, sec. 2.4.
 
     Examples
     --------
@@ -84,6 +84,24 @@ class Preisach(Model):
         )
 
     @property
+    def parameter_names(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of the entries of `theta`."""
+        indices = range(self.thresholds.size)
+        plays = (*(f"thresholds[{i}]" for i in indices), *(f"weights[{i}]" for i in indices))
+        return ("gain", *plays, "centre", "width")
+
+    @property
+    def parameter_units(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Units of the entries of `theta`."""
+        n = self.thresholds.size
+        return ("µm/V",) + ("V",) * n + ("µm/V",) * n + ("V", "V")
+
+    @property
+    def theta(self) -> FloatArray:
+        """Gain, thresholds, weights, centre and width in one vector, shape (3 + 2n,)."""
+        return np.concatenate(([self.gain], self.thresholds, self.weights, [self.centre, self.width]))
+
+    @property
     def is_admissible(self) -> bool:
         """Whether x rises with u: always, for these parameters."""
         return True
@@ -92,20 +110,31 @@ class Preisach(Model):
         """How the model sits in a `SimulatedStage`: see `piezoest.stage.kernel.hysteresis_layouts`."""
         return {name: getattr(self, name) for name in ("gain", "thresholds", "weights", "centre", "width")}
 
-    def simulate(self, u: FloatArray) -> FloatArray:
-        """Displacement [µm], shape (N,), for a voltage record from rest; exact, whatever the sample rate.
+    def simulate(self, u: FloatArray, *, initial_state: FloatArray | None = None) -> FloatArray:
+        """Displacement for a voltage record; exact, whatever the sample rate.
 
         Parameters
         ----------
         u : array_like, shape (N,)
             Voltage [V].
+        initial_state : array_like, shape (n,), optional
+            Play states [V] before the first sample; zeros if not given.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Displacement [µm].
 
         Raises
         ------
         ValueError
-            If u is not a finite 1-D array.
+            If u is not a finite 1-D array or `initial_state` has another length.
         """
-        x, y = array_1d("u", u).copy(), np.zeros(self.thresholds.size)
+        x = array_1d("u", u).copy()
+        n = self.thresholds.size
+        y = np.zeros(n) if initial_state is None else array_1d("initial_state", initial_state).copy()
+        if y.size != n:
+            raise ValueError(f"initial_state must hold {n} play states, got {y.size}")
         _simulate(x, y, self.gain, self.thresholds, self.weights, self.centre, self.width, self.offset)
         return x
 

@@ -43,6 +43,7 @@ from piezoest.machine_code import note_source
 REGISTERED: dict[str, type[Policy]] = {}
 
 HOOKS = ("prepare", "permits", "before_update", "after_update")
+_ARGUMENTS = ["own", "fixed", "state", "settings"]
 # What the estimator follows that moves samples out of the way without a hook.
 _ACTING = frozenset({"belief"})
 # Functions that compiled code calls, by hook and policy: those there were when it was made.
@@ -88,7 +89,18 @@ class Policy:
         REGISTERED[name] = cls
 
     def check(self, at: Conditions) -> None:
-        """Refuse, with a ValueError, an estimator that the policy does not go with."""
+        """Refuse what the policy does not go with.
+
+        Parameters
+        ----------
+        at : Conditions
+            Of the estimator.
+
+        Raises
+        ------
+        ValueError
+            Naming what it needs.
+        """
         name = type(self).__name__
         if self.needs_discrete and not at.discrete:
             raise ValueError(f"policies: {name} goes with the discrete time base")
@@ -100,11 +112,23 @@ class Policy:
             raise ValueError(f"policies: {name} goes with memory='period' and the discrete time base")
 
     def law(self, at: Conditions) -> dict[str, float]:
-        """Numbers of the law itself that it sets: ``forgetting``, ``rate``, ``bound``, ``normalised``."""
+        """Numbers of the law itself that it sets: ``forgetting``, ``rate``, ``bound``, ``normalised``.
+
+        Parameters
+        ----------
+        at : Conditions
+            Of the estimator.
+        """
         return {}
 
     def numbers(self, at: Conditions) -> dict[str, float]:
-        """Numbers that its hooks are given, as ``fixed``: by default its fields that are numbers."""
+        """Numbers that its hooks are given, as ``fixed``: by default its fields that are numbers.
+
+        Parameters
+        ----------
+        at : Conditions
+            Of the estimator.
+        """
         return {
             each.name: float(value)
             for each in dataclasses.fields(self)  # type: ignore[arg-type]
@@ -112,7 +136,13 @@ class Policy:
         }
 
     def keeps(self, n: int) -> Field:
-        """Layout of what it keeps between samples, for an estimator of n parameters."""
+        """Layout of what it keeps between samples.
+
+        Parameters
+        ----------
+        n : int
+            Number of the estimator's parameters.
+        """
         return ABSENT
 
 
@@ -121,19 +151,27 @@ def field_name(policy: type[Policy]) -> str:
     return re.sub(r"(?<!^)(?=[A-Z])", "_", policy.__name__).lower()
 
 
+def _arguments_of(function: Any) -> list[str]:
+    code = function.__code__
+    return list(code.co_varnames[: code.co_argcount])
+
+
 def hooks_of(policy: type[Policy]) -> dict[str, Any]:
     """Functions that a policy's file has for compiled code, by their hooks."""
     here = vars(sys.modules[policy.__module__])
-    alike = {name for name, value in here.items() if inspect.isfunction(value) and _is_like_a_hook(value)}
-    if unknown := sorted(alike - set(HOOKS)):
+    if odd := sorted(name for name in HOOKS if name in here and not inspect.isfunction(here[name])):
+        raise ValueError(f"{policy.__name__}: {', '.join(odd)} must be a plain function, marked @inlined")
+    own = {name: value for name, value in here.items() if inspect.isfunction(value)}
+    functions = {name: value for name, value in own.items() if _arguments_of(value) == _ARGUMENTS}
+    if wrong := sorted(set(HOOKS) & own.keys() - functions.keys()):
+        raise ValueError(
+            f"{policy.__name__}: {', '.join(wrong)} must have the arguments {', '.join(_ARGUMENTS)}, so named"
+        )
+    if unknown := sorted(functions.keys() - set(HOOKS)):
         raise ValueError(
             f"{policy.__name__}: {', '.join(unknown)} are no hooks, these are {', '.join(HOOKS)}"
         )
-    return {name: here[name] for name in HOOKS if name in here}
-
-
-def _is_like_a_hook(function: Any) -> bool:
-    return [*inspect.signature(function).parameters] == ["own", "fixed", "state", "settings"]
+    return functions
 
 
 def check_is_carried_out(policy: type[Policy]) -> None:

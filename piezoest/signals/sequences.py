@@ -73,12 +73,13 @@ def filtered_steps(
     dwell_times: ArrayLike,
     sample_rate: float,
     cutoff: float = 10.0,
+    order: int = 2,
     start: float = 0.0,
     periods: int | None = None,
 ) -> Signal:
     """Low-pass a sequence of steps with a Butterworth filter.
 
-    The filter is of second order; it overshoots each step by 4.3 %.
+    The second-order filter overshoots each step by 4.3 %; order 1 does not overshoot.
 
     Parameters
     ----------
@@ -90,6 +91,8 @@ def filtered_steps(
         Hz.
     cutoff : float
         −3 dB frequency, Hz, below half the sample rate.
+    order : int
+        Of the filter.
     start : float
         Level at which the filter rests before the first step, µm; without effect if `periods` is given.
     periods : int, optional
@@ -130,10 +133,10 @@ def filtered_steps(
         from scipy.signal import sosfilt
 
         start = finite("start", start)
-        values = start + sosfilt(_butterworth(cutoff, sample_rate), steps - start)
+        values = start + sosfilt(_butterworth(cutoff, order, sample_rate), steps - start)
         return Signal(values, sample_rate, None, "filtered steps")
     n = integer("periods", periods, 1)
-    cycle = _periodic_low_pass(steps, cutoff, sample_rate)
+    cycle = _periodic_low_pass(steps, cutoff, order, sample_rate)
     return Signal(np.tile(cycle, n), sample_rate, float(steps.size), "filtered steps")
 
 
@@ -144,6 +147,7 @@ def prbs(
     bits: int = 5,
     chip_rate: float = 40.0,
     cutoff: float = 10.0,
+    order: int = 2,
     start: Literal["sequence", "zero"] = "sequence",
 ) -> Signal:
     """Pseudo-random binary signal through a Butterworth low-pass, periodic.
@@ -167,6 +171,8 @@ def prbs(
         Chips per second, Hz.
     cutoff : float
         −3 dB frequency of the low-pass, Hz, below half the sample rate.
+    order : int
+        Of the low-pass.
     start : {"sequence", "zero"}
         Begin with the first chip, in general away from zero, or at the sample nearest to zero on the
         first rise through zero (the same periodic signal, begun later).
@@ -198,7 +204,7 @@ def prbs(
             f"{chip_rate:g} Hz: use {sample_rate / max(chip, 1):.10g}"
         )
     steps = amplitude * np.repeat(maximal_length_sequence(bits), chip)
-    cycle = _periodic_low_pass(steps, cutoff, sample_rate)
+    cycle = _periodic_low_pass(steps, cutoff, order, sample_rate)
     if start == "zero":
         rise = int(np.flatnonzero((cycle <= 0.0) & (np.roll(cycle, -1) > 0.0))[0]) if amplitude else 0
         cycle = np.roll(cycle, -rise)
@@ -288,7 +294,7 @@ def random_walk(
     return Signal(curve * (amplitude / np.max(np.abs(curve))), sample_rate, float(n), "random walk")
 
 
-def _periodic_low_pass(cycle: FloatArray, cutoff: float, sample_rate: float) -> FloatArray:
+def _periodic_low_pass(cycle: FloatArray, cutoff: float, order: int, sample_rate: float) -> FloatArray:
     """One period of the filter's response to `cycle` repeated for ever.
 
     The state at the start of a period is the one that the filter has again at its end: z = A^N z + z₁, with
@@ -296,7 +302,7 @@ def _periodic_low_pass(cycle: FloatArray, cutoff: float, sample_rate: float) -> 
     """
     from scipy.signal import sosfilt
 
-    sections = _butterworth(cutoff, sample_rate)
+    sections = _butterworth(cutoff, order, sample_rate)
     shape = (sections.shape[0], 2)
     silence = np.zeros_like(cycle)
     forced = sosfilt(sections, cycle, zi=np.zeros(shape))[1].ravel()
@@ -305,8 +311,9 @@ def _periodic_low_pass(cycle: FloatArray, cutoff: float, sample_rate: float) -> 
     return np.asarray(sosfilt(sections, cycle, zi=state.reshape(shape))[0], dtype=np.float64)
 
 
-def _butterworth(cutoff: float, sample_rate: float) -> FloatArray:
+def _butterworth(cutoff: float, order: int, sample_rate: float) -> FloatArray:
     from scipy.signal import butter
 
     cutoff = below_half("cutoff", cutoff, sample_rate)
-    return np.asarray(butter(2, cutoff, fs=sample_rate, output="sos"), dtype=np.float64)
+    order = integer("order", order, 1)
+    return np.asarray(butter(order, cutoff, fs=sample_rate, output="sos"), dtype=np.float64)

@@ -26,8 +26,9 @@ class Signal:
     """Samples with a sample rate, and a period if there is one.
 
     Behaves as an array where one is wanted (`np.asarray(signal)`, `signal - x`, slices, iteration in plain
-    floats). `signal.then(other)` and `signal + other` append; `2 * signal` scales; `signal + 40.0` adds
-    an offset; `signal.with_lead_in(0.2)` begins at rest. Signals compare by identity.
+    floats). `signal.then(other)` and `signal + other` append; `2 * signal` scales; `signal + 40.0`, as
+    `signal.shifted(40.0)`, adds an offset; `signal.with_lead_in(0.2)` begins at rest. Signals compare by
+    identity.
 
     Parameters
     ----------
@@ -183,9 +184,9 @@ class Signal:
         return Signal(np.concatenate([way, self.values]), self.sample_rate, self.period, self.name)
 
     def __add__(self, other: object) -> Signal:
-        """Append another signal (`then`), or add a number to every value."""
+        """Append another signal (`then`), or add a number to every value (`shifted`)."""
         if isinstance(other, Real):
-            return Signal(self.values + finite("offset", other), self.sample_rate, self.period, self.name)
+            return self.shifted(finite("offset", other))
         if not isinstance(other, Signal):
             return NotImplemented
         return self.then(other)
@@ -194,11 +195,15 @@ class Signal:
 
     def __sub__(self, offset: object) -> Signal:
         """Subtract a number from every value."""
-        return self + -finite("offset", offset) if isinstance(offset, Real) else NotImplemented
+        if not isinstance(offset, Real):
+            return NotImplemented
+        return self.shifted(-finite("offset", offset))
 
     def __rsub__(self, offset: object) -> Signal:
         """Subtract every value from a number; `np.float64(2) - signal` is NumPy's, a plain array."""
-        return -self + offset if isinstance(offset, Real) else NotImplemented
+        if not isinstance(offset, Real):
+            return NotImplemented
+        return -self + offset
 
     def __mul__(self, factor: object) -> Signal:
         """Scale by a number; `np.float64(2) * signal` is NumPy's product, a plain array."""
@@ -211,16 +216,38 @@ class Signal:
     def __neg__(self) -> Signal:
         return self * -1.0
 
+    def shifted(self, offset: float) -> Signal:
+        """Return the signal plus a constant.
+
+        Parameters
+        ----------
+        offset : float
+            Added to every value, in its unit.
+
+        Raises
+        ------
+        ValueError
+            If `offset` is not a finite number.
+        """
+        return Signal(self.values + finite("offset", offset), self.sample_rate, self.period, self.name)
+
 
 def check_continuity(values: ArrayLike, sample_rate: float | None = None, name: str = "signal") -> None:
     """Refuse samples with jumps, which the Coleman-Hodgdon model cannot take.
 
-    The model is defined for continuous inputs with a bounded derivative (paper, below (1)). Samples are never
-    continuous, so the test is one of proportion: the increment between two samples is a jump if it is larger
-    than 5 % of the peak-to-peak range, and alone. That is, fewer than three of the five increments before it
-    and the five after it reach a twentieth of its size. Coarse sampling passes, also white noise, because
-    there neighbouring increments are alike. Square waves, staircases of up to 20 steps, unfiltered PRBS and
-    spikes are refused. Where the signal starts from is not judged.
+    The model is defined for continuous inputs with a bounded derivative (paper, below (1)): "not unfiltered
+    steps and square-waves". Samples are never continuous, so the test is one of proportion. The increment
+    between two samples is a jump if it is
+
+    - larger than 5 % of the peak-to-peak range, and
+    - alone: fewer than three of the five increments before it and the five after it reach a twentieth
+      of its size (at the ends of the record: fewer than all, if there are only one or two).
+
+    A rise therefore has to spread over at least four samples. Coarse sampling passes, because there
+    neighbouring increments are alike: a sine of 50 samples a period, even of 5, or white noise. So do a
+    dwell followed by a ramp and a quantised slow signal (steps below 5 % of the range). Square waves,
+    staircases of up to 20 steps, unfiltered PRBS and single-sample spikes are refused: the increments
+    around theirs are zero or small. Where the signal starts from is not judged.
 
     Parameters
     ----------

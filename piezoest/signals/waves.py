@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import Literal
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -11,6 +12,7 @@ from piezoest._checks import FloatArray, array_1d, finite, fraction, integer, no
 from piezoest.signals._arguments import below_half, number_of_samples
 from piezoest.signals.signal import Signal
 
+Shape = Literal["triangle", "sine"]
 HIGHEST_CONTINUITY = 8  # above it the corner's coefficients cancel, and the corner hardly changes
 
 
@@ -79,9 +81,9 @@ def triangle(
     frequency = below_half("frequency", frequency, sample_rate)
     n = number_of_samples("periods", positive("periods", periods) / frequency, sample_rate)
     _, turns = _turns(n, frequency, sample_rate, finite("phase", phase))
-    wave = _unit_triangle(turns, smoothing, continuity)
+    wave = _unit_wave(turns, "triangle", smoothing, continuity)
     if exact_peak:
-        wave /= _unit_triangle(np.array([0.25]), smoothing, continuity)
+        wave /= _unit_wave(np.array([0.25]), "triangle", smoothing, continuity)
     return Signal(amplitude * wave, sample_rate, sample_rate / frequency, "triangle")
 
 
@@ -121,8 +123,11 @@ def amplitude_modulated(
     duration: float,
     sample_rate: float,
     depth: float = 0.5,
+    shape: Shape = "sine",
+    smoothing: float = 0.1,
+    continuity: int = 3,
 ) -> Signal:
-    """Sine wave whose amplitude swings between `amplitude` and (1 − depth)·`amplitude`.
+    """Wave whose amplitude swings between `amplitude` and (1 − depth)·`amplitude`.
 
     The envelope is amplitude·(1 − depth·(1 − cos(2π·modulation_frequency·t))/2); it starts at its largest,
     the wave starts at zero, rising. The period is the common one of wave and envelope, None if their
@@ -140,6 +145,10 @@ def amplitude_modulated(
         Hz.
     depth : float
         0 (no modulation) to 1 (down to nothing).
+    shape : {"sine", "triangle"}
+        Of the wave.
+    smoothing, continuity
+        As in `triangle`.
 
     Raises
     ------
@@ -161,8 +170,9 @@ def amplitude_modulated(
     _, turns = _turns(n, frequency, sample_rate)
     _, envelope_turns = _turns(n, modulation_frequency, sample_rate)
     envelope = amplitude * (1.0 - depth * 0.5 * (1.0 - np.cos(2.0 * np.pi * envelope_turns)))
+    values = envelope * _unit_wave(turns, shape, smoothing, continuity)
     period = _common_period(frequency, modulation_frequency, sample_rate)
-    return Signal(envelope * np.sin(2.0 * np.pi * turns), sample_rate, period, "amplitude-modulated sine")
+    return Signal(values, sample_rate, period, f"amplitude-modulated {shape}")
 
 
 def multi_amplitude(
@@ -170,8 +180,11 @@ def multi_amplitude(
     frequency: float,
     periods: int | Sequence[int],
     sample_rate: float,
+    shape: Shape = "triangle",
+    smoothing: float = 0.1,
+    continuity: int = 3,
 ) -> Signal:
-    """`triangle` that changes its amplitude at zero crossings.
+    """Wave that changes its amplitude at zero crossings.
 
     Each amplitude lasts for a whole number of periods, which begin and end at zero: the values are continuous
     at every change, the slope is not. The period of the signal is that of one wave, although the amplitude
@@ -187,6 +200,10 @@ def multi_amplitude(
         Whole periods for each amplitude.
     sample_rate : float
         Hz.
+    shape : {"triangle", "sine"}
+        Of the wave.
+    smoothing, continuity
+        As in `triangle`.
 
     Raises
     ------
@@ -194,9 +211,13 @@ def multi_amplitude(
         If an argument is out of its range, or `periods` and `amplitudes` differ in length.
     """
     levels = array_1d("amplitudes", amplitudes, minimum_length=1)
-    non_negative("amplitudes", levels.min())
-    given = np.full(levels.size, periods) if np.ndim(periods) == 0 else np.asarray(periods)
-    counts = np.array([integer("periods", count, 1) for count in given])
+    if np.any(levels < 0.0):
+        worst = int(levels.argmin())
+        raise ValueError(f"amplitudes must be zero or more, got {levels[worst]:g} at index {worst}")
+    if np.ndim(periods) == 0:
+        counts = np.full(levels.size, integer("periods", periods, 1))
+    else:
+        counts = np.array([integer(f"periods[{i}]", count, 1) for i, count in enumerate(np.asarray(periods))])
     if counts.size != levels.size:
         raise ValueError(
             f"periods must have one entry for each of the {levels.size} amplitudes, got {counts.size}: "
@@ -207,8 +228,8 @@ def multi_amplitude(
     n = number_of_samples("periods", float(counts.sum()) / frequency, sample_rate)
     cycle, turns = _turns(n, frequency, sample_rate)
     segment = np.searchsorted(np.cumsum(counts), cycle, side="right")
-    values = levels[np.minimum(segment, levels.size - 1)] * _unit_triangle(turns)
-    return Signal(values, sample_rate, sample_rate / frequency, "multi-amplitude triangle")
+    values = levels[np.minimum(segment, levels.size - 1)] * _unit_wave(turns, shape, smoothing, continuity)
+    return Signal(values, sample_rate, sample_rate / frequency, f"multi-amplitude {shape}")
 
 
 def two_tone(amplitudes: ArrayLike, frequencies: ArrayLike, duration: float, sample_rate: float) -> Signal:
@@ -249,8 +270,9 @@ def chirp(
     stop_frequency: float,
     duration: float,
     sample_rate: float,
+    method: Literal["linear", "logarithmic"] = "linear",
 ) -> Signal:
-    """Sine whose frequency runs evenly from `start_frequency` to `stop_frequency`, without a period.
+    """Sine whose frequency runs from `start_frequency` to `stop_frequency`, without a period.
 
     Parameters
     ----------
@@ -260,6 +282,8 @@ def chirp(
         Hz, below half the sample rate, in either order.
     duration, sample_rate
         As in `amplitude_modulated`.
+    method : {"linear", "logarithmic"}
+        The same number of hertz, or of octaves, in every second.
 
     Raises
     ------
@@ -270,7 +294,7 @@ def chirp(
     --------
     >>> import piezoest as pz
     >>> pz.signals.chirp(5.0, start_frequency=1.0, stop_frequency=50.0, duration=2.0, sample_rate=1000.0)
-    Signal('chirp', 2000 samples at 1000 Hz, amplitude 5)
+    Signal('linear chirp', 2000 samples at 1000 Hz, amplitude 5)
     """
     amplitude = non_negative("amplitude", amplitude)
     sample_rate = positive("sample_rate", sample_rate)
@@ -278,8 +302,14 @@ def chirp(
     stop = below_half("stop_frequency", stop_frequency, sample_rate)
     duration = positive("duration", duration)
     t = np.arange(number_of_samples("duration", duration, sample_rate)) / sample_rate
-    turns = start * t + (stop - start) * t * t / (2.0 * duration)
-    return Signal(amplitude * np.sin(2.0 * np.pi * (turns % 1.0)), sample_rate, None, "chirp")
+    if method not in ("linear", "logarithmic"):
+        raise ValueError(f"method must be 'linear' or 'logarithmic', got {method!r}")
+    if method == "linear" or start == stop:
+        turns = start * t + (stop - start) * t * t / (2.0 * duration)
+    else:
+        rate = np.log(stop / start) / duration
+        turns = start * np.expm1(rate * t) / rate
+    return Signal(amplitude * np.sin(2.0 * np.pi * (turns % 1.0)), sample_rate, None, f"{method} chirp")
 
 
 def _turns(n: int, frequency: float, sample_rate: float, phase: float = 0.0) -> tuple[FloatArray, FloatArray]:
@@ -289,10 +319,14 @@ def _turns(n: int, frequency: float, sample_rate: float, phase: float = 0.0) -> 
     return cycle, (rest / sample_rate + phase) % 1.0
 
 
-def _unit_triangle(turns: FloatArray, smoothing: float = 0.1, continuity: int = 3) -> FloatArray:
-    """Return the triangle of nominal amplitude 1 at phases in [0, 1), zero and rising at 0."""
+def _unit_wave(turns: FloatArray, shape: Shape, smoothing: float, continuity: int) -> FloatArray:
+    """Return the wave of nominal amplitude 1 at phases in [0, 1), zero and rising at 0."""
     smoothing = fraction("smoothing", smoothing)
     continuity = integer("continuity", continuity, 1, HIGHEST_CONTINUITY)
+    if shape == "sine":
+        return np.asarray(np.sin(2.0 * np.pi * turns))
+    if shape != "triangle":
+        raise ValueError(f"shape must be 'triangle' or 'sine', got {shape!r}")
     # Distances in periods: to the maximum at phase 1/4 (0 to 1/2), and to the nearer extremum (0 to 1/4).
     from_top = np.abs((turns + 0.25) % 1.0 - 0.5)
     distance = np.minimum(from_top, 0.5 - from_top)

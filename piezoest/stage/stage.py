@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,21 @@ from piezoest.models.mechanics import MassSpringDamper
 from piezoest.stage import kernel
 from piezoest.stage.instruments import Amplifier, Gauge
 from piezoest.stage.temperature import TemperatureLaw
+
+
+class Hysteresis(Protocol):
+    """What a stage needs of a hysteresis model."""
+
+    @property
+    def offset(self) -> float:
+        """Displacement at zero voltage [µm]."""
+
+    def simulate(self, u: FloatArray) -> FloatArray:
+        """Displacement [µm] for a voltage record [V]."""
+
+    def stage_settings(self) -> dict[str, Any]:
+        """Numbers of the hysteresis by name, see `kernel.hysteresis_layouts`; those left out are zero."""
+
 
 Schedule = Callable[[FloatArray], FloatArray]
 
@@ -80,7 +95,7 @@ class SimulatedStage(Copied):
     def __init__(
         self,
         sample_rate: float,
-        hysteresis: Any,
+        hysteresis: Hysteresis,
         creep: Creep | None = None,
         mechanics: MassSpringDamper | None = None,
         amplifier: Amplifier | None = None,
@@ -148,7 +163,7 @@ class SimulatedStage(Copied):
         return self._sample_rate
 
     @property
-    def hysteresis(self) -> Any:
+    def hysteresis(self) -> Hysteresis:
         """The hysteresis model."""
         return self._hysteresis
 
@@ -183,13 +198,18 @@ class SimulatedStage(Copied):
         return self._displacement
 
     def step(self, u: float) -> float:
-        """Apply a voltage for one sample; return the displacement measured at its end [µm].
+        """Apply a voltage for one sample.
 
         Parameters
         ----------
         u : float
             Voltage [V]. For NaN, infinity and anything that is not a number the last finite voltage is
             held: a program may compute a NaN, an amplifier cannot put it out.
+
+        Returns
+        -------
+        float
+            Measured displacement at the end of the sample [µm].
         """
         factor, shape = self._factors(1)
         noise = self._generator.standard_normal() if self._noisy else 0.0
@@ -203,12 +223,17 @@ class SimulatedStage(Copied):
         return measured
 
     def run(self, u: FloatArray) -> FloatArray:
-        """Apply a voltage record from here on; return the displacement measured after each sample [µm], (N,).
+        """Apply a voltage record, from the current state on.
 
         Parameters
         ----------
         u : array_like, shape (N,)
             Voltage [V]; for NaN or infinity the last finite voltage is held.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Measured displacement at the end of each sample [µm].
 
         Raises
         ------
@@ -216,15 +241,20 @@ class SimulatedStage(Copied):
             If u is not a 1-D array.
         """
         x = array_1d("u", u, allow_nan=True).copy()  # voltage, which the kernel turns into displacement
-        measured, n = np.empty_like(x), x.size
-        factor, shape = self._factors(n)
-        noise = self._generator.standard_normal(n) if self._noisy else np.zeros(1)
+        measured = np.empty_like(x)
+        disturbances = self._disturbances(x.size)
         if self._run_loop is None:
             self._run_loop = kernel.run.of(*self._layouts)
-        self._run_loop(self._state, self._settings, x, noise, factor, shape, measured)
-        self._count += n
+        self._run_loop(self._state, self._settings, x, *disturbances, measured)
         self._displacement = x
         return measured
+
+    def _disturbances(self, n: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Noise and factors of the next n samples, each of shape (n,), or (1,) for the same; time goes on."""
+        factor, shape = self._factors(n)
+        noise = self._generator.standard_normal(n) if self._noisy else np.zeros(1)
+        self._count += n
+        return noise, factor, shape
 
     def reset(self) -> None:
         """Go back to the start: at rest at 0 V, time zero, the same random numbers."""
@@ -243,8 +273,8 @@ class SimulatedStage(Copied):
             factor = _values("gain_schedule", "factor", self._schedule, times)
         if self._temperature is not None:
             temperature = _values("temperature", "temperature", self._temperature, times)
-            g, shape = self._temperature_law._factors(temperature)
-            factor = factor * g
+            factor = factor * self._temperature_law.gain_factor(temperature)
+            shape = self._temperature_law.hysteresis_factor(temperature)
         return factor, shape
 
 

@@ -58,8 +58,30 @@ class TemperatureLaw:
         for name in ("reference", "gain", "hysteresis"):
             object.__setattr__(self, name, finite(name, getattr(self, name)))
 
-    def _factors(self, temperature: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Factors g and h for temperatures (N,) [°C]."""
-        rates = self.gain, self.hysteresis
-        g, h = (thermal_factor(temperature, self.reference, rate) for rate in rates)
-        return g, h
+    def gain_factor(self, temperature: FloatArray) -> FloatArray:
+        """Factor g of the whole response.
+
+        Parameters
+        ----------
+        temperature : ndarray, shape (N,)
+            [°C].
+
+        Returns
+        -------
+        ndarray, shape (N,)
+        """
+        return thermal_factor(temperature, self.reference, self.gain)
+
+    def hysteresis_factor(self, temperature: FloatArray) -> FloatArray:
+        """Factor h of the hysteretic part.
+
+        Parameters
+        ----------
+        temperature : ndarray, shape (N,)
+            [°C].
+
+        Returns
+        -------
+        ndarray, shape (N,)
+        """
+        return thermal_factor(temperature, self.reference, self.hysteresis)

@@ -23,7 +23,7 @@ def record(seconds: float = 1.0, **given: Any) -> tuple[Any, Any]:
 def test_solves_once_a_hop_and_holds_between() -> None:
     u, x = record(0.5)
     estimator = MovingHorizon(RATE, hop=0.05)
-    assert estimator.solves == 0
+    assert (estimator.solves, estimator.solver_message) == (0, "")
     last = estimator.theta
     for k in range(1, u.size + 1):
         estimator.step(u[k - 1], x[k - 1])
@@ -33,6 +33,7 @@ def test_solves_once_a_hop_and_holds_between() -> None:
         last = estimator.theta
     assert (estimator.status.updates, estimator.status.held) == (10, u.size - 10)
     assert estimator.failures == 0
+    assert "satisfied" in estimator.solver_message
 
 
 def test_tracks_a_step_of_the_gain() -> None:
@@ -80,6 +81,7 @@ def test_a_bad_solve_keeps_the_last_good_model() -> None:
     estimator = MovingHorizon(RATE, max_iterations=1)
     trace = estimator.run(u, x)
     assert estimator.solves == estimator.failures == 10
+    assert estimator.solver_message == "The maximum number of function evaluations is exceeded."
     assert estimator.status.updates == 0
     assert np.all(trace.theta == START)
     assert np.all(np.isfinite(estimator.P))

@@ -54,6 +54,7 @@ def plays(*arguments: Any, **fields: Any) -> Any:
         (lambda: MODEL.simulate(ONES, initial_state=np.array([0.0, 50.0])), "cannot be reached"),
         (lambda: Creep([0.1], [0.0]), "time_constants must be above zero"),
         (lambda: Creep.logarithmic(0.01, shortest=1.0, longest=0.1), "longest must be above"),
+        (lambda: CREEP.simulate(ONES, sample_rate=1e3, initial_state=np.zeros(3)), "initial_state must"),
         (lambda: MassSpringDamper.from_dict({}), "mechanics has no 'natural_frequency'"),
     ],
 )
@@ -72,6 +73,8 @@ def test_creep() -> None:
     # Of first-order terms: gains (1 - exp(-t/time constants)) after a step.
     t = np.arange(1.0, 1.0 + x.size)[:, None] / 1000.0
     np.testing.assert_allclose(x, (1.0 - np.exp(-t / creep.time_constants)) @ creep.gains, atol=1e-12)
+    rest = creep.simulate(np.zeros(1), sample_rate=1000.0, initial_state=creep.gains)
+    assert rest[0] == pytest.approx(np.sum(creep.gains * creep.decays(1000.0)))
 
 
 def test_mechanics() -> None:

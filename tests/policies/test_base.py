@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import functools
 import itertools
 import sys
 from collections.abc import Callable, Iterator
@@ -107,11 +108,17 @@ def hook(own: Any, fixed: Any, state: Any, settings: Any) -> Any:
     return True
 
 
+def other_arguments(own: Any, numbers: Any, state: Any, settings: Any) -> Any:
+    return True
+
+
 @pytest.mark.parametrize(
     ("functions", "words"),
     [
         ({}, "Mine does nothing: its file has none of prepare, permits"),
         ({"prepair": hook, "permits": hook}, "prepair are no hooks, these are prepare"),
+        ({"permits": other_arguments}, "must have the arguments own, fixed"),
+        ({"permits": functools.partial(hook)}, "permits must be a plain function, marked @inlined"),
     ],
 )
 def test_what_cannot_be_carried_out_is_refused(policy_of: Maker, functions: Any, words: str) -> None:

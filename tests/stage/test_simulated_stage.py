@@ -39,8 +39,9 @@ def test_creep_and_mechanics_are_those_of_the_models() -> None:
     measured = SimulatedStage(FS, PLAYS, creep=creep, mechanics=mechanics).run(U)
     w = PLAYS.simulate(U) - PLAYS.offset
     slow = w + creep.simulate(w, sample_rate=FS) + PLAYS.offset
-    moved = mechanics.simulate(slow - PLAYS.offset, sample_rate=FS)  # the stage starts at rest
-    np.testing.assert_allclose(measured, moved + PLAYS.offset, atol=1e-12)
+    rest = np.array([PLAYS.offset, 0.0])
+    expected = mechanics.simulate(slow, sample_rate=FS, initial_state=rest)
+    np.testing.assert_allclose(measured, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("temperature", [None, [[0.05, 20.0], [0.25, 60.0]], lambda t: 20.0 + 30.0 * t])
@@ -150,7 +151,7 @@ def of_line(**options: Any) -> Any:
     ("make", "message"),
     [
         (lambda: SimulatedStage(0.0, PLAYS), "sample_rate must be above zero"),
-        (lambda: SimulatedStage(FS, LinearGain), "hysteresis must be a LinearGain or .*, got ABCMeta"),
+        (lambda: SimulatedStage(FS, LinearGain), "hysteresis must be a LinearGain or .*, got ABCMeta"),  # type: ignore[arg-type]
         (of_line(gauge=Amplifier()), "gauge must be a Gauge, got Amplifier"),
         (of_line(seed=-1), "seed must be a whole number"),
         (lambda: Amplifier(slew_rate=0.0), "slew_rate must be above zero"),
