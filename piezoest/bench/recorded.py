@@ -50,10 +50,10 @@ def numbers(path: Path, estimator: str | None) -> dict[str, Any]:
     """Numbers of an estimator, or of the straight line (None), on a log: it has no change to settle after."""
     data, sample_rate = _read(path)
     learnt = round(LEARNT * data.u.size)
-    first = prepare(data.u[:learnt], data.measured()[:learnt])
+    first = prepare(data.u[:learnt], data.measured[:learnt])
     if first.extent == 0.0 or not np.any(first.counts) or not np.any(data.counts[learnt:]):
         raise ValueError(f"{path}: there is nothing to learn from, or nothing to predict")
-    error = line_error = _missed(first.line(), data, learnt)
+    error = line_error = _missed(first.line, data, learnt)
     if estimator is not None:
         error = _missed(_learn(estimator, first, sample_rate), data, learnt)
     largest = [float(np.max(segment)) for segment in np.array_split(error, min(SEGMENTS, error.size))]
@@ -79,10 +79,10 @@ def _read(path: Path) -> tuple[Data, float]:
 
 def _learn(estimator: str, data: Data, sample_rate: float) -> Model:
     """Model of an estimator after the part to learn from; it starts from a plain guess about the line."""
-    made = candidate(estimator)(sample_rate, data.loop_about_line())
+    made = candidate(estimator)(sample_rate, data.loop_about_line)
     if hasattr(made, "learn"):
         raise ValueError(f"{estimator} drives a stage: on a log only an estimator can learn")
-    x = data.measured()
+    x = data.measured
     for begins in range(0, data.u.size, AT_A_TIME):
         block = slice(begins, begins + AT_A_TIME)
         feed(made, data.u[block], x[block])

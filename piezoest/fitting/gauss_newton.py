@@ -11,8 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.losses import TUNING
-from piezoest.fitting.problem import Problem
+from piezoest.fitting.problem import TUNING, Problem
 from piezoest.fitting.program import solve
 from piezoest.symbolic import Solution
 

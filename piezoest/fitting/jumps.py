@@ -1,6 +1,6 @@
 """Jumps of a sensor: steps of the displacement that stay and that the voltage does not explain."""
 
-from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -54,20 +54,6 @@ def jumps_of(
     return found, steps
 
 
-@dataclass(frozen=True)
-class _Still:
-    """A log whose voltage explains nothing: what a fit has left of it."""
-
-    late: FloatArray
-    range: float
-    gain: float = 0.0
-    quantum: float = 0.0
-
-    @property
-    def explained(self) -> FloatArray:
-        return np.zeros(self.late.size)
-
-
 def jumps_left(residual: FloatArray, size: float) -> IntArray:
     """First samples after what may be jumps that a fit has left: the largest steps of its residual, if any.
 
@@ -75,7 +61,8 @@ def jumps_left(residual: FloatArray, size: float) -> IntArray:
     residual [µm] is NaN where a sample does not count; `size` is the range of the displacement [µm].
     """
     known = np.flatnonzero(np.isfinite(residual))[:, None]
-    still = _Still(np.zeros(residual.size), size)
+    nothing = np.zeros(residual.size)
+    still = SimpleNamespace(late=nothing, explained=nothing, gain=0.0, range=size, quantum=0.0)
     found, steps = _steps(still, bridged(residual), np.zeros(residual.size, np.bool_), known)
     return found[np.argsort(-np.abs(steps), kind="stable")[:MOST_LEFT]]
 

@@ -15,7 +15,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.compile import Matrix, Vector, compiled
 from piezoest.equations.coleman_hodgdon import hysteresis_step
-from piezoest.models import ColemanHodgdon, Creep
+from piezoest.models import ColemanHodgdon, Creep, Model
 
 # c - 2b, and b, are at least this fraction of the straight line's gain.
 LEAST = 1e-6
@@ -34,9 +34,9 @@ class LoopColumns:
     rested: bool = False
 
     size: ClassVar[int] = 3
-    free: ClassVar[int] = 1
-    foretells: ClassVar[bool] = True
-    bent: ClassVar[bool] = False
+    free: ClassVar[int] = 1  # columns at the end that say where the stage was before the record
+    foretells: ClassVar[bool] = True  # it says how a stage goes on beyond the voltages of the record
+    bent: ClassVar[bool] = False  # equal loops have one shape everywhere
 
     def begin(self) -> FloatArray:
         """Voltage, f, and what is left of the start; the first sample says the voltage."""
@@ -47,7 +47,7 @@ class LoopColumns:
         return replace(self, rested=True)
 
     def rows(self, u: FloatArray, state: FloatArray) -> FloatArray:
-        """Columns along a voltage."""
+        """Columns (N, size) along a voltage; `state` goes on."""
         if np.isnan(state[0]):
             state[0] = u[0]
         rows = np.empty((u.size, 3))
@@ -55,11 +55,11 @@ class LoopColumns:
         return rows
 
     def lower(self, gain: float) -> FloatArray:
-        """What is admissible."""
+        """Least coefficients, where a straight line has that gain [µm/V]."""
         return np.array([LEAST * gain, LEAST * gain, -np.inf])
 
     def line(self) -> FloatArray:
-        """The voltage alone."""
+        """Coefficients that make a straight line of 1 µm/V: the voltage alone."""
         return np.array([1.0, 0.0, 0.0])
 
     def unevenness(self) -> FloatArray:
@@ -82,7 +82,7 @@ class LoopColumns:
         """beta; gamma = alpha c is not linear in them."""
         return {"beta": np.array([1.0, 1.0, 0.0])}
 
-    def initial_state(self, w: FloatArray, model: ColemanHodgdon) -> float:
+    def initial_state(self, w: FloatArray, model: Model) -> float:
         """w_h at the first sample [µm]."""
         return float(w[2])
 

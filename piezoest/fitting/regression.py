@@ -40,11 +40,6 @@ class Log:
     drifts: bool = False  # so much that starts, delays and alphas are compared beside a drift
 
     @property
-    def middle(self) -> float:
-        """Middle of the voltage's range [V]."""
-        return 0.5 * float(self.u.max() + self.u.min())
-
-    @property
     def half(self) -> float:
         """Half of the voltage's range [V]."""
         return 0.5 * float(np.ptp(self.u))
@@ -119,6 +114,7 @@ class Regression:
 
     def __init__(self, design: Design, sums: list[Sums]) -> None:
         self.design, self.sums, self.all = design, sums, total(sums)
+        self.line_gain, self.line_missed = self._line()
         size = design.basis.size
         self.lower = np.full(design.columns, -np.inf)
         self.lower[:size] = design.basis.lower(max(self.line_gain, 0.0))
@@ -129,18 +125,8 @@ class Regression:
         self._always[:size, :size] = design.basis.prior()
         self._always[design.offset + 1, design.offset + 1] = DRIFT
 
-    @property
-    def line_gain(self) -> float:
-        """Slope of the straight line beside the jumps [µm/V]."""
-        return self._line[0]
-
-    @property
-    def line_missed(self) -> float:
-        """What that line misses [µm rms]."""
-        return self._line[1]
-
-    @cached_property
     def _line(self) -> tuple[float, float]:
+        """Slope of the straight line beside the jumps [µm/V], and what that line misses [µm rms]."""
         beside = np.r_[self.design.offset, self.design.offset + 2 : self.design.columns]
         T = np.zeros((self.design.columns, 1 + beside.size))
         T[: self.design.basis.size, 0] = self.design.basis.line()
@@ -158,9 +144,9 @@ class Regression:
 
     def solved(self, smoothness: float, used: IntArray, sums: Sums | None = None) -> FloatArray:
         """All coefficients, zero where a column is not used."""
-        few, lower, penalty = self._of(smoothness, used, sums)
+        few = (self.all if sums is None else sums).only(used)
         w = np.zeros(self.design.columns)
-        w[used] = solve(few, lower, penalty)
+        w[used] = solve(few, self.lower[used], self._cost(smoothness)[np.ix_(used, used)])
         return w
 
     def _foreseeing(self, smoothness: float, used: IntArray, sums: Sums) -> FloatArray:
@@ -185,8 +171,9 @@ class Regression:
 
     def gap(self, fitted: Fitted) -> float:
         """How far another solver's optimum is, relative to the displacement's mean square."""
-        few, lower, penalty = self._of(fitted.smoothness, fitted.used, None)
-        return checked(few, lower, penalty, fitted.w[fitted.used])
+        used = fitted.used
+        penalty = self._cost(fitted.smoothness)[np.ix_(used, used)]
+        return checked(self.all.only(used), self.lower[used], penalty, fitted.w[used])
 
     def curvature(self, smoothness: float) -> FloatArray:
         """Second derivative of half of what is minimised."""
@@ -194,12 +181,6 @@ class Regression:
 
     def _cost(self, smoothness: float) -> FloatArray:
         return smoothness * self._penalty + self._always
-
-    def _of(
-        self, smoothness: float, used: IntArray, sums: Sums | None
-    ) -> tuple[Sums, FloatArray, FloatArray]:
-        sums = self.all if sums is None else sums
-        return sums.only(used), self.lower[used], self._cost(smoothness)[np.ix_(used, used)]
 
     def left_out(self, smoothness: float, used: IntArray) -> tuple[float, list[FloatArray]]:
         """Mean square of what each block but the first misses under the fit of the others, and those fits.
@@ -222,7 +203,8 @@ class Regression:
         """
         used = self.columns(drift=False, gains=gains)
         if smoothness is None:
-            scores = {each: self.left_out(each, used)[0] for each in self._smoothness()}
+            tried = SMOOTHNESS if np.any(self._penalty) else SMOOTHNESS[:1]
+            scores = {each: self.left_out(each, used)[0] for each in tried}
             least = AS_GOOD * min(scores.values())
             smoothness = max(each for each, score in scores.items() if score <= least)
         before, later = total(self.sums[:EARLIER]), total(self.sums[EARLIER:])
@@ -237,6 +219,3 @@ class Regression:
         return Fitted(
             self, w, smoothness, used, float(np.sqrt(score)), without, float(np.sqrt(ahead)), earlier
         )
-
-    def _smoothness(self) -> tuple[float, ...]:
-        return SMOOTHNESS if np.any(self._penalty) else SMOOTHNESS[:1]

@@ -24,10 +24,17 @@ ABOVE_NOISE, MISSED = 1.3, 3.0
 
 def advice_of(found: Identification, data: Data) -> tuple[str, ...]:
     """All there is to say, the log's own doubts first."""
-    said = [each.sentence for each in found.findings]
-    checks = (_left_out, _delay, _creep, _centre, _remainder, _along, _held_out)
-    said += [sentence for say in checks for sentence in say(found, data)]
-    return tuple(said)
+    held_out = found.record.voltage[found.trained :]
+    return (
+        *(each.sentence for each in found.findings),
+        *_left_out(found),
+        *delay_sentences(found.delay, found.sample_rate, found.delay_known, found.delay_estimated),
+        *_creep(found),
+        *_centre(data),
+        *_remainder(found),
+        *_along(found),
+        *beyond_sentences("The held-out part", found.learnt_on, held_out, found.sample_rate),
+    )
 
 
 def unsettled_sentence(seconds: float) -> str:
@@ -65,12 +72,7 @@ def other_log_sentences(found: Identification) -> list[str]:
     return said
 
 
-def _held_out(found: Identification, data: Data) -> list[str]:
-    u = found.record.voltage[found.trained :]
-    return beyond_sentences("The held-out part", found.learnt_on, u, found.sample_rate)
-
-
-def _left_out(found: Identification, data: Data) -> list[str]:
+def _left_out(found: Identification) -> list[str]:
     fit, flaws, said = found.fit, found.flaws, []
     if fit.left_out:
         said.append(unsettled_sentence(fit.left_out / found.sample_rate))
@@ -111,11 +113,7 @@ def delay_sentences(delay: float, sample_rate: float, known: bool, estimated: bo
     return []
 
 
-def _delay(found: Identification, data: Data) -> list[str]:
-    return delay_sentences(found.delay, found.sample_rate, found.delay_known, found.delay_estimated)
-
-
-def _creep(found: Identification, data: Data) -> list[str]:
+def _creep(found: Identification) -> list[str]:
     if found.creep_known or max(each.creep for each in found.candidates) == 0.0:
         return []
     has = f"creeps by {100.0 * found.best.creep:.2g} %" if found.best.creep else "has none"
@@ -125,7 +123,7 @@ def _creep(found: Identification, data: Data) -> list[str]:
     ]
 
 
-def _centre(found: Identification, data: Data) -> list[str]:
+def _centre(data: Data) -> list[str]:
     said = []
     x = data.x[data.counts]
     centre = float(np.mean(x))
@@ -141,7 +139,7 @@ def _centre(found: Identification, data: Data) -> list[str]:
     return said
 
 
-def _remainder(found: Identification, data: Data) -> list[str]:
+def _remainder(found: Identification) -> list[str]:
     said = []
     floor, error = found.noise_floor, min(found.best.cross_validated, found.held_out.rms)
     if error > ABOVE_NOISE * floor:
@@ -186,7 +184,7 @@ def _drift(found: Identification) -> list[str]:
     return []
 
 
-def _along(found: Identification, data: Data) -> list[str]:
+def _along(found: Identification) -> list[str]:
     said = _drift(found)
     if found.held_out.rms > WORSE_ON_HELD_OUT * found.train.rms:
         said.append(

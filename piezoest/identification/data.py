@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.coordinates import bridged, late
+from piezoest.fitting.coordinates import bridged
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.gaps import remembered
 from piezoest.fitting.runs import BoolArray
@@ -42,19 +42,20 @@ class Data(NamedTuple):
         """Range of the voltage [V]."""
         return float(np.ptp(self.u))
 
-    def measured(self, from_sample: int = 0) -> FloatArray:
+    @property
+    def measured(self) -> FloatArray:
         """Displacement, NaN where it does not count [µm]."""
-        x = np.where(self.counts, self.x, np.nan)
-        x[:from_sample] = np.nan
-        return x
+        return np.where(self.counts, self.x, np.nan)
 
-    def line(self, delay: float = 0.0, from_sample: int = 0) -> LinearGain:
-        """Least-squares line through the displacement, which lags by `delay` samples."""
-        return LinearGain.guess(late(self.u, delay), self.measured(from_sample))
+    @property
+    def line(self) -> LinearGain:
+        """Least-squares line through the displacement."""
+        return LinearGain.guess(self.u, self.measured)
 
-    def loop_about_line(self, delay: float = 0.0) -> ColemanHodgdon:
+    @property
+    def loop_about_line(self) -> ColemanHodgdon:
         """A plain guess: a loop about that line, bent within the range of the voltage."""
-        line = self.line(delay)
+        line = self.line
         return ColemanHodgdon.from_loop(2.0 / self.extent, 0.4 * line.gain, 1.3 * line.gain, line.offset)
 
 
@@ -118,7 +119,7 @@ def check_excitation(data: Data, noise: float, found: Iterable[Finding]) -> None
             f"rms, {extent / noise:.1f} times that, at least {SMALLEST_SIGNAL_TO_NOISE:g} are needed: "
             "raise the voltage"
         )
-    if data.line().gain * data.extent <= SMALLEST_RISE * extent:
+    if data.line.gain * data.extent <= SMALLEST_RISE * extent:
         said = {each.name: each.sentence for each in found}
         raise ValueError(
             said.get("falls")

@@ -13,12 +13,10 @@ from piezoest.fitting.flaws import Flaws, flawed
 from piezoest.fitting.runs import BoolArray
 from piezoest.fitting.search import checked_delay
 from piezoest.identification.advice import advice_of, beyond_sentences, other_log_sentences
-from piezoest.identification.candidate import Candidate
-from piezoest.identification.choice import best_of, reason_for
+from piezoest.identification.candidate import Candidate, best_of, reason_for
 from piezoest.identification.clipping import levels
 from piezoest.identification.data import Data, check_enough, check_excitation, judged, noise_of, prepare
-from piezoest.identification.lag import tells_lag
-from piezoest.identification.repeats import noise_floor
+from piezoest.identification.repeats import noise_floor, tells_lag
 from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.result import Identification, Validation
 from piezoest.identification.sense import Finding, findings

@@ -16,13 +16,12 @@ from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression, add
 from piezoest.fitting.rows import dot, times
 from piezoest.fitting.search import BENDS, checked_delay, plays
 from piezoest.identification.advice import delay_sentences, unsettled_sentence
-from piezoest.identification.candidate import left_out_error
-from piezoest.identification.choice import simplest
+from piezoest.identification.candidate import left_out_error, simplest
 from piezoest.identification.data import check_enough, check_excitation, noise_of, prepare
 from piezoest.identification.drawing import Drawn
 from piezoest.identification.examined import FEWEST_SAMPLES
-from piezoest.identification.lag import tells_lag
 from piezoest.identification.parts import Part, Progress, parts, pieces
+from piezoest.identification.repeats import tells_lag
 from piezoest.identification.residual import Misfit
 from piezoest.identification.sense import Finding, findings
 from piezoest.identification.told import Kind, Row, figures_of, parameter_rows

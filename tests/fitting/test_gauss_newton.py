@@ -10,8 +10,7 @@ from scipy.optimize import least_squares
 import piezoest as pz
 from piezoest.fitting.coordinates import coordinates
 from piezoest.fitting.gauss_newton import single_shooting
-from piezoest.fitting.losses import bend
-from piezoest.fitting.problem import Prior, Problem
+from piezoest.fitting.problem import Prior, Problem, bend
 
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 STEEP = pz.ColemanHodgdon(0.021, 0.147, 0.0065)  # not admissible: the fit ends at a bound

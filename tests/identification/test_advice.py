@@ -11,7 +11,7 @@ import piezoest as pz
 from piezoest import signals
 from piezoest._checks import FloatArray
 from piezoest.identification import identify
-from piezoest.identification.choice import best_of
+from piezoest.identification.candidate import best_of
 from piezoest.models import ColemanHodgdon
 from piezoest.records import Record
 from tests.fitting.stages import noise
