@@ -29,7 +29,6 @@ _ADOPT = """{real} model[4];
 _NO_ADOPT = "(void)state;\n    (void)parameters;\n    return 0;"
 _LEARN = "if (state->ring.started != {zero}) {{\n        {learn};\n    }}"
 
-_FIXED = "it fixed: c(None, InverseCompensator(estimator.model))"
 _INTERVAL = 50
 
 
@@ -60,10 +59,6 @@ def c(
     update_interval : int
         Samples between two changes of the compensator's model (default 50: 1 ms at 50 kHz). An
         `AdaptiveFeedforward` goes by travel and has none.
-
-    Returns
-    -------
-    CCode
 
     Raises
     ------
@@ -96,7 +91,10 @@ def c(
     if estimator is not None and not exportable:
         hint = "only estimators with a compiled kernel can be exported"
         if isinstance(getattr(estimator, "model", None), PrandtlIshlinskii):
-            hint = "learn a Prandtl-Ishlinskii model beside the controller, and export " + _FIXED
+            hint = (
+                "learn a Prandtl-Ishlinskii model beside the controller, and export it fixed: "
+                "c(None, InverseCompensator(estimator.model))"
+            )
         raise ValueError(
             f"estimator must be one such as HysteresisRLS, got {type(estimator).__name__}: {hint}"
         )

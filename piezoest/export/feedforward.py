@@ -26,7 +26,9 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
     data = controller.to_dict()
     estimators = saved.read_estimators(data["estimators"], data["state"])
     file = file_of(name, precision, tuple(each for known in estimators for each in known.unneeded))
-    now, anew = _state(controller), _state(_reset(controller))
+    fresh = controller.copy()
+    fresh.reset()
+    now, anew = _state(controller), _state(fresh)
     file.struct(now.layout, "state")
 
     def call_of(function: Any, *numbers: str) -> str:
@@ -74,12 +76,6 @@ def code(controller: AdaptiveFeedforward, name: str, precision: Any) -> CCode:
         },
         learns=bool(estimators),
     )
-
-
-def _reset(controller: AdaptiveFeedforward) -> AdaptiveFeedforward:
-    controller = controller.copy()
-    controller.reset()
-    return controller
 
 
 def _numbered(names: Iterable[str]) -> str:

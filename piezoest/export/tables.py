@@ -87,10 +87,6 @@ def table(
     points : int
         Entries of each branch (default 257).
 
-    Returns
-    -------
-    Table
-
     Raises
     ------
     ValueError

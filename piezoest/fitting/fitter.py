@@ -71,10 +71,6 @@ def fit(
         Time to leave out at the start [s]; by default as long as it is off by more than four robust standard
         deviations, at most a tenth.
 
-    Returns
-    -------
-    Fit
-
     Raises
     ------
     ValueError
@@ -283,8 +279,7 @@ class Fitter:
             One of `FORMS`.
         """
         _known(name)
-        fitted = self._fitted(FORMS[name])
-        return self._outcome(name, fitted)
+        return self._outcome(name, self._fitted(FORMS[name]))
 
     def _fitted(self, form: Form) -> Fitted:
         if form.loop:

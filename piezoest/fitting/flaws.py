@@ -98,9 +98,9 @@ def flawed(u: Any, x: Any) -> Flaws:
         raise ValueError(f"x must have shape ({u.size},) as u has, got ({x.size},)")
     known = np.isfinite(u) & np.isfinite(x)
     nowhere, none = np.empty(0, np.int64), np.zeros(u.size, dtype=np.bool_)
-    no_sizes = np.empty(0)
+    nothing = Flaws(none, none, nowhere, np.empty(0), nowhere.reshape(0, 2), none, none)
     if np.sum(known) < FEWEST_SAMPLES or np.ptp(u[known]) == 0.0:
-        return Flaws(none, none, nowhere, no_sizes, nowhere.reshape(0, 2), none, none)
+        return nothing
     codes = wild(u, x)
     x = np.where(codes, np.nan, x)
     repeated = held(u, x)
@@ -113,8 +113,8 @@ def flawed(u: Any, x: Any) -> Flaws:
     u = bridged(np.where(wrong, np.nan, u))
     rests = rests_of(u)
     if np.ptp(x[known]) == 0.0:
-        return Flaws(codes, none, nowhere, no_sizes, rests, none, none)
-    found = Flaws(codes, none, nowhere, no_sizes, rests, wrong, repeated)
+        return nothing._replace(spikes=codes, rests=rests)
+    found = nothing._replace(spikes=codes, rests=rests, voltage=wrong, repeated=repeated)
     return _of_readings(found, u, bridged(x), known, unknown)
 
 
@@ -131,7 +131,7 @@ def _of_readings(found: Flaws, u: FloatArray, x: FloatArray, known: BoolArray, u
     alone, dropouts = found.spikes.copy(), found.dropouts.copy()
     alone[place[spikes & known]] = True
     dropouts[place[lost]] = True
-    return Flaws(alone, dropouts, place[jumps], sizes, found.rests, found.voltage, found.repeated)
+    return found._replace(spikes=alone, dropouts=dropouts, jumps=place[jumps], jump_sizes=sizes)
 
 
 def _long_gaps(u: FloatArray, wrong: BoolArray) -> BoolArray:

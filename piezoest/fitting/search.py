@@ -165,17 +165,17 @@ def best_alpha(log: Log) -> float:
         return _left(regression(log, LoopColumns(float(np.exp(logarithm)))), log.drifts)
 
     low, high = np.log(np.array(ALPHAS) / (2.0 * log.half))
-    return float(np.exp(_least(cost, np.linspace(low, high, 10), CLOSE_ALPHA)))
+    return float(np.exp(_least(cost, np.linspace(low, high, 10))))
 
 
-def _least(cost: Callable[[float], float], grid: FloatArray, close: float) -> float:
+def _least(cost: Callable[[float], float], grid: FloatArray) -> float:
     """Where a cost is least: about the best point of a grid, then between its neighbours."""
     from scipy.optimize import minimize_scalar
 
     costs = [cost(float(each)) for each in grid]
     best = int(np.argmin(costs))
     between = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, grid.size - 1)]))
-    found = minimize_scalar(cost, bounds=between, method="bounded", options={"xatol": close})
+    found = minimize_scalar(cost, bounds=between, method="bounded", options={"xatol": CLOSE_ALPHA})
     return float(found.x) if found.fun < costs[best] else float(grid[best])
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.identification.data import prepare, turning_voltages
 from piezoest.identification.residual import Misfit, autocorrelation
 from piezoest.identification.told import Kind
 from piezoest.records import Record
@@ -142,22 +141,3 @@ def _draw_autocorrelation(axes: Any, shown: Drawn) -> None:
     )  # fmt: skip
     axes.axhline(0.0, color="0.3", lw=0.6)
     axes.legend(loc="lower left", fontsize="small")
-
-
-def draw_excitation(shown: Drawn) -> Figure:
-    """Draw where the voltage turns, and its spectrum."""
-    from matplotlib.figure import Figure
-    from scipy.signal import welch
-
-    record = shown.record
-    data = prepare(record.voltage, record.displacement)
-    figure = Figure(figsize=(12, 3.4), layout="constrained")
-    turns, spectrum = figure.subplots(1, 2)
-    turns.hist(turning_voltages(data), bins=40, color="C2")
-    turns.set(xlabel="voltage [V]", ylabel="turns", title="where the voltage turns")
-    frequency, power = welch(data.u, record.sample_rate, nperseg=min(data.u.size, 8192), detrend="constant")
-    spectrum.loglog(frequency[1:], np.sqrt(np.maximum(power[1:], 1e-30)), color="C2", lw=0.8)
-    spectrum.set(xlabel="frequency [Hz]", ylabel="voltage [V/√Hz]", title="its spectrum")
-    for axes in (turns, spectrum):
-        axes.grid(alpha=0.3)
-    return figure

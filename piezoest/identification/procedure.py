@@ -21,8 +21,7 @@ from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.result import Identification, Validation
 from piezoest.identification.sense import Finding, findings
 from piezoest.models import LearntOn
-from piezoest.records import Record
-from piezoest.records.as_record import as_record
+from piezoest.records import Record, as_record
 
 # A parameter that is not known to this fraction of itself was not excited by the record.
 LARGEST_RELATIVE_ERROR = 0.5
@@ -82,10 +81,6 @@ def identify(
         Raise an error if one of the logs is doubtful.
     say : callable, optional
         Called with a few words before each step.
-
-    Returns
-    -------
-    Identification
 
     Raises
     ------

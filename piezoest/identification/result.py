@@ -312,12 +312,7 @@ class Identification:
         )  # fmt: skip
 
     def plot(self) -> Figure:
-        """Draw displacement and model over time, the loop, the residual and its autocorrelation.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Draw displacement and model over time, the loop, the residual and its autocorrelation."""
         from piezoest.identification.drawing import draw
 
         return draw(self.drawn())

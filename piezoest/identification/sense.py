@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from piezoest.fitting.held import repeats
+from piezoest.fitting.runs import BoolArray
 from piezoest.identification.clipping import flat_tops, levels
 from piezoest.identification.examined import FEWEST_SAMPLES, FEWEST_TURNS, Examined
 from piezoest.identification.feedback_in_log import answer
@@ -279,13 +280,16 @@ def _resolution(log: Examined) -> Iterator[Finding]:
 
 def _flaws(log: Examined) -> Iterator[Finding]:
     flaws = log.flaws
+
+    def first(marks: BoolArray) -> str:
+        return f"{float(log.record.time[np.argmax(marks)]):.6g} s"
+
     if count := int(np.sum(flaws.spikes)):
-        first = float(log.record.time[np.argmax(flaws.spikes)])
         say = doubt if count > MANY_SPIKES * log.x.size else note
         yield say(
             "spikes",
             f"{counted(count, 'sample')} of the displacement {'stands' if count == 1 else 'stand'} off "
-            f"alone, the first at {first:.6g} s: leave them out, as identify does.",
+            f"alone, the first at {first(flaws.spikes)}: leave them out, as identify does.",
         )
     if flaws.jumps.size:
         largest = int(np.argmax(np.abs(flaws.jump_sizes)))
@@ -296,19 +300,17 @@ def _flaws(log: Examined) -> Iterator[Finding]:
             "give each stretch an offset of its own, as identify does.",
         )
     if flaws.dropouts.any():
-        first = float(log.record.time[np.argmax(flaws.dropouts)])
         yield doubt(
             "dropouts",
             "The displacement stands still while the voltage moves, for "
-            f"{int(np.sum(flaws.dropouts))} samples from {first:.6g} s on: the sensor was lost, leave them "
-            "out, as identify does.",
+            f"{int(np.sum(flaws.dropouts))} samples from {first(flaws.dropouts)} on: the sensor was lost, "
+            "leave them out, as identify does.",
         )
     if count := int(np.sum(flaws.voltage)):
-        first = float(log.record.time[np.argmax(flaws.voltage)])
         say = doubt if count > MANY_SPIKES * log.x.size else note
         yield say(
             "wrong voltage",
-            f"{counted(count, 'sample')} of the voltage, the first at {first:.6g} s, "
+            f"{counted(count, 'sample')} of the voltage, the first at {first(flaws.voltage)}, "
             f"{'is' if count == 1 else 'are'} not what drove the stage (a spike, a zero, or a column that "
             "stands still), for the displacement does not follow: leave them out, as identify does.",
         )

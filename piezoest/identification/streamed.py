@@ -164,10 +164,6 @@ def identify_stream(
     say : callable, optional
         Called with a few words before each pass.
 
-    Returns
-    -------
-    StreamedIdentification
-
     Raises
     ------
     ValueError

@@ -253,16 +253,11 @@ def _in_hdf5(h5py: Any, path: Path, file: Any) -> list[Named]:
 # ---------------------------------------------------------------- TDMS
 
 
-def open_tdms(path: Path) -> Source:
-    """Open a TDMS file: each channel a column, by ``group/channel``; waveforms state the sample rate."""
-    nptdms = _extras.load("nptdms", EXTRA, "reading TDMS")
-    return Tdms(path, nptdms)
-
-
 class Tdms(Table):
-    """A TDMS file, which may have channels of several sample rates."""
+    """A TDMS file: each channel a column, by ``group/channel``; waveforms state the sample rate."""
 
-    def __init__(self, path: Path, nptdms: Any) -> None:
+    def __init__(self, path: Path) -> None:
+        nptdms = _extras.load("nptdms", EXTRA, "reading TDMS")
         super().__init__(path, "TDMS", lambda: _opened_tdms(nptdms, path), _in_tdms, separator="/")
         with damaged(path, "TDMS"), self._opened() as file:
             steps = {_step(channel) for group in file.groups() for channel in group.channels()} - {None}

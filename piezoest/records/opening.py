@@ -16,7 +16,7 @@ FORMATS: tuple[tuple[str, tuple[bytes, ...], tuple[str, ...], str], ...] = (
     ("HDF5", (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3"), (".h5", ".hdf5", ".hdf", ".he5"), "formats:open_hdf5"),
     ("MATLAB", (b"MATLAB 5.0",), (), "formats:open_mat"),
     ("NumPy", (b"\x93NUMPY",), (".npy",), "formats:open_npy"),
-    ("TDMS", (b"TDSm",), (".tdms",), "formats:open_tdms"),
+    ("TDMS", (b"TDSm",), (".tdms",), "formats:Tdms"),
     ("spreadsheet", (ARCHIVE, b"\xd0\xcf\x11\xe0"), SHEET_ENDINGS, "frame:open_sheet"),
     ("NumPy", (ARCHIVE,), (".npz",), "formats:open_npz"),
     ("LabVIEW", (b"LabVIEW Measurement", b"\xef\xbb\xbfLabVIEW Measurement"), (), "lvm:Lvm"),

@@ -6,7 +6,7 @@ from piezoest._version import __version__
 from piezoest.identification import compared
 from piezoest.identification.compared import Found
 from piezoest.identification.data import prepare, turning_voltages
-from piezoest.identification.drawing import draw, draw_excitation
+from piezoest.identification.drawing import draw
 from piezoest.identification.result import Identification
 from piezoest.identification.streamed import StreamedIdentification
 from piezoest.report.page import Page
@@ -67,7 +67,6 @@ def write_report(found: Found, path: str | Path) -> None:
         f"{turning_voltages(data).size} times. Hysteresis shows only at turns, and the parameters belong to "
         "the amplitudes that occur."
     )
-    page.picture(draw_excitation(drawn), "Where the voltage turns, and its spectrum")
     page.footer(f"piezoest {__version__}. Source: {found.source}")
     page.write(path)
 
