@@ -84,17 +84,14 @@ class Expressions(ast.NodeVisitor):
         raise Refused(f"{type(node).__name__} cannot be translated to C")
 
     def value(self, node: ast.expr) -> Value:
-        """Translate an expression."""
         return self.visit(node)
 
     def number(self, value: Value, kind: str = "") -> Number:
-        """A value as a number that C computes."""
         return number(value, self.single, kind)
 
     # ------------------------------------------------------------ names, fields, entries
 
     def visit_Constant(self, node: ast.Constant) -> Value:
-        """A number, or None."""
         return Known(node.value)
 
     def visit_Name(self, node: ast.Name) -> Value:
@@ -125,7 +122,6 @@ class Expressions(ast.NodeVisitor):
         return self.outside(owner.field(node.attr), node.attr, module)
 
     def visit_Subscript(self, node: ast.Subscript) -> Value:
-        """An entry."""
         owner = self.value(node.value)
         nodes = node.slice.elts if type(node.slice) is ast.Tuple else [node.slice]
         if any(type(place) is ast.Slice for place in nodes):
@@ -139,7 +135,6 @@ class Expressions(ast.NodeVisitor):
         return found
 
     def visit_Tuple(self, node: ast.Tuple) -> Value:
-        """Several values."""
         return Items(tuple(self.arguments(node.elts)))
 
     def arguments(self, nodes: list[ast.expr]) -> list[Value]:
@@ -175,11 +170,9 @@ class Expressions(ast.NodeVisitor):
     # ------------------------------------------------------------ operators
 
     def visit_BinOp(self, node: ast.BinOp) -> Value:
-        """Arithmetic."""
         return self.operate(node.op, *self.arguments([node.left, node.right]))
 
     def operate(self, op: ast.operator, left: Value, right: Value) -> Value:
-        """Arithmetic on two values."""
         if type(op) not in _ARITHMETIC:
             raise Refused(f"{type(op).__name__} cannot be translated to C")
         sign, strength, compute = _ARITHMETIC[type(op)]
@@ -207,7 +200,6 @@ class Expressions(ast.NodeVisitor):
         return kind, self.number(left, kind), self.number(right, kind)
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> Value:
-        """Sign and not."""
         value = self.value(node.operand)
         if type(node.op) is ast.Not:
             test = value.truth()
@@ -236,7 +228,6 @@ class Expressions(ast.NodeVisitor):
         ])  # fmt: skip
 
     def compare(self, op: ast.cmpop, left: Value, right: Value) -> Value:
-        """One comparison."""
         if type(op) in (ast.Is, ast.IsNot):
             if not right.is_known or right.value is not None:
                 raise Refused("`is` compares with None only")
@@ -251,7 +242,6 @@ class Expressions(ast.NodeVisitor):
         return Number.joined(f"{a.within(Binds.SUM)} {sign} {b.within(Binds.SUM)}", "bool", strength, a, b)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> Value:
-        """And, or."""
         return self.joined(node.op, [functools.partial(self.value, item) for item in node.values])
 
     def joined(self, op: ast.boolop, items: list[Callable[[], Value]]) -> Value:
@@ -280,7 +270,6 @@ class Expressions(ast.NodeVisitor):
         )
 
     def visit_IfExp(self, node: ast.IfExp) -> Value:
-        """A if test else B."""
         test = self.value(node.test).truth()
         if test.is_known:
             return self.value(node.body if test.value else node.orelse)
@@ -296,7 +285,6 @@ class Expressions(ast.NodeVisitor):
     # ------------------------------------------------------------ calls
 
     def visit_Call(self, node: ast.Call) -> Value:
-        """A call within an expression."""
         called = self.called(node)
         wanted, self.wanted = self.wanted, []
         arguments = self.arguments(node.args)
@@ -310,7 +298,6 @@ class Expressions(ast.NodeVisitor):
         return self.invoke(called, arguments, wanted)
 
     def called(self, node: ast.Call) -> Any:
-        """The function that is called."""
         value = self.value(node.func)
         if not value.is_known or node.keywords:
             raise Refused("call a function by its name, with positional arguments")
@@ -337,12 +324,10 @@ class Expressions(ast.NodeVisitor):
         )
 
     def finite(self, value: Value) -> Value:
-        """``np.isfinite(value)``."""
         number = self.number(value, "real")
         return Number.joined(f"isfinite({number.text})", "bool", Binds.PRIMARY, number)
 
     def converted(self, value: Value) -> Value:
-        """``int(value)``."""
         if value.is_known:
             return Known(int(value.value))
         if value.is_whole:

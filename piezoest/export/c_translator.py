@@ -152,7 +152,6 @@ class Body(Expressions):
         return False
 
     def visit_For(self, node: ast.For) -> None:
-        """For over a range that counts up."""
         called: Any = node.iter
         if type(called) is not ast.Call or getattr(called.func, "id", "") != "range":
             raise Refused("for needs range(...)")
@@ -176,7 +175,6 @@ class Body(Expressions):
         self.out.append(Statement(head, first.uses | last.uses, body=body, loop=True, own=i))
 
     def visit_While(self, node: ast.While) -> None:
-        """A loop with a condition that changes."""
         before = len(self.out)
         test = self.value(node.test).truth()
         if test.is_known or node.orelse or len(self.out) > before:
@@ -188,7 +186,6 @@ class Body(Expressions):
         self.out.append(Statement(f"while ({number.text})", number.uses, body=body, loop=True))
 
     def visit_Break(self, node: ast.Break | ast.Continue) -> bool:
-        """Out of the loop, or on with it."""
         self.out.append(Statement(f"{type(node).__name__.lower()};"))
         return True
 
@@ -237,7 +234,6 @@ class Body(Expressions):
                 value = self.value(as_load(target))
 
     def visit_AugAssign(self, node: ast.AugAssign) -> None:
-        """An assignment of the form x += y."""
         present, value = self.arguments([as_load(node.target), node.value])
         sign = {ast.Add: "+=", ast.Sub: "-=", ast.Mult: "*=", ast.Div: "/="}.get(type(node.op))
         held = self.write(node.target).text != getattr(present, "text", "")

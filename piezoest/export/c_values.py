@@ -104,7 +104,6 @@ class Known(Value):
     is_number = property(lambda self: type(self.value) in (int, bool, float))
 
     def field(self, name: str) -> Value:
-        """Something of a module."""
         if type(self.value) is not ModuleType or not hasattr(self.value, name):
             return super().field(name)
         return Known(getattr(self.value, name))
@@ -114,7 +113,6 @@ class Known(Value):
         return number(self, single) if type(self.value) is float else self
 
     def identity(self) -> Any:
-        """Its value."""
         return "known", type(self.value).__name__, repr(self.value)
 
 
@@ -132,11 +130,9 @@ class Number(Value):
     is_whole = property(lambda self: self.kind != "real")
 
     def identity(self) -> Any:
-        """Its kind."""
         return self.kind
 
     def as_parameter(self, name: str) -> tuple[Value, Root | None]:
-        """A number of that name."""
         return Number(name, self.kind, uses=frozenset({name})), Root(name)
 
     @classmethod
@@ -161,7 +157,6 @@ class Array(Value):
     values: FloatArray | None = None
 
     def entry(self, places: tuple[Value, ...], text: str) -> Value:
-        """One number of it."""
         if len(places) != len(self.shape):
             raise Refused(f"an array of {len(self.shape)} axes has {len(places)} positions")
         if self.values is not None and (self.values.size == 0 or all(place.is_known for place in places)):
@@ -174,7 +169,6 @@ class Array(Value):
         return Number(f"{self.text}{text}", "real", uses=uses, reads=self.values is None)
 
     def length(self) -> int:
-        """Along the first axis."""
         return self.shape[0]
 
     def identity(self) -> Any:
@@ -261,21 +255,17 @@ class Items(Value):
     items: tuple[Any, ...] = field(default_factory=tuple)
 
     def entry(self, places: tuple[Value, ...], text: str) -> Value:
-        """One of its values."""
         if not places[0].is_known:
             raise Refused("a tuple is read at positions that are known")
         return cast(Value, self.items[places[0].value])
 
     def length(self) -> int:
-        """How many."""
         return len(self.items)
 
     def settled(self, single: bool) -> Value:
-        """Each of them."""
         return Items(tuple(item.settled(single) for item in self.items))
 
     def identity(self) -> Any:
-        """Those of its values."""
         return tuple(item.identity() for item in self.items)
 
 

@@ -11,10 +11,9 @@ from piezoest.fitting import search, trust
 from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.design import Design
 from piezoest.fitting.flaws import Flaws, flawed
-from piezoest.fitting.gaps import remembered
 from piezoest.fitting.jumps import jumps_left
 from piezoest.fitting.loop_columns import LoopColumns
-from piezoest.fitting.outliers import beside_steps, lonely, unsettled
+from piezoest.fitting.outliers import beside_steps, lonely, remembered, unsettled
 from piezoest.fitting.play_columns import PlayColumns, Start
 from piezoest.fitting.polish import Polished, polished
 from piezoest.fitting.regression import Fitted, Log, Regression

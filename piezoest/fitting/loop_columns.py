@@ -43,11 +43,9 @@ class LoopColumns:
         return np.zeros(3) if self.rested else np.array([np.nan, 0.0, 1.0])
 
     def afresh(self, u: float) -> LoopColumns:
-        """The same for a stage that rests at 0 V until a record begins at voltage u [V]."""
         return replace(self, rested=True)
 
     def rows(self, u: FloatArray, state: FloatArray) -> FloatArray:
-        """Columns (N, size) along a voltage; `state` goes on."""
         if np.isnan(state[0]):
             state[0] = u[0]
         rows = np.empty((u.size, 3))
@@ -55,15 +53,12 @@ class LoopColumns:
         return rows
 
     def lower(self, gain: float) -> FloatArray:
-        """Least coefficients, where a straight line has that gain [µm/V]."""
         return np.array([LEAST * gain, LEAST * gain, -np.inf])
 
     def line(self) -> FloatArray:
-        """Coefficients that make a straight line of 1 µm/V: the voltage alone."""
         return np.array([1.0, 0.0, 0.0])
 
     def unevenness(self) -> FloatArray:
-        """Nothing is to be smooth."""
         return np.zeros((3, 3))
 
     def prior(self) -> FloatArray:

@@ -78,7 +78,6 @@ class Table(Source):
         self._names = names
 
     def count(self, positions: Sequence[int]) -> int:
-        """Number of rows of these columns."""
         return self._lengths[positions[0]]
 
     def check(self, positions: Sequence[int]) -> None:
@@ -89,7 +88,6 @@ class Table(Source):
             raise LogError(f"{self.path}: the columns differ in length: {said}")
 
     def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:
-        """Yield blocks of at most so many rows."""
         length = self.count(positions)
         with damaged(self.path, self._format), self._opened() as file:
             columns = list(_columns(self._arrays(file)))
@@ -331,11 +329,9 @@ class Parquet(Source):
         super().__init__(path, list(units), [titled(*named) for named in units.items()], len(units))
 
     def count(self, positions: Sequence[int]) -> int:
-        """Number of rows."""
         return self._length
 
     def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:
-        """Yield blocks of at most so many rows."""
         start, names = 0, [self.names[i] for i in positions]
         origins: dict[str, Any] = {}
         # Without the buffer a whole group of rows, which may be the whole file, would be held.

@@ -33,11 +33,9 @@ class Frame(Source):
         self._series, self._first, self.whole = series, first, whole
 
     def count(self, positions: Sequence[int]) -> int:
-        """Number of rows."""
         return len(self._series[0])
 
     def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:
-        """Yield blocks of at most so many rows."""
         columns = [self._floats(position) for position in positions]
         for start in range(0, self.count(positions), rows):
             numbers = np.arange(start, min(start + rows, self.count(positions))) + self._first

@@ -104,11 +104,9 @@ class Lvm(Text):
             )
 
     def lines(self, rows: int) -> Iterator[Lines]:
-        """Lines with samples."""
         return (lines for _, lines in self._segments(rows))
 
     def read(self, positions: Sequence[int], rows: int) -> Iterator[Rows]:
-        """Yield blocks of at most so many rows."""
         clock = _Clock(self.path)
         for header, lines in self._segments(rows):
             if header.names != self.layout.header:

@@ -292,7 +292,7 @@ def _contradicted(
     if "time" not in named and not (source.titles and has_column(source, "time")):
         return []
     try:
-        column = choose(source, ("time",), _only_time(named), _only_time(units))["time"]
+        column = choose(source, ("time",), named, units)["time"]
         times = next(source.read([column.position], FIRST_ROWS)).values[0][:FIRST_ROWS]
     except (LogError, StopIteration):
         return []
@@ -308,10 +308,6 @@ def _ignored(stated: float, found: float) -> list[str]:
     if abs(found / stated - 1.0) < SAME_RATE:
         return []
     return [f"the file states {stated:g} Hz, which is ignored: time has {found:.4g} Hz"]
-
-
-def _only_time(given: Mapping[str, str]) -> dict[str, str]:
-    return {quantity: value for quantity, value in given.items() if quantity == "time"}
 
 
 def _notes(source: Source, chosen: dict[str, Column]) -> list[str]:
