@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 # Private by its spelling alone, of Python itself.
-PUBLIC = ("_exit",)
+PUBLIC = ("_exit", "_replace")
 LONGEST = 400
 
 

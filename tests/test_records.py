@@ -156,7 +156,7 @@ def test_what_had_to_be_assumed_is_noted(tmp_path: Path) -> None:
         assert any(words in note for note in notes)
 
 
-def test_round_trip_and_split(tmp_path: Path) -> None:
+def test_round_trip(tmp_path: Path) -> None:
     voltage = VOLTAGE.copy()
     voltage[3] = np.inf
     record = Record.from_arrays(voltage, DISPLACEMENT, 100.0)

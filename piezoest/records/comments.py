@@ -14,7 +14,7 @@ COMMENTS = ("#", "%")
 ENTRY = re.compile(r"\s*([A-Za-z_][\w ]*?)\s*(?:[(\[](\w+)[)\]])?\s*[:=]\s*([-+.\deE]+)\s*(\w*)\s*")
 PERIODS = (
     "dt", "ts", "sample_time", "sampling_time", "sample_period", "sampling_period", "sample_interval",
-    "tinc", "increment",
+    "tinc",
 )  # fmt: skip
 # What the units are in Hz and in s.
 OF_RATES = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6}
@@ -39,7 +39,10 @@ def entries_in(lines: list[list[str]]) -> list[str]:
     found = [cell for line in lines for cell in line]
     found += [f"{line[0]} = {line[1]}" for line in lines if len(line) > 1]
     for upper, lower in itertools.pairwise(lines):
-        found += [f"{name} = {value}" for name, value in zip(upper, lower, strict=False)]
+        # An increment is a sample period in the files of Rigol alone.
+        rigol = lower[0].lower() == SEQUENCE
+        for name, value in zip(upper, lower, strict=False):
+            found.append(f"{'dt' if rigol and name.lower() == INCREMENT else name} = {value}")
     return found
 
 
