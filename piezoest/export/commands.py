@@ -174,10 +174,8 @@ def table(
 
 def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
     """Model, estimator or None, and limits of a JSON file."""
+    import piezoest as pz
     from piezoest._checks import class_named
-    from piezoest.estimators.ekf import HysteresisEKF
-    from piezoest.estimators.output_error import OutputErrorRLS
-    from piezoest.estimators.rls import HysteresisRLS
     from piezoest.models.reading import NO_MODEL, model_from_dict
 
     data = read_object(path, NO_MODEL)
@@ -192,7 +190,7 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
     estimator = None
     if learnt is not None:
         try:
-            kind = class_named(learnt, "estimator", (HysteresisRLS, HysteresisEKF, OutputErrorRLS))
+            kind = class_named(learnt, "estimator", (pz.HysteresisRLS, pz.HysteresisEKF, pz.OutputErrorRLS))
             estimator = kind.from_dict(learnt)
         except ValueError as error:
             raise ValueError(f"{path}: its estimator is not what to_dict() gave: {error}") from None
@@ -208,18 +206,15 @@ def _read(path: Path) -> tuple[Model, Any, dict[str, Any]]:
 
 def _pair(path: Path, stated: Stated) -> tuple[Any, Any]:
     """Estimator and compensator of a file and the options beside it."""
-    from piezoest.compensators import InverseCompensator, LinearCompensator, VoltageLimits
-    from piezoest.estimators.ekf import HysteresisEKF
-    from piezoest.estimators.rls import HysteresisRLS
-    from piezoest.models import ColemanHodgdon, LinearGain
+    import piezoest as pz
 
     model, estimator, limits = _read(path)
     if stated.estimator is not None:
-        kinds: dict[str, Any] = {"none": None, "rls": HysteresisRLS, "ekf": HysteresisEKF}
+        kinds: dict[str, Any] = {"none": None, "rls": pz.HysteresisRLS, "ekf": pz.HysteresisEKF}
         kind = kinds[stated.estimator]
         if kind is not None and stated.sample_rate is None:
             raise ValueError("an estimator needs --sample-rate")
-        if kind is not None and not isinstance(model, ColemanHodgdon | LinearGain):
+        if kind is not None and not isinstance(model, pz.ColemanHodgdon | pz.LinearGain):
             raise ValueError(
                 f"--estimator {stated.estimator} needs a ColemanHodgdon or a LinearGain, {path} holds a "
                 f"{type(model).__name__}: run identify with --model coleman-hodgdon, or leave --estimator out"
@@ -229,8 +224,8 @@ def _pair(path: Path, stated: Stated) -> tuple[Any, Any]:
     own = {"minimum": stated.minimum, "maximum": stated.maximum, "slew_rate": stated.slew_rate}
     limits |= {name: value for name, value in {**own, "sample_rate": rate}.items() if value is not None}
     try:
-        voltage = VoltageLimits(**{name: value for name, value in limits.items() if value is not None})
+        voltage = pz.VoltageLimits(**{name: value for name, value in limits.items() if value is not None})
     except (TypeError, OverflowError) as error:
         raise ValueError(f"{path}: limits: {error}") from None
-    feed_forward: Any = LinearCompensator if isinstance(model, LinearGain) else InverseCompensator
+    feed_forward: Any = pz.LinearCompensator if isinstance(model, pz.LinearGain) else pz.InverseCompensator
     return estimator, feed_forward(model, voltage)

@@ -67,16 +67,9 @@ class Design:
         """How many there are."""
         return self.offset + 2 + int(self.jumps.size)
 
-    def along(self, w: FloatArray | None = None) -> Along:
-        """What makes rows, one part of the record after the other.
-
-        The model's coefficients, which come first in `w`, make the displacement that drives the creep.
-        """
-        return Along(self, w)
-
     def blocks(self, u: FloatArray, w: FloatArray | None = None) -> Iterator[tuple[slice, FloatArray]]:
         """Rows of all columns along a whole record, some thousand at a time, with their places in it."""
-        along = self.along(w)
+        along = Along(self, w)
         for first in range(0, u.size, CHUNK):
             place = slice(first, min(first + CHUNK, u.size))
             yield place, along.rows(u[place])
@@ -99,9 +92,12 @@ class Design:
 
 
 class Along:
-    """Rows of a design along a record that comes in parts."""
+    """Rows of a design along a record that comes in parts.
 
-    def __init__(self, design: Design, w: FloatArray | None) -> None:
+    The model's coefficients, which come first in `w`, make the displacement that drives the creep.
+    """
+
+    def __init__(self, design: Design, w: FloatArray | None = None) -> None:
         self._design, self._seen = design, 0
         self._followed = design.basis.size - design.basis.free
         self._w = None if w is None else w[: self._followed]

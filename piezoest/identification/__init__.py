@@ -8,14 +8,6 @@ from piezoest.identification.sense import Finding, findings
 from piezoest.identification.streamed import StreamedIdentification, identify_stream
 
 __all__ = [
-    "Candidate",
-    "Finding",
-    "Identification",
-    "Misfit",
-    "StreamedIdentification",
-    "Validation",
-    "Whiteness",
-    "findings",
-    "identify",
-    "identify_stream",
-]
+    "Candidate", "Finding", "Identification", "Misfit", "StreamedIdentification", "Validation", "Whiteness",
+    "findings", "identify", "identify_stream",
+]  # fmt: skip

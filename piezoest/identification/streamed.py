@@ -9,7 +9,7 @@ import numpy as np
 
 from piezoest._checks import FloatArray, fraction
 from piezoest.fitting import FORMS, Fitter
-from piezoest.fitting.design import CHUNK, Design
+from piezoest.fitting.design import CHUNK, Along, Design
 from piezoest.fitting.flaws import flawed
 from piezoest.fitting.program import Sums
 from piezoest.fitting.regression import FOLDS, Fitted, Log, Regression, add
@@ -290,7 +290,7 @@ def _fits(
     thinned = Log(points, points, np.ones(points.size, bool), log.sample_rate, none)
     basis = plays(thinned, fitter.start, bends=BENDS)
     design = Design(basis, log.sample_rate, trained)
-    along, sums = design.along(), [Sums.none(design.columns) for _ in range(FOLDS)]
+    along, sums = Along(design), [Sums.none(design.columns) for _ in range(FOLDS)]
     counted_before = 0
     for part in parts(log, fitter.delay, progress):
         # A start that has not settled is left out.
@@ -321,7 +321,7 @@ class _Judge:
 
     def __init__(self, fitted: Fitted, line: Fitted, samples: int, trained: slice) -> None:
         self._fits = (fitted, line)
-        self._along = tuple(each.design.along() for each in self._fits)
+        self._along = tuple(Along(each.design) for each in self._fits)
         # Of model and line, in the fitted part and the held-out one: sum of squares, largest, count.
         self._sums = np.zeros((2, 2, 3))
         self._trained = trained

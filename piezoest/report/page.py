@@ -30,7 +30,6 @@ th:first-child, td:first-child { text-align: left; }
 .card b { display: block; font-size: 1.35rem; } .card span { color: #5b616b; font-size: .85rem; }
 ul.advice { background: #fff8ec; border-left: 4px solid #d9822b; margin: .5rem 0;
             padding: .6rem 1rem .6rem 2rem; }
-details { margin: .6rem 0; } summary { cursor: pointer; font-weight: 600; }
 .picture { max-width: 100%; }
 footer { margin-top: 2.5rem; color: #5b616b; font-size: .85rem; border-top: 1px solid #e3e6ea;
          padding-top: .6rem; }

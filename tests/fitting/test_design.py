@@ -9,7 +9,7 @@ import pytest
 import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting import search
-from piezoest.fitting.design import CHUNK, NO_CREEP, Basis, Design
+from piezoest.fitting.design import CHUNK, NO_CREEP, Along, Basis, Design
 from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.play_columns import PlayColumns, Start, moving_of, starts
 from piezoest.fitting.regression import Log
@@ -98,7 +98,7 @@ def test_a_record_in_parts_gives_the_same_rows(kind: int) -> None:
     design = Design(bases(u)[kind], RATE, u.size, creep, np.array([900.0, CHUNK + 5.0]))
     w = np.linspace(0.1, 1.0, design.columns)
     whole = np.vstack([rows for _, rows in design.blocks(u, w[: design.basis.size])])
-    along = design.along(w[: design.basis.size])
+    along = Along(design, w[: design.basis.size])
     parts = [along.rows(u[a:b]) for a, b in [(0, 1), (1, 2), (2, 900), (900, 901), (901, u.size)]]
     np.testing.assert_allclose(np.vstack(parts), whole, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(whole @ w, design.output(u, w), rtol=1e-12)
@@ -117,7 +117,7 @@ def test_segments_add_up_to_plays() -> None:
 def test_drift_jumps_and_offset_are_columns() -> None:
     u = walk(3, 1000)
     design = Design(columns_of(u, count=1), RATE, 800, jumps=np.array([300.0, 700.0]))
-    rows = design.along().rows(u)
+    rows = Along(design).rows(u)
     np.testing.assert_array_equal(rows[:, 0], u)
     np.testing.assert_array_equal(rows[:, design.offset], 1.0)
     drift = rows[:, design.offset + 1]
