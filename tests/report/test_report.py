@@ -56,7 +56,7 @@ def test_page_is_sound_and_self_contained(found: pz.Identification, tmp_path: Pa
     outline = Outline(text)
     assert outline.open == []
     assert all(address.startswith("data:") for address in outline.addresses)
-    assert sum(address.startswith("data:image/png") for address in outline.addresses) == 2
+    assert sum(address.startswith("data:image/png") for address in outline.addresses) == 1
     assert "a &lt;stage&gt; &amp; its log.csv: what was identified" in text
     body = text.split("<body>")[1]
     for name, value, error, unit in found.table():
