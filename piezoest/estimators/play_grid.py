@@ -1,5 +1,6 @@
 """Plays on a grid: where thresholds and bends lie, what starts there, regressors, and how slopes move on."""
 
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,6 +43,9 @@ CORRELATION = 3.0  # thresholds over which the weights' deviations are alike
 CREEP_START, CREEP_DEVIATION = 0.01, 0.03
 
 
+# ---------------------------------------------------------------- start
+
+
 class Plan(NamedTuple):
     """Grid and start."""
 
@@ -61,15 +65,17 @@ def plan(initial: Any, voltage_range: Any, thresholds: int, bends: int, times: F
     """Grid and start that the arguments ask for."""
     if np.any(times <= 0.0):
         raise ValueError(f"creep must hold time constants above zero, got {times.min():g} s")
-    given = None if voltage_range is None else _middle(voltage_range)
-    if isinstance(initial, LinearGain):
-        return _of_line(initial, given)
-    if isinstance(initial, PrandtlIshlinskii):
-        return _of_plays(initial)
-    return _of_loop(initial, given, thresholds, bends, times)
+    return _plan(initial, None if voltage_range is None else _middle(voltage_range), thresholds, bends, times)
 
 
-def _of_line(initial: LinearGain, given: Any) -> Plan:
+@functools.singledispatch
+def _plan(initial: Any, given: Any, thresholds: int, bends: int, times: FloatArray) -> Plan:
+    """Plan for a model; `given` are middle and half-width of the range of voltage, where one is."""
+    raise NotImplementedError
+
+
+@_plan.register
+def _of_line(initial: LinearGain, given: Any, thresholds: int, bends: int, times: FloatArray) -> Plan:
     if initial.gain <= 0.0:
         raise ValueError(f"initial_model must have a gain above zero, got {initial.gain:g} µm/V")
     slopes, none = np.array([[initial.gain]]), np.empty(0)
@@ -77,7 +83,8 @@ def _of_line(initial: LinearGain, given: Any) -> Plan:
     return Plan(none, none, none, centre, half_width, True, initial.gain, slopes, none, initial.offset)
 
 
-def _of_plays(initial: PrandtlIshlinskii) -> Plan:
+@_plan.register
+def _of_plays(initial: PrandtlIshlinskii, given: Any, thresholds: int, bends: int, times: FloatArray) -> Plan:
     n, k = initial.thresholds.size, initial.bends.size
     half_width = float(initial.thresholds[-1]) if n else 1.0
     centre = float(np.mean(initial.bends)) if k else 0.0
@@ -89,6 +96,7 @@ def _of_plays(initial: PrandtlIshlinskii) -> Plan:
     return Plan(relative, edges, times, centre, half_width, True, initial.gain, slopes, gains, initial.offset)
 
 
+@_plan.register
 def _of_loop(initial: ColemanHodgdon, given: Any, thresholds: int, bends: int, times: FloatArray) -> Plan:
     centre, half_width = given or (0.0, FIRST_RANGE / initial.alpha)
     fixed = given is not None
@@ -149,6 +157,9 @@ def prior(plan: Plan, uncertainty: float) -> tuple[FloatArray, FloatArray, Float
     P[-1, -1] = (LEVEL_START * plan.unit * plan.half_width) ** 2
     spread = np.concatenate([np.repeat(deviation, columns), np.full(m, CREEP_DEVIATION), [0.0]])
     return np.concatenate([flat, plan.gains, [plan.offset]]), spread, P
+
+
+# ---------------------------------------------------------------- grid
 
 
 def layout(plan: Plan) -> Record:
