@@ -66,7 +66,7 @@ test: $(VENV)/.installed-test  ## Run the tests (ARGS="-k name" passes options t
 	$(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
 
 test-slow: $(VENV)/.installed-test  ## Run the tests that take long: every option, processes, random sweeps
-	$(BIN)/python -m pytest -m slow -n auto $(ARGS)
+	$(BIN)/python -m pytest -m slow -n auto --dist loadfile $(ARGS)
 
 lint: $(VENV)/.installed-lint  ## Check style, formatting and docstrings
 	$(BIN)/ruff check .

@@ -16,6 +16,18 @@ settings.register_profile("deterministic", derandomize=True, deadline=None)
 settings.load_profile("deterministic")
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of a test marked `slow_but_first` the first case is quick to try, and the others are slow."""
+    seen = set()
+    for item in items:
+        if item.get_closest_marker("slow_but_first"):
+            name = item.nodeid.partition("[")[0]
+            if name in seen:
+                item.add_marker("slow")
+            seen.add(name)
+
+
 @pytest.fixture(autouse=True, scope="module")
 def _own_sources_end_with_their_file() -> Iterator[None]:
     """A model in a test file is a source of what is compiled after it: not in the files that come next."""

@@ -133,6 +133,7 @@ def test_identify_the_example(tmp_path: Path, log: Path) -> None:
 
 
 @pytest.mark.parametrize("options", [("--model", "plays-creep"), ("--stream",)])
+@pytest.mark.slow_but_first
 def test_a_model_goes_into_compensate_with_its_ranges(tmp_path: Path, monkeypatch: Any, options: Any) -> None:
     monkeypatch.chdir(tmp_path)
     assert run("identify", "example", "--no-plot", "-o", "model.json", *options).exit_code == 0

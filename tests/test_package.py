@@ -125,6 +125,7 @@ PAGES = {
 
 
 @pytest.mark.parametrize("page", PAGES)
+@pytest.mark.slow_but_first
 def test_code_of_the_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     path = ROOT / page if page == "README.md" else ROOT / "docs" / page

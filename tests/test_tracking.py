@@ -102,6 +102,7 @@ class Driver:
     ],
 )
 @pytest.mark.parametrize("options", [{}, {"temperature": [[0.0, 20.0], [0.2, 60.0]], "seed": 3}])
+@pytest.mark.slow_but_first
 def test_the_compiled_ring_is_the_loop_over_its_parts(model: Any, make: Any, options: Any) -> None:
     r = pz.signals.triangle(5.0, 20.0, 3, FS)
     results = []

@@ -12,6 +12,8 @@ from piezoest.bench.paper import Run
 from piezoest.bench.paper_tables import PRBS_ROW, Published, published
 from tests.bench.shared import bench as command
 
+pytestmark = pytest.mark.slow
+
 # What the stage misses: each has to miss still, so that a better stage shortens the list.
 MISSES = {
     ("7.5 µm @ 5.0 Hz, parameters of 2.5 µm", "compensated_max_error"): (

@@ -95,12 +95,14 @@ def test_signed_rank_of_few_is_the_exact_one(seed: int) -> None:
 
 
 @pytest.mark.parametrize(("factor", "verdict"), [(1.0, "same"), (1.2, "worse"), (1.001, "negligible")])
+@pytest.mark.slow
 def test_a_change_of_every_seed_is_found(factor: float, verdict: str) -> None:
     found = comparison.compare(runs({"e": 1.0}), runs({"e": factor}))
     assert {row["verdict"] for row in found["rows"] if row["quantity"] == "typical"} == {verdict}
     assert found["pairs"] == 4 * SEEDS
 
 
+@pytest.mark.slow
 def test_noise_is_noise_and_few_seeds_tell_nothing() -> None:
     def verdicts(seeds: int) -> list[str]:
         before, after = (runs(dict.fromkeys(names, 1.0), seeds=seeds) for names in (("e", "o"), ("o", "e")))

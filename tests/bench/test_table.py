@@ -158,6 +158,7 @@ def test_tables_are_tidy_and_read_back(tmp_path: Path, format: str) -> None:
     assert periods["error"].to_list() == rows[0]["errors"]
 
 
+@pytest.mark.slow
 def test_processes_give_the_same_rows(tmp_path: Path) -> None:
     tasks = plan("HysteresisEKF").tasks()
     rows = []
@@ -249,6 +250,7 @@ def test_recorded_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 SHORT = ("--scenario", "cold-start", "--scenario", "noise", "--quick", "--only", "HysteresisEKF", "--jobs", 1)
 
 
+@pytest.mark.slow
 def test_command_end_to_end(own: str, tmp_path: Path) -> None:
     asked = (*SHORT, "-e", f"{own}:Broken", "--seeds", 2, "--table", "csv")
     result = bench(*asked, "--json", "a.json", "--figures", "figures")
@@ -272,6 +274,7 @@ def test_command_end_to_end(own: str, tmp_path: Path) -> None:
     assert json.loads(again.stdout)["cells"] == document["cells"]
 
 
+@pytest.mark.slow
 def test_compare_with_itself_finds_no_change(own: str) -> None:
     assert bench(*SHORT, "-o", "one").exit_code == 0
     result = bench("compare", "one", "one", "--json", "c.json")

@@ -26,6 +26,7 @@ def drive(rig: Rig) -> FloatArray:
 
 
 @pytest.mark.parametrize(("kind", "mode"), MODES)
+@pytest.mark.slow_but_first
 def test_step_run_and_pieces_give_the_same_bits(kind: str, mode: str) -> None:
     given = {**SHORT, "hum": 0.1, "drift": 0.3, "delay": 2, "resolution": 1e-3}
     rig = draw(11, fault=kind, mode=mode, **given)

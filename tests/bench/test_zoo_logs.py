@@ -26,6 +26,7 @@ def test_a_log_is_a_function_of_its_seed() -> None:
     assert draw(3).u.size != other.u.size
 
 
+@pytest.mark.slow
 def test_everything_is_drawn() -> None:
     drawn = [draw(seed) for seed in SEEDS]
     assert {log.family for log in drawn} == set(FAMILIES)

@@ -61,6 +61,7 @@ def test_a_long_dwell_ends_where_it_should(noise: tuple[float, float], moved: bo
     assert abs(np.mean((r - x)[-10_000:])) < 0.005 + 0.1 * noise[0]
 
 
+@pytest.mark.slow
 def test_in_an_exact_rest_a_model_is_corrected_too() -> None:
     """Its voltage must not stand still while the correction grows: it would jump in the end."""
     # Where each way of the wave is longer than the last one, the recorded loop does not drive.

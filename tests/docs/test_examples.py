@@ -10,6 +10,8 @@ import pytest
 
 import piezoest as pz
 
+pytestmark = pytest.mark.slow
+
 
 def found() -> Iterator[tuple[str, Any]]:
     names = ("signals", "export", "records", "report")

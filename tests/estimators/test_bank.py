@@ -35,6 +35,7 @@ def records(K: int, N: int) -> tuple[Any, Any]:
         pz.PrandtlIshlinskiiRLS(SAMPLE_RATE, thresholds=4, delay=0.5),
     ],
 )
+@pytest.mark.slow_but_first
 def test_each_channel_is_a_single_estimator(estimator: Any) -> None:
     N, threads = 7, 1 if isinstance(estimator, pz.HysteresisEKF) else 3
     u, x = records(1500, N)

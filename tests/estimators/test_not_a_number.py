@@ -57,6 +57,7 @@ def assert_numbers(estimator: Any) -> None:
     assert model.is_admissible, model
 
 
+@pytest.mark.slow
 def test_covariance_that_winds_up_starts_anew() -> None:
     estimator = rls(memory=0.4, policies=())
     u = 33.0 * np.sin(np.arange(2000) / 50.0)
@@ -77,6 +78,7 @@ def test_covariance_that_winds_up_starts_anew() -> None:
     "kind",
     ["rls-line", "rls-line-bare", "ekf-line", "plays-line", "rls", "ekf", "horizon-line", "batch-line"],
 )
+@pytest.mark.slow_but_first
 def test_a_sensor_that_reads_zero_leaves_a_gain(kind: str) -> None:
     windows = kind.split("-")[0] in ROUNDS
     estimator = MAKERS[kind]()
@@ -104,6 +106,7 @@ def test_spoilt_covariance_starts_anew(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", MAKERS)
+@pytest.mark.slow_but_first
 def test_any_bits(kind: str) -> None:
     """Wild numbers by `step`, then by `run`, over and over."""
     rng = np.random.default_rng(1)

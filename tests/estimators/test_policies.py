@@ -26,6 +26,7 @@ def made(*policies: Any, **options: Any) -> Any:
 
 
 @pytest.mark.parametrize("name", POLICIES)
+@pytest.mark.slow_but_first
 def test_same_bits_by_step_run_and_from_a_file(name: str) -> None:
     u, x = recorded(FS, 6.0)
     u = np.concatenate([u, 0.5 * u, u])
@@ -47,6 +48,7 @@ def test_same_bits_by_step_run_and_from_a_file(name: str) -> None:
 
 
 @pytest.mark.parametrize("forgetting", [p.RandomWalk(), p.PeriodicForgetting(2.0)])
+@pytest.mark.slow_but_first
 def test_a_step_of_the_gain_is_detected_once(forgetting: Any) -> None:
     u, x = recorded(FS, 20.0)
     half = u.size // 2
@@ -62,6 +64,7 @@ def test_a_step_of_the_gain_is_detected_once(forgetting: Any) -> None:
     assert errors[0] < errors[1]
 
 
+@pytest.mark.slow
 def test_projection_keeps_theta_admissible() -> None:
     """A straight line has no admissible Coleman-Hodgdon model: the data pull theta out of the set."""
     u, x = recorded(FS, 4.0, model=pz.LinearGain(0.15))
@@ -76,6 +79,7 @@ def test_projection_keeps_theta_admissible() -> None:
     np.testing.assert_array_equal(inside.model.theta, inside.theta[:3])
 
 
+@pytest.mark.slow
 def test_amplitudes_are_remembered(tmp_path: Path) -> None:
     """Another loop at each amplitude: a long memory then starts from what was learnt there."""
     small, large = pz.ColemanHodgdon(0.024, 0.14, 0.0046), TRUE

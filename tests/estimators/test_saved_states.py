@@ -73,6 +73,7 @@ def test_indices_and_lengths_are_checked(estimator: Any, path: str) -> None:
 
 
 @pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)
+@pytest.mark.slow_but_first
 def test_names_shapes_and_covariances_must_be_its_own(estimator: Any) -> None:
     """Every name, in every record within the state: dropped, renamed, added, of another shape or type."""
     estimator = used(estimator.copy())

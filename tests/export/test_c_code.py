@@ -78,12 +78,14 @@ def log() -> tuple[Any, Any]:
         ("clang", "double", ("rls", "rls-continuous", "ekf-offset", "plays-bent")),
     ],
 )
+@pytest.mark.slow_but_first
 def test_compiles_without_a_warning(cc: str, precision: str, names: tuple[str, ...], tmp_path: Path) -> None:
     for name in names:
         compile_strictly(cc, code(name, precision), tmp_path, "-O1")
 
 
 @pytest.mark.parametrize("name", PAIRS)
+@pytest.mark.slow_but_first
 def test_double_equals_the_library(name: str, log: tuple[Any, Any]) -> None:
     r, x = (values.copy() for values in log)
     x[5000:5100] = np.nan
@@ -118,6 +120,7 @@ def test_freeze_holds_the_model_as_in_python(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["rls-continuous", "rls-delay-highpass", "ekf-offset", "plays-bent"])
+@pytest.mark.slow_but_first
 def test_sanitizers_are_silent(name: str, tmp_path: Path, log: tuple[Any, Any]) -> None:
     precision = "float" if name in ("rls-continuous", "ekf-offset") else "double"
     pairs = np.column_stack(log)
@@ -145,6 +148,7 @@ def test_what_has_no_kernel_is_refused(parts: Any, words: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["rls", "ekf"])
+@pytest.mark.slow_but_first
 def test_float_settles_to_the_same_error(name: str) -> None:
     case = SCENARIOS["cold-start"].build(0, after=10, **AT)
     estimator, compensator = PAIRS[name]()
@@ -180,6 +184,7 @@ def test_parameters_and_limits_can_be_set(log: tuple[Any, Any]) -> None:
 @pytest.mark.parametrize(
     ("name", "precision"), list(zip(PAIRS, itertools.cycle(("float", "double")), strict=False))
 )
+@pytest.mark.slow_but_first
 def test_of_any_bits_it_makes_numbers(name: str, precision: Any) -> None:
     made = pz.export.CompiledController(code(name, precision))
     rng, bits = np.random.default_rng(0), np.uint32 if precision == "float" else np.uint64

@@ -53,6 +53,7 @@ def test_a_model_becomes_what_the_library_makes_of_it(model: Path, kind: str) ->
         refused(result, "Prandtl")
 
 
+@pytest.mark.slow
 def test_an_adaptive_feedforward_needs_no_model(tmp_path: Path) -> None:
     own = ("-o", tmp_path, "--sample-rate", 10_000, "--minimum", -20, "--maximum", 120, "--name", "stage")
     result = run("adaptive", *own, "--estimators", "ekf", "--slew-rate", 5000)

@@ -15,6 +15,8 @@ from piezoest.controller.faults import FAULTS
 from piezoest.controller.shown import STAGES
 from tests.export.building import compile_strictly, under_sanitizers
 
+pytestmark = pytest.mark.slow
+
 FS = 1e4
 LIMITS = pz.VoltageLimits(-100.0, 100.0)
 ESTIMATORS: dict[str, Any] = {"line": (), "default": None, "ekf": (pz.HysteresisEKF,)}
@@ -24,10 +26,7 @@ def controller(estimators: str, limits: pz.VoltageLimits = LIMITS) -> Any:
     return pz.AdaptiveFeedforward(FS, limits=limits, estimators=ESTIMATORS[estimators])
 
 
-@pytest.fixture(
-    scope="module",
-    params=["ekf", *(pytest.param(name, marks=pytest.mark.slow) for name in ("default", "line"))],
-)
+@pytest.fixture(scope="module", params=ESTIMATORS)
 def pair(request: pytest.FixtureRequest) -> tuple[Any, Any]:
     """A controller, and what is exported of it."""
     library = controller(request.param)
@@ -162,8 +161,8 @@ def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> N
     ("estimators", "precision", "cc"),
     [
         ("line", "double", "gcc"),
-        pytest.param("default", "double", "clang", marks=pytest.mark.slow),
-        pytest.param("ekf", "float", "gcc", marks=pytest.mark.slow),
+        ("default", "double", "clang"),
+        ("ekf", "float", "gcc"),
     ],
 )
 def test_compiles_without_a_warning(estimators: str, precision: Any, cc: str, tmp_path: Path) -> None:
@@ -183,7 +182,6 @@ def test_compiles_without_a_warning(estimators: str, precision: Any, cc: str, tm
     assert not {line.split()[-2] for line in held.stdout.splitlines()} & set("bBdDC"), "global state"
 
 
-@pytest.mark.slow
 def test_sanitizers_are_silent(tmp_path: Path) -> None:
     library, stage = controller("default"), rig("bouc-wen").stage()
     pairs = np.zeros((rig("bouc-wen").reference.size, 2))

@@ -36,6 +36,7 @@ def fit(u: FloatArray, x: FloatArray, model: str, **options: Any) -> Fit:
      ("plays-asymmetric-creep", {"bends": 2, "creep": CREEP})],
 )  # fmt: skip
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.slow_but_first
 def test_a_stage_of_plays_is_recovered_to_its_noise(model: str, kinds: dict[str, Any], seed: int) -> None:
     u, x, sigma = drawn(seed, **kinds)
     found = fit(u, x + noise(sigma, seed), model)
@@ -91,6 +92,7 @@ def test_a_start_that_is_not_known_is_found(before: str) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.slow_but_first
 def test_creep_is_not_taken_for_a_delay(seed: int) -> None:
     rng = np.random.default_rng(seed)
     u = voltage(rng)
@@ -102,6 +104,7 @@ def test_creep_is_not_taken_for_a_delay(seed: int) -> None:
 
 @pytest.mark.parametrize("delay", [0.0, 0.6, 3.3, 9.0])
 @pytest.mark.parametrize("model", ["plays", "coleman-hodgdon"])
+@pytest.mark.slow_but_first
 def test_a_delay_is_found_where_the_voltage_has_several_frequencies(delay: float, model: str) -> None:
     rng = np.random.default_rng(5)
     u = voltage(rng)

@@ -21,6 +21,7 @@ def coloured(size: float, seed: int, memory: float) -> FloatArray:
 
 @pytest.mark.parametrize("memory", [0.0, 0.9])
 @pytest.mark.parametrize("model", ["coleman-hodgdon", "line"])
+@pytest.mark.slow
 def test_standard_errors_cover(model: str, memory: float) -> None:
     true: Any = LOOP if model == "coleman-hodgdon" else pz.LinearGain(0.2, -3.0)
     z = []
@@ -36,6 +37,7 @@ def test_standard_errors_cover(model: str, memory: float) -> None:
     assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.5
 
 
+@pytest.mark.slow
 def test_standard_errors_of_plays_and_creep_are_of_the_size_of_their_scatter() -> None:
     """Of a stage whose thresholds and time constants are those of the fit."""
     u = voltage(np.random.default_rng(1), centre=40.0)
@@ -67,6 +69,7 @@ def test_what_ends_at_a_bound_has_no_standard_error() -> None:
 
 
 @pytest.mark.parametrize("model", ["plays", "plays-asymmetric-creep", "coleman-hodgdon"])
+@pytest.mark.slow_but_first
 def test_intervals_hold_what_they_promise(model: str) -> None:
     """Of the half behind the fitted one."""
     inside = []

@@ -67,6 +67,7 @@ def test_what_a_fast_voltage_moves_is_no_noise() -> None:
     assert identify(log(u, x, 5e-3), model="plays").noise_floor == pytest.approx(5e-3, rel=0.2)
 
 
+@pytest.mark.slow
 def test_what_goes_beyond_the_fitted_part_is_said() -> None:
     u = signals.multi_amplitude([10.0, 20.0, 40.0, 40.0], 5.0, 4, FS).values
     grows, steady = log(u, LOOP.simulate(u)), log(swings(), LOOP.simulate(swings()))
@@ -125,6 +126,7 @@ def test_a_little_better_is_better(missed: float, chosen: int) -> None:
     assert best_of(kinds) is kinds[chosen]
 
 
+@pytest.mark.slow
 def test_creep_is_known_where_the_voltage_rests() -> None:
     model = pz.PrandtlIshlinskii(0.1, [5.0, 15.0], [0.02, 0.02], creep=pz.Creep([0.1], [1.0]), sample_rate=FS)
     u = 50.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(8000) / FS)

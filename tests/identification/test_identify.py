@@ -49,6 +49,7 @@ def plays_log(seed: int = 0, rate: float = 1000.0, **kinds: Any) -> Record:
     return Record.from_arrays(u, x + noise(1e-3 * float(np.ptp(x)), seed), rate)
 
 
+@pytest.mark.slow
 def test_finds_a_known_model_within_its_standard_errors() -> None:
     z = []
     for seed in range(8):
@@ -63,6 +64,7 @@ def test_finds_a_known_model_within_its_standard_errors() -> None:
     assert 0.5 < np.sqrt(np.mean(np.square(z))) < 1.5
 
 
+@pytest.mark.slow
 def test_a_lag_that_swings_alike_cannot_tell_is_used_but_not_told() -> None:
     u = 30.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(8000) / RATE)
     found = identify(u, TRUE.simulate(u) + noise(2e-3, 0, u.size), sample_rate=RATE)
@@ -114,12 +116,14 @@ def test_flaws_of_a_log_do_not_matter_and_are_said(name: str) -> None:
     assert sum(said in sentence for sentence in (*found.advice, *found.record.notes)) == 1
 
 
+@pytest.mark.slow
 def test_drift_is_found_and_said() -> None:
     found = identify(changed(made().displacement + np.linspace(0.0, 0.5, len(made()))), model=LOOP)
     assert found.fit.drift + found.drift > 0.2
     assert any("drifts" in sentence for sentence in found.advice)
 
 
+@pytest.mark.slow
 def test_noise_is_what_repeated_periods_differ_by() -> None:
     # White noise is seen in neighbouring samples as well, slow noise only in periods that repeat.
     assert identify(made(), model="line").noise_floor == pytest.approx(2e-3, rel=0.1)
@@ -137,6 +141,7 @@ def test_noise_is_what_repeated_periods_differ_by() -> None:
      ({"bends": 2}, {"plays-asymmetric", "plays-asymmetric-creep"}),
      ({"bends": 2, "creep": pz.Creep([0.08], [0.25])}, {"plays-creep", "plays-asymmetric-creep"})],
 )  # fmt: skip
+@pytest.mark.slow_but_first
 def test_the_kind_that_a_stage_needs_is_chosen(kinds: dict[str, Any], wanted: set[str]) -> None:
     found = [identify(plays_log(seed, **kinds), delay=0.0) for seed in range(3)]
     assert len([each for each in found if each.chosen in wanted]) >= 2
@@ -144,6 +149,7 @@ def test_the_kind_that_a_stage_needs_is_chosen(kinds: dict[str, Any], wanted: se
         assert each.held_out.rms < 1.6 * min(item.held_out.rms for item in each.candidates)
 
 
+@pytest.mark.slow
 def test_the_simplest_that_will_do_is_chosen() -> None:
     t = np.arange(8000) / 1000.0
     u = 30.0 * np.sin(2.0 * np.pi * 1.7 * t) * np.linspace(1.0, 0.5, t.size)
@@ -167,6 +173,7 @@ def test_a_stage_of_relays_needs_asymmetry() -> None:
 
 
 @pytest.mark.parametrize("model", FORMS)
+@pytest.mark.slow_but_first
 def test_one_kind_is_fitted_where_one_is_named(model: str) -> None:
     found = identify(made(), model=model)
     assert found.chosen == model
@@ -174,6 +181,7 @@ def test_one_kind_is_fitted_where_one_is_named(model: str) -> None:
     assert found.line.theta[0] == pytest.approx(found.candidates[0].model.theta[0])
 
 
+@pytest.mark.slow
 def test_arrays_records_files_and_tables_give_the_same(tmp_path: Path) -> None:
     record = made()
     record.write(tmp_path / "log.npy")
@@ -201,6 +209,7 @@ def test_other_logs_are_predicted(tmp_path: Path) -> None:
         identify(made(), validate=[Record.from_arrays(other.voltage[:30], other.displacement[:30], RATE)])
 
 
+@pytest.mark.slow
 def test_another_log_may_have_another_sample_rate() -> None:
     creep = pz.Creep([0.06], [0.25])
     record = plays_log(1, creep=creep)
@@ -209,6 +218,7 @@ def test_another_log_may_have_another_sample_rate() -> None:
     assert found.validations[0].error.rms < 1.3 * found.validations[1].error.rms
 
 
+@pytest.mark.slow
 def test_doubts_are_errors_where_they_are_to_be() -> None:
     record = made()
     gap = record.displacement.copy()
@@ -364,6 +374,7 @@ WHOLE = fitted(RECORD, validate=(RECORD,))
 
 
 @pytest.mark.parametrize("gap", OTHERS)
+@pytest.mark.slow_but_first
 def test_what_does_not_count_hurts_no_figure(gap: str) -> None:
     found = fitted(wrong(gap))
     assert found.held_out.rms < 1.1 * WHOLE.held_out.rms
@@ -375,6 +386,7 @@ def test_what_does_not_count_hurts_no_figure(gap: str) -> None:
 
 
 @pytest.mark.parametrize("gap", LOST_TURN)
+@pytest.mark.slow_but_first
 def test_what_comes_after_a_lost_turn_is_judged_when_it_is_forgotten(gap: str) -> None:
     record = wrong(gap)
     found = fitted(record)
@@ -405,6 +417,7 @@ def real(data_dir: Path) -> Identification:
     return identify(folder / "test_1hz.csv", validate=[folder / "model_1hz.csv"])
 
 
+@pytest.mark.slow
 def test_real_recording_free_running(real: Identification) -> None:
     assert real.trained == pytest.approx(len(real.record) / 2, abs=1)
     assert real.held_out.rms <= 0.30
@@ -415,6 +428,7 @@ def test_real_recording_free_running(real: Identification) -> None:
     assert 0 < real.left_out < 200
 
 
+@pytest.mark.slow
 def test_real_recordings_predict_each_other(real: Identification, data_dir: Path) -> None:
     folder = data_dir / "discrete_backlash_operator"
     other = identify(folder / "model_1hz.csv", validate=[folder / "test_1hz.csv"])

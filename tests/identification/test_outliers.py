@@ -119,6 +119,7 @@ def test_readings_that_are_off_together_are_found(count: int, value: float | Non
         assert flaws.jumps.size == 0
 
 
+@pytest.mark.slow
 def test_bursts_are_found_in_logs_of_all_kinds() -> None:
     found = 0
     for seed in SEEDS:
@@ -131,6 +132,7 @@ def test_bursts_are_found_in_logs_of_all_kinds() -> None:
     assert found > 0.85 * len(SEEDS)
 
 
+@pytest.mark.slow
 def test_error_codes_do_not_keep_a_log_from_being_fitted() -> None:
     u, x = sine_log()
     x[np.random.default_rng(1).choice(4000, 8, replace=False)] = 99999.0
@@ -182,6 +184,7 @@ def test_a_jump_is_found_in_whatever_it_hides(how: str) -> None:
     assert flaws.jump_sizes[0] == pytest.approx(1.0, abs=0.2)
 
 
+@pytest.mark.slow
 def test_missing_samples_are_no_jumps() -> None:
     for seed in SEEDS:
         u, x = zoo_log(seed)[:2]
@@ -190,6 +193,7 @@ def test_missing_samples_are_no_jumps() -> None:
         assert flawed(u, y).jumps.size <= 1, seed
 
 
+@pytest.mark.slow
 def test_what_a_stage_does_in_a_long_gap_is_no_jump() -> None:
     for seed in SEEDS:
         u, x = zoo_log(seed)[0], zoo_log(seed)[1].copy()

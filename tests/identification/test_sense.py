@@ -14,6 +14,7 @@ from piezoest.records import Record
 from tests.identification.zoo_logs import zoo_log
 
 
+@pytest.mark.slow
 def test_healthy_logs_of_all_families_are_not_doubted() -> None:
     doubted = []
     for seed in range(100):

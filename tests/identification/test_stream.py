@@ -31,6 +31,7 @@ def saved(folder: Path, u: FloatArray, x: FloatArray, rows: int = 1000) -> Recor
 
 @pytest.mark.parametrize(("kinds", "kind"), [({}, "plays"), ({"bends": 2}, "plays-asymmetric")])
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.slow
 def test_as_good_as_in_memory(tmp_path: Path, kinds: dict[str, Any], kind: str, seed: int) -> None:
     found = pz.identify_stream(saved(tmp_path, *drawn(seed, **kinds)), delay=0.0)
     wanted = pz.identify(tmp_path / "log.npy", delay=0.0, model=found.chosen)
@@ -57,6 +58,7 @@ def test_whatever_the_blocks_the_same_bits(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("flaw", "skipped"), [("gaps", 1000), ("wrong voltages", 3), ("unsettled", 0)])
+@pytest.mark.slow_but_first
 def test_flaws_do_no_harm(tmp_path: Path, flaw: str, skipped: int) -> None:
     u, x = drawn(4 if flaw == "unsettled" else 2)
     whole = pz.identify_stream(saved(tmp_path, u, x), delay=0.0)

@@ -18,6 +18,7 @@ BY_ROUNDING = {"rls/paper/wild"}
 
 
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.slow_but_first
 def test_case(name: str) -> None:
     assert name in STORED, "not in the file: python -m tests.oracle.make_oracle"
     if TOLERANCE > 0.0 and name in BY_ROUNDING:

@@ -61,6 +61,7 @@ def near(policy: Any) -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("name", ALL)
+@pytest.mark.slow_but_first
 def test_every_policy_is_carried_out(name: str) -> None:
     """Also those to come: with it an estimator does something else than without."""
     options = OPTIONS.get(name, {})
