@@ -62,11 +62,14 @@ calibrate: $(VENV)/.installed  ## Fit the simulated stage to the paper's tables 
 
 # ---------------------------------------------------------------- checks
 
+# A file stays in one process, in the order of tests/conftest.py.
+SPREAD := -n auto --dist loadfile --no-loadscope-reorder
+
 test: $(VENV)/.installed-test  ## Run the tests (ARGS="-k name" passes options to pytest)
-	$(BIN)/python -m pytest -n auto --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest $(SPREAD) $(ARGS)
 
 test-slow: $(VENV)/.installed-test  ## Run the tests that take long: every option, processes, random sweeps
-	$(BIN)/python -m pytest -m slow -n auto --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest -m slow $(SPREAD) $(ARGS)
 
 lint: $(VENV)/.installed-lint  ## Check style, formatting and docstrings
 	$(BIN)/ruff check .

@@ -16,9 +16,15 @@ settings.register_profile("deterministic", derandomize=True, deadline=None)
 settings.load_profile("deterministic")
 
 
+# A controller takes a minute to compile: the first file does it, and those that need it come last, so that no
+# other process compiles it as well.
+FIRST, LAST = "tests/test_package.py", ("tests/bench/", "tests/controller/", "tests/docs/", "tests/test_")
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of a test marked `slow_but_first` the first case is quick to try, and the others are slow."""
+    """Put files in order; of a test marked `slow_but_first` the cases but the first are slow."""
+    items.sort(key=lambda item: (not item.nodeid.startswith(FIRST), item.nodeid.startswith(LAST)))
     seen = set()
     for item in items:
         if item.get_closest_marker("slow_but_first"):

@@ -264,6 +264,7 @@ def test_nothing_is_written_over_what_was_read(log: Path, reference: Path) -> No
     assert reference.read_text().startswith("time_s,reference_um")
 
 
+@pytest.mark.slow
 def test_an_encoding_without_our_signs_is_no_mistake(log: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "piezoest", "identify", str(log), "--no-plot"],

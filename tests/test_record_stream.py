@@ -68,6 +68,7 @@ def test_stream_of_too_few_rows_says_so_at_its_end(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["csv", "npy", "parquet", "h5"])
+@pytest.mark.slow_but_first
 def test_memory_does_not_grow_with_the_file(tmp_path: Path, kind: str) -> None:
     n = 300_000 if kind == "csv" else 1_000_000
     time = np.arange(n) / 50_000.0

@@ -61,6 +61,7 @@ def settled(stage: Any, reference: pz.Signal, with_lead: bool) -> float:
 
 
 @pytest.mark.parametrize("stage", [pz.PaperStage, pytest.param(pz.PreisachStage, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_error_at_a_twentieth_of_the_resonance(stage: Any) -> None:
     triangle = pz.signals.triangle(5.0, 39.0625, 40, FS)
     assert settled(stage, triangle, True) < 0.8 * settled(stage, triangle, False)

@@ -138,6 +138,7 @@ def test_many_inner_loops_leave_the_outer_one(change: float) -> None:
 
 
 @pytest.mark.parametrize("size", [0.03, 0.1, 0.3])
+@pytest.mark.slow_but_first
 def test_closed_inner_loops_do_not_drift(size: float) -> None:
     """The curves of both directions differ, so nothing closes by itself."""
     u, x = loop()

@@ -79,6 +79,7 @@ def test_a6_to_the_letter_freezes_for_good() -> None:
     assert loud @ P @ loud < loud @ frozen @ loud
 
 
+@pytest.mark.slow
 def test_continuous_law_in_seconds_adapts_over_seconds() -> None:
     """The paper's normalised law is bounded per unit of time: in seconds it is the slower one."""
     true, sample_rate = ColemanHodgdon(*TABLE_I[2]), 50_000.0

@@ -58,6 +58,7 @@ CONTINUOUS: dict[str, Any] = {"time_base": "continuous", "step": 0.01}
     ],
     ids=["discrete", "directional", "variable", "continuous", "continuous, normalised"],
 )
+@pytest.mark.slow_but_first
 def test_laws_are_the_textbooks(law: pz.RecursiveLeastSquares, textbook: Any) -> None:
     rng, (theta, P) = np.random.default_rng(3), start()
     for _ in range(100):

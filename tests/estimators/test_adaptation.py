@@ -45,6 +45,7 @@ def test_settles_within_periods(reference: Any, stage: Any, within: dict[int, fl
 
 
 @pytest.mark.parametrize("memory", ["period", 0.4])
+@pytest.mark.slow_but_first
 def test_a_dwell_of_half_a_minute_moves_nothing(memory: Any) -> None:
     u, x = recorded(FS, 10.0)
     half = u.size // 2

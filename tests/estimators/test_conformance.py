@@ -252,6 +252,7 @@ def test_learns_the_parameters(kind: Any) -> None:
     assert error.max() < 0.1
 
 
+@pytest.mark.slow
 def test_learns_a_linear_gain(kind: Any) -> None:
     u, x = record(4.0, model=pz.LinearGain(0.155))
     estimator = kind(RATE, initial_model=pz.LinearGain(0.1))

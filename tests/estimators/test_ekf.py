@@ -28,6 +28,7 @@ def test_jacobian_is_casadis_derivative(travel: float, sign: float) -> None:
 
 
 @pytest.mark.parametrize("offset", [False, True])
+@pytest.mark.slow_but_first
 def test_of_a_linear_gain_is_recursive_least_squares(offset: bool) -> None:
     fs, gain, uncertainty, noise = 2000.0, 0.1, 0.5, 1.5e-3
     u, x = recorded(fs, 5.0, noise, model=pz.LinearGain(0.155, 0.2 * offset))

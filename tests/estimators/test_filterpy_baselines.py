@@ -18,6 +18,7 @@ from tests.estimators.shared import recorded
         {"initial_model": pz.LinearGain(0.1), "mismatch": 0.0},
     ],
 )
+@pytest.mark.slow_but_first
 def test_compiled_filter_equals_filterpy(options: dict[str, Any]) -> None:
     """At 50 kHz, with single and long gaps."""
     fs, samples = 50_000.0, 4000

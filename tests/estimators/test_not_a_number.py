@@ -91,6 +91,7 @@ def test_a_sensor_that_reads_zero_leaves_a_gain(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["rls", "rls-bare", "ekf", "output-error"])
+@pytest.mark.slow_but_first
 def test_spoilt_covariance_starts_anew(kind: str) -> None:
     u = 33.0 * np.sin(np.arange(300) / 10.0)
     x = LOOP.simulate(u, allow_jumps=True)

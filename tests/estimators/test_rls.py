@@ -28,6 +28,7 @@ def test_equals_the_textbook_with_gaps() -> None:
     [pz.HysteresisRLS(FS, memory=0.4, offset=True),
      pz.HysteresisEKF(FS, noise=1e-3, drift=0.0, mismatch=0.0, offset=True)],
 )  # fmt: skip
+@pytest.mark.slow_but_first
 def test_finds_the_centre_of_the_loop(estimator: Any) -> None:
     """A unipolar voltage and a biased gauge: centre (60 V, -120 µm)."""
     u, x = recorded(FS, 5.0)
@@ -52,6 +53,7 @@ def test_high_pass_removes_a_bias_of_the_sensor() -> None:
 
 
 @pytest.mark.parametrize("delay", [0.5, 2.5, 3.0])
+@pytest.mark.slow_but_first
 def test_delay(delay: float) -> None:
     u, x = recorded(FS, 5.0, 0.0)
     late = np.interp(np.arange(x.size) - delay, np.arange(x.size), x)

@@ -123,6 +123,7 @@ def places(holder: Any) -> list[tuple[Any, Any]]:
 
 
 @pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)
+@pytest.mark.slow_but_first
 def test_a_save_changed_at_random_is_refused_or_works(estimator: Any) -> None:
     saved, rng = used(estimator.copy()).to_dict(), np.random.default_rng(1)
     for _ in range(60):

@@ -78,7 +78,7 @@ def log() -> tuple[Any, Any]:
         ("clang", "double", ("rls", "rls-continuous", "ekf-offset", "plays-bent")),
     ],
 )
-@pytest.mark.slow_but_first
+@pytest.mark.slow
 def test_compiles_without_a_warning(cc: str, precision: str, names: tuple[str, ...], tmp_path: Path) -> None:
     for name in names:
         compile_strictly(cc, code(name, precision), tmp_path, "-O1")
@@ -120,7 +120,7 @@ def test_freeze_holds_the_model_as_in_python(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["rls-continuous", "rls-delay-highpass", "ekf-offset", "plays-bent"])
-@pytest.mark.slow_but_first
+@pytest.mark.slow
 def test_sanitizers_are_silent(name: str, tmp_path: Path, log: tuple[Any, Any]) -> None:
     precision = "float" if name in ("rls-continuous", "ekf-offset") else "double"
     pairs = np.column_stack(log)

@@ -148,7 +148,7 @@ def test_what_is_continued_begins_as_the_fitted_record() -> None:
 
 
 @pytest.mark.parametrize("model", ["plays", "plays-asymmetric"])
-@pytest.mark.slow_but_first
+@pytest.mark.slow
 def test_plays_that_go_on_foresee_a_growing_amplitude(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of stages whose plays go on beyond the fitted range, from rest at 0 V."""
     errors = []

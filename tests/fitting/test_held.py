@@ -20,7 +20,7 @@ def slow(times: int, seed: int = 0) -> FloatArray:
 
 
 @pytest.mark.parametrize("times", [2, 4, 10, 20])
-@pytest.mark.slow_but_first
+@pytest.mark.slow
 def test_a_slow_sensor_is_fitted_as_well_as_a_fast_one(times: int) -> None:
     found = pz.identify(U, slow(times), sample_rate=2000.0)
     assert found.flaws.jumps.size == 0

@@ -69,7 +69,7 @@ def test_what_ends_at_a_bound_has_no_standard_error() -> None:
 
 
 @pytest.mark.parametrize("model", ["plays", "plays-asymmetric-creep", "coleman-hodgdon"])
-@pytest.mark.slow_but_first
+@pytest.mark.slow
 def test_intervals_hold_what_they_promise(model: str) -> None:
     """Of the half behind the fitted one."""
     inside = []

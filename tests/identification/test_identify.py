@@ -294,6 +294,7 @@ def test_what_is_no_log_is_refused() -> None:
 
 
 @pytest.mark.parametrize("model", FORMS)
+@pytest.mark.slow_but_first
 def test_dictionary_is_json_and_holds_the_model(model: str, tmp_path: Path) -> None:
     found = identify(plays_log(1, creep=pz.Creep([0.06], [0.25])), model=model)
     (tmp_path / "found.json").write_text(json.dumps(found.to_dict(), allow_nan=False), encoding="utf-8")

@@ -18,6 +18,7 @@ def apart(rng: np.random.Generator, size: int, count: int, least: int) -> FloatA
     return places[np.diff(places, prepend=-least) >= least]
 
 
+@pytest.mark.slow
 def test_healthy_logs_are_without_flaw() -> None:
     for seed in SEEDS:
         flaws = flawed(*zoo_log(seed)[:2])
@@ -43,6 +44,7 @@ def test_spikes_are_found() -> None:
     assert wrong < 0.002 * spikes
 
 
+@pytest.mark.slow
 def test_jumps_are_found() -> None:
     found = jumps = wrong = 0
     for seed in SEEDS:

@@ -45,6 +45,7 @@ def test_as_good_as_in_memory(tmp_path: Path, kinds: dict[str, Any], kind: str, 
     assert (found.samples, found.trained, found.skipped) == (COUNT, COUNT // 2, 0)
 
 
+@pytest.mark.slow
 def test_whatever_the_blocks_the_same_bits(tmp_path: Path) -> None:
     u, x = drawn(1)
     u[300:340], u[:7], x[:2], x[4000:4010] = np.nan, np.nan, np.nan, np.nan
@@ -99,6 +100,7 @@ def test_the_start_is_checked(tmp_path: Path, change: Any, name: str) -> None:
     assert found.findings[0].sentence in found.advice[0]
 
 
+@pytest.mark.slow
 def test_a_lag_is_found_and_followed(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     u = np.tile(voltage(rng), 2)
