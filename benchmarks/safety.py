@@ -123,7 +123,7 @@ def draw(document: Row, path: Path) -> None:
 def main(
     runs: Count = 2000, others: Count | None = None, map: int = 0, singles: int = 0, dwell: int = 0,
     seed: int = 0, jobs: Annotated[int | None, typer.Option("--jobs", "--workers")] = None,
-    output: Annotated[Path, typer.Option("--output", "--out")] = Path("bench-results-safety"),
+    output: Annotated[Path, typer.Option("--output")] = Path("bench-results-safety"),
     json: Path | None = None, figure: Path | None = None,
 ) -> None:  # fmt: skip
     """Play RUNS rigs, one for each seed from SEED on, and OTHERS for what it is compared with.

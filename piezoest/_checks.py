@@ -186,7 +186,11 @@ def array_1d(name: str, value: Any, *, allow_nan: bool = False, minimum_length: 
         raise ValueError(f"{name} must be an array, got None")
     array = as_floats(name, value)
     if array.ndim != 1:
-        hint = "use step() for single samples" if array.ndim == 0 else f"pass {name}.ravel(), or a part of it"
+        hint = f"pass one column, as {name}[:, 0]"
+        if array.ndim == 0:
+            hint = "use step() for single samples"
+        elif array.size == max(array.shape):
+            hint = f"pass {name}.ravel()"
         raise ValueError(f"{name} must have shape (N,), got {array.shape}: {hint}")
     if array.size < minimum_length:
         raise ValueError(f"{name} needs at least {minimum_length} samples, got {array.size}")

@@ -170,6 +170,9 @@ class MachineCode:
     sources, by another Numba or for another processor, and one that is damaged, are all compiled again.
     """
 
+    def flush(self) -> None:
+        """Do nothing: files that no longer fit are written over."""
+
     def __init__(self, function: Any, options: dict[str, Any]) -> None:
         self._name = f"{function.__module__}.{function.__qualname__}"
         self._function = function

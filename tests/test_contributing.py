@@ -72,4 +72,4 @@ def test_an_example_does_what_it_says(title: str, tmp_path: Path) -> None:
     run(tmp_path, str(test))
     if title in FOUND_BY:
         name, *files = FOUND_BY[title]
-        run(tmp_path, *files, "-k", name)
+        run(tmp_path, *files, "-k", name, "-m", "")

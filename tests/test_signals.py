@@ -23,7 +23,7 @@ EXAMPLES: dict[str, Callable[[], Signal]] = {
     "multi_amplitude of sines": lambda: signals.multi_amplitude([1.0, 5.0], 7.0, 3, 1000.0, shape="sine"),
     "filtered_steps": lambda: signals.filtered_steps([1.0, -2.0, 3.0], 0.2, 10_000.0),
     "chirp": lambda: signals.chirp(5.0, 1.0, 20.0, 2.0, 10_000.0),
-    "prbs": lambda: signals.prbs(periods=2, sample_rate=10_000.0),
+    "prbs": lambda: signals.prbs(periods=2, sample_rate=10_000.0, lead_in=0.1),
     "dwell": lambda: signals.dwell(2.0, 0.5, 10_000.0),
     "two_tone": lambda: signals.two_tone((4.0, 1.0), (5.0, 40.0), 1.0, 10_000.0),
     "random_walk": lambda: signals.random_walk(5.0, 20.0, 2.0, 10_000.0, seed=3),
@@ -118,6 +118,10 @@ def test_prbs_is_the_steady_state_of_the_repeated_filtered_sequence() -> None:
     begun = signals.prbs(start="zero")
     assert abs(begun.values[0]) < 0.01 < begun.values[100]
     np.testing.assert_allclose(np.sort(begun.values), np.sort(r.values[:n]), atol=1e-12)
+    led = signals.prbs(periods=2, lead_in=0.2).values
+    assert led[0] == 0.0
+    np.testing.assert_array_equal(led[10_000:], r.values)
+    np.testing.assert_allclose(led[9_950:10_000], r.values[n - 50 : n], atol=1e-5)
 
 
 def test_random_walk_is_band_limited_and_reproducible() -> None:

@@ -14,7 +14,7 @@ from piezoest.bench.statistics import LEVEL, signed_rank
 
 RUN = ["stage", "scenario", "estimator", "seed"]
 QUANTITIES = ("typical", "settled", "worst", "settles")
-RELEVANT = 1.01  # ratio: a smaller median change is none, however sure it is
+RELEVANT = 0.01  # a smaller median change is negligible, however sure it is
 ALL = "all scenarios"
 
 
@@ -108,7 +108,7 @@ def _verdict(row: dict[str, Any]) -> str:
     if row["q"] > LEVEL:
         # The least p that so many pairs can have.
         return "too few seeds" if 2.0 ** (1 - row["changed"]) > LEVEL else "within noise"
-    if 1.0 / RELEVANT < row["ratio"] < RELEVANT:
+    if 1.0 / (1.0 + RELEVANT) < row["ratio"] < 1.0 + RELEVANT:
         return "negligible"
     return "better" if row["ratio"] < 1.0 else "worse"
 

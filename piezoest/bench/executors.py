@@ -14,13 +14,15 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from piezoest._checks import integer
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+# Tasks that Dask's scheduler knows of at a time: enough for a thousand cores, and no burden.
+IN_FLIGHT = 1000
 PATIENCE = 15.0  # s until a scheduler that does not answer is given up
 
 
@@ -33,11 +35,11 @@ def in_processes(
 ) -> Iterator[Result]:
     """Work on items over the cores.
 
-    `processes`: default one for each core; 1 works in this process. `crashed`: result of an item whose
-    process died over it. The items that were under way when a process died are tried again, each alone.
-    Without it the death is an error.
+    `work`: what is done with each; a module's function, as for `pickle`. `processes`: how many; default one
+    for each core, 1 works in this process. `crashed`: result of an item whose process died over it. The items
+    that were under way when a process died are tried again, each alone. Without it the death is an error.
     """
-    processes = _checked(processes)
+    processes = integer("processes", os.cpu_count() or 1 if processes is None else processes, 1)
     if processes == 1:
         yield from map(work, items)
         return
@@ -48,11 +50,6 @@ def in_processes(
             raise BrokenProcessPool("a process died at its work")
         if crashed is not None:
             yield from one_by_one(work, suspects, crashed)
-
-
-def _checked(processes: int | None) -> int:
-    """How many processes there are to be."""
-    return integer("processes", (os.cpu_count() or 1) if processes is None else processes, 1)
 
 
 def one_by_one(
@@ -140,26 +137,45 @@ def on_dask(
         import distributed
     except ImportError:
         raise ValueError("Dask is not installed: pip install 'piezoest[dask]'") from None
-    workers = _checked(processes)
-    local = {"n_workers": workers, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
-    given = local if scheduler is None else {"address": scheduler}
-    try:
-        client = distributed.Client(**given, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise ValueError(f"scheduler {scheduler} does not answer: {error}") from None
-    with client:
+    with _client(scheduler, processes) as client:
         for path in modules:
             client.upload_file(str(path))
-        # Not pure: Dask must not take two equal calls for one.
-        under_way = {client.submit(work, item, pure=False): item for item in items}
-        for future in distributed.as_completed(list(under_way), loop=client.loop):
+        queue = iter(items)
+        under_way: dict[Any, Item] = {}
+
+        def submit_next() -> list[Any]:
+            for item in queue:
+                # Not pure: Dask must not take two equal calls for one.
+                future = client.submit(work, item, pure=False)
+                under_way[future] = item
+                return [future]
+            return []
+
+        first = [future for _ in range(IN_FLIGHT) for future in submit_next()]
+        completed = distributed.as_completed(first, loop=client.loop)
+        for future in completed:
             item = under_way.pop(future)
             try:
-                yield future.result()
+                result = future.result()
             except distributed.KilledWorker:
                 if crashed is None:
                     raise
-                yield crashed(item)
+                result = crashed(item)
+            completed.update(submit_next())
+            yield result
+
+
+def _client(scheduler: str | None, processes: int | None) -> Any:
+    """Client of a cluster, or of one made for it on this machine."""
+    import distributed
+
+    workers = integer("processes", os.cpu_count() or 1 if processes is None else processes, 1)
+    local = {"n_workers": workers, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
+    given = local if scheduler is None else {"address": scheduler}
+    try:
+        return distributed.Client(**given, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ValueError(f"scheduler {scheduler} does not answer: {error}") from None
 
 
 @contextlib.contextmanager

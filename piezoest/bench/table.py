@@ -1,8 +1,7 @@
 """The table of runs: scenarios × stages × estimators × seeds, planned, and summed up in one document."""
 
 import math
-import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from piezoest.bench import tables
+from piezoest.bench import cost, tables
 from piezoest.bench.cases import PAPER, STAGES, STRANGERS, Conditions
 from piezoest.bench.estimators import KNOWN, LINEAR, PAPERS, candidate, is_slow
 from piezoest.bench.executors import in_processes, on_dask, one_by_one
@@ -21,7 +20,6 @@ from piezoest.bench.run import COLUMNS, Task, crashed, follow, play
 from piezoest.bench.scenarios import SCENARIOS, UNREPEATED
 from piezoest.bench.statistics import NEEDS, QUANTITIES, interval, order, relative
 from piezoest.bench.store import Row
-from piezoest.tracking import TrackingRecord
 
 RUNS, PERIODS, DOCUMENT = "runs", "periods", "table.json"
 PERIOD_COLUMNS: dict[str, type] = {
@@ -30,8 +28,6 @@ PERIOD_COLUMNS: dict[str, type] = {
 # Under a minute with all estimators on two cores, compiled.
 QUICK: dict[str, Any] = {"sample_rate": 2000.0, "before": 2, "after": 6, "rest": 0.5, "drift": 1.5}
 DIGITS = 4  # significant, of the numbers of a document
-# One timed pass takes about so long: where a whole record takes longer, its beginning is timed.
-PASS_SECONDS, PASSES, LEAST_SAMPLES = 0.4, 3, 200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,38 +142,9 @@ def _cost(given: dict[str, Any], text: str) -> tuple[str, dict[str, Any]]:
         made = partial(candidate(text), case.sample_rate, case.start)
         # On the voltages of another loop a controller would only seek the gain.
         record = follow(case, text if hasattr(made(), "learn") else LINEAR)
-        return text, {"step_us": 1e6 * _step_seconds(made, record)}
+        return text, {"step_us": 1e6 * cost.step_seconds(made, record)}
     except Exception:
         return text, {}
-
-
-def _step_seconds(new: Callable[[], Any], record: TrackingRecord) -> float:
-    """Time of one sample by `step` from Python [s], of new estimators or controllers; median of three passes.
-
-    A controller answers to the reference, and learns from what was recorded.
-    """
-    columns = (record.reference, record.voltage, record.measured)
-    rows = list(zip(*(values.tolist() for values in columns), strict=True))
-    trial = rows[: max(LEAST_SAMPLES, len(rows) // 10)]
-    _pass(new(), trial)  # loads what is compiled
-    seconds = _pass(new(), trial)
-    rows = rows[: max(len(trial), math.ceil(len(trial) * PASS_SECONDS / max(seconds, 1e-9)))]
-    return float(np.median([_pass(new(), rows) for _ in range(PASSES)])) / len(rows)
-
-
-def _pass(made: Any, rows: list[tuple[float, float, float]]) -> float:
-    """Time of a loop of steps, with the model asked for at its end."""
-    step, learn = made.step, getattr(made, "learn", None)
-    began = time.perf_counter()
-    if learn is None:
-        for _, u, x in rows:
-            step(u, x)
-    else:
-        for r, u, x in rows:
-            step(r)
-            learn(u, x)
-    _ = made.model
-    return time.perf_counter() - began
 
 
 def describe(rows: Sequence[Row], plan: Plan, times: dict[str, dict[str, Any]]) -> dict[str, Any]:

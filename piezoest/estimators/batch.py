@@ -13,10 +13,11 @@ from piezoest.estimators.base import DEFAULT_MODEL, Status
 from piezoest.estimators.batch_result import BatchFitResult
 from piezoest.estimators.hopping import LEAST_HANDED_OUT, Hopping
 from piezoest.fitting.coordinates import Coordinates, bridged, coordinates
-from piezoest.fitting.gauss_newton import best_start, robust, single_shooting
+from piezoest.fitting.gauss_newton import robust, single_shooting
 from piezoest.fitting.multiple_shooting import multiple_shooting
 from piezoest.fitting.outcome import outcome
 from piezoest.fitting.problem import TUNING, Problem
+from piezoest.fitting.start import best_start
 from piezoest.layout import COUNT, MOST, record
 from piezoest.models import Creep, FreeRunning
 

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from piezoest._checks import FloatArray
 from piezoest.compile import Matrix, Vector, compiled
-from piezoest.fitting.loop_columns import LoopColumns
-from piezoest.fitting.play_columns import PlayColumns
 from piezoest.fitting.rows import times
 from piezoest.models import Creep, Model
 
@@ -28,8 +27,60 @@ SLOWER = 0.6
 NO_CREEP = Creep(np.empty(0), np.empty(0))
 
 
-# Columns of one kind of model. No creep follows the `free` ones.
-Basis = LoopColumns | PlayColumns
+class Basis(Protocol):
+    """Columns of one kind of model.
+
+    No creep follows the `free` ones.
+    """
+
+    @property
+    def size(self) -> int:
+        """How many."""
+
+    @property
+    def free(self) -> int:
+        """How many of them, at the end, say where the stage was before the record."""
+
+    @property
+    def foretells(self) -> bool:
+        """Whether the model says by itself how a stage goes on beyond the voltages of the record."""
+
+    @property
+    def bent(self) -> bool:
+        """Whether equal loops elsewhere may have another shape."""
+
+    def begin(self) -> Any:
+        """State before the first sample."""
+
+    def afresh(self, u: float) -> Basis:
+        """The same for a stage that rests at 0 V until a record begins at voltage u [V]."""
+
+    def rows(self, u: FloatArray, state: Any) -> FloatArray:
+        """Columns (N, size) along a voltage; `state` goes on."""
+
+    def lower(self, gain: float) -> FloatArray:
+        """Least coefficients (size,), where a straight line has that gain [µm/V]."""
+
+    def line(self) -> FloatArray:
+        """Coefficients (size,) that make a straight line of 1 µm/V."""
+
+    def unevenness(self) -> FloatArray:
+        """Penalty (size, size) on coefficients that a smooth model does not have, for 1 µm²."""
+
+    def prior(self) -> FloatArray:
+        """Penalty (size, size) on what the record hardly shows, whatever else is to be smooth, for 1 µm²."""
+
+    def beyond(self, w: FloatArray) -> tuple[Basis, FloatArray, float]:
+        """Columns and coefficients that go on beyond the record, and what that adds within it [µm]."""
+
+    def model(self, w: FloatArray, offset: float, creep: Creep | None, rate: float) -> Model:
+        """Model of coefficients (size,)."""
+
+    def initial_state(self, w: FloatArray, model: Any) -> Any:
+        """What that model's `simulate` is to begin with."""
+
+    def names(self, w: FloatArray) -> dict[str, FloatArray]:
+        """How the model's parameters that these coefficients give come from them: rows (size,) by name."""
 
 
 @dataclass(frozen=True, slots=True)

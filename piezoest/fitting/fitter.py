@@ -11,13 +11,15 @@ from piezoest.fitting import search, trust
 from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.design import Design
 from piezoest.fitting.flaws import Flaws, flawed
+from piezoest.fitting.forms import FORMS, Form
+from piezoest.fitting.gaps import remembered
 from piezoest.fitting.jumps import jumps_left
 from piezoest.fitting.loop_columns import LoopColumns
-from piezoest.fitting.outliers import beside_steps, lonely, remembered, unsettled
+from piezoest.fitting.outliers import beside_steps, lonely, unsettled
 from piezoest.fitting.play_columns import PlayColumns, Start
 from piezoest.fitting.polish import Polished, polished
 from piezoest.fitting.regression import Fitted, Log, Regression
-from piezoest.fitting.result import FORMS, Fit, Form
+from piezoest.fitting.result import Fit
 from piezoest.models import Model
 from piezoest.symbolic import quadratic_solver
 

@@ -11,9 +11,10 @@ from piezoest.compile import Vector, compiled
 from piezoest.fitting.bursts import LONGEST as LONGEST_BURST
 from piezoest.fitting.bursts import bursts, wild
 from piezoest.fitting.coordinates import bridged
-from piezoest.fitting.held import held, rests_of
+from piezoest.fitting.held import held
 from piezoest.fitting.jumps import EACH_SIDE, FEWEST_SAMPLES, KINK, UNUSUAL, jumps_of
 from piezoest.fitting.lost_voltage import delay_of, lost_voltage
+from piezoest.fitting.rests import rests_of
 from piezoest.fitting.rows import dot
 from piezoest.fitting.runs import BoolArray, IntArray, runs
 from piezoest.fitting.surprise import is_peak, scale_of, surprise

@@ -6,18 +6,13 @@ D. W. Marquardt, J. SIAM 11 (1963) 431-441. Where the model cannot explain the r
 the same fraction of the way, and two of them tell which: D. G. Anderson, J. ACM 12 (1965) 547-560.
 """
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.loop_columns import LoopColumns
 from piezoest.fitting.problem import TUNING, Problem
 from piezoest.fitting.program import solve
-from piezoest.fitting.regression import Log
-from piezoest.fitting.search import SMOOTH, best_alpha, regression
-from piezoest.models import FreeRunning
 from piezoest.symbolic import Solution
 
 # A robust fit is repeated until its scale, taken from the residual, changes by less.
@@ -33,32 +28,6 @@ DAMPED, POOR, GOOD, MORE, LESS = 1e-3, 0.25, 0.75, 2.0, 3.0
 FARTHEST = 10.0
 # Least curvature of a step, relative to a column's own: rounding. More would hold back what a prior ties.
 RIDGE = 1e-13
-
-
-def best_start(
-    problem: Problem,
-    given: FreeRunning | None,
-    default: FreeRunning,
-    others: Mapping[str, float],
-) -> FloatArray:
-    """Coordinates to start from: the given model's, or those of a loop that misses less of the record.
-
-    Without a given one a model of the record's size, or the default where the record shows none. Creep gains
-    start from `others`, by name.
-    """
-    model, of = problem.coordinates.model, problem.coordinates.of
-    starts = [] if given is None else [of(given, others)]
-    if model.is_loop:
-        log = Log(problem.u, problem.x, problem.measured, 1.0, np.empty(0))
-        loop = regression(log, LoopColumns(best_alpha(log)))
-        if loop.line_gain > 0.0:
-            w = loop.solved(SMOOTH, loop.columns(drift=False))
-            shown: Any = loop.design.model(w)
-            starts.append(of(shown, {**others, "initial_state": float(w[2])}))
-    elif given is None:
-        shown = model.guess(problem.u, np.where(problem.measured, problem.x, np.nan))
-        starts += [of(shown, others)] if shown else []
-    return min(starts or [of(default, others)], key=problem.cost)
 
 
 def single_shooting(

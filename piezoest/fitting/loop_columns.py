@@ -15,7 +15,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.compile import Matrix, Vector, compiled
 from piezoest.equations.coleman_hodgdon import hysteresis_step
-from piezoest.models import ColemanHodgdon, Creep, Model
+from piezoest.models import ColemanHodgdon, Creep
 
 # c - 2b, and b, are at least this fraction of the straight line's gain.
 LEAST = 1e-6
@@ -34,18 +34,20 @@ class LoopColumns:
     rested: bool = False
 
     size: ClassVar[int] = 3
-    free: ClassVar[int] = 1  # columns at the end that say where the stage was before the record
-    foretells: ClassVar[bool] = True  # it says how a stage goes on beyond the voltages of the record
-    bent: ClassVar[bool] = False  # equal loops have one shape everywhere
+    free: ClassVar[int] = 1
+    foretells: ClassVar[bool] = True
+    bent: ClassVar[bool] = False
 
     def begin(self) -> FloatArray:
         """Voltage, f, and what is left of the start; the first sample says the voltage."""
         return np.zeros(3) if self.rested else np.array([np.nan, 0.0, 1.0])
 
     def afresh(self, u: float) -> LoopColumns:
+        """The same for a stage that rests at 0 V until a record begins at voltage u [V]."""
         return replace(self, rested=True)
 
     def rows(self, u: FloatArray, state: FloatArray) -> FloatArray:
+        """Columns along a voltage."""
         if np.isnan(state[0]):
             state[0] = u[0]
         rows = np.empty((u.size, 3))
@@ -53,12 +55,15 @@ class LoopColumns:
         return rows
 
     def lower(self, gain: float) -> FloatArray:
+        """What is admissible."""
         return np.array([LEAST * gain, LEAST * gain, -np.inf])
 
     def line(self) -> FloatArray:
+        """The voltage alone."""
         return np.array([1.0, 0.0, 0.0])
 
     def unevenness(self) -> FloatArray:
+        """Nothing is to be smooth."""
         return np.zeros((3, 3))
 
     def prior(self) -> FloatArray:
@@ -77,7 +82,7 @@ class LoopColumns:
         """beta; gamma = alpha c is not linear in them."""
         return {"beta": np.array([1.0, 1.0, 0.0])}
 
-    def initial_state(self, w: FloatArray, model: Model) -> float:
+    def initial_state(self, w: FloatArray, model: ColemanHodgdon) -> float:
         """w_h at the first sample [µm]."""
         return float(w[2])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -81,10 +81,15 @@ class PlayColumns:
     # other as the voltage goes further on either side.
     moved: int | None = None
 
-    # As in `LoopColumns`: where plays began is not linear, and of wider ones than those that moved nothing is
-    # known.
-    free: ClassVar[int] = 0
-    foretells: ClassVar[bool] = False
+    @property
+    def free(self) -> int:
+        """None: where the plays began is not linear."""
+        return 0
+
+    @property
+    def foretells(self) -> bool:
+        """No: of plays wider than those that moved nothing is known."""
+        return False
 
     @property
     def bent(self) -> bool:
@@ -95,6 +100,10 @@ class PlayColumns:
     def size(self) -> int:
         """Slopes: segment by segment, and in each of them play by play."""
         return int(self.thresholds.size * (self.bends.size + 1))
+
+    @property
+    def _edges(self) -> FloatArray:
+        return edges_of(self.bends)
 
     def begin(self) -> FloatArray:
         """State before the first sample: that of the plays [V]."""
@@ -113,7 +122,7 @@ class PlayColumns:
         return 0.5 * (self.visited[0] + self.visited[1])
 
     def rows(self, u: FloatArray, state: FloatArray) -> FloatArray:
-        """Columns (N, size) along a voltage; `state` goes on."""
+        """Columns along a voltage."""
         plays = np.empty((u.size, self.thresholds.size))
         _plays(u, self.thresholds, state, plays)
         if self.bends.size == 0:
@@ -123,7 +132,7 @@ class PlayColumns:
     def _by_segments(self, plays: FloatArray) -> FloatArray:
         """How far plays (N, n) are within each segment, from where they are at 0 V: (N, segments n)."""
         rows = np.empty((plays.shape[0], plays.shape[1] * (self.bends.size + 1)))
-        _segments(plays, edges_of(self.bends), rows)
+        _segments(plays, self._edges, rows)
         return rows
 
     def lower(self, gain: float) -> FloatArray:
@@ -131,7 +140,7 @@ class PlayColumns:
         return LEAST_GAIN * gain * self.line()
 
     def line(self) -> FloatArray:
-        """Coefficients that make a straight line of 1 µm/V: the voltage alone."""
+        """The voltage alone."""
         w = np.zeros(self.size)
         w[:: self.thresholds.size] = 1.0
         return w

@@ -9,29 +9,9 @@ from piezoest._checks import FloatArray, array_1d, positive
 from piezoest.fitting import trust
 from piezoest.fitting.coordinates import bridged, late
 from piezoest.fitting.design import Design
+from piezoest.fitting.forms import FORMS
 from piezoest.fitting.runs import BoolArray, IntArray
 from piezoest.models import Model
-
-
-class Form(NamedTuple):
-    """A kind of model: what it is called, whether it has plays, a loop, bends and creep."""
-
-    label: str
-    plays: bool = False
-    loop: bool = False
-    bends: bool = False
-    creep: bool = False
-
-
-#: Kinds by name, from the simplest to the richest.
-FORMS: dict[str, Form] = {
-    "line": Form("straight line"),
-    "coleman-hodgdon": Form("Coleman-Hodgdon", loop=True),
-    "plays": Form("plays", plays=True),
-    "plays-creep": Form("plays, creep", plays=True, creep=True),
-    "plays-asymmetric": Form("plays, asymmetric", plays=True, bends=True),
-    "plays-asymmetric-creep": Form("plays, asymmetric, creep", plays=True, bends=True, creep=True),
-}
 
 
 class Prediction(NamedTuple):

@@ -1,8 +1,8 @@
-"""Kinds of model that were fitted to a log: which to use, why, and between what a reading will lie."""
+"""Kinds of model that were fitted to a log: which to use, and why."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,11 +20,6 @@ WORTH_IT = 0.005
 # Where the log does not tell creep from a wider loop, creep of more than this part of the way is believed
 # only if the model misses no more than this part of what others do: else it drifts away at the next rest.
 MUCH_CREEP, CLEARLY = 0.15, 0.4
-# Kinds may be right as well that miss blocks left out by no more than this times what the chosen one does.
-# Those that miss them by up to the second one are not right in the record; but where they differ by more than
-# anywhere in it, the voltage does what no kind was tested on. Chosen on 300 simulated logs (seeds 7000 to
-# 7299 of benchmarks/logs.py), and on 96 that come to rest behind the fitted part.
-AS_WELL, STILL = 1.5, 4.0
 
 
 def left_out_error(fitted: Fit | Fitted) -> float:
@@ -131,22 +126,3 @@ def reason_for(candidates: Sequence[Candidate], best: Candidate) -> str:
             ", which is not enough less for a richer model" if richer else " and is simpler"
         )
     return f"{said}."
-
-
-def interval(best: Candidate, candidates: Iterable[Candidate], u: FloatArray | None) -> Prediction:
-    """Prediction of the best kind along a voltage [V], or the record; wider by how far others are from it."""
-    own, apart = _along(best, u), [np.zeros(1)]
-    for each in candidates:
-        if each is best or each.cross_validated > STILL * best.cross_validated:
-            continue
-        differs = np.abs(_along(each, u).x - own.x)
-        if each.cross_validated > AS_WELL * best.cross_validated:
-            fitted = slice(best.fit.left_out, best.fit.counts.size)
-            differs -= np.max(np.abs(each.prediction.x - best.prediction.x)[fitted])
-        apart.append(differs.clip(0.0))
-    half = np.hypot(own.upper - own.x, np.max(np.broadcast_arrays(*apart), axis=0))
-    return Prediction(own.x, own.x - half, own.x + half)
-
-
-def _along(one: Candidate, u: FloatArray | None) -> Prediction:
-    return one.prediction if u is None else one.fit.predict(u)

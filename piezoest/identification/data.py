@@ -8,7 +8,7 @@ import numpy as np
 from piezoest._checks import FloatArray
 from piezoest.fitting.coordinates import bridged
 from piezoest.fitting.flaws import Flaws
-from piezoest.fitting.outliers import remembered
+from piezoest.fitting.gaps import remembered
 from piezoest.fitting.runs import BoolArray
 from piezoest.fitting.surprise import noise_in
 from piezoest.identification.examined import FEWEST_SAMPLES, FEWEST_TURNS

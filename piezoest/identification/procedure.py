@@ -16,7 +16,8 @@ from piezoest.identification.advice import advice_of, beyond_sentences, other_lo
 from piezoest.identification.candidate import Candidate, best_of, reason_for
 from piezoest.identification.clipping import levels
 from piezoest.identification.data import Data, check_enough, check_excitation, judged, noise_of, prepare
-from piezoest.identification.repeats import noise_floor, tells_lag
+from piezoest.identification.lag import tells_lag
+from piezoest.identification.repeats import noise_floor
 from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.result import Identification, Validation
 from piezoest.identification.sense import Finding, findings

@@ -13,8 +13,9 @@ from piezoest._checks import FloatArray
 from piezoest.fitting import Fit, Prediction
 from piezoest.fitting.flaws import Flaws
 from piezoest.fitting.outliers import unsettled
-from piezoest.identification.candidate import Candidate, interval
+from piezoest.identification.candidate import Candidate
 from piezoest.identification.data import judged
+from piezoest.identification.interval import interval
 from piezoest.identification.residual import Misfit, Whiteness
 from piezoest.identification.sense import Finding
 from piezoest.identification.told import Kind, Row, figures_of, parameter_rows

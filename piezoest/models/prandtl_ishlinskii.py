@@ -81,7 +81,7 @@ class PrandtlIshlinskii(Model):
     sample_rate: float | None = None
 
     inverse: ClassVar[Any] = play_inverse
-    remedy: ClassVar[str] = "all its slopes must be above zero"
+    remedy: ClassVar[str] = "gain and gain + weights[0] + … + weights[i] must be above zero with every bend"
 
     def __init__(
         self,

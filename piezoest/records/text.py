@@ -13,17 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from piezoest._checks import FloatArray
+from piezoest.records import scopes
 from piezoest.records.cells import MISSING, Marks, Style, is_missing, is_number, number, style_of
 from piezoest.records.columns import names_columns, titled, with_units
-from piezoest.records.comments import (
-    COMMENTS,
-    bare,
-    entries_in,
-    numbered_names,
-    rate_in,
-    scope_heading,
-    with_stated_units,
-)
+from piezoest.records.comments import COMMENTS, bare, entries_in, numbered_names, rate_in
 from piezoest.records.lines import (
     LONGEST_FOOTER,
     Lines,
@@ -87,7 +80,7 @@ def layout_of(path: Path) -> Layout:
         header = _named_in_comments(path, above, rows[0][1], delimiter)
     elif below := [line for place, line in comments if filled[-len(rows) - 1][0] < place < rows[0][0]]:
         header = with_units(header, _titles(path, bare(below[-1]), delimiter, len(header))) or header
-    header = with_stated_units(header, preamble)
+    header = scopes.with_stated_units(header, preamble)
     texts = [line for _, line in rows]
     stamps: dict[int, Clock] = {}
     if any(":" in line for line in texts[:STAMP_ROWS]):
@@ -97,7 +90,7 @@ def layout_of(path: Path) -> Layout:
                     stamps[i] = Clock.of(cell)
     width, skip_blank = len(header or _cells(path, texts[0])), between > MOST_BLANK * len(filled)
     style = _style(path, _without_footer(texts, delimiter), delimiter)
-    begins, rate = rows[0][0], rate_in([*above, *entries_in(preamble)])
+    begins, rate = rows[0][0], rate_in([*above, *entries_in(preamble), *scopes.entries(preamble)])
     return Layout(path, encoding, delimiter, header, width, begins, skip_blank, style, stamps, rate)
 
 
@@ -117,7 +110,7 @@ def _table(path: Path, filled: list[Numbered]) -> tuple[str, list[str], list[Num
     """Delimiter, header and rows; instruments may have written other lines above, units below the header."""
     first, mark = _cells(path, filled[0][1]), _delimiter(filled[0][1])
     head = _lines_of_cells(path, filled[:LONGEST_PREAMBLE])
-    if (known := scope_heading(head)) is not None:
+    if (known := scopes.heading(head)) is not None:
         return mark, known[0], filled[known[1] :]
     pairs = enumerate(itertools.pairwise(head))
     begins = next((k for k, rows in pairs if len(rows[0]) == len(rows[1]) > 1 and _numeric(*rows)), 0)

@@ -7,11 +7,11 @@ from numpy.typing import ArrayLike
 
 from piezoest._checks import FloatArray, array_1d, finite, integer, non_negative, positive
 from piezoest.signals._arguments import below_half, number_of_samples
-from piezoest.signals.signal import Signal
+from piezoest.signals.signal import Signal, smooth_rise
 
 
 def dwell(level: float, duration: float, sample_rate: float) -> Signal:
-    """Constant signal, without a period.
+    """Constant signal.
 
     Parameters
     ----------
@@ -21,6 +21,11 @@ def dwell(level: float, duration: float, sample_rate: float) -> Signal:
         s; the number of samples is rounded.
     sample_rate : float
         Hz.
+
+    Returns
+    -------
+    Signal
+        Not periodic.
 
     Raises
     ------
@@ -41,7 +46,7 @@ def dwell(level: float, duration: float, sample_rate: float) -> Signal:
 def from_array(
     values: ArrayLike, sample_rate: float, period: float | None = None, name: str = "array"
 ) -> Signal:
-    """Signal from samples of one's own. Jumps are kept: `check_continuity` refuses them.
+    """Signal from samples of one's own.
 
     Parameters
     ----------
@@ -53,6 +58,11 @@ def from_array(
         Samples per period.
     name : str
         For labels and messages.
+
+    Returns
+    -------
+    Signal
+        Jumps are kept: `check_continuity` refuses them.
 
     Raises
     ------
@@ -96,8 +106,13 @@ def filtered_steps(
     start : float
         Level at which the filter rests before the first step, µm; without effect if `periods` is given.
     periods : int, optional
-        Repeat the levels so often; the samples of all levels are the period. The signal then is the periodic
-        steady state of the filter: it has no start-up transient and its first value is generally not zero.
+        Repeat the levels so often. The signal then is the periodic steady state of the filter: it has no
+        start-up transient and its first value is generally not zero.
+
+    Returns
+    -------
+    Signal
+        Period: the samples of all levels, if `periods` is given.
 
     Raises
     ------
@@ -149,6 +164,7 @@ def prbs(
     cutoff: float = 10.0,
     order: int = 2,
     start: Literal["sequence", "zero"] = "sequence",
+    lead_in: float = 0.0,
 ) -> Signal:
     """Pseudo-random binary signal through a Butterworth low-pass, periodic.
 
@@ -166,7 +182,7 @@ def prbs(
     sample_rate : float
         Hz, a whole multiple of `chip_rate`.
     bits : int
-        Length of the shift register, 2 to 20: 2^bits − 1 chips are a period.
+        Length of the shift register, 2 to 20: 2^bits − 1 chips in a period.
     chip_rate : float
         Chips per second, Hz.
     cutoff : float
@@ -176,6 +192,14 @@ def prbs(
     start : {"sequence", "zero"}
         Begin with the first chip, in general away from zero, or at the sample nearest to zero on the
         first rise through zero (the same periodic signal, begun later).
+    lead_in : float
+        Time, s, during which the signal is faded in from rest at zero before the first period, by a weight
+        with two continuous derivatives. These samples come on top of `periods`.
+
+    Returns
+    -------
+    Signal
+        Period (2^bits − 1)·sample_rate/chip_rate.
 
     Raises
     ------
@@ -197,6 +221,7 @@ def prbs(
     periods = integer("periods", periods, 1)
     sample_rate = positive("sample_rate", sample_rate)
     chip_rate = positive("chip_rate", chip_rate)
+    lead_in = non_negative("lead_in", lead_in)
     chip = round(sample_rate / chip_rate)
     if chip < 1 or abs(chip * chip_rate - sample_rate) > 1e-9 * sample_rate:
         raise ValueError(
@@ -212,11 +237,12 @@ def prbs(
             cycle = np.roll(cycle, -1)
     elif start != "sequence":
         raise ValueError(f"start must be 'sequence' or 'zero', got {start!r}")
-    return Signal(np.tile(cycle, periods), sample_rate, float(cycle.size), "PRBS")
+    values = np.concatenate([_faded_in(cycle, round(lead_in * sample_rate)), np.tile(cycle, periods)])
+    return Signal(values, sample_rate, float(cycle.size), "PRBS")
 
 
 def maximal_length_sequence(bits: int) -> FloatArray:
-    """Maximal-length sequence of ±1, shape (2^bits − 1,), with one +1 more than −1.
+    """Maximal-length sequence of ±1.
 
     Its circular autocorrelation is 2^bits − 1 at lag zero and −1 at every other lag.
 
@@ -224,6 +250,11 @@ def maximal_length_sequence(bits: int) -> FloatArray:
     ----------
     bits : int
         Length of the shift register, 2 to 20.
+
+    Returns
+    -------
+    ndarray, shape (2^bits − 1,)
+        +1 and −1; one +1 more than −1.
 
     Raises
     ------
@@ -236,9 +267,11 @@ def maximal_length_sequence(bits: int) -> FloatArray:
     >>> print(pz.signals.maximal_length_sequence(3))
     [ 1.  1.  1. -1.  1. -1. -1.]
     """
+    bits = integer("bits", bits, 2)
+    if bits > 20:
+        raise ValueError(f"bits must be at most 20, got {bits}: that already is a million chips")
     from scipy.signal import max_len_seq
 
-    bits = integer("bits", bits, 2, 20)
     return 2.0 * np.asarray(max_len_seq(bits)[0], dtype=np.float64) - 1.0
 
 
@@ -249,8 +282,8 @@ def random_walk(
 
     A Fourier series of the harmonics of 1/duration up to `bandwidth`, with normal coefficients that fall as
     1/frequency (the spectrum of a random walk), moved to start at zero and scaled to reach `amplitude`
-    exactly. It contains nothing above `bandwidth` and repeats without a seam: its period is its length. The
-    same seed gives the same curve at every sample rate, up to that scaling.
+    exactly. It contains nothing above `bandwidth` and repeats without a seam. The same seed gives the same
+    curve at every sample rate, up to that scaling.
 
     Parameters
     ----------
@@ -258,10 +291,17 @@ def random_walk(
         Largest absolute value, µm.
     bandwidth : float
         Hz, at least 1/duration, below half the sample rate.
-    duration, sample_rate
-        As in `dwell`.
+    duration : float
+        s; the number of samples is rounded.
+    sample_rate : float
+        Hz.
     seed : int
         Of the random numbers.
+
+    Returns
+    -------
+    Signal
+        Its period is its length.
 
     Raises
     ------
@@ -317,3 +357,8 @@ def _butterworth(cutoff: float, order: int, sample_rate: float) -> FloatArray:
     cutoff = below_half("cutoff", cutoff, sample_rate)
     order = integer("order", order, 1)
     return np.asarray(butter(order, cutoff, fs=sample_rate, output="sos"), dtype=np.float64)
+
+
+def _faded_in(cycle: FloatArray, n: int) -> FloatArray:
+    """Return the `n` samples before the start of a periodic signal, faded in from rest."""
+    return np.asarray(smooth_rise(n) * cycle[np.arange(-n, 0) % cycle.size])

@@ -154,7 +154,7 @@ class Signal:
         """Return a smooth way from a displacement to the first value, followed by this signal.
 
         The way goes in one direction and never beyond its ends, where it is at rest: velocity and
-        acceleration are zero. The period stays: it is the interval over which errors are compared.
+        acceleration are zero.
 
         Parameters
         ----------
@@ -162,6 +162,11 @@ class Signal:
             Of the way, s; the number of samples is rounded.
         start : float
             Where the way begins, such as where the stage rests, in the unit of the values.
+
+        Returns
+        -------
+        Signal
+            Its period is that of this signal: the interval over which errors are compared.
 
         Raises
         ------
@@ -177,10 +182,8 @@ class Signal:
         (12.0, 40.0, 600)
         """
         n = number_of_samples("duration", positive("duration", duration), self.sample_rate)
-        start, s = finite("start", start), np.arange(n) / n
-        # Slope and curvature are zero at both ends.
-        rise = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-        way = start + (self.values[0] - start) * rise
+        start = finite("start", start)
+        way = start + (self.values[0] - start) * smooth_rise(n)
         return Signal(np.concatenate([way, self.values]), self.sample_rate, self.period, self.name)
 
     def __add__(self, other: object) -> Signal:
@@ -230,6 +233,12 @@ class Signal:
             If `offset` is not a finite number.
         """
         return Signal(self.values + finite("offset", offset), self.sample_rate, self.period, self.name)
+
+
+def smooth_rise(n: int) -> FloatArray:
+    """Rise from 0 towards 1, which the sample after these would be; slope and curvature zero at both ends."""
+    s = np.arange(n) / max(n, 1)
+    return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 
 
 def check_continuity(values: ArrayLike, sample_rate: float | None = None, name: str = "signal") -> None:

@@ -33,13 +33,20 @@ def triangle(
     ``exact_peak=True`` it peaks at 5.0.
 
     The ideal triangle of the nominal amplitude keeps its slopes, ±4·amplitude·frequency, and its straight
-    lines up to (1 − smoothing)·amplitude. Around each extremum, `smoothing`/2 of the period is replaced by
-    the even polynomial of lowest degree that joins the lines with k = `continuity` continuous derivatives.
-    With s = −1…1 across the corner, its curvature is proportional to (1 − s²)^(k−1). The wave turns *below*
-    the nominal amplitude: with a smoothing of 10 % at 0.95, 0.9625, 0.969, 0.973 of it for k = 1, 2, 3, 4.
+    lines up to (1 − smoothing)·amplitude. Around each of the two extrema of a period, `smoothing`/2 of the
+    period is replaced by the even polynomial of lowest degree that joins the straight lines with `continuity`
+    continuous derivatives. For order k it has degree 2k. With s = −1…1 across the corner its curvature is
+    proportional to (1 − s²)^(k−1), and the wave at a maximum is amplitude·(1 − smoothing·φ(s)):
 
-    The paper has 10 %: Fig. 4, "5.0 µm amplitude (4.5 µm linear range)". It does not name its polynomial; the
-    errors in its Tables II and III put the peak between 0.966 and 0.984, which fits k of 3 or more.
+    - k = 1: φ = (1 + s²)/2, a parabola;
+    - k = 2: φ = (3 + 6s² − s⁴)/8;
+    - k = 3: φ = (5 + 15s² − 5s⁴ + s⁶)/16.
+
+    The wave therefore turns *below* the nominal amplitude, at amplitude·(1 − smoothing·φ(0)). With the
+    paper's 10 % that is 0.95, 0.9625, 0.969, 0.973, … of it for k = 1, 2, 3, 4, …, and the straight lines
+    end at 90 %: Fig. 4, "5.0 µm amplitude (4.5 µm linear range)". The paper does not name its polynomial;
+    the ratios of maximum to relative error in its Tables II and III put the peak between 0.966 and 0.984 of
+    the nominal amplitude, which fits k of 3 or more and misses k = 2 by 0.3 %.
 
     Parameters
     ----------
@@ -59,6 +66,11 @@ def triangle(
         Start, in periods. 0: at zero, rising.
     exact_peak : bool
         Scale the wave so that its peak, not that of the ideal triangle, is `amplitude`.
+
+    Returns
+    -------
+    Signal
+        Period sample_rate/frequency.
 
     Raises
     ------
@@ -97,6 +109,11 @@ def sine(
     amplitude, frequency, periods, sample_rate, phase
         As in `triangle`.
 
+    Returns
+    -------
+    Signal
+        Period sample_rate/frequency.
+
     Raises
     ------
     ValueError
@@ -130,8 +147,7 @@ def amplitude_modulated(
     """Wave whose amplitude swings between `amplitude` and (1 − depth)·`amplitude`.
 
     The envelope is amplitude·(1 − depth·(1 − cos(2π·modulation_frequency·t))/2); it starts at its largest,
-    the wave starts at zero, rising. The period is the common one of wave and envelope, None if their
-    frequencies have no simple ratio.
+    the wave starts at zero, rising.
 
     Parameters
     ----------
@@ -149,6 +165,11 @@ def amplitude_modulated(
         Of the wave.
     smoothing, continuity
         As in `triangle`.
+
+    Returns
+    -------
+    Signal
+        The period is the common one of wave and envelope, None if their frequencies have no simple ratio.
 
     Raises
     ------
@@ -187,8 +208,7 @@ def multi_amplitude(
     """Wave that changes its amplitude at zero crossings.
 
     Each amplitude lasts for a whole number of periods, which begin and end at zero: the values are continuous
-    at every change, the slope is not. The period of the signal is that of one wave, although the amplitude
-    changes: it is the interval over which errors are compared.
+    at every change, the slope is not.
 
     Parameters
     ----------
@@ -204,6 +224,12 @@ def multi_amplitude(
         Of the wave.
     smoothing, continuity
         As in `triangle`.
+
+    Returns
+    -------
+    Signal
+        Its period is that of one wave, sample_rate/frequency, although the amplitude changes: it is the
+        interval over which errors are compared.
 
     Raises
     ------
@@ -233,7 +259,7 @@ def multi_amplitude(
 
 
 def two_tone(amplitudes: ArrayLike, frequencies: ArrayLike, duration: float, sample_rate: float) -> Signal:
-    """Sum of two sines, both starting at zero, rising; its period is the common one, if there is one.
+    """Sum of two sines, both starting at zero, rising.
 
     Parameters
     ----------
@@ -241,8 +267,15 @@ def two_tone(amplitudes: ArrayLike, frequencies: ArrayLike, duration: float, sam
         µm.
     frequencies : sequence of float, shape (2,)
         Hz, below half the sample rate.
-    duration, sample_rate
-        As in `amplitude_modulated`.
+    duration : float
+        s; the number of samples is rounded.
+    sample_rate : float
+        Hz.
+
+    Returns
+    -------
+    Signal
+        The period is the common one, None if the frequencies have no simple ratio.
 
     Raises
     ------
@@ -272,7 +305,7 @@ def chirp(
     sample_rate: float,
     method: Literal["linear", "logarithmic"] = "linear",
 ) -> Signal:
-    """Sine whose frequency runs from `start_frequency` to `stop_frequency`, without a period.
+    """Sine whose frequency runs from `start_frequency` to `stop_frequency`; starts at zero, rising.
 
     Parameters
     ----------
@@ -280,10 +313,17 @@ def chirp(
         µm.
     start_frequency, stop_frequency : float
         Hz, below half the sample rate, in either order.
-    duration, sample_rate
-        As in `amplitude_modulated`.
+    duration : float
+        s; the number of samples is rounded.
+    sample_rate : float
+        Hz.
     method : {"linear", "logarithmic"}
         The same number of hertz, or of octaves, in every second.
+
+    Returns
+    -------
+    Signal
+        Not periodic.
 
     Raises
     ------
@@ -322,7 +362,9 @@ def _turns(n: int, frequency: float, sample_rate: float, phase: float = 0.0) -> 
 def _unit_wave(turns: FloatArray, shape: Shape, smoothing: float, continuity: int) -> FloatArray:
     """Return the wave of nominal amplitude 1 at phases in [0, 1), zero and rising at 0."""
     smoothing = fraction("smoothing", smoothing)
-    continuity = integer("continuity", continuity, 1, HIGHEST_CONTINUITY)
+    continuity = integer("continuity", continuity, 1)
+    if continuity > HIGHEST_CONTINUITY:
+        raise ValueError(f"continuity must be at most {HIGHEST_CONTINUITY}, got {continuity}")
     if shape == "sine":
         return np.asarray(np.sin(2.0 * np.pi * turns))
     if shape != "triangle":

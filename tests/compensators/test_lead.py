@@ -60,7 +60,7 @@ def settled(stage: Any, reference: pz.Signal, with_lead: bool) -> float:
     return record.max_error(2)
 
 
-@pytest.mark.parametrize("stage", [pz.PaperStage, pytest.param(pz.PreisachStage, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("stage", [pz.PaperStage, pz.PreisachStage])
 @pytest.mark.slow
 def test_error_at_a_twentieth_of_the_resonance(stage: Any) -> None:
     triangle = pz.signals.triangle(5.0, 39.0625, 40, FS)

@@ -11,7 +11,7 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting import fit
 from piezoest.fitting.flaws import flawed
-from piezoest.fitting.outliers import forgotten
+from piezoest.fitting.gaps import forgotten
 
 N = 6000
 T = np.arange(N) / 1000.0

@@ -8,8 +8,8 @@ import pytest
 import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting.flaws import flawed
-from piezoest.fitting.held import rests_of
-from piezoest.identification.repeats import tells_lag
+from piezoest.fitting.rests import rests_of
+from piezoest.identification.lag import tells_lag
 from piezoest.identification.sense import findings
 from piezoest.models import ColemanHodgdon
 from piezoest.records import Record

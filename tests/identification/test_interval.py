@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from piezoest.fitting.result import Prediction
-from piezoest.identification.candidate import AS_WELL, STILL, interval
+from piezoest.identification.interval import AS_WELL, STILL, interval
 
 
 def kind(missed: float, x: list[float]) -> Any:

@@ -62,7 +62,7 @@ def contender(name: str) -> Factory:
     """Maker of a controller.
 
     `name`: "parts", a name in `CHANGED`, a class of the package, or a class or function of one's own as
-    ``module:name``.
+    ``module:name``. It is called as ``name(sample_rate, limits=limits)``.
     """
     if name == PARTS:
         return Parts

@@ -57,8 +57,9 @@ class _Draw:
 def draw(seed: int, **given: Any) -> Rig:
     """Draw a rig and what it is to do: a function of the seed, and of what is given instead of being drawn.
 
-    Names that may be given are those that are picked below. `limits` is a name of `REACHES`; `slew` is
-    relative to the fastest change that the reference needs.
+    `**given`: by its column: family, limits ("±100", "0..150", "0..10", "-20..120"), gain, width,
+    sample_rate, reference, amplitude, frequency, waves, mechanics, delay, noise, resolution, volts, slew,
+    creep, hum, drift, fault, mode, block. `slew` is relative to the fastest change that the reference needs.
     """
     pick = _Draw(integer("seed", seed), given)
     rng = pick.rng

@@ -49,7 +49,7 @@ def write_figure(rig: Rig, row: Row, both: Both, path: Path) -> None:
     for name, label in labels.items():
         panels[name].set(xlabel="voltage [V]" if name == "loop" else "time [s]", ylabel=label)
     # The errors that are judged, not those of the start.
-    if both.run is not None and (largest := max(row["worst"] or 0.0, row["line_worst"] or 0.0)) > 0.0:
+    if both.run is not None and (largest := max(row.get("worst") or 0.0, row.get("line_worst") or 0.0)) > 0.0:
         error.set_ylim(-1.2 * largest, 1.2 * largest)
     said = row.get("failure") or row.get("named") or "nothing said"
     figure.suptitle(

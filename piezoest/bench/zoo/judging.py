@@ -23,6 +23,8 @@ ERRORS = ("worst", "line_worst", "learnt_worst", "ratio")
 def named(rig: Rig, controller: Any) -> dict[str, Any]:
     """What a controller said: names of faults, how soon after the fault the right one, what drove at last."""
     status = getattr(controller, "status", {})
+    now = status if isinstance(status, dict) else {"driving": getattr(status, "driving", None)}
+    drives = now.get("driving", now.get("model"))
     fault, start = rig.fault, rig.fault.start / rig.sample_rate
     said = [(float(event.time), _name(event)) for event in getattr(controller, "events", ())]
     right = [time - start for time, name in said if time >= start and name in fault.names]
@@ -31,7 +33,7 @@ def named(rig: Rig, controller: Any) -> dict[str, Any]:
         "named": "; ".join(dict.fromkeys(name for _, name in said)),
         "named_right": bool(right) if fault.names else None,
         "named_periods": right[0] * rig.plain.frequency if right else None,
-        "driver": status.get("model") if isinstance(status, dict) else getattr(status, "driving", None),
+        "driver": str(drives)[:80] if drives is not None else None,
     }
 
 
@@ -175,7 +177,8 @@ def traced(rig: Rig, factory: Factory) -> tuple[Row, Both]:
     try:
         controller = factory(rig.sample_rate, limits=rig.limits)
         run, seconds = run_controller(rig, controller)
-        row |= judge(rig, run, lines) | named(rig, controller)
+        row |= judge(rig, run, lines)
+        row |= named(rig, controller)
         row["microseconds"] = 1e6 * seconds / run.reference.size
     except Exception as error:
         row["failure"] = f"{type(error).__name__}: {error}"

@@ -55,4 +55,5 @@ def one_run(row: dict[str, Any]) -> dict[str, str]:
     """Numbers of a run that are known, by the words for them."""
     left_out = ("mode", "fault_start", "fault_stop") if row["fault"] == "none" else ()
     known = [name for name in ONE_RUN if row.get(name) not in (None, "") and name not in left_out]
-    return {ONE_RUN[name]: shown(MODES.get(row[name], row[name])) for name in known}
+    row = {**row, "mode": MODES.get(row.get("mode", ""), row.get("mode"))}
+    return {ONE_RUN[name]: shown(row[name]) for name in known}
