@@ -294,7 +294,7 @@ def test_compare_with_itself_finds_no_change(own: str) -> None:
         (("-e", "./mine.py:Mine"), "mine:Mine"),
         (("--stage", "best"), "choose one of"),
         (("--json", "nowhere/a.json"), "there is no folder"),
-        (("--quick", "paper"), "write options after paper"),
+        (("--quick", "paper"), "after paper, if it has them"),
     ],
 )
 def test_command_refuses_wrong_words(own: str, arguments: tuple[str, ...], words: str) -> None:
