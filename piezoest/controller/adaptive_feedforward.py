@@ -152,10 +152,9 @@ class AdaptiveFeedforward(Face):
         write(self._settings, self._start[1])
         self._events = deque(maxlen=MOST_EVENTS)
         self._planned = None
-        if x is None:
-            kernel.begin.of(*self._layouts)(self._state, self._settings, u)
-        else:
-            kernel.begin_at.of(*self._layouts)(self._state, self._settings, u, x)
+        kernel.begin.of(*self._layouts)(self._state, self._settings, u)
+        if x is not None:
+            kernel.resume.of(*self._layouts)(self._state, self._settings, u, x)
         self._compiled()  # before a live loop, not at its first sample
 
     def resume(self, voltage: float, displacement: float) -> None:

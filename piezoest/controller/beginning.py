@@ -27,7 +27,7 @@ def begin_learning(state: Any) -> None:
     travels.begin(state.travel, start.voltage, least)
     state.stage = APPROACH
     start.samples = 0.0
-    state.confirmed = max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
+    state.confirmed = starts.farthest(start)
     state.gone = state.handed = 0.0
     state.railed, state.patience = 0.0, driving.PATIENCE
     state.owed = state.small = 0.0

@@ -17,7 +17,7 @@ from numba.extending import register_jitable
 from piezoest.equations import recent_path
 from piezoest.equations.turning_points import TURNING_POINTS, remember
 from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
-from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, Record, numbers, record
+from piezoest.layout import AMOUNT, FIXED, FLAG, MEASURED, NUMBER, Record, numbers, record
 
 # What a score remembers, in swings.
 MEMORY = 0.6
@@ -40,7 +40,7 @@ def layouts(estimator: tuple[Record, Record], inverse: tuple[Record, Record]) ->
     state = record(
         # The voltage is centre + scale times the model's, and z is shift + scale times where it stands.
         scale=AMOUNT, centre=MEASURED, shift=MEASURED,
-        voltage=MEASURED, usable=FLAG, handed=COUNT, score=SCORE,
+        voltage=MEASURED, usable=FLAG, score=SCORE,
         path=recent_path.PATH, memory=TURNING_POINTS, inverse=inverse[0], estimator=estimator[0],
     )  # fmt: skip
     settings = record(integrated=FIXED, by_path=FIXED, inverse=inverse[1], estimator=estimator[1])
@@ -88,8 +88,9 @@ def learn(state: Any, settings: Any, u: Any, z: Any) -> None:
 
 
 @register_jitable
-def judge(score: Any, miss: Any, swings: Any) -> None:
-    """Count a miss, after a travel of so many swings."""
+def judge(score: Any, miss: Any, bound: Any, swings: Any) -> None:
+    """Count a miss, limited to a bound, after a travel of so many swings."""
+    miss = min(max(miss, -bound), bound)
     if score.block >= BLOCK:
         _forget_what_was_before(score)
     score.weight = min(score.weight + swings, MEMORY)
@@ -140,7 +141,6 @@ def hand_over(state: Any, settings: Any) -> None:
         # What it missed while it had no model says nothing of this one.
         forget(state.score)
     state.usable = 1.0
-    state.handed += 1.0
     state.score.z = z
 
 

@@ -48,12 +48,6 @@ def line_z(state: Any) -> float:
 
 
 @register_jitable
-def _expected(state: Any) -> float:
-    """Where the model that drives stands at the voltage written."""
-    return slots.expected(state.candidates, state.driving, line_z(state))
-
-
-@register_jitable
 def kept(reference: Any, travelled: Any, swing: Any) -> float:
     """The fraction of what is owed that is left after a travel of the reference."""
     if reference.turns <= 1.0:
@@ -62,12 +56,6 @@ def kept(reference: Any, travelled: Any, swing: Any) -> float:
     else:
         paid = PAID * swing
     return max(0.0, 1.0 - travelled / paid) if paid > 0.0 else 1.0
-
-
-@register_jitable
-def _stands(state: Any) -> float:
-    """Where the reference stands for the model that drives: where the model does, and what is owed."""
-    return _expected(state) + slots.owed(state.candidates, state.driving, state.owed)
 
 
 @register_jitable
@@ -97,7 +85,8 @@ def drive(state: Any, number: Any) -> None:
 @register_jitable
 def owe(state: Any, more: Any) -> None:
     """Let what drives, a model or the line, owe more."""
-    stand_at(state, _stands(state) + more)
+    z = slots.stands(state.candidates, state.driving, line_z(state) + state.owed)
+    stand_at(state, z + more)
 
 
 @register_jitable

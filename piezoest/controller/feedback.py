@@ -44,8 +44,7 @@ def follow(state: Any, settings: Any, x: Any) -> None:
         # At a limit it would only wind up.
         return
     state.feedback = _within(state, settings, state.feedback + growth)
-    if share > 0.0:
-        _calm(state, 1.0 / share)
+    _calm(state, 1.0 / share)
 
 
 @register_jitable
@@ -80,12 +79,6 @@ def _calm(state: Any, slow: Any) -> None:
 
 
 @register_jitable
-def turn(state: Any) -> None:
-    """The reference has turned: what the correction does in each leg shakes nothing."""
-    state.shaking.count = 0.0
-
-
-@register_jitable
 def _within(state: Any, settings: Any, correction: Any) -> float:
     """The correction, or as much of it as the corridor leaves room for."""
     room = settings.corridor * 0.5 * state.reference.swing + 3.0 * np.sqrt(state.readings.noise)
@@ -97,14 +90,6 @@ def forget(state: Any) -> None:
     """Forget the correction."""
     state.feedback = state.rest.now = state.rest.left = 0.0
     state.shaking.turned = state.shaking.before = state.shaking.way = state.shaking.count = 0.0
-
-
-@register_jitable
-def _correct(state: Any, settings: Any, correction: Any) -> None:
-    """Change the correction at once; the difference is owed, and paid on the way."""
-    correction = _within(state, settings, correction)
-    driving.owe(state, (correction - state.feedback) / state.unit)
-    state.feedback = state.back = correction
 
 
 @register_jitable
@@ -139,4 +124,7 @@ def _learn_from_legs(state: Any, settings: Any, x: Any) -> None:
         rest.known += 1.0
         rest.sum += state.feedback + state.r - x
     if rest.left == 0.0 and rest.known > KNOWN * rest.count:
-        _correct(state, settings, rest.sum / rest.known)
+        # At once; the difference is owed, and paid on the way.
+        correction = _within(state, settings, rest.sum / rest.known)
+        driving.owe(state, (correction - state.feedback) / state.unit)
+        state.feedback = state.back = correction

@@ -6,14 +6,12 @@
 from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
 from piezoest.compile import Record, Vector, compiled
-from piezoest.controller import candidate, doubt, homing, late, redraw, slots
+from piezoest.controller import candidate, doubt, homing, late, outside, redraw, slots
 from piezoest.controller import feedback as feedbacks
 from piezoest.controller import line as lines
-from piezoest.controller import outside as outsides
 from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
@@ -47,8 +45,9 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         unit=NUMBER, zero=MEASURED,
         # Half the swing that they began with; zero before [V].
         scale=AMOUNT,
-        # Whether the reference goes on small behind a wide way.
-        small=FLAG,
+        # Whether the reference goes on small behind a wide way; whether it is noted that reference or voltage
+        # were outside of what the user's model was learnt on.
+        small=FLAG, outside=FLAG,
         # Correction of the reference by feedback [µm], and that of the voltage planned.
         feedback=NUMBER, back=NUMBER, rest=feedbacks.REST, shaking=feedbacks.SHAKING,
         # Travel of the voltage since the last believed reading, and since models were handed over.
@@ -61,13 +60,13 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
         # misses of the reference.
         score=candidate.SCORE, widest=AMOUNT, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
         travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,
-        start=starts.START, homing=homing.HOMING, pace=paces.PACE, outside=outsides.OUTSIDE,
-        late=late.LATE, candidates=candidates,
+        start=starts.START, homing=homing.HOMING, pace=paces.PACE, late=late.LATE,
+        candidates=candidates,
     )  # fmt: skip
     settings = record(
         minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED, feedback=FIXED,
         # Samples of the shortest period that is far from the resonance, zero where nobody knows it.
-        shortest=FIXED, allowed=outsides.ALLOWED,
+        shortest=FIXED, allowed=outside.ALLOWED,
         # Number of the recorded loop among the candidates, -1 without any.
         recorded=FIXED,
         start=starts.SETTINGS, candidates=candidate_settings,
@@ -110,35 +109,17 @@ def learn_all(state: Record, settings: Record, r: Vector, u: Vector, x: Vector) 
             doubt.go_on_from_planned(state)
 
 
-@register_jitable
-def _begin(state: Any, settings: Any, u: Any) -> None:
+@compiled
+def begin(state: Record, settings: Record, u: float) -> None:
+    """Begin with a state of zeros, at rest at a voltage."""
     state.u = state.planned = u
     starts.begin(state.start, u)
     state.start.given = 1.0 if settings.start.gain != 0.0 else 0.0
 
 
-@register_jitable
-def _rest_at(state: Any, settings: Any, u: Any, x: Any, gain: Any) -> None:
-    starts.rest_at(state.start, settings.start, u, x, gain)
-    state.start.told = 1.0
-
-
-@compiled
-def begin(state: Record, settings: Record, u: float) -> None:
-    """Begin with a state of zeros, at rest at a voltage."""
-    _begin(state, settings, u)
-
-
-@compiled
-def begin_at(state: Record, settings: Record, u: float, x: float) -> None:
-    """Begin with a state of zeros, at rest at a voltage where the sensor reads x."""
-    _begin(state, settings, u)
-    _rest_at(state, settings, u, x, settings.start.gain)
-
-
 @compiled
 def resume(state: Record, settings: Record, u: float, x: float) -> Any:
-    """Go on at rest at a voltage where the sensor reads x, with what was learnt before; whether it can."""
+    """Go on at rest at a voltage where the sensor reads x, with what is known so far; whether it can."""
     if not (settings.minimum <= u <= settings.maximum and np.abs(x) < WILDEST):
         return False
     state.u = state.planned = u
@@ -151,7 +132,8 @@ def resume(state: Record, settings: Record, u: float, x: float) -> Any:
     state.pace.count = 0.0
     starts.begin(state.start, u)
     # A gain that was refuted is not tried again.
-    _rest_at(state, settings, u, x, state.start.given * settings.start.gain)
+    starts.rest_at(state.start, settings.start, u, x, state.start.given * settings.start.gain)
+    state.start.told = 1.0
     return True
 
 

@@ -81,14 +81,6 @@ def _size_up(state: Any, settings: Any, u: Any) -> None:
 
 
 @register_jitable
-def _hand_over(state: Any, settings: Any) -> None:
-    """Take up the estimators' models of now, and choose which drives; without a bump."""
-    if state.scale > 0.0:
-        slots.hand_over(state.candidates, settings.candidates)
-    driving.reconsider(state, settings)
-
-
-@register_jitable
 def _watch_voltage(state: Any, settings: Any, gone: Any, moved: Any) -> None:
     """An amplifier that does not move its voltage with the reference answers nothing."""
     within = settings.minimum < state.u < settings.maximum
@@ -121,16 +113,16 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
         lines.add(state.line.now, state.late.answered, x, 1e9)
     bound = FARTHEST * state.travel.swing
     miss = z - driving.line_z(state) - state.owed
-    candidate.judge(state.score, min(max(miss, -bound), bound), swings)
+    candidate.judge(state.score, miss, bound, swings)
     kept = REMEMBERED if state.travel.turned_now != 0.0 else 1.0
     state.widest = max(state.score.peak, kept * state.widest)
     if state.scale > 0.0:
-        slots.judge(state.candidates, z, swings, bound)
+        slots.judge(state.candidates, z, bound, swings)
     if settings.minimum < u < settings.maximum:
         # No model is to blame for a limit, nor the first one for where the line has left the stage.
         off = (x - state.r) / state.unit
         left = slots.owed(state.candidates, state.driving, state.owed) if state.switches <= 1.0 else 0.0
-        candidate.judge(state.outcome, min(max(off + left, -bound), bound), swings)
+        candidate.judge(state.outcome, off + left, bound, swings)
         driving.watch(state, np.abs(off), np.abs(miss))
 
 
@@ -142,14 +134,6 @@ def _learn_from(state: Any, settings: Any, x: Any, moved: Any) -> None:
         _score(state, settings, x, z, moved)
     if state.scale > 0.0:
         slots.learn(state.candidates, settings.candidates, state.u, z)
-
-
-@register_jitable
-def _begin_swings(state: Any, r: Any, u: Any, least: Any) -> None:
-    """Begin to count swings where the reference has been reached."""
-    travels.begin(state.reference, r, 0.5 * least * np.abs(state.line.gain))
-    travels.begin(state.travel, u, 0.5 * least)
-    state.gone = state.handed = 0.0
 
 
 @register_jitable
@@ -198,7 +182,9 @@ def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any, told: Any) -> 
         lines.begin(line, line.gain, u, lines.at(line, u), least)
         # What is left of the way is paid on the run.
         state.owed = (r - lines.at(line, u)) / state.unit
-        _begin_swings(state, r, u, least)
+        travels.begin(state.reference, r, 0.5 * least * np.abs(line.gain))
+        travels.begin(state.travel, u, 0.5 * least)
+        state.gone = state.handed = 0.0
 
 
 @register_jitable
@@ -285,13 +271,14 @@ def _follow(state: Any, settings: Any, r: Any, u: Any) -> tuple[float, float]:
 def _run(state: Any, settings: Any, u: Any, x: Any, moved: Any, gone: Any) -> float:
     """Take a reading of the run; NaN where it cannot be believed."""
     x = _believe(state, settings, u, x, gone, moved)
-    if state.stage == RUN and np.isfinite(x):
-        feedback.follow(state, settings, x)
     if state.stage == RUN and settings.feedback > 0.0:
+        if np.isfinite(x):
+            feedback.follow(state, settings, x)
         feedback.watch_rest(state, settings, x, moved)
     if state.reference.turned_now != 0.0:
         paces.watch(state, settings)
-        feedback.turn(state)
+        # What the correction does in each leg shakes nothing.
+        state.shaking.count = 0.0
     outside.watch(state, settings)
     return x
 
@@ -324,4 +311,6 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     _learn_from(state, settings, x, moved)
     if state.stage == RUN and state.readings.fault == faults.NONE and _is_due(state, gone):
         state.handed = 0.0
-        _hand_over(state, settings)
+        if state.scale > 0.0:
+            slots.hand_over(state.candidates, settings.candidates)
+        driving.reconsider(state, settings)

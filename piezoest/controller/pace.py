@@ -20,9 +20,9 @@ PACE = record(
     # Samples of a way of the start, where it began; sums of the voltage's way and of the answer; how late the
     # readings were on the last two ways [samples].
     count=COUNT, from_u=MEASURED, from_x=MEASURED, gone=NUMBER, answered=NUMBER, before=AMOUNT, now=AMOUNT,
-    # Samples and length of the reference's last leg, its longest one, samples of a period; sample of the last
-    # warning, and which have been given.
-    leg=COUNT, length=DISTANCE, widest=DISTANCE, period=AMOUNT, told=COUNT, fast=FLAG, late=FLAG,
+    # Length of the reference's last leg, of its longest one; samples of a period; sample of the last warning,
+    # and which have been given.
+    length=DISTANCE, widest=DISTANCE, period=AMOUNT, told=COUNT, fast=FLAG, late=FLAG,
 )  # fmt: skip
 
 # A reference is fast above this fraction of the resonance; a lag of this phase [rad] is about as wide a loop,
@@ -74,8 +74,7 @@ def watch(state: Any, settings: Any) -> None:
     pace, reference = state.pace, state.reference
     pace.widest = max(pace.widest, reference.leg) if reference.turns > 1.0 else 0.0
     wide = min(pace.length, reference.leg) > LEAST * pace.widest
-    pace.period = pace.leg + reference.usual
-    pace.leg, pace.length = reference.usual, reference.leg
+    pace.period, pace.length = reference.past + reference.usual, reference.leg
     # A block notes one event: of two warnings in it the first would be lost.
     if reference.turns < FIRST_LEGS or not wide or state.samples <= pace.told + state.block:
         return

@@ -9,7 +9,7 @@ from piezoest.controller import faults, feedback
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.voltage import SEEK
+from piezoest.controller.voltage import SEEK, is_held
 
 # The voltage may rest at a limit for this travel of the reference, in swings, before all begins anew.
 # Sooner if the line is not sure, once the reference has shown its swing.
@@ -40,19 +40,13 @@ def begin_anew(state: Any, settings: Any) -> None:
 
 
 @register_jitable
-def _ways(start: Any) -> float:
-    """How far the ways of the start have led."""
-    return max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
-
-
-@register_jitable
 def is_refuted(state: Any, gone: Any, answer: Any) -> bool:
     """Whether the answer to a way from where all began speaks against the sign of the gain.
 
     Hum or drift may have passed for the answer to the short ways of the start, but less so for that to a
     longer one.
     """
-    start, ways = state.start, _ways(state.start)
+    start, ways = state.start, starts.farthest(state.start)
     noise = starts.CLEAR * max(start.noise, np.sqrt(state.readings.noise))
     clear = np.abs(answer) > max(noise, AGAINST * np.abs(start.gain) * ways)
     return clear and np.abs(gone) > LONGER * ways and answer * gone * start.gain < 0.0
@@ -64,14 +58,13 @@ def _has_answered(state: Any) -> bool:
     gone, answer = state.u - state.start.origin, state.readings.last - state.start.zero
     # Over a way as short as those of the start, hum, drift or ringing may pass for an answer again.
     shown = answer * gone * state.line.gain > ANSWERED * (state.line.gain * gone) ** 2
-    return shown and np.abs(gone) > LONGER * _ways(state.start)
+    return shown and np.abs(gone) > LONGER * starts.farthest(state.start)
 
 
 @register_jitable
 def _is_out_of_reach(state: Any, settings: Any) -> bool:
     """Whether the stage stands before the reference at a limit, where the readings agree with the line."""
-    left = (state.r - state.readings.last) * state.line.gain
-    short = (state.u <= settings.minimum and left < 0.0) or (state.u >= settings.maximum and left > 0.0)
+    short = is_held(settings, state.u, (state.r - state.readings.last) * state.line.gain)
     fine = state.readings.fault == faults.NONE and state.readings.spikes == 0.0
     return short and fine and (reading.is_sure(state.readings) or _has_answered(state))
 

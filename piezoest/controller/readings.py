@@ -30,9 +30,8 @@ READINGS = record(
     swing=DISTANCE, sure=AMOUNT,
     # Smallest change of the reading: the step of its converter.
     step=AMOUNT,
-    # Spikes in a row, all of them; travel in swings that spoke for each fault, and that spoke for none.
-    spikes=COUNT, outliers=COUNT,
-    weak=AMOUNT, wrong=AMOUNT, large=AMOUNT, stopped=AMOUNT, off=AMOUNT, good=AMOUNT,
+    # Spikes in a row; travel in swings that spoke for each fault, and that spoke for none.
+    spikes=COUNT, weak=AMOUNT, wrong=AMOUNT, large=AMOUNT, off=AMOUNT, good=AMOUNT,
     # What the last readings show, whatever they are: points of the last third of a swing.
     recent=lines.POINTS,
 )  # fmt: skip
@@ -151,8 +150,8 @@ def is_sure(readings: Any) -> bool:
 
 
 @register_jitable
-def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> None:
-    """Count the travel that speaks for each fault."""
+def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> bool:
+    """Count the travel that speaks for each fault; whether the readings stand still."""
     recent = readings.recent
     sure = is_sure(readings)
     moved = recent.square > (0.05 * readings.swing) ** 2
@@ -177,11 +176,11 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> N
     plain = straight or (sure and clear and off)
     large = (answer > LARGE * steep if sure else slope > HUGE and line.legs >= TRUSTED) and moved and plain
     readings.large = _counted(readings.large, swings, large)
-    readings.stopped = 1.0 if stopped else 0.0
     lowest = GOOD if sure else WEAK
     highest = 1.0 / GOOD if sure else HUGE
     good = known and lowest < slope < highest and not stopped and not (off and sure)
     readings.good = readings.good + swings if good else (readings.good if slope > lowest else 0.0)
+    return stopped
 
 
 @register_jitable
@@ -191,7 +190,7 @@ def go_the_wrong_way(readings: Any) -> bool:
 
 
 @register_jitable
-def _name(readings: Any) -> float:
+def _name(readings: Any, stopped: Any) -> float:
     """The fault that the evidence shows; the present one until it is over."""
     if go_the_wrong_way(readings) and is_sure(readings):
         return REVERSED
@@ -203,7 +202,7 @@ def _name(readings: Any) -> float:
         stands = readings.still > STOPPED_FOR * readings.swing
         follows = lines.explained(readings.recent) > STRAIGHT and not stands
         return SCALED if follows else NO_RESPONSE
-    if readings.stopped != 0.0:
+    if stopped:
         return SATURATED if readings.fault == NONE else readings.fault
     over = OVER_STOPPED if readings.fault == SATURATED else OVER
     return NONE if readings.good > over else readings.fault
@@ -212,8 +211,8 @@ def _name(readings: Any) -> float:
 @register_jitable
 def forget(readings: Any) -> None:
     """Forget what spoke for a fault."""
-    readings.weak = readings.wrong = readings.large = readings.off = readings.stopped = readings.spikes = 0.0
-    readings.good = 0.0
+    readings.weak = readings.wrong = readings.large = 0.0
+    readings.off = readings.spikes = readings.good = 0.0
     lines.forget(readings.recent)
 
 
@@ -273,12 +272,10 @@ def believed(
         lines.forget(readings.recent)
     readings.off = _counted(readings.off, min(wanted / unit, MOST), off)
     before = readings.fault
-    _evidence(readings, line, travel, off, swings)
-    readings.fault = _name(readings)
+    stopped = _evidence(readings, line, travel, off, swings)
+    readings.fault = _name(readings, stopped)
     if readings.fault != NONE and before == NONE:
         readings.good = 0.0
-    if far:
-        readings.outliers += 1.0
     still = _stands_still(readings, line, travel, STANDS_STILL, 1.5)
     wrong = readings.wrong > 0.0 and is_sure(readings)
     doubtful = readings.fault != NONE or readings.weak > DOUBT or wrong

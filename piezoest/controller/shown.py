@@ -109,7 +109,7 @@ def _outside(state: Any, learnt_on: Any) -> dict[str, str]:
         return {}
     units = {"displacement": "µm", "voltage": "V"}
     known = {name: ends(learnt_on[name], unit) for name, unit in units.items()}
-    return known | {name: figure(float(state["outside"][name])) for name in ("r", "u")}
+    return known | {name: figure(float(state["seen"][name])) for name in ("r", "u")}
 
 
 def misses(state: Any) -> list[float | None]:

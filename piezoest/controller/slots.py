@@ -89,13 +89,12 @@ def hand_over(slots: Any, settings: Any) -> None:
 
 
 @register_jitable
-def judge(slots: Any, z: Any, swings: Any, bound: Any) -> None:
-    """Count what each model misses of a reading."""
+def judge(slots: Any, z: Any, bound: Any, swings: Any) -> None:
+    """Count what each model misses of a reading, see `candidate.judge`."""
     if slots is not None:
         score = slots.model.score
-        miss = z - score.z - score.owed
-        candidate.judge(score, min(max(miss, -bound), bound), swings)
-        judge(slots.others, z, swings, bound)
+        candidate.judge(score, z - score.z - score.owed, bound, swings)
+        judge(slots.others, z, bound, swings)
 
 
 @register_jitable
@@ -137,12 +136,12 @@ def owed(slots: Any, number: Any, otherwise: Any) -> float:
 
 
 @register_jitable
-def expected(slots: Any, number: Any, otherwise: Any) -> float:
-    """Where the model of a number stands; `otherwise` for the line."""
+def stands(slots: Any, number: Any, otherwise: Any) -> float:
+    """Where the reference stands for the model of a number: where it does, and what it owes."""
     if slots is not None:
         if number == 1.0:
-            return slots.model.score.z
-        return expected(slots.others, number - 1.0, otherwise)
+            return slots.model.score.z + slots.model.score.owed
+        return stands(slots.others, number - 1.0, otherwise)
     return otherwise
 
 

@@ -87,10 +87,9 @@ def begin(start: Any, u: Any) -> None:
 
 
 @register_jitable
-def _begin_windows(start: Any) -> None:
-    """Begin to look at the readings of a way."""
-    start.sum = start.ramp = start.squares = start.summed = start.change = 0.0
-    start.mean = start.mean_before = start.oldest_mean = start.from_x
+def farthest(start: Any) -> float:
+    """How far the last way has led from where all began."""
+    return max(np.abs(start.target - start.origin), np.abs(start.from_u - start.origin))
 
 
 @register_jitable
@@ -98,7 +97,8 @@ def _go_to(start: Any, u: Any, target: Any) -> None:
     """Begin a way."""
     start.stage, start.samples = GO, 0.0
     start.from_u, start.target = u, target
-    _begin_windows(start)
+    start.sum = start.ramp = start.squares = start.summed = start.change = 0.0
+    start.mean = start.mean_before = start.oldest_mean = start.from_x
 
 
 @register_jitable
@@ -167,7 +167,7 @@ def _move(start: Any, settings: Any) -> None:
     start.samples += 1.0
     # A way back from afar takes longer.
     longer = max(1.0, np.abs(start.target - start.from_u) / settings.longest)
-    share = min(start.samples / (longer * settings.ramp), 1.0)
+    share = start.samples / (longer * settings.ramp)
     start.voltage = smooth(start.from_u, start.target, share)
     if share >= 1.0:
         start.stage, start.voltage, start.windows = WAIT, start.target, 0.0
