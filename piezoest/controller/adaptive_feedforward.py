@@ -16,7 +16,7 @@ from piezoest.models import LearntModel
 
 # Events that are kept.
 MOST_EVENTS = 1000
-# What planning a block counts, of which learning knows nothing.
+# What planning a block changes; everything else changes when the block is learnt.
 _COUNTED = ("missing", "saturated", "slewed", "planned", "back")
 
 _log = logging.getLogger(__name__)
@@ -26,11 +26,10 @@ class AdaptiveFeedforward(Face):
     """A complete adaptive feed-forward controller that needs only sample rate and voltage limits.
 
     It measures the gain with small steps of the voltage and moves to the reference. Then it learns the
-    hysteresis while it runs, with a straight line and up to four estimators in parallel, and records the
-    last loop for motion that repeats. What had the smallest recent error computes the voltage (it
-    *drives*). The voltage stays in a corridor around the
-    straight line, and always within the limits. Implausible readings are reported in `status` and `events`.
-    Nothing is learnt from them, and the straight line drives as long as they last.
+    hysteresis while it runs, with a straight line and up to four estimators in parallel, and records the last
+    loop for motion that repeats. What had the smallest recent error computes the voltage (it *drives*). The
+    voltage stays in a corridor around the straight line, and always within the limits. Implausible readings
+    are reported in `status` and `events`; nothing is learnt from them, and the straight line drives.
 
     Parameters
     ----------
@@ -41,9 +40,8 @@ class AdaptiveFeedforward(Face):
     estimators : tuple of callable, optional
         Up to four classes of estimators (`HysteresisRLS`, `OutputErrorRLS`, `HysteresisEKF`,
         `PrandtlIshlinskiiRLS`), or a ``functools.partial`` of one. Default: the first, the second and the
-        last of these; ``()`` is the straight line alone. They are called as ``factory(sample_rate,
-        initial_model=..., noise=...)``, because they work in units of half a swing, in which the stage has
-        a gain of about one.
+        last of these; ``()`` is the straight line alone. The controller calls ``factory(sample_rate,
+        initial_model=..., noise=...)``: they work in units of half a swing, in which the gain is about one.
     corridor : float
         Largest distance of the voltage from the straight line, as a fraction of half the widest recent
         swing, 0 to 1.
@@ -74,9 +72,8 @@ class AdaptiveFeedforward(Face):
 
     Notes
     -----
-    Learning depends on how far the voltage travels and not on time. A negative gain is found as well. The
-    first controller with a choice of estimators is compiled; later ones load the compiled code. Source: a
-    rule of this library.
+    Learning depends on how far the voltage travels and not on time. The first controller with a choice of
+    estimators is compiled; later ones load the compiled code. Source: a rule of this library.
 
     Examples
     --------
@@ -123,7 +120,7 @@ class AdaptiveFeedforward(Face):
         self._make(sample_rate, limits, options, team.made(factories, sample_rate))
 
     def _make(self, sample_rate: float, limits: VoltageLimits, options: Any, estimators: Any) -> None:
-        """Make room for estimators that are known to be good ones."""
+        """Make room for checked estimators, and begin."""
         self._sample_rate, self._limits, self._options = sample_rate, limits, options
         self._estimators, self._names = estimators, team.names(estimators)
         self._layouts, self._start = making.room(sample_rate, limits, options, estimators)
@@ -160,10 +157,9 @@ class AdaptiveFeedforward(Face):
     def resume(self, voltage: float, displacement: float) -> None:
         """Continue from rest with what was learnt.
 
-        Use it the next day, after `from_dict`, or when a program that had to stop goes on. The voltage then
-        moves smoothly from where it is to the reference. The straight line drives until the models have
-        proved their accuracy again. The voltage is taken to have gone straight to where it is now; if it went
-        to and fro meanwhile, `home` erases what that has left.
+        Use it the next day, after `from_dict`, or when a program goes on after a stop. The voltage moves
+        smoothly to the reference. The straight line drives until the models have proved their accuracy again.
+        The voltage must have gone straight to where it is now; if it went to and fro, `home` erases that.
 
         Parameters
         ----------
@@ -191,7 +187,7 @@ class AdaptiveFeedforward(Face):
         kernel.resume.of(*self._layouts)(self._state, self._settings, u, x)
 
     def _compiled(self) -> tuple[Any, ...]:
-        """Machine code: to plan and to learn from a sample, a block; to home."""
+        """Machine code of `step`, `learn`, both for blocks, and `home`."""
         if self._loops is None:
             every = (kernel.step, kernel.learn, kernel.run, kernel.learn_all, kernel.home)
             self._loops = tuple(loop.of(*self._layouts) for loop in every)
@@ -208,13 +204,11 @@ class AdaptiveFeedforward(Face):
         Parameters
         ----------
         amplitude : float, optional
-            Amplitude of the first oscillation [V]. Default: half the range of the limits, which erases
-            everything.
+            Amplitude of the first oscillation [V]. Default: half the range, which erases everything.
         frequency : float
             [Hz]; reduced if the slew rate requires it.
         cycles : int
-            Number of oscillations, 1 to 10 000. With ten, each is smaller than the last by a tenth of the
-            first.
+            Number of oscillations, 1 to 10 000; with ten, each is smaller by a tenth of the first.
 
         Raises
         ------
@@ -284,10 +278,10 @@ class AdaptiveFeedforward(Face):
         Parameters
         ----------
         u : float or None, or array_like, shape (N,)
-            Voltage [V] of the last `step`, or the array of the last `run`. As rounded by a converter, or
-            measured with an error below 1 % of the range, it counts as the planned one. None or NaN means
-            that it is unknown whether it was written. If this matters, the straight line drives until the
-            models have proved their accuracy again.
+            Voltage [V] of the last `step`, or the array of the last `run`. Rounded by a converter, or
+            measured with an error below 1 % of the range, it counts as the planned one. None or NaN: it is
+            unknown whether it was written. If this matters, the straight line drives until the models have
+            proved their accuracy again.
         x : float or None, or array_like, shape (N,)
             Measured displacement [µm]; None, NaN or infinity if there is none. Anything that is not a number
             counts as missing.
@@ -297,8 +291,16 @@ class AdaptiveFeedforward(Face):
         ValueError
             If they are arrays and no block of their length was planned by `run`.
         """
-        if self._planned is not None:
-            self._learn_block(self._planned, u, x)
+        r = self._planned
+        if r is not None:
+            u, x = array_1d("u", u, allow_nan=True), array_1d("x", x, allow_nan=True)
+            if not u.size == x.size == r.size:
+                raise ValueError(
+                    f"u and x must have {r.size} samples, as the block that run() planned, "
+                    f"got {u.size} and {x.size}"
+                )
+            self._planned = None
+            self._teach(self._compiled()[3], r, u, x)
         elif (isinstance(u, np.ndarray) and u.size > 1) or (isinstance(u, list | tuple) and len(u) > 1):
             raise ValueError(
                 f"u must be one number, got {len(u)} values: call run(r) for the block before learn(u, x)"
@@ -308,18 +310,8 @@ class AdaptiveFeedforward(Face):
             x = x if type(x) is float else number_or_nan(x)
             self._teach(self._compiled()[1], u, x)
 
-    def _learn_block(self, r: FloatArray, u: Any, x: Any) -> None:
-        u, x = array_1d("u", u, allow_nan=True), array_1d("x", x, allow_nan=True)
-        if not u.size == x.size == r.size:
-            raise ValueError(
-                f"u and x must have {r.size} samples, as the block that run() planned, "
-                f"got {u.size} and {x.size}"
-            )
-        self._planned = None
-        self._teach(self._compiled()[3], r, u, x)
-
     def _teach(self, loop: Any, *samples: Any) -> None:
-        """Go through samples, and note what was noticed on the way."""
+        """Learn from samples, and keep the event that was noted meanwhile."""
         state = self._state
         before = state["noticed"].item()
         loop(state, self._settings, *samples)
@@ -371,19 +363,12 @@ class AdaptiveFeedforward(Face):
         chosen = (data[name] for name in ("corridor", "gain", "feedback", "resonance", "learnt_on"))
         options = making.options(sample_rate, *chosen)
         controller._make(sample_rate, limits, options, estimators)
-        controller._load(data)
+        layouts = controller._layouts
+        write(controller._state, saved.read_state(data["state"], layouts[0], controller._state))
+        write(controller._settings, saved.read_models(data["models"], layouts[1], controller._settings))
+        if data["planned"] is not None:
+            controller._planned = array_1d("planned", data["planned"], allow_nan=True).copy()
+        controller._events.extend(saved.read_events(data["events"]))
+        for number in range(len(controller._names)):
+            controller._model(number)  # what makes no model is refused
         return controller
-
-    def _load(self, data: dict[str, Any]) -> None:
-        """Go on from what was saved."""
-        state = saved.read_state(data["state"], self._layouts[0], self._state)
-        settings = saved.read_models(data["models"], self._layouts[1], self._settings)
-        planned, events = data["planned"], saved.read_events(data["events"])
-        if planned is not None:
-            planned = array_1d("planned", planned, allow_nan=True).copy()
-        write(self._state, state)
-        write(self._settings, settings)
-        self._planned = planned
-        self._events.extend(events)
-        for number in range(len(self._names)):
-            self._model(number)  # what makes no model is refused

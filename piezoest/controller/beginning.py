@@ -11,7 +11,7 @@ from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.voltage import APPROACH, HOME, SEEK
+from piezoest.controller.voltage import APPROACH, SEEK
 
 
 @register_jitable
@@ -32,21 +32,8 @@ def begin_learning(state: Any) -> None:
     state.railed, state.patience = 0.0, driving.PATIENCE
     state.owed = state.small = 0.0
     reading.forget(state.readings)
-    # The last readings may be as old as the start is long.
+    # The last readings may be from before the start.
     state.readings.before = state.readings.last = start.now
-
-
-@register_jitable
-def begin_homing(state: Any, settings: Any, amplitude: Any, turn: Any, cycles: Any) -> bool:
-    """Begin to erase what hysteresis remembers; whether it can be."""
-    if not homing.begin(state.homing, settings, state.u, amplitude, turn, cycles):
-        return False
-    if state.unit != 0.0:
-        doubt.all_models(state)
-    state.stage = HOME
-    feedback.forget(state)
-    reading.forget(state.readings)
-    return True
 
 
 @register_jitable
@@ -58,7 +45,7 @@ def _begin_again(state: Any, settings: Any, u: Any, x: Any) -> None:
 
 @register_jitable
 def home(state: Any, settings: Any, u: Any, x: Any) -> None:
-    """Follow the sweep; behind it the way to the reference begins, or the gain is sought."""
+    """Follow the sweep; after it the way to the reference begins, or the gain is sought."""
     line, recent = state.line, state.readings.recent
     if state.scale > 0.0:
         slots.advance(state.candidates, settings.candidates, u)

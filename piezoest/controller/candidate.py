@@ -1,12 +1,11 @@
-"""A candidate: a compiled estimator, its current model, and the recent error of this model.
+"""A candidate: a compiled estimator or the recorder, its current model, and the model's recent error.
 
-The model is simulated along the voltage that was written. Its error is the error that the stage would have
-had if this model had computed the voltage. Estimator and model work in units in which the line has gain one
-and the voltage swings from about -1 to 1, so nothing need be known of the stage beforehand. Their output is
-z = (x - zero)/unit, a voltage. For the recorded loop the recorder takes the place of the estimator.
+The model is simulated along the voltage that was written: its error is that which the stage would have had
+if this model had computed the voltage. Estimator and model work in units in which the line has gain one and
+the voltage swings from about -1 to 1. The output of a model is z = (x - zero)/unit, a voltage.
 
-The voltage must not jump when another model begins to drive. The offset that prevents this is what the model
-*owes*, as z. It is paid, that is decays to zero, while the reference travels.
+The offset that prevents a jump of the voltage when a model begins to drive is what the model *owes*, as z.
+While the reference travels it decays to zero: it is paid.
 """
 
 from typing import Any
@@ -19,16 +18,14 @@ from piezoest.equations.turning_points import TURNING_POINTS, remember
 from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
 from piezoest.layout import AMOUNT, FIXED, FLAG, MEASURED, NUMBER, Record, numbers, record
 
-# What a score remembers, in swings.
-MEMORY = 0.6
-# The largest miss of late counts like a root mean square so many times smaller.
-PEAK = 2.5
-# A score looks back over BLOCKS blocks of travel, BLOCK swings each. What was missed before them counts no
-# more than the largest miss in them: it says nothing about a model that has learnt since.
+# Memory of a score, in swings; the largest recent miss counts like a root mean square PEAK times smaller.
+MEMORY, PEAK = 0.6, 2.5
+# The largest misses are kept for BLOCKS blocks of travel, BLOCK swings each. Older misses count no more than
+# the largest of them: the model has learnt since.
 BLOCKS, BLOCK = 5, 0.2
 
-# Weight and mean square of the misses, the largest of late; the largest miss in each block, the present block
-# first; travel in the present block; where the model stands, and what it owes.
+# Weight and mean square of the misses, the largest recent one; the largest one in each block, the present
+# block first; travel in this block; where the model stands, and what it owes.
 SCORE = record(
     weight=AMOUNT, square=AMOUNT, peak=AMOUNT, peaks=numbers(BLOCKS, kind=AMOUNT), block=AMOUNT, z=MEASURED,
     owed=NUMBER,
@@ -122,7 +119,7 @@ def forget(score: Any) -> None:
 
 @register_jitable
 def missed(score: Any) -> float:
-    """What has been missed of late, as a root mean square."""
+    """The recent misses, as a root mean square."""
     return max(np.sqrt(score.square), score.peak / PEAK)
 
 
@@ -138,7 +135,7 @@ def hand_over(state: Any, settings: Any) -> None:
     if state.usable != 0.0:
         state.score.owed += state.score.z - z
     else:
-        # What it missed while it had no model says nothing of this one.
+        # What was missed without a model says nothing about this one.
         forget(state.score)
     state.usable = 1.0
     state.score.z = z

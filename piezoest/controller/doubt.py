@@ -1,4 +1,4 @@
-"""Where what is known may be of no use: the line drives until the models have proved themselves again."""
+"""What is known may be wrong now: the line drives until the models have proved their accuracy again."""
 
 from typing import Any
 
@@ -9,9 +9,9 @@ from piezoest.controller import candidate, driving, faults, slots
 from piezoest.controller import line as lines
 from piezoest.controller import travel as travels
 
-# A voltage that may not have been written does not matter below this fraction of a swing.
+# Whether a voltage was written does not matter for a difference below this fraction of a swing.
 NOTHING = 1.0 / 64.0
-# A small scan has become wide again in a leg that is so many times as long as those before.
+# A small scan is wide again in a leg so many times as long as those before.
 OUTGROWN = 2.0
 
 
@@ -33,13 +33,13 @@ def matters(state: Any) -> bool:
 
 @register_jitable
 def lose_write(state: Any) -> None:
-    """Nobody knows whether the voltage was written: it is the planned one, or still the last one."""
+    """It is unknown whether the voltage was written: it is the planned one, or still the last one."""
     single = state.pending > 0.0
     state.pending = 0.0
     if not matters(state):
         return
     if state.since > 0.0:
-        # Once for all that are lost in a row.
+        # Once for several in a row.
         faults.notice(state, faults.UNKNOWN)
     all_models(state)
     if single:
@@ -48,13 +48,13 @@ def lose_write(state: Any) -> None:
 
 @register_jitable
 def go_on_from_planned(state: Any) -> None:
-    """Let the line go on from the planned voltage: from the last known one it would go back and forth."""
+    """Let the line go on from the planned voltage, so that it does not go back to the last known one."""
     state.owed -= state.line.gain * (state.planned - state.u) / state.unit
 
 
 @register_jitable
 def narrow(state: Any) -> None:
-    """Behind a wide way the reference may go on small: what was known of the wide one is of no use there."""
+    """After a wide way the reference may go on small, where what was learnt on the wide one is of no use."""
     reference, line = state.reference, state.line
     if not travels.is_over(reference, np.sqrt(state.readings.noise)):
         return

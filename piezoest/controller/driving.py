@@ -14,28 +14,24 @@ from piezoest.controller import travel as travels
 
 # The line alone drives until it has seen a leg, or the voltage has come back this fraction of its first way.
 BACK = 0.5
-# What a model owes is paid within this fraction of a swing of the reference. If it were paid faster, a loop
-# through the models would feed a resonance.
-PAID = 1.0 / 4.0
-# ... of the leg so far, which counts for at least this fraction of the swing.
-LEAST_LEG = 0.1
-# Another model drives if it has missed less than this fraction of what the present one has.
+# What is owed is paid within this fraction of a swing of the reference; faster, the loop through the models
+# would feed a resonance. In the first leg: of the leg so far, at least of LEAST_LEG swings.
+PAID, LEAST_LEG = 1.0 / 4.0, 0.1
+# Another model drives if its miss is below this fraction of that of the present one.
 BETTER = 0.8
-# Swings between two changes of the model that drives; after a fall back to the line twice as many each time.
+# Least number of swings between two changes of model. It doubles at each return to the line.
 PATIENCE, LONGEST_PATIENCE = 0.25, 128.0
-# Swings after which a model that drives has shown what it does; before which the miss may be the last one's.
+# Swings after which a model that drives is judged; before CALM the miss may still be that of the last one.
 SEEN, CALM = 0.6, 0.1
-# A model that has driven for so many times the patience halves it; swings that count for it from then on.
+# A model that has driven for so many times the patience halves it, and then has driven for PROVEN swings.
 SHOWN, PROVEN = 4.0, 1.0
-# A model that drives falls back at once where the stage misses by so many times what the line has missed.
-TRIP = 2.0
-# ... unless the line would miss by so many times more: small legs make it flat, and a wide one follows.
-WORSE = 1.5
-# No model may miss more than the line has. That bound follows the line down at once, and up by this factor
-# each time, for the stage may have changed. It is at least so many swings: hysteresis lets no line be better.
+# The line drives at once where the stage misses by so many times the recent miss of the line, unless the line
+# would miss by WORSE times as much: small legs make it flat, and then a wide one follows.
+TRIP, WORSE = 2.0, 1.5
+# No model may miss more than the line has. This bound follows the line down at once, and up by this factor
+# each time, because the stage may have changed; at least so many swings, which hysteresis costs any line.
 SLOWLY_UP, AT_LEAST = 1.05, 0.05
-# After so many of these sudden falls an event says so, once: so many are no chance, unless models drive well
-# for long between them.
+# After so many sudden returns to the line an event is noted: this is no chance. Good driving takes them back.
 OFTEN = 3.0
 # Misses below this fraction of a swing are all alike.
 ALIKE = 5e-4
@@ -51,7 +47,7 @@ def line_z(state: Any) -> float:
 def kept(reference: Any, travelled: Any, swing: Any) -> float:
     """The fraction of what is owed that is left after a travel of the reference."""
     if reference.turns <= 1.0:
-        # Nobody knows the swing yet: the way from rest may be much longer.
+        # The swing is not known yet: the way from rest may be much longer.
         paid = PAID * max(np.abs(reference.last - reference.turned), LEAST_LEG * swing)
     else:
         paid = PAID * swing
@@ -78,7 +74,7 @@ def drive(state: Any, number: Any) -> None:
     """Let another model drive, without a bump."""
     state.switches += number != state.driving
     state.driving = number
-    # Where the corridor held the last one back it stood elsewhere.
+    # Not from where the last one stands: the corridor may have held it back.
     stand_at_reference(state)
 
 
@@ -91,13 +87,10 @@ def owe(state: Any, more: Any) -> None:
 
 @register_jitable
 def _faked(state: Any) -> float:
-    """By how much late readings miss what is true: models learn it as if it were hysteresis.
-
-    It is most where the reference is fastest, as on edges between rests.
-    """
+    """How wrong late readings are, which models learn as if it were hysteresis; most on the fastest edges."""
     reference = state.reference
     fastest = travels.in_swings(reference, reference.fastest)
-    # What the start has left of the first leg may be short: the second one counts as it goes on.
+    # The first leg began before the run and may be short: the second one counts while it goes on.
     leg = max(reference.usual, reference.count if reference.turns == 1.0 else 1.0)
     late = state.start.lag * max(1.0 / leg, fastest)
     return min(late, 1.0) * state.travel.swing
@@ -107,9 +100,9 @@ def _faked(state: Any) -> float:
 def _choose(state: Any, settings: Any) -> float:
     """The model with the smallest recent error, if it is clearly better than the present one.
 
-    Models that learn from late readings predict these well, but not the stage: what is faked by that is added
-    to their misses, and taken off the line's. The recorded loop is of no use where the reference leaves it,
-    however good it was before.
+    Models that learn from late readings predict these, not the stage: the error of late readings is added to
+    their misses, and subtracted from that of the line. Where the reference leaves the recorded loop, that
+    loop is of no use, however good it was.
     """
     faked = _faked(state)
     line = max(candidate.missed(state.score) - faked, 0.0)
@@ -132,13 +125,13 @@ def _choose(state: Any, settings: Any) -> float:
 
 @register_jitable
 def _floor(state: Any) -> float:
-    """What the noise alone misses, about, in volts."""
+    """About what the noise alone misses, as z."""
     return 2.0 * np.sqrt(state.readings.noise) / np.abs(state.unit)
 
 
 @register_jitable
 def _at_most(missed: Any, before: Any) -> float:
-    """What the line misses now, as far as it exceeds what it missed before by no more than allowed."""
+    """The miss of the line; what it missed before limits how fast it grows."""
     return min(missed, max(SLOWLY_UP * before, AT_LEAST))
 
 
@@ -146,14 +139,14 @@ def _at_most(missed: Any, before: Any) -> float:
 def _disappoints(state: Any) -> bool:
     """Whether the stage misses the reference by more than the line did when it drove.
 
-    A model can be right and still shake a resonance, which every model then misses alike.
+    A correct model can still shake a resonance, and then all models miss alike.
     """
     if state.since <= SEEN:
         return False
     swing = travels.widest(state.travel)
     missed, peak = candidate.missed(state.score) / swing, state.score.peak / swing
     if state.driving > 0.0:
-        # What it missed on the first way, or before it was drawn anew, would excuse too much.
+        # What the line missed at first, or before it was drawn again, would excuse too much.
         missed, peak = _at_most(missed, state.line_missed), _at_most(peak, state.line_peak)
     state.line_missed, state.line_peak = missed, peak
     return state.driving > 0.0 and candidate.missed(state.outcome) > missed * swing + _floor(state)
@@ -161,11 +154,11 @@ def _disappoints(state: Any) -> bool:
 
 @register_jitable
 def watch(state: Any, off: Any, line_off: Any) -> None:
-    """Fall back to the line at once where the stage is farther off than the line would be, and has been."""
+    """Let the line drive at once where the stage misses by more than the line would, and has."""
     wide = travels.widest(state.travel)
     if state.driving == 0.0 or not wide > 0.0:
         return
-    # The bound of the last change of model may come from a quiet stretch: the line misses more by now.
+    # `line_peak` may be from a quiet time: the line may miss more by now.
     peak = max(state.line_peak, _at_most(state.score.peak / wide, state.line_peak))
     most = TRIP * peak * wide + 3.0 * _floor(state)
     if off > most and line_off < WORSE * off and state.since > CALM:
@@ -177,7 +170,7 @@ def watch(state: Any, off: Any, line_off: Any) -> None:
 
 @register_jitable
 def _change(state: Any, chosen: Any) -> None:
-    """Let another model drive; after each fall back to the line the models have to wait longer."""
+    """Let another model drive; after each return to the line the models wait longer."""
     if chosen == 0.0:
         state.patience = min(2.0 * state.patience, LONGEST_PATIENCE)
     state.since = 0.0
@@ -186,16 +179,11 @@ def _change(state: Any, chosen: Any) -> None:
 
 
 @register_jitable
-def _has_come_back(state: Any) -> bool:
-    """Whether the voltage has come back some of its way from the start."""
-    turned, origin = state.travel.turned, state.start.origin
-    return (turned - state.u) * np.sign(turned - origin) > BACK * state.confirmed
-
-
-@register_jitable
 def reconsider(state: Any, settings: Any) -> None:
     """Let the best model drive."""
-    if state.line.legs < 1.0 and not _has_come_back(state):
+    turned = state.travel.turned
+    back = (turned - state.u) * np.sign(turned - state.start.origin)
+    if state.line.legs < 1.0 and not back > BACK * state.confirmed:
         return
     chosen = 0.0 if _disappoints(state) else _choose(state, settings)
     if chosen != state.driving:

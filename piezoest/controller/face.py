@@ -1,4 +1,4 @@
-"""What a controller shows to its user; nothing is changed here."""
+"""What can be read of a controller; nothing is changed here."""
 
 from collections import deque
 from typing import Any

@@ -1,11 +1,10 @@
-"""What can be wrong, and what else is noted: its numbers in the loop, its names and what they mean."""
+"""Faults and other events: their numbers in compiled code, their names, and what they mean."""
 
 from typing import Any
 
 from numba.extending import register_jitable
 
-# What each means to the user. The first five are faults: while there is one nobody learns. The others are
-# noted beside them.
+# What each means to the user. The first five are faults, during which nothing is learnt.
 MEANINGS = {
     "no response": "the readings do not answer the voltage",
     "reversed": "the readings go the wrong way",
@@ -38,13 +37,13 @@ FAULTS = ("", *MEANINGS)
     OTHER_GAIN, UNKNOWN, SHAKEN, FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START, FEEDBACK,
     NO_READINGS,
 ) = (float(number) for number in range(len(FAULTS)))  # fmt: skip
-# Of what is noted beside faults, that which the user is to change.
+# Events that are no faults, but that the user should act on.
 WARNINGS = (FAST, LATE, OUTSIDE, OUT_OF_REACH, FALSE_START, FEEDBACK, NO_READINGS)
 
 
 @register_jitable
 def notice(state: Any, number: Any) -> None:
-    """Note a fault, its end, or what else was noticed, and where it was, for the log."""
+    """Note a fault, its end (`NONE`), or another event, and what the figures in its text need."""
     state.noticed += 1.0
     state.notice = number
     state.seen.samples, state.seen.r = state.samples, state.r

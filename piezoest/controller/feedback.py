@@ -1,4 +1,4 @@
-"""Integral feedback around the feed-forward: what no model knows, creep and drift, is taken back slowly.
+"""Integral feedback around the feed-forward: it slowly removes what no model contains, creep and drift.
 
 The reference of the feed-forward is r + i, with di/dt = gain (r - x). Source: K. J. Åström, R. M. Murray,
 Feedback Systems, Princeton 2008, sec. 10.4.
@@ -14,57 +14,53 @@ from piezoest.controller import travel as travels
 from piezoest.controller.voltage import is_held
 from piezoest.layout import AMOUNT, COUNT, FLAG, MEASURED, NUMBER, SIGN, record
 
-# No sample corrects more than this fraction of an error, of one that is answered late less.
+# A sample corrects at most this fraction of an error, less if the answer is late.
 FASTEST = 0.25
-# A correction that goes back and forth so many times within a leg, by this fraction of a swing each time, and
-# within so many times what it takes to correct an error, shakes the stage: its gain is halved. But not if the
-# last way is below this part of the first one: the stage rings by itself, as behind a step.
+# The gain is halved if the correction shakes the stage: if it turns more than SHAKES times in a leg, goes
+# BACK_AND_FORTH swings each time, and takes less than QUICK times the time to correct an error. Not if the
+# last way is below LASTS times the first: then the stage rings by itself, as after a step.
 SHAKES, BACK_AND_FORTH, QUICK, LASTS = 8.0, 0.003, 3.0, 0.9
-# Where the correction turned last, and before, its way since, samples since; such turns in a row, how far the
-# first of them went; halvings so far.
+# Where the correction turned last, and before that; direction and samples since; such turns in a row, length
+# of the first way; halvings so far.
 SHAKING = record(
     turned=NUMBER, before=NUMBER, way=SIGN, samples=COUNT, count=COUNT, size=AMOUNT, halved=COUNT
 )
-# A rest is over where the reference has gone so far from it, in swings.
+# A rest is over when the reference has gone so far from it, in swings.
 OVER = 0.02
-# Whether the reference rests, and where. Behind a rest: turns left to look at; samples since the first one,
-# those with a reading, and the sum of the corrections that these ask for.
+# Whether the reference rests, and where. After a rest: turns to go; samples since the first one, those with a
+# reading, and the sum of the corrections that these need.
 REST = record(now=FLAG, r=MEASURED, left=COUNT, count=COUNT, known=COUNT, sum=NUMBER)
-# Between the first and the last of so many turns lie two whole legs; this part of them must have readings.
+# Between the first and the last of so many turns are two whole legs; this part of them must have readings.
 TURNS, KNOWN = 3.0, 0.5
 
 
 @register_jitable
 def follow(state: Any, settings: Any, x: Any) -> None:
-    """Take a believed reading; a sensor that lies can drive it no farther than the corridor."""
+    """Take a believed reading; a wrong one cannot drive the correction farther than the corridor."""
     gain = settings.feedback * 0.5**state.shaking.halved
     share = min(gain, FASTEST / (1.0 + state.block + state.start.lag))
     growth = share * (state.late.answered_r - x)
     if is_held(settings, state.u, growth * state.line.gain):
-        # At a limit it would only wind up.
+        # At a limit it would only grow, without an effect.
         return
     state.feedback = _within(state, settings, state.feedback + growth)
     _calm(state, 1.0 / share)
 
 
 @register_jitable
-def _noise(state: Any) -> float:
-    """Noise of the readings as it was at rest, if it was seen: what is shaken would pass for noise."""
-    return state.start.noise if state.start.told == 0.0 else np.sqrt(state.readings.noise)
-
-
-@register_jitable
 def _calm(state: Any, slow: Any) -> None:
-    """Halve the gain of a correction that shakes the stage: it takes `slow` samples to correct an error.
+    """Halve the gain of a correction that shakes the stage; it takes `slow` samples to correct an error.
 
-    Integral feedback is stable below twice damping times resonance, which nobody has told.
+    Integral feedback is stable below twice damping times resonance, which are unknown.
     """
     shaking = state.shaking
+    # The noise at rest, if it was seen: a shaken stage looks noisy.
+    noise = state.start.noise if state.start.told == 0.0 else np.sqrt(state.readings.noise)
     shaking.samples += 1.0
     gone = state.feedback - shaking.turned
     if gone * shaking.way > 0.0:
         shaking.turned = state.feedback
-    elif np.abs(gone) > max(BACK_AND_FORTH * state.reference.swing, _noise(state)):
+    elif np.abs(gone) > max(BACK_AND_FORTH * state.reference.swing, noise):
         size = np.abs(shaking.turned - shaking.before)
         shaking.before, shaking.turned = shaking.turned, state.feedback
         shaking.count = shaking.count + 1.0 if shaking.samples < QUICK * slow else 0.0
@@ -80,7 +76,7 @@ def _calm(state: Any, slow: Any) -> None:
 
 @register_jitable
 def _within(state: Any, settings: Any, correction: Any) -> float:
-    """The correction, or as much of it as the corridor leaves room for."""
+    """The correction, limited to the corridor."""
     room = settings.corridor * 0.5 * state.reference.swing + 3.0 * np.sqrt(state.readings.noise)
     return min(max(correction, -room), room)
 
@@ -94,9 +90,9 @@ def forget(state: Any) -> None:
 
 @register_jitable
 def watch_rest(state: Any, settings: Any, x: Any, moved: Any) -> None:
-    """Behind a long rest, learn the correction anew from the first two legs.
+    """After a long rest, take the correction from the first two legs.
 
-    What the stage has crept is wiped out in motion, and the integral alone would keep it for long.
+    Motion erases the creep of a rest, and the integral alone would keep it for long.
     """
     rest = state.rest
     if state.readings.fault != faults.NONE:
@@ -112,7 +108,7 @@ def watch_rest(state: Any, settings: Any, x: Any, moved: Any) -> None:
 
 @register_jitable
 def _learn_from_legs(state: Any, settings: Any, x: Any) -> None:
-    """Correct by what the first two whole legs behind a rest have missed in the mean."""
+    """Correct the mean error of the first two whole legs after a rest."""
     rest = state.rest
     if rest.left == 0.0:
         return

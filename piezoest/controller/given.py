@@ -1,8 +1,7 @@
 """A gain that the user knows, until the readings have confirmed it.
 
-On its way to the reference the voltage goes a few per cent of its range first, on the side that has more
-room, and rests there until the readings have answered about as the gain says: one that lags takes a while.
-Where they speak against it for long, the gain is sought as if nothing were known.
+First the voltage goes a few per cent of its range, to the side with more room, and rests there until the
+readings have answered about as the gain predicts. If they contradict it for long, the gain is sought.
 """
 
 from typing import Any
@@ -15,19 +14,17 @@ from piezoest.controller import start as starts
 
 # An answer confirms the gain within this factor.
 ALIKE = 3.0
-# The voltage goes so many first ways before its answer is looked at.
-FREE = 4.0
-# The answer, a mean, is clear above so many times the noise of a reading.
-CLEAR = 3.0
-# No lag counts below this part of the time in which the way doubles.
+# The answer counts after so many first ways; it is clear above so many times the noise of a reading.
+FREE, CLEAR = 4.0, 3.0
+# A lag below this part of the time in which the way doubles does not count.
 SMALL = 0.03
-# An answer rests that grows by no more than this part of it until its time is so many times as long.
+# An answer rests if it grows by no more than this part while its time becomes so many times as long.
 RESTS, LATER = 0.04, 1.25
 
 
 @register_jitable
 def compare(state: Any, settings: Any) -> None:
-    """Compare what the readings of late have answered to the way from the start with the user's gain."""
+    """Compare the recent answer to the way from the beginning with the user's gain."""
     start, readings = state.start, state.readings
     gone = readings.recent.mean_u - start.origin
     answer = readings.recent.mean_x - start.zero
@@ -48,7 +45,7 @@ def compare(state: Any, settings: Any) -> None:
         start.agreed = start.largest = start.look = 0.0
         start.doubted += 1.0
     if not clear:
-        # Nobody can tell yet.
+        # Go farther: the answer is too small to tell.
         state.confirmed = max(state.confirmed, min(way, 0.5 * settings.start.longest))
     waited = start.agreed + start.doubted
     if start.agreed >= settings.doubling and waited >= start.look:
@@ -57,22 +54,15 @@ def compare(state: Any, settings: Any) -> None:
             # It still grows: look again later.
             start.largest, start.look = np.abs(answer), LATER * waited
             return
-        # The area between the way and the answer, both as parts of what they came to: about the time
-        # constant of a lag, whatever the gain. Creep and a bent answer look like a small one, so nobody is
-        # warned.
+        # The area between way and answer, both divided by their final values, is about the time constant of a
+        # lag. Creep and a bent answer look like a small one, so there is no warning.
         late = start.gone / gone - start.answered / answer - SMALL * settings.doubling
         start.lag, state.pace.late = min(max(late, 0.0), longest), 1.0
         start.given = start.doubted = 0.0
     elif start.doubted > 2.0 * longest:
         start.given = start.doubted = 0.0
         if clear:
-            _forget(state, settings, answered)
-
-
-@register_jitable
-def _forget(state: Any, settings: Any, answered: Any) -> None:
-    """Seek the gain."""
-    state.start.gain_before = answered
-    state.unit = state.line.gain = 0.0
-    reach.seek_again(state, settings)
-    faults.notice(state, faults.OTHER_GAIN)
+            start.gain_before = answered
+            state.unit = state.line.gain = 0.0
+            reach.seek_again(state, settings)
+            faults.notice(state, faults.OTHER_GAIN)

@@ -1,7 +1,6 @@
 """A decaying sweep of the voltage, which erases what hysteresis remembers.
 
-The voltage goes from one extreme to the other, each time a little less far, until nothing is left: whatever
-the stage remembered, it has been wiped out by then.
+The voltage goes from one extreme to the other, each time a little less far, until nothing is left.
 """
 
 from typing import Any
@@ -12,17 +11,17 @@ from numba.extending import register_jitable
 from piezoest.controller import start as starts
 from piezoest.layout import AMOUNT, COUNT, MEASURED, NUMBER, record
 
-# Middle and signed amplitude of the sweep; legs of it, and the present one, the way to the sweep being 0;
-# samples of a leg, those gone; the leg's ends.
+# Middle and signed amplitude of the sweep; its legs, and the present one (0: the way to the sweep); samples
+# of a leg, samples so far; both ends of the leg.
 HOMING = record(
     middle=MEASURED, amplitude=NUMBER, legs=AMOUNT, leg=COUNT, length=AMOUNT, gone=COUNT,
     from_u=MEASURED, target=MEASURED,
 )  # fmt: skip
 
-# Most of a cycle in a sample; most cycles; the fraction of the slew rate that is used.
+# Largest fraction of a cycle in a sample; most cycles; the fraction of the slew rate that is used.
 FASTEST, MOST, SLEW = 1.0 / 16.0, 1e4, 0.9
-# The steepest part of a smooth way, relative to a straight one; what was in the way is caught up this much
-# faster.
+# The steepest slope of a smooth way, relative to a straight one; a voltage that lags moves at most so many
+# times as fast.
 STEEPEST, CATCH_UP = 1.5, 2.0
 
 

@@ -9,16 +9,15 @@ import numpy as np
 
 from piezoest._checks import WILDEST
 from piezoest.compile import Record, Vector, compiled
-from piezoest.controller import candidate, doubt, homing, late, outside, redraw, slots
-from piezoest.controller import feedback as feedbacks
+from piezoest.controller import candidate, doubt, feedback, homing, late, outside, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.beginning import begin_homing, go_on_at_rest
+from piezoest.controller.beginning import go_on_at_rest
 from piezoest.controller.learning import take
-from piezoest.controller.voltage import RUN, SEEK, plan, written
+from piezoest.controller.voltage import HOME, RUN, SEEK, plan, written
 from piezoest.layout import AMOUNT, COUNT, FIXED, FLAG, MEASURED, NUMBER, Field, record, whole
 from piezoest.layout import Record as Layout
 
@@ -30,34 +29,32 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
     """Layouts of state and settings."""
     state = record(
         samples=COUNT, missing=COUNT, saturated=COUNT, slewed=COUNT,
-        # What it is doing; voltages planned since the last one was written; samples that waited for a block.
+        # Phase; voltages planned since the last one was written; samples that wait for the end of a block.
         stage=whole(0.0, 3.0), pending=COUNT, block=AMOUNT,
-        # Reference planned for, whether there was one; voltage planned, voltage written; samples without a
-        # reading, the most of late.
+        # Reference of the last plan, whether there was one; voltage planned, voltage written; samples without
+        # a reading, now and in the longest recent gap.
         r=MEASURED, asked=FLAG, planned=MEASURED, u=MEASURED, silent=COUNT, gap=AMOUNT,
-        # Farthest way from the start's voltage that was answered; travel of the reference with the voltage at
-        # a limit, and with a voltage that stood still; samples of it out of reach.
+        # Farthest way from the beginning that was answered; travel of the reference with the voltage at a
+        # limit, and with a voltage that stood still; samples with the reference out of reach.
         confirmed=AMOUNT, railed=AMOUNT, frozen=AMOUNT, beyond=COUNT,
-        # The model that drives, 0 for the line; what changes of the line owe; swings since another one drove,
-        # those that one drives at least, changes so far.
+        # The model that drives, 0 for the line; what the line owes; swings since the last change of model,
+        # least number before the next one, changes so far.
         driving=whole(0.0, slots.MOST + 1.0), owed=NUMBER, since=AMOUNT, patience=AMOUNT, switches=COUNT,
-        # z = (x - zero)/unit is what candidates know of a reading.
-        unit=NUMBER, zero=MEASURED,
-        # Half the swing that they began with; zero before [V].
-        scale=AMOUNT,
-        # Whether the reference goes on small behind a wide way; whether it is noted that reference or voltage
+        # Candidates get z = (x - zero)/unit; half the swing that they began with, zero before [V].
+        unit=NUMBER, zero=MEASURED, scale=AMOUNT,
+        # Whether the reference goes on small after a wide way; whether it is noted that reference or voltage
         # were outside of what the user's model was learnt on.
         small=FLAG, outside=FLAG,
-        # Correction of the reference by feedback [µm], and that of the voltage planned.
-        feedback=NUMBER, back=NUMBER, rest=feedbacks.REST, shaking=feedbacks.SHAKING,
+        # Correction of the reference by feedback [µm]: now, and of the last plan.
+        feedback=NUMBER, back=NUMBER, rest=feedback.REST, shaking=feedback.SHAKING,
         # Travel of the voltage since the last believed reading, and since models were handed over.
         gone=AMOUNT, handed=AMOUNT,
-        # Faults noted so far, counting their ends, and the last one.
+        # Number of events, what the last one was; sudden returns to the line, see `driving.OFTEN`.
         noticed=COUNT, notice=whole(0.0, 15.0), shaken=COUNT,
-        # When the last one was noted; reference, reading and voltage then.
+        # Sample, reference, reading and voltage of the last event.
         seen=record(samples=COUNT, r=MEASURED, x=MEASURED, u=MEASURED),
-        # What the line misses, the most of late, what it missed of a swing when it drove; what the stage
-        # misses of the reference.
+        # What the line misses, its largest recent miss, bounds for models in swings; what the stage misses of
+        # the reference.
         score=candidate.SCORE, widest=AMOUNT, line_missed=AMOUNT, line_peak=AMOUNT, outcome=candidate.SCORE,
         travel=travels.TRAVEL, reference=travels.TRAVEL, line=lines.LINE, readings=reading.READINGS,
         start=starts.START, homing=homing.HOMING, pace=paces.PACE, late=late.LATE,
@@ -65,7 +62,7 @@ def layouts(candidates: Field, candidate_settings: Field) -> tuple[Layout, Layou
     )  # fmt: skip
     settings = record(
         minimum=FIXED, maximum=FIXED, largest_step=FIXED, doubling=FIXED, corridor=FIXED, feedback=FIXED,
-        # Samples of the shortest period that is far from the resonance, zero where nobody knows it.
+        # Samples of the shortest period that is far from the resonance, zero if that is unknown.
         shortest=FIXED, allowed=outside.ALLOWED,
         # Number of the recorded loop among the candidates, -1 without any.
         recorded=FIXED,
@@ -101,7 +98,7 @@ def learn_all(state: Record, settings: Record, r: Vector, u: Vector, x: Vector) 
     state.block = max(0.9 * state.block, len(r) - 1.0)
     last = len(r) - 1
     for k in range(len(r)):
-        # Of a block only the last voltage that was planned is known.
+        # Only the last planned voltage of a block is known.
         take(state, settings, r[k], written(state, settings, u[k]) if k == last else u[k], x[k])
     if state.stage == RUN and len(r) > 1:
         redraw.go_on(state, settings)
@@ -128,7 +125,7 @@ def resume(state: Record, settings: Record, u: float, x: float) -> Any:
         go_on_at_rest(state, settings, u, x)
         return True
     state.stage = SEEK
-    # What was seen of a way that is broken off says nothing.
+    # A way that was interrupted shows nothing.
     state.pace.count = 0.0
     starts.begin(state.start, u)
     # A gain that was refuted is not tried again.
@@ -140,4 +137,11 @@ def resume(state: Record, settings: Record, u: float, x: float) -> Any:
 @compiled
 def home(state: Record, settings: Record, amplitude: float, turn: float, cycles: float) -> Any:
     """Begin a decaying sweep, `turn` of a cycle each sample; whether it can be."""
-    return begin_homing(state, settings, amplitude, turn, cycles)
+    if not homing.begin(state.homing, settings, state.u, amplitude, turn, cycles):
+        return False
+    if state.unit != 0.0:
+        doubt.all_models(state)
+    state.stage = HOME
+    feedback.forget(state)
+    reading.forget(state.readings)
+    return True

@@ -1,8 +1,8 @@
-"""What a late reading answers: readings come after what a delay or a lag holds back.
+"""The voltage and the reference that a late reading answers.
 
-The line through voltages and readings of the same samples would be too flat where readings are late, and
-beside its place; from a quarter of a period on it would point the wrong way. Feedback would take what the
-reference has gone meanwhile for an error.
+A line through the voltages and late readings of the same samples would be too flat and shifted; from a
+quarter of a period on its sign would be wrong. For feedback, the motion of the reference since then would
+look like an error.
 """
 
 from typing import Any
@@ -13,7 +13,7 @@ from piezoest.layout import MEASURED, numbers, record, whole
 
 # Samples that are remembered.
 MOST = 32
-# The last voltages and references, where the last ones stand, and those that the present reading answers.
+# The last voltages and references, the place of the newest ones, and those that the present reading answers.
 LATE = record(
     u=numbers(MOST, kind=MEASURED), r=numbers(MOST, kind=MEASURED), at=whole(0.0, MOST - 1.0),
     answered=MEASURED, answered_r=MEASURED,
@@ -22,7 +22,7 @@ LATE = record(
 
 @register_jitable
 def rest(late: Any, u: Any, r: Any) -> None:
-    """All has rested for longer than anything is late."""
+    """Stage and reference have rested for longer than any delay."""
     for i in range(MOST):
         late.u[i], late.r[i] = u, r
     late.answered, late.answered_r = u, r
@@ -32,7 +32,7 @@ def rest(late: Any, u: Any, r: Any) -> None:
 def remember(late: Any, start: Any, u: Any, r: Any) -> None:
     """Remember what was written and wanted, and find what is answered, at most the oldest one.
 
-    A stage that was late at the start because it is slow to slew is not late on slower ways.
+    If a stage that slews was late at the start, it is not late on slower ways.
     """
     late.at = late.at + 1.0 if late.at < MOST - 1.0 else 0.0
     late.u[int(late.at)], late.r[int(late.at)] = u, r

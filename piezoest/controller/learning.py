@@ -31,24 +31,24 @@ from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK, is_held
 
 # Models are handed over after this fraction of a swing.
 HAND_OVER = 1.0 / 8.0
-# The way to the reference is over within this fraction of its length, or after so many times what a doubling
-# takes: a fast reference is never caught.
+# The way to the reference is over within this fraction of its length, or after so many times the time of a
+# doubling: a fast reference is never reached.
 NEAR, LONGEST = 0.05, 50.0
-# The gain on the way is that of readings whose mean has gone this fraction of it, and at least this fraction
-# of the gain that the start has found: in the dead zone behind a turn there is hardly any answer.
+# The gain on the way counts if the mean of the recent readings has gone this fraction of it. It is at least
+# this fraction of the gain from the start: in the dead zone after a turn the stage hardly answers.
 LEAST_WAY, LEAST_GAIN = 0.4, 0.5
-# Where the voltage rests at a limit and the stage stands beyond the reference, the line follows after this
-# travel of the reference, in swings.
+# If the voltage rests at a limit and the stage is beyond the reference, the line follows the readings after
+# this travel of the reference, in swings.
 BEYOND = 0.1
-# The models begin where the voltage is farther from where all began than this fraction of half the range, in
-# a unit that is usual then.
+# The models begin where the voltage is farther from the beginning than this fraction of half the range, with
+# USUAL times half the range as their unit.
 WIDE, USUAL = 0.12, 0.4
-# Else in the second leg when it has gone this fraction of the first way, or after it. Their unit is at least
+# Otherwise they begin when the second leg has gone this fraction of the first way. Their unit is at least
 # this fraction of the way of the start.
 PASSED, SMALLEST = 0.7, 0.25
-# The voltage stands still for this travel of the reference, in swings: it is frozen.
+# The voltage is frozen if it stands still for this travel of the reference, in swings.
 FROZEN = 0.4
-# What the line misses most is remembered over turns, near which it misses least: this fraction at each.
+# At each turn, near which the line misses least, its largest miss is multiplied by this.
 REMEMBERED = 0.7
 # No miss counts for more than so many swings.
 FARTHEST = 3.0
@@ -56,11 +56,11 @@ FARTHEST = 3.0
 
 @register_jitable
 def _size_up(state: Any, settings: Any, u: Any) -> None:
-    """Let the models begin when the voltage has shown how far it swings: in that unit they learn soonest."""
+    """Begin the models when the voltage has shown how far it swings: in that unit they learn fastest."""
     travel, models, numbers = state.travel, state.candidates, settings.candidates
     origin, half_range = state.start.origin, 0.5 * (settings.maximum - settings.minimum)
     if np.abs(u - origin) > WIDE * half_range:
-        # On the first way from rest all is known that models and estimators remember.
+        # On the first way from rest the past that models and estimators remember is known.
         state.scale = USUAL * half_range
         slots.begin(models, numbers, origin, origin, state.scale)
         slots.learn(models, numbers, origin, (state.start.zero - state.zero) / state.unit)
@@ -72,7 +72,7 @@ def _size_up(state: Any, settings: Any, u: Any) -> None:
     first = max(travel.leg, np.abs(travel.turned - origin))
     early = travel.turns == 1.0 and np.abs(u - travel.turned) > PASSED * first > 0.0
     if early or travel.turns > 1.0:
-        # Early, the second leg is expected to go on as far again.
+        # Early: the second leg is expected to become as long as the first.
         state.scale = max(first if early else 0.5 * travel.leg, SMALLEST * way)
         slots.begin(models, numbers, origin, travel.turned + travel.direction * state.scale, state.scale)
         slots.advance(models, numbers, travel.turned)
@@ -82,9 +82,9 @@ def _size_up(state: Any, settings: Any, u: Any) -> None:
 
 @register_jitable
 def _watch_voltage(state: Any, settings: Any, gone: Any, moved: Any) -> None:
-    """An amplifier that does not move its voltage with the reference answers nothing."""
+    """If the voltage does not move with the reference, there is no response."""
     within = settings.minimum < state.u < settings.maximum
-    # The rest of a block that was planned before the reference was reached stands still by right.
+    # The rest of a block may stand still if it was planned before the reference was reached.
     planned = state.travel.turns > 0.0 or state.travel.count > state.block
     state.frozen = state.frozen + moved if gone == 0.0 and within and planned else 0.0
     if state.frozen > FROZEN * state.reference.swing and state.readings.fault == faults.NONE:
@@ -93,7 +93,7 @@ def _watch_voltage(state: Any, settings: Any, gone: Any, moved: Any) -> None:
 
 @register_jitable
 def _name_silence(state: Any, settings: Any) -> None:
-    """Where no voltage was answered there is no response; without readings nobody can say."""
+    """There is no response if no way was answered; without readings this is unknown."""
     if state.silent > settings.doubling:
         return
     silent = state.start.tries >= 1.0 and state.start.stage != starts.DONE
@@ -119,7 +119,7 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
     if state.scale > 0.0:
         slots.judge(state.candidates, z, bound, swings)
     if settings.minimum < u < settings.maximum:
-        # No model is to blame for a limit, nor the first one for where the line has left the stage.
+        # No model causes the error at a limit, nor the first one that which the line has left.
         off = (x - state.r) / state.unit
         left = slots.owed(state.candidates, state.driving, state.owed) if state.switches <= 1.0 else 0.0
         candidate.judge(state.outcome, off + left, bound, swings)
@@ -127,18 +127,8 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
 
 
 @register_jitable
-def _learn_from(state: Any, settings: Any, x: Any, moved: Any) -> None:
-    """Take a reading, NaN where it cannot be believed, after the voltage has been followed."""
-    z = (x - state.zero) / state.unit
-    if np.isfinite(x):
-        _score(state, settings, x, z, moved)
-    if state.scale > 0.0:
-        slots.learn(state.candidates, settings.candidates, state.u, z)
-
-
-@register_jitable
 def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
-    """Draw the line anew by a reading on the way to the reference; single ones are doubted."""
+    """Draw the line again with a reading on the way to the reference; single wrong ones do not count."""
     start, line, recent = state.start, state.line, state.readings.recent
     x = reading.middle(state.readings, x)
     lines.add(recent, u, x, settings.doubling)
@@ -147,13 +137,13 @@ def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
         given.compare(state, settings)
     elif reach.is_refuted(state, recent.mean_u - start.origin, recent.mean_x - start.zero):
         reach.begin_anew(state, settings)
-    elif way >= state.confirmed and way > 0.0:
-        # Only on new ground: on the way back hysteresis would pass for gain.
+    elif way >= state.confirmed:
+        # Only on new ground: on the way back hysteresis would look like gain.
         state.confirmed = way
-        # Where the voltage came back, what the way there has left behind would pass for an answer.
+        # Where the voltage came back, what is left of the way there would look like an answer.
         back = (u - start.target) * (start.target - start.origin) < 0.0
         gone = recent.mean_u - (start.target if back else start.origin)
-        # Where the way has led through its beginning, the mean has hardly gone anywhere.
+        # A way through its own beginning has hardly moved the mean.
         if np.abs(gone) > LEAST_WAY * way:
             gain = (recent.mean_x - (start.now if back else start.zero)) / gone
             least = LEAST_GAIN * line.first_gain
@@ -165,7 +155,7 @@ def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
 
 @register_jitable
 def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any, told: Any) -> None:
-    """The run begins where a reading has told that the reference is reached, or the way has taken long."""
+    """The run begins when a reading has shown that the reference is reached, or the way has taken long."""
     start, line = state.start, state.line
     if gone == 0.0:
         # The rest of a block that was planned before the way began.
@@ -189,7 +179,7 @@ def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any, told: Any) -> 
 
 @register_jitable
 def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any, gone: Any) -> float:
-    """Take a reading on the way to the reference; nobody learns in the unit of a gain that may be wrong."""
+    """Take a reading on the way to the reference; NaN, for nothing to learn, while the gain may be wrong."""
     known = np.abs(x) < WILDEST
     if known:
         x = _refine(state, settings, u, x)
@@ -201,7 +191,7 @@ def _approach(state: Any, settings: Any, r: Any, u: Any, x: Any, gone: Any) -> f
 
 @register_jitable
 def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -> float:
-    """The reading where it can be believed, NaN where not; what is wrong is noted, and the line drives."""
+    """The reading if it can be believed, else NaN; a fault is noted, and the line drives."""
     before = state.readings.fault
     raw, wanted, line = x, gone, state.line
     if not settings.minimum < u < settings.maximum:
@@ -216,7 +206,7 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
         if state.readings.fault != faults.NONE:
             driving.drive(state, 0.0)
             redraw.hold(state)
-    # At a limit with the stage beyond the reference what is known is wrong.
+    # At a limit, with the stage beyond the reference, the line is wrong.
     beyond = is_held(settings, u, (raw - state.r) * line.gain)
     reach.watch(state, settings, moved)
     far = (beyond and state.railed > BEYOND * state.reference.swing) or redraw.is_young(state)
@@ -226,15 +216,8 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
 
 
 @register_jitable
-def _is_due(state: Any, gone: Any) -> bool:
-    """Whether the voltage has travelled far enough for other models, or the reference has turned."""
-    turned = state.reference.turned_now != 0.0
-    return gone > 0.0 and (turned or state.handed >= HAND_OVER * state.travel.swing)
-
-
-@register_jitable
 def _seek(state: Any, settings: Any, u: Any, x: Any) -> None:
-    """Look for the gain; where it is found all models begin."""
+    """Look for the gain; when it is found all models begin."""
     paces.follow(state.pace, state.start, u, x)
     starts.learn(state.start, settings.start, u, x)
     if state.scale > 0.0:
@@ -269,7 +252,7 @@ def _follow(state: Any, settings: Any, r: Any, u: Any) -> tuple[float, float]:
 
 @register_jitable
 def _run(state: Any, settings: Any, u: Any, x: Any, moved: Any, gone: Any) -> float:
-    """Take a reading of the run; NaN where it cannot be believed."""
+    """Take a reading of the run; NaN if it cannot be believed."""
     x = _believe(state, settings, u, x, gone, moved)
     if state.stage == RUN and settings.feedback > 0.0:
         if np.isfinite(x):
@@ -308,8 +291,13 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         x = _approach(state, settings, state.r, u, x, gone)
     else:
         x = _run(state, settings, u, x, moved, gone)
-    _learn_from(state, settings, x, moved)
-    if state.stage == RUN and state.readings.fault == faults.NONE and _is_due(state, gone):
+    z = (x - state.zero) / state.unit
+    if np.isfinite(x):
+        _score(state, settings, x, z, moved)
+    if state.scale > 0.0:
+        slots.learn(state.candidates, settings.candidates, u, z)
+    due = state.reference.turned_now != 0.0 or state.handed >= HAND_OVER * state.travel.swing
+    if state.stage == RUN and state.readings.fault == faults.NONE and gone > 0.0 and due:
         state.handed = 0.0
         if state.scale > 0.0:
             slots.hand_over(state.candidates, settings.candidates)

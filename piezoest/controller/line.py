@@ -1,9 +1,9 @@
-"""The straight line x = gain u + centre that readings show: linear feed-forward, always a candidate.
+"""The straight line x = gain u + centre through the readings: linear feed-forward, always a candidate.
 
-Its slope is the ratio of the spreads of reading and voltage over the last legs of the reference, those up and
-those down alike, so that a loop's width cancels. It is drawn again at each turn; between turns nothing that a
-resonance or a lag does can lead it astray. A short leg takes little weight from those before it: small loops
-are flatter than the wide one around them, and a line through the last two small ones would be wrong.
+Its slope is the spread of the readings, divided by that of the voltage, over the last legs of the reference.
+Legs up and legs down count alike, so that the width of the loop cancels. The line is drawn again at turns
+only, so that ringing and lag do not change it in between. A short leg takes little weight from those before
+it, because small loops are flatter than the wide one around them.
 """
 
 from typing import Any
@@ -13,51 +13,51 @@ from numba.extending import register_jitable
 
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SIGN, record
 
-# Points: how many; means of voltage and reading; mean squares of their deviations, mean product.
+# Number of points; means of voltage and reading; mean squares and mean product of the deviations from them.
 POINTS = record(
     count=AMOUNT, mean_u=MEASURED, mean_x=MEASURED, square=AMOUNT, square_x=AMOUNT, product=NUMBER
 )
-# Legs of late in one direction, and their length in all [µm].
+# The recent legs in one direction, and their total length [µm].
 LEGS = record(length=DISTANCE, points=POINTS)
-# The line; the one before the last turn, and before the one before; the gain it began with; whether the
-# voltage was at a limit since the last turn; legs so far, those of late that agreed with it; length of this
-# leg when it was looked at last [V], of the longest leg of late [µm]; direction of the last leg;
-# points of this leg, of those before it, and of both directions together.
+# The line; the lines before the last turn and before the turn before that; the gain at the beginning; whether
+# the voltage was at a limit since the last turn; legs so far, recent ones that agreed with the line; length
+# of this leg at the last look [V], of the longest recent leg [µm]; direction of the last leg; points of this
+# leg, of the legs before it, and of both directions together.
 LINE = record(
     gain=NUMBER, centre=NUMBER, last_gain=NUMBER, last_centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER,
     first_gain=NUMBER, clipped=FLAG, legs=COUNT, agreed=AMOUNT, looked=AMOUNT, longest=DISTANCE,
     direction=SIGN, now=POINTS, up=LEGS, down=LEGS, both=POINTS,
 )  # fmt: skip
 
-# Points of which a line explains less than the first share are not straight; less than the second, they teach
-# nothing about its gain. It changes by no more than this factor at once, and by less after so many legs;
-# before it grows no more than that in all.
-EXPLAINED, SIGNED, CHANGE, LATER_CHANGE, CERTAIN = 0.8, 0.5, 2.0, 1.3, 4.0
-# In the dead zone behind a turn there is hardly any answer: no line is flatter than this part of the first.
+# Share of the readings' mean square that a line must explain: for points to be straight, to show a gain, and
+# to show anything at all.
+EXPLAINED, SIGNED, ANSWERED = 0.8, 0.5, 0.1
+# The gain changes by this factor at most at once, and by the second one after CERTAIN legs. In the first leg
+# it grows by CHANGE at most in all.
+CHANGE, LATER_CHANGE, CERTAIN = 2.0, 1.3, 4.0
+# In the dead zone after a turn the stage hardly answers: no line is flatter than this part of the first.
 FLATTEST = 0.3
-# Points of which a line explains less than this share teach nothing at all.
-ANSWERED = 0.1
-# Where no line explains the points, the stage goes too far at so many times what the gain says, if the
-# voltage was at a limit and if not.
+# Where no line explains the points, the stage goes too far from this multiple of the line's way on: the first
+# if the voltage was at a limit, else the second.
 FARTHER, MUCH_FARTHER = 1.5, 2.5
-# ... and not far enough at so many times that, if the mean square of its way is below this fraction of the
-# square of the reference's: then it goes less than half of it.
+# ... and not far enough below this multiple, if it goes less than half as far as the reference: the mean
+# square of an even motion over a length is its square / 12.
 NEARER, STANDS = 0.4, 0.5**2 / 12.0
-# After a leg those before it count for KEPT (longest - leg) + LEFT leg of their length; the longest one of
-# late fades by this factor at each turn.
+# After a leg, the length KEPT (longest - leg) + LEFT leg of those before it still counts. At each turn the
+# longest recent leg is multiplied by FADES.
 LEFT, KEPT, FADES = 1.0 / 3.0, 2.0, 0.95
-# Before so many legs only the last two count, which may lead from rest to where the reference is; and of them
-# the last one alone, if the mean square of the one before is so many times larger.
+# Before so many legs only the last two count: the first may lead from rest to the reference. If the mean
+# square of the first of the two is so many times larger, it does not count either.
 SETTLED, UNLIKE = 4.0, 6.0
-# A leg is looked at again when it has become so many times as long.
+# A leg is looked at again when it is so many times as long.
 GROWN = 2.0
-# A leg agrees with the line within this factor; one shorter than this fraction of the longest says nothing.
+# A leg agrees with the line within this factor; one shorter than this part of the longest says nothing.
 ALIKE, SHORT = 1.6, 0.3
 
 
 @register_jitable
 def begin(line: Any, gain: Any, u: Any, x: Any, leg: Any) -> None:
-    """Begin with a gain and a line through one point; legs shorter than half of `leg` are not looked at."""
+    """Begin with a line through a point; legs shorter than half of `leg` are not looked at."""
     line.gain = line.last_gain = line.held_gain = line.first_gain = gain
     line.centre = line.last_centre = line.held_centre = x - gain * u
     line.agreed = line.legs = line.longest = line.direction = 0.0
@@ -80,7 +80,7 @@ def forget_legs(line: Any) -> None:
 
 @register_jitable
 def add(points: Any, u: Any, x: Any, memory: Any) -> None:
-    """Take a point; at most so many count, the last ones more."""
+    """Take a point; about the last `memory` points count."""
     points.count = min(points.count + 1.0, memory)
     share = 1.0 / points.count
     keep = 1.0 - share
@@ -100,9 +100,9 @@ def slope(points: Any) -> float:
 
 @register_jitable
 def spread(points: Any) -> float:
-    """How far readings spread for the voltage's spread [µm/V]; zero without any.
+    """Spread of the readings over that of the voltage [µm/V]; zero without any.
 
-    The slope of least squares is this times the correlation, which a delay or a wide loop lowers.
+    The least-squares slope is this times the correlation, which a delay or a wide loop reduces.
     """
     return np.sqrt(points.square_x / points.square) if points.square > 0.0 else 0.0
 
@@ -128,7 +128,7 @@ def voltage(line: Any, r: Any) -> float:
 
 @register_jitable
 def _join(points: Any, more: Any, share: Any) -> None:
-    """Take more points into others, of which they are a share of one or less then."""
+    """Add points to others; the new ones get a share of the weight, 0 to 1."""
     keep = 1.0 - share
     du, dx = more.mean_u - points.mean_u, more.mean_x - points.mean_x
     points.mean_u += share * du
@@ -140,48 +140,45 @@ def _join(points: Any, more: Any, share: Any) -> None:
 
 @register_jitable
 def _take(legs: Any, now: Any, leg: Any, kept: Any) -> None:
-    """Take a leg of some length; of those before so much length still counts."""
+    """Add a leg; of those before it, the length `kept` still counts."""
     legs.length = min(legs.length, kept) + leg
     _join(legs.points, now, leg / legs.length)
 
 
 @register_jitable
 def _draw(line: Any, points: Any, leg: Any) -> None:
-    """Draw the line through the middle of points, with their slope if they lie near it.
-
-    `leg` is how far the reference has gone meanwhile [µm].
-    """
+    """Draw the line through the middle of points; `leg` is how far the reference has gone meanwhile [µm]."""
     square, square_x, product = points.square, points.square_x, points.product
     most = CHANGE if line.legs < CERTAIN else LATER_CHANGE
     answers = product * line.gain > 0.0 and product * product > ANSWERED * square * square_x
     nearer, steeper = NEARER * line.gain, np.abs(line.gain) > np.abs(line.first_gain)
     farther = (FARTHER if line.clipped != 0.0 else MUCH_FARTHER) * line.gain
-    # The first way may lead from rest to where the reference is, and no loop is round yet.
+    # The first leg may lead from rest to the reference, where there is no loop yet.
     least = SIGNED if line.legs > 1.0 else EXPLAINED
     if product * product > least * square * square_x and product * line.gain > 0.0:
         line.gain *= min(max(spread(points) / np.abs(line.gain), 1.0 / most), most)
         if np.abs(line.gain) < FLATTEST * np.abs(line.first_gain):
             line.gain = FLATTEST * line.first_gain
         if line.legs < 1.0 and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
-            # What lags goes on while the voltage hardly moves.
+            # A stage that lags goes on while the voltage hardly moves.
             line.gain = CHANGE * line.first_gain
     elif square_x > farther * farther * square > 0.0:
-        # The stage goes much farther than the line says, late or ringing: with less voltage it does no harm.
+        # Late or ringing, the stage goes much farther than the line says: less voltage is safe.
         line.gain *= most
     elif square_x < nearer * nearer * square and square_x < STANDS * leg * leg and steeper:
-        # It hardly moves: what has made the line steeper, like ringing, is over.
+        # The stage hardly moves: what made the line steeper, such as ringing, is over.
         line.gain = np.sign(line.gain) * max(np.abs(line.gain) / most, np.abs(line.first_gain))
     elif not answers:
-        # Readings that do not go with the voltage say nothing of the centre either: it would run away.
+        # Readings that do not follow the voltage do not show the centre either: it would run away.
         return
     line.centre = points.mean_x - line.gain * points.mean_u
 
 
 @register_jitable
 def _through_both(line: Any, legs: Any, others: Any, direction: Any, leg: Any) -> None:
-    """Draw the line through the legs of both directions, which count alike, however long they took."""
+    """Draw the line through the legs of both directions; both count alike, whatever their readings."""
     unlike = line.legs <= SETTLED and others.points.square > UNLIKE * line.now.square
-    # Where a quick way back has too few readings, those of an earlier one become old.
+    # If a quick way back had too few readings, the legs of that direction are old.
     if unlike or direction == line.direction:
         others.length = 0.0
     line.direction = direction
@@ -193,7 +190,7 @@ def _through_both(line: Any, legs: Any, others: Any, direction: Any, leg: Any) -
 
 @register_jitable
 def turn(line: Any, direction: Any, leg: Any) -> None:
-    """The reference has turned after a leg in a direction: draw the line through the legs of late."""
+    """The reference has turned after a leg in a direction: draw the line through the recent legs."""
     now = line.now
     if now.count < 4.0 or leg <= 0.0:
         return
@@ -217,20 +214,18 @@ def turn(line: Any, direction: Any, leg: Any) -> None:
 
 
 @register_jitable
-def grow(line: Any, leg: Any) -> bool:
-    """Draw the line each time the first leg has grown, or a later one has outgrown those of late.
+def grow(line: Any, leg: Any) -> None:
+    """Draw the line when the first leg has grown, or a later one is much longer than the recent ones.
 
-    A later one only if that makes the line steeper: small legs are flatter, and a flat line leads too far.
+    The later one only if the line becomes steeper: small legs are flat, and a flat line leads too far.
     """
     now, later = line.now, line.legs >= SETTLED
     looked = max(line.looked, line.longest / np.abs(line.gain)) if later else line.looked
     if 0.0 < line.legs < SETTLED or leg < GROWN * looked or now.count < 16.0:
-        return False
+        return
     line.looked = leg
-    if later and (explained(now) < EXPLAINED or spread(now) < np.abs(line.gain)):
-        return False
-    _draw(line, now, 0.0)
-    return True
+    if not (later and (explained(now) < EXPLAINED or spread(now) < np.abs(line.gain))):
+        _draw(line, now, 0.0)
 
 
 @register_jitable
@@ -244,6 +239,6 @@ def hold(line: Any) -> None:
 
 @register_jitable
 def follow(line: Any, recent: Any) -> None:
-    """Lay the line through the middle of the points of late."""
+    """Move the line to the middle of the recent points."""
     if recent.count >= 4.0 and (recent.product * line.gain >= 0.0 or explained(recent) < EXPLAINED):
         line.centre = recent.mean_x - line.gain * recent.mean_u

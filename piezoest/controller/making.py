@@ -1,4 +1,4 @@
-"""What a controller is made of: limits that are checked, layouts, numbers to begin with."""
+"""Making a controller: its checked arguments, layouts, and first numbers."""
 
 import math
 from typing import Any
@@ -8,7 +8,7 @@ from piezoest.compensators.limits import VoltageLimits, check_rate
 from piezoest.controller import candidate, homing, kernel, pace, recorded_loop, recorder, slots
 from piezoest.controller.feedback import FASTEST
 from piezoest.estimators.compiled import CompiledEstimator
-from piezoest.layout import Field, Record, new
+from piezoest.layout import Record, new
 from piezoest.models import LearntModel, LearntOn
 from piezoest.models.learnt_on import allowed
 
@@ -110,7 +110,7 @@ def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, A
         "allowed": _allowed(options["learnt_on"]),
         "start": {
             "gain": options["gain"],
-            # Where the gain is known, the first way only has to show that.
+            # If the gain is known, a first way only has to confirm it.
             "way": (0.005 if options["gain"] else 0.02) * width,
             "longest": 0.1 * width,
             "ramp": max(4.0, 7e-3 * sample_rate),
@@ -122,7 +122,7 @@ def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, A
 
 
 def _allowed(learnt_on: dict[str, Any] | None) -> dict[str, float]:
-    """Ranges beyond which it is noted that the user's model was not learnt there."""
+    """Ranges that the user's model was learnt on, with a margin; infinite without them."""
     every = math.inf
     r, u = (-every, every), (-every, every)
     if learnt_on is not None:
@@ -147,9 +147,7 @@ def room(
         pairs.append(candidate.layouts(recorder.LAYOUTS, recorded_loop.LAYOUTS))
         values.append({})
         given.append({})
-    states: list[Field] = [state for state, _ in pairs]
-    settings: list[Field] = [fixed for _, fixed in pairs]
-    layouts = kernel.layouts(slots.layout(states), slots.layout(settings))
+    layouts = kernel.layouts(slots.layout([own[0] for own in pairs]), slots.layout([own[1] for own in pairs]))
     fixed = _settings_of(sample_rate, limits, options)
     fixed |= {"candidates": slots.values(given), "recorded": len(given) or -1.0}
     return layouts, (new(layouts[0], candidates=slots.values(values)), new(layouts[1], **fixed))

@@ -1,4 +1,4 @@
-"""Whether reference or voltage leave what the model was learnt on: noted once, for learning goes on."""
+"""Whether reference or voltage leave the ranges that the user's model was learnt on: noted once."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ ALLOWED = record(lowest_r=FIXED, highest_r=FIXED, lowest_u=FIXED, highest_u=FIXE
 def watch(state: Any, settings: Any) -> None:
     """Note the first sample that is outside."""
     allowed = settings.allowed
-    # A block notes one event: of two warnings in it the first would be lost.
+    # A block keeps one event: of two warnings in it the first would be lost.
     if state.outside != 0.0 or state.samples <= state.pace.told + state.block:
         return
     within = allowed.lowest_r <= state.r <= allowed.highest_r

@@ -1,8 +1,8 @@
-"""Whether the reference is too fast: near the resonance, or so fast that lag passes for width of the loop.
+"""Whether the reference is too fast: near the resonance, or so fast that lag looks like width of the loop.
 
-The start shows how late the readings are: the area between the way of the voltage and the answer, both as
-fractions of what they came to, is the time between them, for a lag and for a delay alike, whatever rings
-around it. Both voltages and readings are those of the same sample, so blocks do not count.
+The start shows how late the readings are. The area between the way of the voltage and the answer, both
+divided by their final values, is the time between them, for a lag and for a delay; ringing cancels. Voltage
+and reading are of the same sample, so blocks do not count.
 """
 
 from typing import Any
@@ -17,28 +17,28 @@ from piezoest.controller import start as starts
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, record
 
 PACE = record(
-    # Samples of a way of the start, where it began; sums of the voltage's way and of the answer; how late the
-    # readings were on the last two ways [samples].
+    # A way of the start: samples, where it began, sums of the way and of the answer; how late the readings
+    # were on the last two ways [samples].
     count=COUNT, from_u=MEASURED, from_x=MEASURED, gone=NUMBER, answered=NUMBER, before=AMOUNT, now=AMOUNT,
-    # Length of the reference's last leg, of its longest one; samples of a period; sample of the last warning,
-    # and which have been given.
+    # Length of the reference's last leg, and of its longest one; samples of a period; sample of the last
+    # warning; which warnings have been given.
     length=DISTANCE, widest=DISTANCE, period=AMOUNT, told=COUNT, fast=FLAG, late=FLAG,
 )  # fmt: skip
 
-# A reference is fast above this fraction of the resonance; a lag of this phase [rad] is about as wide a loop,
-# relative to the swing.
+# A reference is fast above this fraction of the resonance, or with this phase of the lag [rad], which is
+# about the width of the loop relative to the swing.
 FAST, LATE = 0.05, 0.05
 WAVE = 2.0 * np.pi
-# Creep, and the bend of the way, take this fraction of the samples off, about. Two ways are alike within this
-# factor: an amplifier that slews is later on the last one, which is longer, and hum on the first one.
+# Creep and the bend of the way look like this fraction of the samples. The delays on two ways agree within
+# the factor ALIKE: an amplifier that slews is later on the last, longer one, and hum changes the first.
 CREEP, ALIKE = 0.007, 1.8
-# Legs below this fraction of the longest are noise of a reference that rests; the first one leads there.
+# Legs below this fraction of the longest are noise of a reference that rests; so many legs must be over.
 LEAST, FIRST_LEGS = 0.05, 3.0
 
 
 @register_jitable
 def _end(pace: Any, start: Any, u: Any) -> None:
-    """A way of the start is over: how late the readings were on it; the middle one of three is one later."""
+    """A way is over: how late the readings were. The median of three has added one sample."""
     way, answer = u - pace.from_u, start.mean - pace.from_x
     if pace.count == 0.0 or way * answer == 0.0:
         return
@@ -61,7 +61,7 @@ def follow(pace: Any, start: Any, u: Any, x: Any) -> None:
 
 @register_jitable
 def conclude(pace: Any, start: Any, u: Any) -> None:
-    """Note how late the readings are. Where two ways disagree the smaller delay counts, without a warning."""
+    """Note how late the readings are; if two ways disagree the smaller delay counts, without a warning."""
     _end(pace, start, u)
     alike = start.ways == 0.0 or (pace.now < ALIKE * pace.before and pace.before < ALIKE * pace.now)
     start.lag = pace.now if alike else min(pace.now, pace.before)
@@ -70,12 +70,12 @@ def conclude(pace: Any, start: Any, u: Any) -> None:
 
 @register_jitable
 def watch(state: Any, settings: Any) -> None:
-    """Warn once where the reference is too fast, when it has turned."""
+    """At a turn: warn once if the reference is too fast."""
     pace, reference = state.pace, state.reference
     pace.widest = max(pace.widest, reference.leg) if reference.turns > 1.0 else 0.0
     wide = min(pace.length, reference.leg) > LEAST * pace.widest
     pace.period, pace.length = reference.past + reference.usual, reference.leg
-    # A block notes one event: of two warnings in it the first would be lost.
+    # A block keeps one event: of two warnings in it the first would be lost.
     if reference.turns < FIRST_LEGS or not wide or state.samples <= pace.told + state.block:
         return
     if pace.fast == 0.0 and pace.period < settings.shortest:

@@ -1,4 +1,4 @@
-"""Where the voltage rests at a limit: the reference is out of reach, or what is known is wrong."""
+"""The voltage rests at a limit: the reference is out of reach, or what is known is wrong."""
 
 from typing import Any
 
@@ -11,21 +11,21 @@ from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
 from piezoest.controller.voltage import SEEK, is_held
 
-# The voltage may rest at a limit for this travel of the reference, in swings, before all begins anew.
-# Sooner if the line is not sure, once the reference has shown its swing.
+# The voltage may rest at a limit for this travel of the reference, in swings, before the gain is sought
+# again; the second number is for a line that is not sure, once the reference has shown its swing.
 RESTED, SOON_RESTED = 4.0, 1.5
-# An answer to a way that is so many times as long as the ways of the start says more than theirs.
-# It speaks against them from this fraction of their answer on.
+# A way so many times as long as those of the start shows more than they did. Its answer contradicts them if
+# it is at least this fraction of theirs.
 LONGER, AGAINST = 2.0, 0.5
-# Before the line is sure, the stage must have gone this fraction of the way that the line says.
+# Before the line is sure, the stage must have gone this fraction of the way that the line predicts.
 ANSWERED = 0.2
-# A reference is said to be out of reach when it was for so many times what a doubling takes.
+# A reference is reported as out of reach after so many times the time of a doubling.
 SAID = 25.0
 
 
 @register_jitable
 def seek_again(state: Any, settings: Any) -> None:
-    """Seek the gain again, on longer ways."""
+    """Seek the gain again, with longer ways."""
     state.stage, state.driving = SEEK, 0.0
     feedback.forget(state)
     state.start.least = np.abs(state.u - state.start.origin)
@@ -34,17 +34,16 @@ def seek_again(state: Any, settings: Any) -> None:
 
 @register_jitable
 def begin_anew(state: Any, settings: Any) -> None:
-    """What the start has found is wrong: say so, and seek again."""
+    """What the start has found is wrong: note that, and seek the gain again."""
     faults.notice(state, faults.FALSE_START)
     seek_again(state, settings)
 
 
 @register_jitable
 def is_refuted(state: Any, gone: Any, answer: Any) -> bool:
-    """Whether the answer to a way from where all began speaks against the sign of the gain.
+    """Whether the answer to a way from the beginning contradicts the sign of the gain.
 
-    Hum or drift may have passed for the answer to the short ways of the start, but less so for that to a
-    longer one.
+    Hum or drift may have looked like an answer to the short ways of the start; on a longer way it does less.
     """
     start, ways = state.start, starts.farthest(state.start)
     noise = starts.CLEAR * max(start.noise, np.sqrt(state.readings.noise))
@@ -54,16 +53,16 @@ def is_refuted(state: Any, gone: Any, answer: Any) -> bool:
 
 @register_jitable
 def _has_answered(state: Any) -> bool:
-    """Whether the stage has gone from where all began about as the line says, if much less far."""
+    """Whether the stage has gone in the direction that the line predicts, if much less far."""
     gone, answer = state.u - state.start.origin, state.readings.last - state.start.zero
-    # Over a way as short as those of the start, hum, drift or ringing may pass for an answer again.
+    # On ways as short as those of the start, hum, drift or ringing may look like an answer again.
     shown = answer * gone * state.line.gain > ANSWERED * (state.line.gain * gone) ** 2
     return shown and np.abs(gone) > LONGER * starts.farthest(state.start)
 
 
 @register_jitable
 def _is_out_of_reach(state: Any, settings: Any) -> bool:
-    """Whether the stage stands before the reference at a limit, where the readings agree with the line."""
+    """Whether the stage has not reached the reference at a limit, with good readings."""
     short = is_held(settings, state.u, (state.r - state.readings.last) * state.line.gain)
     fine = state.readings.fault == faults.NONE and state.readings.spikes == 0.0
     return short and fine and (reading.is_sure(state.readings) or _has_answered(state))
@@ -71,7 +70,7 @@ def _is_out_of_reach(state: Any, settings: Any) -> bool:
 
 @register_jitable
 def watch(state: Any, settings: Any, moved: Any) -> None:
-    """Start again where what is known is wrong: the voltage rests at a limit for long, or goes the wrong way.
+    """Start again if the voltage rests at a limit for long, or readings go the wrong way: the line is wrong.
 
     A reference that is out of reach is no reason.
     """
@@ -82,7 +81,7 @@ def watch(state: Any, settings: Any, moved: Any) -> None:
             faults.notice(state, faults.OUT_OF_REACH)
         return
     rests = state.u <= settings.minimum or state.u >= settings.maximum
-    # Beside a line that was learnt from wrong readings, right ones look reversed, scaled or moved.
+    # With a line learnt from wrong readings, right readings look reversed, scaled or moved.
     fault = state.readings.fault
     doubted = fault == faults.NONE or (fault >= faults.REVERSED and fault != faults.SATURATED)
     state.railed = state.railed + moved if rests and doubted else max(state.railed - moved, 0.0)

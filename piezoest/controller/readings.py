@@ -1,8 +1,7 @@
-"""Which readings can be believed, and what is wrong where none can.
+"""Which readings can be believed, and which fault explains the others.
 
-The voltage and the line that is known say about where a reading must lie. A single one that is far off is a
-spike. Where readings do not follow the voltage for longer than the widest hysteresis explains, something
-hides the truth: nobody learns from it, and it has a name.
+The line shows about where a reading must be. A single one that is far off is a spike. If the readings do not
+follow the voltage for longer than the widest hysteresis explains, there is a fault, and nothing is learnt.
 """
 
 from typing import Any
@@ -18,61 +17,57 @@ from piezoest.layout import AMOUNT, COUNT, DISTANCE, MEASURED, NUMBER, record, w
 
 READINGS = record(
     fault=whole(NONE, MOVED),
-    # The last two finite readings, how many came; the voltage of the last one, and how far it has gone since
-    # the reading changed: now, and farthest.
+    # The last two finite readings, their number; the voltage of the last one; how far the voltage has gone
+    # since the reading changed: now, and farthest.
     before=MEASURED, last=MEASURED, count=COUNT, voltage=MEASURED, gone=NUMBER, still=AMOUNT,
-    # How far the last two were from the line, and the last one that was not alone; those alone in a row;
-    # mean square of what changes from one to the next [µm²].
+    # Distance from the line of the last two readings and of the last one that was not alone; number of
+    # readings alone in a row; mean square of the change of the distance [µm²].
     beside_before=NUMBER, beside_last=NUMBER, beside_kept=NUMBER, alone=COUNT, changes=AMOUNT,
-    # Mean square of the noise [µm²].
-    noise=AMOUNT,
-    # The widest swing of the voltage of late, the most legs of late that had agreed with the line.
+    # Mean square of the noise [µm²]; smallest change of the reading: the step of its converter.
+    noise=AMOUNT, step=AMOUNT,
+    # The widest recent swing of the voltage, the largest recent number of legs that agreed with the line.
     swing=DISTANCE, sure=AMOUNT,
-    # Smallest change of the reading: the step of its converter.
-    step=AMOUNT,
-    # Spikes in a row; travel in swings that spoke for each fault, and that spoke for none.
+    # Spikes in a row; travel in swings that is evidence of each fault, and of none.
     spikes=COUNT, weak=AMOUNT, wrong=AMOUNT, large=AMOUNT, off=AMOUNT, good=AMOUNT,
-    # What the last readings show, whatever they are: points of the last third of a swing.
+    # Points of the last third of a leg, believed or not.
     recent=lines.POINTS,
 )  # fmt: skip
 
 # The recent points, in legs; legs that must have agreed with the line before a fault is named.
 RECENT, TRUSTED = 0.3, 3.0
-# Before so many legs the way to the reference has shown more than they have.
+# Before so many legs the way to the reference has shown more than the legs.
 EARLY = 8.0
-# Slopes, relative to the line's, of no response, of the wrong way round, and of too much, even for a line
-# that is not sure; and of a good one.
+# Slopes relative to the line: no response; the wrong direction; too large, and too large even if the line is
+# not sure; good.
 WEAK, WRONG, LARGE, HUGE, GOOD = 0.12, -0.3, 3.0, 30.0, 0.4
-# Points of which a line explains this share show a slope; the sign of one.
+# Share of the readings' mean square that a line explains where the points show a slope; where they show its
+# sign.
 STRAIGHT, SIGNED = 0.7, 0.4
-# A leg that is so many times as long as the longest of late is new ground.
+# A leg so many times as long as the longest recent one is new ground.
 OUTGROWN = 3.0
 # Widest backlash, in swings.
 BACKLASH = 0.35
-# Of the widest swing this fraction counts after another turn: in the minor loops of a walk or of steps the
-# stage is as far from the line as in the wide one around them. So does trust, of which so many legs are
-# enough: readings that lie do not agree with the line either.
+# The widest swing is multiplied by KEPT at each turn: in the small loops of a walk or of steps the stage is
+# as far from the line as in the wide loop around them. So is the number of legs that agreed, at most ENOUGH:
+# wrong readings do not agree with the line either.
 KEPT, ENOUGH = 0.9, 6.0
-# No sample speaks for more than this, in swings, nor for a reading that stands still: it may be late by some
+# Most evidence of one sample, in swings; most for a reading that stands still: it may be late by some
 # samples, or oscillate.
 MOST, MOST_STILL = 0.03, 0.01
-# For so many swings.
+# Swings of evidence that make a fault; the same for a line that is not sure.
 WEAK_FOR, WRONG_FOR, LARGE_FOR, STOPPED_FOR = 0.35, 0.15, 0.15, 0.06
-# For so many swings of a line that has not held.
 SILENT_FOR, REFUTED_FOR = 2.0, 2.0
-# A reading that is the same to the last bit is believed for this travel, in swings.
-STANDS_STILL = 5e-3
-# ... and for so many before nobody learns any more.
-DOUBT = 0.1
-# A fault is over after so many good swings; one of range after more.
+# Swings for which a reading that does not change at all is believed, and one with a weak answer.
+STANDS_STILL, DOUBT = 5e-3, 0.1
+# A fault is over after so many good swings; readings that stood still after more.
 OVER, OVER_STOPPED = 0.6, 1.6
-# Farthest from the line that a reading can be, in swings of the last legs, and in the widest of late: half a
-# loop and what a minor loop's slope adds; spikes in a row that are spikes.
+# Farthest distance from the line, in swings of the last legs and in the widest recent swing: half a loop, and
+# what the slope of a minor loop adds. More spikes in a row than this are no spikes.
 FAR, FAR_WITHIN, IN_A_ROW = 1.0, 0.4, 5.0
-# A reading is alone that is this fraction of a swing farther beside the line than those before it, and so
-# many times what is usual from one to the next; legs of the line before.
+# A reading is alone that is farther from the line than those before it, by this fraction of a swing and by so
+# many times the usual change; if the line has seen so many legs.
 ALONE, UNUSUAL, SEEN = 0.05, 6.0, 2.0
-# After so many readings, one adds no more to the noise than so many times its mean square.
+# After so many readings, one adds at most so many times the mean square to the noise.
 FIRST_NOISE, MOST_NOISE = 20.0, 4.0
 
 
@@ -84,7 +79,7 @@ def median(a: Any, b: Any, c: Any) -> float:
 
 @register_jitable
 def _mean_square(readings: Any, before: Any, square: Any) -> float:
-    """A mean of squares with the next one; rare readings that are wrong count for little."""
+    """A mean of squares with the next one; rare wrong readings count little."""
     if readings.count > FIRST_NOISE:
         square = min(square, MOST_NOISE * before + readings.step * readings.step)
     return before + max(1.0 / readings.count, 2e-3) * (square - before)
@@ -92,7 +87,7 @@ def _mean_square(readings: Any, before: Any, square: Any) -> float:
 
 @register_jitable
 def _counted(so_far: Any, swings: Any, speaks: Any) -> float:
-    """The travel (or the count) that speaks for something without a break."""
+    """The travel (or the count) for which something was true without a break."""
     return so_far + swings if speaks else 0.0
 
 
@@ -110,7 +105,7 @@ def _follow(readings: Any, x: Any, gone: Any) -> float:
     if x != readings.last:
         readings.gone = readings.still = 0.0
     else:
-        # Not its whole travel: the noise of a reference that rests goes nowhere.
+        # Not the whole travel: the noise of a reference that rests leads nowhere.
         most = MOST_STILL * readings.swing
         readings.gone += min(max(gone, -most), most)
         readings.still = max(readings.still, np.abs(readings.gone))
@@ -121,22 +116,22 @@ def _follow(readings: Any, x: Any, gone: Any) -> float:
 
 @register_jitable
 def _size_up(readings: Any, line: Any, travel: Any) -> None:
-    """The widest swing and the surest line of late."""
+    """The widest recent swing, and how sure the line was."""
     if travel.turns == 0.0:
         readings.swing = readings.sure = 0.0
     kept = KEPT if travel.turned_now != 0.0 else 1.0
     readings.swing = max(travel.swing, kept * readings.swing)
     readings.sure = max(min(line.agreed, ENOUGH), kept * readings.sure)
     if np.abs((travel.last - travel.turned) * line.gain) > OUTGROWN * line.longest:
-        # Legs that were so much shorter say little of such a wide one.
+        # Much shorter legs say little about such a wide one.
         readings.sure = line.agreed = 0.0
 
 
 @register_jitable
 def _stands_still(readings: Any, line: Any, travel: Any, fraction: Any, steps: Any) -> bool:
-    """Whether the reading has not changed by a bit for a fraction of a swing, and for steps of its converter.
+    """Whether the reading has not changed for a fraction of a swing, and for steps of its converter.
 
-    Just after a turn it may: a stage with backlash rests there.
+    Just after a turn it may stand still: a stage with backlash rests there.
     """
     gain = np.abs(line.gain)
     onward = np.abs(travel.last - travel.turned) > BACKLASH * readings.swing
@@ -151,20 +146,20 @@ def is_sure(readings: Any) -> bool:
 
 @register_jitable
 def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> bool:
-    """Count the travel that speaks for each fault; whether the readings stand still."""
+    """Count the travel that is evidence of each fault; whether the readings stand still."""
     recent = readings.recent
     sure = is_sure(readings)
     moved = recent.square > (0.05 * readings.swing) ** 2
     clear = np.abs(line.gain) * readings.swing > 30.0 * np.sqrt(readings.noise)
     known = clear and moved
     answer = lines.spread(recent) / np.abs(line.gain)
-    # The way to the reference was wider than small legs, which are flat: what it has shown is not too much.
+    # Small legs are flat. The way to the reference was wider, and its slope is not too large.
     steep = max(np.abs(line.first_gain / line.gain), 1.0) if line.legs < EARLY else 1.0
     slope, explained = lines.slope(recent) / line.gain, lines.explained(recent)
     stopped = sure and clear and _stands_still(readings, line, travel, STOPPED_FOR, 4.0)
     straight = explained > STRAIGHT
-    # Of a line that has not held yet silence takes longer to be believed; readings that follow the voltage
-    # may be right, and the line wrong.
+    # If the line is not sure, no response takes longer to be believed: readings that follow the voltage may
+    # be right, and the line wrong.
     share = 1.0 if sure else WEAK_FOR / SILENT_FOR
     weakest = WEAK if sure or not straight else (1.0 / HUGE if line.legs >= TRUSTED else 0.0)
     if known:
@@ -172,7 +167,7 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> b
     wrong = known and explained > SIGNED and slope < WRONG
     share = 1.0 if sure else WRONG_FOR / REFUTED_FOR
     readings.wrong = _counted(readings.wrong, share * swings, wrong)
-    # What is far too large passes for noise.
+    # Readings that are far too large look like noise.
     plain = straight or (sure and clear and off)
     large = (answer > LARGE * steep if sure else slope > HUGE and line.legs >= TRUSTED) and moved and plain
     readings.large = _counted(readings.large, swings, large)
@@ -185,13 +180,13 @@ def _evidence(readings: Any, line: Any, travel: Any, off: Any, swings: Any) -> b
 
 @register_jitable
 def go_the_wrong_way(readings: Any) -> bool:
-    """Whether readings have gone the wrong way for long: they lie, or the line does if it is not sure."""
+    """Whether readings go the wrong way for long: they are wrong, or a line that is not sure."""
     return readings.wrong > WRONG_FOR
 
 
 @register_jitable
 def _name(readings: Any, stopped: Any) -> float:
-    """The fault that the evidence shows; the present one until it is over."""
+    """The fault that the evidence shows; the present one lasts until it is over."""
     if go_the_wrong_way(readings) and is_sure(readings):
         return REVERSED
     if readings.large > LARGE_FOR:
@@ -210,7 +205,7 @@ def _name(readings: Any, stopped: Any) -> float:
 
 @register_jitable
 def forget(readings: Any) -> None:
-    """Forget what spoke for a fault."""
+    """Forget all evidence."""
     readings.weak = readings.wrong = readings.large = 0.0
     readings.off = readings.spikes = readings.good = 0.0
     lines.forget(readings.recent)
@@ -224,9 +219,9 @@ def middle(readings: Any, x: Any) -> float:
 
 @register_jitable
 def _is_alone(readings: Any, line: Any, beside: Any) -> bool:
-    """Whether a reading is much farther beside the line than others: than the last good one, or the last two.
+    """Whether the distance from the line differs much from that of the last good reading, or the last two.
 
-    Not so many in a row: they show something. Nor where the line itself still moves.
+    Not if many in a row do: they are true. Nor while the line itself still moves.
     """
     change = beside - readings.beside_last
     apart = max(np.abs(change), np.abs(beside - readings.beside_before))
@@ -245,11 +240,11 @@ def _is_alone(readings: Any, line: Any, beside: Any) -> bool:
 def believed(
     readings: Any, line: Any, travel: Any, memory: Any, answered: Any, u: Any, x: Any, gone: Any, wanted: Any
 ) -> float:
-    """The reading where it can be believed, NaN where not; `gone` is the voltage's travel since the last.
+    """The reading if it can be believed, else NaN; `gone` is the travel of the voltage since the last one.
 
-    `memory` is about how many samples a leg takes, `answered` the voltage that a late reading answers: with
-    the present one, late readings would look reversed. Where the voltage is at a limit `wanted` is the travel
-    that the reference wants.
+    `memory`: about how many samples a leg takes. `answered`: the voltage that a late reading answers; with
+    the present one, late readings would look reversed. `wanted`: `gone`, at a limit the travel that the
+    reference wants.
     """
     if not np.abs(x) < WILDEST:
         return np.nan

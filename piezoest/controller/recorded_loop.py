@@ -1,10 +1,9 @@
 """The recorded loop as a model: the last measured curve for rising and for falling voltage.
 
-If the voltage repeats a loop, the displacement repeats as well, whatever the law of the hysteresis is:
-repeated motion needs no model. If the voltage turns elsewhere than in the record, the displacement goes
-on as it did from the beginning of the curve of the new direction (Masing's rule). It meets the last way
-about where that began, and there the way before the last goes on. The functions are those of an inverse,
-see `piezoest.compensators.inverse_kernel`.
+If the voltage repeats a loop, the displacement repeats as well, whatever the law of the hysteresis is. After
+a turn at another voltage, the curve of the new direction is used from its beginning (Masing's rule). It meets
+the last way about where that began, and from there on the way before the last continues. The functions are
+those of an inverse, see `piezoest.compensators.inverse_kernel`.
 
 Sources: G. Masing, Proc. 2nd Int. Congr. Appl. Mech., Zürich 1926, 332-335; the wiping-out property,
 I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991.
@@ -24,23 +23,23 @@ CURVE = record(begins=MEASURED, apart=AMOUNT, x=numbers(KNOTS, kind=MEASURED))
 # Both curves, and direction of the last recorded leg.
 LOOP = record(up=CURVE, down=CURVE, ended=SIGN)
 WAYS = 7
-# The ways from turn to turn that are not wiped out, outermost first: the direction of each, voltage and
-# displacement where it began, and how many times as steep as its curve it is. Number `present` is the way of
-# now; the next one is the way back from the furthest voltage, which is not a turn while it is small.
+# The ways from turn to turn that are not wiped out, outermost first: direction, voltage and displacement
+# where each began, its slope relative to its curve. Number `present` is the present way; the next one is the
+# way back from the furthest voltage, which is not a turn while it is small.
 STATE = record(
     __name__, present=whole(0.0, WAYS - 2.0), furthest=MEASURED, direction=numbers(WAYS, kind=SIGN),
     u=numbers(WAYS, kind=MEASURED), x=numbers(WAYS, kind=MEASURED), steeper=numbers(WAYS, kind=AMOUNT),
 )  # fmt: skip
 LAYOUTS = STATE, LOOP  # of state and settings
 
-# Least slope of a curve in the record. A way is at most so many times as steep as its curve, or as flat.
-# A way back longer than this part of the present direction's curve is a turn.
+# Least slope of a recorded curve. A way is at most STEEPER times as steep or as flat as its curve. A way back
+# longer than TURN times the curve of the present direction is a turn.
 STEEP, STEEPER, TURN = 0.1, 3.0, 0.01
 
 
 @register_jitable
 def _gone(curve: Any, far: Any) -> float:
-    """Displacement so far from the beginning of a curve; beyond its ends as on its first or last piece."""
+    """Displacement at a distance from the beginning of a curve; beyond its ends its end pieces go on."""
     place = far / curve.apart
     i = int(min(max(place, 0.0), KNOTS - 2.0))
     return curve.x[i] - curve.x[0] + (place - i) * (curve.x[i + 1] - curve.x[i])
@@ -48,7 +47,7 @@ def _gone(curve: Any, far: Any) -> float:
 
 @register_jitable
 def _on_curve(loop: Any, direction: Any, far: Any) -> float:
-    """Displacement so far from the beginning of the curve of a direction."""
+    """Displacement at a distance from the beginning of the curve of a direction."""
     return _gone(loop.up, far) if direction > 0.0 else _gone(loop.down, far)
 
 
@@ -81,7 +80,7 @@ def _at(own: Any, loop: Any, way: Any, u: Any) -> float:
 
 @register_jitable
 def _meet(own: Any, loop: Any, way: Any, u: Any, x: Any) -> None:
-    """Let a way lead to a voltage and a displacement."""
+    """Change the slope of a way so that it leads to a voltage and a displacement."""
     direction, steeper = own.direction[way], 1.0
     if _apart(loop, direction) > 0.0:
         gone = _on_curve(loop, direction, (u - own.u[way]) * direction)
@@ -156,7 +155,7 @@ def place(state: Any, settings: Any) -> None:
 def _end_as_recorded(own: Any, loop: Any) -> None:
     """Let the way back lead to where its own curve ended, if that is near.
 
-    At its end the stage may rest and creep: where the other curve began is after that.
+    At its end the stage may have crept in a rest before the other curve began.
     """
     back, apart = own.direction[1], _apart(loop, own.direction[1])
     length = (own.u[0] - _begins(loop, back)) * back

@@ -1,9 +1,8 @@
 """Records the loop: the last leg of the voltage in each direction becomes a smooth curve.
 
-The samples of a leg are averaged in bins of equal width. When the leg becomes longer than all bins,
-neighbours are joined in pairs. At its end a polynomial is fitted by least squares, which removes oscillations
-and most of the noise. The functions are those of an estimator's kernel, see
-`piezoest.estimators.compiled.CompiledEstimator`.
+The samples of a leg are averaged in bins of equal width; when it becomes too long, the bins are joined in
+pairs. At its end a polynomial is fitted by least squares, which removes oscillations and most of the noise.
+The functions are those of an estimator's kernel, see `piezoest.estimators.compiled.CompiledEstimator`.
 
 Source: G. E. Forsythe, J. Soc. Indust. Appl. Math. 5 (1957) 74-88 (polynomials orthogonal on given points).
 """
@@ -26,25 +25,25 @@ LEG = record(
     turned=MEASURED, passed=COUNT, width=AMOUNT, count=numbers(BINS, kind=COUNT),
     sum_u=numbers(BINS, kind=NUMBER), sum_x=numbers(BINS, kind=NUMBER),
 )  # fmt: skip
-# Direction of travel and furthest voltage in it; this leg, and the way back from there, which is the next leg
-# once it is long enough, and how far it has led; length of the last leg, of the longest of late; the loop,
-# the direction that alone was recorded, and whether the loop is newer than the model in use.
+# Direction of travel and furthest voltage in it; this leg; the way back from there, which becomes the next
+# leg, and its length; length of the last leg, and of the longest recent one; the loop; the only direction
+# that was recorded, zero for both; whether the loop is newer than the model in use.
 STATE = record(
     __name__, direction=SIGN, furthest=MEASURED, leg=LEG, back=LEG, far=DISTANCE, last=DISTANCE,
     longest=DISTANCE, loop=LOOP, alone=SIGN, fresh=FLAG,
 )  # fmt: skip
 LAYOUTS = STATE, record()  # of state and settings, of which there are none
 
-# A leg shorter than SHORT times the longest of late is not recorded. The longest fades by FADES at each turn
-# after a leg as long, by less after shorter ones. A way back shorter than TURN times the leg before or this
-# one is wiped out where the leg goes on: where models change, the voltage may go back for a moment.
+# A leg shorter than SHORT times the longest recent one is not recorded. At each turn the longest one loses
+# FADES of itself, less after shorter legs. A way back is a turn from TURN times this leg and the last one on:
+# when models change, the voltage may go back for a moment.
 SHORT, FADES, TURN = 0.05, 0.03, 0.04
-# A leg shorter than this part of the next one says less of its direction than that one does, reversed.
+# If a leg is shorter than this part of the next one, the next one, reversed, is better for its direction.
 ALIKE = 0.7
 # First width of a bin, in units; degree of the polynomial; least number of bins with readings.
 NARROW, DEGREE, LEAST = 1e-3, 4, 8
-# The readings must cover this part of a leg, and there must be one for this part of its samples: far from its
-# points a polynomial is useless.
+# Part of a leg that readings must cover, and of its samples that must have one: far from its points a
+# polynomial is useless.
 COVERED, READ = 0.9, 0.5
 
 
@@ -147,7 +146,7 @@ def _is_known(state: Any) -> bool:
 
 @register_jitable
 def _reverse(curve: Any, to: Any, u: Any) -> None:
-    """Write a curve as that of the other direction, from where it ended: loops are about symmetric."""
+    """Use a curve, reversed, for the other direction: loops are about symmetric."""
     to.begins, to.apart = u, curve.apart
     for k in range(KNOTS):
         to.x[k] = curve.x[KNOTS - 1] - (curve.x[k] - curve.x[0])
@@ -155,7 +154,7 @@ def _reverse(curve: Any, to: Any, u: Any) -> None:
 
 @register_jitable
 def _record(state: Any, curve: Any, other: Any) -> None:
-    """Record a leg; until there is one about as long in the other direction, it stands for both."""
+    """Record a leg; without one about as long in the other direction, it is used for both."""
     _draw(state, curve)
     if state.alone == state.direction or other.apart < ALIKE * curve.apart:
         _reverse(curve, other, state.furthest)
@@ -196,7 +195,7 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
     """What becomes of one sample; x is NaN where there is no reading."""
     way = u - state.furthest
     if way == 0.0:
-        # A rest is no part of a leg: creep would pass for hysteresis.
+        # A rest is no part of a leg: creep would look like hysteresis.
         return
     if state.direction == 0.0:
         state.direction = np.sign(way)

@@ -1,6 +1,6 @@
-"""When the line is fitted again, and how a change of model is paid.
+"""When the line is drawn again, and how a change of model is paid.
 
-What changes at one sample would shake the stage: the difference is owed, and paid on the way.
+A sudden change would shake the stage: the difference is owed, and paid while the reference travels.
 """
 
 from typing import Any
@@ -12,14 +12,12 @@ from piezoest.controller import driving, slots
 from piezoest.controller import line as lines
 from piezoest.controller.readings import RECENT
 
-# At rest, too, a change of model is paid: this fraction of it in the time of a doubling.
+# A change of model is also paid at rest: this fraction of it in the time of a doubling.
 PAID_IN_TIME = 0.25
-# Before so many legs were seen the line follows the readings of late.
-YOUNG = 2.0
-# ... those of this leg so far, and of this fraction of the last one.
-LEAST_MEMORY = 0.1
-# It follows no faster than so many times the time of a doubling, twice: a resonance, whose peak may be fifty
-# times its gain, must not be fed. And not faster than so many times what block and stage are late by.
+# Before so many legs the line follows the recent readings: at least those of this fraction of the last leg.
+YOUNG, LEAST_MEMORY = 2.0, 0.1
+# It takes at least so many times the time of a doubling to follow, because the peak of a resonance may be
+# fifty times its gain; and at least so many times the delay of block and stage.
 SLOW, LATE = 2.5, 4.0
 
 
@@ -31,13 +29,13 @@ def is_young(state: Any) -> bool:
 
 @register_jitable
 def _slow(state: Any, settings: Any) -> float:
-    """Samples in which the line may follow the readings."""
+    """Least number of samples in which the line follows the readings."""
     return max(SLOW * settings.doubling, LATE * (state.block + state.gap + state.start.lag))
 
 
 @register_jitable
 def memory(state: Any, settings: Any) -> float:
-    """About how many samples a leg takes, for what readings show of late."""
+    """About how many samples a leg takes: what the recent readings look back over."""
     reference = state.reference
     if is_young(state):
         return max(reference.count, LEAST_MEMORY * reference.usual, _slow(state, settings) / RECENT)
@@ -46,7 +44,7 @@ def memory(state: Any, settings: Any) -> float:
 
 @register_jitable
 def kept(state: Any, settings: Any, moved: Any, swing: Any) -> float:
-    """The fraction of what is owed that is left after a travel of the reference and a sample."""
+    """The fraction of what is owed that is left after one more sample of the reference."""
     left = driving.kept(state.reference, moved, swing) * (1.0 - PAID_IN_TIME / settings.doubling)
     if is_young(state) or state.railed > 0.0:
         left = max(left, 1.0 - 1.0 / _slow(state, settings))
@@ -63,19 +61,19 @@ def pay(state: Any, settings: Any, moved: Any) -> None:
 
 @register_jitable
 def draw(state: Any) -> None:
-    """Draw the line anew where the reference has turned; what that changes is owed."""
+    """Draw the line again where the reference has turned; the change is owed."""
     line, travel, reference = state.line, state.travel, state.reference
     before = driving.line_z(state)
     if reference.turned_now != 0.0:
         lines.turn(line, -reference.direction, reference.leg)
-    elif not lines.grow(line, np.abs(travel.furthest - travel.turned)):
-        return
+    else:
+        lines.grow(line, np.abs(travel.furthest - travel.turned))
     state.owed += before - driving.line_z(state)
 
 
 @register_jitable
 def follow(state: Any) -> None:
-    """Lay the line through the readings of late: two legs are too long to wait for where it is far off."""
+    """Move a line that is far off to the recent readings, which cannot wait for two legs."""
     before = driving.line_z(state)
     lines.follow(state.line, state.readings.recent)
     state.owed += before - driving.line_z(state)
@@ -83,7 +81,7 @@ def follow(state: Any) -> None:
 
 @register_jitable
 def hold(state: Any) -> None:
-    """Go back to the line that was known before the last turn: what came after may be wrong."""
+    """Return to the line before the last two turns: what came after may be wrong."""
     before = driving.line_z(state)
     lines.hold(state.line)
     state.owed += before - driving.line_z(state)
@@ -91,7 +89,6 @@ def hold(state: Any) -> None:
 
 @register_jitable
 def go_on(state: Any, settings: Any) -> None:
-    """After a block: whatever it has changed is owed, so that the voltage goes on from where it is."""
-    if not settings.minimum < state.u < settings.maximum:
-        return
-    driving.stand_at_reference(state)
+    """After a block, owe what it has changed, so that the voltage goes on from where it is."""
+    if settings.minimum < state.u < settings.maximum:
+        driving.stand_at_reference(state)

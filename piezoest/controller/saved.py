@@ -1,4 +1,4 @@
-"""A controller as a JSON-safe dictionary, and what one must be before it is believed."""
+"""A controller as a JSON-safe dictionary, and the checks of a dictionary before it is used."""
 
 from collections.abc import Iterator
 from typing import Any

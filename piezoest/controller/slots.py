@@ -1,12 +1,12 @@
 """The candidates of a controller beside the straight line: up to four estimators and the recorded loop.
 
 They are a chain: a ``model`` with its estimator, see `piezoest.controller.candidate`, and the ``others``,
-which are None behind the last. What compiled code does for all of them stands here. Where the chain has
-ended, nothing is compiled: Numba drops a branch whose test is ``slots is not None`` and nothing else, so
-these tests are never joined to others.
+which are None after the last. Functions that do something for all of them are here. After the end of the
+chain nothing is compiled: Numba drops a branch whose test is ``slots is not None`` alone, so this test is
+never joined with others.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from numba.extending import register_jitable
@@ -18,7 +18,7 @@ from piezoest.layout import ABSENT, Field, Record, record
 MOST = 4
 
 
-def layout(fields: list[Field]) -> Field:
+def layout(fields: Sequence[Field]) -> Field:
     """Layout of candidates, states or settings."""
     chain: Field = ABSENT
     for field in reversed(fields):

@@ -1,11 +1,10 @@
-"""Finding out what the stage does, from nothing: the voltage goes a small way.
+"""The start: the gain of an unknown stage, from its answers to small ways of the voltage.
 
-At rest the first readings say where the stage stands; one wrong one among them does not count. Then the
-voltage goes two per cent of its range and rests until the reading has come to rest too. The gain is what lies
-between two rests, where neither delay nor lag counts. An answer that drowns in noise or in steps of the
-converter doubles the way; one that is clear, but not sure, or came more slowly than the voltage went, is
-checked by a way twice as long: both must have been answered alike, else, as with backlash, the way is
-doubled. A gain that a user knows is not sought.
+The first readings, at rest, show where the stage stands; one of them may be wrong. Then the voltage goes two
+per cent of its range and rests until the readings rest too. The gain is that between two rests, where neither
+delay nor lag counts. If the answer is not above noise and steps of the converter, the way is doubled. If it
+is clear but not sure, or slower than the voltage, a way twice as long checks it. If the two gains differ, as
+with backlash, the way is doubled again. A gain that the user knows is not sought.
 """
 
 from typing import Any
@@ -23,28 +22,28 @@ FIRST = 5
 
 START = record(
     stage=whole(0.0, 4.0),
-    # Voltage planned, where all began, the way on from there, zero on one back that asks nothing; how many
-    # ways have been answered.
+    # Voltage planned, and at the beginning; the present way, from where and to where, and its signed length,
+    # zero where it only leads back; number of ways that were answered.
     voltage=MEASURED, origin=MEASURED, from_u=MEASURED, target=MEASURED, way=NUMBER, ways=COUNT,
-    # Samples of the stage; where the reading stood at first and at the last rest, its noise.
+    # Samples in this stage; reading at the first and at the last rest, its noise.
     samples=COUNT, zero=MEASURED, from_x=MEASURED, noise=AMOUNT,
-    # Sums over a window of readings, scatter around its trend; its mean, the one before that and the one
-    # before both; mean of the last two; windows so far; the last two readings and the smallest change of one:
-    # the step of its converter.
+    # Sums over a window of readings, scatter around its trend; means of the last three windows, mean of the
+    # last two; windows so far; the last two readings; smallest change of a reading: the converter's step.
     sum=NUMBER, ramp=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT,
     mean=MEASURED, mean_before=MEASURED, oldest_mean=MEASURED, now=MEASURED, windows=COUNT,
     before=MEASURED, last=MEASURED, step=AMOUNT,
     # Largest change between two windows [µm]; fastest change of the voltage that a slow stage follows [V],
-    # zero for a fast one; both per sample.
+    # zero for a fast stage; both per sample.
     change=AMOUNT, fastest=AMOUNT,
-    # Sums of the ways gone from the start and of the answers to them; the answer at the last look, the
-    # samples before the next; how late the stage answers [samples].
+    # To check a known gain: sums of the ways and of the answers; answer at the last look, samples before the
+    # next one. How late the stage answers [samples].
     gone=NUMBER, answered=NUMBER, largest=AMOUNT, look=AMOUNT, lag=AMOUNT,
-    # Gain of the last way [µm/V], of the one before; ways for nothing; samples without the voltage.
+    # Gain of the last way [µm/V], of the one before; ways without an answer; samples in a row without a
+    # reading, or with another voltage than planned; the first readings.
     gain=NUMBER, gain_before=NUMBER, tries=AMOUNT, stuck=COUNT, first=numbers(FIRST, kind=MEASURED),
-    # Whether the gain is the user's, and not confirmed yet; readings in a row that spoke for it, all against.
+    # Whether the gain is the user's and not confirmed yet; readings in a row for it, all readings against it.
     given=FLAG, agreed=COUNT, doubted=COUNT,
-    # Whether the voltage is planned before there are readings; whether where it stands was said, not read;
+    # Whether the voltage is planned before its readings come; whether the user told the reading at rest;
     # shortest first way, zero for the usual one [V].
     ahead=FLAG, told=FLAG, least=AMOUNT,
 )  # fmt: skip
@@ -53,28 +52,27 @@ SETTINGS = record(
     way=FIXED, longest=FIXED, ramp=FIXED, window=FIXED, lowest=FIXED, highest=FIXED, gain=FIXED
 )  # fmt: skip
 
-# An answer is clear above so many times the noise at rest, the scatter within a window, and the step of the
-# converter, on the longest way fewer; two are alike within this factor.
+# A clear answer exceeds so many times the noise at rest, the scatter within a window, and the step of the
+# converter (fewer on the longest way); two answers are alike within this factor.
 CLEAR, SCATTERS, STEPS, FEW_STEPS, ALIKE = 6.0, 3.0, 10.0, 4.0, 1.6
-# An answer so many times as clear is sure by itself, if it came to rest within so many windows, for hum rests
-# only for a moment, and the last two are this close to it, for a slow amplifier is still on its way.
+# An answer so many times as clear is sure without a check, if it rested within so many windows (hum rests
+# only for a moment) and the last two are this close together (a slow amplifier still moves).
 SURE, AT_ONCE, CLOSE = 3.0, 4.0, 0.02
-# The voltage written follows the one planned within this fraction of a way.
-FOLLOWS = 0.125
-# Without that, or without readings, the start is given up after so many windows.
-STUCK = 240.0
-# The way that checks an answer is so many times as long: what slews is later on it.
+# The voltage written is the planned one within this fraction of a way. If it is not, or without readings, the
+# start gives up after so many windows.
+FOLLOWS, STUCK = 0.125, 240.0
+# The way that checks an answer is so many times as long: a stage that slews is later on it.
 CHECK = 2.0
-# At rest the means of two windows, of a slow stage of three, differ by less than this fraction of the answer;
-# so many windows are enough at any rate; at least so many are looked at where there is no answer. A stage is
-# slow that changes by less than this fraction of the mean speed of the voltage, which is half as fast again
-# midway. Where it moves with more than this fraction of its fastest change it may take more windows.
+# At rest the means of two windows, of a slow stage of three, differ by less than STILL times the answer. Not
+# more than MOST_WINDOWS are needed, and without an answer not less than LATE: it may be late. A stage is slow
+# below SLOW times the mean speed of the voltage, whose highest speed is 1.5 times that. A stage that moves
+# with more than SLEWS times its highest speed slews, and may take MOST_SLEWING windows.
 STILL, MOST_WINDOWS, LATE, SLOW = 0.04, 30.0, 4.0, 0.75
 SLEWS, MOST_SLEWING = 0.7, 400.0
-# The way back goes beyond where all began by this part of the way: hysteresis then leaves nothing. On small
-# loops (Rayleigh: branches are parabolas) it is one half.
+# The way back goes too far by this part of the way, so that no hysteresis is left: one half for small loops,
+# whose branches are parabolas (Rayleigh).
 OVERSHOOT = 0.5
-# Windows before the first repetition; then twice as many each time.
+# Windows before the ways are repeated, twice as many each time; at most so many doublings.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
 
 
@@ -103,7 +101,7 @@ def _go_to(start: Any, u: Any, target: Any) -> None:
 
 @register_jitable
 def _go(start: Any, settings: Any, u: Any) -> None:
-    """Begin the next way; back to where there is room if there is none ahead."""
+    """Begin the next way; in the other direction if there is no room ahead."""
     ahead = u + start.way
     if not settings.lowest <= ahead <= settings.highest:
         start.way = -start.way
@@ -112,14 +110,14 @@ def _go(start: Any, settings: Any, u: Any) -> None:
 
 @register_jitable
 def _go_back(start: Any, u: Any, target: Any) -> None:
-    """Begin a way that asks nothing."""
+    """Begin a way whose answer does not count."""
     start.way = 0.0
     _go_to(start, u, target)
 
 
 @register_jitable
 def begin_again(start: Any, settings: Any, u: Any) -> None:
-    """Start again from a voltage where the stage may not be at rest yet: near 0 V, but not at a limit."""
+    """Go to a rest voltage near 0 V, but not at a limit, and start there again."""
     rest = min(max(0.0, settings.lowest + settings.way), settings.highest - settings.way)
     begin(start, rest)
     start.voltage, start.tries = u, 0.5
@@ -128,7 +126,7 @@ def begin_again(start: Any, settings: Any, u: Any) -> None:
 
 @register_jitable
 def rest_at(start: Any, settings: Any, u: Any, x: Any, gain: Any) -> None:
-    """The stage rests, and reads x: go the first way, or none where the gain is known and not zero."""
+    """The stage rests, and the reading is x: go the first way, or none if the gain is known and not zero."""
     start.from_x = start.zero = start.now = x
     way = min(max(settings.way, start.least), settings.longest)
     start.way = way if settings.highest - u >= u - settings.lowest else -way
@@ -141,7 +139,7 @@ def rest_at(start: Any, settings: Any, u: Any, x: Any, gain: Any) -> None:
 
 @register_jitable
 def _settle_rest(start: Any, settings: Any, u: Any) -> None:
-    """Where the stage stands at rest: the middle reading; the noise from the others."""
+    """The stage stands at the middle one of the first readings; the others show the noise."""
     first = start.first
     for i in range(1, FIRST):
         value, j = first[i], i
@@ -149,21 +147,21 @@ def _settle_rest(start: Any, settings: Any, u: Any) -> None:
             first[j] = first[j - 1]
             j -= 1
         first[j] = value
-    # The farthest one may be wrong: the noise is what the others scatter.
+    # The farthest one may be wrong and does not count.
     start.noise = 0.6 * min(first[FIRST - 1] - first[1], first[FIRST - 2] - first[0])
     rest_at(start, settings, u, first[FIRST // 2], start.given * settings.gain)
 
 
 @register_jitable
 def smooth(from_u: Any, target: Any, share: Any) -> float:
-    """The voltage after a share of a way that begins and ends gently."""
+    """The voltage after a share of a way that begins and ends slowly."""
     share = min(share, 1.0)
     return from_u + share * share * (3.0 - 2.0 * share) * (target - from_u)
 
 
 @register_jitable
 def _move(start: Any, settings: Any) -> None:
-    """The next voltage of a way, which begins and ends gently."""
+    """The next voltage of a way."""
     start.samples += 1.0
     # A way back from afar takes longer.
     longer = max(1.0, np.abs(start.target - start.from_u) / settings.longest)
@@ -185,7 +183,7 @@ def _fills_window(start: Any, settings: Any, x: Any) -> bool:
     if count < settings.window:
         return False
     mean = start.sum / count
-    # What still moves is no noise: only what is left around the trend is.
+    # A trend is no noise: the stage still moves.
     along = start.ramp / count - 0.5 * (count + 1.0) * mean
     trend = along * along * 12.0 / (count * count - 1.0)
     start.scatter = np.sqrt(max(0.0, start.squares / count - mean * mean - trend))
@@ -200,17 +198,16 @@ def _fills_window(start: Any, settings: Any, x: Any) -> bool:
 @register_jitable
 def _rests(start: Any, settings: Any) -> bool:
     """Whether the stage has come to rest."""
-    # What rings or is noise differs by chance.
+    # With ringing or noise the means differ by chance.
     chance = 3.0 * start.scatter * np.sqrt(2.0 / settings.window) + 0.5 * start.noise
     most = STILL * np.abs(start.now - start.from_x) + chance
-    # What came slowly may still come, hidden by chance for one window.
+    # A slow stage may still move, hidden by chance for one window.
     slow = start.change * settings.ramp < SLOW * np.abs(start.now - start.from_x)
     moves = np.abs(start.mean - start.mean_before)
     still = moves < most and (not slow or np.abs(start.mean - start.oldest_mean) < most)
-    # What slews comes as fast as ever until it is there.
+    # A stage that slews keeps its speed until it is there.
     slews = moves > max(SLEWS * settings.window * start.change, chance)
     enough = MOST_SLEWING if slews else MOST_WINDOWS
-    # Where nothing is seen yet, it may be late.
     least = 1.0 if np.abs(start.now - start.from_x) > _clear(start, STEPS) else LATE
     return start.windows > least and ((still and not slews) or start.windows >= enough)
 
@@ -223,10 +220,10 @@ def _clear(start: Any, steps: Any) -> float:
 
 @register_jitable
 def _judge(start: Any, settings: Any, u: Any) -> None:
-    """What the way has shown: done if two were answered alike, else another, twice as long."""
+    """Judge the answer: done if two are alike, else another way, twice as long."""
     answer = start.now - start.from_x
     start.gain_before, start.gain = start.gain, answer / (u - start.from_u) if u != start.from_u else 0.0
-    # A sensor that has not changed by a bit on all ways is asked again by the shortest one alone.
+    # A sensor that has not changed at all on all ways is tested again by the shortest one only.
     dead = start.step == 0.0 and start.tries >= 1.0
     longest = np.abs(start.way) >= settings.longest or dead
     bound = _clear(start, FEW_STEPS if longest else STEPS)
@@ -248,7 +245,7 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
         start.stage = DONE
         return
     if longest:
-        # Back to where all began: nothing rests at a limit.
+        # Back to the beginning: the stage is not to rest at a limit.
         start.ways = 0.0
         start.tries += 1.0
         beyond = start.origin - OVERSHOOT * (u - start.origin)
@@ -270,7 +267,7 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
         if change > 0.0 and start.samples + start.windows > 1.0:
             start.step = min(start.step, change) if start.step > 0.0 else change
     if start.stage < DONE:
-        # In a block that was planned at rest the voltage does not follow yet; one that never does is frozen.
+        # In a block that was planned at rest the voltage does not follow yet; if it never does, it is frozen.
         follows = np.abs(u - start.voltage) <= FOLLOWS * np.abs(start.target - start.from_u)
         fine = known if start.stage == REST else follows and (known or start.stage == GO)
         start.stuck = 0.0 if fine else start.stuck + 1.0
@@ -283,13 +280,11 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
                 _fills_window(start, settings, middle)
             _move(start, settings)
     elif start.stage == REST and start.ahead != 0.0:
-        # Planned before the readings are there: the first way begins after as many samples as they take.
+        # Planned before the readings come: the first way begins after as many samples as they will take.
         start.samples += 1.0
         if start.samples >= FIRST:
             rest_at(start, settings, u, 0.0, start.given * settings.gain)
-    elif not known and start.stage < DONE:
-        return
-    elif start.stage == REST:
+    elif start.stage == REST and known:
         start.first[int(start.samples)] = x
         start.samples += 1.0
         if start.samples >= FIRST:
@@ -299,6 +294,6 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
             _judge(start, settings, u)
     elif start.stage == SILENT:
         start.samples += 1.0
-        # Less and less often: the stage is not to be shaken for nothing.
+        # Less and less often, because it moves the stage for nothing.
         if start.samples >= PAUSE * settings.window * 2.0 ** min(start.tries, LONGEST_PAUSE):
             start.stage, start.samples, start.way = REST, 0.0, settings.way

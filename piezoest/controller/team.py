@@ -1,8 +1,7 @@
-"""The estimators that work for a controller, made for a stage of gain one and a voltage from -1 to 1.
+"""The estimators of a controller, made for a stage of gain one and a voltage from -1 to 1.
 
-A controller gives them voltages and readings in units of half the swing, z = (x - zero)/unit, so that nothing
-needs to be known of the stage beforehand. What they begin with must be made for that, which is why a
-controller makes them itself.
+A controller gives them voltages and readings in units of half the swing, z = (x - zero)/unit. They must begin
+with a model in these units, which is why the controller makes them itself.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,14 +21,14 @@ from piezoest.models import ColemanHodgdon
 Factory = Callable[..., Any]
 
 DEFAULT: tuple[Factory, ...] = (HysteresisRLS, OutputErrorRLS, PrandtlIshlinskiiRLS)
-KNOWN = (HysteresisRLS, OutputErrorRLS, PrandtlIshlinskiiRLS, HysteresisEKF)
+KNOWN = (*DEFAULT, HysteresisEKF)
 # Inverses whose numbers a controller can hand over.
 INVERSES = (loop_inverse, play_inverse)
 # Name of the recorded loop; a controller with at least one estimator has it.
 RECORDED = "recorded loop"
-# Gain of a first model, about.
+# Least and largest gain of a first model.
 LEAST, MOST = 0.1, 10.0
-# What they begin with: a loop of the usual width, and noise of so small a part of half a swing.
+# What they begin with: a loop of the usual width, and noise, in half swings.
 START, NOISE = ColemanHodgdon(alpha=0.8, beta=0.8, gamma=0.96), 2.5e-4
 
 
@@ -40,7 +39,7 @@ def made(factories: Any, sample_rate: float) -> tuple[CompiledEstimator, ...]:
     if len(factories) > slots.MOST:
         raise ValueError(f"estimators must be at most {slots.MOST}, got {len(factories)}: choose")
     given = {"initial_model": START, "noise": NOISE}
-    return tuple(_made(f"estimators[{i}]", factories[i], sample_rate, given) for i in range(len(factories)))
+    return tuple(_made(f"estimators[{i}]", each, sample_rate, given) for i, each in enumerate(factories))
 
 
 def _made(name: str, factory: Any, sample_rate: float, given: dict[str, Any]) -> CompiledEstimator:

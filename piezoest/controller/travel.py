@@ -10,12 +10,11 @@ from numba.extending import register_jitable
 
 from piezoest.layout import COUNT, DISTANCE, FLAG, MEASURED, SIGN, record
 
-# Direction of travel, furthest value in it, where this leg began, length of the last leg; size of a usual
-# swing, least one before two turns were seen; turns so far, the last value, whether it has just turned;
-# samples of this leg, those since it went on clearly, those of the last leg, and of the one before; the
-# farthest way back since then, and where it was then; the largest change of late from one sample to the next;
-# the extremes of late; whether each of the last two legs, this one and the last, is no longer than the one
-# before it.
+# Direction of travel, furthest value in it, where this leg began, length of the last leg; usual swing, least
+# one before two turns; turns so far, the last value, whether it has just turned; samples of this leg, those
+# since it went on clearly, those of the last leg, and of the leg before; the farthest way back since it went
+# on, and where that was; the largest recent change from sample to sample; the recent extremes; whether this
+# leg and the last one are each no longer than the leg before.
 TRAVEL = record(
     direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE, swing=DISTANCE, least=DISTANCE,
     turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, waits=COUNT, usual=COUNT,
@@ -23,27 +22,23 @@ TRAVEL = record(
     nested=FLAG,
 )  # fmt: skip
 
-# A way back of this fraction of a swing is a turn; so many turns show a swing. Before, a smaller one is: the
-# first way may lead to a bias that small waves lie on.
+# A way back of TURN swings is a turn. Before SHOWN turns a smaller one is: the first way may lead to a bias
+# with small waves on it.
 TURN, SHOWN, FIRST_TURN = 0.05, 2.0, 0.02
-# A leg is longer than another if it exceeds it by this part.
-LONGER = 0.1
-# A leg is long that has taken so many times the last one.
-LONG = 2.0
-# What was wide is over where the signal stays back for long, and moves to and fro there by this fraction of
-# the swing, and by so many times the noise of a reading.
+# A leg is longer than another by this part at least; it takes long from so many times its samples on.
+LONGER, LONG = 0.1, 2.0
+# The least motion to and fro that is not noise, in swings and in noises of a reading.
 SMALL, NOISE = 1e-3, 10.0
-# No swing counts for less than this fraction of the one before: noise at rest would.
+# No swing is below this fraction of the last one: noise at rest would be a swing.
 LEAST = 0.02
-# At each turn this fraction of the largest change of late is kept.
-SLOWER = 0.7
-# At each turn the extremes come nearer to the present leg by this fraction of the way there.
-FADES = 0.1
+# At each turn the largest recent change is multiplied by SLOWER, and the extremes come nearer to the present
+# leg by FADES of the distance.
+SLOWER, FADES = 0.7, 0.1
 
 
 @register_jitable
 def begin(travel: Any, value: Any, least: Any) -> None:
-    """Begin, or start again, at a value; no swing is smaller than `least` until two turns were seen."""
+    """Begin, or start again, at a value; no swing is smaller than `least` before two turns."""
     travel.mark = travel.furthest = travel.turned = travel.last = travel.highest = travel.lowest = value
     travel.direction = travel.leg = travel.turns = travel.back = 0.0
     travel.count = travel.waits = travel.usual = travel.past = travel.fastest = 0.0
@@ -64,7 +59,7 @@ def follow(travel: Any, value: Any) -> float:
         if travel.direction == 0.0:
             travel.direction = np.sign(way)
         travel.furthest = value
-        # The drift of a small scan is no way on.
+        # A small scan that drifts does not go on.
         if np.abs(value - travel.mark) > SMALL * travel.swing:
             travel.waits = travel.back = 0.0
             travel.mark = value
@@ -93,13 +88,13 @@ def follow(travel: Any, value: Any) -> float:
 
 @register_jitable
 def _smallest(travel: Any, noise: Any) -> float:
-    """The way to and fro that is no noise."""
+    """The least way to and fro that is not noise."""
     return max(SMALL * travel.swing, NOISE * noise)
 
 
 @register_jitable
 def is_over(travel: Any, noise: Any) -> bool:
-    """Whether what goes on behind a wide leg is too small for a turn; `noise` is that of a reading."""
+    """Whether a motion after a wide leg is too small for a turn; `noise` is that of a reading."""
     if travel.waits <= LONG * max(travel.usual, travel.count - travel.waits, 8.0):
         return False
     fro = travel.back - np.abs(travel.last - travel.furthest)
@@ -108,20 +103,20 @@ def is_over(travel: Any, noise: Any) -> bool:
 
 @register_jitable
 def narrow(travel: Any, waits: Any, least: Any) -> None:
-    """Start again with a small swing, at the last value; a leg may take as long as the signal has waited."""
+    """Start again with a small swing, at the last value; a leg may take `waits` samples."""
     begin(travel, travel.last, least)
     travel.usual = waits
 
 
 @register_jitable
 def widest(travel: Any) -> float:
-    """How far the signal has swung of late: what a wide swing has strained no smaller one wipes out."""
+    """The widest recent swing: smaller ones do not erase what it has left."""
     return max(travel.swing, travel.highest - travel.lowest)
 
 
 @register_jitable
 def progress(travel: Any, gone: Any) -> float:
-    """What a sample counts, about one in all for a leg as long as the widest swing, less for a shorter one.
+    """The weight of a sample: about one in all for a leg as long as the widest swing, less for a shorter one.
 
     Half by travel, half by time; rests soon count nothing.
     """
@@ -133,10 +128,8 @@ def progress(travel: Any, gone: Any) -> float:
 
 @register_jitable
 def rests(travel: Any, gone: Any) -> bool:
-    """Whether a leg has taken long, and the last sample has gone no farther: a rest is no part of a leg.
-
-    Of steps up and one step back again the way up takes much longer.
-    """
+    """Whether a leg has taken long, and the last sample has gone no farther: a rest is no part of a leg."""
+    # Of the last two legs the slower one: many steps up take longer than one step back.
     late = travel.count > LONG * max(travel.usual, travel.past, 8.0)
     return late and (gone == 0.0 or travel.furthest != travel.last)
 

@@ -12,34 +12,30 @@ from piezoest.controller import travel as travels
 
 # The gain is sought; the voltage goes to where the reference needs it; all is learnt; hysteresis is erased.
 SEEK, APPROACH, RUN, HOME = 0.0, 1.0, 2.0, 3.0
-# The corridor reaches no farther from the line than so many times what the line has missed of late.
+# The corridor reaches at most so many times as far from the line as the line has missed recently.
 WIDER = 2.0
-# A model's voltage moves no faster than so many times the line's.
+# The voltage of a model moves at most so many times as fast as that of the line.
 RATE = 5.0
-# On the way to the reference the voltage goes no farther than so many times the way that was answered; a
-# doubling takes so many times as long as the stage takes to answer.
-AHEAD, LATE = 8.0, 3.0
-# Where the stage was slow, so many times its speed.
-FOLLOWED = 0.8
-# ... and where the readings have yet to confirm a user's gain, than so many times.
-FIRST_AHEAD = 2.0
-# A voltage that was told as written differs from the planned one by this fraction of the range at most, where
-# it is the same one: rounded by a converter, or measured by a monitor.
+# On the way to the reference the voltage goes at most so many times as far as was answered, before a user's
+# gain is confirmed FIRST_AHEAD times as far. A doubling takes LATE times the delay of the stage. A slow stage
+# is followed with this part of its speed.
+AHEAD, FIRST_AHEAD, LATE, FOLLOWED = 8.0, 2.0, 3.0, 0.8
+# A written voltage that differs from the planned one by less than this fraction of the range is the planned
+# one: rounded by a converter, or measured by a monitor.
 OFF = 0.01
 
 
 @register_jitable
 def is_held(settings: Any, u: Any, way: Any) -> bool:
-    """Whether a limit holds a voltage back from going a way."""
+    """Whether a voltage at a limit cannot go a way."""
     return (u <= settings.minimum and way < 0.0) or (u >= settings.maximum and way > 0.0)
 
 
 @register_jitable
 def written(state: Any, settings: Any, u: Any) -> float:
-    """A voltage that was told as written: the planned one if it is near that.
+    """The voltage that was written, u according to the user: the planned one if u is near it.
 
-    A small way that goes on from what a converter has rounded would be rounded away again, and the errors of
-    a monitor would add up from sample to sample.
+    From a rounded voltage a small way would be rounded away again; the errors of a monitor would add up.
     """
     near = np.abs(state.planned - u) <= OFF * (settings.maximum - settings.minimum)
     return state.planned if near else u
@@ -47,10 +43,7 @@ def written(state: Any, settings: Any, u: Any) -> float:
 
 @register_jitable
 def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
-    """Voltage of the model that drives, in the corridor around the line, for reference and feedback.
-
-    `before` is the reference planned for last.
-    """
+    """Voltage of the model that drives, in the corridor around the line; `before` is the last reference."""
     line = state.line
     swing = max(state.reference.swing, np.abs(r - state.reference.turned))
     kept = redraw.kept(state, settings, np.abs(r - state.reference.last), swing)
@@ -59,7 +52,7 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
     straight = wanted = lines.voltage(line, r - state.owed * kept * state.unit)
     drives = state.readings.fault == faults.NONE and state.driving > 0.0
     if drives and state.pending > 1.0:
-        # Nobody has said yet what became of the last voltage: go on along the line, and soon on it.
+        # It is unknown what became of the last voltage: go on parallel to the line, and soon on it.
         moved = np.abs(onward * line.gain)
         left = driving.kept(state.reference, moved, swing) if doubt.matters(state) else 1.0
         wanted += left * (state.planned + onward - wanted)
@@ -67,7 +60,7 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
         owed = slots.owed(state.candidates, state.driving, 0.0)
         z = (r - state.zero) / state.unit - owed * kept
         wanted = slots.voltage(state.candidates, settings.candidates, state.driving, z, straight)
-        # Near a turn the inverse of a wide loop leaps, which would shake a resonance.
+        # Near a turn the inverse of a wide loop jumps, which would shake a resonance.
         learnt = state.reference.last + state.back
         ahead = lines.voltage(line, r - owed * kept * state.unit)
         ahead -= lines.voltage(line, learnt - owed * state.unit)
@@ -76,7 +69,7 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
     if not np.abs(wanted) < WILDEST:
         wanted = straight
     room = np.abs(settings.corridor * 0.5 * max(swing, travels.widest(state.reference)) / line.gain)
-    # No model can gain more on the line than the line has missed of late.
+    # No model can be better than the line by more than the line has missed recently.
     missed = np.abs(state.unit) * state.widest + 3.0 * np.sqrt(state.readings.noise)
     room = min(room, WIDER * missed / np.abs(line.gain))
     return min(max(wanted, straight - room), straight + room)
@@ -84,9 +77,9 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
 
 @register_jitable
 def _nearer(state: Any, settings: Any, target: Any) -> float:
-    """The next voltage on the way to a target: faster and faster from where all began, gently at the end.
+    """The next voltage on the way to a target: faster and faster from the beginning, and slower at the end.
 
-    Where a way was answered it may go as fast: else it would never catch a reference that goes to and fro.
+    Where the stage has answered it is fast: else it would never reach a reference that goes to and fro.
     """
     start = state.start
     span = max(np.abs(state.u - start.origin), state.confirmed)
@@ -114,10 +107,10 @@ def plan(state: Any, settings: Any, r: Any) -> float:
     if state.stage == SEEK:
         wanted = state.start.voltage
     elif state.stage == APPROACH:
-        # Without any reference the voltage stays where the start has left it.
+        # Without a reference the voltage stays.
         target = lines.voltage(state.line, r) if state.asked != 0.0 else state.u
         if state.start.given != 0.0:
-            # The first way says whether the gain is right.
+            # The first way shows whether the gain is right.
             way = min(FIRST_AHEAD * state.confirmed, settings.start.longest)
             target = state.start.origin + np.sign(state.start.way) * way
         wanted = _nearer(state, settings, target)

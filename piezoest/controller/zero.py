@@ -1,4 +1,4 @@
-"""The zero of the readings has moved, as after a gauge was set back: when that is followed."""
+"""The zero of the readings has moved, as after a reset of the gauge: when that is followed."""
 
 from typing import Any
 
@@ -9,20 +9,19 @@ from piezoest.controller import faults
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
 
-# A zero that has moved is looked at after so many swings. It has its name after more, for what is late comes
-# back after a turn; it is followed after so many, if the reference has not moved with it.
+# Swings after which a moved zero is considered; is named, because late readings come back after a turn; and
+# is followed if the reference has not moved with it.
 OFF_FOR, MOVED_FOR, HELD_FOR = 0.3, 0.5, 24.0
-# Readings of a moved zero have at least this slope relative to the line's; they are near the reference by
-# so many swings if it has moved, too, or nearer than the line by this factor.
+# Readings with a moved zero have at least this slope relative to the line. If the reference has moved too,
+# they are within so many swings of it, or closer to it than the line by this factor.
 LEAST_SLOPE, NEAR_IT, NEARER = 0.2, 0.6, 0.5
 
 
 @register_jitable
 def follow(state: Any) -> None:
-    """Readings run at a distance from the line: their zero has moved, for good or not.
+    """If the reference has moved too, or the line is not sure, follow a moved zero at once.
 
-    If the reference has moved with it, or the line is not sure, the line follows at once. Else it holds for
-    long, for the gauge may come back; then the gauge is believed.
+    Otherwise the line stays for long, because the gauge may come back. Then the gauge is believed.
     """
     readings, line = state.readings, state.line
     if readings.off < OFF_FOR:
@@ -37,7 +36,7 @@ def follow(state: Any) -> None:
         return
     miss = np.abs(readings.last - state.r)
     near = miss < NEAR_IT * np.abs(line.gain) * state.travel.swing
-    # A reference that the line cannot reach, but the readings do, has moved with them.
+    # A reference to which the readings are closer than the line has moved with them.
     near = near or miss < NEARER * np.abs(lines.at(line, state.u) - state.r)
     if sure and not near and readings.off < HELD_FOR:
         if known and readings.off > MOVED_FOR:
