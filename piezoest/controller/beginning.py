@@ -28,9 +28,8 @@ def begin_learning(state: Any) -> None:
     state.stage = APPROACH
     start.samples = 0.0
     state.confirmed = starts.farthest(start)
-    state.gone = state.handed = 0.0
-    state.railed, state.patience = 0.0, driving.PATIENCE
-    state.owed = state.small = 0.0
+    state.gone = state.handed = state.railed = state.owed = state.small = 0.0
+    state.patience = driving.PATIENCE
     reading.forget(state.readings)
     # The last readings may be from before the start.
     state.readings.before = state.readings.last = start.now

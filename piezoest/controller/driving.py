@@ -23,15 +23,16 @@ BETTER = 0.8
 PATIENCE, LONGEST_PATIENCE = 0.25, 128.0
 # Swings after which a model that drives is judged; before CALM the miss may still be that of the last one.
 SEEN, CALM = 0.6, 0.1
-# A model that has driven for so many times the patience halves it, and then has driven for PROVEN swings.
+# A model that has driven for SHOWN times the patience halves it; then PROVEN swings count as driven.
 SHOWN, PROVEN = 4.0, 1.0
 # The line drives at once where the stage misses by so many times the recent miss of the line, unless the line
 # would miss by WORSE times as much: small legs make it flat, and then a wide one follows.
 TRIP, WORSE = 2.0, 1.5
 # No model may miss more than the line has. This bound follows the line down at once, and up by this factor
-# each time, because the stage may have changed; at least so many swings, which hysteresis costs any line.
+# each time, because the stage may have changed. It is at least so many swings: hysteresis lets no line be
+# better.
 SLOWLY_UP, AT_LEAST = 1.05, 0.05
-# After so many sudden returns to the line an event is noted: this is no chance. Good driving takes them back.
+# After so many sudden returns to the line an event is noted. Each long time of good driving takes one back.
 OFTEN = 3.0
 # Misses below this fraction of a swing are all alike.
 ALIKE = 5e-4
@@ -137,10 +138,8 @@ def _at_most(missed: Any, before: Any) -> float:
 
 @register_jitable
 def _disappoints(state: Any) -> bool:
-    """Whether the stage misses the reference by more than the line did when it drove.
-
-    A correct model can still shake a resonance, and then all models miss alike.
-    """
+    """Whether the stage misses the reference by more than the line did when it drove."""
+    # A correct model can still shake a resonance, and then all models miss alike.
     if state.since <= SEEN:
         return False
     swing = travels.widest(state.travel)

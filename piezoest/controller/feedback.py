@@ -16,9 +16,9 @@ from piezoest.layout import AMOUNT, COUNT, FLAG, MEASURED, NUMBER, SIGN, record
 
 # A sample corrects at most this fraction of an error, less if the answer is late.
 FASTEST = 0.25
-# The gain is halved if the correction shakes the stage: if it turns more than SHAKES times in a leg, goes
-# BACK_AND_FORTH swings each time, and takes less than QUICK times the time to correct an error. Not if the
-# last way is below LASTS times the first: then the stage rings by itself, as after a step.
+# The gain is halved if the correction shakes the stage: it turns more than SHAKES times in a leg, each time
+# after BACK_AND_FORTH swings, within QUICK times the time to correct an error. Not if the last way is below
+# LASTS times the first one: then the stage rings by itself, as after a step.
 SHAKES, BACK_AND_FORTH, QUICK, LASTS = 8.0, 0.003, 3.0, 0.9
 # Where the correction turned last, and before that; direction and samples since; such turns in a row, length
 # of the first way; halvings so far.
@@ -49,10 +49,8 @@ def follow(state: Any, settings: Any, x: Any) -> None:
 
 @register_jitable
 def _calm(state: Any, slow: Any) -> None:
-    """Halve the gain of a correction that shakes the stage; it takes `slow` samples to correct an error.
-
-    Integral feedback is stable below twice damping times resonance, which are unknown.
-    """
+    """Halve the gain of a correction that shakes the stage; it takes `slow` samples to correct an error."""
+    # Integral feedback is stable below twice damping times resonance, which are unknown.
     shaking = state.shaking
     # The noise at rest, if it was seen: a shaken stage looks noisy.
     noise = state.start.noise if state.start.told == 0.0 else np.sqrt(state.readings.noise)
@@ -90,10 +88,8 @@ def forget(state: Any) -> None:
 
 @register_jitable
 def watch_rest(state: Any, settings: Any, x: Any, moved: Any) -> None:
-    """After a long rest, take the correction from the first two legs.
-
-    Motion erases the creep of a rest, and the integral alone would keep it for long.
-    """
+    """After a long rest, take the correction from the first two legs."""
+    # Motion erases the creep of a rest, and the integral alone would keep it for long.
     rest = state.rest
     if state.readings.fault != faults.NONE:
         rest.left = 0.0

@@ -30,12 +30,10 @@ def rest(late: Any, u: Any, r: Any) -> None:
 
 @register_jitable
 def remember(late: Any, start: Any, u: Any, r: Any) -> None:
-    """Remember what was written and wanted, and find what is answered, at most the oldest one.
-
-    If a stage that slews was late at the start, it is not late on slower ways.
-    """
+    """Remember what was written and wanted, and find what is answered, at most the oldest one."""
     late.at = late.at + 1.0 if late.at < MOST - 1.0 else 0.0
     late.u[int(late.at)], late.r[int(late.at)] = u, r
+    # If a stage that slews was late at the start, it is not late on slower ways.
     lag = int(min(start.lag, MOST - 1.0) + 0.5) if start.fastest == 0.0 else 0
     place = int(late.at) - lag
     place = place if place >= 0 else place + MOST

@@ -119,7 +119,7 @@ def _score(state: Any, settings: Any, x: Any, z: Any, moved: Any) -> None:
     if state.scale > 0.0:
         slots.judge(state.candidates, z, bound, swings)
     if settings.minimum < u < settings.maximum:
-        # No model causes the error at a limit, nor the first one that which the line has left.
+        # Models do not cause the error at a limit, nor the first model the error that the line has left.
         off = (x - state.r) / state.unit
         left = slots.owed(state.candidates, state.driving, state.owed) if state.switches <= 1.0 else 0.0
         candidate.judge(state.outcome, off + left, bound, swings)
@@ -232,7 +232,9 @@ def _seek(state: Any, settings: Any, u: Any, x: Any) -> None:
 def _follow(state: Any, settings: Any, r: Any, u: Any) -> tuple[float, float]:
     """Let line and models follow reference and voltage; how far each has moved."""
     moved = travels.follow(state.reference, r)
-    redraw.pay(state, settings, moved)
+    left = redraw.kept(state, settings, moved, state.reference.swing)
+    state.owed *= left
+    slots.pay(state.candidates, left)
     gone = travels.follow(state.travel, u)
     if state.stage == RUN:
         if state.readings.fault == faults.NONE:

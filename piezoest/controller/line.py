@@ -100,10 +100,8 @@ def slope(points: Any) -> float:
 
 @register_jitable
 def spread(points: Any) -> float:
-    """Spread of the readings over that of the voltage [µm/V]; zero without any.
-
-    The least-squares slope is this times the correlation, which a delay or a wide loop reduces.
-    """
+    """Spread of the readings over that of the voltage [µm/V]; zero without any."""
+    # The least-squares slope is this times the correlation, which a delay or a wide loop reduces.
     return np.sqrt(points.square_x / points.square) if points.square > 0.0 else 0.0
 
 
@@ -215,15 +213,13 @@ def turn(line: Any, direction: Any, leg: Any) -> None:
 
 @register_jitable
 def grow(line: Any, leg: Any) -> None:
-    """Draw the line when the first leg has grown, or a later one is much longer than the recent ones.
-
-    The later one only if the line becomes steeper: small legs are flat, and a flat line leads too far.
-    """
+    """Draw the line when the first leg has grown, or a later one is much longer than the recent ones."""
     now, later = line.now, line.legs >= SETTLED
     looked = max(line.looked, line.longest / np.abs(line.gain)) if later else line.looked
     if 0.0 < line.legs < SETTLED or leg < GROWN * looked or now.count < 16.0:
         return
     line.looked = leg
+    # The later one only if the line becomes steeper: small legs are flat, and a flat line leads too far.
     if not (later and (explained(now) < EXPLAINED or spread(now) < np.abs(line.gain))):
         _draw(line, now, 0.0)
 

@@ -98,7 +98,11 @@ def sweep(
 
 def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, Any]) -> dict[str, Any]:
     """Settings of the kernel but for the candidates."""
-    width = limits.maximum - limits.minimum
+    width, learnt_on = limits.maximum - limits.minimum, options["learnt_on"]
+    # Without a user's model all ranges are allowed.
+    r = u = (-math.inf, math.inf)
+    if learnt_on is not None:
+        r, u = allowed(learnt_on["displacement"]), allowed(learnt_on["voltage"])
     return {
         "minimum": limits.minimum,
         "maximum": limits.maximum,
@@ -107,7 +111,7 @@ def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, A
         "corridor": options["corridor"],
         "feedback": options["feedback"] / sample_rate,
         "shortest": sample_rate / (pace.FAST * options["resonance"]) if options["resonance"] else 0.0,
-        "allowed": _allowed(options["learnt_on"]),
+        "allowed": {"lowest_r": r[0], "highest_r": r[1], "lowest_u": u[0], "highest_u": u[1]},
         "start": {
             "gain": options["gain"],
             # If the gain is known, a first way only has to confirm it.
@@ -119,15 +123,6 @@ def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, A
             "highest": limits.maximum,
         },
     }
-
-
-def _allowed(learnt_on: dict[str, Any] | None) -> dict[str, float]:
-    """Ranges that the user's model was learnt on, with a margin; infinite without them."""
-    every = math.inf
-    r, u = (-every, every), (-every, every)
-    if learnt_on is not None:
-        r, u = allowed(learnt_on["displacement"]), allowed(learnt_on["voltage"])
-    return {"lowest_r": r[0], "highest_r": r[1], "lowest_u": u[0], "highest_u": u[1]}
 
 
 def room(

@@ -41,10 +41,8 @@ def begin_anew(state: Any, settings: Any) -> None:
 
 @register_jitable
 def is_refuted(state: Any, gone: Any, answer: Any) -> bool:
-    """Whether the answer to a way from the beginning contradicts the sign of the gain.
-
-    Hum or drift may have looked like an answer to the short ways of the start; on a longer way it does less.
-    """
+    """Whether the answer to a way from the beginning contradicts the sign of the gain."""
+    # On the short ways of the start hum or drift may have looked like an answer; on a longer way less so.
     start, ways = state.start, starts.farthest(state.start)
     noise = starts.CLEAR * max(start.noise, np.sqrt(state.readings.noise))
     clear = np.abs(answer) > max(noise, AGAINST * np.abs(start.gain) * ways)
@@ -70,10 +68,8 @@ def _is_out_of_reach(state: Any, settings: Any) -> bool:
 
 @register_jitable
 def watch(state: Any, settings: Any, moved: Any) -> None:
-    """Start again if the voltage rests at a limit for long, or readings go the wrong way: the line is wrong.
-
-    A reference that is out of reach is no reason.
-    """
+    """Start again if the line is wrong: for long at a limit, or with readings that go the wrong way."""
+    # A reference that is out of reach is no reason.
     if _is_out_of_reach(state, settings):
         state.railed = 0.0
         state.beyond += 1.0
@@ -83,7 +79,7 @@ def watch(state: Any, settings: Any, moved: Any) -> None:
     rests = state.u <= settings.minimum or state.u >= settings.maximum
     # With a line learnt from wrong readings, right readings look reversed, scaled or moved.
     fault = state.readings.fault
-    doubted = fault == faults.NONE or (fault >= faults.REVERSED and fault != faults.SATURATED)
+    doubted = fault != faults.NO_RESPONSE and fault != faults.SATURATED
     state.railed = state.railed + moved if rests and doubted else max(state.railed - moved, 0.0)
     sure = reading.is_sure(state.readings)
     most = RESTED if sure or state.reference.turns < travels.SHOWN else SOON_RESTED

@@ -129,11 +129,9 @@ def _size_up(readings: Any, line: Any, travel: Any) -> None:
 
 @register_jitable
 def _stands_still(readings: Any, line: Any, travel: Any, fraction: Any, steps: Any) -> bool:
-    """Whether the reading has not changed for a fraction of a swing, and for steps of its converter.
-
-    Just after a turn it may stand still: a stage with backlash rests there.
-    """
+    """Whether the reading has not changed for a fraction of a swing, and for steps of its converter."""
     gain = np.abs(line.gain)
+    # Just after a turn it may stand still: a stage with backlash rests there.
     onward = np.abs(travel.last - travel.turned) > BACKLASH * readings.swing
     return onward and gain * readings.still > max(fraction * gain * readings.swing, steps * readings.step)
 
@@ -219,15 +217,13 @@ def middle(readings: Any, x: Any) -> float:
 
 @register_jitable
 def _is_alone(readings: Any, line: Any, beside: Any) -> bool:
-    """Whether the distance from the line differs much from that of the last good reading, or the last two.
-
-    Not if many in a row do: they are true. Nor while the line itself still moves.
-    """
+    """Whether the distance from the line differs much from that of the last good reading, or the last two."""
     change = beside - readings.beside_last
     apart = max(np.abs(change), np.abs(beside - readings.beside_before))
     near = max(UNUSUAL * np.sqrt(readings.changes), ALONE * np.abs(line.gain) * readings.swing)
     fits = np.abs(beside - readings.beside_kept) < near or apart < near
     readings.alone = 0.0 if fits else readings.alone + 1.0
+    # Not if many in a row do: they are true. Nor while the line itself still moves.
     alone = 0.0 < readings.alone <= IN_A_ROW and line.legs >= SEEN
     readings.changes = _mean_square(readings, readings.changes, change * change)
     readings.beside_before, readings.beside_last = readings.beside_last, beside

@@ -17,11 +17,12 @@ from numba.extending import register_jitable
 from piezoest.layout import AMOUNT, MEASURED, SIGN, numbers, record, whole
 
 KNOTS = 17
-# Voltage where a curve begins, and displacements from there on, at evenly spaced voltages in the direction of
-# travel; `apart` is zero while nothing is known.
-CURVE = record(begins=MEASURED, apart=AMOUNT, x=numbers(KNOTS, kind=MEASURED))
-# Both curves, and direction of the last recorded leg.
-LOOP = record(up=CURVE, down=CURVE, ended=SIGN)
+# Two curves, up and down: voltage where each begins, and displacements from there on, at voltages that are
+# `apart` in the direction of travel (zero while nothing is known); direction of the last recorded leg.
+LOOP = record(
+    begins=numbers(2, kind=MEASURED), apart=numbers(2, kind=AMOUNT), x=numbers(2, KNOTS, kind=MEASURED),
+    ended=SIGN,
+)  # fmt: skip
 WAYS = 7
 # The ways from turn to turn that are not wiped out, outermost first: direction, voltage and displacement
 # where each began, its slope relative to its curve. Number `present` is the present way; the next one is the
@@ -38,35 +39,25 @@ STEEP, STEEPER, TURN = 0.1, 3.0, 0.01
 
 
 @register_jitable
-def _gone(curve: Any, far: Any) -> float:
-    """Displacement at a distance from the beginning of a curve; beyond its ends its end pieces go on."""
-    place = far / curve.apart
-    i = int(min(max(place, 0.0), KNOTS - 2.0))
-    return curve.x[i] - curve.x[0] + (place - i) * (curve.x[i + 1] - curve.x[i])
-
-
-@register_jitable
-def _on_curve(loop: Any, direction: Any, far: Any) -> float:
-    """Displacement at a distance from the beginning of the curve of a direction."""
-    return _gone(loop.up, far) if direction > 0.0 else _gone(loop.down, far)
+def curve_of(direction: Any) -> int:
+    """Number of the curve of a direction."""
+    return 0 if direction > 0.0 else 1
 
 
 @register_jitable
 def _apart(loop: Any, direction: Any) -> float:
-    """How far apart the knots of the curve of a direction are."""
-    return loop.up.apart if direction > 0.0 else loop.down.apart
+    """Distance between the knots of the curve of a direction [V]."""
+    return loop.apart[curve_of(direction)]
 
 
 @register_jitable
-def _begins(loop: Any, direction: Any) -> float:
-    """Voltage at which the curve of a direction begins."""
-    return loop.up.begins if direction > 0.0 else loop.down.begins
-
-
-@register_jitable
-def _first(loop: Any, direction: Any) -> float:
-    """Displacement at which the curve of a direction begins."""
-    return loop.up.x[0] if direction > 0.0 else loop.down.x[0]
+def _gone(loop: Any, direction: Any, far: Any) -> float:
+    """Displacement at a distance from the beginning of a curve; beyond its ends its end pieces go on."""
+    curve = curve_of(direction)
+    place = far / loop.apart[curve]
+    i = int(min(max(place, 0.0), KNOTS - 2.0))
+    here = loop.x[curve, i]
+    return here - loop.x[curve, 0] + (place - i) * (loop.x[curve, i + 1] - here)
 
 
 @register_jitable
@@ -75,7 +66,7 @@ def _at(own: Any, loop: Any, way: Any, u: Any) -> float:
     direction = own.direction[way]
     if direction == 0.0 or _apart(loop, direction) == 0.0:
         return u
-    return own.x[way] + own.steeper[way] * _on_curve(loop, direction, (u - own.u[way]) * direction)
+    return own.x[way] + own.steeper[way] * _gone(loop, direction, (u - own.u[way]) * direction)
 
 
 @register_jitable
@@ -83,7 +74,7 @@ def _meet(own: Any, loop: Any, way: Any, u: Any, x: Any) -> None:
     """Change the slope of a way so that it leads to a voltage and a displacement."""
     direction, steeper = own.direction[way], 1.0
     if _apart(loop, direction) > 0.0:
-        gone = _on_curve(loop, direction, (u - own.u[way]) * direction)
+        gone = _gone(loop, direction, (u - own.u[way]) * direction)
         if gone != 0.0:
             steeper = min(max((x - own.x[way]) / gone, 1.0 / STEEPER), STEEPER)
     own.steeper[way] = steeper
@@ -141,9 +132,10 @@ def place(state: Any, settings: Any) -> None:
     furthest = own.furthest
     if own.direction[int(own.present)] == 0.0:
         return
-    own.present, own.steeper[0] = 0.0, 1.0
-    own.direction[0], own.u[0], own.x[0] = loop.ended, _begins(loop, loop.ended), _first(loop, loop.ended)
-    end = own.u[0] + loop.ended * (KNOTS - 1.0) * _apart(loop, loop.ended)
+    own.present, own.direction[0], own.steeper[0] = 0.0, loop.ended, 1.0
+    curve = curve_of(loop.ended)
+    own.u[0], own.x[0] = loop.begins[curve], loop.x[curve, 0]
+    end = own.u[0] + loop.ended * (KNOTS - 1.0) * loop.apart[curve]
     _go(own, loop, end)
     if (furthest - end) * loop.ended <= 0.0:
         _end_as_recorded(own, loop)
@@ -153,14 +145,12 @@ def place(state: Any, settings: Any) -> None:
 
 @register_jitable
 def _end_as_recorded(own: Any, loop: Any) -> None:
-    """Let the way back lead to where its own curve ended, if that is near.
-
-    At its end the stage may have crept in a rest before the other curve began.
-    """
-    back, apart = own.direction[1], _apart(loop, own.direction[1])
-    length = (own.u[0] - _begins(loop, back)) * back
-    if np.abs(length - (KNOTS - 1.0) * apart) < apart:
-        own.x[0] = _first(loop, back) + _on_curve(loop, back, length)
+    """Let the way back lead to where its own curve ended, if that is near."""
+    # At its end the stage may have crept in a rest before the other curve began.
+    back, curve = own.direction[1], curve_of(own.direction[1])
+    length = (own.u[0] - loop.begins[curve]) * back
+    if np.abs(length - (KNOTS - 1.0) * loop.apart[curve]) < loop.apart[curve]:
+        own.x[0] = loop.x[curve, 0] + _gone(loop, back, length)
         _meet(own, loop, 1, own.u[0], own.x[0])
 
 
@@ -187,7 +177,7 @@ def wanted(state: Any, settings: Any, r: Any) -> float:
     own, loop = state.inverse, settings.inverse
     now, u = int(own.present), own.furthest
     direction = own.direction[now]
-    if direction == 0.0 or loop.up.apart == 0.0 or loop.down.apart == 0.0:
+    if direction == 0.0 or loop.apart[0] == 0.0 or loop.apart[1] == 0.0:
         return r
     if (r - own.x[now + 1]) * direction < 0.0:
         now, direction = now + 1, -direction

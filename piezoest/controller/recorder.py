@@ -13,8 +13,8 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.compile import like
-from piezoest.controller.recorded_loop import KNOTS, LOOP, STEEP
+from piezoest.compile import like, local
+from piezoest.controller.recorded_loop import KNOTS, LOOP, STEEP, curve_of
 from piezoest.estimators.model_writing import NO_MODEL, TO_BE_PLACED
 from piezoest.layout import AMOUNT, COUNT, DISTANCE, FLAG, MEASURED, NUMBER, SIGN, numbers, record
 
@@ -35,8 +35,8 @@ STATE = record(
 LAYOUTS = STATE, record()  # of state and settings, of which there are none
 
 # A leg shorter than SHORT times the longest recent one is not recorded. At each turn the longest one loses
-# FADES of itself, less after shorter legs. A way back is a turn from TURN times this leg and the last one on:
-# when models change, the voltage may go back for a moment.
+# FADES of itself, less after shorter legs. A way back longer than TURN times this leg and the last one is a
+# turn: when models change, the voltage may go back for a moment.
 SHORT, FADES, TURN = 0.05, 0.03, 0.04
 # If a leg is shorter than this part of the next one, the next one, reversed, is better for its direction.
 ALIKE = 0.7
@@ -53,14 +53,6 @@ def _begin_leg(leg: Any, u: Any) -> None:
     leg.turned, leg.width, leg.passed = u, NARROW, 0.0
     for i in range(BINS):
         leg.count[i] = leg.sum_u[i] = leg.sum_x[i] = 0.0
-
-
-@register_jitable
-def _become(leg: Any, other: Any) -> None:
-    """Let a leg become another one."""
-    leg.turned, leg.width, leg.passed = other.turned, other.width, other.passed
-    for i in range(BINS):
-        leg.count[i], leg.sum_u[i], leg.sum_x[i] = other.count[i], other.sum_u[i], other.sum_x[i]
 
 
 @register_jitable
@@ -92,21 +84,22 @@ def _add(leg: Any, u: Any, x: Any) -> None:
 
 @register_jitable
 def _draw(state: Any, curve: Any) -> None:
-    """Draw a polynomial through the bins of a leg, from its beginning to its end."""
-    leg = state.leg
-    curve.begins, curve.apart = leg.turned, np.abs(state.furthest - leg.turned) / (KNOTS - 1.0)
+    """Draw a polynomial through the bins of a leg, from its beginning to its end, as a curve of the loop."""
+    leg, x = state.leg, state.loop.x
+    apart = np.abs(state.furthest - leg.turned) / (KNOTS - 1.0)
+    state.loop.begins[curve], state.loop.apart[curve] = leg.turned, apart
     # Each polynomial and the one before it, in the bins and at the knots: p(t), t = -1...1 along the curve.
     in_bins, bins_before = like(leg.count), like(leg.count)
-    at_knots, knots_before = like(curve.x), like(curve.x)
+    at_knots, knots_before = local(KNOTS), local(KNOTS)
     for i in range(BINS):
         in_bins[i], bins_before[i] = 1.0, 0.0
     for k in range(KNOTS):
-        at_knots[k], knots_before[k], curve.x[k] = 1.0, 0.0, 0.0
+        at_knots[k], knots_before[k], x[curve, k] = 1.0, 0.0, 0.0
     half, norm_before, t = 0.5 * (KNOTS - 1.0), 1.0, like(leg.count)
     for i in range(BINS):
         t[i] = 0.0
         if leg.count[i] > 0.0:
-            t[i] = np.abs(leg.sum_u[i] / leg.count[i] - leg.turned) / (curve.apart * half) - 1.0
+            t[i] = np.abs(leg.sum_u[i] / leg.count[i] - leg.turned) / (apart * half) - 1.0
     for _ in range(DEGREE + 1):
         norm = product = middle = 0.0
         for i in range(BINS):
@@ -121,12 +114,12 @@ def _draw(state: Any, curve: Any) -> None:
             next_one = (t[i] - middle) * in_bins[i] - before * bins_before[i]
             in_bins[i], bins_before[i] = next_one, in_bins[i]
         for k in range(KNOTS):
-            curve.x[k] += share * at_knots[k]
+            x[curve, k] += share * at_knots[k]
             next_one = (k / half - 1.0 - middle) * at_knots[k] - before * knots_before[k]
             at_knots[k], knots_before[k] = next_one, at_knots[k]
     for k in range(1, KNOTS):
-        gone = (curve.x[k] - curve.x[k - 1]) * state.direction
-        curve.x[k] = curve.x[k - 1] + max(gone, STEEP * curve.apart) * state.direction
+        gone = (x[curve, k] - x[curve, k - 1]) * state.direction
+        x[curve, k] = x[curve, k - 1] + max(gone, STEEP * apart) * state.direction
 
 
 @register_jitable
@@ -145,33 +138,20 @@ def _is_known(state: Any) -> bool:
 
 
 @register_jitable
-def _reverse(curve: Any, to: Any, u: Any) -> None:
-    """Use a curve, reversed, for the other direction: loops are about symmetric."""
-    to.begins, to.apart = u, curve.apart
-    for k in range(KNOTS):
-        to.x[k] = curve.x[KNOTS - 1] - (curve.x[k] - curve.x[0])
-
-
-@register_jitable
-def _record(state: Any, curve: Any, other: Any) -> None:
-    """Record a leg; without one about as long in the other direction, it is used for both."""
-    _draw(state, curve)
-    if state.alone == state.direction or other.apart < ALIKE * curve.apart:
-        _reverse(curve, other, state.furthest)
-
-
-@register_jitable
 def _end_leg(state: Any) -> None:
     """Record a leg that is over, if it is known."""
-    loop = state.loop
     if not _is_known(state):
         return
+    loop, curve = state.loop, curve_of(state.direction)
+    other = 1 - curve
     alone = loop.ended == 0.0 or state.alone == state.direction
     state.alone = state.direction if alone else 0.0
-    if state.direction > 0.0:
-        _record(state, loop.up, loop.down)
-    else:
-        _record(state, loop.down, loop.up)
+    _draw(state, curve)
+    if alone or loop.apart[other] < ALIKE * loop.apart[curve]:
+        # Reversed, the curve is used for the other direction, too: loops are about symmetric.
+        loop.begins[other], loop.apart[other] = state.furthest, loop.apart[curve]
+        for k in range(KNOTS):
+            loop.x[other, k] = loop.x[curve, KNOTS - 1] - (loop.x[curve, k] - loop.x[curve, 0])
     loop.ended = state.direction
     state.fresh = 1.0
 
@@ -179,15 +159,17 @@ def _end_leg(state: Any) -> None:
 @register_jitable
 def _turn(state: Any, u: Any) -> None:
     """The way back has become the next leg."""
-    length = np.abs(state.furthest - state.leg.turned)
+    leg, back = state.leg, state.back
+    length = np.abs(state.furthest - leg.turned)
     state.longest = max(state.longest, length)
     if length > SHORT * state.longest:
         _end_leg(state)
     if state.longest > 0.0:
         state.longest -= FADES * length * length / state.longest
-    state.last, state.direction, state.furthest = length, -state.direction, u
-    state.far = 0.0
-    _become(state.leg, state.back)
+    state.last, state.direction, state.furthest, state.far = length, -state.direction, u, 0.0
+    leg.turned, leg.width, leg.passed = back.turned, back.width, back.passed
+    for i in range(BINS):
+        leg.count[i], leg.sum_u[i], leg.sum_x[i] = back.count[i], back.sum_u[i], back.sum_x[i]
 
 
 @register_jitable
@@ -213,21 +195,15 @@ def sample(state: Any, settings: Any, u: Any, x: Any) -> None:
 
 
 @register_jitable
-def _copy(curve: Any, to: Any) -> None:
-    """Write one curve over another."""
-    to.begins, to.apart = curve.begins, curve.apart
-    for k in range(KNOTS):
-        to.x[k] = curve.x[k]
-
-
-@register_jitable
 def write_model(state: Any, settings: Any, model: Any) -> float:
     """Hand over the loop if it is new."""
     loop = state.loop
     if state.fresh == 0.0:
         return NO_MODEL
     state.fresh = 0.0
-    _copy(loop.up, model.up)
-    _copy(loop.down, model.down)
+    for curve in range(2):
+        model.begins[curve], model.apart[curve] = loop.begins[curve], loop.apart[curve]
+        for k in range(KNOTS):
+            model.x[curve, k] = loop.x[curve, k]
     model.ended = loop.ended
     return TO_BE_PLACED

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.controller import driving, slots
+from piezoest.controller import driving
 from piezoest.controller import line as lines
 from piezoest.controller.readings import RECENT
 
@@ -49,14 +49,6 @@ def kept(state: Any, settings: Any, moved: Any, swing: Any) -> float:
     if is_young(state) or state.railed > 0.0:
         left = max(left, 1.0 - 1.0 / _slow(state, settings))
     return left
-
-
-@register_jitable
-def pay(state: Any, settings: Any, moved: Any) -> None:
-    """Pay what is owed."""
-    left = kept(state, settings, moved, state.reference.swing)
-    state.owed *= left
-    slots.pay(state.candidates, left)
 
 
 @register_jitable

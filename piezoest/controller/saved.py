@@ -11,7 +11,7 @@ from piezoest.controller import slots, start, team
 from piezoest.controller.shown import Event
 from piezoest.estimators import saved_state
 from piezoest.estimators.compiled import CompiledEstimator
-from piezoest.layout import FIXED, NUMBER, Kind, Numbers, Record, by_name
+from piezoest.layout import FIXED, NUMBER, Numbers, Record, by_name
 
 FORMAT = 10
 _FIELDS = (
@@ -80,14 +80,13 @@ def _inverses(layout: Record, settings: Any) -> Iterator[tuple[Any, Any]]:
 
 def changeable(layout: Record) -> Record:
     """The layout with numbers that may be others than at the start, but for its lengths."""
-    every = ((name, field if name in layout.lengths else _changed(field)) for name, field in layout.fields)
-    return Record(tuple(every), layout.functions)
-
-
-def _changed(field: Any) -> Any:
-    if isinstance(field, Numbers):
-        return Numbers(field.shape, NUMBER)
-    return NUMBER if isinstance(field, Kind) and field == FIXED else field
+    changed = dict(layout.fields)
+    for name, field in layout.fields:
+        if isinstance(field, Numbers):
+            changed[name] = Numbers(field.shape, NUMBER)
+        elif field == FIXED and name not in layout.lengths:
+            changed[name] = NUMBER
+    return Record(tuple(changed.items()), layout.functions)
 
 
 def block(r: FloatArray | None) -> Any:

@@ -106,11 +106,11 @@ def forget(slots: Any) -> None:
 
 
 @register_jitable
-def pay(slots: Any, kept: Any) -> None:
-    """Keep a fraction of what is owed."""
+def pay(slots: Any, left: Any) -> None:
+    """Pay what is owed, but for a fraction that is left."""
     if slots is not None:
-        slots.model.score.owed *= kept
-        pay(slots.others, kept)
+        slots.model.score.owed *= left
+        pay(slots.others, left)
 
 
 # ---------------------------------------------------------------- one of them, by its number: 0 is the line

@@ -116,10 +116,8 @@ def widest(travel: Any) -> float:
 
 @register_jitable
 def progress(travel: Any, gone: Any) -> float:
-    """The weight of a sample: about one in all for a leg as long as the widest swing, less for a shorter one.
-
-    Half by travel, half by time; rests soon count nothing.
-    """
+    """The weight of a sample: about one in all for a leg as long as the widest swing, else less."""
+    # Half by travel, half by time; rests soon count nothing.
     usual = max(travel.usual, 8.0)
     by_time = 1.0 / max(usual, travel.count) if travel.count < 2.0 * usual else 0.0
     wide = widest(travel)

@@ -33,10 +33,8 @@ def is_held(settings: Any, u: Any, way: Any) -> bool:
 
 @register_jitable
 def written(state: Any, settings: Any, u: Any) -> float:
-    """The voltage that was written, u according to the user: the planned one if u is near it.
-
-    From a rounded voltage a small way would be rounded away again; the errors of a monitor would add up.
-    """
+    """The voltage that was written, u according to the user: the planned one if u is near it."""
+    # From a rounded voltage a small way would be rounded away again; the errors of a monitor would add up.
     near = np.abs(state.planned - u) <= OFF * (settings.maximum - settings.minimum)
     return state.planned if near else u
 
@@ -77,10 +75,8 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
 
 @register_jitable
 def _nearer(state: Any, settings: Any, target: Any) -> float:
-    """The next voltage on the way to a target: faster and faster from the beginning, and slower at the end.
-
-    Where the stage has answered it is fast: else it would never reach a reference that goes to and fro.
-    """
+    """The next voltage on the way to a target: faster and faster at first, and slower at the end."""
+    # Where the stage has answered it is fast: else it would never reach a reference that goes to and fro.
     start = state.start
     span = max(np.abs(state.u - start.origin), state.confirmed)
     doubling = max(settings.doubling, LATE * start.lag, state.gap)

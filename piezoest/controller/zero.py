@@ -19,10 +19,7 @@ LEAST_SLOPE, NEAR_IT, NEARER = 0.2, 0.6, 0.5
 
 @register_jitable
 def follow(state: Any) -> None:
-    """If the reference has moved too, or the line is not sure, follow a moved zero at once.
-
-    Otherwise the line stays for long, because the gauge may come back. Then the gauge is believed.
-    """
+    """Follow a zero that has moved: at once if the reference has moved too, or the line is not sure."""
     readings, line = state.readings, state.line
     if readings.off < OFF_FOR:
         return
@@ -38,6 +35,7 @@ def follow(state: Any) -> None:
     near = miss < NEAR_IT * np.abs(line.gain) * state.travel.swing
     # A reference to which the readings are closer than the line has moved with them.
     near = near or miss < NEARER * np.abs(lines.at(line, state.u) - state.r)
+    # Otherwise the line stays for long, because the gauge may come back. Then the gauge is believed.
     if sure and not near and readings.off < HELD_FOR:
         if known and readings.off > MOVED_FOR:
             readings.fault = faults.MOVED

@@ -86,8 +86,8 @@ def test_after_other_turns_it_goes_as_plays_do(turns: tuple[float, ...]) -> None
     # Without memory, on the absolute curves, it would be up to half a loop beside.
     absolute = np.where(
         np.diff(more[8:]) > 0.0,
-        np.interp(more[9:], np.linspace(-1.0, 1.0, 17), given.inverse.up.x),
-        np.interp(-more[9:], np.linspace(-1.0, 1.0, 17), given.inverse.down.x),
+        np.interp(more[9:], np.linspace(-1.0, 1.0, 17), given.inverse.x[0]),
+        np.interp(-more[9:], np.linspace(-1.0, 1.0, 17), given.inverse.x[1]),
     )
     assert np.abs(absolute - x[u.size + 9 :]).max() > 0.05
 
@@ -95,11 +95,11 @@ def test_after_other_turns_it_goes_as_plays_do(turns: tuple[float, ...]) -> None
 def test_the_first_leg_stands_for_both_directions() -> None:
     u, x = loop(0.6)
     state = recorded(u, x)
-    up, down = state.loop.up, state.loop.down
-    np.testing.assert_allclose(np.diff(up.x), -np.diff(down.x))
-    np.testing.assert_allclose(up.x[[0, -1]], down.x[[-1, 0]])
-    state = recorded(*loop(1.2))
-    assert np.abs(np.diff(state.loop.up.x) + np.diff(state.loop.down.x)).max() > 1e-3
+    up, down = state.loop.x
+    np.testing.assert_allclose(np.diff(up), -np.diff(down))
+    np.testing.assert_allclose(up[[0, -1]], down[[-1, 0]])
+    up, down = recorded(*loop(1.2)).loop.x
+    assert np.abs(np.diff(up) + np.diff(down)).max() > 1e-3
 
 
 def test_a_leg_stands_for_a_much_shorter_one_before_it() -> None:
@@ -107,8 +107,8 @@ def test_a_leg_stands_for_a_much_shorter_one_before_it() -> None:
     u = np.interp(np.arange(0.0, 3.0, 0.002), np.arange(4), [0.0, 0.5, -1.0, -0.9])
     x = plays(u)
     state = recorded(u, x)
-    up, down = state.loop.up, state.loop.down
-    assert up.apart == pytest.approx(down.apart, rel=0.1)
+    up, down = state.loop.apart
+    assert up == pytest.approx(down, rel=0.1)
     back = plays(np.interp(np.arange(0.0, 4.0, 0.002), np.arange(5), [0.0, 0.5, -1.0, 0.5, 0.4]))[1000:1501]
     own, given = placed(state, -0.9)
     np.testing.assert_allclose(
@@ -122,9 +122,9 @@ def test_a_direction_that_is_never_recorded_is_the_other_one_reversed() -> None:
     """A sawtooth flies back in a few samples."""
     u = np.concatenate([np.linspace(0.0, 1.0, 200), *[np.linspace(-1.0, 1.0, 400)] * 3, [0.5]])
     state = recorded(u, 2.0 * u)
-    up, down = state.loop.up, state.loop.down
-    assert (up.begins, down.begins) == (pytest.approx(-1.0, abs=0.01), pytest.approx(1.0, abs=0.01))
-    np.testing.assert_allclose(down.x, up.x[::-1], atol=1e-9)
+    up, down = state.loop.x
+    np.testing.assert_allclose(state.loop.begins, (-1.0, 1.0), atol=0.01)
+    np.testing.assert_allclose(down, up[::-1], atol=1e-9)
 
 
 @pytest.mark.parametrize("change", [0.0, 0.01, -0.01], ids=["equal", "growing", "shrinking"])
@@ -152,7 +152,7 @@ def test_closed_inner_loops_do_not_drift(size: float) -> None:
 def test_numbers_that_were_changed_do_not_stop_it() -> None:
     u, x = loop()
     own, given = placed(recorded(u, x), float(u[-1]))
-    given.inverse.down.apart = 0.0
+    given.inverse.apart[1] = 0.0
     assert recorded_loop.wanted(own, given, 0.3) == 0.3
 
 
@@ -191,7 +191,7 @@ def test_the_inverse_is_exact_wherever_it_turns(seed: int, longer: float) -> Non
     """Also between curves of unlike length: a way back may be a turn for one direction alone."""
     u, x = loop()
     own, given = placed(recorded(u, x), float(u[-1]))
-    given.inverse.down.apart *= longer
+    given.inverse.apart[1] *= longer
     # Turns anywhere, also beyond both ends, and rests; then small ones.
     rng = np.random.default_rng(seed)
     r = np.interp(np.arange(0.0, 29.0, rng.uniform(0.02, 1.0)), np.arange(30), rng.uniform(-1.3, 1.3, 30))
@@ -250,21 +250,20 @@ def test_a_leg_goes_on_behind_a_small_way_back(size: float) -> None:
     back = u[k] - size * np.concatenate([np.linspace(0.0, 1.0, 9), np.linspace(1.0, 0.0, 9)])
     goes_back = np.concatenate([u[:k], back, u[k:], [0.9]])
     found = recorded(goes_back, plays(goes_back)).loop
-    for curve, other in ((plain.up, found.up), (plain.down, found.down)):
-        np.testing.assert_allclose(other.x, curve.x, atol=1e-3)
-        assert (other.begins, other.apart) == (curve.begins, curve.apart)
+    np.testing.assert_allclose(found.x, plain.x, atol=1e-3)
+    np.testing.assert_array_equal((found.begins, found.apart), (plain.begins, plain.apart))
 
 
 def test_a_rest_noise_and_ringing_are_not_recorded() -> None:
     u, x = loop()
     t, plain = np.arange(u.size), recorded(u, x).loop
     rests = np.insert(u, 500, np.full(3000, u[499])), np.insert(x, 500, np.full(3000, x[499] - 0.1))
-    np.testing.assert_array_equal(recorded(*rests).loop.down.x, plain.down.x)
+    np.testing.assert_array_equal(recorded(*rests).loop.x[1], plain.x[1])
     rings = x + 0.02 * np.sin(2.0 * np.pi * t / 20.0) + np.random.default_rng(0).normal(0.0, 0.01, t.size)
     noisy = recorded(u, rings).loop
-    for curve, other, direction in ((plain.up, noisy.up, 1.0), (plain.down, noisy.down, -1.0)):
-        assert np.abs(curve.x - other.x)[1:-1].max() < 0.01
-        assert np.all(np.diff(other.x) * direction > 0.0)
+    for curve, other, direction in zip(plain.x, noisy.x, (1.0, -1.0), strict=True):
+        assert np.abs(curve - other)[1:-1].max() < 0.01
+        assert np.all(np.diff(other) * direction > 0.0)
 
 
 @pytest.mark.parametrize("end", [None, 0.3, 0.75])
@@ -272,20 +271,20 @@ def test_small_waves_and_a_leg_that_is_read_in_part_leave_it(end: float | None) 
     """A polynomial is wild where it has no points, as in a block that is planned ahead."""
     u, x = loop()
     state = recorded(np.append(u, 0.9), np.append(x, 0.9))  # the last leg is over
-    before = state.loop.up.x.copy(), state.loop.down.x.copy()
+    before = state.loop.x.copy()
     if end is None:  # the setpoint of a long rest is noisy, and readings are missing
         small = 0.9 + 0.02 * np.sin(0.35 * np.arange(10_000))
         recorded(small, np.where(np.arange(small.size) % 2, np.nan, 0.0), state)
     else:
         blind = (np.arange(u.size) - 1) % 200 >= 200.0 * end  # the end, too
         recorded(u, np.where(blind, np.nan, 2.0 * x), state)
-    np.testing.assert_array_equal((state.loop.up.x, state.loop.down.x), before)
+    np.testing.assert_array_equal(state.loop.x, before)
 
 
 def test_a_smaller_motion_is_recorded_anew() -> None:
     state = recorded(*loop(3.0, largest=0.2), recorded(*loop(2.0)))
-    assert state.loop.up.begins == pytest.approx(-0.2, abs=0.01)
-    assert 16.0 * state.loop.down.apart == pytest.approx(0.4, abs=0.02)
+    assert state.loop.begins[0] == pytest.approx(-0.2, abs=0.01)
+    assert 16.0 * state.loop.apart[1] == pytest.approx(0.4, abs=0.02)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
