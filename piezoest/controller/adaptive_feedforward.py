@@ -363,12 +363,15 @@ class AdaptiveFeedforward(Face):
         chosen = (data[name] for name in ("corridor", "gain", "feedback", "resonance", "learnt_on"))
         options = making.options(sample_rate, *chosen)
         controller._make(sample_rate, limits, options, estimators)
-        layouts = controller._layouts
-        write(controller._state, saved.read_state(data["state"], layouts[0], controller._state))
-        write(controller._settings, saved.read_models(data["models"], layouts[1], controller._settings))
-        if data["planned"] is not None:
-            controller._planned = array_1d("planned", data["planned"], allow_nan=True).copy()
-        controller._events.extend(saved.read_events(data["events"]))
-        for number in range(len(controller._names)):
-            controller._model(number)  # what makes no model is refused
+        controller._load(data)
         return controller
+
+    def _load(self, data: dict[str, Any]) -> None:
+        """Go on from what was saved."""
+        write(self._state, saved.read_state(data["state"], self._layouts[0], self._state))
+        write(self._settings, saved.read_models(data["models"], self._layouts[1], self._settings))
+        if data["planned"] is not None:
+            self._planned = array_1d("planned", data["planned"], allow_nan=True).copy()
+        self._events.extend(saved.read_events(data["events"]))
+        for number in range(len(self._names)):
+            self._model(number)  # what makes no model is refused

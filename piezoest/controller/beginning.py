@@ -38,7 +38,7 @@ def begin_learning(state: Any) -> None:
 @register_jitable
 def _begin_again(state: Any, settings: Any, u: Any, x: Any) -> None:
     """Begin the way to the reference from a voltage where the stage stands at x; the gain is known."""
-    starts.rest_at(state.start, settings.start, u, x, state.line.gain)
+    starts.rest_at(state.start, settings, u, x, state.line.gain)
     begin_learning(state)
 
 
@@ -55,7 +55,7 @@ def home(state: Any, settings: Any, u: Any, x: Any) -> None:
         return
     if state.unit == 0.0:
         state.stage = SEEK
-        starts.begin_again(state.start, settings.start, u)
+        starts.begin_again(state.start, settings, u)
         return
     here = lines.at(line, u)
     if recent.count > 0.0:

@@ -129,7 +129,7 @@ def resume(state: Record, settings: Record, u: float, x: float) -> Any:
     state.pace.count = 0.0
     starts.begin(state.start, u)
     # A gain that was refuted is not tried again.
-    starts.rest_at(state.start, settings.start, u, x, state.start.given * settings.start.gain)
+    starts.rest_at(state.start, settings, u, x, state.start.given * settings.start.gain)
     state.start.told = 1.0
     return True
 

@@ -219,7 +219,7 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
 def _seek(state: Any, settings: Any, u: Any, x: Any) -> None:
     """Look for the gain; when it is found all models begin."""
     paces.follow(state.pace, state.start, u, x)
-    starts.learn(state.start, settings.start, u, x)
+    starts.learn(state.start, settings, u, x)
     if state.scale > 0.0:
         slots.advance(state.candidates, settings.candidates, u)
     _name_silence(state, settings)

@@ -119,8 +119,6 @@ def _settings_of(sample_rate: float, limits: VoltageLimits, options: dict[str, A
             "longest": 0.1 * width,
             "ramp": max(4.0, 7e-3 * sample_rate),
             "window": max(3.0, 2.5e-3 * sample_rate),
-            "lowest": limits.minimum,
-            "highest": limits.maximum,
         },
     }
 

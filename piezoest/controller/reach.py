@@ -29,7 +29,7 @@ def seek_again(state: Any, settings: Any) -> None:
     state.stage, state.driving = SEEK, 0.0
     feedback.forget(state)
     state.start.least = np.abs(state.u - state.start.origin)
-    starts.begin_again(state.start, settings.start, state.u)
+    starts.begin_again(state.start, settings, state.u)
 
 
 @register_jitable

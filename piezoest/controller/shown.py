@@ -86,30 +86,30 @@ def event(state: Any, sample_rate: float, learnt_on: Any) -> Event:
     if not name:
         return Event(time, "resumed", "the readings follow the voltage again")
     action = "fell back" if number == state["readings"]["fault"] else "went on"
-    start = {each: float(state["start"][each]) + 0.0 for each in ("gain", "gain_before")}
-    here = {"wanted": seen["r"], "there": seen["x"], "limit": seen["u"]}
-    here["silence"] = float(state["silent"]) / sample_rate
-    figures = start | here | _pace(state, sample_rate) | _outside(state, learnt_on)
+    figures = _figures(state, sample_rate, learnt_on)
     return Event(time, action, f"{name}: {faults.MEANINGS[name].format_map(figures)}")
 
 
-def _pace(state: Any, sample_rate: float) -> dict[str, float]:
-    """Frequency of the reference [Hz]; how late the readings are [ms], and how wide a loop that makes [%]."""
-    period, lag = max(float(state["pace"]["period"]), 1.0), float(state["start"]["lag"])
-    return {
+def _figures(state: Any, sample_rate: float, learnt_on: Any) -> dict[str, Any]:
+    """Figures for the texts in `faults.MEANINGS`: times in s, the lag in ms, the loop that it makes in %."""
+    start, seen = state["start"], state["seen"]
+    period, lag = max(float(state["pace"]["period"]), 1.0), float(start["lag"])
+    figures = {
+        "gain": float(start["gain"]) + 0.0,
+        "gain_before": float(start["gain_before"]) + 0.0,
+        "wanted": seen["r"],
+        "there": seen["x"],
+        "limit": seen["u"],
+        "silence": float(state["silent"]) / sample_rate,
         "frequency": sample_rate / period,
         "lag": 1e3 * lag / sample_rate,
         "width": 100.0 * WAVE * lag / period,
     }
-
-
-def _outside(state: Any, learnt_on: Any) -> dict[str, str]:
-    """Where reference and voltage were outside, and of what."""
     if learnt_on is None:
-        return {}
+        return figures
     units = {"displacement": "µm", "voltage": "V"}
-    known = {name: ends(learnt_on[name], unit) for name, unit in units.items()}
-    return known | {name: figure(float(state["seen"][name])) for name in ("r", "u")}
+    ranges = {name: ends(learnt_on[name], unit) for name, unit in units.items()}
+    return figures | ranges | {name: figure(float(seen[name])) for name in ("r", "u")}
 
 
 def misses(state: Any) -> list[float | None]:

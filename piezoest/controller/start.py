@@ -47,10 +47,8 @@ START = record(
     # shortest first way, zero for the usual one [V].
     ahead=FLAG, told=FLAG, least=AMOUNT,
 )  # fmt: skip
-# First and longest way [V], samples of a way, of a window; the limits; the user's gain, zero for none.
-SETTINGS = record(
-    way=FIXED, longest=FIXED, ramp=FIXED, window=FIXED, lowest=FIXED, highest=FIXED, gain=FIXED
-)  # fmt: skip
+# First and longest way [V], samples of a way, of a window; the user's gain, zero for none.
+SETTINGS = record(way=FIXED, longest=FIXED, ramp=FIXED, window=FIXED, gain=FIXED)
 
 # A clear answer exceeds so many times the noise at rest, the scatter within a window, and the step of the
 # converter (fewer on the longest way); two answers are alike within this factor.
@@ -103,9 +101,9 @@ def _go_to(start: Any, u: Any, target: Any) -> None:
 def _go(start: Any, settings: Any, u: Any) -> None:
     """Begin the next way; in the other direction if there is no room ahead."""
     ahead = u + start.way
-    if not settings.lowest <= ahead <= settings.highest:
+    if not settings.minimum <= ahead <= settings.maximum:
         start.way = -start.way
-    _go_to(start, u, min(max(u + start.way, settings.lowest), settings.highest))
+    _go_to(start, u, min(max(u + start.way, settings.minimum), settings.maximum))
 
 
 @register_jitable
@@ -118,7 +116,7 @@ def _go_back(start: Any, u: Any, target: Any) -> None:
 @register_jitable
 def begin_again(start: Any, settings: Any, u: Any) -> None:
     """Go to a rest voltage near 0 V, but not at a limit, and start there again."""
-    rest = min(max(0.0, settings.lowest + settings.way), settings.highest - settings.way)
+    rest = min(max(0.0, settings.minimum + settings.start.way), settings.maximum - settings.start.way)
     begin(start, rest)
     start.voltage, start.tries = u, 0.5
     _go_back(start, u, rest)
@@ -128,8 +126,8 @@ def begin_again(start: Any, settings: Any, u: Any) -> None:
 def rest_at(start: Any, settings: Any, u: Any, x: Any, gain: Any) -> None:
     """The stage rests, and the reading is x: go the first way, or none if the gain is known and not zero."""
     start.from_x = start.zero = start.now = x
-    way = min(max(settings.way, start.least), settings.longest)
-    start.way = way if settings.highest - u >= u - settings.lowest else -way
+    way = min(max(settings.start.way, start.least), settings.start.longest)
+    start.way = way if settings.maximum - u >= u - settings.minimum else -way
     _go(start, settings, u)
     if gain != 0.0:
         start.stage, start.gain = DONE, gain
@@ -149,7 +147,7 @@ def _settle_rest(start: Any, settings: Any, u: Any) -> None:
         first[j] = value
     # The farthest one may be wrong and does not count.
     start.noise = 0.6 * min(first[FIRST - 1] - first[1], first[FIRST - 2] - first[0])
-    rest_at(start, settings, u, first[FIRST // 2], start.given * settings.gain)
+    rest_at(start, settings, u, first[FIRST // 2], start.given * settings.start.gain)
 
 
 @register_jitable
@@ -164,8 +162,8 @@ def _move(start: Any, settings: Any) -> None:
     """The next voltage of a way."""
     start.samples += 1.0
     # A way back from afar takes longer.
-    longer = max(1.0, np.abs(start.target - start.from_u) / settings.longest)
-    share = start.samples / (longer * settings.ramp)
+    longer = max(1.0, np.abs(start.target - start.from_u) / settings.start.longest)
+    share = start.samples / (longer * settings.start.ramp)
     start.voltage = smooth(start.from_u, start.target, share)
     if share >= 1.0:
         start.stage, start.voltage, start.windows = WAIT, start.target, 0.0
@@ -180,7 +178,7 @@ def _fills_window(start: Any, settings: Any, x: Any) -> bool:
     start.ramp += start.summed * off
     start.squares += off * off
     count = start.summed
-    if count < settings.window:
+    if count < settings.start.window:
         return False
     mean = start.sum / count
     # A trend is no noise: the stage still moves.
@@ -199,14 +197,14 @@ def _fills_window(start: Any, settings: Any, x: Any) -> bool:
 def _rests(start: Any, settings: Any) -> bool:
     """Whether the stage has come to rest."""
     # With ringing or noise the means differ by chance.
-    chance = 3.0 * start.scatter * np.sqrt(2.0 / settings.window) + 0.5 * start.noise
+    chance = 3.0 * start.scatter * np.sqrt(2.0 / settings.start.window) + 0.5 * start.noise
     most = STILL * np.abs(start.now - start.from_x) + chance
     # A slow stage may still move, hidden by chance for one window.
-    slow = start.change * settings.ramp < SLOW * np.abs(start.now - start.from_x)
+    slow = start.change * settings.start.ramp < SLOW * np.abs(start.now - start.from_x)
     moves = np.abs(start.mean - start.mean_before)
     still = moves < most and (not slow or np.abs(start.mean - start.oldest_mean) < most)
     # A stage that slews keeps its speed until it is there.
-    slews = moves > max(SLEWS * settings.window * start.change, chance)
+    slews = moves > max(SLEWS * settings.start.window * start.change, chance)
     enough = MOST_SLEWING if slews else MOST_WINDOWS
     least = 1.0 if np.abs(start.now - start.from_x) > _clear(start, STEPS) else LATE
     return start.windows > least and ((still and not slews) or start.windows >= enough)
@@ -225,13 +223,13 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     start.gain_before, start.gain = start.gain, answer / (u - start.from_u) if u != start.from_u else 0.0
     # A sensor that has not changed at all on all ways is tested again by the shortest one only.
     dead = start.step == 0.0 and start.tries >= 1.0
-    longest = np.abs(start.way) >= settings.longest or dead
+    longest = np.abs(start.way) >= settings.start.longest or dead
     bound = _clear(start, FEW_STEPS if longest else STEPS)
     clear = u != start.from_u and np.abs(answer) > bound
     rests = start.windows <= AT_ONCE and np.abs(start.mean - start.now) < CLOSE * np.abs(answer)
     # An answer slower than the voltage may not be complete yet: a slow amplifier, or a lag.
     change = start.change / np.abs(start.gain) if start.gain != 0.0 else 0.0
-    start.fastest = change if change < SLOW * np.abs(u - start.from_u) / settings.ramp else 0.0
+    start.fastest = change if change < SLOW * np.abs(u - start.from_u) / settings.start.ramp else 0.0
     sure = rests and np.abs(answer) > SURE * bound and start.told == 0.0 and start.fastest == 0.0
     alike = sure or (start.ways > 0.0 and 1.0 / ALIKE < start.gain / start.gain_before < ALIKE)
     start.from_x = start.now
@@ -249,10 +247,10 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
         start.ways = 0.0
         start.tries += 1.0
         beyond = start.origin - OVERSHOOT * (u - start.origin)
-        _go_back(start, u, min(max(beyond, settings.lowest), settings.highest))
+        _go_back(start, u, min(max(beyond, settings.minimum), settings.maximum))
         return
     start.way *= CHECK if clear and start.ways == 0.0 else 2.0
-    start.way = np.sign(start.way) * min(np.abs(start.way), settings.longest)
+    start.way = np.sign(start.way) * min(np.abs(start.way), settings.start.longest)
     start.ways += clear
     _go(start, settings, u)
 
@@ -271,7 +269,7 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
         follows = np.abs(u - start.voltage) <= FOLLOWS * np.abs(start.target - start.from_u)
         fine = known if start.stage == REST else follows and (known or start.stage == GO)
         start.stuck = 0.0 if fine else start.stuck + 1.0
-        if start.stuck > STUCK * settings.window:
+        if start.stuck > STUCK * settings.start.window:
             start.stage, start.samples, start.stuck = SILENT, 0.0, 0.0
             start.tries += 1.0
     if start.stage == GO:
@@ -283,7 +281,7 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
         # Planned before the readings come: the first way begins after as many samples as they will take.
         start.samples += 1.0
         if start.samples >= FIRST:
-            rest_at(start, settings, u, 0.0, start.given * settings.gain)
+            rest_at(start, settings, u, 0.0, start.given * settings.start.gain)
     elif start.stage == REST and known:
         start.first[int(start.samples)] = x
         start.samples += 1.0
@@ -295,5 +293,5 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
     elif start.stage == SILENT:
         start.samples += 1.0
         # Less and less often, because it moves the stage for nothing.
-        if start.samples >= PAUSE * settings.window * 2.0 ** min(start.tries, LONGEST_PAUSE):
-            start.stage, start.samples, start.way = REST, 0.0, settings.way
+        if start.samples >= PAUSE * settings.start.window * 2.0 ** min(start.tries, LONGEST_PAUSE):
+            start.stage, start.samples, start.way = REST, 0.0, settings.start.way
