@@ -10,10 +10,6 @@ from piezoest.bench.cases import RIGHT_GAIN, RIGHT_MODEL, Case
 from piezoest.bench.scenarios import DRIFT, GAIN_RAMP, SCENARIOS
 from piezoest.signals import check_continuity
 
-NAMES = [
-    "cold-start", "amplitude-switch", "amplitude-drop", "gain-step", "drift",
-    "dwell", "prbs", "random-walk", "two-tone", "noise",
-]  # fmt: skip
 EVERY = pytest.mark.parametrize("name", SCENARIOS)
 SMALL: dict[str, Any] = {"sample_rate": 4000.0, "before": 3, "after": 4, "rest": 0.5, "drift": 1.0}
 
@@ -25,11 +21,6 @@ def case(name: str, seed: int = 0, **overrides: Any) -> Case:
 def factors(made: Case) -> np.ndarray[Any, np.dtype[np.float64]]:
     times, values = np.array(made.gain_schedule or ((0.0, 1.0),)).T
     return np.interp(made.reference.time, times, values)
-
-
-def test_names_are_for_good() -> None:
-    assert list(SCENARIOS)[: len(NAMES)] == NAMES
-    assert all(scenario.name == name and scenario.description for name, scenario in SCENARIOS.items())
 
 
 @EVERY

@@ -73,14 +73,6 @@ def test_a_learn_that_is_left_out_does_not_matter() -> None:
         assert driver.status.driving == whole.status.driving
 
 
-def test_nobody_need_learn() -> None:
-    driver, _, _ = drive(lambda _, x: x)
-    voltages = np.array([driver.step(float(r)) for r in TRIANGLE])
-    line = driver.candidates[0].model
-    # Beside the line by no more than before, however long.
-    assert np.abs(voltages - (TRIANGLE - line.offset) / line.gain).max() < 0.4 * 5.0 / line.gain
-
-
 @pytest.mark.parametrize("step", [0.05, 0.2, 0.4])
 def test_a_coarse_sensor_is_enough(step: float) -> None:
     driver, _, x = drive(lambda _, x: step * round(x / step))
@@ -115,14 +107,6 @@ def test_readings_that_do_not_come_are_reported_once_and_so_is_their_return() ->
         ("resumed", ""),
     ]
     assert driver.events[0].time == pytest.approx(1.8, abs=0.01)
-
-
-def test_a_sensor_that_has_never_given_a_reading_is_reported() -> None:
-    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
-    for r_k in TRIANGLE[:6000].tolist():
-        driver.learn(driver.step(r_k), None)
-    assert driver.events[0].name == "no readings"
-    assert driver.voltage == 0.0
 
 
 def test_between_rare_readings_the_approach_does_not_go_too_far() -> None:

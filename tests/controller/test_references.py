@@ -50,18 +50,6 @@ def test_wide_waves_behind_a_small_scan_are_learnt() -> None:
     assert last_error(r, drive(driver, stage, r).x, 800) < 0.12
 
 
-def test_noise_of_a_reference_at_rest_is_no_scan() -> None:
-    rng = np.random.default_rng(0)
-    driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS), pz.SimulatedStage(FS, LOOP)
-    wave = pz.signals.triangle(5.0, 5.0, 6, FS).values
-    gains = []
-    for r_k in (*wave.tolist(), *(1e-3 * rng.normal(size=20_000)).tolist()):
-        u = driver.step(r_k)
-        driver.learn(u, stage.step(u) + 1e-3 * rng.normal())
-        gains.append(float(driver.state["line"]["gain"]))
-    assert np.abs(np.array(gains[wave.size :]) / gains[wave.size - 1] - 1.0).max() < 0.05
-
-
 @pytest.mark.parametrize("drift", [0.001, 0.003])
 def test_a_small_scan_that_drifts_is_learnt(drift: float) -> None:
     """Before, each sample that went farther than all others was a way on: 10 nm of error instead of 0.2."""

@@ -183,14 +183,6 @@ def test_models_learn_with_a_gain_that_is_about_right_and_anew_with_one_that_was
     assert last_error(SINE, x[SINE.size :]) < 0.1
 
 
-def test_a_reference_out_of_reach_is_no_reason_to_begin_again() -> None:
-    driver, beyond = controller(), 40.0 + 2.0 * np.sin(2.0 * np.pi * np.arange(10 * 500) / 500.0)
-    u, _, stages = drive(driver, loop(), beyond)
-    last = stages.index("running")
-    assert "seeking" not in stages[last:]
-    np.testing.assert_array_equal(u[-2000:], driver.limits.maximum)
-
-
 # Hum that passes for the answer to the first small ways: the gain is doubted, and sought again.
 FAST, SLOPE, SWEPT = 10_000.0, 0.06, 2.5
 UNIPOLAR, BIASED, BIPOLAR = (0.0, 150.0), (-20.0, 120.0), (-100.0, 100.0)
