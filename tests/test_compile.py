@@ -1,8 +1,6 @@
 """Compiled functions on named numbers: machine code and Python do the same, and nothing else compiles."""
 
-import copy
 import itertools
-import pickle
 from typing import Any
 
 import pytest
@@ -96,28 +94,6 @@ def test_unknown_names_are_refused() -> None:
         new(layout_of(2), law={"cuont": 1.0})
     with pytest.raises(ValueError, match=r"\['plays'\] are names of fields and of lengths"):
         record(plays=COUNT, u=numbers(Length("plays", 3)))
-
-
-def test_layouts_are_values() -> None:
-    layout = layout_of(4)
-    for same in (layout_of(4), copy.deepcopy(layout), pickle.loads(pickle.dumps(layout))):
-        assert same == layout
-        assert hash(same) == hash(layout)
-    others = (layout_of(5), record(**dict(layout.fields[:-1])), Layout(layout.fields, "piezoest.layout"))
-    assert len({layout, *others}) == 4
-
-
-def test_named_reads_and_writes_the_array() -> None:
-    state = new(layout_of(2), total=5.0)
-    named: Any = Named(state, layout_of(2))
-    assert type(named.total) is float
-    assert named.rates is None
-    named.law.theta[1] = 3.0
-    named.memory.last = 4.0
-    assert (state["law"]["theta"][1], state["memory"]["last"]) == (3.0, 4.0)
-    for misspelt in (lambda: named.law.thetta, lambda: setattr(named.law, "thetta", 1.0)):
-        with pytest.raises((ValueError, KeyError, AttributeError), match="thetta"):
-            misspelt()
 
 
 @settings(max_examples=25)

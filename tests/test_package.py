@@ -10,7 +10,6 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import piezoest
@@ -69,15 +68,7 @@ FS, LIMITS = 1000.0, pz.VoltageLimits(-50.0, 100.0)
     ("mistake", "words"),
     [
         (lambda: pz.PaperStage(FS).run(None), "must be an array, got None"),
-        (
-            lambda: pz.InverseCompensator(pz.ColemanHodgdon(-1.0, 1.0, 1.0)),
-            "alpha and beta must be above zero",
-        ),
-        (lambda: pz.identify([np.nan] * 200, [0.0] * 200, sample_rate=FS), "voltage has no finite sample"),
-        (
-            lambda: pz.track([0.0], stage=object(), controller=1, sample_rate=FS),
-            "must have step(u), or run(u)",
-        ),
+        (lambda: pz.track([0.0], stage=object(), controller=1, sample_rate=FS), "must have step(u)"),
         (lambda: pz.foo, "piezoest has no attribute 'foo'"),
     ],
 )
@@ -89,18 +80,11 @@ def test_messages_name_the_mistake(mistake: Any, words: str) -> None:
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (
-            lambda: pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=()),
-            "(1000 Hz): seeking, line drives>",
-        ),
-        (lambda: pz.InverseCompensator(pz.LinearGain(0.5)), "<InverseCompensator: LinearGain(gain=0.5"),
-        (
-            lambda: pz.IntegralFeedback(pz.LinearCompensator(pz.LinearGain(0.5)), gain=5.0, sample_rate=FS),
-            "around <LinearCompensator",
-        ),
-        (lambda: pz.PaperStage(FS), "<PaperStage(1000 Hz): PrandtlIshlinskii>"),
-        (lambda: pz.RecursiveLeastSquares(2), "theta [0., 0.]>"),
-        (lambda: pz.EstimatorBank(pz.HysteresisRLS(FS), 3), "<EstimatorBank: 3 channels of HysteresisRLS>"),
+        (lambda: pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=()), "seeking"),
+        (lambda: pz.InverseCompensator(pz.LinearGain(0.5)), "gain=0.5"),
+        (lambda: pz.PaperStage(FS), "1000 Hz"),
+        (lambda: pz.RecursiveLeastSquares(2), "[0., 0.]"),
+        (lambda: pz.EstimatorBank(pz.HysteresisRLS(FS), 3), "3 channels"),
     ],
 )
 def test_texts_are_short(make: Any, text: str) -> None:

@@ -95,8 +95,7 @@ def test_names_and_units_above_rows_that_blanks_part(tmp_path: Path, above: str)
 
 
 COMMENTS = (
-    "# measured by me", "# t x y", '# a 5" stage', "# a b c", "# 1 2 3", "# fs = 10",
-    "# voltage and position",
+    "# measured by me", "# t x y", "# a b c", "# 1 2 3", "# fs = 10", "# voltage and position",
 )  # fmt: skip
 
 

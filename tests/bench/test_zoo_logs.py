@@ -56,13 +56,3 @@ def test_the_delay_is_what_the_log_says() -> None:
             errors.append(np.std((log.truth - x)[10:]))
         assert delays[np.argmin(errors)] == pytest.approx(log.added.get("delay", 0.0), abs=0.26)
         assert min(errors) < 2e-3 * log.stroke
-
-
-def test_a_clean_log_of_a_family() -> None:
-    for seed in range(10):
-        log = logs.draw(seed, family="duhem", clean=True)
-        assert log.family == "duhem"
-        assert not {"creep", "drift", "jumps", "spikes"} & set(log.added)
-        assert not log.spikes.any()
-    with pytest.raises(ValueError, match="family must be one of"):
-        logs.draw(0, family="unheard-of")

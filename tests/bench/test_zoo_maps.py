@@ -33,20 +33,6 @@ def test_shares_count_what_is_asked_for() -> None:
     assert (found["by_family"][0]["runs"], found["other_places"][0]["switch"]) == (21, 1.0)
 
 
-@pytest.mark.parametrize("frequency", settling.FREQUENCIES)
-def test_a_cell_has_a_resonance_and_samples_enough(frequency: float) -> None:
-    for seed in range(6):
-        rig = settling.cell_rig(settling.Cell("relays", 1.0, frequency, seed))
-        resonance, damping = rig.around.resonance
-        assert 400.0 <= resonance <= 780.0
-        assert damping == 0.01
-        assert rig.sample_rate > 0.99 * settling.SLOWEST
-        assert rig.plain.cycle == round(rig.sample_rate / frequency) >= settling.PERIOD
-        assert rig.plain.values.size == sum(periods for _, _, periods in SEGMENTS) * rig.plain.cycle
-        assert settling.asked(rig) == (frequency <= 0.025 * resonance)
-    assert not settling.asked(settling.cell_rig(settling.Cell("relays", 1e-3, frequency, 0)))
-
-
 def settled(seed: int, controller: str, error: float | None) -> dict[str, Any]:
     return {"family": "paper", "reference": "sine", "seed": seed, "controller": controller, "settled": error,
             "amplitude": 10.0, "failure": None if error else "none"}  # fmt: skip

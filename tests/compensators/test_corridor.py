@@ -105,29 +105,6 @@ def test_a_wrong_first_reading_does_not_leave_the_voltage_at_a_limit(make: Any, 
     assert np.mean((u <= rig.limits.minimum) | (u >= rig.limits.maximum)) < 0.75
 
 
-def unipolar(seed: int) -> pz.SimulatedStage:
-    paper, gauge = pz.PaperStage(FS), Gauge(noise=1.2e-3)
-    return pz.SimulatedStage(FS, paper.hysteresis, paper.creep, paper.mechanics, gauge=gauge, seed=seed)
-
-
-@pytest.mark.parametrize("every", [1, 50])
-def test_a_unipolar_stage_with_an_identified_start_settles(every: int) -> None:
-    s = np.linspace(0.0, 1.0, int(0.2 * FS))
-    up = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-    centre = 8.0
-    r = np.concatenate([centre * up, centre + np.asarray(pz.signals.triangle(5.0, 5.0, 6, FS))])
-    log = 6.5 * np.concatenate([centre * up, centre + np.asarray(pz.signals.triangle(7.0, 5.0, 3, FS))])
-    identified = pz.BatchFit(FS)
-    identified.run(log, unipolar(1).run(log))
-    model = identified.model
-    assert isinstance(model, pz.ColemanHodgdon)
-    estimator = pz.HysteresisRLS(FS, initial_model=model)
-    compensator = pz.InverseCompensator(model, pz.VoltageLimits(0.0, 150.0))
-    errors, voltages = hand_wired(r, unipolar(0), estimator, compensator, every)
-    assert per_period(errors[s.size :], 6)[2:].max() < 0.1
-    assert 0.0 <= voltages.min() <= voltages.max() <= 150.0
-
-
 def test_whatever_is_handed_over_the_voltage_stays_in_the_corridor() -> None:
     rng = np.random.default_rng(3)
     line = pz.LinearGain(0.15)

@@ -75,12 +75,6 @@ def test_in_an_exact_rest_a_model_is_corrected_too() -> None:
     assert np.abs(r - x)[30_000:30_020].max() < 0.05
 
 
-def test_none_changes_nothing() -> None:
-    r = np.tile(WAVE, 2)
-    first, second = (drive(controller(feedback), r, none)[0] for feedback in (None, 0))
-    np.testing.assert_array_equal(first, second)
-
-
 def test_it_goes_no_farther_than_the_corridor() -> None:
     r = np.concatenate([WAVE, np.full(10_000, 0.0)])
     _, _, i = drive(controller(20.0, corridor=0.2), r, lambda t: 2.0 * max(t - 5.0, 0.0))

@@ -152,16 +152,6 @@ def test_the_next_day_it_goes_from_where_the_stage_rests() -> None:
     assert driver.events == ()
 
 
-def test_a_controller_that_knows_nothing_resumes_as_if_reset() -> None:
-    one, other = controller(), controller()
-    drive(one, pz.SimulatedStage(FS, LOOP), SINE[:3])
-    one.resume(5.0, 1.0)
-    other.reset(5.0, 1.0)
-    stages = pz.SimulatedStage(FS, LOOP), pz.SimulatedStage(FS, LOOP)
-    u = [drive(each, stage, np.tile(SINE, 2)).u for each, stage in zip((one, other), stages, strict=True)]
-    np.testing.assert_array_equal(u[0], u[1])
-
-
 def test_it_resumes_from_a_fault_without_it() -> None:
     driver, stage = learnt()
     drive(driver, stage, np.tile(SINE, 2), lambda k, x: 1.0)

@@ -1,5 +1,6 @@
 """The recorded loop: repeated motion needs no model."""
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
-from piezoest.controller import recorded_loop, recorder, team
+from piezoest.controller import recorded_loop, recorder, team, travel
 from piezoest.layout import NUMBER, Named, new, record
 from tests.controller.shared import LIMITS, drive
 
@@ -91,6 +92,16 @@ def test_after_other_turns_it_goes_as_plays_do(turns: tuple[float, ...]) -> None
     assert np.abs(absolute - x[u.size + 9 :]).max() > 0.05
 
 
+def test_the_first_leg_stands_for_both_directions() -> None:
+    u, x = loop(0.6)
+    state = recorded(u, x)
+    up, down = state.loop.x
+    np.testing.assert_allclose(np.diff(up), -np.diff(down))
+    np.testing.assert_allclose(up[[0, -1]], down[[-1, 0]])
+    up, down = recorded(*loop(1.2)).loop.x
+    assert np.abs(np.diff(up) + np.diff(down)).max() > 1e-3
+
+
 def test_a_leg_stands_for_a_much_shorter_one_before_it() -> None:
     """A small way up, then all the way down: farther up nothing is known but that it is like the way down."""
     u = np.interp(np.arange(0.0, 3.0, 0.002), np.arange(4), [0.0, 0.5, -1.0, -0.9])
@@ -138,6 +149,25 @@ def test_closed_inner_loops_do_not_drift(size: float) -> None:
     np.testing.assert_allclose(stands[::100], stands[0], atol=1e-9)
 
 
+def test_numbers_that_were_changed_do_not_stop_it() -> None:
+    u, x = loop()
+    own, given = placed(recorded(u, x), float(u[-1]))
+    given.inverse.apart[1] = 0.0
+    assert recorded_loop.wanted(own, given, 0.3) == 0.3
+
+
+def test_the_reference_leaves_the_loop_where_it_goes_farther_than_before() -> None:
+    reference = Named(new(travel.TRAVEL), travel.TRAVEL)
+    travel.begin(reference, 0.0, 0.1)
+    ends = [0.0, 1.0, -1.0, 1.0, -0.5, 0.5, -0.5, 2.0, -2.0, 2.0, -2.0, -1.0]
+    inside = []
+    for begin, end in itertools.pairwise(ends):
+        for value in np.linspace(begin, end, 50)[1:]:
+            travel.follow(reference, value)
+        inside.append(reference.nested)
+    assert inside == [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0]
+
+
 def test_what_was_missed_before_anything_was_recorded_does_not_count() -> None:
     model = draw_family("preisach", np.random.default_rng(5), Reach(-60.0, 60.0), width=0.15, gain=0.1)
     stage = pz.SimulatedStage(FS, model, seed=1)
@@ -146,6 +176,13 @@ def test_what_was_missed_before_anything_was_recorded_does_not_count() -> None:
     missed = driver.candidates[-1].missed
     assert missed is not None
     assert missed < 0.04 * 3.0
+
+
+def test_the_curves_are_those_of_the_record() -> None:
+    u, x = loop()
+    state = recorded(u, x)
+    own, given = placed(state, float(u[-1]))
+    np.testing.assert_allclose(follows(own, given, u[400:])[20:], x[420:], atol=3e-3)
 
 
 @pytest.mark.parametrize("longer", [1.0, 3.0])
@@ -179,6 +216,29 @@ def test_beyond_the_recorded_end_it_goes_on(direction: float) -> None:
         own.voltage = recorded_loop.wanted(own, given, r)
         assert (own.voltage - last) * direction > 0.0
         recorded_loop.follow(own, given, own.voltage, own.voltage)
+
+
+def test_the_inverse_goes_on_beyond_the_end_of_a_steep_curve() -> None:
+    u, x = loop()
+    own, given = placed(recorded(u, 3.0 * x), float(u[-1]))
+    for r in np.linspace(3.0, 4.5, 200).tolist():
+        before = own.voltage
+        own.voltage = recorded_loop.wanted(own, given, r)
+        assert own.voltage >= before
+        assert recorded_loop.expected(own, given) == pytest.approx(r, abs=1e-3)
+
+
+def test_a_way_back_too_small_to_be_recorded_does_not_confuse_it() -> None:
+    u, x = loop()
+    state = recorded(np.append(u, [0.9, 0.905]), np.append(x, [0.9, 0.905]))
+    plain, given = placed(state, 0.9)
+    back, _ = placed(state, 0.905)
+    back.inverse.direction[0], back.inverse.u[0] = 1.0, 0.9
+    recorded_loop.place(back, given)
+    small = 2.0 * 0.005  # what the displacement can do on so small a way
+    assert recorded_loop.expected(back, given) == pytest.approx(
+        recorded_loop.expected(plain, given), abs=small
+    )
 
 
 @pytest.mark.parametrize("size", [0.01, 0.06])

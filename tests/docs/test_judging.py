@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import piezoest as pz
 from piezoest.bench.zoo.families import FAMILIES
 from piezoest.bench.zoo.faults import FAULTS
 from piezoest.bench.zoo.logs import Log
@@ -90,17 +89,6 @@ def log(**given: Any) -> Log:
     )  # fmt: skip
 
 
-def test_plays_by_least_squares_find_a_stage_made_of_plays(judging: Any) -> None:
-    u = voltage()
-    thresholds = 0.5 * np.ptp(u[:TRAINED]) * np.array([2, 5, 11]) / judging.PLAYS
-    # From plays that begin at the first voltage.
-    truth = pz.PrandtlIshlinskii(0.3, thresholds, [0.1, 0.05, 0.08], offset=-7.0).simulate(u - u[0])
-    x = truth + np.random.default_rng(0).normal(0.0, 0.02, N)
-    x[100:150] = np.nan
-    assert judging.rms((judging.by_plays(u, x, TRAINED) - truth)[TRAINED:]) < 0.2 * 0.02
-    assert judging.rms((judging.by_line(u, x, TRAINED) - truth)[TRAINED:]) > 1.0 * 0.02
-
-
 def test_coverage_counts_readings_without_spikes_and_later_jumps(judging: Any) -> None:
     one = log(jumps=1.5 * (np.arange(N) >= 500) + 4.0 * (np.arange(N) >= 3000))
     # Jumps count up to the end of the fitted part.
@@ -116,23 +104,3 @@ def test_coverage_counts_readings_without_spikes_and_later_jumps(judging: Any) -
     # Of 1000 that count, 250 are below.
     lower[3250:] += 3.0
     assert judging.coverage(one, TRAINED, lower, upper) == 0.75
-
-
-def test_a_row_holds_the_chosen_the_best_and_scores_or_what_failed(judging: Any, monkeypatch: Any) -> None:
-    model = pz.ColemanHodgdon(0.02, 0.12, 0.0036)
-    one = log(family="coleman-hodgdon", model=model)
-    monkeypatch.setattr(judging, "draw", lambda seed: one)
-    found = judging.Found(
-        "a", {"a": one.truth + 0.3, "b": one.truth + 0.1, "c": one.truth + 9.0},
-        {"a": 0.5, "b": 0.2, "c": 0.9}, one.truth - 1.0, one.truth + 1.0,
-        errors={"alpha": 0.001, "beta": 0.01, "gamma": 0.0, "offset": 1.0},
-        theta=model.theta + np.array([0.002, -0.01, 0.1]),
-    )  # fmt: skip
-    monkeypatch.setattr(judging, "fitted", lambda log: found)
-    row = judging.judge(1)
-    assert row["failure"] is None
-    assert (row["chosen"], row["best"], row["own"], row["coverage"]) == pytest.approx((0.3, 0.1, 0.5, 1.0))
-    assert (row["chosen_name"], row["best_name"]) == ("a", "b")
-    assert row["z"] == [pytest.approx(2.0), pytest.approx(-1.0), None]
-    found.predictions["a"][:] = np.nan
-    assert judging.judge(1)["failure"]

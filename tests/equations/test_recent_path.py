@@ -1,7 +1,6 @@
 """The recent path of the voltage tells where any Coleman-Hodgdon model would stand."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -47,12 +46,3 @@ def test_equals_a_model_that_had_been_running(turns: list[float], a: float, rest
     slack = 2.0 * recent_path.TURN * (np.ptp(u) + abs(rest)) * len(turns)
     path = followed(u, rest)
     assert abs(with_decay(path, a) - expected) <= slack + 3.0 * recent_path.FORGOTTEN / a
-
-
-@pytest.mark.parametrize("before", [0.01, 0.02, 0.04])
-@pytest.mark.parametrize("a", [0.01, 0.02, 0.05])
-@pytest.mark.parametrize("amplitude", [1.0, 3.0, 30.0])
-def test_steady_loop_is_known_however_long_it_went_on(amplitude: float, a: float, before: float) -> None:
-    u = np.concatenate([triangle([amplitude, -amplitude] * 200), np.linspace(-1.0, 0.4, 20)[1:] * amplitude])
-    h = with_decay(followed(u, a=before), a)
-    assert h == pytest.approx(simulated(u, a), abs=0.01 * amplitude)

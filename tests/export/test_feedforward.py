@@ -112,20 +112,7 @@ def test_a_gain_that_is_known_need_not_be_right(gain: float) -> None:
 
 
 @pytest.mark.parametrize("begin", [0, 2500])
-def test_it_resumes(begin: int) -> None:
-    library = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=())
-    board, own = pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem")
-    drive(library, board, own, count=begin)
-    for each in (library, board):
-        each.resume(10.0, 2.0)
-    drive(library, board, own, count=1500)
-    for wrong in ((101.0, 0.0), (np.nan, 0.0), (0.0, np.nan), (0.0, 1e30)):
-        with pytest.raises(ValueError, match="voltage must"):
-            board.resume(*wrong)
-
-
-@pytest.mark.parametrize("begin", [0, 2500])
-def test_it_homes(begin: int) -> None:
+def test_it_homes_and_resumes(begin: int) -> None:
     library = pz.AdaptiveFeedforward(FS, limits=pz.VoltageLimits(-100.0, 100.0, 2e4, FS), estimators=())
     board, own = pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem")
     drive(library, board, own, count=begin)
@@ -133,9 +120,15 @@ def test_it_homes(begin: int) -> None:
         each.home(40.0, 50.0, 4)
     seen = drive(library, board, own, count=3000)
     assert {stage for stage, _, _ in seen} == ({0, 1, 2, 3} if begin == 0 else {1, 2, 3})
-    for wrong in ((101.0, 50.0, 4), (40.0, 1e4, 4), (40.0, 50.0, 0), (np.nan, 50.0, 4)):
+    for each in (library, board):
+        each.resume(10.0, 2.0)
+    drive(library, board, own, count=1500)
+    for wrong in ((101.0, 0.0), (np.nan, 0.0), (0.0, np.nan), (0.0, 1e30)):
+        with pytest.raises(ValueError, match="voltage must"):
+            board.resume(*wrong)
+    for sweep in ((101.0, 50.0, 4), (40.0, 1e4, 4), (40.0, 50.0, 0), (np.nan, 50.0, 4)):
         with pytest.raises(ValueError, match="no sweep"):
-            board.home(*wrong)
+            board.home(*sweep)
 
 
 def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> None:

@@ -11,7 +11,6 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting import fit
 from piezoest.fitting.flaws import flawed
-from piezoest.fitting.gaps import forgotten
 
 N = 6000
 T = np.arange(N) / 1000.0
@@ -125,25 +124,6 @@ def test_an_overflow_is_found_anywhere_in_a_short_log(place: int) -> None:
 
 def waves(sizes: list[float]) -> FloatArray:
     return np.concatenate([size * np.sin(2.0 * np.pi * np.arange(200) / 200.0) for size in sizes])
-
-
-def bridged(u: FloatArray) -> FloatArray:
-    known = np.isfinite(u)
-    return np.interp(np.arange(u.size), np.flatnonzero(known), u[known])
-
-
-def test_samples_behind_a_gap_are_left_out_until_both_extremes_were_passed() -> None:
-    u = waves([10.0] * 6)
-    u[430:530] = np.nan  # over a maximum
-    found = np.flatnonzero(forgotten(u, bridged(u)))
-    assert found[0] == 530
-    assert 630 < found[-1] < 670  # the next maximum is at 650
-
-
-def test_short_gaps_and_those_without_a_turn_are_no_matter() -> None:
-    u = waves([10.0] * 6)
-    u[500:503], u[690:720] = np.nan, np.nan
-    assert not forgotten(u, bridged(u)).any()
 
 
 def test_a_turn_that_was_lost_does_not_spoil_a_fit() -> None:

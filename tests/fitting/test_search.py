@@ -10,7 +10,7 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo.families import draw_family
 from piezoest.bench.zoo.logs import REACHES
-from piezoest.fitting import Fit, search
+from piezoest.fitting import Fit
 from tests.fitting.stages import RATE, N, T, noise, play_matrix, rms, stage, voltage
 
 CREEP = pz.Creep([0.06], [0.25])
@@ -57,14 +57,6 @@ def test_a_loop_is_recovered_to_its_noise(centre: float) -> None:
     assert rms(found.predict().x - x) < 1e-3
     np.testing.assert_allclose(found.model.theta, LOOP.theta, rtol=0.01)
     assert found.model.offset == pytest.approx(1.5, abs=0.05)
-
-
-def test_a_line_is_recovered_to_its_noise() -> None:
-    u = voltage(np.random.default_rng(2), centre=30.0)
-    found = fit(u, 0.2 * u - 3.0 + noise(2e-3), "line")
-    assert found.model.theta[0] == pytest.approx(0.2, abs=1e-5)
-    assert found.model.offset == pytest.approx(-3.0, abs=1e-3)
-    assert found.parameters == 2
 
 
 def test_no_noise_is_no_hindrance() -> None:
@@ -126,27 +118,6 @@ def test_creep_is_found() -> None:
     u, x, sigma = drawn(7)  # which has none
     found = fit(u, x + noise(sigma), "plays-creep")
     assert found.model.creep is None or found.model.creep.gains.sum() < 0.01
-
-
-def test_creep_terms_that_are_none_do_not_begin_the_search_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    steps: list[int] = []
-    crept = search._crept
-
-    def counted(log: Any, last: Any, creep: pz.Creep) -> Any:
-        steps.append(creep.gains.size)
-        return crept(log, last, creep)
-
-    monkeypatch.setattr(search, "_crept", counted)
-    u, x, sigma = drawn(0, creep=pz.Creep([0.06], [0.5]))
-    fit(u, x + noise(sigma), "plays-creep")
-    assert steps == [3, 3, 3, 1, 1]
-
-
-def test_a_loop_without_delay_needs_no_plays(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(search, "best_start", None)
-    u = voltage(np.random.default_rng(2))
-    found = fit(u, LOOP.simulate(u) + noise(1e-3), "coleman-hodgdon")
-    assert rms(found.predict().x - LOOP.simulate(u)) < 1e-3
 
 
 def test_creep_that_began_before_the_record_is_fitted() -> None:
@@ -236,15 +207,6 @@ def test_spikes_dropouts_and_gaps_do_not_move_a_fit() -> None:
     assert rms(found.predict().x - without) < 0.35 * sigma
     assert not found.counts[3000:3200].any()
     assert np.all(np.isfinite(found.predict().x))
-
-
-def test_a_start_that_has_not_settled_is_left_out() -> None:
-    u, x, sigma = drawn(12)
-    y = x + noise(sigma) + 500.0 * sigma * np.exp(-np.arange(N) / 15.0)
-    found = fit(u, y, "plays")
-    assert 40 < found.left_out < 400
-    assert rms((found.predict().x - x)[found.left_out :]) < sigma
-    assert fit(u, y, "plays", settle=0.2).left_out == 200
 
 
 @pytest.mark.parametrize("seed", range(6))

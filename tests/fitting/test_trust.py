@@ -96,14 +96,8 @@ def test_intervals_hold_what_they_promise(model: str) -> None:
     [
         (Spread(3.0, 4.0, 0.4, (-10.0, 10.0)), [0.0, 10.0, 20.0], [0.0, 0.0, 0.0], [3.0, 3.0, 5.0]),
         (Spread(3.0, 4.0, 0.4, (-10.0, 10.0)), [0.0, 0.0], [0.0, np.expm1(1.0)], [3.0, 5.0]),
-        # After a voltage beyond the range it stays wide: the stage remembers where it was.
+        # It stays wide afterwards: the stage remembers where it was.
         (Spread(3.0, 4.0, 0.4, (-10.0, 10.0)), [0.0, 20.0, 0.0], [0.0, 0.0, 0.0], [3.0, 5.0, 5.0]),
-        # And where the voltage moves further within the delay: a swing is flattened by its rate to its end.
-        (Spread(3.0, 0.0, 0.4, (-10.0, 10.0), by_move=2.0, delay=2.0, moved=3.0),
-         [0.0, 0.0, 5.0, 5.0, 5.0], [0.0] * 5, [3.0, 3.0, 5.0, 5.0, 5.0]),
-        # And where the voltage stays at one side for longer.
-        (Spread(3.0, 0.0, 0.0, (-50.0, 50.0), by_stay=0.4, memory=1e-3, stayed=(-10.0, 10.0)),
-         [0.0, 10.0, 20.0, -20.0, 0.0], [0.0] * 5, [3.0, 3.0, 5.0, 5.0, 3.0]),
     ],
 )  # fmt: skip
 def test_an_interval_widens(spread: Spread, u: list[float], behind: list[float], half: list[float]) -> None:
@@ -136,14 +130,6 @@ def test_a_loop_is_trusted_beyond_the_range_and_plays_are_not() -> None:
     x = LOOP.simulate(u) + noise(5e-3)
     wide = [pz.fit(u, x, sample_rate=RATE, model=name).spread for name in ("coleman-hodgdon", "plays")]
     assert wide[0].by_volt < 0.5 * wide[1].by_volt
-
-
-def test_a_fast_step_widens_the_interval_while_it_lasts() -> None:
-    spread = Spread(0.01, 0.0, 0.0, (-50.0, 50.0), by_move=0.1, delay=3.0, moved=2.0)
-    u = np.where(np.arange(300) < 40, 0.0, 20.0)
-    half = spread.along(u, np.zeros(1))
-    assert half[41] > 1.0
-    np.testing.assert_allclose(np.delete(half, np.arange(38, 140)), 0.01)
 
 
 def test_an_interval_holds_loops_that_the_record_did_not_show() -> None:

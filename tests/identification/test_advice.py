@@ -106,7 +106,8 @@ def test_other_logs_are_checked_too() -> None:
 
 @pytest.mark.parametrize(
     ("creep", "missed", "chosen"),
-    [(0.1, 0.8, 1), (0.18, 0.8, 0), (0.4, 0.5, 0), (0.4, 0.35, 1), (0.0, 0.8, 1)],
+    # Where noise is most of what is missed, a per cent less is much less of the model's own error.
+    [(0.1, 0.8, 1), (0.18, 0.8, 0), (0.4, 0.5, 0), (0.4, 0.35, 1), (0.0, 0.985, 1), (0.0, 0.997, 0)],
 )
 def test_much_creep_that_a_log_cannot_tell_must_be_clearly_better(
     creep: float, missed: float, chosen: int
@@ -116,14 +117,7 @@ def test_much_creep_that_a_log_cannot_tell_must_be_clearly_better(
         SimpleNamespace(creep=creep, cross_validated=missed),
     ]
     assert best_of(kinds, tells_creep=False) is kinds[chosen]
-    assert best_of(kinds) is kinds[1]
-
-
-@pytest.mark.parametrize(("missed", "chosen"), [(0.997, 0), (0.985, 1)])
-def test_a_little_better_is_better(missed: float, chosen: int) -> None:
-    """Where noise is most of what is missed, a per cent less is much less of the model's own error."""
-    kinds: Any = [SimpleNamespace(creep=0.0, cross_validated=each) for each in (1.0, missed)]
-    assert best_of(kinds) is kinds[chosen]
+    assert best_of(kinds) is kinds[missed < 0.99]
 
 
 @pytest.mark.slow

@@ -54,21 +54,6 @@ def test_swapped_columns_turn_the_loop_round(family: str) -> None:
     assert "clockwise" in [each.name for each in findings(Record.from_arrays(x, u, 1000.0))]
 
 
-def test_the_opening_of_a_loop_is_its_width_whatever_drifts() -> None:
-    t = np.linspace(0.0, 1.0, 20_000)
-    u = 50.0 * np.sin(2.0 * np.pi * 10.0 * t)
-    play = pz.PrandtlIshlinskii(0.1, [5.0], [0.02]).simulate(u)
-    known = np.ones(t.size, dtype=np.bool_)
-    still = loop_of(u, play, known, 0.12)
-    drifting = loop_of(u, play + 3.0 * t, known, 0.12)
-    # A play of threshold 5 V is 10 V wide, but for where it turns.
-    assert 0.7 * 0.2 < float(np.median(still.openings)) < 0.2
-    np.testing.assert_allclose(drifting.openings, still.openings, atol=0.01)
-    assert still.clockwise == 0.0
-    assert still.opening > 0.0
-    assert loop_of(t, t, known, 1.0).opening == 0.0  # which does not turn
-
-
 @pytest.mark.parametrize("delay", range(8))
 def test_a_staircase_answered_late_is_not_doubted(delay: int) -> None:
     for seed in range(8):
