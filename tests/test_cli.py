@@ -54,7 +54,6 @@ def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 THETA = ("--alpha", 0.02, "--beta", 0.12, "--gamma", 0.0036)
-WIDE = ("--minimum", -100, "--maximum", 100)
 
 
 def test_demo_reduces_the_error_by_ninety_percent(tmp_path: Path) -> None:
@@ -68,7 +67,6 @@ def test_demo_reduces_the_error_by_ninety_percent(tmp_path: Path) -> None:
     assert errors[0] > 5.0 * errors[-1]
     # The start is wrong: without adaptation it is worse than the straight line.
     assert fixed.max_error(2) > linear.max_error(2)
-    # The controller starts from nothing, and finds what the other one finds.
     assert result.reduction(demo.CONTROLLER) >= 0.89
     assert result.learnt["beta"] == pytest.approx(adaptive.theta[-1, 1], rel=0.05)
     u = controller.voltage
@@ -103,9 +101,7 @@ def test_identify_predicts_other_logs(log: Path) -> None:
     assert result.exit_code == 0
     assert "other.csv" in result.stdout
     other, same = json.loads(run("identify", log, *options, "--json").stdout)["validation"]
-    assert (other["source"], same["source"]) == ("other.csv", str(log))
     assert other["error"]["rms_um"] == pytest.approx(0.5, rel=0.01)
-    assert other["without_mean"]["rms_um"] < 3e-3
     assert same["error"]["rms_um"] < 3e-3
     refused(run("identify", log, "--no-plot", "--validate", "none.csv"), "none.csv", "No such file")
 
@@ -121,7 +117,6 @@ def test_strict_refuses_a_doubtful_log(log: Path) -> None:
 def test_identify_the_example(tmp_path: Path, log: Path) -> None:
     found = json.loads(run("identify", "example", "--json", "--no-plot").stdout)
     assert found["samples"] == 14_155
-    # A file of that name comes first.
     Path("example").write_bytes(log.read_bytes())
     found = json.loads(run("identify", "example", "--json", "--no-plot").stdout)
     assert found["samples"] < 14_155
@@ -168,19 +163,6 @@ def test_compensate_warns_where_nothing_bounds_the_voltage(reference: Path, limi
     assert result.exit_code == 0
     for name in ("--minimum", "--maximum"):
         assert (name in result.stderr) == (name not in limits)
-
-
-@pytest.mark.parametrize("offset", [3.0, 0.0])
-def test_compensate_says_what_the_model_was_not_learnt_on(reference: Path, offset: float) -> None:
-    r = signals.triangle(2.0, 5.0, 4, RATE)
-    write_columns(reference, {"time_s": r.time, "reference_um": r.values + offset})
-    moved = () if offset == TRUE.offset else ("--offset", offset)
-    leaves = {"rate": 100.0, "displacement": [2.0, 4.0]}
-    for change, lines in (({}, 0), ({"frequency": None}, 0), (leaves, 2)):
-        Path("model.json").write_text(json.dumps({"model": TRUE.to_dict(), "learnt_on": LEARNT_ON | change}))
-        result = run("compensate", reference, "-p", "model.json", "-o", "voltage.csv", *moved, *WIDE)
-        assert result.exit_code == 0
-        assert len(result.stderr.strip().splitlines()) == lines
 
 
 def test_mistakes_in_logs(log: Path) -> None:

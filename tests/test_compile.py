@@ -105,7 +105,6 @@ def test_machine_code_does_what_python_does_at_any_length(plays: int | None, pla
         total = step.of(layout, GAIN)(machine, given, each)
         assert total == step.function(Named(plain, layout), Named(given, GAIN), each)
     assert machine.tobytes() == plain.tobytes()
-    # With and without a memory, whatever its lengths.
     assert step.of(layout, GAIN) is step.of(layout_of(None if plays is None else 4), GAIN)
 
 

@@ -44,7 +44,6 @@ def apply(block: str, folder: Path) -> Path:
     return path
 
 
-# Tests that find what was added, and its name.
 FOUND_BY = {
     "Adding a policy": ("VarianceLimit", "tests/test_package.py", "tests/policies/test_base.py"),
     "Adding a model": ("Backlash", "tests/test_package.py"),

@@ -20,8 +20,11 @@ START = np.datetime64("2026-11-22T10:00:00", "ns")
 STAMPS = [str(START + np.timedelta64(round(1e9 * t), "ns")) for t in TIME]
 
 
-def write(path: Path, separator: str, rows: Sequence[tuple[str, ...]], header: str = "t,u,x") -> Path:
-    lines = [header.replace(",", separator), *(separator.join(row) for row in rows)]
+def write(
+    path: Path, separator: str, rows: Sequence[tuple[str, ...]], header: str = "t,u,x", above: str = ""
+) -> Path:
+    """Rows below a header, or below lines as they are."""
+    lines = [above or header.replace(",", separator), *(separator.join(row) for row in rows)]
     path.write_text("\n".join(line for line in lines if line) + "\n", encoding="utf-8")
     return path
 
@@ -64,34 +67,25 @@ PREAMBLE = "Oscilloscope DSO-X\nDate,2026-11-01\nSample rate,1000\n\n"
     ],
 )
 def test_lines_of_an_instrument_above_the_rows(tmp_path: Path, above: str) -> None:
-    file = write(tmp_path / "log.csv", ",", rows_of(str), header="")
-    file.write_text(above + "\n" + file.read_text())
-    check(file)
-
-
-def test_a_line_of_units_is_heeded(tmp_path: Path) -> None:
-    file = write(tmp_path / "log.csv", ",", rows_of(str), header="")
-    file.write_text("time,voltage,displacement\nms,mV,nm\n" + file.read_text())
-    check_thousandths(file)
+    check(write(tmp_path / "log.csv", ",", rows_of(str), above=above))
 
 
 @pytest.mark.parametrize(
-    "above",
+    ("separator", "above"),
     [
-        "# t[ms] U[mV] x[nm]",
-        "# date\n# t (ms)  U (mV)  x (nm)",
-        "# t U x\n# ms mV nm",
-        "# t [ms], U [mV], x [nm]",
-        "t (ms)  drive voltage (mV)  x (nm)",
-        '# a 5" stage\n# t[ms] U[mV] x[nm]',
-        "t{ms} U{mV} x<nm>",
-        "t U x\n# ms mV nm",
+        (",", "time,voltage,displacement\nms,mV,nm"),
+        (" ", "# t[ms] U[mV] x[nm]"),
+        (" ", "# date\n# t (ms)  U (mV)  x (nm)"),
+        (" ", "# t U x\n# ms mV nm"),
+        (" ", "# t [ms], U [mV], x [nm]"),
+        (" ", "t (ms)  drive voltage (mV)  x (nm)"),
+        (" ", '# a 5" stage\n# t[ms] U[mV] x[nm]'),
+        (" ", "t{ms} U{mV} x<nm>"),
+        (" ", "t U x\n# ms mV nm"),
     ],
 )
-def test_names_and_units_above_rows_that_blanks_part(tmp_path: Path, above: str) -> None:
-    file = write(tmp_path / "log.txt", " ", rows_of(str), header="")
-    file.write_text(above + "\n" + file.read_text())
-    check_thousandths(file)
+def test_names_and_units_above_the_rows(tmp_path: Path, separator: str, above: str) -> None:
+    check_thousandths(write(tmp_path / "log.txt", separator, rows_of(str), above=above))
 
 
 COMMENTS = (
@@ -101,22 +95,19 @@ COMMENTS = (
 
 @pytest.mark.parametrize("comment", COMMENTS)
 def test_a_comment_that_names_no_columns_is_none(tmp_path: Path, comment: str) -> None:
-    file = write(tmp_path / "log.txt", " ", rows_of(str), header="")
-    file.write_text(comment + "\n" + file.read_text())
+    file = write(tmp_path / "log.txt", " ", rows_of(str), above=comment)
     check(file)
     assert "columns without names" in read_record(file).notes[0]
 
 
 @pytest.mark.parametrize("other", ["r[nm]", "temperature[K]"])
 def test_names_in_a_comment_with_one_column_more(tmp_path: Path, other: str) -> None:
-    file = write(tmp_path / "log.txt", " ", [("7.5", *row) for row in rows_of(str)], header="")
-    file.write_text(f"# {other} t[ms] U[mV] x[nm]\n" + file.read_text())
-    check_thousandths(file)
+    rows = [("7.5", *row) for row in rows_of(str)]
+    check_thousandths(write(tmp_path / "log.txt", " ", rows, above=f"# {other} t[ms] U[mV] x[nm]"))
 
 
 def test_two_voltages_in_a_comment_are_asked_for(tmp_path: Path) -> None:
-    file = write(tmp_path / "log.txt", " ", rows_of(str), header="")
-    file.write_text("# set[V] monitor[V] x[um]\n" + file.read_text())
+    file = write(tmp_path / "log.txt", " ", rows_of(str), above="# set[V] monitor[V] x[um]")
     with pytest.raises(ValueError, match="could all be the voltage"):
         read_record(file, sample_rate=10.0)
 
@@ -128,29 +119,26 @@ GCS = """# REM E-727
 #
 # NAME1 = Actual Position of Axis 1
 # NAME0 = Output Voltage of channel 1
-# END_HEADER
-"""
+# END_HEADER"""
 
 
 @pytest.mark.parametrize(
     "above",
     [
         GCS,
-        "# fs = 200 Hz\nu,x\n",
-        "% Sample rate [kHz]: 0.2\n% u [V], x [um]\n",
-        "# dt = 5 ms\nvoltage,position of stage\n",
+        "# fs = 200 Hz\nu,x",
+        "% Sample rate [kHz]: 0.2\n% u [V], x [um]",
+        "# dt = 5 ms\nvoltage,position of stage",
     ],
 )
 def test_sample_rate_in_a_comment(tmp_path: Path, above: str) -> None:
-    file = write(tmp_path / "log.csv", ",", [row[1:] for row in rows_of(str)], header="")
-    file.write_text(above + file.read_text())
+    file = write(tmp_path / "log.csv", ",", [row[1:] for row in rows_of(str)], above=above)
     check(file)
     assert "as the file states it" in read_record(file).notes[0]
 
 
 def test_rows_below_other_lines_without_a_header_go_by_number(tmp_path: Path) -> None:
-    file = write(tmp_path / "log.csv", ",", rows_of(str), header="")
-    file.write_text("Scope\nDate,2026-11-01\n" + file.read_text())
+    file = write(tmp_path / "log.csv", ",", rows_of(str), above="Scope\nDate,2026-11-01")
     with pytest.raises(ValueError, match="1, 2, 3"):
         read_record(file)
     record = read_record(file, columns={"time": "1", "voltage": "2", "displacement": "3"})
@@ -264,7 +252,6 @@ def test_time_goes_on_where_the_clock_begins_anew(tmp_path: Path, start: str, wr
     assert any("line 42: the clock" in note for note in read_record(file).notes) == ("/" not in written)
     stream = stream_record(file, rows=7)
     np.testing.assert_allclose(np.concatenate([block.time for block in stream]), TIME, atol=1e-12)
-    # Elsewhere it was set, and nothing says by how much.
     write(file, ",", rows[:30] + rows[:30])
     with pytest.raises(ValueError, match="does not increase"):
         read_record(file)

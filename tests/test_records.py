@@ -104,7 +104,6 @@ def test_refusals_name_place_and_reason(tmp_path: Path, changes: dict[str, str],
 
 @pytest.mark.parametrize("written_twice", [False, True])
 def test_a_repeated_time_stamp_is_read_and_said(tmp_path: Path, written_twice: bool) -> None:
-    """The stamp of a row, or the whole row."""
     path = log(tmp_path)
     lines = path.read_text().splitlines()
     if written_twice:

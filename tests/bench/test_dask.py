@@ -71,7 +71,6 @@ def test_a_worker_killed_half_way_loses_nothing(
     assert said == [(k, len(tasks)) for k in range(len(tasks) + 1)]
     assert [row["key"] for row in rows] == [task.key for task in tasks]
     assert [row["failure"] for row in rows] == [None] * len(tasks)
-    # Others have worked after it, or all along.
     assert {int(line) for line in notes.read_text().split()} > set(killed)
 
     assert rows == played(tasks, tmp_path / "here", table.over_cores(1))

@@ -3,12 +3,10 @@
 import json
 import math
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from piezoest.bench.paper import Run
 from piezoest.bench.paper_tables import PRBS_ROW, Published, published
 from tests.bench.shared import bench as command
 
@@ -25,7 +23,6 @@ MISSES = {
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the whole procedure leaves behind, without the sweep over the memory."""
     folder = tmp_path_factory.mktemp("paper")
     result = command("paper", "--quick", "--json", folder / "paper.json", "--figures", folder)
     assert result.exit_code == 0, result.output
@@ -38,7 +35,6 @@ def document(folder: Path) -> Any:
 
 
 def number_of(document: Any, row: str, quantity: str) -> Any:
-    """The entry of a number; rows of Table III have names of their own."""
     (entry,) = (each for each in document["tables"] if (each["row"], each["quantity"]) == (row, quantity))
     return entry
 
@@ -87,12 +83,4 @@ def test_every_row_adapts_and_settles(document: Any) -> None:
     for run in runs:
         assert run["settling_periods"] is not None
         if run["compensation"] == "inverse" and run["row"] != PRBS_ROW:
-            # The start belongs to no row: the first period shows it.
             assert run["max_error_um"][0] > 3.0 * run["stationary_max_error_um"]
-
-
-def test_a_run_that_becomes_worse_never_settles() -> None:
-    experiment: Any = None
-    stationary: Any = SimpleNamespace(max_error=lambda: 2.5)
-    runs = [Run(experiment, (), errors, stationary) for errors in ((0.5, 2.5, 2.5), (9.0, 2.5, 2.5))]
-    assert [run.settling_periods for run in runs] == [None, 1]

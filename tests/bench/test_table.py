@@ -215,7 +215,6 @@ def test_recorded_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = [play(each) for each in tasks]
     assert [row["failure"] is None for row in rows] == [True] * 6 + [False] * 3
     for linear, derivative, plays in (rows[:3], rows[3:6]):
-        # Of a triangle on the stage the loop is a tenth of the range.
         assert 0.0 < plays["settled"] < derivative["settled"] < 0.5 * linear["settled"]
         assert len(derivative["errors"]) == recorded.SEGMENTS
     document = table.describe(rows, asked, {})

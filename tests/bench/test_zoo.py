@@ -61,8 +61,6 @@ def without_time(row: dict[str, Any]) -> dict[str, Any]:
 
 
 class Wild(Line):
-    """NaN, and volts beyond all limits."""
-
     def run(self, r: Any) -> Any:
         u = np.array(super().run(r))
         u[0], u[-1] = np.nan, 1e3
@@ -122,25 +120,6 @@ def test_a_rest_at_a_limit_is_seen() -> None:
     assert traces.run is not None
     np.testing.assert_array_equal(traces.run.error, traces.run.reference - traces.run.displacement)
     assert row["worst"] == pytest.approx(np.max(np.abs(traces.run.error[rig.judged_from :])))
-
-
-def test_beyond_the_stroke_a_limit_is_where_to_be() -> None:
-    rig = draw(1, **{**{k: v for k, v in SHORT.items() if k != "amplitude"}, "reference": "beyond"})
-    assert rig.plain.amplitude > 15.0
-    row, traces = traced(rig, best_line(rig))
-    assert not row["rests_at_rail"]
-    assert row["line_worst"] >= np.max(np.abs(traces.lines.fitted.error[rig.judged_from :])) > 1.0
-
-
-@pytest.mark.parametrize(("fault", "mode"), [("gap", "transient"), ("gain-step", "permanent")])
-def test_after_a_fault_two_swings_pass(fault: str, mode: str) -> None:
-    rig = draw(1, **{**SHORT, "fault": fault, "mode": mode})
-    row, traces = traced(rig, best_line(rig))
-    assert traces.run is not None
-    assert rig.learning == round(1.5 * rig.plain.cycle) + rig.block
-    first = rig.learning + (rig.fault.stop if mode == "transient" else rig.fault.start)
-    assert row["after_worst"] == np.max(np.abs(traces.run.error[first:]))
-    assert play(draw(1, **SHORT), Parts)["after_worst"] is None
 
 
 def test_the_map_counts_periods() -> None:

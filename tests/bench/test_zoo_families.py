@@ -115,7 +115,6 @@ def test_relays_are_relays() -> None:
 
 
 def test_of_too_many_loops_the_smallest_are_forgotten() -> None:
-    """A decaying sweep of more turns than are kept; a large swing then deletes it."""
     model = draw_family("relays", np.random.default_rng(6), REACHES[0], width=0.2, gain=0.1)
     turns = 60.0 * 0.97 ** np.arange(200) * (-1.0) ** np.arange(200)
     x = model.simulate(np.concatenate((turns, [90.0, -20.0])))

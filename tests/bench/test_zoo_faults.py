@@ -56,7 +56,6 @@ def test_it_is_there_when_it_should_be_and_only_then(kind: str, mode: str) -> No
     pairs = ((rig.reference, sound.reference), (x, x_sound), (true, true_sound))
     assert not all(np.array_equal(*pair) for pair in pairs)
     if not fault.lasting and kind not in ("drift", "dwell"):
-        # A loop that is left open closes again.
         np.testing.assert_allclose(x[fault.stop + 300 :], x_sound[fault.stop + 300 :], atol=1e-3)
         np.testing.assert_allclose(true[-60:], true_sound[-60:], atol=1e-3)
 

@@ -73,7 +73,6 @@ def test_change_of_model_is_bumpless(at: int) -> None:
     after = compensator.run(r[at:])
     usual = np.max(np.abs(np.diff(before)))
     assert np.max(np.abs(np.diff(np.concatenate([before, after])))) < 3.0 * usual
-    # Once paid back, it is the new model's inverse: the output follows r.
     settled = pz.InverseCompensator(new)
     for each in (compensator, settled):
         each.run(np.tile(r, 3))

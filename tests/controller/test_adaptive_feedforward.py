@@ -104,7 +104,6 @@ COPIES = (
     lambda driver: pickle.loads(pickle.dumps(driver)),
 )  # fmt: skip
 KNOWN = pz.models.LearntOn((-60.0, 60.0), (-3.0, 3.0), 1.0)
-# What a user may say of the stage is kept, too.
 OPTIONS: dict[str, dict[str, Any]] = {
     "line": {},
     "default": {"estimators": None},
@@ -172,7 +171,6 @@ WRONG: dict[str, tuple[tuple[Any, ...], Any]] = {
 
 @pytest.mark.parametrize("message", WRONG)
 def test_a_damaged_file_is_refused(message: str) -> None:
-    """What its arguments are is checked as that of a new one."""
     driver = controller()
     drive(driver, pz.SimulatedStage(FS, LOOP), triangle(1))
     data = driver.to_dict()

@@ -135,7 +135,6 @@ def test_what_feedback_corrects_at_rest_does_not_spoil_the_waves_behind(part: fl
 
 
 def test_a_staircase_keeps_its_correction_and_a_square_wave_its_steps() -> None:
-    """Each plateau is a rest, and the stage drifts; the amplifier slews."""
     limits = pz.VoltageLimits(-50.0, 50.0, slew_rate=4000.0, sample_rate=FS)
     stairs, square = np.repeat(-3.0 + 0.5 * np.arange(10), 1000), np.tile(np.repeat([3.0, -3.0], 2000), 3)
     for steps, length, soon, within in ((stairs, 1000, 50, 0.02), (square, 2000, 12, 0.3)):

@@ -43,7 +43,6 @@ def test_the_voltage_swings_less_and_less(name: str) -> None:
     assert doing[-1] == "running"
     assert np.abs(swept - middle).max() == pytest.approx(max(amplitude, abs(before - middle)), rel=0.01)
     assert abs(swept[-1] - middle) < 0.001 * amplitude
-    # It begins and ends gently, and keeps the slew rate.
     steps = np.abs(np.diff(swept, prepend=before))
     assert max(steps[0], steps[-1]) < 0.05 * steps.max()
     assert steps.max() <= limits.largest_step
@@ -51,7 +50,6 @@ def test_the_voltage_swings_less_and_less(name: str) -> None:
     extremes = np.abs(swept[turned + 1] - middle)
     extremes = extremes[extremes > 0.01 * amplitude][-2 * options.get("cycles", 10) + 2 :]
     assert np.all(np.diff(extremes) < 0.0)
-    # Nothing was in the way of the sweep itself.
     again = controller(limits)
     again.home(**options)
     drive(again, pz.SimulatedStage(FS, LOOP), np.zeros(swept.size))
@@ -72,7 +70,6 @@ def test_it_erases_what_the_stage_remembers() -> None:
 
 
 def test_the_models_know_the_stage_again() -> None:
-    """One that drove before is right again after a sweep, whatever the stage went through meanwhile."""
     driver, stage = controller(estimators=None), pz.SimulatedStage(FS, PLAYS)
     drive(driver, stage, np.tile(SINE, 60))
     assert driver.status.driving != "line"
@@ -98,19 +95,6 @@ def test_without_a_gain_it_seeks_then(gain: float | None) -> None:
     _, x, doing = drive(driver, stage, r)
     assert list(dict.fromkeys(doing)) == ["homing", "seeking", "approaching", "running"]
     assert last_error(r, x) < 0.5
-
-
-def test_readings_that_are_missing_do_not_matter() -> None:
-    driver, stage = controller(), pz.SimulatedStage(FS, LOOP)
-    drive(driver, stage, np.tile(SINE, 10))
-    driver.home(20.0, 50.0, 5)
-    while driver.status.stage == "homing":
-        stage.step(driver.step(0.0))
-        driver.learn(driver.voltage, None)
-    assert driver.status.stage == "approaching"
-    _, x, doing = drive(driver, stage, np.tile(SINE, 10))
-    assert doing[-1] == "running"
-    assert last_error(np.tile(SINE, 10), x) < 0.5
 
 
 @pytest.mark.parametrize("after", [0, 100, 400, 900])
@@ -225,7 +209,6 @@ def test_one_that_changes_nothing_does_not_matter() -> None:
 
 @pytest.mark.parametrize("said", ["unknown", "nothing"])
 def test_for_long_without_news_of_the_voltage_it_follows_the_line(said: str) -> None:
-    """All are written, but nobody says so: no jump, and the stage is not farther off than by the line."""
     (driver, stage), (_, other) = learnt(), learnt()
     straight = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), gain=driver.candidates[0].model.gain)
     line = float(np.abs(np.tile(SINE, 20) - drive(straight, other, np.tile(SINE, 20)).x)[-1000:].max())

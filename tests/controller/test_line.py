@@ -74,7 +74,6 @@ def test_late_readings_do_not_make_the_line_flat() -> None:
 
 
 def test_a_factor_of_the_sensor_is_no_new_start_where_readings_were_late() -> None:
-    """The line was never straight, and has held for long: the voltage stays with it."""
     driver = pz.AdaptiveFeedforward(1000.0, limits=pz.VoltageLimits(-100.0, 100.0), estimators=())
     x, u = np.zeros(5), []
     for k, r_k in enumerate(pz.signals.triangle(2.0, 20.0, 80, 1000.0).values.tolist()):

@@ -44,7 +44,6 @@ def test_quick_edges_with_late_readings_are_left_to_the_line(late: int) -> None:
         return readings[-1 - late]
 
     run = drive(pz.AdaptiveFeedforward(FS, limits=LIMITS), Plays(1.0), r, read)
-    # Of a stage without a loop the line knows all.
     assert np.abs(r - run.x)[-1700:].max() < 0.05
 
 
@@ -72,6 +71,5 @@ def test_models_go_on_where_the_gain_changes(share: float, amplitude: float) -> 
     r = pz.signals.sine(amplitude, 4.0, 14, FS).values
     run = drive(pz.AdaptiveFeedforward(FS, limits=LIMITS), Changing(share, 0.7, 5000), r)
     worst = np.abs(r - run.x).reshape(14, -1).max(axis=1) / amplitude
-    # Back at the line, which knows the old gain, it is 0.3 of the amplitude.
     assert worst[10] < 0.15
     assert worst[12] < 0.03

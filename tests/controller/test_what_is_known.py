@@ -25,7 +25,6 @@ def loop() -> Callable[[float], float]:
 
 
 def lag(time_constant: float, gain: float = 0.15) -> Callable[[float], float]:
-    """A stage that is late by a time constant [s]."""
     x, share = 0.0, 1.0 - np.exp(-1.0 / (time_constant * FS))
 
     def step(u: float) -> float:
@@ -37,7 +36,6 @@ def lag(time_constant: float, gain: float = 0.15) -> Callable[[float], float]:
 
 
 def backlash(width: float) -> Callable[[float], float]:
-    """A play of a width [V] on either side."""
     place = 0.0
 
     def step(u: float) -> float:
@@ -51,7 +49,6 @@ def backlash(width: float) -> Callable[[float], float]:
 def drive(
     driver: Any, stage: Any, r: FloatArray, noise: float = 0.0
 ) -> tuple[FloatArray, FloatArray, list[str]]:
-    """Voltage, displacement, and stage of the work after each sample."""
     rng = np.random.default_rng(0)
     run = shared.drive(driver, SimpleNamespace(step=stage), r, lambda _, x: x + noise * rng.normal())
     return run.u, run.x, [*run.doing[1:], driver.status.stage]
@@ -133,7 +130,6 @@ def test_the_readings_at_rest_need_not_be_waited_for(gain: float | None) -> None
 
 
 def test_where_it_stands_may_be_wrong() -> None:
-    """Two ways are answered alike, whatever the first one began with."""
     driver = controller()
     driver.reset(displacement=3.0)
     _, x, _ = drive(driver, loop(), SINE)
@@ -214,7 +210,6 @@ def test_a_gain_of_the_wrong_sign_is_doubted(limits: Any, width: float, hum: flo
     assert error < 0.5 * SWEPT
     said = [event.reason for event in driver.events]
     assert any(reason.startswith("false start") for reason in said)
-    # Where it begins again it does not rest at a limit.
     doubted = next(event.time for event in driver.events if event.reason.startswith("false start"))
     later = u[int(FAST * doubted) + 10 :]
     assert np.all((later > limits[0]) & (later < limits[1]))

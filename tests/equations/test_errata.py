@@ -75,7 +75,6 @@ def test_a6_to_the_letter_freezes_for_good() -> None:
         ls.continuous_step(theta, P, phi, 0.0, h, 1.0 / memory, 1.0, rates)
         ls.continuous_correction(theta, P, h, bound, rates)
     assert ls.trace(P) <= bound
-    # What the regressor tells, it keeps telling.
     assert loud @ P @ loud < loud @ frozen @ loud
 
 

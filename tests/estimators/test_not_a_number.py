@@ -41,7 +41,6 @@ MAKERS: dict[str, Any] = {
     "batch": lambda: pz.BatchFit(RATE, offset=True),
     "batch-line": lambda: pz.BatchFit(RATE, initial_model=LINE),
 }  # fmt: skip
-# Too slow for many rounds, or for many samples.
 ROUNDS = {"filterpy": 2, "horizon": 6, "batch": 6}
 
 
@@ -109,7 +108,6 @@ def test_spoilt_covariance_starts_anew(kind: str) -> None:
 @pytest.mark.parametrize("kind", MAKERS)
 @pytest.mark.slow_but_first
 def test_any_bits(kind: str) -> None:
-    """Wild numbers by `step`, then by `run`, over and over."""
     rng = np.random.default_rng(1)
     for _ in range(ROUNDS.get(kind.split("-")[0], 60)):
         estimator = MAKERS[kind]()

@@ -155,7 +155,6 @@ def test_float_settles_to_the_same_error(name: str) -> None:
     single = pz.export.CompiledController(code(name, "float"))
     library = pz.track(case.reference, stage=case.new_stage(), compensator=compensator, estimator=estimator)
     own = pz.track(case.reference, stage=case.new_stage(), compensator=single)
-    # Rounding moves the samples at which a model is handed over.
     assert own.max_error(2) == pytest.approx(library.max_error(2), rel=0.03)
 
 

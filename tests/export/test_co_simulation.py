@@ -71,7 +71,6 @@ def test_equals_the_library(unit: Path, tmp_path: Path) -> None:
         x = float(record.measured[k])
     np.testing.assert_allclose(u, record.voltage, rtol=0.0, atol=1e-12 * np.max(np.abs(u)))
     assert running.getReal([5])[0] == pytest.approx(record.theta[-1, 0], rel=0.5)
-    # A state that was kept goes on as it did.
     running.setFMUState(saved)
     running.setReal([0, 1], [float(r[3000]), float(record.measured[2999])])
     running.doStep(3000 / FS, 1.0 / FS)

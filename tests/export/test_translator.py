@@ -59,7 +59,6 @@ def in_order(state: Any) -> Any:
 
 @pytest.mark.parametrize(("function", "value"), [(unused_argument, 5.0), (in_order, 30.0 + 4.0 * 5.0 - 5.0)])
 def test_calls_are_made_from_left_to_right(tmp_path: Path, function: Any, value: float) -> None:
-    """Also one in an argument that is not used."""
     own = np.array([3.0])
     assert build(tmp_path, function, STATE)(ctypes.c_void_p(own.ctypes.data)) == value
 
@@ -89,14 +88,6 @@ def with_a_step(x: Any) -> None:
         x[i] = 0.0
 
 
-def with_a_power(x: Any) -> Any:
-    return x**3
-
-
-def with_keywords(x: Any) -> Any:
-    return ignores(x, value=1)
-
-
 def writes(x: Any) -> Any:
     x[0] = 2.0
     return x[0]
@@ -118,8 +109,6 @@ def with_itself(x: Any) -> Any:
     ("function", "word"),
     [
         (with_a_step, "range with a step"),
-        (with_a_power, "write x * x"),
-        (with_keywords, "positional"),
         (with_a_slice, "slice"),
         (with_a_hidden_write, "put it into a name first"),
         (with_itself, "calls itself"),

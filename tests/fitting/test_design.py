@@ -38,7 +38,6 @@ def columns_of(u: FloatArray, bends: int = 0, count: int = 8, start: Start | Non
 def slopes(basis: PlayColumns, seed: int) -> FloatArray:
     rng = np.random.default_rng([seed, 4])
     w = rng.uniform(0.0, 1.0, (basis.bends.size + 1, basis.thresholds.size)) / basis.thresholds.size
-    # Some plays have no slope anywhere.
     w[:, 1:] *= rng.random(basis.thresholds.size - 1) < 0.7
     w[:, 0] += 0.2
     return w.ravel()
@@ -119,7 +118,6 @@ def test_a_creep_gain_is_the_derivative_of_the_output() -> None:
 
 @pytest.mark.parametrize("basis", ["plays", "loop"])
 def test_a_thinned_log_has_the_rows_of_the_whole_one(basis: str) -> None:
-    """Between turns of the voltage, and in rests, nothing is remembered."""
     rng = np.random.default_rng(3)
     u = np.repeat(np.cumsum(rng.standard_normal(400)), rng.integers(1, 30, 400))
     u = np.interp(np.arange(0.0, u.size, 0.25), np.arange(u.size), u)

@@ -57,7 +57,6 @@ def test_ends_where_scipy_does(loss: str, model: Any) -> None:
 
 @pytest.mark.parametrize("sharp", [1.0, 1e6])
 def test_a_prior_counts_as_rows_do(sharp: float) -> None:
-    """Also one that ties coordinates to each other far more closely than the record does."""
     tie = np.eye(START.size)
     tie[0, :] = sharp
     given = problem(prior=Prior(START, 1e2 * tie))

@@ -65,7 +65,6 @@ def test_no_sample_of_a_healthy_voltage_is_wrong(name: str, recorded: str) -> No
         assert not flawed(RECORDED[recorded](u), x).voltage.any()
 
 
-# Places, and what is recorded there of the voltage.
 WRONG: dict[str, tuple[list[int], Callable[[FloatArray], Any]]] = {
     "spikes": ([700, 2111, 4321], lambda u: np.add(u, [25.0, -30.0, 8.0])),
     "zeros": ([900, 2500, 2501, *range(4000, 4025)], lambda u: 0.0 * u),

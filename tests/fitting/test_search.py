@@ -45,7 +45,6 @@ def test_a_stage_of_plays_is_recovered_to_its_noise(model: str, kinds: dict[str,
     assert rms(error) < (1.5 if kinds else 0.7) * sigma
     assert found.held_out < (2.2 if kinds else 1.5) * sigma
     assert found.spikes <= 5
-    # A stage that creeps at the start has not settled.
     assert found.left_out <= 0.1 * N
 
 
@@ -142,7 +141,6 @@ def test_a_drift_is_fitted_beside_the_model() -> None:
 
 @pytest.mark.parametrize("seed", [0, 3])
 def test_a_drift_is_fitted_together_with_a_coleman_hodgdon_loop_and_its_delay(seed: int) -> None:
-    """A drift that stays where plays have put it bends the loop."""
     u = voltage(np.random.default_rng(seed))
     loop = pz.ColemanHodgdon(0.03, 0.12, 0.0066)
     x = loop.simulate(np.concatenate([np.linspace(0.0, u[0], 300), u]))[300:]
@@ -163,7 +161,6 @@ def test_a_jump_is_fitted_beside_the_model(place: int) -> None:
     without = fit(u, y, "plays")
     y[place:] += 100.0 * sigma
     found = fit(u, y, "plays")
-    # It is nobody's fault, wherever it stands.
     assert found.held_out < 1.2 * without.held_out
     assert found.ahead < 1.5 * without.ahead
     assert found.spread.within < 1.5 * without.spread.within

@@ -39,7 +39,6 @@ def test_standard_errors_cover(model: str, memory: float) -> None:
 
 @pytest.mark.slow
 def test_standard_errors_of_plays_and_creep_are_of_the_size_of_their_scatter() -> None:
-    """Of a stage whose thresholds and time constants are those of the fit."""
     u = voltage(np.random.default_rng(1), centre=40.0)
     thresholds = 0.45 * np.ptp(u) * np.arange(1, 20) / 19.0
     creep = pz.Creep([0.05], [0.5])
@@ -71,7 +70,6 @@ def test_what_ends_at_a_bound_has_no_standard_error() -> None:
 @pytest.mark.parametrize("model", ["plays", "plays-asymmetric-creep", "coleman-hodgdon"])
 @pytest.mark.slow
 def test_intervals_hold_what_they_promise(model: str) -> None:
-    """Of the half behind the fitted one."""
     inside = []
     for seed in range(8):
         rng = np.random.default_rng(seed)
@@ -116,7 +114,6 @@ def test_an_interval_holds_a_lag_that_is_no_delay() -> None:
 
 
 def test_blocks_beyond_the_others_do_not_widen_the_interval_within_the_range() -> None:
-    """Nothing was known there; within the range a stage of plays is known well."""
     t = np.linspace(0.0, 1.0, N)
     u = 40.0 * t * np.sin(150.0 * t)
     x = stage(np.random.default_rng(0)).simulate(u) + noise(5e-3)
@@ -153,7 +150,6 @@ def test_an_interval_holds_loops_that_the_record_did_not_show() -> None:
 
 
 def test_an_interval_holds_creep_that_the_record_could_not_show() -> None:
-    """Of a stage that only swings, and then comes to rest at one side."""
     t = np.arange(2 * N) / RATE
     u = 40.0 * np.sin(2.0 * np.pi * 2.25 * np.minimum(t, 1.3 * N / RATE))
     assert abs(u[-1]) > 20.0

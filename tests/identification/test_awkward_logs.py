@@ -181,7 +181,6 @@ def test_missing_readings_hide_nothing() -> None:
 
 
 def test_a_date_in_days_is_no_time_in_seconds() -> None:
-    """MATLAB counts days; 100 Hz would be 8.6 MHz."""
     u, x, _ = log()
     days = 739_948.4 + 10.0 * T / 86_400.0
     record = Record(days, u, x, (N - 1) / (days[-1] - days[0]))

@@ -89,7 +89,6 @@ def resting_first(u: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 AT = np.arange(swings().size)
-# What is made of a log, and what is said of it.
 FLAWS: dict[str, tuple[Any, str]] = {
     "unipolar": (lambda u, x: (u + 60.0, x), "not centred"),
     "gaps": (
@@ -290,7 +289,6 @@ TURN = HALF + int(np.argmax(RECORD.voltage[HALF:]))
 
 
 AROUND, NONE = slice(TURN - 60, TURN + 60), slice(0)
-# Voltages and displacements that are missing.
 LOST_TURN = {"rows": (AROUND, AROUND), "voltage": (AROUND, NONE)}
 OTHERS = {
     "at both ends": (slice(-400, None), slice(HALF, HALF + 300)),
@@ -376,7 +374,6 @@ def test_real_recordings_predict_each_other(real: Identification, data_dir: Path
     other = identify(folder / "model_1hz.csv", validate=[folder / "test_1hz.csv"])
     assert real.validations[0].without_mean.rms <= 0.45
     assert other.validations[0].without_mean.rms <= 0.45
-    # It swings alike all the time: a lag cannot be told.
     assert not other.delay_known
 
 
@@ -389,7 +386,6 @@ def test_free_running_sees_only_the_voltage(real: Identification) -> None:
 
 
 def test_an_interval_holds_what_kinds_expect_that_may_be_right_as_well() -> None:
-    """Beyond the fitted voltages, where they differ by more than what any of them misses within."""
     found = identify(plays_log(0, bends=2))
     u = 2.0 * (found.record.voltage - 40.0) + 40.0
     expected = found.predict(u)
@@ -399,6 +395,5 @@ def test_an_interval_holds_what_kinds_expect_that_may_be_right_as_well() -> None
     apart = np.max([np.abs(each.fit.predict(u).x - expected.x) for each in rivals], axis=0)
     assert apart.max() > found.fit.spread.within
     own = found.fit.predict(u)
-    # Kinds that are not as good may differ by even more.
     assert np.all(expected.upper - expected.x >= 0.9999 * np.hypot(own.upper - own.x, apart))
     np.testing.assert_allclose(expected.x - expected.lower, expected.upper - expected.x)

@@ -32,7 +32,6 @@ def test_spikes_are_found() -> None:
         rng = np.random.default_rng(seed)
         u, x, _, noise = zoo_log(seed)
         places = apart(rng, x.size, round(x.size * 10.0 ** rng.uniform(-3.0, np.log10(0.02))), 4)
-        # What is less than a part in a thousand of the range is left alone.
         least = max(10.0 * noise, 3e-3 * np.ptp(x))
         y = x.copy()
         y[places] += rng.choice([-1.0, 1.0], places.size) * least * 10.0 ** rng.uniform(0.0, 1.5, places.size)

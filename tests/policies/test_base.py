@@ -63,7 +63,6 @@ def near(policy: Any) -> Iterator[Any]:
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.slow_but_first
 def test_every_policy_is_carried_out(name: str) -> None:
-    """Also those to come: with it an estimator does something else than without."""
     options = OPTIONS.get(name, {})
     memory = 0.4 if name == "Forgetting" else None
     u, x = eventful()
@@ -136,7 +135,6 @@ def test_a_policy_defined_after_the_estimators_is_refused(policy_of: Maker) -> N
     ):
         with pytest.raises(ValueError, match=r"Late was defined after the estimators.* not call its prepare"):
             make()
-    # Others go on as they are.
     estimator = pz.RecursiveLeastSquares(2, policies=(p.DeadZone(),))
     estimator.update(1.0, [1.0, 1.0])
     assert estimator.theta.sum() == pytest.approx(1.0, rel=1e-3)

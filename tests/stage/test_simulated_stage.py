@@ -73,7 +73,6 @@ def test_reset_repeats_and_seeds_differ() -> None:
 
 
 def test_starts_at_rest() -> None:
-    """At 0 V nothing moves, whatever offset, bias, filters and delay there are."""
     stage = SimulatedStage(
         FS, PLAYS, Creep([0.1], [0.01]), pz.MassSpringDamper(780.0, 0.02),
         Amplifier(cutoff=2000.0), Gauge(bias=0.7, cutoff=2000.0, delay=3),
