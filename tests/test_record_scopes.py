@@ -16,6 +16,7 @@ SCALE = 2.0  # [µm/V]
 
 ROWS = [f"{t:.6e},{u},{x}" for t, u, x in zip(TIME, VOLTAGE, SENSOR, strict=True)]
 SEQUENCE = [f"{k},{u},{x}" for k, (u, x) in enumerate(zip(VOLTAGE, SENSOR, strict=True))]
+NAMES = "time [s],voltage [V],position [um]"
 BARE = [f"{u},{x}" for u, x in zip(VOLTAGE, SENSOR, strict=True)]
 TEKTRONIX = [
     "Model,MSO2024", "", "Horizontal Units,S,", "Sample Interval,2e-03,", f"Record Length,{N},",
@@ -42,6 +43,12 @@ QUOTED = [
 ]
 
 
+def written(folder: Path, lines: list[str], end: str = "\n") -> Path:
+    file = folder / "log.csv"
+    file.write_bytes(end.join(lines).encode())
+    return file
+
+
 @pytest.mark.parametrize(
     ("lines", "channels"),
     [
@@ -59,8 +66,7 @@ QUOTED = [
          "tektronix, beside", "tektronix, quoted"],
 )  # fmt: skip
 def test_channels_in_volts_are_asked_for(tmp_path: Path, lines: list[str], channels: str) -> None:
-    file = tmp_path / "scope.csv"
-    file.write_bytes("\r\n".join([*lines, ""]).encode())
+    file = written(tmp_path, [*lines, ""], "\r\n")
     named = {"voltage": f"{channels}1", "displacement": f"{channels}2"}
     with pytest.raises(ValueError, match="could all be the voltage, and none is a displacement") as caught:
         read_record(file)
@@ -75,15 +81,13 @@ def test_channels_in_volts_are_asked_for(tmp_path: Path, lines: list[str], chann
 
 
 def test_one_channel_beside_its_lines_is_no_log(tmp_path: Path) -> None:
-    file = tmp_path / "F0000CH1.CSV"
-    file.write_text("\n".join(beside(1, VOLTAGE)))
+    file = written(tmp_path, beside(1, VOLTAGE))
     with pytest.raises(ValueError, match="no column for displacement found"):
         read_record(file)
 
 
 def test_a_sensor_in_millivolts_is_said(tmp_path: Path) -> None:
-    file = tmp_path / "pico.csv"
-    file.write_text("\n".join(["Time,Channel A,Channel B", "(s),(V),(mV)", "", *ROWS]))
+    file = written(tmp_path, ["Time,Channel A,Channel B", "(s),(V),(mV)", "", *ROWS])
     named = {"voltage": "Channel A", "displacement": "Channel B"}
     record = read_record(file, columns=named, units={"displacement": "2 nm"})
     np.testing.assert_allclose(record.displacement, 2e-3 * SENSOR)
@@ -91,33 +95,25 @@ def test_a_sensor_in_millivolts_is_said(tmp_path: Path) -> None:
 
 
 def test_a_stated_rate_that_time_does_not_have_is_said(tmp_path: Path) -> None:
-    file = tmp_path / "log.csv"
     for rate, said in ((500, 0), (1000, 1)):
-        file.write_text(
-            "\n".join([f"Sample rate,{rate} Hz", "", "time [s],voltage [V],position [um]", *ROWS])
-        )
-        record = read_record(file)
+        record = read_record(written(tmp_path, [f"Sample rate,{rate} Hz", "", NAMES, *ROWS]))
         assert record.sample_rate == pytest.approx(RATE)
         assert sum("is ignored: time has 500 Hz" in note for note in record.notes) == said
-    file.write_text("\n".join(["Sample rate,10 kHz", "", "voltage [V],position [um]", *BARE]))
+    file = written(tmp_path, ["Sample rate,10 kHz", "", "voltage [V],position [um]", *BARE])
     assert read_record(file).sample_rate == 10_000.0
 
 
 def test_columns_that_are_called_start_and_increment_are_no_mark_of_a_scope(tmp_path: Path) -> None:
-    file = tmp_path / "log.csv"
     rows = [f"{row},1,2" for row in ROWS]
-    file.write_text("\n".join(["time [s],voltage [V],position [um],Start,Increment", *rows]))
-    assert len(read_record(file)) == N
+    assert len(read_record(written(tmp_path, [f"{NAMES},Start,Increment", *rows]))) == N
 
 
 def test_an_increment_above_the_rows_is_no_time_unless_it_is_rigols(tmp_path: Path) -> None:
-    file = tmp_path / "log.csv"
-    file.write_text("\n".join(["Voltage step,0.5", "Increment,0.5", "voltage [V],position [um]", *BARE]))
+    lines = ["Voltage step,0.5", "Increment,0.5", "voltage [V],position [um]", *BARE]
     with pytest.raises(ValueError, match="sample rate"):
-        read_record(file)
+        read_record(written(tmp_path, lines))
 
 
 def test_a_length_padded_by_a_spreadsheet_is_a_line_as_any_other(tmp_path: Path) -> None:
-    file = tmp_path / "log.csv"
-    file.write_text("\n".join([f"Record Length,{N},,,,", "time [s],voltage [V],position [um]", *ROWS]))
-    np.testing.assert_array_equal(read_record(file).displacement, SENSOR)
+    record = read_record(written(tmp_path, [f"Record Length,{N},,,,", NAMES, *ROWS]))
+    np.testing.assert_array_equal(record.displacement, SENSOR)

@@ -132,7 +132,6 @@ FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "closed loop, reading after": (lambda: closed_loop(False), "closed loop", "later"),
     "closed loop, reading before": (lambda: closed_loop(True), "closed loop", "opposite ways"),
     "sensor clipped above": (with_(lambda u, x: (u, x.clip(-9.0, 3.0))), "clipped displacement", "3 µm"),
-    "sensor clipped below": (with_(lambda u, x: (u, x.clip(-2.5, 9.0))), "clipped displacement", "-2.5 µm"),
     "recorder clips the voltage": (with_(lambda u, x: (u.clip(max=40.0), x)), "clipped voltage", "at 40 V"),
     "saturated": (lambda: (SINE, log(SINE.clip(-45.0, 45.0))[1], FS), "clipped displacement", "comes back"),
     "four bits": (in_steps_of(0.8), "coarse", "steps of 0.8 µm"),
