@@ -1,6 +1,5 @@
 """Columns times coefficients are what the model simulates, in one piece and in many."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -98,22 +97,6 @@ def test_segments_add_up_to_plays() -> None:
     np.testing.assert_allclose(rows @ T, plain.rows(u, plain.begin()), atol=1e-12)
     expected = play_matrix(u, bent.thresholds, bent.start.states(bent.thresholds))
     np.testing.assert_allclose(plain.rows(u, plain.begin()), expected, atol=1e-12)
-
-
-def test_a_creep_gain_is_the_derivative_of_the_output() -> None:
-    u = walk(4)
-    basis = columns_of(u)
-    w = np.append(slopes(basis, 4), np.zeros(6))
-
-    def output(gains: FloatArray) -> FloatArray:
-        return Design(basis, RATE, u.size, replace(CREEP, gains=gains)).output(u, w)
-
-    design = Design(basis, RATE, u.size, CREEP)
-    rows = np.vstack([each for _, each in design.blocks(u, w[: basis.size])])
-    for j in range(2):
-        step = 1e-3 * np.eye(2)[j]
-        expected = (output(CREEP.gains + step) - output(CREEP.gains - step)) / 2e-3
-        np.testing.assert_allclose(rows[:, design.gains][:, j], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("basis", ["plays", "loop"])

@@ -74,8 +74,8 @@ def test_what_goes_beyond_the_fitted_part_is_said() -> None:
     fast = Record.from_arrays(steady.voltage, steady.displacement, 2.0 * FS)
     said = identify(grows, model="line", validate=[steady]).advice
     (held,) = [each for each in said if each.startswith("The held-out part goes beyond")]
-    assert "the voltage goes from -38.8 to 38.8 V, the model was learnt from -19.4 to 19.4 V" in held
-    assert any(each.startswith("Other log") and "learnt from -19.4 to 19.4 V" in each for each in said)
+    assert "-38.8 to 38.8 V" in held
+    assert any(each.startswith("Other log") and "-19.4 to 19.4 V" in each for each in said)
     said = identify(steady, model="line", validate=[steady, fast]).advice
     (other,) = [each for each in said if "goes beyond" in each]
     assert "V/s" in other
@@ -144,12 +144,9 @@ def test_a_stage_of_another_gain_or_offset_is_told_apart() -> None:
         for factor, offset, name in ((1.0, 0.0, "same"), (2.0, 0.0, "gain"), (1.0, 2.5, "offset"))
     ]
     said = [each for each in identify(log(u, PLAYS.simulate(u)), validate=others).advice if "log" in each]
-    about = {
-        name: [each for each in said if each.startswith(f"Other log {name}")] for name in ("same", "gain")
-    }
-    assert about["same"] == []
-    assert any("misses it" in each for each in about["gain"])
-    assert any("only its offset differs, by 2.5 µm" in each for each in said)
+    assert not any(each.startswith("Other log same") for each in said)
+    assert any(each.startswith("Other log gain") for each in said)
+    assert any("offset differs, by 2.5 µm" in each for each in said)
 
 
 def test_a_column_without_a_number_is_refused() -> None:

@@ -12,7 +12,7 @@ import piezoest as pz
 from piezoest import signals
 from piezoest._checks import FloatArray
 from piezoest.fitting import FORMS
-from piezoest.identification import Identification, Whiteness, identify
+from piezoest.identification import Identification, identify
 from piezoest.identification.sense import findings
 from piezoest.models import ColemanHodgdon
 from piezoest.models.reading import LearntModel
@@ -176,19 +176,6 @@ def test_other_logs_are_predicted(tmp_path: Path) -> None:
         identify(made(), validate=[Record.from_arrays(other.voltage[:30], other.displacement[:30], RATE)])
 
 
-@pytest.mark.slow
-def test_doubts_are_errors_where_they_are_to_be() -> None:
-    record = made()
-    gap = record.displacement.copy()
-    gap[-4000:] = np.nan
-    found = identify(changed(gap), model="line", train=0.2)
-    assert [each.name for each in found.findings if each.severity == "doubt"] == ["missing"]
-    assert found.findings[0].sentence in found.advice
-    with pytest.raises(ValueError, match="%"):
-        identify(changed(gap), model="line", train=0.2, strict=True)
-    assert identify(record, model="line", strict=True).chosen == "line"
-
-
 def bad_records() -> dict[str, tuple[Record, str]]:
     u, time = swings(), np.arange(swings().size) / RATE
     hiss = noise(1e-2, 0, u.size)
@@ -272,14 +259,6 @@ def test_text_names_what_matters() -> None:
     table = identify(plays_log()).table()
     assert [row[0] for row in table][-2:] == ["offset", "delay"]
     assert len(table) <= 12
-
-
-def test_whiteness() -> None:
-    white = np.random.default_rng(0).standard_normal(2000)
-    assert Whiteness.of(white).is_white
-    coloured = Whiteness.of(np.convolve(white, np.ones(5), mode="valid"))
-    assert not coloured.is_white
-    assert coloured.first_autocorrelation == pytest.approx(0.8, abs=0.05)
 
 
 # Gaps and wrong voltages: models are judged where the stage is known, and never by NaN.
