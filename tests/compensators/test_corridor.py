@@ -96,10 +96,7 @@ def test_a_wrong_first_reading_does_not_leave_the_voltage_at_a_limit(make: Any, 
     gain = float(np.exp(rng.uniform(np.log(0.6), np.log(1.6)))) * rig.gain
     wrong = rig.plain.amplitude * rng.uniform(0.3, 1.5) * float(rng.choice([-1.0, 1.0]))
     start, limits = pz.ColemanHodgdon.from_loop(1.5 / rig.reach.half, 0.2 * gain, gain), rig.limits
-    estimator, compensator = (
-        make(rig.sample_rate, initial_model=start),
-        pz.InverseCompensator(start, rig.limits),
-    )
+    estimator, compensator = make(rig.sample_rate, initial_model=start), pz.InverseCompensator(start, limits)
     _, u = hand_wired(rig.reference, rig.stage(), estimator, compensator, wrong=wrong)
     u = u[-min(2 * rig.plain.cycle, u.size // 3) :]
     assert np.mean((u <= limits.minimum) | (u >= limits.maximum)) < 0.75

@@ -1,4 +1,4 @@
-"""MovingHorizon: one solve a hop, parity, tracking, arrival cost, thinning, bad solves."""
+"""MovingHorizon: one solve a hop, parity, tracking, arrival cost, decimation, bad solves."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""OutputErrorRLS: exact on its own plant from any start, noise, rest."""
+"""OutputErrorRLS: exact on its own plant from any start, noise."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The simulated stage: its parts, its streams, its seeds; the paper's stage: its loops and how they warm."""
+"""The simulated stage: its parts, its streams, its seeds; the paper's stage: its loops."""
 
 from typing import Any
 
