@@ -3,6 +3,8 @@
 import dataclasses
 import json
 import math
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -319,3 +321,36 @@ def test_a_file_that_is_no_store_is_named(tmp_path: Path) -> None:
     path.write_text("no rows" * 1000)
     with pytest.raises(OSError, match=r"runs\.sqlite: file is not a database"), opened(path):
         pass
+
+
+APPEND = """
+import sys
+from pathlib import Path
+
+from piezoest.bench.store import append, opened, row_of
+
+path, name = Path(sys.argv[1]), sys.argv[2]
+keys = [f"{name}{k}" for k in range(500)]
+with opened(path) as file:
+    print("open", flush=True)
+    sys.stdin.readline()
+    for k, key in enumerate(keys):
+        assert append(file, {"key": key, "text": name * (k % 997)})
+    for k, key in enumerate(keys):
+        assert row_of(file, key) == {"key": key, "text": name * (k % 997)}
+"""
+
+
+@pytest.mark.slow
+def test_two_processes_append_to_one_store(tmp_path: Path) -> None:
+    path = tmp_path / "runs.sqlite"
+    command = [sys.executable, "-c", APPEND, str(path)]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    workers = [subprocess.Popen([*command, name], **pipes) for name in "xy"]  # type: ignore[call-overload]
+    for worker in workers:
+        worker.stdout.readline()
+    for worker in workers:
+        worker.stdin.write("\n")
+        worker.stdin.flush()
+    assert [worker.communicate() and worker.returncode for worker in workers] == [0, 0]
+    assert kept(path) == 1000

@@ -8,7 +8,6 @@ import pytest
 import piezoest as pz
 from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
 from piezoest.identification.feedback_in_log import answer
-from piezoest.identification.loop_direction import loop_of
 from piezoest.identification.sense import findings
 from piezoest.records import Record
 from tests.identification.zoo_logs import zoo_log

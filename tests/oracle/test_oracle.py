@@ -17,8 +17,21 @@ TOLERANCE = 0.0 if storage.home() == MADE else 1e-7
 BY_ROUNDING = {"rls/paper/wild"}
 
 
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.slow_but_first
+# Each of these compiles an estimator of its own.
+SLOW = (
+    "rls/paper/",
+    "rls/line/",
+    "rls/continuous/",
+    "rls/all-policies/",
+    "ekf/line-offset/",
+    "plays/mechanics-delay/",
+)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] if name.startswith(SLOW) else []) for name in CASES],
+)
 def test_case(name: str) -> None:
     assert name in STORED, "not in the file: python -m tests.oracle.make_oracle"
     if TOLERANCE > 0.0 and name in BY_ROUNDING:
