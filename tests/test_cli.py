@@ -93,6 +93,7 @@ def test_identify_one_kind(log: Path) -> None:
     assert [each["name"] for each in data["candidates"]] == ["line", "plays"]
 
 
+@pytest.mark.slow
 def test_identify_predicts_other_logs(log: Path) -> None:
     record = read_record(log)
     Record.from_arrays(record.voltage, record.displacement + 0.5, RATE).write("other.csv")

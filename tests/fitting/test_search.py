@@ -106,6 +106,7 @@ def test_a_delay_is_found_where_the_voltage_has_several_frequencies(delay: float
     assert found.delay_estimated
 
 
+@pytest.mark.slow
 def test_creep_is_found() -> None:
     u, x, sigma = drawn(5, creep=pz.Creep([0.05], [0.5]))
     found: Any = fit(u, x + noise(sigma), "plays-creep")
@@ -155,6 +156,7 @@ def test_a_drift_is_fitted_together_with_a_coleman_hodgdon_loop_and_its_delay(se
 
 
 @pytest.mark.parametrize("place", [700, 2600, 3900, 4700])
+@pytest.mark.slow_but_first
 def test_a_jump_is_fitted_beside_the_model(place: int) -> None:
     u, x, sigma = drawn(10)
     y = x + noise(sigma)
@@ -207,6 +209,7 @@ def test_spikes_dropouts_and_gaps_do_not_move_a_fit() -> None:
 
 
 @pytest.mark.parametrize("seed", range(6))
+@pytest.mark.slow
 def test_predicts_what_comes_as_well_as_plain_least_squares(seed: int) -> None:
     """Of the same 20 plays, without penalty and with the true start."""
     u, x, sigma = drawn(seed)

@@ -129,6 +129,7 @@ def test_a_loop_is_trusted_beyond_the_range_and_plays_are_not() -> None:
     assert wide[0].by_volt < 0.5 * wide[1].by_volt
 
 
+@pytest.mark.slow
 def test_an_interval_holds_loops_that_the_record_did_not_show() -> None:
     """Of slopes that were fitted to loops of one size; where it had shown those, nothing is wider."""
     t = np.arange(2 * N) / RATE

@@ -65,6 +65,7 @@ def test_page_is_sound_and_self_contained(found: pz.Identification, tmp_path: Pa
     assert len(text) < 1_000_000
 
 
+@pytest.mark.slow
 def test_command_writes_the_report(record: pz.Record, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.chdir(tmp_path)
     record.write("log.csv")
