@@ -15,6 +15,7 @@ from typer.testing import CliRunner, Result
 from piezoest import demo, signals
 from piezoest._version import __version__
 from piezoest.cli import app
+from piezoest.fitting import FORMS
 from piezoest.models import ColemanHodgdon, LearntModel, PrandtlIshlinskii
 from piezoest.records import Record, read_record, write_columns
 
@@ -54,6 +55,7 @@ def reference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 THETA = ("--alpha", 0.02, "--beta", 0.12, "--gamma", 0.0036)
+WIDE = ("--minimum", -100, "--maximum", 100)
 
 
 def test_demo_reduces_the_error_by_ninety_percent(tmp_path: Path) -> None:
@@ -67,6 +69,7 @@ def test_demo_reduces_the_error_by_ninety_percent(tmp_path: Path) -> None:
     assert errors[0] > 5.0 * errors[-1]
     # The start is wrong: without adaptation it is worse than the straight line.
     assert fixed.max_error(2) > linear.max_error(2)
+    # The controller starts from nothing, and finds what the other one finds.
     assert result.reduction(demo.CONTROLLER) >= 0.89
     assert result.learnt["beta"] == pytest.approx(adaptive.theta[-1, 1], rel=0.05)
     u = controller.voltage
@@ -81,7 +84,9 @@ def test_identify_prints_tables_and_writes_figure_and_model(log: Path) -> None:
     assert result.exit_code == 0
     for word in ("alpha", "µm/V²", "▸ Coleman-Hodgdon", "log_identified.png", "model.json"):
         assert word in result.stdout
-    assert max(len(line) for line in result.stdout.splitlines() if line.startswith("──")) <= 80
+    rules = [line for line in result.stdout.splitlines() if line.startswith("──")]
+    assert len(rules) == 3
+    assert max(map(len, rules)) <= 80
     assert Path("log_identified.png").stat().st_size > 10_000
     assert json.loads(Path("model.json").read_text(encoding="utf-8"))["model"]["model"] == "ColemanHodgdon"
 
@@ -91,9 +96,10 @@ def test_identify_one_kind(log: Path) -> None:
     assert (data["kind"], data["delay_samples"]) == ("plays", 0.0)
     assert not list(log.parent.glob("*.png"))
     assert [each["name"] for each in data["candidates"]] == ["line", "plays"]
+    said = run("identify", "--help").stdout
+    assert all(name in said for name in FORMS)
 
 
-@pytest.mark.slow
 def test_identify_predicts_other_logs(log: Path) -> None:
     record = read_record(log)
     Record.from_arrays(record.voltage, record.displacement + 0.5, RATE).write("other.csv")
@@ -102,7 +108,9 @@ def test_identify_predicts_other_logs(log: Path) -> None:
     assert result.exit_code == 0
     assert "other.csv" in result.stdout
     other, same = json.loads(run("identify", log, *options, "--json").stdout)["validation"]
+    assert (other["source"], same["source"]) == ("other.csv", str(log))
     assert other["error"]["rms_um"] == pytest.approx(0.5, rel=0.01)
+    assert other["without_mean"]["rms_um"] < 3e-3
     assert same["error"]["rms_um"] < 3e-3
     refused(run("identify", log, "--no-plot", "--validate", "none.csv"), "none.csv", "No such file")
 
@@ -118,6 +126,7 @@ def test_strict_refuses_a_doubtful_log(log: Path) -> None:
 def test_identify_the_example(tmp_path: Path, log: Path) -> None:
     found = json.loads(run("identify", "example", "--json", "--no-plot").stdout)
     assert found["samples"] == 14_155
+    # A file of that name comes first.
     Path("example").write_bytes(log.read_bytes())
     found = json.loads(run("identify", "example", "--json", "--no-plot").stdout)
     assert found["samples"] < 14_155
@@ -166,6 +175,19 @@ def test_compensate_warns_where_nothing_bounds_the_voltage(reference: Path, limi
         assert (name in result.stderr) == (name not in limits)
 
 
+@pytest.mark.parametrize("offset", [3.0, 0.0])
+def test_compensate_says_what_the_model_was_not_learnt_on(reference: Path, offset: float) -> None:
+    r = signals.triangle(2.0, 5.0, 4, RATE)
+    write_columns(reference, {"time_s": r.time, "reference_um": r.values + offset})
+    moved = () if offset == TRUE.offset else ("--offset", offset)
+    leaves = {"rate": 100.0, "displacement": [2.0, 4.0]}
+    for change, lines in (({}, 0), ({"frequency": None}, 0), (leaves, 2)):
+        Path("model.json").write_text(json.dumps({"model": TRUE.to_dict(), "learnt_on": LEARNT_ON | change}))
+        result = run("compensate", reference, "-p", "model.json", "-o", "voltage.csv", *moved, *WIDE)
+        assert result.exit_code == 0
+        assert len(result.stderr.strip().splitlines()) == lines
+
+
 def test_mistakes_in_logs(log: Path) -> None:
     for options in (("--model", "plays"), ("--validate", log), ("--strict",), ("--plot", "figure.png")):
         refused(run("identify", log, "--stream", *options), options[0], "leave out --stream")
@@ -179,13 +201,20 @@ def test_mistakes_in_logs(log: Path) -> None:
     assert isinstance(run("identify", "none.csv", "--debug").exception, OSError)
     refused(run("identify", "none.csv"), "none.csv", "No such file")
     refused(run("identify", "."), "Is a directory" if sys.platform != "win32" else ".")
+    Path("empty.csv").write_text("")
+    refused(run("identify", "empty.csv"), "empty")
     Path("text.csv").write_text(log.read_text().replace("0.005,", "oops,", 1))
     refused(run("identify", "text.csv"), "line 7", "time_s", "oops")
+    Path("columns.csv").write_text(log.read_text().replace("voltage_V", "current_A"))
+    refused(run("identify", "columns.csv"), "voltage", "current_A")
     refused(run("identify", log, "--columns", "voltage=foo"), "foo")
     refused(run("identify", log, "--plot", "no/such/figure.png"), "no folder")
     for name in ("figure.xyz", "figure"):
         refused(run("identify", log, "--plot", name), name, ".png")
         refused(run("demo", "--output", name), name, ".png")
+    lines = log.read_text().splitlines()
+    Path("dwell.csv").write_text("\n".join([lines[0], *(f"{k / 100},5.0,{1 + k % 2}" for k in range(300))]))
+    refused(run("identify", "dwell.csv"), "too little excitation", "5 V")
 
 
 def test_mistakes_in_compensate(reference: Path) -> None:
@@ -193,11 +222,13 @@ def test_mistakes_in_compensate(reference: Path) -> None:
     refused(run("compensate", reference, *out), "no model")
     refused(run("compensate", reference, *THETA, "-o", "voltage.xlsx"), "voltage.xlsx", "no format")
     refused(run("compensate", reference, "--alpha", 1, *out), "--beta and --gamma")
+    refused(run("compensate", reference, "--alpha", 1, "--beta", 1, "--gamma", 9, *out), "not admissible")
     refused(run("compensate", reference, *THETA, "--minimum", 5, "--maximum", 1, *out), "must be below")
     refused(run("compensate", reference, "-p", "none.json", *out), "none.json")
     contents = {
         "{": "not JSON",
         "[1]": "no model",
+        '{"model": ["a"]}': "no model",
         '{"model": "Foo"}': "Foo",
         json.dumps({"model": TRUE.to_dict(), "learnt_on": LEARNT_ON | {"rate": "fast"}}): "rate must be one",
         '{"alpha": 1}': "ColemanHodgdon has no 'beta'",

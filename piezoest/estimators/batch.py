@@ -14,9 +14,10 @@ from piezoest.estimators.batch_result import BatchFitResult
 from piezoest.estimators.hopping import LEAST_HANDED_OUT, Hopping
 from piezoest.fitting.coordinates import Coordinates, bridged, coordinates
 from piezoest.fitting.gauss_newton import robust, single_shooting
+from piezoest.fitting.losses import TUNING
 from piezoest.fitting.multiple_shooting import multiple_shooting
 from piezoest.fitting.outcome import outcome
-from piezoest.fitting.problem import TUNING, Problem
+from piezoest.fitting.problem import Problem
 from piezoest.fitting.start import best_start
 from piezoest.layout import COUNT, MOST, record
 from piezoest.models import Creep, FreeRunning

@@ -12,7 +12,19 @@ from piezoest.compile import Record, compiled, inlined
 from piezoest.equations import innovation_energy
 from piezoest.equations import least_squares as equations
 from piezoest.estimators.samples import HELD, MISSING, OUTCOME, UPDATED
-from piezoest.layout import ABSENT, AMOUNT, COUNT, COVARIANCE, FIXED, NUMBER, PARAMETER, WORK, numbers, record
+from piezoest.layout import (
+    ABSENT,
+    AMOUNT,
+    COUNT,
+    COVARIANCE,
+    FIXED,
+    NUMBER,
+    PARAMETER,
+    WORK,
+    Field,
+    numbers,
+    record,
+)
 from piezoest.policies import Policy
 from piezoest.policies.base import Conditions, chain
 
@@ -25,7 +37,7 @@ before_update = chain("before_update")
 after_update = chain("after_update")
 
 
-def law_layout(n: int, *, discrete: bool) -> Any:
+def law_layout(n: int, *, discrete: bool) -> Field:
     """What the law keeps: outcome, estimate, and of the sample z, factor, noise, S of the gain, P phi."""
     rates = record(theta=numbers(n, kind=WORK), P=numbers(n, n, kind=WORK))
     return record(
@@ -36,7 +48,7 @@ def law_layout(n: int, *, discrete: bool) -> Any:
     )  # fmt: skip
 
 
-def law_settings_layout(n: int) -> Any:
+def law_settings_layout(n: int) -> Field:
     """What the law is given: forgetting factor, noise variance, bound on the trace, step, rate."""
     return record(
         forgetting=FIXED, noise=FIXED, bound=FIXED, step=FIXED, rate=FIXED, normalised=FIXED,
@@ -137,7 +149,7 @@ def adapt(state: Any, settings: Any) -> None:
             innovation_energy.learn(state.energy, law.innovation, law.innovation_variance, state.fraction)
 
 
-def layout(n: int, policies: Any, *, discrete: bool) -> Any:
+def layout(n: int, policies: Field, *, discrete: bool) -> Any:
     """State of a `RecursiveLeastSquares`, which follows no voltage."""
     law = law_layout(n, discrete=discrete)
     return record(

@@ -11,7 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.problem import TUNING, Problem
+from piezoest.fitting.losses import TUNING
+from piezoest.fitting.problem import Problem
 from piezoest.fitting.program import solve
 from piezoest.symbolic import Solution
 

@@ -9,7 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from piezoest._checks import FloatArray
-from piezoest.fitting.problem import Problem, bend
+from piezoest.fitting.losses import bend
+from piezoest.fitting.problem import Problem
 from piezoest.fitting.rows import onto
 
 # Smallest eigenvalue of a scaled information matrix; below it, rounding. Nothing is known of a parameter

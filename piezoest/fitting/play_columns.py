@@ -266,7 +266,7 @@ def _plays(u: Vector, thresholds: Vector, y: Vector, plays: Matrix) -> None:
 
 @compiled
 def _segments(plays: Matrix, edges: Vector, rows: Matrix) -> None:
-    """The same, into `rows`."""
+    """How far each play is within each segment, from where it is at 0 V, into `rows`."""
     n = plays.shape[1]
     for k in range(plays.shape[0]):
         for s in range(edges.size - 1):

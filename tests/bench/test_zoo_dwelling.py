@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from piezoest.bench.zoo import dwelling, tasks
 from piezoest.bench.zoo.dwelling import BEFORE, SHAPES, Dwell, dwell_rig, dwells, summarise_dwells
 from piezoest.bench.zoo.line import fit_line
 from tests.bench.shared import Line, bench
@@ -55,6 +56,20 @@ def test_a_line_goes_on_as_before_and_a_jump_is_seen() -> None:
     assert far["excursion"] > row["excursion"]
     found = summarise_dwells([row, {**far, "seed": -1}, {**row, "failure": "ValueError: no"}])
     assert (found["runs"], found["failures"], found["kept"], found["rigs"]) == (3, 1, 1, 2)
+    (group,) = found["groups"]
+    assert (group["runs"], group["kept"], group["feedback"]) == (3, 1, False)
+    assert group["largest"] == far["first"] / far["allowed"]
+    assert [each["seed"] for each in found["worst"]] == [-1]
+
+
+def test_what_breaks_is_a_row() -> None:
+    (task,) = tasks.tasks("parts", [Dwell(3, True, 1.0)])
+    row, died = tasks.carry_out(task), tasks.died(task)
+    assert "unexpected keyword argument 'feedback'" in row["failure"]
+    assert died["failure"] == "the process died"
+    found = summarise_dwells([row, died])
+    assert found["failures"] == 2
+    assert found["groups"][0]["first"] is None
 
 
 def test_the_command_plays_it(tmp_path: Path) -> None:
@@ -65,4 +80,6 @@ def test_the_command_plays_it(tmp_path: Path) -> None:
     assert "After a rest of 60 s" in result.output
     document = json.loads((tmp_path / "dwell.json").read_text(encoding="utf-8"))
     assert (document["runs"], document["failures"]) == (2, 1)
-    assert (tmp_path / "dwell.csv").exists()
+    heads = (tmp_path / "dwell.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
+    assert heads[:3] == ["key", "controller", "seed"]
+    assert {"duration", "setpoint_noise", "feedback", "failure", *dwelling.PERIODS, "kept"} <= {*heads}

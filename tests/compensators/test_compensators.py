@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import piezoest as pz
 
@@ -20,11 +22,16 @@ def triangle(periods: int = 3) -> Any:
     return pz.signals.triangle(5.0, 5.0, periods, FS)
 
 
+def test_linear() -> None:
+    u = pz.LinearCompensator(pz.LinearGain(0.155, offset=0.3)).run([0.0, 1.0, -2.0])
+    np.testing.assert_allclose(u, (np.array([0.0, 1.0, -2.0]) - 0.3) / 0.155)
+    inverted = pz.LinearCompensator(pz.LinearGain(-0.155)).run([0.0, 1.0, -40.0])
+    np.testing.assert_allclose(inverted, np.array([0.0, 1.0, -40.0]) / -0.155)
+
+
 @pytest.mark.parametrize(
-    ("model", "method"),
-    [(MODEL, "closed-form"), (MODEL, "bogacki-shampine"), (BENT, "closed-form"),
-     (pz.LinearGain(0.15, offset=0.3), "closed-form"), (pz.LinearGain(-0.15), "closed-form")],
-)  # fmt: skip
+    ("model", "method"), [(MODEL, "closed-form"), (MODEL, "bogacki-shampine"), (BENT, "closed-form")]
+)
 def test_step_run_and_split_run_are_the_same_bits_within_limits(model: Any, method: Any) -> None:
     r = triangle(1).values.copy()
     r[400], r[5000:5020] = np.nan, np.inf
@@ -46,6 +53,21 @@ def test_step_run_and_split_run_are_the_same_bits_within_limits(model: Any, meth
     np.testing.assert_array_equal(whole.run(r), u)
 
 
+@given(
+    st.lists(st.floats(allow_nan=True, allow_infinity=True, width=64), min_size=1, max_size=30),
+    st.floats(-50.0, -1.0),
+    st.floats(1.0, 50.0),
+)
+def test_voltage_never_leaves_its_limits(r: list[float], low: float, high: float) -> None:
+    limits = pz.VoltageLimits(low, high, slew_rate=1000.0, sample_rate=1000.0)
+    compensator = pz.InverseCompensator(MODEL, limits)
+    u = compensator.run(r)
+    assert np.all((u >= low) & (u <= high))
+    assert np.max(np.abs(np.diff(u, prepend=0.0))) <= 1.0 + 1e-12
+    later = compensator.run(triangle(1))
+    assert np.all(np.isfinite(later))
+
+
 @pytest.mark.parametrize("at", [700, 2500, 4100])
 def test_change_of_model_is_bumpless(at: int) -> None:
     r = triangle(2).values
@@ -56,6 +78,7 @@ def test_change_of_model_is_bumpless(at: int) -> None:
     after = compensator.run(r[at:])
     usual = np.max(np.abs(np.diff(before)))
     assert np.max(np.abs(np.diff(np.concatenate([before, after])))) < 3.0 * usual
+    # Once paid back, it is the new model's inverse: the output follows r.
     settled = pz.InverseCompensator(new)
     for each in (compensator, settled):
         each.run(np.tile(r, 3))

@@ -1,6 +1,7 @@
 """Adaptive feed-forward as one object: what it promises whatever comes in, and what it shows."""
 
 import copy
+import functools
 import logging
 import pickle
 from collections.abc import Callable
@@ -11,8 +12,8 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
-from piezoest.controller import shown
-from tests.controller.shared import LIMITS, LOOP, drive, last_error, read_back
+from piezoest.controller import shown, team
+from tests.controller.shared import LIMITS, LOOP, drive, in_blocks, last_error, read_back
 
 FS = 5000.0
 BOTH: Any = pytest.mark.parametrize("estimators", [(), None], ids=["line", "default"])
@@ -68,6 +69,14 @@ def test_blocks_of_one_are_samples(estimators: Any) -> None:
     assert single.status.missing == 3
 
 
+@BOTH
+def test_blocks_are_planned_and_followed(estimators: Any) -> None:
+    driver, r = controller(estimators), triangle(20)
+    _, x = in_blocks(driver, pz.SimulatedStage(FS, LOOP), r, 25)
+    assert driver.status.samples == r.size
+    assert last_error(r, x) < (0.6 if estimators == () else 0.1)
+
+
 def test_a_block_wants_its_own_length() -> None:
     driver = controller()
     with pytest.raises(ValueError, match=r"call run\(r\)"):
@@ -104,6 +113,7 @@ COPIES = (
     lambda driver: pickle.loads(pickle.dumps(driver)),
 )  # fmt: skip
 KNOWN = pz.models.LearntOn((-60.0, 60.0), (-3.0, 3.0), 1.0)
+# What a user may say of the stage is kept, too.
 OPTIONS: dict[str, dict[str, Any]] = {
     "line": {},
     "default": {"estimators": None},
@@ -151,17 +161,20 @@ def changed(data: dict[str, Any], *path: Any, value: Any) -> dict[str, Any]:
 
 WRONG: dict[str, tuple[tuple[Any, ...], Any]] = {
     "not of a AdaptiveFeedforward": (("controller",), "HysteresisRLS"),
+    "data is of a None": (("controller",), None),
     "gain must": (("gain",), np.nan),
     "learnt_on must": (("learnt_on",), 3),
     "format 2": (("format",), 2),
     "unknown fields": (("more",), 1),
     "limits has unknown": (("limits", "more"), 1.0),
     "estimators must be a list": (("estimators",), None),
+    "at most 4": (("estimators",), [{}] * 5),
     "estimator None is unknown": (("estimators",), [{}]),
     "state has no": (("state",), {}),
     "finite": (("state", "line", "gain"), np.nan),
     "driving must be a whole number": (("state", "driving"), 7.0),
     "readings at rest": (("state", "start"), {"stage": 0.0, "samples": 9.0}),
+    "models must be a list": (("models",), None),
     "models must be 0": (("models",), [{}]),
     "planned must": (("planned",), "x"),
     "events must be a list": (("events",), None),
@@ -171,6 +184,7 @@ WRONG: dict[str, tuple[tuple[Any, ...], Any]] = {
 
 @pytest.mark.parametrize("message", WRONG)
 def test_a_damaged_file_is_refused(message: str) -> None:
+    """What its arguments are is checked as that of a new one."""
     driver = controller()
     drive(driver, pz.SimulatedStage(FS, LOOP), triangle(1))
     data = driver.to_dict()
@@ -179,9 +193,13 @@ def test_a_damaged_file_is_refused(message: str) -> None:
         value = data["state"]["start"] | value
     with pytest.raises(ValueError, match=message):
         pz.AdaptiveFeedforward.from_dict(changed(data, *path, value=value))
-    nothing: Any = 7
-    with pytest.raises(ValueError, match="dictionary"):
-        pz.AdaptiveFeedforward.from_dict(nothing)
+
+
+def test_what_is_no_controller_is_refused() -> None:
+    nothing: Any
+    for nothing, message in ((7, "dictionary"), ({}, "no .controller.: pass")):
+        with pytest.raises(ValueError, match=message):
+            pz.AdaptiveFeedforward.from_dict(nothing)
 
 
 @pytest.mark.parametrize(
@@ -190,6 +208,7 @@ def test_a_damaged_file_is_refused(message: str) -> None:
         (("state", "candidates", "model", "estimator", "samples"), -1.0),
         (("state", "candidates", "others", "others", "model", "estimator", "plays"), {}),
         (("models", 2, "thresholds"), [1.0]),
+        (("models", 2, "plays"), 1e6),
         (("models", 0, "a"), np.nan),
         (("models", 0), None),
         (("estimators", 0, "arguments"), {}),
@@ -210,18 +229,23 @@ def test_a_damaged_estimator_is_refused(path: tuple[Any, ...], value: Any) -> No
         *(({"feedback": gain}, "feedback must") for gain in (-1.0, np.nan, np.inf, "x", 1300.0)),
         *(({"resonance": wrong}, "resonance must") for wrong in (0.0, -1.0, np.nan, np.inf, "x", 1e30)),
         ({"gain": 0.1, "stroke": 20.0}, "gain and stroke both give the gain: pass one of them"),
+        ({"gain": 0.1, "stroke": 20.0, "model": LOOP}, "gain and stroke and model all give"),
         ({"gain": 0.0}, "gain must not be zero"),
         ({"gain": np.nan}, "gain must be finite"),
+        ({"gain": "x"}, "gain must be one number"),
         ({"gain": 1e30}, "size of gain must lie within"),
         ({"stroke": 0.0}, "stroke must not be zero"),
+        ({"stroke": np.inf}, "stroke must be finite"),
         ({"model": 0.1}, "model must be a model, as LinearGain"),
         ({"limits": None}, "limits must be VoltageLimits"),
         ({"limits": (-1.0, 1.0)}, "limits must be VoltageLimits"),
+        ({"limits": pz.VoltageLimits()}, "limits must be finite"),
         ({"limits": pz.VoltageLimits(minimum=0.0)}, "limits must be finite"),
         ({"limits": pz.VoltageLimits(0.0, 1e7)}, "limits must lie within"),
         ({"limits": pz.VoltageLimits(0.0, 1e-9)}, "limits must lie within"),
         ({"limits": pz.VoltageLimits(0.0, 1.0, sample_rate=1.0)}, "limits are for 1 Hz"),
         ({"corridor": 1.5}, "corridor must"),
+        ({"corridor": "wide"}, "corridor must"),
         ({"estimators": pz.HysteresisRLS}, "estimators must be a tuple"),
         ({"estimators": (pz.HysteresisRLS(FS),)}, r"estimators\[0\] must be a class"),
         ({"estimators": (pz.HysteresisRLS,) * 5}, "at most 4, got 5"),
@@ -244,6 +268,7 @@ def test_wrong_arguments_are_refused(options: dict[str, Any], message: str) -> N
         *(("reset", {"displacement": wrong}, "displacement must") for wrong in (np.nan, np.inf, "x", 1e12)),
         ("home", {"amplitude": 0.0}, "amplitude must be above zero"),
         ("home", {"amplitude": 61.0}, "amplitude must be at most 60 V, half the range, got 61 V"),
+        ("home", {"amplitude": np.nan}, "amplitude must be finite"),
         ("home", {"frequency": 0.0}, "frequency must"),
         ("home", {"frequency": 400.0}, "frequency must be at most 312.5 Hz"),
         *(("home", {"cycles": wrong}, "cycles must") for wrong in (0, 1.5, 10**6)),
@@ -254,6 +279,14 @@ def test_calls_that_cannot_be_change_nothing(call: str, arguments: dict[str, Any
     with pytest.raises(ValueError, match=message):
         getattr(driver, call)(**arguments)
     assert same(driver, controller())
+
+
+def test_estimators_are_made_for_a_gain_of_one() -> None:
+    factories = (pz.HysteresisRLS, functools.partial(pz.HysteresisRLS, memory=0.4), pz.HysteresisEKF)
+    made = team.made(factories, FS)
+    assert team.names(made) == ("line", "HysteresisRLS", "HysteresisRLS 2", "HysteresisEKF", team.RECORDED)
+    assert all(0.5 < each.model.line[0] < 2.0 for each in made)
+    assert made[1].to_dict()["arguments"]["memory"] == 0.4
 
 
 @BOTH

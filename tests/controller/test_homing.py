@@ -43,6 +43,7 @@ def test_the_voltage_swings_less_and_less(name: str) -> None:
     assert doing[-1] == "running"
     assert np.abs(swept - middle).max() == pytest.approx(max(amplitude, abs(before - middle)), rel=0.01)
     assert abs(swept[-1] - middle) < 0.001 * amplitude
+    # It begins and ends gently, and keeps the slew rate.
     steps = np.abs(np.diff(swept, prepend=before))
     assert max(steps[0], steps[-1]) < 0.05 * steps.max()
     assert steps.max() <= limits.largest_step
@@ -50,6 +51,7 @@ def test_the_voltage_swings_less_and_less(name: str) -> None:
     extremes = np.abs(swept[turned + 1] - middle)
     extremes = extremes[extremes > 0.01 * amplitude][-2 * options.get("cycles", 10) + 2 :]
     assert np.all(np.diff(extremes) < 0.0)
+    # Nothing was in the way of the sweep itself.
     again = controller(limits)
     again.home(**options)
     drive(again, pz.SimulatedStage(FS, LOOP), np.zeros(swept.size))
@@ -70,6 +72,7 @@ def test_it_erases_what_the_stage_remembers() -> None:
 
 
 def test_the_models_know_the_stage_again() -> None:
+    """One that drove before is right again after a sweep, whatever the stage went through meanwhile."""
     driver, stage = controller(estimators=None), pz.SimulatedStage(FS, PLAYS)
     drive(driver, stage, np.tile(SINE, 60))
     assert driver.status.driving != "line"
@@ -95,6 +98,19 @@ def test_without_a_gain_it_seeks_then(gain: float | None) -> None:
     _, x, doing = drive(driver, stage, r)
     assert list(dict.fromkeys(doing)) == ["homing", "seeking", "approaching", "running"]
     assert last_error(r, x) < 0.5
+
+
+def test_readings_that_are_missing_do_not_matter() -> None:
+    driver, stage = controller(), pz.SimulatedStage(FS, LOOP)
+    drive(driver, stage, np.tile(SINE, 10))
+    driver.home(20.0, 50.0, 5)
+    while driver.status.stage == "homing":
+        stage.step(driver.step(0.0))
+        driver.learn(driver.voltage, None)
+    assert driver.status.stage == "approaching"
+    _, x, doing = drive(driver, stage, np.tile(SINE, 10))
+    assert doing[-1] == "running"
+    assert last_error(np.tile(SINE, 10), x) < 0.5
 
 
 @pytest.mark.parametrize("after", [0, 100, 400, 900])
@@ -134,6 +150,16 @@ def test_the_next_day_it_goes_from_where_the_stage_rests() -> None:
     assert driver.status.driving != "line"
     assert last_error(r, x) < 0.05
     assert driver.events == ()
+
+
+def test_a_controller_that_knows_nothing_resumes_as_if_reset() -> None:
+    one, other = controller(), controller()
+    drive(one, pz.SimulatedStage(FS, LOOP), SINE[:3])
+    one.resume(5.0, 1.0)
+    other.reset(5.0, 1.0)
+    stages = pz.SimulatedStage(FS, LOOP), pz.SimulatedStage(FS, LOOP)
+    u = [drive(each, stage, np.tile(SINE, 2)).u for each, stage in zip((one, other), stages, strict=True)]
+    np.testing.assert_array_equal(u[0], u[1])
 
 
 def test_it_resumes_from_a_fault_without_it() -> None:
@@ -176,7 +202,11 @@ def test_a_write_that_may_be_lost_makes_the_line_drive() -> None:
     driver, stage = learnt()
     before = len(driver.events)
     # Several in a row: the planned voltage and the last one that is known part.
-    planned = drive(driver, stage, SINE[:40], told=lambda u: None).u
+    r = SINE[:40].tolist()
+    planned = []
+    for r_k in r:
+        planned.append(driver.step(r_k))
+        driver.learn(None, stage.step(planned[-1]))
     assert driver.status.driving == "line"
     assert len(driver.events) == before + 1
     assert driver.events[-1].action == "went on"
@@ -205,12 +235,16 @@ def test_one_that_changes_nothing_does_not_matter() -> None:
 
 @pytest.mark.parametrize("said", ["unknown", "nothing"])
 def test_for_long_without_news_of_the_voltage_it_follows_the_line(said: str) -> None:
+    """All are written, but nobody says so: no jump, and the stage is not farther off than by the line."""
     (driver, stage), (_, other) = learnt(), learnt()
     straight = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), gain=driver.candidates[0].model.gain)
     line = float(np.abs(np.tile(SINE, 20) - drive(straight, other, np.tile(SINE, 20)).x)[-1000:].max())
-    r = np.tile(SINE, 6)
-    left_out = () if said == "unknown" else range(r.size)
-    u, x, _ = drive(driver, stage, r, left_out=left_out, told=lambda u: None)
+    r, u, x = np.tile(SINE, 6), [], []
+    for r_k in r.tolist():
+        u.append(driver.step(r_k))
+        x.append(stage.step(u[-1]))
+        if said == "unknown":
+            driver.learn(None, x[-1])
     assert np.abs(r - x).max() < 1.2 * line
     assert np.abs(np.diff(u)).max() < 2.5 * np.abs(np.diff(drive(driver, stage, r).u)).max()
 
@@ -226,7 +260,9 @@ def test_steps_without_a_write_go_on_along_the_line() -> None:
 
 def test_nothing_is_lost_before_it_runs() -> None:
     driver = controller()
-    drive(driver, pz.SimulatedStage(FS, LOOP), np.ones(20), told=lambda u: None)
+    for _ in range(20):
+        driver.step(1.0)
+        driver.learn(None, 0.0)
     assert driver.status.stage == "seeking"
     assert driver.events == ()
 

@@ -73,6 +73,14 @@ def test_a_learn_that_is_left_out_does_not_matter() -> None:
         assert driver.status.driving == whole.status.driving
 
 
+def test_nobody_need_learn() -> None:
+    driver, _, _ = drive(lambda _, x: x)
+    voltages = np.array([driver.step(float(r)) for r in TRIANGLE])
+    line = driver.candidates[0].model
+    # Beside the line by no more than before, however long.
+    assert np.abs(voltages - (TRIANGLE - line.offset) / line.gain).max() < 0.4 * 5.0 / line.gain
+
+
 @pytest.mark.parametrize("step", [0.05, 0.2, 0.4])
 def test_a_coarse_sensor_is_enough(step: float) -> None:
     driver, _, x = drive(lambda _, x: step * round(x / step))
@@ -91,7 +99,10 @@ def test_what_is_out_of_reach_is_said_once(size: float) -> None:
 @pytest.mark.parametrize("given", [{}, {"gain": 0.15}])
 def test_without_a_reference_the_voltage_stays_where_the_start_has_left_it(given: Any) -> None:
     driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS, **given), pz.SimulatedStage(FS, LOOP)
-    u = shared.drive(driver, stage, np.full(2000, np.nan)).u
+    u = np.empty(2000)
+    for k in range(u.size):
+        u[k] = driver.step(None)
+        driver.learn(u[k], stage.step(float(u[k])))
     assert np.ptp(u[1000:]) == 0.0
     _, x, _ = shared.drive(driver, stage, TRIANGLE)
     assert last(x) < 0.05
@@ -104,6 +115,14 @@ def test_readings_that_do_not_come_are_reported_once_and_so_is_their_return() ->
         ("resumed", ""),
     ]
     assert driver.events[0].time == pytest.approx(1.8, abs=0.01)
+
+
+def test_a_sensor_that_has_never_given_a_reading_is_reported() -> None:
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
+    for r_k in TRIANGLE[:6000].tolist():
+        driver.learn(driver.step(r_k), None)
+    assert driver.events[0].name == "no readings"
+    assert driver.voltage == 0.0
 
 
 def test_between_rare_readings_the_approach_does_not_go_too_far() -> None:

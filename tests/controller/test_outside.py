@@ -57,7 +57,8 @@ def test_what_is_said_has_the_figures(caplog: pytest.LogCaptureFixture) -> None:
     (event,) = driver.events
     assert event.action == "went on"
     assert event.time == pytest.approx(0.3 + 3.3 / 160.0, abs=1e-3)
-    assert "3.3" in event.reason
+    assert "the reference is at 3.3" in event.reason
+    assert "learnt from -3 to 3 µm and from -60 to 60 V" in event.reason
     assert caplog.text.count("outside:") == 1
 
 
@@ -68,10 +69,17 @@ def test_it_changes_no_voltage() -> None:
     assert (with_ranges.voltage, with_ranges.model) == (without.voltage, without.model)
 
 
-def test_a_model_may_be_given_by_its_file(tmp_path: Path) -> None:
+def test_a_file_and_what_identify_returns_will_do(tmp_path: Path) -> None:
+    class Found:
+        model, learnt_on = LOOP, WIDE
+
     file = tmp_path / "model.json"
     file.write_text(json.dumps(LearntModel(LOOP, WIDE).to_dict()))
-    assert controller(file).to_dict() == controller(LearntModel(LOOP, WIDE)).to_dict()
+    data = controller(LearntModel(LOOP, WIDE)).to_dict()
+    assert data["learnt_on"] == WIDE.to_dict()
+    for given in (file, str(file), Found()):
+        assert controller(given).to_dict() == data
+    assert controller(LOOP).to_dict()["learnt_on"] is None
     with pytest.raises(FileNotFoundError):
         controller(tmp_path / "none.json")
 

@@ -47,6 +47,7 @@ def test_a_lag_that_passes_for_hysteresis_is_told_once(block: int, noise: float)
 
 
 def test_an_amplifier_that_slews_is_no_lag() -> None:
+    """The start goes faster than it can; the reference does not."""
     amplifier, r = pz.stage.Amplifier(-60.0, 60.0, slew_rate=120.0), wave(1.0, 3)
     slow = pz.SimulatedStage(FS, LOOP, amplifier=amplifier)
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=())
@@ -58,6 +59,7 @@ def test_an_amplifier_that_slews_is_no_lag() -> None:
 def test_a_reference_near_the_resonance_is_told_once(resonance: float | None, told: list[str]) -> None:
     driver = driven(wave(20.0, 10), resonance=resonance)
     assert warnings(driver) == told
+    # A lag is told beside it, also within blocks.
     driver = driven(wave(20.0, 30), lag=1e-3, block=2000, resonance=resonance)
     assert sorted(warnings(driver)) == ["lag", *told]
 

@@ -25,6 +25,7 @@ def loop() -> Callable[[float], float]:
 
 
 def lag(time_constant: float, gain: float = 0.15) -> Callable[[float], float]:
+    """A stage that is late by a time constant [s]."""
     x, share = 0.0, 1.0 - np.exp(-1.0 / (time_constant * FS))
 
     def step(u: float) -> float:
@@ -36,6 +37,7 @@ def lag(time_constant: float, gain: float = 0.15) -> Callable[[float], float]:
 
 
 def backlash(width: float) -> Callable[[float], float]:
+    """A play of a width [V] on either side."""
     place = 0.0
 
     def step(u: float) -> float:
@@ -49,6 +51,7 @@ def backlash(width: float) -> Callable[[float], float]:
 def drive(
     driver: Any, stage: Any, r: FloatArray, noise: float = 0.0
 ) -> tuple[FloatArray, FloatArray, list[str]]:
+    """Voltage, displacement, and stage of the work after each sample."""
     rng = np.random.default_rng(0)
     run = shared.drive(driver, SimpleNamespace(step=stage), r, lambda _, x: x + noise * rng.normal())
     return run.u, run.x, [*run.doing[1:], driver.status.stage]
@@ -130,6 +133,7 @@ def test_the_readings_at_rest_need_not_be_waited_for(gain: float | None) -> None
 
 
 def test_where_it_stands_may_be_wrong() -> None:
+    """Two ways are answered alike, whatever the first one began with."""
     driver = controller()
     driver.reset(displacement=3.0)
     _, x, _ = drive(driver, loop(), SINE)
@@ -179,6 +183,14 @@ def test_models_learn_with_a_gain_that_is_about_right_and_anew_with_one_that_was
     assert last_error(SINE, x[SINE.size :]) < 0.1
 
 
+def test_a_reference_out_of_reach_is_no_reason_to_begin_again() -> None:
+    driver, beyond = controller(), 40.0 + 2.0 * np.sin(2.0 * np.pi * np.arange(10 * 500) / 500.0)
+    u, _, stages = drive(driver, loop(), beyond)
+    last = stages.index("running")
+    assert "seeking" not in stages[last:]
+    np.testing.assert_array_equal(u[-2000:], driver.limits.maximum)
+
+
 # Hum that passes for the answer to the first small ways: the gain is doubted, and sought again.
 FAST, SLOPE, SWEPT = 10_000.0, 0.06, 2.5
 UNIPOLAR, BIASED, BIPOLAR = (0.0, 150.0), (-20.0, 120.0), (-100.0, 100.0)
@@ -210,6 +222,7 @@ def test_a_gain_of_the_wrong_sign_is_doubted(limits: Any, width: float, hum: flo
     assert error < 0.5 * SWEPT
     said = [event.reason for event in driver.events]
     assert any(reason.startswith("false start") for reason in said)
+    # Where it begins again it does not rest at a limit.
     doubted = next(event.time for event in driver.events if event.reason.startswith("false start"))
     later = u[int(FAST * doubted) + 10 :]
     assert np.all((later > limits[0]) & (later < limits[1]))

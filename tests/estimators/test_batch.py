@@ -33,6 +33,7 @@ def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
     errors = np.array([fit.theta[:3] - TRUE.theta for fit in fits])
     together = np.mean(np.einsum("ki,ij,kj->k", errors, np.linalg.inv(bound), errors)) / 3.0
     assert 0.9 < np.sqrt(together) < 1.1
+    # What the fit says of itself is the bound too.
     said = np.mean([fit.P[:3, :3] for fit in fits], axis=0)
     np.testing.assert_allclose(said / bound, 1.0, rtol=0.05)
     inside = np.abs(errors) < 3.0 * np.array([fit.standard_errors[:3] for fit in fits])
@@ -42,6 +43,7 @@ def test_scatter_is_that_of_the_cramer_rao_bound() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_start_state_and_offset(method: Any) -> None:
+    """A unipolar voltage and a biased gauge, in the middle of a loop."""
     u, x = record(initial_state=-1.2)
     fit = BatchFit(RATE, offset=True, method=method).fit(u + 60.0, x - 120.0)
     assert fit.success
@@ -152,8 +154,10 @@ def test_outliers(loss: Any, method: Any) -> None:
     u, x = record()
     bad = rng.random(x.size) < 0.05
     x[bad] += 2.0 * rng.standard_normal(bad.sum())
+    plain = BatchFit(RATE).fit(u, x)
     robust = BatchFit(RATE, loss=loss, method=method).fit(u, x)
     assert robust.success
+    assert np.abs(plain.theta[:3] / TRUE.theta - 1.0).max() > 0.02
     np.testing.assert_allclose(robust.theta[:3], TRUE.theta, rtol=5e-3)
     assert np.all(np.abs(robust.theta[:3] - TRUE.theta) < 4.0 * robust.standard_errors[:3])
     assert robust.noise < 1.5 * NOISE
@@ -171,6 +175,7 @@ def test_a_failure_is_told_in_the_solvers_words_with_the_best_iterate() -> None:
         np.testing.assert_allclose(fit.theta[:3], TRUE.theta, rtol=0.1)
         assert fit.model.is_admissible
         assert fit.noise < 0.1
+    # In a stream nothing is raised either.
     estimator = BatchFit(RATE, max_iterations=1)
     estimator.run(u, x)
     assert estimator.result is not None

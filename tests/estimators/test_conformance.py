@@ -148,6 +148,8 @@ def test_trace_holds_what_was_asked_for(kind: Any) -> None:
 
 
 class Sulking:
+    """What a driver's own class may do."""
+
     def __float__(self) -> float:
         raise RuntimeError("no reading")
 
@@ -159,6 +161,7 @@ NUMBERS: tuple[Any, ...] = (
     lambda v: np.array(v, np.float32), lambda v: np.array([v], object), np.ma.array,
     lambda v: np.ma.array([v]), lambda v: np.ma.array([v], mask=[False]), lambda v: [np.int32(v)],
 )  # fmt: skip
+# What is none of theirs.
 NO_READINGS: tuple[Any, ...] = (
     "1.5", "", b"1", bytearray(b"1"), np.str_("1"), np.array(["1"]), 10**400, -(10**400), 1.0 + 0.0j,
     np.complex64(1.0), np.array([1.0j]), [], (), [1.0, 2.0], [[1.0]], [None], ["1"], {}, {1.0}, object(),
@@ -186,6 +189,7 @@ def test_takes_a_number_of_any_kind(kind: Any) -> None:
 
 
 def test_what_is_no_number_is_missing(kind: Any) -> None:
+    """Any of it is as good as None: a sample that counts as missing and by itself leaves theta."""
     u, x = record(0.5)
     plain, other = kind(RATE), kind(RATE)
     with pytest.raises(ValueError, match="predict"):
@@ -274,6 +278,7 @@ def test_a_dwell_moves_nothing(kind: Any) -> None:
 N = 300
 RNG = np.random.default_rng(2)
 HELD, WAVE = recorded(RATE, 1.5, noise=0.0)
+# Records that no stage makes.
 HOSTILE: dict[str, tuple[FloatArray, FloatArray]] = {
     "noise": (RNG.normal(0.0, 50.0, N), RNG.normal(0.0, 10.0, N)),
     "backwards": (HELD, -WAVE),
@@ -327,6 +332,7 @@ def test_works_in_the_ring(kind: Any) -> None:
     assert np.all(np.isfinite(record.voltage))
     assert record.max_error() < 2.0
     assert_sound(estimator)
+    # The ring teaches it what the record does.
     alone = kind(RATE)
     for k in range(0, len(reference), 25):
         alone.run(record.voltage[k : k + 25], record.measured[k : k + 25])

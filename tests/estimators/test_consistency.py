@@ -60,6 +60,7 @@ def test_ekf_of_a_true_plant() -> None:
     found = Outcome(lambda: pz.HysteresisEKF(FS, **SURE), 200)
     assert_chi_squared(found.nees, 3)
     assert_chi_squared(found.state_nees, 4)
+    # Of the innovations of one run, and of all runs together.
     each = 1.96 * np.sqrt(2.0 / found.settled)
     assert np.mean(np.abs(found.nis - 1.0) < each) >= 0.9
     assert abs(np.mean(found.nis) - 1.0) < each / np.sqrt(200)

@@ -50,6 +50,7 @@ def test_of_a_linear_gain_is_recursive_least_squares(offset: bool) -> None:
 
 
 def test_stays_admissible_while_it_learns() -> None:
+    """From a start that drives the unbounded filter out of the set."""
     fs = 2000.0
     u, x = recorded(fs, 2.5)
     start = pz.ColemanHodgdon.from_loop(0.06, 0.2, 0.45)

@@ -20,6 +20,7 @@ from tests.estimators.shared import recorded
 )
 @pytest.mark.slow_but_first
 def test_compiled_filter_equals_filterpy(options: dict[str, Any]) -> None:
+    """At 50 kHz, with single and long gaps."""
     fs, samples = 50_000.0, 4000
     u, x = recorded(fs, samples / fs * 5.0)
     gaps = np.random.default_rng(1).random(samples) < 0.01

@@ -1,4 +1,4 @@
-"""MovingHorizon: one solve a hop, parity, tracking, arrival cost, decimation, bad solves."""
+"""MovingHorizon: one solve a hop, parity, tracking, arrival cost, thinning, bad solves."""
 
 from typing import Any
 
@@ -8,6 +8,7 @@ import pytest
 import piezoest as pz
 from piezoest.estimators.batch import BatchFit
 from piezoest.estimators.horizon import MovingHorizon
+from piezoest.estimators.thinning import thinned
 from tests.estimators.shared import TRUE, recorded
 
 RATE = 2000.0
@@ -62,13 +63,17 @@ def test_arrival_cost_keeps_what_has_left_the_window() -> None:
     assert np.all(np.abs(keeping.theta - whole.theta[:3]) < 1.5 * whole.standard_errors[:3])
 
 
-def test_offset() -> None:
+def test_offset_and_linear_gain() -> None:
     u, x = record()
     estimator = MovingHorizon(RATE, offset=True)
     estimator.run(u + 60.0, x - 120.0)
     assert estimator.parameter_names == ("alpha", "beta", "gamma", "offset")
     np.testing.assert_allclose(estimator.theta[:3], TRUE.theta, rtol=0.02)
     assert estimator.model.offset == pytest.approx(-120.0 - 60.0 * TRUE.c, abs=0.05)
+    u, x = record(model=pz.LinearGain(0.155, 3.0))
+    estimator = MovingHorizon(RATE, offset=True, initial_model=pz.LinearGain(0.1))
+    estimator.run(u, x)
+    np.testing.assert_allclose(estimator.theta, [0.155, 3.0], rtol=1e-4)
 
 
 def test_a_bad_solve_keeps_the_last_good_model() -> None:
@@ -97,3 +102,24 @@ def test_decimation_costs_no_accuracy() -> None:
     for estimator in (full, few):
         estimator.run(*record(1.0))
     np.testing.assert_allclose(few.standard_errors, full.standard_errors, rtol=0.15)
+
+
+def test_thinning_loses_neither_path_nor_displacement() -> None:
+    """Without noise each mean is the model's output at its point, path and turning points kept."""
+    turns = 2.0 * np.pi * np.arange(30_000) / 50_000.0
+    u = 25.0 * np.sin(5.0 * turns) + 8.0 * np.sin(15.0 * turns)
+    x = TRUE.simulate(u)
+    x[4321] = np.nan
+    points, shift, mean, root_weight = thinned(u, x, 7, 9, 333)
+    assert points.size < u.size / 8
+    assert {0, 333, u.size - 1} <= set(points.tolist())
+    there = TRUE.simulate(u)[points]
+    np.testing.assert_allclose(TRUE.simulate(u[points], allow_jumps=True), there, atol=1e-12)
+    assert np.abs(mean - TRUE.c * shift - there)[root_weight > 0.0].max() < 1e-5
+    assert np.sum(root_weight**2) > 0.97 * u.size
+    # A voltage that turns all the time is taken at full rate.
+    noise = np.random.default_rng(0).standard_normal(500)
+    points, shift, _, root_weight = thinned(noise, noise, 0, 10, 0)
+    np.testing.assert_array_equal(points, np.arange(500))
+    assert np.all(root_weight == 1.0)
+    assert not shift.any()

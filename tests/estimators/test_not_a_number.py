@@ -41,6 +41,7 @@ MAKERS: dict[str, Any] = {
     "batch": lambda: pz.BatchFit(RATE, offset=True),
     "batch-line": lambda: pz.BatchFit(RATE, initial_model=LINE),
 }  # fmt: skip
+# Too slow for many rounds, or for many samples.
 ROUNDS = {"filterpy": 2, "horizon": 6, "batch": 6}
 
 
@@ -67,6 +68,10 @@ def test_covariance_that_winds_up_starts_anew() -> None:
     assert_numbers(estimator)
     assert estimator.status.resets > 0
     np.testing.assert_allclose(estimator.theta, learnt, rtol=1e-3)
+    more = rls(memory=0.4, policies=())
+    more._load(estimator._state)
+    more.run(u, x)
+    np.testing.assert_allclose(more.theta, LOOP.theta, rtol=0.05)
 
 
 @pytest.mark.parametrize(
@@ -104,6 +109,7 @@ def test_spoilt_covariance_starts_anew(kind: str) -> None:
 @pytest.mark.parametrize("kind", MAKERS)
 @pytest.mark.slow_but_first
 def test_any_bits(kind: str) -> None:
+    """Wild numbers by `step`, then by `run`, over and over."""
     rng = np.random.default_rng(1)
     for _ in range(ROUNDS.get(kind.split("-")[0], 60)):
         estimator = MAKERS[kind]()

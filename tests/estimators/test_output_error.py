@@ -1,4 +1,4 @@
-"""OutputErrorRLS: exact on its own plant from any start, noise."""
+"""OutputErrorRLS: exact on its own plant from any start, noise, rest."""
 
 from typing import Any
 
@@ -54,6 +54,19 @@ def test_noise_makes_no_wrong_loop(noise: float) -> None:
     # Noise leaves the decay itself uncertain, not the slope of a first branch.
     assert theta[1] == pytest.approx(TRUE.beta, rel=0.05)
     assert loop_error(estimator.model, u) < 5e-3 + 2.0 * noise
+
+
+def test_rest_moves_nothing() -> None:
+    u = voltage(6.0)
+    x = TRUE.simulate(u)
+    estimator = pz.OutputErrorRLS(RATE)
+    estimator.run(u, x)
+    before, held = estimator.theta, estimator.status.held
+    creep = 0.1 * np.linspace(0.0, 1.0, 20_000)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(creep.size)
+    estimator.run(np.full(creep.size, u[-1]), x[-1] + creep + noise)
+    np.testing.assert_array_equal(estimator.theta, before)
+    assert (estimator.status.held, estimator.status.last) == (held + creep.size, "held")
 
 
 def test_settles_within_two_periods_from_a_bad_start() -> None:

@@ -94,6 +94,9 @@ def test_amplitudes_are_remembered(tmp_path: Path) -> None:
     np.testing.assert_allclose(profile.swings, [30.0, 90.0], rtol=0.05)
     np.testing.assert_allclose(profile.at(30.0).theta, small.theta, rtol=0.25)
     np.testing.assert_allclose(profile.at(90.0).theta, large.theta, rtol=0.15)
+    np.testing.assert_array_equal(
+        np.median([*profile.theta, profile.at(60.0).theta], axis=0), profile.at(60.0).theta
+    )
     path = tmp_path / "profile.json"
     profile.save(path)
     loaded = pz.AmplitudeProfile.load(path)

@@ -26,6 +26,7 @@ OPTIONS: list[tuple[Any, dict[str, Any], str]] = [
     (pz.HysteresisEKF, {"uncertainty": 0.0}, "uncertainty must be above zero"),
     (pz.HysteresisEKF, {"drift": -1.0}, "drift must be zero or more"),
     (pz.OutputErrorRLS, {"span": 1.0}, "span"),
+    (pz.OutputErrorRLS, {"members": 2}, "members"),
     (pz.OutputErrorRLS, {"policies": ()}, "RandomWalk"),
     (pz.OutputErrorRLS, {"policies": (p.RandomWalk(), p.NormBound())}, "NormBound"),
     (pz.PrandtlIshlinskiiRLS, {"voltage_range": (3.0, 1.0)}, "voltage_range"),
@@ -41,6 +42,7 @@ OPTIONS: list[tuple[Any, dict[str, Any], str]] = [
     (pz.BatchFit, {"creep": [0.1]}, "creep must be a Creep"),
     (pz.BatchFit, {"fixed": {"apha": 0.02}}, r"fixed holds unknown names \['apha'\]"),
     (pz.BatchFit, {"fixed": {"alpha": 0.02, "beta": 0.1, "gamma": 1.0}}, "parameters are not admissible"),
+    (pz.BatchFit, {"fixed": {"beta": -0.1}}, "must be above zero"),
     (pz.BatchFit, {"initial_model": LINE, "fixed": {"gain": 1.0}}, "nothing to fit"),
     (pz.BatchFit, {"initial_model": pz.LinearGain(0.0)}, "gain of zero"),
     # What becomes a size is bounded.

@@ -53,6 +53,7 @@ ALL = (
     ids=lambda value: type(value).__name__ if hasattr(value, "step") else None,
 )
 def test_indices_and_lengths_are_checked(estimator: Any, path: str) -> None:
+    """What becomes an index is a whole number, and a length is as the arguments make it."""
     data = estimator.to_dict()
     lengths = {
         name: float(value)
@@ -74,6 +75,7 @@ def test_indices_and_lengths_are_checked(estimator: Any, path: str) -> None:
 @pytest.mark.parametrize("estimator", ALL, ids=lambda estimator: type(estimator).__name__)
 @pytest.mark.slow_but_first
 def test_names_shapes_and_covariances_must_be_its_own(estimator: Any) -> None:
+    """Every name, in every record within the state: dropped, renamed, added, of another shape or type."""
     estimator = used(estimator.copy())
     data = estimator.to_dict()
 

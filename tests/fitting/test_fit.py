@@ -9,6 +9,7 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting import FORMS, Fitter
 from piezoest.fitting.flaws import flawed
+from piezoest.fitting.play_columns import PlayColumns
 from tests.fitting.stages import RATE, N, T, noise, rms, stage, voltage
 
 U = voltage(np.random.default_rng(0))
@@ -27,6 +28,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "text": ({"x": ["a"] * N}, "x must"),
     "few": ({"u": U[:49], "x": Y[:49]}, "49 samples in common"),
     "few in common": ({"x": np.where(np.arange(N) < 40, Y, np.nan)}, "40 samples in common"),
+    "no number": ({"x": np.full(N, np.nan)}, "0 samples in common"),
     "no voltage": ({"u": np.full(N, np.nan)}, "0 samples in common"),
     "constant voltage": ({"u": np.full(N, 5.0)}, "u must move, it stays at 5 V"),
     "falling": ({"x": -Y}, "x must rise with u.* change the sign"),
@@ -34,6 +36,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "constant displacement": ({"x": np.full(N, 2.0)}, "x must move with u, it stays at 2 µm"),
     "model": ({"model": "spline"}, "model must be one of line, .*, got 'spline'"),
     "delay too long": ({"delay": 10.5}, "delay must"),
+    "delay below zero": ({"delay": -1.0}, "delay must"),
     "delay no number": ({"delay": np.nan}, "delay must"),
     "delay in words": ({"delay": "soon"}, "delay must be 'auto' or a number of samples, got 'soon'"),
     "settle": ({"settle": 10.0}, "settle must"),
@@ -90,8 +93,20 @@ def test_flaws_may_be_given() -> None:
     np.testing.assert_array_equal(fit(flaws=flaws).predict().x, fit().predict().x)
 
 
+def test_another_record_is_predicted_from_rest() -> None:
+    """The fitted record comes from elsewhere, another one from 0 V."""
+    model = stage(np.random.default_rng(1))
+    before = np.concatenate([np.full(5, 45.0), np.linspace(45.0, U[0], 50)])
+    y = model.simulate(np.concatenate([before, U]))[before.size :] + noise(SIGMA)
+    found = fit(U, y)
+    v = voltage(np.random.default_rng(5))
+    assert rms(found.predict(v).x - model.simulate(v)) < 2.0 * SIGMA
+    np.testing.assert_array_equal(found.predict(v).x, found.elsewhere(v))
+
+
 @pytest.mark.parametrize("model", ["plays-creep", "coleman-hodgdon"])
 def test_another_record_from_a_voltage_of_its_own(model: str) -> None:
+    """It comes from 0 V, and goes to its first voltage at once."""
     loop = pz.ColemanHodgdon(0.03, 0.12, 0.0066)
     plays = stage(np.random.default_rng(1), creep=pz.Creep([0.05], [2.5]))
     true: Any = loop if model == "coleman-hodgdon" else plays
@@ -130,6 +145,23 @@ def test_what_is_continued_begins_as_the_fitted_record() -> None:
     assert rms(whole.x[half:] - X[half:] - 0.02) < 0.02
     widths = whole.upper - whole.lower
     assert widths[-1] >= widths[0]
+
+
+@pytest.mark.parametrize("model", ["plays", "plays-asymmetric"])
+@pytest.mark.slow
+def test_plays_that_go_on_foresee_a_growing_amplitude(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of stages whose plays go on beyond the fitted range, from rest at 0 V."""
+    errors = []
+    for ends in (False, True):
+        if ends:
+            monkeypatch.setattr(PlayColumns, "beyond", lambda basis, w: (basis, w, 0.0))
+        for seed in range(5):
+            rng = np.random.default_rng(seed)
+            u = growing(rng)
+            x = stage(rng, 40.0, plays=25).simulate(u)
+            y = x + noise(1e-3 * float(np.ptp(x)), seed)
+            errors.append(rms((fit(u[: N // 2], y[: N // 2], model=model).continued(u).x - x)[N // 2 :]))
+    assert np.max(np.divide(errors[:5], errors[5:])) < 0.95
 
 
 @pytest.mark.parametrize("centre", [0.0, 40.0])

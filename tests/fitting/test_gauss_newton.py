@@ -10,7 +10,8 @@ from scipy.optimize import least_squares
 import piezoest as pz
 from piezoest.fitting.coordinates import coordinates
 from piezoest.fitting.gauss_newton import single_shooting
-from piezoest.fitting.problem import Prior, Problem, bend
+from piezoest.fitting.losses import bend
+from piezoest.fitting.problem import Prior, Problem
 
 TRUE = pz.ColemanHodgdon(0.021, 0.147, 0.00429)
 STEEP = pz.ColemanHodgdon(0.021, 0.147, 0.0065)  # not admissible: the fit ends at a bound
@@ -57,6 +58,7 @@ def test_ends_where_scipy_does(loss: str, model: Any) -> None:
 
 @pytest.mark.parametrize("sharp", [1.0, 1e6])
 def test_a_prior_counts_as_rows_do(sharp: float) -> None:
+    """Also one that ties coordinates to each other far more closely than the record does."""
     tie = np.eye(START.size)
     tie[0, :] = sharp
     given = problem(prior=Prior(START, 1e2 * tie))

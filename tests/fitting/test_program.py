@@ -6,6 +6,7 @@ from scipy.optimize import lsq_linear
 
 from piezoest._checks import FloatArray
 from piezoest.fitting.program import RIDGE, Sums, checked, solve, total
+from piezoest.fitting.rows import FEW, gram, onto, times
 from piezoest.symbolic import quadratic_program
 
 SEEDS = range(12)
@@ -97,3 +98,12 @@ def test_sums_of_combined_columns() -> None:
 def test_no_rounding_makes_what_is_missed_negative() -> None:
     A = np.random.default_rng(5).standard_normal((50, 2)) + 1e6
     assert Sums.of(A, A @ np.array([1.0, 2.0])).missed(np.array([1.0, 2.0])) >= 0.0
+
+
+@pytest.mark.parametrize("count", [0, 1, FEW - 1, FEW, 3 * FEW + 5])
+def test_products_of_rows(count: int) -> None:
+    rng = np.random.default_rng(count)
+    rows, x, w = rng.standard_normal((count, 5)), rng.standard_normal(count), rng.standard_normal(5)
+    np.testing.assert_allclose(gram(rows), rows.T @ rows, atol=1e-12)
+    np.testing.assert_allclose(onto(rows, x), rows.T @ x, atol=1e-12)
+    np.testing.assert_allclose(times(rows, w), rows @ w, atol=1e-12)

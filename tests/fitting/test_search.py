@@ -10,7 +10,7 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.bench.zoo.families import draw_family
 from piezoest.bench.zoo.logs import REACHES
-from piezoest.fitting import Fit
+from piezoest.fitting import Fit, search
 from tests.fitting.stages import RATE, N, T, noise, play_matrix, rms, stage, voltage
 
 CREEP = pz.Creep([0.06], [0.25])
@@ -45,6 +45,7 @@ def test_a_stage_of_plays_is_recovered_to_its_noise(model: str, kinds: dict[str,
     assert rms(error) < (1.5 if kinds else 0.7) * sigma
     assert found.held_out < (2.2 if kinds else 1.5) * sigma
     assert found.spikes <= 5
+    # A stage that creeps at the start has not settled.
     assert found.left_out <= 0.1 * N
 
 
@@ -56,6 +57,14 @@ def test_a_loop_is_recovered_to_its_noise(centre: float) -> None:
     assert rms(found.predict().x - x) < 1e-3
     np.testing.assert_allclose(found.model.theta, LOOP.theta, rtol=0.01)
     assert found.model.offset == pytest.approx(1.5, abs=0.05)
+
+
+def test_a_line_is_recovered_to_its_noise() -> None:
+    u = voltage(np.random.default_rng(2), centre=30.0)
+    found = fit(u, 0.2 * u - 3.0 + noise(2e-3), "line")
+    assert found.model.theta[0] == pytest.approx(0.2, abs=1e-5)
+    assert found.model.offset == pytest.approx(-3.0, abs=1e-3)
+    assert found.parameters == 2
 
 
 def test_no_noise_is_no_hindrance() -> None:
@@ -93,7 +102,7 @@ def test_creep_is_not_taken_for_a_delay(seed: int) -> None:
     assert found.delay == pytest.approx(2.4, abs=0.15)
 
 
-@pytest.mark.parametrize("delay", [3.3, 0.6, 0.0, 9.0])
+@pytest.mark.parametrize("delay", [0.0, 0.6, 3.3, 9.0])
 @pytest.mark.parametrize("model", ["plays", "coleman-hodgdon"])
 @pytest.mark.slow_but_first
 def test_a_delay_is_found_where_the_voltage_has_several_frequencies(delay: float, model: str) -> None:
@@ -106,7 +115,6 @@ def test_a_delay_is_found_where_the_voltage_has_several_frequencies(delay: float
     assert found.delay_estimated
 
 
-@pytest.mark.slow
 def test_creep_is_found() -> None:
     u, x, sigma = drawn(5, creep=pz.Creep([0.05], [0.5]))
     found: Any = fit(u, x + noise(sigma), "plays-creep")
@@ -118,6 +126,27 @@ def test_creep_is_found() -> None:
     u, x, sigma = drawn(7)  # which has none
     found = fit(u, x + noise(sigma), "plays-creep")
     assert found.model.creep is None or found.model.creep.gains.sum() < 0.01
+
+
+def test_creep_terms_that_are_none_do_not_begin_the_search_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    steps: list[int] = []
+    crept = search._crept
+
+    def counted(log: Any, last: Any, creep: pz.Creep) -> Any:
+        steps.append(creep.gains.size)
+        return crept(log, last, creep)
+
+    monkeypatch.setattr(search, "_crept", counted)
+    u, x, sigma = drawn(0, creep=pz.Creep([0.06], [0.5]))
+    fit(u, x + noise(sigma), "plays-creep")
+    assert steps == [3, 3, 3, 1, 1]
+
+
+def test_a_loop_without_delay_needs_no_plays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, "best_start", None)
+    u = voltage(np.random.default_rng(2))
+    found = fit(u, LOOP.simulate(u) + noise(1e-3), "coleman-hodgdon")
+    assert rms(found.predict().x - LOOP.simulate(u)) < 1e-3
 
 
 def test_creep_that_began_before_the_record_is_fitted() -> None:
@@ -142,6 +171,7 @@ def test_a_drift_is_fitted_beside_the_model() -> None:
 
 @pytest.mark.parametrize("seed", [0, 3])
 def test_a_drift_is_fitted_together_with_a_coleman_hodgdon_loop_and_its_delay(seed: int) -> None:
+    """A drift that stays where plays have put it bends the loop."""
     u = voltage(np.random.default_rng(seed))
     loop = pz.ColemanHodgdon(0.03, 0.12, 0.0066)
     x = loop.simulate(np.concatenate([np.linspace(0.0, u[0], 300), u]))[300:]
@@ -156,13 +186,13 @@ def test_a_drift_is_fitted_together_with_a_coleman_hodgdon_loop_and_its_delay(se
 
 
 @pytest.mark.parametrize("place", [700, 2600, 3900, 4700])
-@pytest.mark.slow_but_first
 def test_a_jump_is_fitted_beside_the_model(place: int) -> None:
     u, x, sigma = drawn(10)
     y = x + noise(sigma)
     without = fit(u, y, "plays")
     y[place:] += 100.0 * sigma
     found = fit(u, y, "plays")
+    # It is nobody's fault, wherever it stands.
     assert found.held_out < 1.2 * without.held_out
     assert found.ahead < 1.5 * without.ahead
     assert found.spread.within < 1.5 * without.spread.within
@@ -208,8 +238,16 @@ def test_spikes_dropouts_and_gaps_do_not_move_a_fit() -> None:
     assert np.all(np.isfinite(found.predict().x))
 
 
+def test_a_start_that_has_not_settled_is_left_out() -> None:
+    u, x, sigma = drawn(12)
+    y = x + noise(sigma) + 500.0 * sigma * np.exp(-np.arange(N) / 15.0)
+    found = fit(u, y, "plays")
+    assert 40 < found.left_out < 400
+    assert rms((found.predict().x - x)[found.left_out :]) < sigma
+    assert fit(u, y, "plays", settle=0.2).left_out == 200
+
+
 @pytest.mark.parametrize("seed", range(6))
-@pytest.mark.slow
 def test_predicts_what_comes_as_well_as_plain_least_squares(seed: int) -> None:
     """Of the same 20 plays, without penalty and with the true start."""
     u, x, sigma = drawn(seed)

@@ -39,6 +39,7 @@ def test_standard_errors_cover(model: str, memory: float) -> None:
 
 @pytest.mark.slow
 def test_standard_errors_of_plays_and_creep_are_of_the_size_of_their_scatter() -> None:
+    """Of a stage whose thresholds and time constants are those of the fit."""
     u = voltage(np.random.default_rng(1), centre=40.0)
     thresholds = 0.45 * np.ptp(u) * np.arange(1, 20) / 19.0
     creep = pz.Creep([0.05], [0.5])
@@ -70,6 +71,7 @@ def test_what_ends_at_a_bound_has_no_standard_error() -> None:
 @pytest.mark.parametrize("model", ["plays", "plays-asymmetric-creep", "coleman-hodgdon"])
 @pytest.mark.slow
 def test_intervals_hold_what_they_promise(model: str) -> None:
+    """Of the half behind the fitted one."""
     inside = []
     for seed in range(8):
         rng = np.random.default_rng(seed)
@@ -94,8 +96,14 @@ def test_intervals_hold_what_they_promise(model: str) -> None:
     [
         (Spread(3.0, 4.0, 0.4, (-10.0, 10.0)), [0.0, 10.0, 20.0], [0.0, 0.0, 0.0], [3.0, 3.0, 5.0]),
         (Spread(3.0, 4.0, 0.4, (-10.0, 10.0)), [0.0, 0.0], [0.0, np.expm1(1.0)], [3.0, 5.0]),
-        # It stays wide afterwards: the stage remembers where it was.
+        # After a voltage beyond the range it stays wide: the stage remembers where it was.
         (Spread(3.0, 4.0, 0.4, (-10.0, 10.0)), [0.0, 20.0, 0.0], [0.0, 0.0, 0.0], [3.0, 5.0, 5.0]),
+        # And where the voltage moves further within the delay: a swing is flattened by its rate to its end.
+        (Spread(3.0, 0.0, 0.4, (-10.0, 10.0), by_move=2.0, delay=2.0, moved=3.0),
+         [0.0, 0.0, 5.0, 5.0, 5.0], [0.0] * 5, [3.0, 3.0, 5.0, 5.0, 5.0]),
+        # And where the voltage stays at one side for longer.
+        (Spread(3.0, 0.0, 0.0, (-50.0, 50.0), by_stay=0.4, memory=1e-3, stayed=(-10.0, 10.0)),
+         [0.0, 10.0, 20.0, -20.0, 0.0], [0.0] * 5, [3.0, 3.0, 5.0, 5.0, 3.0]),
     ],
 )  # fmt: skip
 def test_an_interval_widens(spread: Spread, u: list[float], behind: list[float], half: list[float]) -> None:
@@ -114,6 +122,7 @@ def test_an_interval_holds_a_lag_that_is_no_delay() -> None:
 
 
 def test_blocks_beyond_the_others_do_not_widen_the_interval_within_the_range() -> None:
+    """Nothing was known there; within the range a stage of plays is known well."""
     t = np.linspace(0.0, 1.0, N)
     u = 40.0 * t * np.sin(150.0 * t)
     x = stage(np.random.default_rng(0)).simulate(u) + noise(5e-3)
@@ -129,7 +138,14 @@ def test_a_loop_is_trusted_beyond_the_range_and_plays_are_not() -> None:
     assert wide[0].by_volt < 0.5 * wide[1].by_volt
 
 
-@pytest.mark.slow
+def test_a_fast_step_widens_the_interval_while_it_lasts() -> None:
+    spread = Spread(0.01, 0.0, 0.0, (-50.0, 50.0), by_move=0.1, delay=3.0, moved=2.0)
+    u = np.where(np.arange(300) < 40, 0.0, 20.0)
+    half = spread.along(u, np.zeros(1))
+    assert half[41] > 1.0
+    np.testing.assert_allclose(np.delete(half, np.arange(38, 140)), 0.01)
+
+
 def test_an_interval_holds_loops_that_the_record_did_not_show() -> None:
     """Of slopes that were fitted to loops of one size; where it had shown those, nothing is wider."""
     t = np.arange(2 * N) / RATE
@@ -151,6 +167,7 @@ def test_an_interval_holds_loops_that_the_record_did_not_show() -> None:
 
 
 def test_an_interval_holds_creep_that_the_record_could_not_show() -> None:
+    """Of a stage that only swings, and then comes to rest at one side."""
     t = np.arange(2 * N) / RATE
     u = 40.0 * np.sin(2.0 * np.pi * 2.25 * np.minimum(t, 1.3 * N / RATE))
     assert abs(u[-1]) > 20.0

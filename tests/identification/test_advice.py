@@ -74,15 +74,14 @@ def test_what_goes_beyond_the_fitted_part_is_said() -> None:
     fast = Record.from_arrays(steady.voltage, steady.displacement, 2.0 * FS)
     said = identify(grows, model="line", validate=[steady]).advice
     (held,) = [each for each in said if each.startswith("The held-out part goes beyond")]
-    assert "-38.8 to 38.8 V" in held
-    assert any(each.startswith("Other log") and "-19.4 to 19.4 V" in each for each in said)
+    assert "the voltage goes from -38.8 to 38.8 V, the model was learnt from -19.4 to 19.4 V" in held
+    assert any(each.startswith("Other log") and "learnt from -19.4 to 19.4 V" in each for each in said)
     said = identify(steady, model="line", validate=[steady, fast]).advice
     (other,) = [each for each in said if "goes beyond" in each]
     assert "V/s" in other
     assert "swings at 10 Hz" in other
 
 
-@pytest.mark.slow
 def test_ringing_is_said() -> None:
     """A square voltage makes a stage ring; a loop that is missed has harmonics, and does not ring."""
     u = 30.0 * np.sign(np.sin(2.0 * np.pi * 2.0 * np.arange(8000) / FS) + 1e-9)
@@ -96,7 +95,6 @@ def test_ringing_is_said() -> None:
     assert not any("oscillates" in each for each in missed.advice)
 
 
-@pytest.mark.slow
 def test_other_logs_are_checked_too() -> None:
     right, falls = log(swings(), LOOP.simulate(swings())), log(swings(), -LOOP.simulate(swings()))
     found = identify(right, model="line", validate=[right, falls])
@@ -108,8 +106,7 @@ def test_other_logs_are_checked_too() -> None:
 
 @pytest.mark.parametrize(
     ("creep", "missed", "chosen"),
-    # Where noise is most of what is missed, a per cent less is much less of the model's own error.
-    [(0.1, 0.8, 1), (0.18, 0.8, 0), (0.4, 0.5, 0), (0.4, 0.35, 1), (0.0, 0.985, 1), (0.0, 0.997, 0)],
+    [(0.1, 0.8, 1), (0.18, 0.8, 0), (0.4, 0.5, 0), (0.4, 0.35, 1), (0.0, 0.8, 1)],
 )
 def test_much_creep_that_a_log_cannot_tell_must_be_clearly_better(
     creep: float, missed: float, chosen: int
@@ -119,7 +116,14 @@ def test_much_creep_that_a_log_cannot_tell_must_be_clearly_better(
         SimpleNamespace(creep=creep, cross_validated=missed),
     ]
     assert best_of(kinds, tells_creep=False) is kinds[chosen]
-    assert best_of(kinds) is kinds[missed < 0.99]
+    assert best_of(kinds) is kinds[1]
+
+
+@pytest.mark.parametrize(("missed", "chosen"), [(0.997, 0), (0.985, 1)])
+def test_a_little_better_is_better(missed: float, chosen: int) -> None:
+    """Where noise is most of what is missed, a per cent less is much less of the model's own error."""
+    kinds: Any = [SimpleNamespace(creep=0.0, cross_validated=each) for each in (1.0, missed)]
+    assert best_of(kinds) is kinds[chosen]
 
 
 @pytest.mark.slow
@@ -131,7 +135,6 @@ def test_creep_is_known_where_the_voltage_rests() -> None:
     assert ["Creep is not known" in each for each in said] == [True, False]
 
 
-@pytest.mark.slow
 def test_rounding_is_noise() -> None:
     # Periods that repeat to the bit show no noise.
     u = 40.0 * np.sin(2.0 * np.pi * np.arange(12_000) / 1000.0)
@@ -147,9 +150,12 @@ def test_a_stage_of_another_gain_or_offset_is_told_apart() -> None:
         for factor, offset, name in ((1.0, 0.0, "same"), (2.0, 0.0, "gain"), (1.0, 2.5, "offset"))
     ]
     said = [each for each in identify(log(u, PLAYS.simulate(u)), validate=others).advice if "log" in each]
-    assert not any(each.startswith("Other log same") for each in said)
-    assert any(each.startswith("Other log gain") for each in said)
-    assert any("offset differs, by 2.5 µm" in each for each in said)
+    about = {
+        name: [each for each in said if each.startswith(f"Other log {name}")] for name in ("same", "gain")
+    }
+    assert about["same"] == []
+    assert any("misses it" in each for each in about["gain"])
+    assert any("only its offset differs, by 2.5 µm" in each for each in said)
 
 
 def test_a_column_without_a_number_is_refused() -> None:

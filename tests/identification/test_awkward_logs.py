@@ -9,6 +9,7 @@ import piezoest as pz
 from piezoest._checks import FloatArray
 from piezoest.fitting.flaws import flawed
 from piezoest.fitting.rests import rests_of
+from piezoest.identification.lag import tells_lag
 from piezoest.identification.sense import findings
 from piezoest.models import ColemanHodgdon
 from piezoest.records import Record
@@ -118,22 +119,34 @@ FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "nm taken for um": (lambda: times(x=1e3), "too large", "nm taken for µm"),
     "volts taken for millivolts": (lambda: times(u=1e-3, x=5.0), "too large", "V for mV"),
     "mm taken for um": (lambda: times(x=1e-3), "too small", "mm or m taken for µm"),
+    "m taken for um": (lambda: times(x=1e-6), "too small", "mm or m taken for µm"),
     "mV taken for V": (lambda: times(u=1e3), "voltage", "mV taken for V"),
     "a stroke of some nm": (lambda: times(u=1e-3, x=1e-3), "small stroke", "raise the voltage"),
     "us taken for s": (lambda: times(rate=1e-6 * FS), "sample rate", "unit of time"),
     "ms taken for s": (lambda: times(rate=1.0), "sample rate", "ms"),
+    "s taken for us": (lambda: times(rate=1e6 * FS), "sample rate", "unit of time"),
     "a swing of hours": (lambda: (*log(SINE.repeat(80))[:2], 1.1), "swing time", "there and back"),
     "a swing of microseconds": (lambda: (*times()[:2], 9e6 * 4), "sample rate", "unit of time"),
     "sign of the sensor": (lambda: times(x=-1.0), "falls", "change the sign"),
+    "sign of the voltage": (lambda: times(u=-1.0), "falls", "change the sign"),
     "columns swapped": (with_(lambda u, x: (x, u)), "clockwise", "swapped"),
     "displacement early": (lambda: early(25), "clockwise", "time stamps"),
     "the reference in um": (lambda: followed(1.0), "reference", "reference in µm"),
     "the reference in volts": (lambda: followed(0.1), "straight", "servo off"),
     "closed loop, reading after": (lambda: closed_loop(False), "closed loop", "later"),
     "closed loop, reading before": (lambda: closed_loop(True), "closed loop", "opposite ways"),
-    "sensor clipped above": (with_(lambda u, x: (u, x.clip(-9.0, 3.0))), "clipped displacement", "3 µm"),
+    "sensor clipped above": (
+        with_(lambda u, x: (u, x.clip(-9.0, 3.0))),
+        "clipped displacement",
+        "stands at 3 µm",
+    ),
+    "sensor clipped below": (with_(lambda u, x: (u, x.clip(-2.5, 9.0))), "clipped displacement", "-2.5 µm"),
     "recorder clips the voltage": (with_(lambda u, x: (u.clip(max=40.0), x)), "clipped voltage", "at 40 V"),
-    "saturated": (lambda: (SINE, log(SINE.clip(-45.0, 45.0))[1], FS), "clipped displacement", "comes back"),
+    "amplifier saturates": (
+        lambda: (SINE, log(SINE.clip(-45.0, 45.0))[1], FS),
+        "clipped displacement",
+        "comes back",
+    ),
     "four bits": (in_steps_of(0.8), "coarse", "steps of 0.8 µm"),
     "six bits": (in_steps_of(0.15), "coarse", "steps of 0.15 µm"),
     "a slow sensor": (with_(lambda u, x: (u, x[::8].repeat(8))), "repeated", "8 times in a row"),
@@ -143,7 +156,11 @@ FOUND: dict[str, tuple[Callable[[], Log], str, str]] = {
     "nothing but gaps": (lambda: times(x=np.nan), "short", "0 usable samples"),
     "one way": (lambda: ramp(0), "no swing", "turns 0 times"),
     "one turn": (lambda: ramp(1), "no swing", "turns once"),
-    "a quarter missing": (stands(1000, 3000, x=np.inf), "missing", "25 %"),
+    "a quarter missing": (
+        with_(lambda u, x: (u, np.where((T >= 1.0) & (T < 3.0), np.nan, x))),
+        "missing",
+        "25 %",
+    ),
     "another axis": (lambda: (SINE, np.cumsum(noise(deviation=0.05)), FS), "unrelated", "one axis"),
     "some spikes": (spiky(8, 1.0), "spikes", "8 samples"),
     "many spikes": (spiky(80, -2.0), "spikes", "stand off alone"),
@@ -180,10 +197,22 @@ def test_missing_readings_hide_nothing() -> None:
 
 
 def test_a_date_in_days_is_no_time_in_seconds() -> None:
+    """MATLAB counts days; 100 Hz would be 8.6 MHz."""
     u, x, _ = log()
     days = 739_948.4 + 10.0 * T / 86_400.0
     record = Record(days, u, x, (N - 1) / (days[-1] - days[0]))
     assert next(found.name for found in findings(record)) == "days"
+
+
+def test_a_jump_in_a_rest_leaves_the_voltage_alone() -> None:
+    u, x, _ = jump_in_rest()
+    assert not flawed(u, x).voltage.any()
+
+
+def test_flaws_say_where() -> None:
+    dropouts = flawed(*FOUND["sensor lost"][0]()[:2]).dropouts
+    np.testing.assert_allclose(np.flatnonzero(dropouts), np.arange(1800, 1860), atol=1)
+    np.testing.assert_allclose(flawed(*with_rest()[:2]).rests, [[2000, 5000]], atol=1)
 
 
 @pytest.mark.parametrize("deviation", [0.0, 0.1, 0.5, 1.0])
@@ -250,3 +279,21 @@ def test_nothing_is_doubted_in_a_healthy_log(name: str) -> None:
     flaws = flawed(u, x)
     assert not flaws.unusable.any()
     assert flaws.jumps.size == 0
+
+
+TELLING = ("steps", "square", "chirp", "walk", "dying away")
+VOLTAGES: dict[str, tuple[FloatArray, bool]] = {
+    **{name: (HEALTHY[name]()[0], name in TELLING) for name in ("sine", "triangle", "late", *TELLING)},
+    "noisy": (HEALTHY["noise in the recorded voltage"]()[0], False),
+    "nothing": (np.zeros(100), False),
+    "no number": (np.full(100, np.nan), False),
+    "ramp": (np.linspace(0.0, 1.0, 100), False),
+    "two frequencies": (np.concatenate((SINE, triangle(7.0))), True),
+    "white": (noise(1000), True),
+}
+
+
+@pytest.mark.parametrize("name", VOLTAGES)
+def test_whether_a_voltage_tells_a_lag(name: str) -> None:
+    u, tells = VOLTAGES[name]
+    assert tells_lag(u) is tells

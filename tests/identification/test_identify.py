@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import piezoest as pz
 from piezoest import signals
 from piezoest._checks import FloatArray
 from piezoest.fitting import FORMS
-from piezoest.identification import Identification, identify
+from piezoest.identification import Identification, Whiteness, identify
 from piezoest.identification.sense import findings
 from piezoest.models import ColemanHodgdon
 from piezoest.models.reading import LearntModel
@@ -74,7 +75,6 @@ def test_a_lag_that_swings_alike_cannot_tell_is_used_but_not_told() -> None:
     assert identify(made()).delay_known
 
 
-@pytest.mark.slow
 def test_corners_of_one_triangle_show_a_lag_to_the_fit() -> None:
     u = 30.0 * (2.0 * np.abs(np.arange(8000) / 400.0 % 2.0 - 1.0) - 1.0)
     x = np.roll(TRUE.simulate(u), 3)[3:]
@@ -90,6 +90,7 @@ def resting_first(u: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 AT = np.arange(swings().size)
+# What is made of a log, and what is said of it.
 FLAWS: dict[str, tuple[Any, str]] = {
     "unipolar": (lambda u, x: (u + 60.0, x), "not centred"),
     "gaps": (
@@ -104,7 +105,6 @@ FLAWS: dict[str, tuple[Any, str]] = {
 
 
 @pytest.mark.parametrize("name", FLAWS)
-@pytest.mark.slow_but_first
 def test_flaws_of_a_log_do_not_matter_and_are_said(name: str) -> None:
     change, said = FLAWS[name]
     record = made(delay=0.0)
@@ -114,6 +114,13 @@ def test_flaws_of_a_log_do_not_matter_and_are_said(name: str) -> None:
     assert found.held_out.rms < 4e-3
     assert np.all(np.isfinite(found.prediction))
     assert sum(said in sentence for sentence in (*found.advice, *found.record.notes)) == 1
+
+
+@pytest.mark.slow
+def test_drift_is_found_and_said() -> None:
+    found = identify(changed(made().displacement + np.linspace(0.0, 0.5, len(made()))), model=LOOP)
+    assert found.fit.drift + found.drift > 0.2
+    assert any("drifts" in sentence for sentence in found.advice)
 
 
 @pytest.mark.slow
@@ -151,6 +158,7 @@ def test_the_simplest_that_will_do_is_chosen() -> None:
     assert found.chosen == LOOP
     line = identify(u, 0.2 * u + noise(5e-3, 0, t.size), sample_rate=1000.0)
     assert line.chosen == "line"
+    assert any("straight line does about as well" in sentence for sentence in found.advice) is False
 
 
 def test_a_stage_of_relays_needs_asymmetry() -> None:
@@ -162,6 +170,29 @@ def test_a_stage_of_relays_needs_asymmetry() -> None:
     assert list(errors) == list(FORMS)
     assert errors[found.chosen] < 0.4 * errors[LOOP]
     assert found.best.label in found.reason
+
+
+@pytest.mark.parametrize("model", FORMS)
+@pytest.mark.slow_but_first
+def test_one_kind_is_fitted_where_one_is_named(model: str) -> None:
+    found = identify(made(), model=model)
+    assert found.chosen == model
+    assert [each.name for each in found.candidates] == list(dict.fromkeys(["line", model]))
+    assert found.line.theta[0] == pytest.approx(found.candidates[0].model.theta[0])
+
+
+@pytest.mark.slow
+def test_arrays_records_files_and_tables_give_the_same(tmp_path: Path) -> None:
+    record = made()
+    record.write(tmp_path / "log.npy")
+    wanted = identify(record, model=LOOP).model.theta
+    same = identify(record.voltage, record.displacement, sample_rate=RATE, model=LOOP)
+    np.testing.assert_array_equal(same.model.theta, wanted)
+    np.testing.assert_allclose(identify(tmp_path / "log.npy", model=LOOP).model.theta, wanted, rtol=1e-6)
+    mine = pd.DataFrame({"t": record.time, "mon": 1e3 * record.voltage, "cap": record.displacement})
+    named = {"time": "t", "voltage": "mon", "displacement": "cap"}
+    found = identify(mine, columns=named, units={"voltage": "mV", "displacement": "um"}, model=LOOP)
+    np.testing.assert_allclose(found.model.theta, wanted, rtol=1e-6)
 
 
 def test_other_logs_are_predicted(tmp_path: Path) -> None:
@@ -178,6 +209,36 @@ def test_other_logs_are_predicted(tmp_path: Path) -> None:
         identify(made(), validate=[Record.from_arrays(other.voltage[:30], other.displacement[:30], RATE)])
 
 
+@pytest.mark.slow
+def test_another_log_may_have_another_sample_rate() -> None:
+    creep = pz.Creep([0.06], [0.25])
+    record = plays_log(1, creep=creep)
+    half = Record.from_arrays(record.voltage[::2], record.displacement[::2], 500.0)
+    found = identify(record, train=0.9, validate=[half, record])
+    assert found.validations[0].error.rms < 1.3 * found.validations[1].error.rms
+
+
+@pytest.mark.slow
+def test_doubts_are_errors_where_they_are_to_be() -> None:
+    record = made()
+    gap = record.displacement.copy()
+    gap[-4000:] = np.nan
+    found = identify(changed(gap), model="line", train=0.2)
+    assert [each.name for each in found.findings if each.severity == "doubt"] == ["missing"]
+    assert found.findings[0].sentence in found.advice
+    with pytest.raises(ValueError, match="%"):
+        identify(changed(gap), model="line", train=0.2, strict=True)
+    assert identify(record, model="line", strict=True).chosen == "line"
+
+
+def test_every_step_is_told() -> None:
+    told: list[str] = []
+    identify(made(), say=told.append)
+    assert told[0] == "looking at the log"
+    fitted = [words for words in told if words.startswith("fitting")]
+    assert fitted == [f"fitting {form.label}" for form in FORMS.values()]
+
+
 def bad_records() -> dict[str, tuple[Record, str]]:
     u, time = swings(), np.arange(swings().size) / RATE
     hiss = noise(1e-2, 0, u.size)
@@ -190,6 +251,7 @@ def bad_records() -> dict[str, tuple[Record, str]]:
         "only noise": (Record.from_arrays(u, hiss, RATE), r"displacement moves by .* µm in noise of"),
         "small": (Record.from_arrays(u / 20, TRUE.simulate(u / 20) + hiss, RATE), "alpha = .* known only"),
         "two levels": (Record.from_arrays(square, stepped, RATE), "(alpha|beta|gamma) = .* known only"),
+        "falls": (Record.from_arrays(u, -TRUE.simulate(u), RATE), "falls as the voltage rises"),
         "even": (Record.from_arrays(u, 0.1 * np.abs(u), RATE), "leaves .* % of the displacement"),
         "short": (Record.from_arrays(u[:60], TRUE.simulate(u[:60]), RATE), "part .* 30 usable samples"),
     }  # fmt: skip
@@ -233,16 +295,13 @@ def test_what_is_no_log_is_refused() -> None:
 
 @pytest.mark.parametrize("model", FORMS)
 @pytest.mark.slow_but_first
-def test_the_kind_that_is_named_is_fitted_and_its_dictionary_holds_the_model(
-    model: str, tmp_path: Path
-) -> None:
+def test_dictionary_is_json_and_holds_the_model(model: str, tmp_path: Path) -> None:
     found = identify(plays_log(1, creep=pz.Creep([0.06], [0.25])), model=model)
-    assert [each.name for each in found.candidates] == list(dict.fromkeys(["line", model]))
-    assert found.chosen == model
     (tmp_path / "found.json").write_text(json.dumps(found.to_dict(), allow_nan=False), encoding="utf-8")
     learnt = LearntModel.read(tmp_path / "found.json")
     assert (learnt, learnt.learnt_on) == (LearntModel.of(found), found.learnt_on)
     data = found.to_dict()
+    assert data["held_out"]["rms_um"] == found.held_out.rms
     assert set(data["standard_errors"]) == {*found.model.parameter_names, "offset", "delay"}
     first = found.record.voltage[:500]
     r = cast(Any, found.model).simulate(np.concatenate([np.linspace(0.0, first[0], 300), first]))
@@ -253,14 +312,34 @@ def test_the_kind_that_is_named_is_fitted_and_its_dictionary_holds_the_model(
 
 def test_text_names_what_matters() -> None:
     found = identify(made(), model=LOOP)
-    text = str(found)
+    text = found.report()
+    assert str(found) == text
+    assert "held out" in text
     assert found.reason in text
     assert all(sentence in text for sentence in found.advice)
+    assert found.best.label in repr(found)
     lines = found.compare(identify(made(), model="line")).splitlines()
     assert [word in line for word, line in zip(("Coleman-Hodgdon", "straight line"), lines[1:], strict=True)]
     table = identify(plays_log()).table()
     assert [row[0] for row in table][-2:] == ["offset", "delay"]
     assert len(table) <= 12
+
+
+def test_prediction_is_that_of_the_best_fit() -> None:
+    found = identify(made(), model=LOOP)
+    np.testing.assert_array_equal(found.predict().x, found.prediction)
+    x, expected = found.record.displacement, found.predict()
+    assert 0.9 < np.mean((x >= expected.lower) & (x <= expected.upper)) < 0.99
+    v = swings()[:3000]
+    np.testing.assert_array_equal(found.predict(v).x, found.fit.predict(v).x)
+
+
+def test_whiteness() -> None:
+    white = np.random.default_rng(0).standard_normal(2000)
+    assert Whiteness.of(white).is_white
+    coloured = Whiteness.of(np.convolve(white, np.ones(5), mode="valid"))
+    assert not coloured.is_white
+    assert coloured.first_autocorrelation == pytest.approx(0.8, abs=0.05)
 
 
 # Gaps and wrong voltages: models are judged where the stage is known, and never by NaN.
@@ -270,6 +349,7 @@ TURN = HALF + int(np.argmax(RECORD.voltage[HALF:]))
 
 
 AROUND, NONE = slice(TURN - 60, TURN + 60), slice(0)
+# Voltages and displacements that are missing.
 LOST_TURN = {"rows": (AROUND, AROUND), "voltage": (AROUND, NONE)}
 OTHERS = {
     "at both ends": (slice(-400, None), slice(HALF, HALF + 300)),
@@ -355,6 +435,7 @@ def test_real_recordings_predict_each_other(real: Identification, data_dir: Path
     other = identify(folder / "model_1hz.csv", validate=[folder / "test_1hz.csv"])
     assert real.validations[0].without_mean.rms <= 0.45
     assert other.validations[0].without_mean.rms <= 0.45
+    # It swings alike all the time: a lag cannot be told.
     assert not other.delay_known
 
 
@@ -367,6 +448,7 @@ def test_free_running_sees_only_the_voltage(real: Identification) -> None:
 
 
 def test_an_interval_holds_what_kinds_expect_that_may_be_right_as_well() -> None:
+    """Beyond the fitted voltages, where they differ by more than what any of them misses within."""
     found = identify(plays_log(0, bends=2))
     u = 2.0 * (found.record.voltage - 40.0) + 40.0
     expected = found.predict(u)
@@ -376,5 +458,6 @@ def test_an_interval_holds_what_kinds_expect_that_may_be_right_as_well() -> None
     apart = np.max([np.abs(each.fit.predict(u).x - expected.x) for each in rivals], axis=0)
     assert apart.max() > found.fit.spread.within
     own = found.fit.predict(u)
+    # Kinds that are not as good may differ by even more.
     assert np.all(expected.upper - expected.x >= 0.9999 * np.hypot(own.upper - own.x, apart))
     np.testing.assert_allclose(expected.x - expected.lower, expected.upper - expected.x)

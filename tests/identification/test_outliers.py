@@ -32,6 +32,7 @@ def test_spikes_are_found() -> None:
         rng = np.random.default_rng(seed)
         u, x, _, noise = zoo_log(seed)
         places = apart(rng, x.size, round(x.size * 10.0 ** rng.uniform(-3.0, np.log10(0.02))), 4)
+        # What is less than a part in a thousand of the range is left alone.
         least = max(10.0 * noise, 3e-3 * np.ptp(x))
         y = x.copy()
         y[places] += rng.choice([-1.0, 1.0], places.size) * least * 10.0 ** rng.uniform(0.0, 1.5, places.size)
@@ -72,6 +73,14 @@ def test_noise_of_a_long_log_has_no_spikes() -> None:
     assert flaws.jumps.size == 0
 
 
+def test_a_jump_has_its_place_and_its_size() -> None:
+    u = 50.0 * np.sin(np.linspace(0.0, 40.0, 4000))
+    x = 0.1 * u + 0.5 * (np.arange(4000) >= 1500)
+    flaws = flawed(u, x)
+    np.testing.assert_array_equal(flaws.jumps, [1500])
+    np.testing.assert_allclose(flaws.jump_sizes, 0.5, rtol=0.05)
+
+
 @pytest.mark.parametrize("turns", [0.0, 0.5, 7.0, 300.0])
 def test_a_log_without_noise_is_taken(turns: float) -> None:
     u = np.linspace(0.0, 1.0, 4000) if turns == 0.0 else np.sin(np.linspace(0.0, 6.28 * turns, 4000))
@@ -85,6 +94,11 @@ def test_a_log_without_noise_is_taken(turns: float) -> None:
 def test_short_logs_are_taken(size: int) -> None:
     u = np.sin(np.arange(size))
     assert flawed(u, 0.1 * u).spikes.shape == (size,)
+
+
+def test_one_shape_is_asked_for() -> None:
+    with pytest.raises(ValueError, match=r"x must have shape \(3,\)"):
+        flawed(np.zeros(3), np.zeros(4))
 
 
 def sine_log() -> tuple[FloatArray, FloatArray]:
@@ -105,6 +119,28 @@ def test_readings_that_are_off_together_are_found(count: int, value: float | Non
         flaws = flawed(u, y)
         np.testing.assert_array_equal(np.flatnonzero(flaws.spikes), start + np.arange(count))
         assert flaws.jumps.size == 0
+
+
+@pytest.mark.slow
+def test_bursts_are_found_in_logs_of_all_kinds() -> None:
+    found = 0
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        u, x, _, noise = zoo_log(seed)
+        start, count = int(rng.integers(100, x.size - 100)), int(rng.integers(2, 7))
+        y = x.copy()
+        y[start : start + count] += max(0.3 * float(np.ptp(x)), 30.0 * noise)
+        found += np.array_equal(np.flatnonzero(flawed(u, y).spikes), start + np.arange(count))
+    assert found > 0.85 * len(SEEDS)
+
+
+@pytest.mark.slow
+def test_error_codes_do_not_keep_a_log_from_being_fitted() -> None:
+    u, x = sine_log()
+    x[np.random.default_rng(1).choice(4000, 8, replace=False)] = 99999.0
+    found = pz.identify(u, x, sample_rate=1000.0)
+    assert found.held_out.rms < 0.005
+    assert found.learnt_on.displacement[1] < 20.0
 
 
 def test_no_error_code_is_seen_in_the_only_swing_of_a_rest() -> None:
@@ -151,11 +187,18 @@ def test_a_jump_is_found_in_whatever_it_hides(how: str) -> None:
 
 
 @pytest.mark.slow
-def test_missing_samples_are_no_jumps_nor_is_what_a_stage_does_in_a_long_gap() -> None:
+def test_missing_samples_are_no_jumps() -> None:
     for seed in SEEDS:
-        rng, (u, x) = np.random.default_rng(seed), zoo_log(seed)[:2]
-        single, gap, start = x.copy(), x.copy(), int(rng.integers(100, x.size - 500))
-        single[apart(rng, x.size, x.size // 100, 4)] = np.nan
-        assert flawed(u, single).jumps.size <= 1, seed
-        gap[start : start + 200] = np.nan
-        assert not np.any(np.abs(flawed(u, gap).jumps - start) <= 200), seed
+        u, x = zoo_log(seed)[:2]
+        y = x.copy()
+        y[apart(np.random.default_rng(seed), x.size, x.size // 100, 4)] = np.nan
+        assert flawed(u, y).jumps.size <= 1, seed
+
+
+@pytest.mark.slow
+def test_what_a_stage_does_in_a_long_gap_is_no_jump() -> None:
+    for seed in SEEDS:
+        u, x = zoo_log(seed)[0], zoo_log(seed)[1].copy()
+        start = int(np.random.default_rng(seed).integers(100, x.size - 500))
+        x[start : start + 200] = np.nan
+        assert not np.any(np.abs(flawed(u, x).jumps - start) <= 200), seed

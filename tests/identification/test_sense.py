@@ -8,6 +8,7 @@ import pytest
 import piezoest as pz
 from piezoest.bench.zoo.families import FAMILIES, Reach, draw_family
 from piezoest.identification.feedback_in_log import answer
+from piezoest.identification.loop_direction import loop_of
 from piezoest.identification.sense import findings
 from piezoest.records import Record
 from tests.identification.zoo_logs import zoo_log
@@ -51,6 +52,21 @@ def test_swapped_columns_turn_the_loop_round(family: str) -> None:
     assert findings(Record.from_arrays(u, x, 1000.0))[:1] != ()  # the drift
     assert [each.severity for each in findings(Record.from_arrays(u, x, 1000.0))] == ["note"]
     assert "clockwise" in [each.name for each in findings(Record.from_arrays(x, u, 1000.0))]
+
+
+def test_the_opening_of_a_loop_is_its_width_whatever_drifts() -> None:
+    t = np.linspace(0.0, 1.0, 20_000)
+    u = 50.0 * np.sin(2.0 * np.pi * 10.0 * t)
+    play = pz.PrandtlIshlinskii(0.1, [5.0], [0.02]).simulate(u)
+    known = np.ones(t.size, dtype=np.bool_)
+    still = loop_of(u, play, known, 0.12)
+    drifting = loop_of(u, play + 3.0 * t, known, 0.12)
+    # A play of threshold 5 V is 10 V wide, but for where it turns.
+    assert 0.7 * 0.2 < float(np.median(still.openings)) < 0.2
+    np.testing.assert_allclose(drifting.openings, still.openings, atol=0.01)
+    assert still.clockwise == 0.0
+    assert still.opening > 0.0
+    assert loop_of(t, t, known, 1.0).opening == 0.0  # which does not turn
 
 
 @pytest.mark.parametrize("delay", range(8))

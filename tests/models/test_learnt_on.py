@@ -90,6 +90,7 @@ def test_who_leaves_a_range_is_told(used: LearntOn, count: int) -> None:
 
 @pytest.mark.parametrize("kind", [pz.signals.triangle, pz.signals.sine])
 def test_the_same_reference_again_leaves_nothing(kind: Any) -> None:
+    """Though the inverse is steeper after a turn than on the way."""
     r = kind(5.0, 5.0, 4, FS).values
     log = pz.InverseCompensator(LOOP).run(kind(5.0, 5.0, 4, FS).values + LOOP.offset)
     known = LearntOn.of(kind(np.ptp(log) / 2.0, 5.0, 4, FS).values, r, FS)

@@ -1,4 +1,4 @@
-"""The simulated stage: its parts, its streams, its seeds; the paper's stage: its loops."""
+"""The simulated stage: its parts, its streams, its seeds; the paper's stage: its loops and how they warm."""
 
 from typing import Any
 
@@ -13,6 +13,7 @@ from piezoest.equations.filters import biquad_step, butterworth_low_pass
 FS = 10_000.0
 COLEMAN_HODGDON = ColemanHodgdon(0.021, 0.147, 4.29e-3, offset=0.3)
 PLAYS = PrandtlIshlinskii(0.1, [1.0, 5.0, 20.0], [0.02, 0.01, 0.03], offset=-0.2)
+BENT = PrandtlIshlinskii(0.1, [1.0], [0.02], bends=[5.0], bend_weights=[[0.01, 0.0]])
 PREISACH = pz.PreisachStage(FS).hysteresis
 U = 40.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(3000) / FS)
 
@@ -73,6 +74,7 @@ def test_reset_repeats_and_seeds_differ() -> None:
 
 
 def test_starts_at_rest() -> None:
+    """At 0 V nothing moves, whatever offset, bias, filters and delay there are."""
     stage = SimulatedStage(
         FS, PLAYS, Creep([0.1], [0.01]), pz.MassSpringDamper(780.0, 0.02),
         Amplifier(cutoff=2000.0), Gauge(bias=0.7, cutoff=2000.0, delay=3),
@@ -158,6 +160,7 @@ def of_line(**options: Any) -> Any:
         (of_line(gain_schedule=lambda t: t * np.nan), "NaN or infinity"),
         (of_line(gain_schedule=[[1.0, 1.0], [0.0, 3.0]]), "rising times"),
         (of_line(temperature=np.array([20.0, 30.0])), r"temperature must have shape \(M, 2\)"),
+        (of_line(temperature=float("nan")), "temperature must be finite"),
         (of_line(temperature=lambda t: np.ones(3)), "temperature must return one temperature per time"),
     ],
 )
@@ -184,3 +187,32 @@ def test_gain_and_linear_error(amplitude: float, gain: float, error: float) -> N
         fitted = float((u[last] @ x[last]) / (u[last] @ u[last]))
     assert fitted == pytest.approx(gain, rel=0.02)
     assert np.max(np.abs(r - x)[last]) == pytest.approx(error, rel=0.05)
+
+
+def loop(temperature: float | None) -> tuple[float, float]:
+    """Gain [µm/V] and half the opening of the loop, relative to the amplitude, at some 5 µm."""
+    stage = pz.PaperStage(noise=0.0, quantisation=False, temperature=temperature)
+    u = np.asarray(pz.signals.triangle(32.0, 5.0, 3, 50_000.0))
+    stage.run(u)
+    u, x = u[-10_000:], np.asarray(stage.displacement)[-10_000:]
+    gain = float(u @ x / (u @ u))
+    return gain, float(np.max(np.abs(x - gain * u)) / np.max(np.abs(x)))
+
+
+def test_it_gains_and_straightens_as_it_warms() -> None:
+    (cold_gain, cold_loop), (gain, opening), (warm_gain, warm_loop) = loop(10.0), loop(None), loop(30.0)
+    assert loop(20.0) == (gain, opening)
+    assert cold_gain < gain < warm_gain
+    assert cold_loop > opening > warm_loop
+    # About 0.1 % a kelvin, as the docstring says.
+    assert warm_gain / cold_gain == pytest.approx(1.02, abs=0.01)
+
+
+def test_readings_lie_on_the_converter_and_carry_the_noise() -> None:
+    stage = pz.PaperStage()
+    x = stage.run(np.zeros(20_000))
+    codes = x / stage.gauge.resolution
+    np.testing.assert_allclose(codes, np.round(codes), atol=1e-9)
+    assert 0.5e-3 < x.std() < 1.5e-3
+    smooth = pz.PaperStage(noise=0.0, quantisation=False)
+    np.testing.assert_array_equal(smooth.run(np.zeros(100)), np.zeros(100))

@@ -59,7 +59,7 @@ class Dwell:
         gone = float(np.max(np.abs(u[rest] - u[rest.start - 1])))
         return json_safe(
             {
-                **self.drawn(),
+                **self._row(rig, drawn),
                 "settled": level,
                 "allowed": allowed,
                 **dict(zip(PERIODS, after, strict=True)),
@@ -71,6 +71,9 @@ class Dwell:
     def drawn(self) -> Row:
         """What the rig is, and the rest."""
         rig, _, drawn = dwell_rig(self)
+        return self._row(rig, drawn)
+
+    def _row(self, rig: Rig, drawn: dict[str, float]) -> Row:
         return {**rig.to_dict(), **drawn, "duration": self.duration, "failure": None}
 
 

@@ -76,6 +76,7 @@ class Lines(NamedTuple):
     knows: int
 
 
+@np.errstate(all="ignore")
 def judge(rig: Rig, run: Traces, lines: Lines) -> dict[str, Any]:
     """Numbers of a run beside the larger error of both lines in each part; None where nothing is judged."""
     n, first, cycle = run.reference.size, rig.judged_from, rig.plain.cycle
@@ -166,7 +167,6 @@ def play(rig: Rig, factory: Factory) -> Row:
     return traced(rig, factory)[0]
 
 
-@np.errstate(all="ignore")
 def traced(rig: Rig, factory: Factory) -> tuple[Row, Both]:
     """Let a controller drive a rig, and judge it beside straight lines."""
     line = fit_line(rig)

@@ -57,7 +57,8 @@ class Cell:
 
     def play(self, factory: Factory) -> Row:
         """Run a controller over it; with the periods until it settled in each segment, None if it did not."""
-        rig, row = cell_rig(self), self.drawn()
+        rig = cell_rig(self)
+        row = self._row(rig)
         run, _ = run_controller(rig, factory(rig.sample_rate, limits=rig.limits))
         worst = np.abs(run.error).reshape(-1, rig.plain.cycle).max(axis=1)
         first = 0
@@ -71,7 +72,9 @@ class Cell:
 
     def drawn(self) -> Row:
         """The place, and what was drawn."""
-        rig = cell_rig(self)
+        return self._row(cell_rig(self))
+
+    def _row(self, rig: Rig) -> Row:
         return {**asdict(self), "gain": rig.gain, "width": rig.width, "block": rig.block, "noise": rig.noise,
                 "mechanics": rig.around.mechanics, "asked": asked(rig), "failure": None,
                 "segments": []}  # fmt: skip
