@@ -100,6 +100,7 @@ def test_identify_one_kind(log: Path) -> None:
     assert all(name in said for name in FORMS)
 
 
+@pytest.mark.slow
 def test_identify_predicts_other_logs(log: Path) -> None:
     record = read_record(log)
     Record.from_arrays(record.voltage, record.displacement + 0.5, RATE).write("other.csv")

@@ -23,6 +23,7 @@ def ring(stage: Any, reference: pz.Signal, **options: Any) -> pz.TrackingRecord:
 
 
 @pytest.mark.parametrize("stage", [pz.PaperStage, pz.PreisachStage])
+@pytest.mark.slow_but_first
 def test_minor_loops_in_the_ring(stage: Any) -> None:
     reference = pz.signals.two_tone([3.5, 1.5], [2.0, 7.0], 4.0, RATE)
     record = ring(stage(RATE), reference)

@@ -15,8 +15,6 @@ from piezoest.controller.faults import FAULTS
 from piezoest.controller.shown import STAGES
 from tests.export.building import compile_strictly, under_sanitizers
 
-pytestmark = pytest.mark.slow
-
 FS = 1e4
 LIMITS = pz.VoltageLimits(-100.0, 100.0)
 ESTIMATORS: dict[str, Any] = {"line": (), "default": None, "ekf": (pz.HysteresisEKF,)}
@@ -68,6 +66,7 @@ def drive(library: Any, board: Any, own: Any, wrong: Any = float, count: int = 1
     return seen
 
 
+@pytest.mark.slow
 def test_voltages_are_the_librarys_over_all_stages_and_faults(pair: tuple[Any, Any]) -> None:
     library, board = pair
     seen = set()
@@ -88,6 +87,7 @@ def test_voltages_are_the_librarys_over_all_stages_and_faults(pair: tuple[Any, A
     assert len(faults) >= 4
 
 
+@pytest.mark.slow
 def test_it_goes_on_from_where_it_was_exported() -> None:
     library = controller("line", pz.VoltageLimits(-100.0, 100.0, 2e4, FS))
     stage = rig("duhem").stage()
@@ -104,6 +104,7 @@ def test_it_goes_on_from_where_it_was_exported() -> None:
 
 
 @pytest.mark.parametrize("gain", [0.2, -0.2])
+@pytest.mark.slow
 def test_a_gain_that_is_known_need_not_be_right(gain: float) -> None:
     library = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), gain=gain, feedback=5.0)
     seen = drive(library, pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem", "lag"))
@@ -112,6 +113,7 @@ def test_a_gain_that_is_known_need_not_be_right(gain: float) -> None:
 
 
 @pytest.mark.parametrize("begin", [0, 2500])
+@pytest.mark.slow
 def test_it_homes_and_resumes(begin: int) -> None:
     library = pz.AdaptiveFeedforward(FS, limits=pz.VoltageLimits(-100.0, 100.0, 2e4, FS), estimators=())
     board, own = pz.export.CompiledFeedforward(pz.export.c(library)), rig("duhem")
@@ -131,6 +133,7 @@ def test_it_homes_and_resumes(begin: int) -> None:
             board.home(*sweep)
 
 
+@pytest.mark.slow
 def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> None:
     rng = np.random.default_rng(1)
     wild = np.array([np.nan, np.inf, -np.inf, 1e308, -1e308, 1e30, -1e30, 9e8, -9e8, 1e5, 0.0, 1e-45])
@@ -158,6 +161,7 @@ def test_whatever_comes_in_a_number_within_the_limits_goes_out(single: Any) -> N
         ("ekf", "float", "gcc"),
     ],
 )
+@pytest.mark.slow
 def test_compiles_without_a_warning(estimators: str, precision: Any, cc: str, tmp_path: Path) -> None:
     library = controller(estimators)
     code = pz.export.c(library, name="stage", precision=precision)
@@ -175,6 +179,7 @@ def test_compiles_without_a_warning(estimators: str, precision: Any, cc: str, tm
     assert not {line.split()[-2] for line in held.stdout.splitlines()} & set("bBdDC"), "global state"
 
 
+@pytest.mark.slow
 def test_sanitizers_are_silent(tmp_path: Path) -> None:
     library, stage = controller("default"), rig("bouc-wen").stage()
     pairs = np.zeros((rig("bouc-wen").reference.size, 2))

@@ -146,6 +146,7 @@ def test_a_fast_step_widens_the_interval_while_it_lasts() -> None:
     np.testing.assert_allclose(np.delete(half, np.arange(38, 140)), 0.01)
 
 
+@pytest.mark.slow
 def test_an_interval_holds_loops_that_the_record_did_not_show() -> None:
     """Of slopes that were fitted to loops of one size; where it had shown those, nothing is wider."""
     t = np.arange(2 * N) / RATE

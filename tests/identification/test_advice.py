@@ -82,6 +82,7 @@ def test_what_goes_beyond_the_fitted_part_is_said() -> None:
     assert "swings at 10 Hz" in other
 
 
+@pytest.mark.slow
 def test_ringing_is_said() -> None:
     """A square voltage makes a stage ring; a loop that is missed has harmonics, and does not ring."""
     u = 30.0 * np.sign(np.sin(2.0 * np.pi * 2.0 * np.arange(8000) / FS) + 1e-9)
@@ -95,6 +96,7 @@ def test_ringing_is_said() -> None:
     assert not any("oscillates" in each for each in missed.advice)
 
 
+@pytest.mark.slow
 def test_other_logs_are_checked_too() -> None:
     right, falls = log(swings(), LOOP.simulate(swings())), log(swings(), -LOOP.simulate(swings()))
     found = identify(right, model="line", validate=[right, falls])
@@ -135,6 +137,7 @@ def test_creep_is_known_where_the_voltage_rests() -> None:
     assert ["Creep is not known" in each for each in said] == [True, False]
 
 
+@pytest.mark.slow
 def test_rounding_is_noise() -> None:
     # Periods that repeat to the bit show no noise.
     u = 40.0 * np.sin(2.0 * np.pi * np.arange(12_000) / 1000.0)

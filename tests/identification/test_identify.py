@@ -75,6 +75,7 @@ def test_a_lag_that_swings_alike_cannot_tell_is_used_but_not_told() -> None:
     assert identify(made()).delay_known
 
 
+@pytest.mark.slow
 def test_corners_of_one_triangle_show_a_lag_to_the_fit() -> None:
     u = 30.0 * (2.0 * np.abs(np.arange(8000) / 400.0 % 2.0 - 1.0) - 1.0)
     x = np.roll(TRUE.simulate(u), 3)[3:]
@@ -105,6 +106,7 @@ FLAWS: dict[str, tuple[Any, str]] = {
 
 
 @pytest.mark.parametrize("name", FLAWS)
+@pytest.mark.slow_but_first
 def test_flaws_of_a_log_do_not_matter_and_are_said(name: str) -> None:
     change, said = FLAWS[name]
     record = made(delay=0.0)

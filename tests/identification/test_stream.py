@@ -77,6 +77,7 @@ def test_flaws_do_no_harm(tmp_path: Path, flaw: str, skipped: int) -> None:
     assert any(each.name == "wrong voltage" for each in found.findings) == (flaw == "wrong voltages")
 
 
+@pytest.mark.slow
 def test_where_half_of_the_fitted_part_is_missing_it_is_as_good_as_in_memory(tmp_path: Path) -> None:
     u, x = drawn(2)
     x[2000:5000] = np.nan
@@ -115,6 +116,7 @@ def test_a_lag_is_found_and_followed(tmp_path: Path) -> None:
     assert given.held_out.rms < 0.7 * pz.identify_stream(stream, delay=0.0).held_out.rms
 
 
+@pytest.mark.slow
 def test_progress_is_told_in_three_passes_and_what_was_found_is_json(tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     found = pz.identify_stream(saved(tmp_path, *drawn()), progress=lambda *done: told.append(done))
