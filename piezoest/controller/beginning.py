@@ -55,7 +55,7 @@ def home(state: Any, settings: Any, u: Any, x: Any) -> None:
         return
     if state.unit == 0.0:
         state.stage = SEEK
-        starts.begin_again(state.start, settings, u)
+        starts.begin_again(state.start, settings, u, state.readings.last)
         return
     here = lines.at(line, u)
     if recent.count > 0.0:

@@ -19,22 +19,22 @@ POINTS = record(
 )
 # The recent legs in one direction, and their total length [µm].
 LEGS = record(length=DISTANCE, points=POINTS)
-# The line; the lines before the last turn and before the turn before that; the gain at the beginning; whether
-# the voltage was at a limit since the last turn; legs so far, recent ones that agreed with the line; length
-# of this leg at the last look [V], of the longest recent leg [µm]; direction of the last leg; points of this
-# leg, of the legs before it, and of both directions together.
+# The line; the lines before the last turn and before the turn before that; the gain at the beginning, and the
+# way of the voltage that showed it [V]; whether the voltage was at a limit since the last turn; legs so far,
+# recent ones that agreed with the line; length of this leg at the last look [V], of the longest recent leg
+# [µm]; direction of the last leg; points of this leg, of the legs before it, and of both directions together.
 LINE = record(
     gain=NUMBER, centre=NUMBER, last_gain=NUMBER, last_centre=NUMBER, held_gain=NUMBER, held_centre=NUMBER,
-    first_gain=NUMBER, clipped=FLAG, legs=COUNT, agreed=AMOUNT, looked=AMOUNT, longest=DISTANCE,
-    direction=SIGN, now=POINTS, up=LEGS, down=LEGS, both=POINTS,
+    first_gain=NUMBER, first_leg=DISTANCE, clipped=FLAG, legs=COUNT, agreed=AMOUNT, looked=AMOUNT,
+    longest=DISTANCE, direction=SIGN, now=POINTS, up=LEGS, down=LEGS, both=POINTS,
 )  # fmt: skip
 
-# Share of the readings' mean square that a line must explain: for points to be straight, to show a gain, and
-# to show anything at all.
-EXPLAINED, SIGNED, ANSWERED = 0.8, 0.5, 0.1
+# Share of the readings' mean square that a line must explain: for points to be straight, to show a gain, to
+# show that a line is too steep, and to show anything at all.
+EXPLAINED, SIGNED, TOO_STEEP, ANSWERED = 0.8, 0.5, 0.25, 0.1
 # The gain changes by this factor at most at once, and by the second one after CERTAIN legs. In the first leg
-# it grows by CHANGE at most in all.
-CHANGE, LATER_CHANGE, CERTAIN = 2.0, 1.3, 4.0
+# it grows by CHANGE at most in all, until the leg is so many times as long as the way that showed the gain.
+CHANGE, LATER_CHANGE, CERTAIN, LONG = 2.0, 1.3, 4.0, 4.0
 # In the dead zone after a turn the stage hardly answers: no line is flatter than this part of the first.
 FLATTEST = 0.3
 # Where no line explains the points, the stage goes too far from this multiple of the line's way on: the first
@@ -42,7 +42,8 @@ FLATTEST = 0.3
 FARTHER, MUCH_FARTHER = 1.5, 2.5
 # ... and not far enough below this multiple, if it goes less than half as far as the reference: the mean
 # square of an even motion over a length is its square / 12.
-NEARER, STANDS = 0.4, 0.5**2 / 12.0
+EVEN = 12.0
+NEARER, STANDS = 0.4, 0.5**2 / EVEN
 # After a leg, the length KEPT (longest - leg) + LEFT leg of those before it still counts. At each turn the
 # longest recent leg is multiplied by FADES.
 LEFT, KEPT, FADES = 1.0 / 3.0, 2.0, 0.95
@@ -61,7 +62,7 @@ def begin(line: Any, gain: Any, u: Any, x: Any, leg: Any) -> None:
     line.gain = line.last_gain = line.held_gain = line.first_gain = gain
     line.centre = line.last_centre = line.held_centre = x - gain * u
     line.agreed = line.legs = line.longest = line.direction = 0.0
-    line.looked = 0.25 * leg
+    line.first_leg, line.looked = leg, 0.25 * leg
     forget_legs(line)
     forget(line.now)
 
@@ -144,10 +145,12 @@ def _take(legs: Any, now: Any, leg: Any, kept: Any) -> None:
 
 
 @register_jitable
-def _draw(line: Any, points: Any, leg: Any) -> None:
-    """Draw the line through the middle of points; `leg` is how far the reference has gone meanwhile [µm]."""
+def _draw(line: Any, points: Any, leg: Any, most: Any) -> None:
+    """Draw the line through the middle of points; `leg` is how far the reference has gone meanwhile [µm].
+
+    The gain changes by the factor `most` at most.
+    """
     square, square_x, product = points.square, points.square_x, points.product
-    most = CHANGE if line.legs < CERTAIN else LATER_CHANGE
     answers = product * line.gain > 0.0 and product * product > ANSWERED * square * square_x
     nearer, steeper = NEARER * line.gain, np.abs(line.gain) > np.abs(line.first_gain)
     farther = (FARTHER if line.clipped != 0.0 else MUCH_FARTHER) * line.gain
@@ -157,7 +160,8 @@ def _draw(line: Any, points: Any, leg: Any) -> None:
         line.gain *= min(max(spread(points) / np.abs(line.gain), 1.0 / most), most)
         if np.abs(line.gain) < FLATTEST * np.abs(line.first_gain):
             line.gain = FLATTEST * line.first_gain
-        if line.legs < 1.0 and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
+        short = line.legs < 1.0 and line.looked < LONG * line.first_leg
+        if short and np.abs(line.gain) > CHANGE * np.abs(line.first_gain):
             # A stage that lags goes on while the voltage hardly moves.
             line.gain = CHANGE * line.first_gain
     elif square_x > farther * farther * square > 0.0:
@@ -166,6 +170,9 @@ def _draw(line: Any, points: Any, leg: Any) -> None:
     elif square_x < nearer * nearer * square and square_x < STANDS * leg * leg and steeper:
         # The stage hardly moves: what made the line steeper, such as ringing, is over.
         line.gain = np.sign(line.gain) * max(np.abs(line.gain) / most, np.abs(line.first_gain))
+    elif steeper and answers and explained(points) > TOO_STEEP and spread(points) < np.abs(line.gain):
+        # The loop is wide on the small ways of a line that is too steep.
+        line.gain *= max(spread(points) / np.abs(line.gain), 1.0 / most, line.first_gain / line.gain)
     elif not answers:
         # Readings that do not follow the voltage do not show the centre either: it would run away.
         return
@@ -183,7 +190,7 @@ def _through_both(line: Any, legs: Any, others: Any, direction: Any, leg: Any) -
     _join(line.both, legs.points, 1.0)
     if others.length > 0.0:
         _join(line.both, others.points, 0.5)
-    _draw(line, line.both, leg)
+    _draw(line, line.both, leg, CHANGE if line.legs < CERTAIN else LATER_CHANGE)
 
 
 @register_jitable
@@ -214,14 +221,18 @@ def turn(line: Any, direction: Any, leg: Any) -> None:
 @register_jitable
 def grow(line: Any, leg: Any) -> None:
     """Draw the line when the first leg has grown, or a later one is much longer than the recent ones."""
-    now, later = line.now, line.legs >= SETTLED
-    looked = max(line.looked, line.longest / np.abs(line.gain)) if later else line.looked
+    now, later, looked = line.now, line.legs >= SETTLED, line.looked
+    if later:
+        # By the first gain if the line is steeper now, as where a resonance rings: the voltage hardly moves.
+        gain = min(np.abs(line.gain), np.abs(line.first_gain))
+        looked = max(looked, line.longest / gain)
+        leg = min(leg, np.sqrt(EVEN * now.square))
     if 0.0 < line.legs < SETTLED or leg < GROWN * looked or now.count < 16.0:
         return
     line.looked = leg
     # The later one only if the line becomes steeper: small legs are flat, and a flat line leads too far.
     if not (later and (explained(now) < EXPLAINED or spread(now) < np.abs(line.gain))):
-        _draw(line, now, 0.0)
+        _draw(line, now, 0.0, CHANGE)
 
 
 @register_jitable

@@ -14,9 +14,10 @@ from piezoest.controller.voltage import SEEK, is_held
 # The voltage may rest at a limit for this travel of the reference, in swings, before the gain is sought
 # again; the second number is for a line that is not sure, once the reference has shown its swing.
 RESTED, SOON_RESTED = 4.0, 1.5
-# A way so many times as long as those of the start shows more than they did. Its answer contradicts them if
-# it is at least this fraction of theirs.
-LONGER, AGAINST = 2.0, 0.5
+# A way so many times as long as those of the start shows more than they did, if it is at least this fraction
+# of the farthest way so far: nearer to the beginning, hysteresis of that way is left. Its answer contradicts
+# them if it is at least this fraction of theirs.
+LONGER, LEFT, AGAINST = 2.0, 0.5, 0.5
 # Before the line is sure, the stage must have gone this fraction of the way that the line predicts.
 ANSWERED = 0.2
 # A reference is reported as out of reach after so many times the time of a doubling.
@@ -29,7 +30,7 @@ def seek_again(state: Any, settings: Any) -> None:
     state.stage, state.driving = SEEK, 0.0
     feedback.forget(state)
     state.start.least = np.abs(state.u - state.start.origin)
-    starts.begin_again(state.start, settings, state.u)
+    starts.begin_again(state.start, settings, state.u, state.readings.last)
 
 
 @register_jitable
@@ -46,7 +47,8 @@ def is_refuted(state: Any, gone: Any, answer: Any) -> bool:
     start, ways = state.start, starts.farthest(state.start)
     noise = starts.CLEAR * max(start.noise, np.sqrt(state.readings.noise))
     clear = np.abs(answer) > max(noise, AGAINST * np.abs(start.gain) * ways)
-    return clear and np.abs(gone) > LONGER * ways and answer * gone * start.gain < 0.0
+    far = np.abs(gone) > max(LONGER * ways, LEFT * state.confirmed)
+    return clear and far and answer * gone * start.gain < 0.0
 
 
 @register_jitable

@@ -10,6 +10,7 @@ from numba.extending import register_jitable
 
 from piezoest.controller import driving
 from piezoest.controller import line as lines
+from piezoest.controller import readings as reading
 from piezoest.controller.readings import RECENT
 
 # A change of model is also paid at rest: this fraction of it in the time of a doubling.
@@ -56,7 +57,10 @@ def draw(state: Any) -> None:
     """Draw the line again where the reference has turned; the change is owed."""
     line, travel, reference = state.line, state.travel, state.reference
     before = driving.line_z(state)
-    if reference.turned_now != 0.0:
+    if reference.turned_now != 0.0 and state.readings.weak > 0.0 and reading.is_sure(state.readings):
+        # The readings may have failed within this leg.
+        lines.forget(line.now)
+    elif reference.turned_now != 0.0:
         lines.turn(line, -reference.direction, reference.leg)
     else:
         lines.grow(line, np.abs(travel.furthest - travel.turned))

@@ -114,11 +114,11 @@ def _go_back(start: Any, u: Any, target: Any) -> None:
 
 
 @register_jitable
-def begin_again(start: Any, settings: Any, u: Any) -> None:
-    """Go to a rest voltage near 0 V, but not at a limit, and start there again."""
+def begin_again(start: Any, settings: Any, u: Any, x: Any) -> None:
+    """Go from where the stage is to a rest voltage near 0 V, but not at a limit, and start there again."""
     rest = min(max(0.0, settings.minimum + settings.start.way), settings.maximum - settings.start.way)
     begin(start, rest)
-    start.voltage, start.tries = u, 0.5
+    start.voltage, start.from_x, start.tries = u, x, 0.5
     _go_back(start, u, rest)
 
 
