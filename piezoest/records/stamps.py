@@ -10,15 +10,20 @@ from piezoest._checks import FloatArray
 HALF = r"(\s*[AaPp]\.?[Mm]\.?)"
 # 2026-11-22T10:00:00.005+01:00, as ISO 8601 has it.
 ISO = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(:\d{2})?([.,]\d+)?\s*(Z|z|[-+]\d{2}(:?\d{2})?)?")
-# 22.11.2026 10:00:00,005 and 11/22/2026 10:00:00.005 AM, and a date of ISO 8601 before AM or PM.
-DATE = r"(\d{1,2})([./])(\d{1,2})\2(\d{4})[,.]?\s+"
+# 22.11.2026 10:00:00,005 and 11/22/26 10:00:00.005 AM, 22-Nov-2026 10:00:00:005, and a date of ISO 8601
+# before AM or PM.
+YEAR = r"(\d{4}|\d{2})[,.]?\s+"
+DATE = rf"(\d{{1,2}})([./])(\d{{1,2}})\2{YEAR}"
+MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+NAMED = rf"(\d{{1,2}})[-. ]\s*({'|'.join(MONTHS)})[a-z]*[-. ]\s*{YEAR}"
 ISO_DATE = r"(\d{4}[-/]\d{2}[-/]\d{2})\s+"
-TIME = rf"(\d{{1,2}})(:\d{{2}}(?::\d{{2}}(?:[.,]\d+)?)?){HALF}?"
-DATED, PARTS = (re.compile(rf"(?:{DATE}|{ISO_DATE}){often}{TIME}") for often in ("", "?"))
-OF_DAY = re.compile(rf"\d{{1,2}}:\d{{2}}:\d{{2}}([.,]\d+)?{HALF}?")
+FRACTION = r"(?:[.,]\d+|:\d{3})?"
+TIME = rf"(\d{{1,2}})(:\d{{2}}(?::\d{{2}}{FRACTION})?){HALF}?"
+DATED, PARTS = (re.compile(rf"(?:{DATE}|{NAMED}|{ISO_DATE}){often}{TIME}", re.I) for often in ("", "?"))
+OF_DAY = re.compile(rf"\d{{1,2}}:\d{{2}}:\d{{2}}{FRACTION}{HALF}?")
 OF_HOUR = re.compile(r"\d{1,2}:\d{2}[.,]\d+")  # minutes and seconds: with two parts, only a fraction tells
 TURNS = {OF_DAY: 86_400.0, OF_HOUR: 3600.0}
-SLASHES = re.compile(r"(\d{1,2})/(\d{1,2})/\d{4}")
+SLASHES = re.compile(r"(\d{1,2})/(\d{1,2})/\d{2}")
 DAY = "2000-01-01T"
 # A clock that begins anew stands so near its beginning, in parts of a turn; elsewhere it was set.
 NEAR = 1.0 / 24.0
@@ -52,14 +57,18 @@ def _as_iso(word: str, day_first: bool) -> str:
     parts = PARTS.fullmatch(f"00:{'0' * (word[1] == ':')}{word}" if OF_HOUR.fullmatch(word) else word)
     if parts is None:
         return ""
-    first, mark, second, year, date, hour, rest, half = parts.groups()
+    first, mark, second, year, named_day, name, named_year, date, hour, rest, half = parts.groups()
     if half is not None:
         if not 1 <= int(hour) <= 12:
             return ""
         hour = str(int(hour) % 12 + 12 * (half.strip()[0] in "Pp"))
     if year is not None:
         day, month = (first, second) if mark == "." or day_first else (second, first)
-        date = f"{year}-{month:0>2}-{day:0>2}"
+    elif name is not None:
+        day, month, year = named_day, str(MONTHS.index(name.lower()) + 1), named_year
+    if year is not None:
+        date = f"{year if len(year) == 4 else f'20{year}'}-{month:0>2}-{day:0>2}"
+    rest = re.sub(r":(\d{3})$", r".\1", rest)
     return f"{date}T{hour:0>2}{rest}" if date else f"{DAY}{hour:0>2}{rest}"
 
 
