@@ -11,7 +11,6 @@ from numba.extending import register_jitable
 from piezoest.controller import driving
 from piezoest.controller import line as lines
 from piezoest.controller import readings as reading
-from piezoest.controller.readings import RECENT
 
 # A change of model is also paid at rest: this fraction of it in the time of a doubling.
 PAID_IN_TIME = 0.25
@@ -39,7 +38,7 @@ def memory(state: Any, settings: Any) -> float:
     """About how many samples a leg takes: what the recent readings look back over."""
     reference = state.reference
     if is_young(state):
-        return max(reference.count, LEAST_MEMORY * reference.usual, _slow(state, settings) / RECENT)
+        return max(reference.count, LEAST_MEMORY * reference.usual, _slow(state, settings) / reading.RECENT)
     return max(reference.usual, state.travel.usual)
 
 
@@ -57,13 +56,13 @@ def draw(state: Any) -> None:
     """Draw the line again where the reference has turned; the change is owed."""
     line, travel, reference = state.line, state.travel, state.reference
     before = driving.line_z(state)
-    if reference.turned_now != 0.0 and state.readings.weak > 0.0 and reading.is_sure(state.readings):
+    if reference.turned_now == 0.0:
+        lines.grow(line, np.abs(travel.furthest - travel.turned))
+    elif state.readings.weak > 0.0 and reading.is_sure(state.readings):
         # The readings may have failed within this leg.
         lines.forget(line.now)
-    elif reference.turned_now != 0.0:
-        lines.turn(line, -reference.direction, reference.leg)
     else:
-        lines.grow(line, np.abs(travel.furthest - travel.turned))
+        lines.turn(line, -reference.direction, reference.leg)
     state.owed += before - driving.line_z(state)
 
 

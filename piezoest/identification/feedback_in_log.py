@@ -81,26 +81,22 @@ def _usual(A: FloatArray, b: FloatArray) -> BoolArray:
     """Rows that least squares does not miss by far more than others."""
     used: BoolArray = np.ones(b.size, dtype=np.bool_)
     for _ in range(PASSES):
-        off = np.abs(b - A @ _solved(A[used], b[used]))
+        off = np.abs(b - A @ _solved(A[used], b[used])[0])
         used = np.asarray(off <= 5.0 * 1.4826 * np.median(off) + 1e-12 * np.max(np.abs(b)))
         if np.sum(used) < FEWEST_SAMPLES:
             break
     return used
 
 
-def _normal(A: FloatArray) -> FloatArray:
-    """A^T A, never singular."""
+def _solved(A: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Weights by least squares, and A^T A, which is never singular."""
     G = A.T @ A
-    return np.asarray(G + (1e-9 * np.max(np.diag(G)) + 1e-300) * np.eye(len(G)))
-
-
-def _solved(A: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.solve(_normal(A), A.T @ b), dtype=np.float64)
+    G = np.asarray(G + (1e-9 * np.max(np.diag(G)) + 1e-300) * np.eye(len(G)))
+    return np.asarray(np.linalg.solve(G, A.T @ b), dtype=np.float64), G
 
 
 def _least_squares(A: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Weights, what they leave, and their standard errors."""
-    G = _normal(A)
-    weights: FloatArray = np.asarray(np.linalg.solve(G, A.T @ b), dtype=np.float64)
+    weights, G = _solved(A, b)
     left = b - A @ weights
     return weights, left, np.sqrt(np.diag(np.linalg.inv(G))) * float(np.std(left))

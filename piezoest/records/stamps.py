@@ -10,28 +10,33 @@ from piezoest._checks import FloatArray
 HALF = r"(\s*[AaPp]\.?[Mm]\.?)"
 # 2026-11-22T10:00:00.005+01:00, as ISO 8601 has it.
 ISO = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(:\d{2})?([.,]\d+)?\s*(Z|z|[-+]\d{2}(:?\d{2})?)?")
-# 22.11.2026 10:00:00,005 and 11/22/26 10:00:00.005 AM, 22-Nov-2026 10:00:00:005, and a date of ISO 8601
-# before AM or PM.
-YEAR = r"(\d{4}|\d{2})[,.]?\s+"
-DATE = rf"(\d{{1,2}})([./])(\d{{1,2}})\2{YEAR}"
-MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
-NAMED = rf"(\d{{1,2}})[-. ]\s*({'|'.join(MONTHS)})[a-z]*[-. ]\s*{YEAR}"
+# 22.11.2026 10:00:00,005 and 11/22/26 10:00:00.005 AM, and a date of ISO 8601 before AM or PM.
+DATE = r"(\d{1,2})([./])(\d{1,2})\2(\d{4}|\d{2})[,.]?\s+"
 ISO_DATE = r"(\d{4}[-/]\d{2}[-/]\d{2})\s+"
-FRACTION = r"(?:[.,]\d+|:\d{3})?"
-TIME = rf"(\d{{1,2}})(:\d{{2}}(?::\d{{2}}{FRACTION})?){HALF}?"
-DATED, PARTS = (re.compile(rf"(?:{DATE}|{NAMED}|{ISO_DATE}){often}{TIME}", re.I) for often in ("", "?"))
-OF_DAY = re.compile(rf"\d{{1,2}}:\d{{2}}:\d{{2}}{FRACTION}{HALF}?")
+TIME = rf"(\d{{1,2}})(:\d{{2}}(?::\d{{2}}(?:[.,]\d+)?)?){HALF}?"
+DATED, PARTS = (re.compile(rf"(?:{DATE}|{ISO_DATE}){often}{TIME}") for often in ("", "?"))
+OF_DAY = re.compile(rf"\d{{1,2}}:\d{{2}}:\d{{2}}([.,]\d+)?{HALF}?")
 OF_HOUR = re.compile(r"\d{1,2}:\d{2}[.,]\d+")  # minutes and seconds: with two parts, only a fraction tells
 TURNS = {OF_DAY: 86_400.0, OF_HOUR: 3600.0}
 SLASHES = re.compile(r"(\d{1,2})/(\d{1,2})/\d{2}")
+# 22-Nov-2026 10:00:00:005
+MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+NAMED = re.compile(rf"(\d{{1,2}})[-. ]\s*({'|'.join(MONTHS)})[a-z]*[-. ]\s*(?=\d)", re.IGNORECASE)
+MILLISECONDS = re.compile(r"(:\d{2}:\d{2}):(?=\d{3}(?!\d))")
 DAY = "2000-01-01T"
 # A clock that begins anew stands so near its beginning, in parts of a turn; elsewhere it was set.
 NEAR = 1.0 / 24.0
 
 
+def _plain(cell: str) -> str:
+    """Cell with numbers for names of months, and a point before milliseconds."""
+    cell = NAMED.sub(lambda date: f"{date[1]}.{MONTHS.index(date[2].lower()) + 1}.", cell.strip())
+    return MILLISECONDS.sub(r"\1.", cell)
+
+
 def is_stamp(cell: str) -> bool:
     """Whether a cell holds a time of day, minutes and seconds, or a time behind a date."""
-    return any(each.fullmatch(cell.strip()) for each in (ISO, DATED, *TURNS))
+    return any(each.fullmatch(_plain(cell)) for each in (ISO, DATED, *TURNS))
 
 
 def times_of(cells: Any, day_first: bool = False) -> Any:
@@ -48,7 +53,7 @@ def times_of(cells: Any, day_first: bool = False) -> Any:
     other = times.isna() & (words != "")
     if not other.any():
         return times
-    words[other] = [_as_iso(word, day_first) for word in words[other]]
+    words[other] = [_as_iso(_plain(word), day_first) for word in words[other]]
     return pd.to_datetime(words, format="ISO8601", utc=True, errors="coerce")
 
 
@@ -57,18 +62,14 @@ def _as_iso(word: str, day_first: bool) -> str:
     parts = PARTS.fullmatch(f"00:{'0' * (word[1] == ':')}{word}" if OF_HOUR.fullmatch(word) else word)
     if parts is None:
         return ""
-    first, mark, second, year, named_day, name, named_year, date, hour, rest, half = parts.groups()
+    first, mark, second, year, date, hour, rest, half = parts.groups()
     if half is not None:
         if not 1 <= int(hour) <= 12:
             return ""
         hour = str(int(hour) % 12 + 12 * (half.strip()[0] in "Pp"))
     if year is not None:
         day, month = (first, second) if mark == "." or day_first else (second, first)
-    elif name is not None:
-        day, month, year = named_day, str(MONTHS.index(name.lower()) + 1), named_year
-    if year is not None:
-        date = f"{year if len(year) == 4 else f'20{year}'}-{month:0>2}-{day:0>2}"
-    rest = re.sub(r":(\d{3})$", r".\1", rest)
+        date = f"{'20' if len(year) == 2 else ''}{year}-{month:0>2}-{day:0>2}"
     return f"{date}T{hour:0>2}{rest}" if date else f"{DAY}{hour:0>2}{rest}"
 
 
@@ -83,7 +84,7 @@ class Clock(NamedTuple):
     @classmethod
     def of(cls, cell: str) -> "Clock":
         """Clock whose first time stands in a cell."""
-        turns = (turn for pattern, turn in TURNS.items() if pattern.fullmatch(cell.strip()))
+        turns = (turn for pattern, turn in TURNS.items() if pattern.fullmatch(_plain(cell)))
         slashes = SLASHES.match(cell.strip())
         first, second = map(int, slashes.groups()) if slashes else (0, 13)
         guessed = cell.strip() if max(first, second) <= 12 and first != second else ""

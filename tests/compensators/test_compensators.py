@@ -30,8 +30,10 @@ def test_linear() -> None:
 
 
 @pytest.mark.parametrize(
-    ("model", "method"), [(MODEL, "closed-form"), (MODEL, "bogacki-shampine"), (BENT, "closed-form")]
-)
+    ("model", "method"),
+    [(MODEL, "closed-form"), (MODEL, "bogacki-shampine"), (BENT, "closed-form"),
+     (pz.LinearGain(0.15, offset=0.3), "closed-form"), (pz.LinearGain(-0.15), "closed-form")],
+)  # fmt: skip
 def test_step_run_and_split_run_are_the_same_bits_within_limits(model: Any, method: Any) -> None:
     r = triangle(1).values.copy()
     r[400], r[5000:5020] = np.nan, np.inf

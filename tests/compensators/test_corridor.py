@@ -194,12 +194,14 @@ def test_every_voltage_is_finite_and_within_its_limits(
         *made(lambda: pz.LinearGain(*line)),
         *made(lambda: pz.PrandtlIshlinskii(plays[0], [plays[1]], [plays[2]], plays[3])),
     ]
-    for limits in (LIMITS, pz.VoltageLimits(0.0, 150.0), pz.VoltageLimits()):
+    slow = pz.VoltageLimits(-50.0, 50.0, slew_rate=1000.0, sample_rate=1000.0)
+    for limits in (LIMITS, pz.VoltageLimits(0.0, 150.0), pz.VoltageLimits(), slow):
         for start in (START, *models):
             for compensator in made(lambda start=start, limits=limits: pz.InverseCompensator(start, limits)):
                 for k, r_k in enumerate(r * 2):
-                    u = compensator.step(r_k)
+                    before, u = compensator.voltage, compensator.step(r_k)
                     assert np.isfinite(u)
+                    assert abs(u - before) <= limits.largest_step * (1.0 + 1e-9)
                     assert limits.minimum <= u <= limits.maximum
                     if models:
                         with np.errstate(all="ignore"):

@@ -27,16 +27,28 @@ def drive(
     r: FloatArray,
     read: Callable[[int, float], Any] = lambda _, x: x,
     left_out: Container[int] = (),
+    told: Callable[[float], Any] = lambda u: u,
 ) -> Run:
-    """A ring, sample by sample: `read` is the sensor, and `learn` is left out at some samples."""
+    """A ring, sample by sample: `read` is the sensor, `learn` is `told` of the voltage, or left out."""
     u, x, doing = np.empty_like(r), np.empty_like(r), []
     for k, r_k in enumerate(r.tolist()):
         doing.append(driver.status.stage)
         u[k] = driver.step(r_k)
         x[k] = stage.step(float(u[k]))
         if k not in left_out:
-            driver.learn(float(u[k]), read(k, float(x[k])))
+            driver.learn(told(float(u[k])), read(k, float(x[k])))
     return Run(u, x, doing)
+
+
+def late(samples: int, before: float = 0.0) -> Callable[[int, float], float]:
+    """A sensor that reads what was so many samples ago."""
+    readings = [before] * samples
+
+    def read(_: int, x: float) -> float:
+        readings.append(x)
+        return readings[-1 - samples]
+
+    return read
 
 
 def in_blocks(driver: Any, stage: Any, r: FloatArray, block: int) -> tuple[FloatArray, FloatArray]:

@@ -169,20 +169,14 @@ def test_a_gain_that_shakes_the_stage_is_halved_until_it_does_not(gain: float) -
 
 
 def test_readings_that_are_late_do_not_pass_for_an_error() -> None:
-    fs, late, errors = 1e4, 20, []
+    fs, errors = 1e4, []
     r = np.tile(pz.signals.sine(3.0, 10.0, 1, fs).values, 20)
     for feedback in (None, 20.0):
         driver, stage = (
             pz.AdaptiveFeedforward(fs, limits=LIMITS, feedback=feedback),
             pz.SimulatedStage(fs, LOOP),
         )
-        seen = [0.0] * late
-
-        def read(k: int, x: float, seen: Any = seen) -> float:
-            seen.append(x)
-            return float(seen[k])
-
-        errors.append(last_error(r, shared.drive(driver, stage, r, read).x))
+        errors.append(last_error(r, shared.drive(driver, stage, r, shared.late(20)).x))
     assert errors[1] < 1.2 * errors[0]
 
 

@@ -113,7 +113,7 @@ def test_a_sensor_that_never_speaks_is_named() -> None:
     driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=())
     r, stage = np.ones(5000), pz.SimulatedStage(FS, LOOP)
     drive(driver, stage, r, lambda *_: None)
-    assert driver.status.fault == "no readings"
+    assert (driver.status.fault, driver.voltage) == ("no readings", 0.0)
     _, x, _ = drive(driver, stage, r)
     assert driver.status.stage == "running"
     assert abs(x[-1] - 1.0) < 0.1

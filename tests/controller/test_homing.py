@@ -202,11 +202,7 @@ def test_a_write_that_may_be_lost_makes_the_line_drive() -> None:
     driver, stage = learnt()
     before = len(driver.events)
     # Several in a row: the planned voltage and the last one that is known part.
-    r = SINE[:40].tolist()
-    planned = []
-    for r_k in r:
-        planned.append(driver.step(r_k))
-        driver.learn(None, stage.step(planned[-1]))
+    planned = drive(driver, stage, SINE[:40], told=lambda u: None).u
     assert driver.status.driving == "line"
     assert len(driver.events) == before + 1
     assert driver.events[-1].action == "went on"
@@ -239,12 +235,9 @@ def test_for_long_without_news_of_the_voltage_it_follows_the_line(said: str) -> 
     (driver, stage), (_, other) = learnt(), learnt()
     straight = pz.AdaptiveFeedforward(FS, limits=LIMITS, estimators=(), gain=driver.candidates[0].model.gain)
     line = float(np.abs(np.tile(SINE, 20) - drive(straight, other, np.tile(SINE, 20)).x)[-1000:].max())
-    r, u, x = np.tile(SINE, 6), [], []
-    for r_k in r.tolist():
-        u.append(driver.step(r_k))
-        x.append(stage.step(u[-1]))
-        if said == "unknown":
-            driver.learn(None, x[-1])
+    r = np.tile(SINE, 6)
+    left_out = () if said == "unknown" else range(r.size)
+    u, x, _ = drive(driver, stage, r, left_out=left_out, told=lambda u: None)
     assert np.abs(r - x).max() < 1.2 * line
     assert np.abs(np.diff(u)).max() < 2.5 * np.abs(np.diff(drive(driver, stage, r).u)).max()
 
@@ -260,9 +253,7 @@ def test_steps_without_a_write_go_on_along_the_line() -> None:
 
 def test_nothing_is_lost_before_it_runs() -> None:
     driver = controller()
-    for _ in range(20):
-        driver.step(1.0)
-        driver.learn(None, 0.0)
+    drive(driver, pz.SimulatedStage(FS, LOOP), np.ones(20), told=lambda u: None)
     assert driver.status.stage == "seeking"
     assert driver.events == ()
 

@@ -1,5 +1,6 @@
 """The straight line of a controller: what it remembers of legs of different length."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 import piezoest as pz
 from piezoest.controller import line as lines
 from piezoest.layout import Named, new
+from tests.controller.shared import drive, last_error, late
 
 FS = 10_000.0
+SLOPE = SimpleNamespace(step=lambda u: 0.1 * u)
 
 
 def test_gain_does_not_swing_with_the_size_of_the_legs() -> None:
@@ -65,22 +68,15 @@ def test_a_line_that_became_too_steep_comes_back_where_little_moves(answer: floa
 def test_late_readings_do_not_make_the_line_flat() -> None:
     """Five samples late, of legs of 25: least squares gives 0.078 µm/V."""
     driver = pz.AdaptiveFeedforward(1000.0, limits=pz.VoltageLimits(-100.0, 100.0), estimators=())
-    x = np.zeros(5)
-    for r_k in pz.signals.triangle(2.0, 20.0, 40, 1000.0).values.tolist():
-        u = driver.step(r_k)
-        driver.learn(u, float(x[0]))
-        x = np.append(x[1:], 0.1 * u)
+    drive(driver, SLOPE, pz.signals.triangle(2.0, 20.0, 40, 1000.0).values, late(5))
     assert driver.state["line"]["gain"] == pytest.approx(0.1, rel=0.12)
 
 
 def test_a_factor_of_the_sensor_is_no_new_start_where_readings_were_late() -> None:
     """The line was never straight, and has held for long: the voltage stays with it."""
     driver = pz.AdaptiveFeedforward(1000.0, limits=pz.VoltageLimits(-100.0, 100.0), estimators=())
-    x, u = np.zeros(5), []
-    for k, r_k in enumerate(pz.signals.triangle(2.0, 20.0, 80, 1000.0).values.tolist()):
-        u.append(driver.step(r_k))
-        driver.learn(u[-1], float(x[0]) * (1.0 if k < 2000 else -0.05))
-        x = np.append(x[1:], 0.1 * u[-1])
+    r, read = pz.signals.triangle(2.0, 20.0, 80, 1000.0).values, late(5)
+    u = drive(driver, SLOPE, r, lambda k, x: read(k, x) * (1.0 if k < 2000 else -0.05)).u
     assert np.abs(u[2000:]).max() < 25.0
     assert driver.status.fault in ("reversed", "no response", "scaled")
 
@@ -94,19 +90,13 @@ def test_no_dead_zone_makes_the_line_flat() -> None:
     assert 0.04 < line.gain < 0.08
 
 
-@pytest.mark.parametrize("late", [6, 13, 25])
-def test_the_line_is_that_of_the_voltage_that_late_readings_answer(late: int) -> None:
+@pytest.mark.parametrize("samples", [6, 13, 25])
+def test_the_line_is_that_of_the_voltage_that_late_readings_answer(samples: int) -> None:
     """Readings of the same samples lie on an ellipse, whose line may fall where the stage rises."""
     fs, frequency = 1000.0, 20.0
     r = 5.0 + np.concatenate([np.zeros(200), 2.0 * np.sin(2.0 * np.pi * frequency / fs * np.arange(1000))])
     controller = pz.AdaptiveFeedforward(fs, limits=pz.VoltageLimits(0.0, 100.0), estimators=())
-    answers, missed = [1.0] * late, []
-    for r_k in r.tolist():
-        u = controller.step(r_k)
-        answers.append(0.2 * u + 1.0)
-        controller.learn(u, answers[-1 - late])
-        missed.append(r_k - answers[-1])
-    line = controller.state["line"]
-    assert abs(line["gain"] / 0.2 - 1.0) < 0.05
-    assert np.abs(missed[-500:]).max() < 0.1
+    x = drive(controller, SimpleNamespace(step=lambda u: 0.2 * u + 1.0), r, late(samples, 1.0)).x
+    assert abs(controller.state["line"]["gain"] / 0.2 - 1.0) < 0.05
+    assert last_error(r, x, 500) < 0.1
     assert not any(event.reason.startswith("reversed") for event in controller.events)

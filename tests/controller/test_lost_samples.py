@@ -99,10 +99,7 @@ def test_what_is_out_of_reach_is_said_once(size: float) -> None:
 @pytest.mark.parametrize("given", [{}, {"gain": 0.15}])
 def test_without_a_reference_the_voltage_stays_where_the_start_has_left_it(given: Any) -> None:
     driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS, **given), pz.SimulatedStage(FS, LOOP)
-    u = np.empty(2000)
-    for k in range(u.size):
-        u[k] = driver.step(None)
-        driver.learn(u[k], stage.step(float(u[k])))
+    u = shared.drive(driver, stage, np.full(2000, np.nan)).u
     assert np.ptp(u[1000:]) == 0.0
     _, x, _ = shared.drive(driver, stage, TRIANGLE)
     assert last(x) < 0.05

@@ -5,7 +5,7 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
-from tests.controller.shared import drive
+from tests.controller.shared import drive, late
 
 FS = 2000.0
 LIMITS = pz.VoltageLimits(-150.0, 150.0)
@@ -32,18 +32,12 @@ def test_waves_of_seventy_times_the_amplitude_are_no_fault() -> None:
     assert np.abs(run.u)[-2000:].max() < 110.0
 
 
-@pytest.mark.parametrize("late", [2, 4])
-def test_quick_edges_with_late_readings_are_left_to_the_line(late: int) -> None:
+@pytest.mark.parametrize("samples", [2, 4])
+def test_quick_edges_with_late_readings_are_left_to_the_line(samples: int) -> None:
     edge = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 25))
     leg = np.concatenate((2.0 * edge - 1.0, np.ones(400)))
     r: FloatArray = 5.0 * np.tile(np.concatenate((leg, -leg)), 12)
-    readings = [0.0] * late
-
-    def read(_: int, x: float) -> float:
-        readings.append(x)
-        return readings[-1 - late]
-
-    run = drive(pz.AdaptiveFeedforward(FS, limits=LIMITS), Plays(1.0), r, read)
+    run = drive(pz.AdaptiveFeedforward(FS, limits=LIMITS), Plays(1.0), r, late(samples))
     # Of a stage without a loop the line knows all.
     assert np.abs(r - run.x)[-1700:].max() < 0.05
 

@@ -8,7 +8,7 @@ import pytest
 
 import piezoest as pz
 from piezoest._checks import FloatArray
-from tests.controller.shared import LIMITS, LOOP
+from tests.controller.shared import LIMITS, LOOP, drive
 
 FS = 50_000.0
 RANGE = LIMITS.maximum - LIMITS.minimum
@@ -19,12 +19,7 @@ SINE = 1.0 - pz.signals.sine(1.5, 10.0, 8, FS).values
 def told(change: Callable[[float], float], r: FloatArray = SINE) -> tuple[Any, FloatArray]:
     """The controller and its errors where the stage gets a voltage and `learn` is told a changed one."""
     driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS), pz.SimulatedStage(FS, LOOP)
-    x = np.empty_like(r)
-    for k, r_k in enumerate(r.tolist()):
-        u = driver.step(r_k)
-        x[k] = stage.step(u)
-        driver.learn(change(u), float(x[k]))
-    return driver, np.abs(r - x)
+    return driver, np.abs(r - drive(driver, stage, r, told=change).x)
 
 
 def rounded(bits: int) -> Callable[[float], float]:
@@ -70,9 +65,6 @@ def test_a_limit_is_one_whatever_a_converter_makes_of_it() -> None:
 def test_a_slew_rate_is_kept_where_a_sample_of_it_is_less_than_a_step() -> None:
     limits = pz.VoltageLimits(-60.0, 60.0, slew_rate=1000.0, sample_rate=FS)
     driver, stage = pz.AdaptiveFeedforward(FS, limits=limits), pz.SimulatedStage(FS, LOOP)
-    change, u = rounded(10), np.empty(50_000)
-    for k in range(u.size):
-        u[k] = driver.step(4.0)
-        driver.learn(change(u[k]), stage.step(float(u[k])))
+    u = drive(driver, stage, np.full(50_000, 4.0), told=rounded(10)).u
     assert np.abs(np.diff(u)).max() < limits.largest_step * (1.0 + 1e-9)
     assert abs(float(np.asarray(stage.displacement)) - 4.0) < 0.05

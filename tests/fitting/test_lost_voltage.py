@@ -152,5 +152,7 @@ def test_a_turn_that_was_lost_does_not_spoil_a_fit() -> None:
     x = model.simulate(u) + 1e-3 * np.random.default_rng(0).standard_normal(u.size)
     u[400:500], x[400:500] = np.nan, np.nan
     found = fit(u, x, sample_rate=1000.0, model="plays")
+    assert not found.counts[500:600].any()
+    assert found.counts[1200:].all()
     missed = (found.predict().x - x)[found.counts]
     assert np.sqrt(np.mean(missed**2)) < 2e-3

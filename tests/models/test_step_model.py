@@ -73,6 +73,15 @@ def test_a_compensator_and_a_stage_are_made_of_it() -> None:
     np.testing.assert_allclose(stages[0].run(8.0 * R), stages[1].run(8.0 * R), atol=1e-12)
 
 
+def test_its_inverse_is_exported() -> None:
+    compensator = pz.InverseCompensator(MODEL, pz.VoltageLimits(-60.0, 60.0))
+    try:
+        exported = pz.export.CompiledController(pz.export.c(None, compensator))
+    except ValueError as absent:
+        pytest.skip(str(absent))
+    np.testing.assert_array_equal(exported.run(R, R), compensator.run(R))
+
+
 @pytest.mark.parametrize("method", ["single-shooting", "multiple-shooting"])
 def test_a_fit_finds_it(method: Any) -> None:
     u = 8.0 * R
