@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from piezoest.controller import driving, faults
+from piezoest.controller import driving, faults, slots
 from piezoest.controller import travel as travels
 from piezoest.controller.voltage import is_held
 from piezoest.layout import AMOUNT, COUNT, FLAG, MEASURED, NUMBER, SIGN, record
@@ -120,3 +120,20 @@ def _learn_from_legs(state: Any, settings: Any, x: Any) -> None:
         correction = _within(state, settings, rest.sum / rest.known)
         driving.owe(state, (correction - state.feedback) / state.unit)
         state.feedback = state.back = correction
+
+
+@register_jitable
+def leave_to_model(state: Any) -> None:
+    """After a rest, drop the part of the correction that the model that drives has learnt meanwhile."""
+    # Model and correction both know of the creep: what the model owes would bring it in twice.
+    rest = state.rest
+    if rest.left == 0.0:
+        return
+    owed = state.unit * slots.owed(state.candidates, state.driving, state.owed)
+    if owed * state.feedback <= 0.0:
+        return
+    known = np.sign(owed) * min(np.abs(owed), np.abs(state.feedback))
+    driving.owe(state, -known / state.unit)
+    state.feedback -= known
+    state.back = state.feedback
+    rest.count = rest.known = rest.sum = 0.0

@@ -304,3 +304,4 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         if state.scale > 0.0:
             slots.hand_over(state.candidates, settings.candidates)
         driving.reconsider(state, settings)
+        feedback.leave_to_model(state)

@@ -13,13 +13,13 @@ from piezoest.layout import COUNT, DISTANCE, FLAG, MEASURED, SIGN, record
 # Direction of travel, furthest value in it, where this leg began, length of the last leg; usual swing, least
 # one before two turns; turns so far, the last value, whether it has just turned; samples of this leg, those
 # since it went on clearly, those of the last leg, and of the leg before; the farthest way back since it went
-# on, and where that was; the largest recent change from sample to sample; the recent extremes; whether this
-# leg and the last one are each no longer than the leg before.
+# on, the path to and fro since then, and where that was; the largest recent change from sample to sample; the
+# recent extremes; whether this leg and the last one are each no longer than the leg before.
 TRAVEL = record(
     direction=SIGN, furthest=MEASURED, turned=MEASURED, leg=DISTANCE, swing=DISTANCE, least=DISTANCE,
     turns=COUNT, last=MEASURED, turned_now=FLAG, count=COUNT, waits=COUNT, usual=COUNT,
-    past=COUNT, back=DISTANCE, mark=MEASURED, fastest=DISTANCE, highest=MEASURED, lowest=MEASURED,
-    nested=FLAG,
+    past=COUNT, back=DISTANCE, path=DISTANCE, mark=MEASURED, fastest=DISTANCE, highest=MEASURED,
+    lowest=MEASURED, nested=FLAG,
 )  # fmt: skip
 
 # A way back of TURN swings is a turn. Before SHOWN turns a smaller one is: the first way may lead to a bias
@@ -29,6 +29,9 @@ TURN, SHOWN, FIRST_TURN = 0.05, 2.0, 0.02
 LONGER, LONG = 0.1, 2.0
 # The least motion to and fro that is not noise, in swings and in noises of a reading.
 SMALL, NOISE = 1e-3, 10.0
+# A motion to and fro is noise if it goes on average farther from sample to sample than this part of the
+# farthest way back: a scan has more samples in a leg.
+JAGGED = 0.1
 # No swing is below this fraction of the last one: noise at rest would be a swing.
 LEAST = 0.02
 # At each turn the largest recent change is multiplied by SLOWER, and the extremes come nearer to the present
@@ -40,7 +43,7 @@ SLOWER, FADES = 0.7, 0.1
 def begin(travel: Any, value: Any, least: Any) -> None:
     """Begin, or start again, at a value; no swing is smaller than `least` before two turns."""
     travel.mark = travel.furthest = travel.turned = travel.last = travel.highest = travel.lowest = value
-    travel.direction = travel.leg = travel.turns = travel.back = 0.0
+    travel.direction = travel.leg = travel.turns = travel.back = travel.path = 0.0
     travel.count = travel.waits = travel.usual = travel.past = travel.fastest = 0.0
     travel.swing = travel.least = least
 
@@ -54,6 +57,7 @@ def follow(travel: Any, value: Any) -> float:
     travel.turned_now = 0.0
     travel.count += 1.0
     travel.waits += 1.0
+    travel.path += gone
     way = value - travel.furthest
     if travel.direction * way >= 0.0:
         if travel.direction == 0.0:
@@ -61,7 +65,7 @@ def follow(travel: Any, value: Any) -> float:
         travel.furthest = value
         # A small scan that drifts does not go on.
         if np.abs(value - travel.mark) > SMALL * travel.swing:
-            travel.waits = travel.back = 0.0
+            travel.waits = travel.back = travel.path = 0.0
             travel.mark = value
     elif np.abs(way) > (TURN if travel.turns >= SHOWN else FIRST_TURN) * travel.swing:
         leg = np.abs(travel.furthest - travel.turned)
@@ -70,7 +74,7 @@ def follow(travel: Any, value: Any) -> float:
         travel.turned_now = 1.0
         travel.fastest *= SLOWER
         travel.past, travel.usual = travel.usual, travel.count
-        travel.count = travel.waits = travel.back = 0.0
+        travel.count = travel.waits = travel.back = travel.path = 0.0
         travel.nested = 1.0 if leg <= (1.0 + LONGER) * travel.leg else 0.0
         travel.swing, travel.leg = swing, leg
         travel.turned = travel.furthest
@@ -93,12 +97,18 @@ def _smallest(travel: Any, noise: Any) -> float:
 
 
 @register_jitable
+def _is_jagged(travel: Any) -> bool:
+    """Whether the motion to and fro is noise, by how far it goes from sample to sample."""
+    return travel.path > JAGGED * travel.waits * travel.back
+
+
+@register_jitable
 def is_over(travel: Any, noise: Any) -> bool:
     """Whether a motion after a wide leg is too small for a turn; `noise` is that of a reading."""
     if travel.waits <= LONG * max(travel.usual, travel.count - travel.waits, 8.0):
         return False
     fro = travel.back - np.abs(travel.last - travel.furthest)
-    return fro > _smallest(travel, noise)
+    return fro > _smallest(travel, noise) and not _is_jagged(travel)
 
 
 @register_jitable
@@ -141,4 +151,5 @@ def in_swings(travel: Any, gone: Any) -> float:
 @register_jitable
 def dithers(travel: Any, gone: Any, noise: Any) -> bool:
     """Whether a signal at rest moves to and fro by no more than noise."""
-    return gone > 0.0 and rests(travel, gone) and travel.back <= _smallest(travel, noise)
+    small = travel.back <= _smallest(travel, noise) or _is_jagged(travel)
+    return gone > 0.0 and rests(travel, gone) and small

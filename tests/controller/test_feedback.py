@@ -140,6 +140,23 @@ def test_what_feedback_corrects_at_rest_does_not_spoil_the_waves_behind(part: fl
     assert waves[3] < 0.08  # 0.16 to 0.21 by the integral alone
 
 
+@pytest.mark.parametrize("part", [0.1, 0.8])
+def test_creep_that_stays_is_not_corrected_twice(part: float) -> None:
+    """The model has learnt in the rest what the feedback has corrected there: 0.43 µm."""
+    period, rests = 250, 20_000
+    wave = np.tile(5.0 * np.sin(2.0 * np.pi * np.arange(period) / period), 24)
+    k = 12 * period + round(part * period)
+    r = np.concatenate((wave[:k], np.full(rests, wave[k - 1]), wave[k:]))
+    crept = np.zeros_like(r)
+    crept[k:] = 0.1 * np.log10(1.0 + np.minimum(np.arange(r.size - k), rests))
+    driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS, feedback=1.0), pz.SimulatedStage(FS, LOOP)
+    left = iter(crept)
+    x = shared.drive(driver, SimpleNamespace(step=lambda u: stage.step(u) - next(left)), r).x
+    waves = np.abs(r - x)[k + rests :][: 2 * period].reshape(2, -1).max(axis=1)
+    assert waves[0] < 0.2  # 0.47 if it is
+    assert waves[1] < 0.1
+
+
 def test_a_staircase_keeps_its_correction_and_a_square_wave_its_steps() -> None:
     """Each plateau is a rest, and the stage drifts; the amplifier slews."""
     limits = pz.VoltageLimits(-50.0, 50.0, slew_rate=4000.0, sample_rate=FS)

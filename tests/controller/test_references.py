@@ -62,6 +62,16 @@ def test_noise_of_a_reference_at_rest_is_no_scan() -> None:
     assert np.abs(np.array(gains[wave.size :]) / gains[wave.size - 1] - 1.0).max() < 0.05
 
 
+@pytest.mark.parametrize("noise", [2e-3, 1e-2])
+def test_waves_go_on_behind_a_rest_with_more_noise_than_a_small_scan(noise: float) -> None:
+    rng = np.random.default_rng(0)
+    driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS), pz.SimulatedStage(FS, LOOP)
+    wave = pz.signals.triangle(5.0, 5.0, 8, FS).values
+    r = np.concatenate((wave, noise * rng.normal(size=20_000), wave))
+    off = np.abs(r - drive(driver, stage, r, lambda _, x: x + 1e-4 * rng.normal()).x)
+    assert off[wave.size :][20_000:].max() < max(1.5 * off[wave.size - 800 : wave.size].max(), 0.05)
+
+
 @pytest.mark.parametrize("drift", [0.001, 0.003])
 def test_a_small_scan_that_drifts_is_learnt(drift: float) -> None:
     """Before, each sample that went farther than all others was a way on: 10 nm of error instead of 0.2."""
