@@ -222,6 +222,9 @@ def day_first(stamp: str) -> str:
         lambda text_: f"{text_[11:-6]}am",
         lambda text_: f"22-Nov-2026 {text_[11:-6]}",
         lambda text_: f"22 november 2026 {text_[11:-6]}",
+        lambda text_: f"Nov 22, 2026 {text_[11:-6]}",
+        lambda text_: f"Sun Nov 22 {text_[11:-6]} 2026",
+        lambda text_: text_.replace("-", "").replace(":", ""),
         lambda text_: f"11/22/26 {text_[11:-6]}",
         lambda text_: f"22.11.26 {text_[11:-6]}",
         lambda text_: text_[11:23].replace(".", ":"),
@@ -291,7 +294,9 @@ def test_a_long_footer_in_a_file_of_several_blocks(tmp_path: Path) -> None:
         read_record(file)
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1"])
+@pytest.mark.parametrize(
+    "encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "latin-1"]
+)
 def test_encodings_and_packed_text(tmp_path: Path, encoding: str) -> None:
     lines = ["t_s;u_V;Weg [µm]", *(";".join(row) for row in rows_of(lambda value: f"{value:.3f}"))]
     plain, packed = tmp_path / "log.csv", tmp_path / "log.csv.gz"

@@ -28,6 +28,7 @@ LONGEST_FOOTER = 20
 # Characters that no text has, unless as UTF-16.
 CONTROL = frozenset(range(32)) - frozenset(b"\t\n\v\f\r\x1a\x1b")
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+UTF_32 = (b"\xff\xfe\0\0", b"\0\0\xfe\xff")
 UNMARKED = {"utf-16-le": 1, "utf-16-be": 0}  # and which byte of two is zero in Latin letters
 PACKED = b"\x1f\x8b"
 # A line that is blank or a comment, in a text that begins with the end of a line.
@@ -83,6 +84,8 @@ def beginning(path: Path, size: int) -> bytes:
 def encoding_of(path: Path) -> str:
     """Encoding by which the file can be read; ValueError if it is not a text."""
     raw = beginning(path, HEAD_BYTES)
+    if raw.startswith(UTF_32):
+        return "utf-32"
     if raw.startswith(UTF_16):
         return "utf-16"
     for encoding, zeros in UNMARKED.items():

@@ -21,7 +21,13 @@ TURNS = {OF_DAY: 86_400.0, OF_HOUR: 3600.0}
 SLASHES = re.compile(r"(\d{1,2})/(\d{1,2})/\d{2}")
 # 22-Nov-2026 10:00:00:005
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
-NAMED = re.compile(rf"(\d{{1,2}})[-. ]\s*({'|'.join(MONTHS)})[a-z]*[-. ]\s*(?=\d)", re.IGNORECASE)
+NAME = rf"({'|'.join(MONTHS)})[a-z]*"
+NAMED = re.compile(rf"(\d{{1,2}})[-. ]\s*{NAME}[-. ]\s*(?=\d)", re.IGNORECASE)
+# Nov 22, 2026 10:00:00, and Sun Nov 22 10:00:00 2026 of the C library
+NAME_FIRST = re.compile(rf"{NAME}\.? +(\d{{1,2}})[,.]? +(?=\d{{4}}\b)", re.IGNORECASE)
+YEAR_LAST = re.compile(rf"[a-z]{{3}} +{NAME} +(\d{{1,2}}) +(\d\d:\d\d:\d\d\S*) +(\d{{4}})", re.IGNORECASE)
+# 20261122T100000
+WITHOUT_MARKS = re.compile(r"(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)(?!\d)")
 MILLISECONDS = re.compile(r"(:\d{2}:\d{2}):(?=\d{3}(?!\d))")
 DAY = "2000-01-01T"
 # A clock that begins anew stands so near its beginning, in parts of a turn; elsewhere it was set.
@@ -29,9 +35,15 @@ NEAR = 1.0 / 24.0
 
 
 def _plain(cell: str) -> str:
-    """Cell with numbers for names of months, and a point before milliseconds."""
-    cell = NAMED.sub(lambda date: f"{date[1]}.{MONTHS.index(date[2].lower()) + 1}.", cell.strip())
+    """Cell with numbers for names of months, the usual marks, and a point before milliseconds."""
+    cell = WITHOUT_MARKS.sub(r"\1-\2-\3T\4:\5:\6", YEAR_LAST.sub(r"\2-\1-\4 \3", cell.strip()))
+    cell = NAMED.sub(lambda date: f"{date[1]}.{_number(date[2])}.", NAME_FIRST.sub(r"\2-\1-", cell))
     return MILLISECONDS.sub(r"\1.", cell)
+
+
+def _number(month: str) -> int:
+    """Number of the month of a name."""
+    return MONTHS.index(month.lower()) + 1
 
 
 def is_stamp(cell: str) -> bool:

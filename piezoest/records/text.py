@@ -83,7 +83,7 @@ def layout_of(path: Path) -> Layout:
     header = scopes.with_stated_units(header, preamble)
     texts = [line for _, line in rows]
     stamps: dict[int, Clock] = {}
-    if any(":" in line for line in texts[:STAMP_ROWS]):
+    if any(":" in line or "T" in line for line in texts[:STAMP_ROWS]):
         for row in split(path, texts[:STAMP_ROWS], delimiter):
             for i, cell in enumerate(row):
                 if i not in stamps and is_stamp(cell):
