@@ -269,6 +269,18 @@ def _run(state: Any, settings: Any, u: Any, x: Any, moved: Any, gone: Any) -> fl
 
 
 @register_jitable
+def _hand_over(state: Any, settings: Any) -> None:
+    """Use the models of now."""
+    state.handed = 0.0
+    if state.scale > 0.0:
+        slots.hand_over(state.candidates, settings.candidates)
+        repeats = state.reference.turned_now != 0.0 and state.reference.nested != 0.0
+        if repeats and state.driving != settings.recorded:
+            # What it missed on the legs before says little of a loop that is recorded anew.
+            slots.forget_one(state.candidates, settings.recorded)
+
+
+@register_jitable
 def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
     """Learn from a voltage that was written and a reading."""
     state.samples += 1.0
@@ -300,8 +312,6 @@ def take(state: Any, settings: Any, r: Any, u: Any, x: Any) -> None:
         slots.learn(state.candidates, settings.candidates, u, z)
     due = state.reference.turned_now != 0.0 or state.handed >= HAND_OVER * state.travel.swing
     if state.stage == RUN and state.readings.fault == faults.NONE and gone > 0.0 and due:
-        state.handed = 0.0
-        if state.scale > 0.0:
-            slots.hand_over(state.candidates, settings.candidates)
+        _hand_over(state, settings)
         driving.reconsider(state, settings)
         feedback.leave_to_model(state)

@@ -126,6 +126,15 @@ def owe(slots: Any, number: Any, z: Any) -> None:
 
 
 @register_jitable
+def forget_one(slots: Any, number: Any) -> None:
+    """Forget what the model of a number has missed."""
+    if slots is not None:
+        if number == 1.0:
+            candidate.forget(slots.model.score)
+        forget_one(slots.others, number - 1.0)
+
+
+@register_jitable
 def owed(slots: Any, number: Any, otherwise: Any) -> float:
     """What the model of a number owes; `otherwise` for the line."""
     if slots is not None:
