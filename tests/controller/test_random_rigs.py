@@ -1,5 +1,7 @@
 """Rigs drawn at random on which a controller once went wrong."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import piezoest as pz
 from piezoest.bench.zoo.drawing import draw
 from piezoest.bench.zoo.rig import Rig
 from piezoest.bench.zoo.running import Traces, run_controller
+from piezoest.bench.zoo.settling import Cell
 
 
 def driven(seed: int) -> tuple[Rig, pz.AdaptiveFeedforward, Traces]:
@@ -51,3 +54,10 @@ def test_ringing_does_not_make_the_line_steeper_and_steeper() -> None:
     """The gain doubled in every leg, to a thousand times the true one, and the stage stood still."""
     rig, controller, _ = driven(25500)
     assert abs(controller.state["line"]["gain"]) < 30.0 * rig.to_dict()["gain"]
+
+
+@pytest.mark.parametrize("place", [("bouc-wen", 5.0, 3.0, 504), ("duhem", 1.0, 10.0, 500)])
+def test_a_loop_recorded_anew_drives_soon_after_a_change_of_amplitude(place: Any) -> None:
+    """What the loop before had missed kept it from driving for another period."""
+    changes = {part["change"]: part for part in Cell(*place).play(pz.AdaptiveFeedforward)["segments"]}
+    assert changes["switch-back"]["periods"] <= 2
