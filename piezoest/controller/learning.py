@@ -275,8 +275,9 @@ def _hand_over(state: Any, settings: Any) -> None:
     if state.scale > 0.0:
         slots.hand_over(state.candidates, settings.candidates)
         repeats = state.reference.turned_now != 0.0 and state.reference.nested != 0.0
-        if repeats and state.driving != settings.recorded:
-            # What it missed on the legs before says little of a loop that is recorded anew.
+        if repeats and state.pace.late == 0.0 and state.driving != settings.recorded:
+            # What it missed on the legs before says little of a loop that is recorded anew; but late readings
+            # make a loop look better than it is.
             slots.forget_one(state.candidates, settings.recorded)
 
 
