@@ -134,6 +134,5 @@ def leave_to_model(state: Any) -> None:
         return
     known = np.sign(owed) * min(np.abs(owed), np.abs(state.feedback))
     driving.owe(state, -known / state.unit)
-    state.feedback -= known
-    state.back = state.feedback
+    state.feedback = state.back = state.feedback - known
     rest.count = rest.known = rest.sum = 0.0

@@ -48,7 +48,8 @@ def _number(month: str) -> int:
 
 def is_stamp(cell: str) -> bool:
     """Whether a cell holds a time of day, minutes and seconds, or a time behind a date."""
-    return any(each.fullmatch(_plain(cell)) for each in (ISO, DATED, *TURNS))
+    plain = _plain(cell)
+    return any(each.fullmatch(plain) for each in (ISO, DATED, *TURNS))
 
 
 def times_of(cells: Any, day_first: bool = False) -> Any:
@@ -96,7 +97,8 @@ class Clock(NamedTuple):
     @classmethod
     def of(cls, cell: str) -> "Clock":
         """Clock whose first time stands in a cell."""
-        turns = (turn for pattern, turn in TURNS.items() if pattern.fullmatch(_plain(cell)))
+        plain = _plain(cell)
+        turns = (turn for pattern, turn in TURNS.items() if pattern.fullmatch(plain))
         slashes = SLASHES.match(cell.strip())
         first, second = map(int, slashes.groups()) if slashes else (0, 13)
         guessed = cell.strip() if max(first, second) <= 12 and first != second else ""

@@ -12,6 +12,7 @@ from tests.controller import shared
 from tests.controller.shared import LIMITS, LOOP, last_error
 
 FS = 1000.0
+PERIOD = 250
 WAVE = 5.0 * np.sin(2.0 * np.pi * 2.0 * np.arange(5000) / FS)
 
 
@@ -117,42 +118,37 @@ def test_a_stage_that_answers_late_does_not_swing() -> None:
     assert last_error(r, shared.drive(driver, SimpleNamespace(step=late), r).x, 5000) < 0.01
 
 
-@pytest.mark.parametrize("part", [0.1, 0.3, 0.6, 0.85])
-def test_what_feedback_corrects_at_rest_does_not_spoil_the_waves_behind(part: float) -> None:
-    """The stage creeps at rest by 0.43 µm; the first waves behind wipe that out within 0.1 s."""
-    period, rests = 250, 20_000
-    wave = np.tile(5.0 * np.sin(2.0 * np.pi * np.arange(period) / period), 24)
-    k = 12 * period + round(part * period)
+def around_a_rest(part: float, behind: Any) -> tuple[FloatArray, FloatArray, int]:
+    """Waves that stop for 20 s at a part of a period: errors, correction, and the first sample behind.
+
+    The stage creeps by 0.43 µm in the rest; `behind` is what is left of it some samples after.
+    """
+    wave = np.tile(5.0 * np.sin(2.0 * np.pi * np.arange(PERIOD) / PERIOD), 24)
+    k, rests = 12 * PERIOD + round(part * PERIOD), 20_000
     r = np.concatenate((wave[:k], np.full(rests, wave[k - 1]), wave[k:]))
     crept = np.zeros_like(r)
     crept[k : k + rests] = 0.1 * np.log10(1.0 + np.arange(rests))
-    crept[k + rests :] = crept[k + rests - 1] * np.exp(-np.arange(r.size - k - rests) / 100.0)
-    driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS, feedback=1.0), pz.SimulatedStage(FS, LOOP)
-    error, corrected = np.empty_like(r), np.empty_like(r)
-    for j, r_j in enumerate(r.tolist()):
-        u = driver.step(r_j)
-        x = stage.step(u) - crept[j]
-        driver.learn(u, x)
-        error[j], corrected[j] = abs(r_j - x), driver.state["feedback"]
-    assert abs(corrected[k + rests - 1]) > 0.3
-    assert error[k + rests - 1] < 5e-3
-    waves = error[k + rests :][: 4 * period].reshape(4, -1).max(axis=1)
+    crept[k + rests :] = crept[k + rests - 1] * behind(np.arange(r.size - k - rests))
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS, feedback=1.0)
+    _, x, corrected = drive(driver, r, lambda t: -crept[round(t * FS)])
+    return np.abs(r - x), corrected, k + rests
+
+
+@pytest.mark.parametrize("part", [0.1, 0.3, 0.6, 0.85])
+def test_what_feedback_corrects_at_rest_does_not_spoil_the_waves_behind(part: float) -> None:
+    """The first waves behind wipe out the creep within 0.1 s."""
+    error, corrected, k = around_a_rest(part, lambda samples: np.exp(-samples / 100.0))
+    assert abs(corrected[k - 1]) > 0.3
+    assert error[k - 1] < 5e-3
+    waves = error[k:][: 4 * PERIOD].reshape(4, -1).max(axis=1)
     assert waves[3] < 0.08  # 0.16 to 0.21 by the integral alone
 
 
 @pytest.mark.parametrize("part", [0.1, 0.8])
 def test_creep_that_stays_is_not_corrected_twice(part: float) -> None:
-    """The model has learnt in the rest what the feedback has corrected there: 0.43 µm."""
-    period, rests = 250, 20_000
-    wave = np.tile(5.0 * np.sin(2.0 * np.pi * np.arange(period) / period), 24)
-    k = 12 * period + round(part * period)
-    r = np.concatenate((wave[:k], np.full(rests, wave[k - 1]), wave[k:]))
-    crept = np.zeros_like(r)
-    crept[k:] = 0.1 * np.log10(1.0 + np.minimum(np.arange(r.size - k), rests))
-    driver, stage = pz.AdaptiveFeedforward(FS, limits=LIMITS, feedback=1.0), pz.SimulatedStage(FS, LOOP)
-    left = iter(crept)
-    x = shared.drive(driver, SimpleNamespace(step=lambda u: stage.step(u) - next(left)), r).x
-    waves = np.abs(r - x)[k + rests :][: 2 * period].reshape(2, -1).max(axis=1)
+    """The model has learnt in the rest what the feedback has corrected there."""
+    error, _, k = around_a_rest(part, np.ones_like)
+    waves = error[k:][: 2 * PERIOD].reshape(2, -1).max(axis=1)
     assert waves[0] < 0.2  # 0.47 if it is
     assert waves[1] < 0.1
 
