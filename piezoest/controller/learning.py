@@ -27,7 +27,7 @@ from piezoest.controller import pace as paces
 from piezoest.controller import readings as reading
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
-from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK, is_held
+from piezoest.controller.voltage import APPROACH, HOME, RUN, SEEK, goal, is_held
 
 # Models are handed over after this fraction of a swing.
 HAND_OVER = 1.0 / 8.0
@@ -37,6 +37,8 @@ NEAR, LONGEST = 0.05, 50.0
 # The gain on the way counts if the mean of the recent readings has gone this fraction of it. It is at least
 # this fraction of the gain from the start: in the dead zone after a turn the stage hardly answers.
 LEAST_WAY, LEAST_GAIN = 0.4, 0.5
+# A way so many times as long as those of the start shows how the gain grows.
+MUCH_LONGER = 1.5
 # If the voltage rests at a limit and the stage is beyond the reference, the line follows the readings after
 # this travel of the reference, in swings.
 BEYOND = 0.1
@@ -148,6 +150,9 @@ def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
             gain = (recent.mean_x - (start.now if back else start.zero)) / gone
             least = LEAST_GAIN * line.first_gain
             line.gain = gain if gain / least > 1.0 else least
+            longer = way / starts.farthest(start)
+            if longer > MUCH_LONGER:
+                start.growth = starts.growth(line.gain / start.gain, longer)
     if state.stage != SEEK:
         line.centre = recent.mean_x - line.gain * recent.mean_u
     return x
@@ -161,7 +166,7 @@ def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any, told: Any) -> 
         # The rest of a block that was planned before the way began.
         return
     start.samples += 1.0
-    target = lines.voltage(line, r)
+    target = goal(state, r)
     there = np.abs(target - u) <= NEAR * np.abs(u - start.origin) or is_held(settings, u, target - u)
     longest = LONGEST * max(settings.doubling, start.lag) + 2.0 * state.gap
     if start.fastest > 0.0:
@@ -208,7 +213,9 @@ def _believe(state: Any, settings: Any, u: Any, x: Any, gone: Any, moved: Any) -
             redraw.hold(state)
     # At a limit, with the stage beyond the reference, the line is wrong.
     beyond = is_held(settings, u, (raw - state.r) * line.gain)
-    reach.watch(state, settings, moved)
+    if np.abs(raw) < WILDEST:
+        # Without readings nobody knows whether the line is wrong, as while a block is planned.
+        reach.watch(state, settings, moved)
     far = (beyond and state.railed > BEYOND * state.reference.swing) or redraw.is_young(state)
     if far and state.readings.fault == faults.NONE:
         redraw.follow(state)

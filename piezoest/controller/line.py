@@ -219,6 +219,17 @@ def turn(line: Any, direction: Any, leg: Any) -> None:
 
 
 @register_jitable
+def steepen(line: Any, u: Any) -> None:
+    """Let the line be as steep as the way to the reference or the recent legs, through its point at u."""
+    steepest = max(np.abs(line.gain), np.abs(line.first_gain))
+    if line.both.product * line.gain > 0.0 and explained(line.both) > SIGNED:
+        steepest = max(steepest, spread(line.both))
+    x = at(line, u)
+    line.gain = np.sign(line.gain) * steepest
+    line.centre = x - line.gain * u
+
+
+@register_jitable
 def grow(line: Any, leg: Any) -> None:
     """Draw the line when the first leg has grown, or a later one is much longer than the recent ones."""
     now, later, looked = line.now, line.legs >= SETTLED, line.looked

@@ -17,7 +17,8 @@ PAID_IN_TIME = 0.25
 # Before so many legs the line follows the recent readings: at least those of this fraction of the last leg.
 YOUNG, LEAST_MEMORY = 2.0, 0.1
 # It takes at least so many times the time of a doubling to follow, because the peak of a resonance may be
-# fifty times its gain; and at least so many times the delay of block and stage.
+# fifty times its gain; at least so many times the delay of the stage; and a block, for what was wrong in it
+# shows at its end.
 SLOW, LATE = 2.5, 4.0
 
 
@@ -30,7 +31,7 @@ def is_young(state: Any) -> bool:
 @register_jitable
 def _slow(state: Any, settings: Any) -> float:
     """Least number of samples in which the line follows the readings."""
-    return max(SLOW * settings.doubling, LATE * (state.block + state.gap + state.start.lag))
+    return max(SLOW * settings.doubling, LATE * (state.gap + state.start.lag), state.block)
 
 
 @register_jitable
@@ -63,6 +64,10 @@ def draw(state: Any) -> None:
         lines.forget(line.now)
     else:
         lines.turn(line, -reference.direction, reference.leg)
+        far = np.abs(state.r - lines.at(line, state.u)) > reference.swing
+        if far and state.block > reference.usual:
+            # Small legs may be flat, the way that is left is wide, and in a block nothing stops it.
+            lines.steepen(line, state.u)
     state.owed += before - driving.line_z(state)
 
 

@@ -4,7 +4,8 @@ The first readings, at rest, show where the stage stands; one of them may be wro
 per cent of its range and rests until the readings rest too. The gain is that between two rests, where neither
 delay nor lag counts. If the answer is not above noise and steps of the converter, the way is doubled. If it
 is clear but not sure, or slower than the voltage, a way twice as long checks it. If the two gains differ, as
-with backlash, the way is doubled again. A gain that the user knows is not sought.
+with backlash, the way is doubled again. A gain that the user knows is not sought. In a block that is planned
+before its readings come, the second way follows the first one after a while.
 """
 
 from typing import Any
@@ -38,9 +39,10 @@ START = record(
     # To check a known gain: sums of the ways and of the answers; answer at the last look, samples before the
     # next one. How late the stage answers [samples].
     gone=NUMBER, answered=NUMBER, largest=AMOUNT, look=AMOUNT, lag=AMOUNT,
-    # Gain of the last way [µm/V], of the one before; ways without an answer; samples in a row without a
-    # reading, or with another voltage than planned; the first readings.
-    gain=NUMBER, gain_before=NUMBER, tries=AMOUNT, stuck=COUNT, first=numbers(FIRST, kind=MEASURED),
+    # Gain of the last way [µm/V], of the one before; the gain grows with this power of the way; ways without
+    # an answer; samples in a row without a reading, or with another voltage than planned; the first readings.
+    gain=NUMBER, gain_before=NUMBER, growth=AMOUNT, tries=AMOUNT, stuck=COUNT,
+    first=numbers(FIRST, kind=MEASURED),
     # Whether the gain is the user's and not confirmed yet; readings in a row for it, all readings against it.
     given=FLAG, agreed=COUNT, doubted=COUNT,
     # Whether the voltage is planned before its readings come; whether the user told the reading at rest;
@@ -59,8 +61,8 @@ SURE, AT_ONCE, CLOSE = 3.0, 4.0, 0.02
 # The voltage written is the planned one within this fraction of a way. If it is not, or without readings, the
 # start gives up after so many windows.
 FOLLOWS, STUCK = 0.125, 240.0
-# The way that checks an answer is so many times as long: a stage that slews is later on it.
-CHECK = 2.0
+# The next way is so many times as long: a stage that slews is later on it.
+LONGER = 2.0
 # At rest the means of two windows, of a slow stage of three, differ by less than STILL times the answer. Not
 # more than MOST_WINDOWS are needed, and without an answer not less than LATE: it may be late. A stage is slow
 # below SLOW times the mean speed of the voltage, whose highest speed is 1.5 times that. A stage that moves
@@ -72,6 +74,11 @@ SLEWS, MOST_SLEWING = 0.7, 400.0
 OVERSHOOT = 0.5
 # Windows before the ways are repeated, twice as many each time; at most so many doublings.
 PAUSE, LONGEST_PAUSE = 10.0, 8.0
+# In a block that is planned before its readings come, the second way begins after so many windows: else a
+# whole block would be lost.
+BLIND = 8.0
+# Largest power that the gain grows with.
+MOST_GROWTH = 0.6
 
 
 @register_jitable
@@ -217,6 +224,19 @@ def _clear(start: Any, steps: Any) -> float:
 
 
 @register_jitable
+def growth(ratio: Any, longer: Any) -> float:
+    """The power of the way that a gain grows with; `ratio` of gains and `longer` of ways."""
+    return min(np.log(max(ratio, 1.0)) / np.log(longer), MOST_GROWTH)
+
+
+@register_jitable
+def _go_on(start: Any, settings: Any, u: Any) -> None:
+    """Begin the next way, which is longer."""
+    start.way = np.sign(start.way) * min(LONGER * np.abs(start.way), settings.start.longest)
+    _go(start, settings, u)
+
+
+@register_jitable
 def _judge(start: Any, settings: Any, u: Any) -> None:
     """Judge the answer: done if two are alike, else another way, twice as long."""
     answer = start.now - start.from_x
@@ -249,10 +269,8 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
         beyond = start.origin - OVERSHOOT * (u - start.origin)
         _go_back(start, u, min(max(beyond, settings.minimum), settings.maximum))
         return
-    start.way *= CHECK if clear and start.ways == 0.0 else 2.0
-    start.way = np.sign(start.way) * min(np.abs(start.way), settings.start.longest)
     start.ways += clear
-    _go(start, settings, u)
+    _go_on(start, settings, u)
 
 
 @register_jitable
@@ -272,6 +290,7 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
         if start.stuck > STUCK * settings.start.window:
             start.stage, start.samples, start.stuck = SILENT, 0.0, 0.0
             start.tries += 1.0
+    next_way = LONGER * np.abs(start.way)
     if start.stage == GO:
         if start.stuck == 0.0:
             if known:
@@ -287,6 +306,16 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
         start.samples += 1.0
         if start.samples >= FIRST:
             _settle_rest(start, settings, u)
+    elif start.stage == WAIT and start.ahead != 0.0:
+        start.samples += 1.0
+        late = start.samples >= settings.start.ramp + BLIND * settings.start.window
+        if late and 0.0 < np.abs(start.way) <= max(settings.start.way, start.least):
+            _go_on(start, settings, u)
+    elif start.stage == WAIT and known and 0.0 < (u - start.target) * np.sign(start.way) <= next_way:
+        # The next way of a block began before the stage rested: both are one.
+        start.voltage = start.target = u
+        start.way = u - start.from_u
+        start.windows = start.sum = start.ramp = start.squares = start.summed = start.stuck = 0.0
     elif start.stage == WAIT and start.stuck == 0.0:
         if _fills_window(start, settings, middle) and _rests(start, settings):
             _judge(start, settings, u)

@@ -37,7 +37,7 @@ _RESERVED = frozenset(
     """auto break case char const continue default do double else enum extern float for goto if inline
     int long register restrict return short signed sizeof static struct switch typedef union unsigned void
     volatile while
-    exp expf sqrt sqrtf fabs fabsf pow powf expm1 isfinite
+    exp expf log logf sqrt sqrtf fabs fabsf pow powf expm1 isfinite
     sign larger smaller larger_number smaller_number exp_minus_one squared
     gamma y0 y1 yn j0 j1 jn index signal""".split()  # noqa: SIM905
 )
@@ -47,12 +47,13 @@ _BUILTIN = {made.__name__: made for made in (abs, min, max, int, float, bool, le
 _MATHEMATICS: dict[Any, tuple[str, Callable[..., float]]] = {
     abs: ("fabs", abs), np.abs: ("fabs", abs), math.fabs: ("fabs", abs),
     np.exp: ("exp", math.exp), math.exp: ("exp", math.exp),
+    np.log: ("log", math.log), math.log: ("log", math.log),
     np.sqrt: ("sqrt", math.sqrt), math.sqrt: ("sqrt", math.sqrt),
     np.expm1: ("exp_minus_one", math.expm1), math.expm1: ("exp_minus_one", math.expm1),
     np.sign: ("sign", np.sign), max: ("larger", max), min: ("smaller", min),
     np.fmax: ("larger_number", np.fmax), np.fmin: ("smaller_number", np.fmin),
 }  # fmt: skip
-_LIBRARY = ("fabs", "exp", "sqrt", "pow")
+_LIBRARY = ("fabs", "exp", "log", "sqrt", "pow")
 
 
 class Expressions(ast.NodeVisitor):
