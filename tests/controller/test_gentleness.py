@@ -33,6 +33,26 @@ def test_the_start_does_not_jump(block: int) -> None:
     assert np.abs(np.diff(u)).max() < 0.4
 
 
+@pytest.mark.parametrize("bias", [0.0, 3.0, -4.0])
+def test_blocks_of_two_periods_are_good_from_the_third_on(bias: float) -> None:
+    """Both ways of the start are in the first block, and the second block leads to the reference."""
+    rate = 1000.0
+    r = pz.signals.triangle(1.0, 5.0, 8, rate).values + bias
+    _, true = in_blocks(pz.AdaptiveFeedforward(rate, limits=LIMITS), pz.SimulatedStage(rate, LOOP), r, 400)
+    assert last_error(r, true, r.size - 800) < 0.9
+
+
+def test_a_dead_sensor_and_long_blocks_do_not_lead_away() -> None:
+    """No way goes on before the one before it was judged, but in the first block."""
+    driver = pz.AdaptiveFeedforward(FS, limits=LIMITS)
+    r = np.zeros(1000)
+    for _ in range(20):
+        u = driver.run(r)
+        assert np.abs(u).max() < 40.0
+        driver.learn(u, r)
+    assert driver.status.fault == "no response"
+
+
 @pytest.mark.parametrize("amplitude", [0.1, 0.5, 5.0])
 def test_small_swings_are_learnt_as_soon_as_large_ones(amplitude: float) -> None:
     r = triangle(6, amplitude)
