@@ -86,7 +86,7 @@ def learn(state: Record, settings: Record, u: float, x: float) -> None:
 @compiled
 def run(state: Record, settings: Record, r: Vector, u: Vector) -> None:
     """Voltages `u` for a reference `r`, were each written as planned; for a copy of the state."""
-    state.start.ahead = 1.0 if len(r) > 1 else 0.0
+    state.start.ahead = len(r) - 1.0
     for k in range(len(r)):
         u[k] = plan(state, settings, r[k])
         take(state, settings, r[k], u[k], np.nan)

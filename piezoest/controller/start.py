@@ -45,9 +45,9 @@ START = record(
     first=numbers(FIRST, kind=MEASURED),
     # Whether the gain is the user's and not confirmed yet; readings in a row for it, all readings against it.
     given=FLAG, agreed=COUNT, doubted=COUNT,
-    # Whether the voltage is planned before its readings come; whether the user told the reading at rest;
-    # shortest first way, zero for the usual one [V].
-    ahead=FLAG, told=FLAG, least=AMOUNT,
+    # Samples of a block after the first, while it is planned before its readings come; whether the user told
+    # the reading at rest; shortest first way, zero for the usual one [V].
+    ahead=COUNT, told=FLAG, least=AMOUNT,
 )  # fmt: skip
 # First and longest way [V], samples of a way, of a window; the user's gain, zero for none.
 SETTINGS = record(way=FIXED, longest=FIXED, ramp=FIXED, window=FIXED, gain=FIXED)
@@ -155,6 +155,12 @@ def _settle_rest(start: Any, settings: Any, u: Any) -> None:
     # The farthest one may be wrong and does not count.
     start.noise = 0.6 * min(first[FIRST - 1] - first[1], first[FIRST - 2] - first[0])
     rest_at(start, settings, u, first[FIRST // 2], start.given * settings.start.gain)
+
+
+@register_jitable
+def blind(settings: Any) -> float:
+    """Samples of a way and of the rest after it, in a block that is planned before its readings come."""
+    return settings.start.ramp + BLIND * settings.start.window
 
 
 @register_jitable
@@ -308,8 +314,8 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
             _settle_rest(start, settings, u)
     elif start.stage == WAIT and start.ahead != 0.0:
         start.samples += 1.0
-        late = start.samples >= settings.start.ramp + BLIND * settings.start.window
-        if late and 0.0 < np.abs(start.way) <= max(settings.start.way, start.least):
+        first = 0.0 < np.abs(start.way) <= max(settings.start.way, start.least)
+        if first and start.samples >= blind(settings):
             _go_on(start, settings, u)
     elif start.stage == WAIT and known and 0.0 < (u - start.target) * np.sign(start.way) <= next_way:
         # The next way of a block began before the stage rested: both are one.

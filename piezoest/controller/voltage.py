@@ -8,6 +8,7 @@ from numba.extending import register_jitable
 from piezoest._checks import WILDEST
 from piezoest.controller import doubt, driving, faults, homing, redraw, slots
 from piezoest.controller import line as lines
+from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
 
 # The gain is sought; the voltage goes to where the reference needs it; all is learnt; hysteresis is erased.
@@ -20,6 +21,8 @@ RATE = 5.0
 # gain is confirmed FIRST_AHEAD times as far. A doubling takes LATE times the delay of the stage. A slow stage
 # is followed with this part of its speed.
 AHEAD, FIRST_AHEAD, LATE, FOLLOWED = 8.0, 2.0, 3.0, 0.8
+# In a long block that way is at once this part of the longest: like both ways of a start without a gain.
+AT_ONCE = 0.6
 # A written voltage that differs from the planned one by less than this fraction of the range is the planned
 # one: rounded by a converter, or measured by a monitor.
 OFF = 0.01
@@ -119,6 +122,8 @@ def plan(state: Any, settings: Any, r: Any) -> float:
         if state.start.given != 0.0:
             # The first way shows whether the gain is right.
             way = min(FIRST_AHEAD * state.confirmed, settings.start.longest)
+            if state.start.ahead > starts.blind(settings):
+                way = max(way, AT_ONCE * settings.start.longest)
             target = state.start.origin + np.sign(state.start.way) * way
         wanted = _nearer(state, settings, target)
     elif state.stage == HOME:

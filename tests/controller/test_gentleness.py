@@ -33,12 +33,14 @@ def test_the_start_does_not_jump(block: int) -> None:
     assert np.abs(np.diff(u)).max() < 0.4
 
 
+@pytest.mark.parametrize("gain", [None, 0.14])
 @pytest.mark.parametrize("bias", [0.0, 3.0, -4.0])
-def test_blocks_of_two_periods_are_good_from_the_third_on(bias: float) -> None:
+def test_blocks_of_two_periods_are_good_from_the_third_on(bias: float, gain: float | None) -> None:
     """Both ways of the start are in the first block, and the second block leads to the reference."""
     rate = 1000.0
     r = pz.signals.triangle(1.0, 5.0, 8, rate).values + bias
-    _, true = in_blocks(pz.AdaptiveFeedforward(rate, limits=LIMITS), pz.SimulatedStage(rate, LOOP), r, 400)
+    driver = pz.AdaptiveFeedforward(rate, limits=LIMITS, gain=gain)
+    _, true = in_blocks(driver, pz.SimulatedStage(rate, LOOP), r, 400)
     assert last_error(r, true, r.size - 800) < 0.9
 
 
