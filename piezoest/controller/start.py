@@ -280,6 +280,24 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
 
 
 @register_jitable
+def _wait(start: Any, settings: Any, u: Any, known: Any, middle: Any) -> None:
+    """Rest after a way until the stage rests; in a block that is being planned, for a while."""
+    beyond = (u - start.target) * np.sign(start.way)
+    if start.ahead != 0.0:
+        start.samples += 1.0
+        first = 0.0 < np.abs(start.way) <= max(settings.start.way, start.least)
+        if first and start.samples >= blind(settings):
+            _go_on(start, settings, u)
+    elif known and 0.0 < beyond <= LONGER * np.abs(start.way):
+        # The next way of a block began before the stage rested: both are one.
+        start.voltage = start.target = u
+        start.way = u - start.from_u
+        start.windows = start.sum = start.ramp = start.squares = start.summed = start.stuck = 0.0
+    elif start.stuck == 0.0 and _fills_window(start, settings, middle) and _rests(start, settings):
+        _judge(start, settings, u)
+
+
+@register_jitable
 def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
     """Take the reading at a voltage, NaN for none, and choose the next voltage."""
     known, middle = np.abs(x) < WILDEST, x
@@ -296,7 +314,6 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
         if start.stuck > STUCK * settings.start.window:
             start.stage, start.samples, start.stuck = SILENT, 0.0, 0.0
             start.tries += 1.0
-    next_way = LONGER * np.abs(start.way)
     if start.stage == GO:
         if start.stuck == 0.0:
             if known:
@@ -312,19 +329,8 @@ def learn(start: Any, settings: Any, u: Any, x: Any) -> None:
         start.samples += 1.0
         if start.samples >= FIRST:
             _settle_rest(start, settings, u)
-    elif start.stage == WAIT and start.ahead != 0.0:
-        start.samples += 1.0
-        first = 0.0 < np.abs(start.way) <= max(settings.start.way, start.least)
-        if first and start.samples >= blind(settings):
-            _go_on(start, settings, u)
-    elif start.stage == WAIT and known and 0.0 < (u - start.target) * np.sign(start.way) <= next_way:
-        # The next way of a block began before the stage rested: both are one.
-        start.voltage = start.target = u
-        start.way = u - start.from_u
-        start.windows = start.sum = start.ramp = start.squares = start.summed = start.stuck = 0.0
-    elif start.stage == WAIT and start.stuck == 0.0:
-        if _fills_window(start, settings, middle) and _rests(start, settings):
-            _judge(start, settings, u)
+    elif start.stage == WAIT:
+        _wait(start, settings, u, known, middle)
     elif start.stage == SILENT:
         start.samples += 1.0
         # Less and less often, because it moves the stage for nothing.
