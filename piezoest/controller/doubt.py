@@ -74,8 +74,6 @@ def widen(state: Any) -> None:
     if state.small == 0.0 or np.abs(reference.last - reference.turned) < OUTGROWN * longest:
         return
     state.small = 0.0
-    x = lines.at(line, state.u)
     if np.abs(line.gain) < np.abs(line.first_gain):
-        line.gain = line.first_gain
-        line.centre = x - line.gain * state.u
+        lines.tilt(line, line.first_gain, state.u)
         lines.forget_legs(line)

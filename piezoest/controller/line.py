@@ -219,14 +219,20 @@ def turn(line: Any, direction: Any, leg: Any) -> None:
 
 
 @register_jitable
+def tilt(line: Any, gain: Any, u: Any) -> None:
+    """Give the line another gain; its point at u stays."""
+    x = at(line, u)
+    line.gain = gain
+    line.centre = x - gain * u
+
+
+@register_jitable
 def steepen(line: Any, u: Any) -> None:
     """Let the line be as steep as the way to the reference or the recent legs, through its point at u."""
     steepest = max(np.abs(line.gain), np.abs(line.first_gain))
     if line.both.product * line.gain > 0.0 and explained(line.both) > SIGNED:
         steepest = max(steepest, spread(line.both))
-    x = at(line, u)
-    line.gain = np.sign(line.gain) * steepest
-    line.centre = x - line.gain * u
+    tilt(line, np.sign(line.gain) * steepest, u)
 
 
 @register_jitable

@@ -96,11 +96,18 @@ def farthest(start: Any) -> float:
 
 
 @register_jitable
+def _empty(start: Any) -> None:
+    """Begin a window."""
+    start.sum = start.ramp = start.squares = start.summed = 0.0
+
+
+@register_jitable
 def _go_to(start: Any, u: Any, target: Any) -> None:
     """Begin a way."""
     start.stage, start.samples = GO, 0.0
     start.from_u, start.target = u, target
-    start.sum = start.ramp = start.squares = start.summed = start.change = 0.0
+    start.change = 0.0
+    _empty(start)
     start.mean = start.mean_before = start.oldest_mean = start.from_x
 
 
@@ -202,7 +209,7 @@ def _fills_window(start: Any, settings: Any, x: Any) -> bool:
     start.now = 0.5 * (start.mean_before + start.mean)
     start.change = max(start.change, np.abs(start.mean - start.mean_before) / count)
     start.windows += 1.0
-    start.sum = start.ramp = start.squares = start.summed = 0.0
+    _empty(start)
     return True
 
 
@@ -292,7 +299,8 @@ def _wait(start: Any, settings: Any, u: Any, known: Any, middle: Any) -> None:
         # The next way of a block began before the stage rested: both are one.
         start.voltage = start.target = u
         start.way = u - start.from_u
-        start.windows = start.sum = start.ramp = start.squares = start.summed = start.stuck = 0.0
+        start.windows = start.stuck = 0.0
+        _empty(start)
     elif start.stuck == 0.0 and _fills_window(start, settings, middle) and _rests(start, settings):
         _judge(start, settings, u)
 
