@@ -166,7 +166,7 @@ def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any, told: Any) -> 
         # The rest of a block that was planned before the way began.
         return
     start.samples += 1.0
-    target = goal(state, r)
+    target = goal(state, settings, r)
     there = np.abs(target - u) <= NEAR * np.abs(u - start.origin) or is_held(settings, u, target - u)
     longest = LONGEST * max(settings.doubling, start.lag) + 2.0 * state.gap
     if start.fastest > 0.0:

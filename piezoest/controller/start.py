@@ -1,11 +1,12 @@
 """The start: the gain of an unknown stage, from its answers to small ways of the voltage.
 
 The first readings, at rest, show where the stage stands; one of them may be wrong. Then the voltage goes two
-per cent of its range and rests until the readings rest too. The gain is that between two rests, where neither
-delay nor lag counts. If the answer is not above noise and steps of the converter, the way is doubled. If it
-is clear but not sure, or slower than the voltage, a way twice as long checks it. If the two gains differ, as
-with backlash, the way is doubled again. A gain that the user knows is not sought. In a block that is planned
-before its readings come, the second way follows the first one after a while.
+per cent of its range and rests until the readings rest too, or only go to and fro, as with hum. The gain is
+that between two rests, where neither delay nor lag counts. If the answer is not above noise and steps of the
+converter, the way is doubled. If it is clear but not sure, or slower than the voltage, a way twice as long
+checks it. If the two gains differ, as with backlash, the way is doubled again. A gain that the user knows is
+not sought. In a block that is planned before its readings come, the second way follows the first one after a
+while.
 """
 
 from typing import Any
@@ -33,6 +34,8 @@ START = record(
     sum=NUMBER, ramp=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT,
     mean=MEASURED, mean_before=MEASURED, oldest_mean=MEASURED, now=MEASURED, windows=COUNT,
     before=MEASURED, last=MEASURED, step=AMOUNT,
+    # Where the means of the windows turned last, and how often at this rest.
+    turned=MEASURED, turns=COUNT,
     # Largest change between two windows [µm]; fastest change of the voltage that a slow stage follows [V],
     # zero for a fast stage; both per sample.
     change=AMOUNT, fastest=AMOUNT,
@@ -186,7 +189,7 @@ def _move(start: Any, settings: Any) -> None:
     share = start.samples / (longer * settings.start.ramp)
     start.voltage = smooth(start.from_u, start.target, share)
     if share >= 1.0:
-        start.stage, start.voltage, start.windows = WAIT, start.target, 0.0
+        start.stage, start.voltage, start.windows, start.turns = WAIT, start.target, 0.0, 0.0
 
 
 @register_jitable
@@ -228,6 +231,25 @@ def _rests(start: Any, settings: Any) -> bool:
     enough = MOST_SLEWING if slews else MOST_WINDOWS
     least = 1.0 if np.abs(start.now - start.from_x) > _clear(start, STEPS) else LATE
     return start.windows > least and ((still and not slews) or start.windows >= enough)
+
+
+@register_jitable
+def _swings(start: Any) -> bool:
+    """Whether the readings only go to and fro, as with hum: the stage then stands in the middle."""
+    before = start.turned
+    if (start.mean_before - start.oldest_mean) * (start.mean - start.mean_before) >= 0.0:
+        return False
+    start.turned = start.mean_before
+    start.turns += 1.0
+    middle = 0.5 * (before + start.turned)
+    # A stage that answers late may not have moved yet, or not much.
+    answer = np.abs(middle - start.from_x)
+    enough = 2.0 if answer > np.abs(start.turned - before) else 3.0
+    late = start.windows <= LATE and answer < SURE * _clear(start, STEPS)
+    if start.turns < enough or late:
+        return False
+    start.now = start.mean = middle
+    return True
 
 
 @register_jitable
@@ -299,9 +321,13 @@ def _wait(start: Any, settings: Any, u: Any, known: Any, middle: Any) -> None:
         # The next way of a block began before the stage rested: both are one.
         start.voltage = start.target = u
         start.way = u - start.from_u
-        start.windows = start.stuck = 0.0
+        start.windows = start.turns = start.stuck = 0.0
         _empty(start)
-    elif start.stuck == 0.0 and _fills_window(start, settings, middle) and _rests(start, settings):
+    elif (
+        start.stuck == 0.0
+        and _fills_window(start, settings, middle)
+        and (_rests(start, settings) or _swings(start))
+    ):
         _judge(start, settings, u)
 
 

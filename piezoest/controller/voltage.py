@@ -77,11 +77,11 @@ def _feed_forward(state: Any, settings: Any, r: Any, before: Any) -> float:
 
 
 @register_jitable
-def goal(state: Any, r: Any) -> float:
+def goal(state: Any, settings: Any, r: Any) -> float:
     """Voltage for a reference on the way to it."""
     start, confirmed = state.start, state.confirmed
     way = lines.voltage(state.line, r) - start.origin
-    if start.ahead != 0.0 and np.abs(way) > confirmed > 0.0:
+    if start.ahead > settings.start.ramp and np.abs(way) > confirmed > 0.0:
         # The gain grows with the way, as Rayleigh's law says, and no reading tells how far.
         way = np.sign(way) * confirmed * (np.abs(way) / confirmed) ** (1.0 / (1.0 + start.growth))
     return start.origin + way
@@ -118,7 +118,7 @@ def plan(state: Any, settings: Any, r: Any) -> float:
         wanted = state.start.voltage
     elif state.stage == APPROACH:
         # Without a reference the voltage stays.
-        target = goal(state, r) if state.asked != 0.0 else state.u
+        target = goal(state, settings, r) if state.asked != 0.0 else state.u
         if state.start.given != 0.0:
             # The first way shows whether the gain is right.
             way = min(FIRST_AHEAD * state.confirmed, settings.start.longest)
