@@ -196,6 +196,11 @@ FAST, SLOPE, SWEPT = 10_000.0, 0.06, 2.5
 UNIPOLAR, BIASED, BIPOLAR = (0.0, 150.0), (-20.0, 120.0), (-100.0, 100.0)
 
 
+def fifty_hertz(hum: float, phase: float) -> Callable[[int, float], float]:
+    """A sensor with hum of this amplitude [µm]."""
+    return lambda k, x: x + float(hum * np.sin(2.0 * np.pi * 50.0 * k / FAST + phase))
+
+
 def humming(limits: Any, width: float, hum: float) -> tuple[Any, float, Any]:
     """A controller behind a triangle on a stage with backlash and 50 Hz on its gauge.
 
@@ -205,17 +210,19 @@ def humming(limits: Any, width: float, hum: float) -> tuple[Any, float, Any]:
     bias = 0.7 * SLOPE * 0.5 * (limits[0] + limits[1])
     wave = pz.signals.triangle(SWEPT, 5.0, 14, FAST).values + bias
     r = np.concatenate((np.linspace(0.0, wave[0], 1000), wave))
-    seen = hum * np.sin(2.0 * np.pi * (50.0 * np.arange(r.size) / FAST + 1.0 / 3.0))
     play = backlash(width)
     stage = SimpleNamespace(step=lambda u: SLOPE * (play(u) / 0.15 + 0.05 * u) / 1.05)
-    run = shared.drive(driver, stage, r, lambda k, x: x + float(seen[k]))
+    run = shared.drive(driver, stage, r, fifty_hertz(hum, 2.0 * np.pi / 3.0))
     return driver, last_error(r, run.x, 2000), run.u
 
 
 @pytest.mark.parametrize(
     ("limits", "width", "hum"),
-    [(UNIPOLAR, 2.0, 0.1), (UNIPOLAR, 2.0, 0.2), (BIASED, 2.0, 0.1), (BIASED, 2.0, 0.2), (BIPOLAR, 3.0, 0.2)],
-)
+    [
+        (UNIPOLAR, 2.0, 0.1), (UNIPOLAR, 2.0, 0.2), (BIASED, 2.0, 0.1), (BIASED, 2.0, 0.2),
+        (BIPOLAR, 2.0, 0.2), (BIPOLAR, 3.0, 0.2),
+    ],
+)  # fmt: skip
 def test_a_gain_of_the_wrong_sign_is_doubted(limits: Any, width: float, hum: float) -> None:
     driver, error, u = humming(limits, width, hum)
     assert driver.model.line[0] == pytest.approx(SLOPE, rel=0.3)
@@ -227,6 +234,24 @@ def test_a_gain_of_the_wrong_sign_is_doubted(limits: Any, width: float, hum: flo
     later = u[int(FAST * doubted) + 10 :]
     assert np.all((later > limits[0]) & (later < limits[1]))
     assert not any(reason.startswith("out of reach") for reason in said)
+
+
+@pytest.mark.parametrize("limits", [UNIPOLAR, BIASED])
+def test_hum_as_large_as_the_answer_does_not_turn_the_sign(limits: Any) -> None:
+    driver, error, _ = humming(limits, 5.0, 0.2)
+    assert driver.model.line[0] == pytest.approx(SLOPE, rel=0.3)
+    assert error < 0.5 * SWEPT
+    assert driver.events == ()
+
+
+@pytest.mark.parametrize("phase", np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False))
+def test_the_start_does_not_wait_until_hum_rests(phase: float) -> None:
+    driver, hum = pz.AdaptiveFeedforward(FAST, limits=pz.VoltageLimits(-20.0, 100.0)), 0.2
+    r = pz.signals.sine(2.0, 20.0, 20, FAST).values
+    stage = SimpleNamespace(step=lambda u: 0.1 * u)  # moves 0.24 µm on the first way
+    _, x, doing = shared.drive(driver, stage, r, fifty_hertz(hum, phase))
+    assert doing.count("seeking") < 0.08 * FAST
+    assert last_error(r, x, 5000) < 1.5 * hum
 
 
 def test_an_event_tells_where_it_was_noticed_also_within_a_block() -> None:
