@@ -13,10 +13,11 @@ from piezoest.layout import MEASURED, numbers, record, whole
 
 # Samples that are remembered.
 MOST = 32
-# The last voltages and references, the place of the newest ones, and those that the present reading answers.
+# The last voltages and references, the place of the newest ones, and those that the present reading answers;
+# the voltage that the reading before answers, and so about the middle one of three.
 LATE = record(
     u=numbers(MOST, kind=MEASURED), r=numbers(MOST, kind=MEASURED), at=whole(0.0, MOST - 1.0),
-    answered=MEASURED, answered_r=MEASURED,
+    answered=MEASURED, answered_r=MEASURED, before=MEASURED,
 )  # fmt: skip
 
 
@@ -25,7 +26,7 @@ def rest(late: Any, u: Any, r: Any) -> None:
     """Stage and reference have rested for longer than any delay."""
     for i in range(MOST):
         late.u[i], late.r[i] = u, r
-    late.answered, late.answered_r = u, r
+    late.before, late.answered, late.answered_r = u, u, r
 
 
 @register_jitable
@@ -37,4 +38,5 @@ def remember(late: Any, start: Any, u: Any, r: Any) -> None:
     lag = int(min(start.lag, MOST - 1.0) + 0.5) if start.fastest == 0.0 else 0
     place = int(late.at) - lag
     place = place if place >= 0 else place + MOST
+    late.before = late.answered
     late.answered, late.answered_r = late.u[place], late.r[place]

@@ -133,7 +133,7 @@ def _refine(state: Any, settings: Any, u: Any, x: Any) -> float:
     """Draw the line again with a reading on the way to the reference; single wrong ones do not count."""
     start, line, recent = state.start, state.line, state.readings.recent
     x = reading.middle(state.readings, x)
-    lines.add(recent, u, x, settings.doubling)
+    lines.add(recent, state.late.before, x, settings.doubling)
     way = np.abs(u - start.origin)
     if start.given != 0.0:
         given.compare(state, settings)
@@ -168,6 +168,10 @@ def _arrive(state: Any, settings: Any, r: Any, u: Any, gone: Any, told: Any) -> 
     start.samples += 1.0
     target = goal(state, settings, r)
     there = np.abs(target - u) <= NEAR * np.abs(u - start.origin) or is_held(settings, u, target - u)
+    # A fast reference passes by: between two samples it goes farther than is near.
+    side, before = np.sign(target - u), start.side
+    start.side = side
+    there = there or side * before < 0.0
     longest = LONGEST * max(settings.doubling, start.lag) + 2.0 * state.gap
     if start.fastest > 0.0:
         longest += 2.0 * np.abs(target - start.origin) / start.fastest

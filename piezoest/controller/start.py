@@ -34,8 +34,8 @@ START = record(
     sum=NUMBER, ramp=NUMBER, squares=AMOUNT, summed=COUNT, scatter=AMOUNT,
     mean=MEASURED, mean_before=MEASURED, oldest_mean=MEASURED, now=MEASURED, windows=COUNT,
     before=MEASURED, last=MEASURED, step=AMOUNT,
-    # Where the means of the windows turned last, and how often at this rest.
-    turned=MEASURED, turns=COUNT,
+    # Where the means of the windows turned last, and how often at this rest; windows before the answer came.
+    turned=MEASURED, turns=COUNT, waited=COUNT,
     # Largest change between two windows [µm]; fastest change of the voltage that a slow stage follows [V],
     # zero for a fast stage; both per sample.
     change=AMOUNT, fastest=AMOUNT,
@@ -51,6 +51,8 @@ START = record(
     # Samples of a block after the first, while it is planned before its readings come; whether the user told
     # the reading at rest; shortest first way, zero for the usual one [V].
     ahead=COUNT, told=FLAG, least=AMOUNT,
+    # On which side of the voltage its goal is, on the way to the reference.
+    side=NUMBER,
 )  # fmt: skip
 # First and longest way [V], samples of a way, of a window; the user's gain, zero for none.
 SETTINGS = record(way=FIXED, longest=FIXED, ramp=FIXED, window=FIXED, gain=FIXED)
@@ -59,7 +61,8 @@ SETTINGS = record(way=FIXED, longest=FIXED, ramp=FIXED, window=FIXED, gain=FIXED
 # converter (fewer on the longest way); two answers are alike within this factor.
 CLEAR, SCATTERS, STEPS, FEW_STEPS, ALIKE = 6.0, 3.0, 10.0, 4.0, 1.6
 # An answer so many times as clear is sure without a check, if it rested within so many windows (hum rests
-# only for a moment) and the last two are this close together (a slow amplifier still moves).
+# only for a moment) and the last two are this close together (a slow amplifier still moves). On the very
+# first way the answer may begin late, by so many windows; later on it may be a sensor that had failed.
 SURE, AT_ONCE, CLOSE = 3.0, 4.0, 0.02
 # The voltage written is the planned one within this fraction of a way. If it is not, or without readings, the
 # start gives up after so many windows.
@@ -75,8 +78,9 @@ SLEWS, MOST_SLEWING = 0.7, 400.0
 # The way back goes too far by this part of the way, so that no hysteresis is left: one half for small loops,
 # whose branches are parabolas (Rayleigh).
 OVERSHOOT = 0.5
-# Windows before the ways are repeated, twice as many each time; at most so many doublings.
-PAUSE, LONGEST_PAUSE = 10.0, 8.0
+# Windows before the ways are repeated, twice as many each time; at most so many doublings. An odd number is
+# hardly ever a multiple of the period of hum, which would look the same at each try.
+PAUSE, LONGEST_PAUSE = 11.0, 8.0
 # In a block that is planned before its readings come, the second way begins after so many windows: else a
 # whole block would be lost.
 BLIND = 8.0
@@ -181,6 +185,12 @@ def smooth(from_u: Any, target: Any, share: Any) -> float:
 
 
 @register_jitable
+def _listen(start: Any) -> None:
+    """Begin to wait for an answer."""
+    start.windows = start.turns = start.waited = 0.0
+
+
+@register_jitable
 def _move(start: Any, settings: Any) -> None:
     """The next voltage of a way."""
     start.samples += 1.0
@@ -189,7 +199,8 @@ def _move(start: Any, settings: Any) -> None:
     share = start.samples / (longer * settings.start.ramp)
     start.voltage = smooth(start.from_u, start.target, share)
     if share >= 1.0:
-        start.stage, start.voltage, start.windows, start.turns = WAIT, start.target, 0.0, 0.0
+        start.stage, start.voltage = WAIT, start.target
+        _listen(start)
 
 
 @register_jitable
@@ -212,6 +223,8 @@ def _fills_window(start: Any, settings: Any, x: Any) -> bool:
     start.now = 0.5 * (start.mean_before + start.mean)
     start.change = max(start.change, np.abs(start.mean - start.mean_before) / count)
     start.windows += 1.0
+    if np.abs(start.mean - start.from_x) <= _clear(start, STEPS):
+        start.waited = start.windows
     _empty(start)
     return True
 
@@ -259,6 +272,13 @@ def _clear(start: Any, steps: Any) -> float:
 
 
 @register_jitable
+def _late(start: Any, settings: Any) -> float:
+    """Windows by which an answer may be late and sure."""
+    first = np.abs(start.way) <= max(settings.start.way, start.least) and start.tries == 0.0
+    return min(start.waited, AT_ONCE) if first else 0.0
+
+
+@register_jitable
 def growth(ratio: Any, longer: Any) -> float:
     """The power of the way that a gain grows with; `ratio` of gains and `longer` of ways."""
     return min(np.log(max(ratio, 1.0)) / np.log(longer), MOST_GROWTH)
@@ -281,7 +301,8 @@ def _judge(start: Any, settings: Any, u: Any) -> None:
     longest = np.abs(start.way) >= settings.start.longest or dead
     bound = _clear(start, FEW_STEPS if longest else STEPS)
     clear = u != start.from_u and np.abs(answer) > bound
-    rests = start.windows <= AT_ONCE and np.abs(start.mean - start.now) < CLOSE * np.abs(answer)
+    at_once = start.windows - _late(start, settings) <= AT_ONCE
+    rests = at_once and np.abs(start.mean - start.now) < CLOSE * np.abs(answer)
     # An answer slower than the voltage may not be complete yet: a slow amplifier, or a lag.
     change = start.change / np.abs(start.gain) if start.gain != 0.0 else 0.0
     start.fastest = change if change < SLOW * np.abs(u - start.from_u) / settings.start.ramp else 0.0
@@ -321,7 +342,8 @@ def _wait(start: Any, settings: Any, u: Any, known: Any, middle: Any) -> None:
         # The next way of a block began before the stage rested: both are one.
         start.voltage = start.target = u
         start.way = u - start.from_u
-        start.windows = start.turns = start.stuck = 0.0
+        start.stuck = 0.0
+        _listen(start)
         _empty(start)
     elif (
         start.stuck == 0.0

@@ -6,7 +6,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from piezoest._checks import WILDEST
-from piezoest.controller import doubt, driving, faults, homing, redraw, slots
+from piezoest.controller import doubt, driving, faults, homing, late, redraw, slots
 from piezoest.controller import line as lines
 from piezoest.controller import start as starts
 from piezoest.controller import travel as travels
@@ -18,9 +18,10 @@ WIDER = 2.0
 # The voltage of a model moves at most so many times as fast as that of the line.
 RATE = 5.0
 # On the way to the reference the voltage goes at most so many times as far as was answered, before a user's
-# gain is confirmed FIRST_AHEAD times as far. A doubling takes LATE times the delay of the stage. A slow stage
-# is followed with this part of its speed.
-AHEAD, FIRST_AHEAD, LATE, FOLLOWED = 8.0, 2.0, 3.0, 0.8
+# gain is confirmed FIRST_AHEAD times as far. On new ground a doubling takes LATE times the delay of the
+# stage, TOO_LATE times one that is longer than voltages are remembered. A slow stage is followed with this
+# part of its speed.
+AHEAD, FIRST_AHEAD, LATE, TOO_LATE, FOLLOWED = 8.0, 2.0, 2.0, 3.0, 0.8
 # In a long block that way is at once this part of the longest: like both ways of a start without a gain.
 AT_ONCE = 0.6
 # A written voltage that differs from the planned one by less than this fraction of the range is the planned
@@ -93,7 +94,10 @@ def _nearer(state: Any, settings: Any, target: Any) -> float:
     # Where the stage has answered it is fast: else it would never reach a reference that goes to and fro.
     start = state.start
     span = max(np.abs(state.u - start.origin), state.confirmed)
-    doubling = max(settings.doubling, LATE * start.lag, state.gap)
+    doubling = max(settings.doubling, state.gap)
+    if np.abs(target - start.origin) > state.confirmed:
+        # The readings must tell in time how far the stage goes.
+        doubling = max(doubling, (LATE if start.lag < late.MOST else TOO_LATE) * start.lag)
     end = start.origin + AHEAD * np.sign(target - start.origin) * state.confirmed
     left = target - state.u
     if np.abs(target - start.origin) > np.abs(end - start.origin):

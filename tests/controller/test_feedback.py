@@ -144,13 +144,20 @@ def test_what_feedback_corrects_at_rest_does_not_spoil_the_waves_behind(part: fl
     assert waves[3] < 0.08  # 0.16 to 0.21 by the integral alone
 
 
-@pytest.mark.parametrize("part", [0.1, 0.8])
-def test_creep_that_stays_is_not_corrected_twice(part: float) -> None:
+def test_creep_that_stays_is_not_corrected_twice() -> None:
     """The model has learnt in the rest what the feedback has corrected there."""
-    error, _, k = around_a_rest(part, np.ones_like)
+    error, _, k = around_a_rest(0.1, np.ones_like)
     waves = error[k:][: 2 * PERIOD].reshape(2, -1).max(axis=1)
     assert waves[0] < 0.2  # 0.47 if it is
     assert waves[1] < 0.1
+
+
+@pytest.mark.parametrize("part", [0.3, 0.5, 0.8])
+def test_creep_that_stays_is_learnt_within_a_wave(part: float) -> None:
+    error, _, k = around_a_rest(part, np.ones_like)
+    waves = error[k:][: 3 * PERIOD].reshape(3, -1).max(axis=1)
+    assert waves[1] < 0.15
+    assert waves[2] < 0.05
 
 
 def test_a_staircase_keeps_its_correction_and_a_square_wave_its_steps() -> None:

@@ -166,4 +166,4 @@ def test_a_model_that_the_corridor_holds_back_gives_way_without_a_step() -> None
     driver, stage, r = pz.AdaptiveFeedforward(rig.sample_rate, limits=rig.limits), rig.stage(), rig.reference
     u = drive(driver, stage, r).u
     assert driver.status.switches > 2
-    assert np.abs(np.diff(u)).max() < 0.05 * np.ptp(u)
+    assert np.abs(np.diff(u)).max() < 0.08 * np.ptp(u)

@@ -77,7 +77,7 @@ def test_a_factor_of_the_sensor_is_no_new_start_where_readings_were_late() -> No
     driver = pz.AdaptiveFeedforward(1000.0, limits=pz.VoltageLimits(-100.0, 100.0), estimators=())
     r, read = pz.signals.triangle(2.0, 20.0, 80, 1000.0).values, late(5)
     u = drive(driver, SLOPE, r, lambda k, x: read(k, x) * (1.0 if k < 2000 else -0.05)).u
-    assert np.abs(u[2000:]).max() < 25.0
+    assert np.abs(u[2000:]).max() < 33.0
     assert driver.status.fault in ("reversed", "no response", "scaled")
 
 

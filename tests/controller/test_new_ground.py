@@ -49,6 +49,26 @@ def test_a_reference_that_is_faster_than_the_start_is_caught() -> None:
     assert np.abs(run.u).max() < 140.0
 
 
+@pytest.mark.parametrize(("samples", "frequency", "soon"), [(5, 30.0, 80), (10, 20.0, 120), (10, 40.0, 120)])
+def test_a_fast_reference_is_caught_with_late_readings(samples: int, frequency: float, soon: int) -> None:
+    """The gain on the way there is that of the voltage that late readings answer."""
+    r = 3.0 + pz.signals.sine(4.0, frequency, 40, 1000.0).values
+    driver = pz.AdaptiveFeedforward(1000.0, limits=LIMITS, estimators=())
+    run = drive(driver, Plays(1.0), r, late(samples))
+    assert run.doing.index("running") < soon
+    # The gain is 0.1 µm/V, and the first wave already misses little.
+    assert np.abs(r - run.x)[soon : soon + 100].max() < 1.0
+
+
+@pytest.mark.parametrize("asleep", range(90, 130, 4))
+def test_a_sensor_that_wakes_up_is_no_late_answer(asleep: int) -> None:
+    """What it says when it wakes up is no answer to the way just gone: a second way asks again."""
+    driver = pz.AdaptiveFeedforward(1000.0, limits=LIMITS, estimators=())
+    r = pz.signals.sine(4.0, 5.0, 20, 1000.0).values
+    drive(driver, Plays(1.0), r, lambda k, x: x + 5.0 if k >= asleep else 0.0)
+    assert driver.state["line"]["gain"] == pytest.approx(0.1, rel=0.05)
+
+
 class Changing(Plays):
     """A stage whose gain changes by a factor after so many samples."""
 

@@ -32,10 +32,9 @@ def test_what_hysteresis_leaves_of_a_wide_way_does_not_refute_the_start(seed: in
     assert "false start" not in [event.name for event in controller.events]
 
 
-def test_a_new_start_waits_until_a_slow_amplifier_is_there() -> None:
+def test_a_start_waits_until_a_slow_amplifier_is_there() -> None:
     """500 V/s: while it came down from a limit, the gain was found with the wrong sign, for ever."""
-    rig, controller, run = driven(22688)
-    assert "false start" in [event.name for event in controller.events]
+    rig, _, run = driven(22688)
     assert largest(rig, run, 4.0, 5.5) < 0.1
 
 
