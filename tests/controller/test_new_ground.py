@@ -60,15 +60,6 @@ def test_a_fast_reference_is_caught_with_late_readings(samples: int, frequency: 
     assert np.abs(r - run.x)[soon : soon + 100].max() < 1.0
 
 
-@pytest.mark.parametrize("asleep", range(90, 130, 4))
-def test_a_sensor_that_wakes_up_is_no_late_answer(asleep: int) -> None:
-    """What it says when it wakes up is no answer to the way just gone: a second way asks again."""
-    driver = pz.AdaptiveFeedforward(1000.0, limits=LIMITS, estimators=())
-    r = pz.signals.sine(4.0, 5.0, 20, 1000.0).values
-    drive(driver, Plays(1.0), r, lambda k, x: x + 5.0 if k >= asleep else 0.0)
-    assert driver.state["line"]["gain"] == pytest.approx(0.1, rel=0.05)
-
-
 class Changing(Plays):
     """A stage whose gain changes by a factor after so many samples."""
 

@@ -38,6 +38,12 @@ def test_a_start_waits_until_a_slow_amplifier_is_there() -> None:
     assert largest(rig, run, 4.0, 5.5) < 0.1
 
 
+def test_a_sensor_that_recovers_is_no_late_answer() -> None:
+    """It comes back a while after a way of the start: the gain was -0.72 instead of 0.26 µm/V."""
+    rig, _, run = driven(20862)
+    assert largest(rig, run, 0.29, 1.2) < 0.02
+
+
 def test_a_gain_from_a_dead_zone_is_left_behind_on_the_first_long_leg() -> None:
     """A twentieth of the true gain: later the voltage went from one limit to the other again and again."""
     rig, _, run = driven(26402)
